@@ -55,7 +55,8 @@ module nocdyn_forced_response
   !> Work space of one thread.
   type :: work_t
     type(band_work_t) :: band
-    complex(wp), allocatable :: stiffness(:), moment(:)   !! [elements]
+    complex(wp), allocatable :: stiffness(:)    !! [elements]
+    complex(wp), allocatable :: moment(:, :)    !! [elements, lines]
   end type work_t
 
 contains
@@ -142,7 +143,7 @@ contains
 
     !$omp parallel private(work)
     work%band = new_band_work(self%matrix)
-    allocate (work%stiffness(size(self%loss_factor)), work%moment(size(self%loss_factor)))
+    allocate (work%stiffness(size(self%loss_factor)), work%moment(size(self%loss_factor), size(self%lines)))
     !$omp do schedule(dynamic, 4)
     do i = 1, size(points)
       call solve_point(self, points(i), work)
@@ -175,7 +176,7 @@ contains
     type(work_t), intent(inout) :: work
     integer :: l, q
 
-    associate (lines => size(self%lines), quantities => size(self%quantities), mean => point%state%mean)
+    associate (lines => size(self%lines), quantities => size(self%quantities))
       allocate (point%frequency(lines))
       do l = 1, lines
         point%frequency(l) = point%sources(self%lines(l)%source(1))%frequency
@@ -188,13 +189,38 @@ contains
         call solve_line(self, l, point, work)
       end do
       do q = 1, quantities
-        associate (one => self%quantities(q))
-          point%mean(q) = sum(one%weight * mean(one%element)) + one%by_held_torque * point%state%torque
-        end associate
-        call self%synthesis%extremes(point%quantity(:, q), point%lowest(q), point%highest(q))
+        call find_quantity(self, q, point, work)
       end do
     end associate
   end subroutine solve_point
+
+  !> One quantity of all lines, and its synthesis. If it has several points, they are those of the point with the largest half
+  !> range.
+  pure subroutine find_quantity(self, q, point, work)
+    type(forced_response_t), intent(in) :: self
+    integer, intent(in) :: q
+    type(response_point_t), intent(inout) :: point
+    type(work_t), intent(in) :: work
+    complex(wp) :: amplitude(size(self%lines))
+    real(wp) :: highest, lowest
+    integer :: l, p
+
+    associate (one => self%quantities(q))
+      do p = 1, size(one%weight, 1)
+        do l = 1, size(amplitude)
+          amplitude(l) = one%total(p, work%moment(:, l))
+        end do
+        call self%synthesis%extremes(amplitude, lowest, highest)
+        if (p > 1) then
+          if (highest - lowest <= point%highest(q) - point%lowest(q)) cycle
+        end if
+        point%quantity(:, q) = amplitude
+        point%lowest(q) = lowest
+        point%highest(q) = highest
+        point%mean(q) = sum(one%weight(p, :) * point%state%mean(one%element)) + one%by_held_torque * point%state%torque
+      end do
+    end associate
+  end subroutine find_quantity
 
   !> Moments, angles and heat of one line.
   pure subroutine solve_line(self, l, point, work)
@@ -204,7 +230,7 @@ contains
     type(work_t), intent(inout) :: work
     real(wp), parameter :: beside = 1.0e-9_wp   ! an undamped resonance, where there is no response
     complex(wp) :: twist
-    integer :: e, i, q
+    integer :: e, i
     logical :: singular
 
     associate (frequency => point%frequency(l), sources => point%sources, line => self%lines(l))
@@ -220,16 +246,13 @@ contains
       call self%matrix%solve(work%band)
       do e = 1, size(work%stiffness)
         twist = self%matrix%twist(e, work%band)
-        work%moment(e) = -work%stiffness(e) * twist
+        work%moment(e, l) = -work%stiffness(e) * twist
         point%heat(e) = point%heat(e) + 0.5_wp * frequency * aimag(work%stiffness(e)) * (real(twist, wp)**2 + aimag(twist)**2)
       end do
       do i = 1, size(line%source)
         associate (source => sources(line%source(i)))
-          work%moment(source%element) = work%moment(source%element) + source%moment
+          work%moment(source%element, l) = work%moment(source%element, l) + source%moment
         end associate
-      end do
-      do q = 1, size(self%quantities)
-        point%quantity(l, q) = self%quantities(q)%total(work%moment)
       end do
       call set_angles(self, work, point%angle(l, :))
     end associate

@@ -11,59 +11,59 @@ module nocdyn_response_quantities
 
   public :: list_quantities
 
-  integer, parameter, public :: quantity_moment = 1     !! of a coupling, elastic and damping moment together, on its first body
-  integer, parameter, public :: quantity_reaction = 2   !! of a constraint row
+  integer, parameter, public :: quantity_moment = 1     !! of a coupling, with damping, on its first body; force of a mesh
+  integer, parameter, public :: quantity_stress = 2     !! shear stress that this moment causes
+  integer, parameter, public :: quantity_reaction = 3   !! of a constraint row
 
   !> A sum of moments of elements.
   type, public :: response_quantity_t
     integer :: kind = quantity_moment
     character(len=:), allocatable :: name          !! of the coupling or gear
     character(len=:), allocatable :: label         !! of its column, without unit
-    character(len=:), allocatable :: unit          !! 'N m' or 'N'
+    character(len=:), allocatable :: unit          !! 'N m', 'Pa' or 'N'
     integer, allocatable :: element(:)             !! [terms]
-    real(wp), allocatable :: weight(:)             !! [terms]
+    real(wp), allocatable :: weight(:, :)          !! [points, terms]: of several points, that with the largest half range counts
     real(wp) :: by_held_torque = 0.0_wp            !! per torque on the reference body that holds the speed
-    real(wp) :: section_modulus = 0.0_wp           !! stress = moment / section_modulus [m3]; 0: unknown
   contains
     procedure :: total
   end type response_quantity_t
 
+  !> Quantities that are appended one by one.
+  type :: quantity_list_t
+    integer :: count = 0
+    type(response_quantity_t), allocatable :: list(:)
+  contains
+    procedure :: add
+  end type quantity_list_t
+
 contains
 
-  !> All quantities of a machine: couplings in the order of the input, then constraint rows.
+  !> All quantities of a machine: the moment, and where a section modulus is known the stress, of each coupling in the order of
+  !> the input; then constraint rows.
   subroutine list_quantities(machine, reference, quantities)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: reference   !! body on which a torque holds the speed
     type(response_quantity_t), allocatable, intent(out) :: quantities(:)
-    type(response_quantity_t) :: one
-    integer :: b, e, modulus, n
+    type(quantity_list_t) :: list
+    integer :: b, e, r
 
-    n = 0
-    allocate (quantities(count_of(machine)))
     do b = 1, size(machine%banks)
       associate (bank => machine%banks(b)%bank)
         if (bank%role /= role_coupling) cycle
         if (bank%has_parts) then
-          call list_shafts(bank, n, quantities)
+          call add_shafts(bank, list)
           cycle
         end if
         do e = 1, bank%count
-          n = n + 1
-          call set_quantity(quantity_moment, bank%names(e)%text, 'moment_', 'N m', one)
-          one%element = [bank%first + e - 1]
-          one%weight = [-1.0_wp]
-          if (is_mesh(bank)) then
-            call set_quantity(quantity_moment, bank%names(e)%text, 'force_', 'N', one)
-            one%element = [bank%first + e - 1]
-            one%weight = [1.0_wp]
-          end if
-          modulus = bank%number_of('section_modulus')
-          if (modulus > 0) one%section_modulus = bank%parameters(modulus)%value(1, e)
-          quantities(n) = one
+          call add_coupling(bank, e, list)
         end do
       end associate
     end do
-    call list_reactions(machine, reference, quantities(n + 1:))
+    allocate (quantities(list%count + machine%constraints%rows()))
+    do r = 1, list%count
+      quantities(r) = list%list(r)
+    end do
+    call list_reactions(machine, reference, quantities(list%count + 1:))
   end subroutine list_quantities
 
   !> Whether the elements of a bank are meshes of teeth.
@@ -77,56 +77,90 @@ contains
     end select
   end function is_mesh
 
-  !> The moments at both ends of every shaft.
-  subroutine list_shafts(bank, n, quantities)
+  !> The moment of a coupling and its stress, or the force of a mesh.
+  subroutine add_coupling(bank, e, list)
     class(bank_t), intent(in) :: bank
-    integer, intent(inout) :: n   !! number of the last quantity
-    type(response_quantity_t), intent(inout) :: quantities(:)
+    integer, intent(in) :: e   !! numbered within the bank
+    type(quantity_list_t), intent(inout) :: list
+    integer :: modulus
+
+    if (is_mesh(bank)) then
+      call list%add(quantity_moment, bank%names(e)%text, 'force_' // bank%names(e)%text, 'N')
+    else
+      call list%add(quantity_moment, bank%names(e)%text, 'moment_' // bank%names(e)%text, 'N m')
+    end if
+    list%list(list%count)%element = [bank%first + e - 1]
+    list%list(list%count)%weight = reshape([merge(1.0_wp, -1.0_wp, is_mesh(bank))], [1, 1])
+    modulus = bank%number_of('section_modulus')
+    if (modulus == 0) return
+    associate (value => bank%parameters(modulus)%value(1, e))
+      if (.not. value > 0) return
+      call list%add(quantity_stress, bank%names(e)%text, 'stress_' // bank%names(e)%text, 'Pa')
+      list%list(list%count)%element = [bank%first + e - 1]
+      list%list(list%count)%weight = reshape([-1.0_wp / value], [1, 1])
+    end associate
+  end subroutine add_coupling
+
+  !> The moments at both ends of each shaft, and its largest stress.
+  subroutine add_shafts(bank, list)
+    class(bank_t), intent(in) :: bank
+    type(quantity_list_t), intent(inout) :: list
     real(wp), allocatable :: modulus(:)
-    integer :: e, s, side
+    integer :: end, k, s
 
     select type (bank)
     type is (shafts_t)
       do s = 1, size(bank%shafts)
-        allocate (modulus, source=bank%section_moduli(s, 1))
-        associate (shaft => bank%shafts(s))
-          do side = 1, 2
-            n = n + 1
-            call set_quantity(quantity_moment, bank%names(shaft%first)%text, 'moment_', 'N m', quantities(n))
-            quantities(n)%label = quantities(n)%label // merge('_1', '_2', side == 1)
-            quantities(n)%element = [(bank%first + e - 1, e=shaft%first, shaft%last)]
-            quantities(n)%weight = -shaft%moments(merge(1, size(modulus), side == 1), :)
-            quantities(n)%section_modulus = modulus(merge(1, size(modulus), side == 1))
+        modulus = bank%section_moduli(s, 1)
+        associate (shaft => bank%shafts(s), name => bank%names(bank%shafts(s)%first)%text)
+          do end = 1, 3
+            if (end == 1) call list%add(quantity_moment, name, 'moment_' // name // '_1', 'N m')
+            if (end == 2) call list%add(quantity_moment, name, 'moment_' // name // '_2', 'N m')
+            if (end == 3) call list%add(quantity_stress, name, 'stress_' // name, 'Pa')
+            associate (one => list%list(list%count))
+              one%element = [(bank%first + k - 1, k=shaft%first, shaft%last)]
+              if (end == 1) one%weight = -shaft%moments(:1, :)
+              if (end == 2) one%weight = -shaft%moments(size(modulus):, :)
+              if (end == 3) one%weight = -shaft%moments / spread(modulus, 2, size(one%element))
+            end associate
           end do
         end associate
-        deallocate (modulus)
       end do
     end select
-  end subroutine list_shafts
+  end subroutine add_shafts
+
+  !> Appends a quantity without terms.
+  subroutine add(self, kind, name, label, unit)
+    class(quantity_list_t), intent(inout) :: self
+    integer, intent(in) :: kind   !! quantity_...
+    character(len=*), intent(in) :: name, label, unit
+    type(response_quantity_t), allocatable :: longer(:)
+    integer :: i
+
+    if (.not. allocated(self%list)) allocate (self%list(8))
+    if (self%count == size(self%list)) then
+      allocate (longer(2 * self%count))
+      do i = 1, self%count
+        longer(i) = self%list(i)
+      end do
+      call move_alloc(longer, self%list)
+    end if
+    self%count = self%count + 1
+    call set_quantity(kind, name, label, unit, self%list(self%count))
+  end subroutine add
 
   !> A quantity without terms. (gfortran 12 loses texts of a structure constructor.)
-  subroutine set_quantity(kind, name, prefix, unit, quantity)
+  subroutine set_quantity(kind, name, label, unit, quantity)
     integer, intent(in) :: kind   !! quantity_...
-    character(len=*), intent(in) :: name, prefix, unit
+    character(len=*), intent(in) :: name, label, unit
     type(response_quantity_t), intent(out) :: quantity
 
     quantity%kind = kind
     quantity%name = name
-    quantity%label = prefix // name
+    quantity%label = label
     quantity%unit = unit
-    allocate (quantity%element(0), quantity%weight(0))
+    allocate (quantity%element(0), quantity%weight(1, 0))
   end subroutine set_quantity
-
-  pure integer function count_of(machine)
-    type(machine_t), intent(in) :: machine
-    integer :: b
-
-    count_of = machine%constraints%rows()
-    do b = 1, size(machine%banks)
-      if (machine%banks(b)%bank%role == role_coupling) count_of = count_of + machine%banks(b)%bank%named_count() &
-                                                             * merge(2, 1, machine%banks(b)%bank%has_parts)
-    end do
-  end function count_of
 
   !> The reactions, which are linear in the moments of the elements.
   subroutine list_reactions(machine, reference, quantities)
@@ -140,8 +174,8 @@ contains
     if (size(quantities) == 0) return
     coordinates = machine%coordinates
     do r = 1, size(quantities)
-      call set_quantity(quantity_reaction, machine%constraints%names(r)%text, 'reaction_', machine%constraints%units(r)%text, &
-                        quantities(r))
+      call set_quantity(quantity_reaction, machine%constraints%names(r)%text, 'reaction_' // machine%constraints%names(r)%text, &
+                        machine%constraints%units(r)%text, quantities(r))
     end do
     do e = 1, machine%elements%count
       torque = 0.0_wp
@@ -150,7 +184,7 @@ contains
       do r = 1, size(quantities)
         if (.not. abs(lambda(r)) > 0) cycle
         quantities(r)%element = [quantities(r)%element, e]
-        quantities(r)%weight = [quantities(r)%weight, lambda(r)]
+        quantities(r)%weight = reshape([quantities(r)%weight, lambda(r)], [1, size(quantities(r)%element)])
       end do
     end do
     torque = 0.0_wp
@@ -159,12 +193,17 @@ contains
     quantities%by_held_torque = lambda
   end subroutine list_reactions
 
-  !> The quantity of complex moments of the elements.
-  pure complex(wp) function total(self, moment)
+  !> The quantity at one of its points, of complex moments of the elements.
+  pure complex(wp) function total(self, point, moment)
     class(response_quantity_t), intent(in) :: self
+    integer, intent(in) :: point
     complex(wp), intent(in) :: moment(:)   !! [N m], [elements]
+    integer :: k
 
-    total = sum(self%weight * moment(self%element))
+    total = (0.0_wp, 0.0_wp)
+    do k = 1, size(self%element)
+      total = total + self%weight(point, k) * moment(self%element(k))
+    end do
   end function total
 
 end module nocdyn_response_quantities

@@ -2,7 +2,7 @@
 !>
 !> Limits of half ranges and stresses are those of a steady oscillation; `nocdyn response` compares with them.
 module nocdyn_run_limits
-  use nocdyn_input, only: input_t
+  use nocdyn_input, only: group_t, input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: rounded_text, string_t
@@ -13,8 +13,8 @@ module nocdyn_run_limits
 
   !> A limit and the largest magnitude of its column.
   type, public :: run_limit_t
-    character(len=:), allocatable :: coupling, column
-    real(wp) :: limit = 0.0_wp, largest = 0.0_wp   !! [N m]
+    character(len=:), allocatable :: name, column   !! of the coupling or shaft; of the results
+    real(wp) :: limit = 0.0_wp, largest = 0.0_wp   !! [N m], or [N] of a mesh
   end type run_limit_t
 
 contains
@@ -29,16 +29,25 @@ contains
     integer :: column, i, n
 
     allocate (groups, source=input%groups_named('limit'))
-    allocate (limits(count([(input%groups(groups(i))%has_value('moment'), i=1, size(groups))])))
+    allocate (limits(count([(has_peak(input%groups(groups(i))), i=1, size(groups))])))
     n = 0
     do i = 1, size(groups)
       associate (group => input%groups(groups(i)))
-        if (.not. group%has_value('moment')) cycle
+        if (.not. has_peak(group)) cycle
         n = n + 1
-        limits(n)%coupling = group%text('coupling')
-        limits(n)%limit = group%number('moment')
-        column = column_of(labels, 'shaft_' // limits(n)%coupling // ' [N m]')   ! with damping
-        if (column == 0) column = column_of(labels, 'moment_' // limits(n)%coupling // ' [N m]')
+        if (group%has_value('mesh')) then
+          limits(n)%name = group%text('mesh')
+          column = column_of(labels, 'force_' // limits(n)%name // ' [N]')
+        else if (group%has_value('shaft')) then
+          limits(n)%name = group%text('shaft')
+          column = column_of(labels, 'moment_' // limits(n)%name // '_max [N m]')
+        else
+          limits(n)%name = group%text('coupling')
+          column = column_of(labels, 'shaft_' // limits(n)%name // ' [N m]')   ! with damping
+          if (column == 0) column = column_of(labels, 'moment_' // limits(n)%name // ' [N m]')
+        end if
+        limits(n)%limit = group%number('moment', absent=0.0_wp)
+        if (group%has_value('mesh')) limits(n)%limit = group%number('force')
         limits(n)%column = ''
         if (column == 0) cycle
         limits(n)%column = labels(column)%text
@@ -46,6 +55,13 @@ contains
       end associate
     end do
   end subroutine check_run_limits
+
+  !> Whether a group limits a peak.
+  pure logical function has_peak(group)
+    type(group_t), intent(in) :: group
+
+    has_peak = group%has_value('moment') .or. group%has_value('force')
+  end function has_peak
 
   pure integer function column_of(labels, label) result(column)
     type(string_t), intent(in) :: labels(:)
@@ -67,10 +83,10 @@ contains
     call json%open_list('limits')
     do i = 1, size(limits)
       call json%open()
-      call json%put('coupling', limits(i)%coupling)
+      call json%put('name', limits(i)%name)
       call json%put('column', limits(i)%column)
-      call json%put('moment_N_m', limits(i)%limit)
-      call json%put('largest_N_m', limits(i)%largest)
+      call json%put('limit', limits(i)%limit)
+      call json%put('largest', limits(i)%largest)
       call json%put('ratio', limits(i)%largest / limits(i)%limit)
       call json%close()
     end do

@@ -10,7 +10,7 @@ module nocdyn_response_files
   use nocdyn_output_units, only: turn_labels
   use nocdyn_response_analysis, only: response_analysis_t
   use nocdyn_response_limits, only: no_limit, response_limit_t
-  use nocdyn_response_quantities, only: quantity_moment
+  use nocdyn_response_quantities, only: quantity_moment, response_quantity_t
   use nocdyn_response_summary, only: critical_t, response_summary_t, worst_ratio
   use nocdyn_text, only: string_t
   use nocdyn_units, only: from_si
@@ -59,8 +59,7 @@ contains
           call list%add('mean_' // one%label // ' [' // one%unit // ']')
           call list%add('half_range_' // one%label // ' [' // one%unit // ']')
           call list%add('peak_' // one%label // ' [' // one%unit // ']')
-          if (one%section_modulus > 0) call list%add('half_range_stress_' // element_of(one%label) // ' [Pa]')
-          if (one%kind == quantity_moment) call list%add('heat_' // element_of(one%label) // ' [W]')
+          if (has_heat(quantities, q)) call list%add('heat_' // one%name // ' [W]')
           if (any(analysis%limits%quantity == q)) call list%add('ratio_' // one%label // ' [1]')
         end associate
       end do
@@ -78,13 +77,15 @@ contains
     call list%take(labels)
   end subroutine list_labels
 
-  !> A label without the word for the quantity before it: 'tail_2' of 'moment_tail_2'.
-  pure function element_of(label) result(name)
-    character(len=*), intent(in) :: label
-    character(len=:), allocatable :: name
+  !> Whether the heat of a coupling stands beside a quantity: its moment, of a shaft that at the first end.
+  pure logical function has_heat(quantities, q)
+    type(response_quantity_t), intent(in) :: quantities(:)
+    integer, intent(in) :: q
 
-    name = label(index(label, '_') + 1:)
-  end function element_of
+    has_heat = quantities(q)%kind == quantity_moment
+    if (has_heat .and. q > 1) has_heat = .not. (quantities(q - 1)%kind == quantity_moment .and. &
+                                               quantities(q - 1)%name == quantities(q)%name)
+  end function has_heat
 
   !> Whether some limit of a quantity bounds its half range.
   logical function has_continuous(analysis, label)
@@ -133,8 +134,7 @@ contains
       do q = 1, size(quantities)
         row(n + 1:n + 3) = [point%mean(q), point%half_range(q), point%peak(q)]
         n = n + 3
-        if (quantities(q)%section_modulus > 0) call put(point%half_range(q) / quantities(q)%section_modulus)
-        if (quantities(q)%kind == quantity_moment) call put(sum(point%heat(quantities(q)%element)))
+        if (has_heat(quantities, q)) call put(sum(point%heat(quantities(q)%element)))
         if (any(limits%quantity == q)) call put(worst_ratio(limits, point, q))
       end do
       do k = 1, size(limits)
@@ -246,7 +246,13 @@ contains
       call json%put('operating_rad_s', analysis%settings%operating)
       call json%put('margin', analysis%settings%margin)
     end if
-    call json%put('orders', [(analysis%response%lines(i)%order, i=1, size(analysis%response%lines))])
+    call json%open_list('lines')
+    do i = 1, size(analysis%response%lines)
+      call json%open()
+      call put_line(json, analysis, i)
+      call json%close()
+    end do
+    call json%close_list()
     call json%open_list('critical_speeds')
     do i = 1, size(summary%criticals)
       call put_critical(json, analysis, summary%criticals(i))
@@ -258,6 +264,22 @@ contains
     text = json%text()
   end function response_json
 
+  !> The order of a line, or its fixed frequency, or its number if its frequency is neither.
+  subroutine put_line(json, analysis, l)
+    type(json_t), intent(inout) :: json
+    type(response_analysis_t), intent(in) :: analysis
+    integer, intent(in) :: l   !! number of the line
+
+    associate (line => analysis%response%lines(l), points => analysis%response%points)
+      if (line%is_order) then
+        call json%put('order', line%order)
+      else
+        call json%put('line', l)
+        call json%put('line_frequency_Hz', [points(1)%frequency(l), points(size(points))%frequency(l)] / turn)
+      end if
+    end associate
+  end subroutine put_line
+
   subroutine put_critical(json, analysis, critical)
     type(json_t), intent(inout) :: json
     type(response_analysis_t), intent(in) :: analysis
@@ -265,7 +287,7 @@ contains
 
     call json%open()
     call json%put('mode', critical%crossing%mode)
-    call json%put('order', analysis%response%lines(critical%crossing%line)%order)
+    call put_line(json, analysis, critical%crossing%line)
     call json%put('speed_rad_s', critical%crossing%speed)
     call json%put('frequency_Hz', critical%crossing%frequency / turn)
     call json%put('damping_ratio', critical%crossing%damping_ratio)
@@ -274,11 +296,15 @@ contains
       if (.not. critical%is_unbounded) then
         call json%put('peak_speed_rad_s', critical%speed)
         call json%put('moment_N_m', critical%amplitude)
+        if (critical%stress > 0) call json%put('stress_Pa', critical%stress)
         call json%put('half_range_N_m', critical%half_range)
         if (critical%ratio > 0) call json%put('ratio_to_limit', critical%ratio)
       end if
     end if
-    if (size(analysis%settings%operating) > 0) call json%put('distance_to_operation', critical%margin)
+    if (size(analysis%settings%operating) > 0) then
+      call json%put('distance_to_operation', critical%margin)
+      call json%put('is_too_near', critical%is_too_near)
+    end if
     call json%close()
   end subroutine put_critical
 
@@ -297,7 +323,6 @@ contains
         call json%put('half_range', largest%half_range)
         call json%put('half_range_speed_rad_s', points(largest%half_point)%state%speed)
         call json%put('half_range_by_order', abs(points(largest%half_point)%quantity(:, q)))
-        if (one%section_modulus > 0) call json%put('half_range_stress_Pa', largest%half_range / one%section_modulus)
         call json%put('peak', largest%peak)
         call json%put('peak_speed_rad_s', points(largest%peak_point)%state%speed)
         if (largest%ratio_point > 0) then

@@ -6,9 +6,9 @@
 !> with c_D = 0.35 + 0.93 d^(-0.2), d in mm; for passing through quickly it is tau_T = 1.7 tau_C / sqrt(c_K).
 module nocdyn_response_limits
   use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_input, only: input_t
+  use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_response_quantities, only: quantity_moment, response_quantity_t
+  use nocdyn_response_quantities, only: quantity_moment, quantity_stress, response_quantity_t
   use nocdyn_schema_text, only: suggestion
   use nocdyn_text, only: quoted, string_t
   implicit none (type, external)
@@ -26,7 +26,6 @@ module nocdyn_response_limits
     real(wp), private :: vibratory = no_limit         !! of the half range
     real(wp), private :: peak = no_limit              !! of the largest magnitude, with the mean
     real(wp), private :: transient = no_limit         !! of the half range while a speed is passed
-    real(wp), private :: stress_to_moment = 0.0_wp    !! section modulus [m3]
     logical, private :: has_rule = .false.
     real(wp), private :: tensile_strength = 0.0_wp    !! sigma_B [Pa]
     real(wp), private :: c_k = 1.0_wp, diameter = 0.0_wp, rated = 0.0_wp   !! [1], [m], [rad/s]
@@ -43,95 +42,138 @@ contains
     type(response_limit_t), allocatable, intent(out) :: limits(:)
     type(error_t), allocatable, intent(out) :: error
     integer, allocatable :: groups(:)
+    character(len=:), allocatable :: kind
     integer :: i
 
     allocate (groups, source=input%groups_named('limit'))
-    allocate (limits(size(groups)))
+    allocate (limits(0))
     do i = 1, size(groups)
-      call read_limit(input, groups(i), quantities, limits(i), error)
+      call find_kind(input, groups(i), quantities, kind, error)
+      if (.not. allocated(error)) call add_moment_limits(input%groups(groups(i)), groups(i), kind, quantities, limits)
+      if (.not. allocated(error)) call add_stress_limits(input, groups(i), kind, quantities, limits, error)
       if (allocated(error)) return
     end do
   end subroutine read_limits
 
-  subroutine read_limit(input, index, quantities, limit, error)
+  !> Whether a group limits a coupling, a shaft or a mesh, which must exist.
+  subroutine find_kind(input, index, quantities, kind, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
     type(response_quantity_t), intent(in) :: quantities(:)
-    type(response_limit_t), intent(inout) :: limit
+    character(len=:), allocatable, intent(out) :: kind   !! 'coupling', 'shaft' or 'mesh'
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: key
+    type(string_t), allocatable :: names(:)
+    integer, allocatable :: groups(:)
+    integer :: i
+
+    kind = 'coupling'
+    if (input%groups(index)%has_value('shaft')) kind = 'shaft'
+    if (input%groups(index)%has_value('mesh')) kind = 'mesh'
+    allocate (groups, source=input%groups_named(kind))
+    allocate (names(size(groups)))
+    do i = 1, size(groups)
+      names(i)%text = input%groups(groups(i))%name
+      if (names(i)%text == input%groups(index)%text(kind)) return
+    end do
+    call raise(error, exit_input, input%location(index, kind) // ': there is no ' // kind // ' ' // &
+               quoted(input%groups(index)%text(kind)) // suggestion(input%groups(index)%text(kind), names))
+  end subroutine find_kind
+
+  !> Limits of the moment of a coupling, of those of both ends of a shaft, or of the force of a mesh.
+  subroutine add_moment_limits(group, index, kind, quantities, limits)
+    type(group_t), intent(in) :: group
+    integer, intent(in) :: index   !! of the group
+    character(len=*), intent(in) :: kind
+    type(response_quantity_t), intent(in) :: quantities(:)
+    type(response_limit_t), allocatable, intent(inout) :: limits(:)
+    type(response_limit_t) :: limit
+    integer :: q
 
     limit%group = index
-    call find_quantity(input, index, quantities, limit%quantity, error)
-    if (allocated(error)) return
-    associate (group => input%groups(index), modulus => quantities(limit%quantity)%section_modulus)
-      limit%stress_to_moment = modulus
+    if (kind == 'mesh') then
+      limit%vibratory = group%number('vibratory_force', absent=no_limit)
+      limit%peak = group%number('force', absent=no_limit)
+    else
+      limit%vibratory = group%number('vibratory_moment', absent=no_limit)
+      limit%peak = group%number('moment', absent=no_limit)
+    end if
+    if (min(limit%vibratory, limit%peak) >= no_limit) return
+    do q = 1, size(quantities)
+      if (quantities(q)%kind /= quantity_moment .or. quantities(q)%name /= group%text(kind)) cycle
+      limit%quantity = q
+      limits = [limits, limit]
+    end do
+  end subroutine add_moment_limits
+
+  !> Limits of its stress.
+  subroutine add_stress_limits(input, index, kind, quantities, limits, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    character(len=*), intent(in) :: kind
+    type(response_quantity_t), intent(in) :: quantities(:)
+    type(response_limit_t), allocatable, intent(inout) :: limits(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(response_limit_t) :: limit
+    character(len=:), allocatable :: key
+    integer :: q
+
+    associate (group => input%groups(index))
       key = ''
       if (group%has_value('stress_transient')) key = 'stress_transient'
       if (group%has_value('stress')) key = 'stress'
       if (group%has_value('rule')) key = 'rule'
-      if (key /= '' .and. .not. modulus > 0) then
+      if (key == '') return
+      do q = 1, size(quantities)
+        if (quantities(q)%kind == quantity_stress .and. quantities(q)%name == group%text(kind)) limit%quantity = q
+      end do
+      if (limit%quantity == 0) then
         call raise(error, exit_input, input%location(index, key) // ': ' // key // ' limits a stress, but ' // &
-                   quoted(quantities(limit%quantity)%name) // ' has none; required: section_modulus [m3] or diameter [m] of ' // &
-                   '&coupling')
+                   quoted(group%text(kind)) // ' has none; required: section_modulus [m3] or diameter [m] of &coupling')
         return
       end if
-      limit%vibratory = group%number('vibratory_moment', absent=no_limit)
-      if (group%has_value('stress')) limit%vibratory = min(limit%vibratory, group%number('stress') * modulus)
-      limit%peak = group%number('moment', absent=no_limit)
-      if (group%has_value('stress_transient')) limit%transient = group%number('stress_transient') * modulus
-      limit%has_rule = group%has_value('rule')
-      if (.not. limit%has_rule) return
+      limit%group = index
+      limit%vibratory = group%number('stress', absent=no_limit)
+      limit%transient = group%number('stress_transient', absent=no_limit)
+      if (key == 'rule') call set_rule(input, index, kind, limit, error)
+    end associate
+    limits = [limits, limit]
+  end subroutine add_stress_limits
+
+  !> The numbers of the rule iacs_m68.
+  subroutine set_rule(input, index, kind, limit, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    character(len=*), intent(in) :: kind
+    type(response_limit_t), intent(inout) :: limit
+    type(error_t), allocatable, intent(out) :: error
+
+    associate (group => input%groups(index))
+      limit%has_rule = .true.
       limit%tensile_strength = group%number('tensile_strength')
       limit%c_k = group%number('c_k')
-      limit%diameter = group%number('diameter', absent=diameter_of(input, quantities(limit%quantity)%name))
+      limit%diameter = group%number('diameter', absent=diameter_of(input, kind, group%text(kind)))
       limit%rated = abs(group%number('rated_speed'))
       if (limit%diameter > 0) return
       call raise(error, exit_input, input%location(index, 'rule') // ': the rule iacs_m68 needs a diameter [m], of &limit ' // &
-                 'or of &coupling ' // quoted(quantities(limit%quantity)%name))
+                 'or of &' // kind // ' ' // quoted(group%text(kind)))
     end associate
-  end subroutine read_limit
+  end subroutine set_rule
 
-  !> The diameter of a coupling [m], 0 if it is not given.
-  pure real(wp) function diameter_of(input, name) result(diameter)
+  !> The diameter of a coupling, or the smallest one of a shaft [m]; 0 if it is not given.
+  pure real(wp) function diameter_of(input, kind, name) result(diameter)
     type(input_t), intent(in) :: input
-    character(len=*), intent(in) :: name
+    character(len=*), intent(in) :: kind, name
     integer, allocatable :: groups(:)
     integer :: i
 
     diameter = 0.0_wp
-    allocate (groups, source=input%groups_named('coupling'))
+    allocate (groups, source=input%groups_named(kind))
     do i = 1, size(groups)
-      if (input%groups(groups(i))%name == name) diameter = input%groups(groups(i))%number('diameter', absent=0.0_wp)
+      if (input%groups(groups(i))%name /= name) cycle
+      if (kind == 'coupling') diameter = input%groups(groups(i))%number('diameter', absent=0.0_wp)
+      if (kind == 'shaft') diameter = minval(input%groups(groups(i))%numbers('diameters'))
     end do
   end function diameter_of
-
-  !> The quantity that a group limits.
-  subroutine find_quantity(input, index, quantities, quantity, error)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: index
-    type(response_quantity_t), intent(in) :: quantities(:)
-    integer, intent(out) :: quantity
-    type(error_t), allocatable, intent(out) :: error
-    type(string_t), allocatable :: names(:)
-    character(len=:), allocatable :: name
-    integer :: i
-
-    name = input%groups(index)%text('coupling')
-    allocate (names(count(quantities%kind == quantity_moment)))
-    do quantity = 1, size(quantities)
-      if (quantities(quantity)%kind /= quantity_moment) cycle
-      if (quantities(quantity)%name == name) return
-    end do
-    i = 0
-    do quantity = 1, size(quantities)
-      if (quantities(quantity)%kind /= quantity_moment) cycle
-      i = i + 1
-      names(i)%text = quantities(quantity)%name
-    end do
-    call raise(error, exit_input, input%location(index, 'coupling') // ': there is no coupling ' // quoted(name) // &
-               suggestion(name, names))
-  end subroutine find_quantity
 
   !> The limit of the half range in continuous operation at a speed, in the unit of the quantity.
   elemental real(wp) function continuous_limit(self, speed) result(limit)
@@ -139,7 +181,7 @@ contains
     real(wp), intent(in) :: speed   !! of the reference body [rad/s]
 
     limit = self%vibratory
-    if (self%has_rule) limit = min(limit, m68_stress(self, speed) * self%stress_to_moment)
+    if (self%has_rule) limit = min(limit, m68_stress(self, speed))
   end function continuous_limit
 
   !> The limit of the half range while a speed is passed; without one, `no_limit`.
@@ -148,7 +190,7 @@ contains
     real(wp), intent(in) :: speed   !! [rad/s]
 
     limit = self%transient
-    if (self%has_rule) limit = min(limit, 1.7_wp * m68_stress(self, speed) / sqrt(self%c_k) * self%stress_to_moment)
+    if (self%has_rule) limit = min(limit, 1.7_wp * m68_stress(self, speed) / sqrt(self%c_k))
   end function transient_limit
 
   !> The limit of the largest magnitude, with the mean.

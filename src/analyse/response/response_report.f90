@@ -55,7 +55,7 @@ contains
     type(response_summary_t), intent(in) :: summary
     type(text_buffer_t), intent(inout) :: report
     character(len=:), allocatable :: line
-    integer :: i, q, width
+    integer :: i, width
     logical :: has_ratio, has_stress
 
     if (size(summary%criticals) == 0) then
@@ -64,11 +64,7 @@ contains
     end if
     width = maxval([8, (text_width(coupling_name(analysis, summary%criticals(i))), i=1, size(summary%criticals))])
     has_ratio = any(summary%criticals%ratio > 0)
-    has_stress = .false.
-    do i = 1, size(summary%criticals)
-      q = summary%criticals(i)%quantity
-      if (q > 0) has_stress = has_stress .or. analysis%response%quantities(q)%section_modulus > 0
-    end do
+    has_stress = any(summary%criticals%stress > 0)
     line = '  mode  frequency [Hz]   order  critical [rpm]  damping ratio  ' // padded('coupling', width) // &
            cell('moment [N m]') // cell('at [rpm]')
     if (has_stress) line = line // cell('stress [MPa]')
@@ -98,8 +94,7 @@ contains
     integer, intent(in) :: width   !! of the names
     logical, intent(in) :: has_stress, has_ratio
     type(text_buffer_t), intent(inout) :: report
-    character(len=:), allocatable :: line
-    real(wp) :: modulus
+    character(len=:), allocatable :: line, stress
 
     line = right(to_text(critical%crossing%mode), 6) // right(rounded_text(critical%crossing%frequency / turn, 7), 16) // &
            right(rounded_text(analysis%response%lines(critical%crossing%line)%order, 5), 8) // &
@@ -109,19 +104,14 @@ contains
       call report%append_line(line)
       return
     end if
-    modulus = analysis%response%quantities(critical%quantity)%section_modulus
     if (critical%is_unbounded) then
       line = line // cell('unbounded') // cell('')
     else
       line = line // cell(rounded_text(critical%amplitude, 5)) // cell(rpm(critical%speed))
     end if
-    if (has_stress) then
-      if (modulus > 0 .and. .not. critical%is_unbounded) then
-        line = line // cell(rounded_text(critical%amplitude / modulus / mega, 4))
-      else
-        line = line // cell('')
-      end if
-    end if
+    stress = ''
+    if (critical%stress > 0) stress = rounded_text(critical%stress / mega, 4)
+    if (has_stress) line = line // cell(stress)
     if (has_ratio) line = line // cell(ratio_text(critical%ratio))
     if (size(analysis%settings%operating) > 0) line = line // '  ' // margin_text(critical)
     call report%append_line(trim(line))
@@ -169,7 +159,6 @@ contains
       if (shown == 0) return
       width = maxval([(text_width(quantities(q)%label // ' [' // quantities(q)%unit // ']'), q=1, shown)])
       line = '  ' // padded('largest', width) // cell('half range') // cell('at [rpm]') // cell('peak') // cell('at [rpm]')
-      if (any(quantities%section_modulus > 0)) line = line // cell('stress [MPa]')
       if (any(summary%largest%ratio > 0)) line = line // cell('of limit') // cell('at [rpm]')
       call report%append_line(line // '  orders in the half range')
       do q = 1, shown
@@ -187,15 +176,12 @@ contains
     integer, intent(in) :: q       !! quantity
     integer, intent(in) :: width   !! of the labels
     type(text_buffer_t), intent(inout) :: report
-    character(len=:), allocatable :: line, stress
+    character(len=:), allocatable :: line
 
     associate (largest => summary%largest(q), points => analysis%response%points, one => analysis%response%quantities(q))
       line = '  ' // padded(one%label // ' [' // one%unit // ']', width) // &
              cell(rounded_text(largest%half_range, 5)) // cell(rpm(points(largest%half_point)%state%speed)) // &
              cell(rounded_text(largest%peak, 5)) // cell(rpm(points(largest%peak_point)%state%speed))
-      stress = ''
-      if (one%section_modulus > 0) stress = rounded_text(largest%half_range / one%section_modulus / mega, 4)
-      if (any(analysis%response%quantities%section_modulus > 0)) line = line // cell(stress)
       if (largest%ratio_point > 0) then
         line = line // cell(ratio_text(largest%ratio)) // cell(rpm(points(largest%ratio_point)%state%speed))
       else if (any(summary%largest%ratio > 0)) then
@@ -236,7 +222,7 @@ contains
 
     do i = 1, size(summary%barred)
       associate (range => summary%barred(i))
-        line = '  barred by ' // analysis%response%quantities(analysis%limits(range%limit)%quantity)%name // ': ' // &
+        line = '  barred by ' // analysis%response%quantities(analysis%limits(range%limit)%quantity)%label // ': ' // &
                rpm(range%from) // ' to ' // rpm(range%to) // ' rpm'
         if (.not. range%can_be_passed) line = line // '; the limit for passing through is exceeded too'
         call report%append_line(line)
@@ -245,7 +231,7 @@ contains
     do q = 1, size(summary%largest)
       if (summary%largest(q)%ratio <= 1.0_wp) cycle
       if (any(analysis%limits(summary%barred%limit)%quantity == q)) cycle
-      call report%append_line('  ' // analysis%response%quantities(q)%name // ' exceeds its limit of the peak')
+      call report%append_line('  ' // analysis%response%quantities(q)%label // ' exceeds its limit of the peak')
     end do
     if (size(analysis%limits) > 0 .and. .not. summary%limits_exceeded) call report%append_line('  all limits are kept')
   end subroutine put_barred

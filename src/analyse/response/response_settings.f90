@@ -100,7 +100,7 @@ contains
     if (size(range) == 0) return
     if (range(1) * range(2) > 0 .and. abs(range(1)) < abs(range(2))) return
     call raise(error, exit_input, input%location(group, key) // ': ' // key // ' = ' // to_text(range(1)) // ', ' // &
-               to_text(range(2)) // ' rad/s; allowed: first the lower, then the higher speed, both in one direction')
+               to_text(range(2)) // ' rad/s; allowed: first the lower speed, then the higher one, both with one sign')
   end subroutine check_range
 
   !> Distance of a critical speed to the speeds in operation, as a share of the nearer one.

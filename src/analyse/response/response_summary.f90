@@ -6,7 +6,7 @@ module nocdyn_response_summary
   use nocdyn_kinds, only: wp
   use nocdyn_response_analysis, only: response_analysis_t
   use nocdyn_response_limits, only: no_limit, response_limit_t
-  use nocdyn_response_quantities, only: quantity_moment
+  use nocdyn_response_quantities, only: quantity_moment, quantity_reaction, quantity_stress
   use nocdyn_response_settings, only: operating_distance
   implicit none (type, external)
   private
@@ -19,6 +19,7 @@ module nocdyn_response_summary
     integer :: quantity = 0            !! the coupling, 0 if there is none
     real(wp) :: speed = 0.0_wp         !! of its peak; the critical speed itself if there is no peak near it [rad/s]
     real(wp) :: amplitude = 0.0_wp     !! at this speed, of the line alone [N m]
+    real(wp) :: stress = 0.0_wp        !! the same of its stress; 0 if it is unknown [Pa]
     real(wp) :: half_range = 0.0_wp    !! at this speed, of all lines [N m]
     real(wp) :: ratio = 0.0_wp         !! of the response of this quantity to its limits there, 0 without limits
     logical :: is_unbounded = .false.  !! without damping there is no finite response
@@ -76,7 +77,7 @@ contains
     type(response_analysis_t), intent(in) :: analysis
     type(critical_t), intent(inout) :: critical
     real(wp), parameter :: near = 0.02_wp   ! of the critical speed, without damping
-    integer :: i, start
+    integer :: i, k, start
     real(wp) :: speed(size(analysis%response%points))
 
     critical%quantity = main_coupling(analysis, critical%crossing%mode)
@@ -103,7 +104,13 @@ contains
       critical%speed = speed(i)
       critical%amplitude = abs(points(i)%quantity(line, q))
       critical%half_range = points(i)%half_range(q)
-      critical%ratio = worst_ratio(analysis%limits, points(i), q)
+      do k = 1, size(analysis%response%quantities)
+        associate (one => analysis%response%quantities(k))
+          if (one%name /= analysis%response%quantities(q)%name .or. one%kind == quantity_reaction) cycle
+          critical%ratio = max(critical%ratio, worst_ratio(analysis%limits, points(i), k))
+          if (one%kind == quantity_stress) critical%stress = abs(points(i)%quantity(line, k))
+        end associate
+      end do
     end associate
   end subroutine find_peak
 
@@ -111,15 +118,18 @@ contains
   integer function main_coupling(analysis, mode) result(coupling)
     type(response_analysis_t), intent(in) :: analysis
     integer, intent(in) :: mode
-    integer :: e, q
+    integer :: e, k, q
     real(wp) :: energy, most
 
     coupling = 0
     most = 0.0_wp
     do q = 1, size(analysis%response%quantities)
       if (analysis%response%quantities(q)%kind /= quantity_moment) cycle
-      e = analysis%response%quantities(q)%element(1)
-      energy = abs(analysis%response%points(1)%state%stiffness(e)) * analysis%modes%twists(e, mode)**2
+      energy = 0.0_wp
+      do k = 1, size(analysis%response%quantities(q)%element)
+        e = analysis%response%quantities(q)%element(k)
+        energy = energy + abs(analysis%response%points(1)%state%stiffness(e)) * analysis%modes%twists(e, mode)**2
+      end do
       if (energy <= most) cycle
       coupling = q
       most = energy

@@ -2,7 +2,8 @@
 module nocdyn_schema_response
   use nocdyn_kinds, only: wp
   use nocdyn_schema_rules, only: a_body, a_number, a_text, a_word, allowed_t, an_integer, any_number, any_times, anything, &
-    at_most_once, example_t, group_rule_t, key_rule_t, not_zero, positive, relation_rule_t, required, requires, unset
+    at_most_once, at_most_one, exactly_one, example_t, group_rule_t, key_rule_t, not_zero, positive, &
+    relation_rule_t, required, requires, unset
   implicit none (type, external)
   private
 
@@ -14,7 +15,7 @@ module nocdyn_schema_response
 
   type(group_rule_t), parameter, public :: response_groups(*) = [ &
     group_rule_t('response', at_most_once, '', "Speeds and orders of 'nocdyn response' and 'nocdyn campbell'."), &
-    group_rule_t('limit',    any_times,    '', 'Limits of the moment or of the stress of a coupling.')]
+    group_rule_t('limit',    any_times,    '', 'Limits of moments, stresses and forces of a coupling, a shaft or a mesh.')]
 
   type(key_rule_t), parameter, public :: response_keys(*) = [ &
     key_rule_t('response',   'body',            a_body,         1, '',            required,    anything, &
@@ -29,12 +30,20 @@ module nocdyn_schema_response
       'lowest and highest speed in operation'), &
     key_rule_t('response',   'margin',          a_number,       1, '',            '0.1',       margins, &
       'a critical speed so near to the speeds in operation, as a share of it, is reported'), &
-    key_rule_t('limit',      'coupling',        a_text,         1, '',            required,    anything, &
+    key_rule_t('limit',      'coupling',        a_text,         1, '',            unset,       anything, &
       'name of the coupling'), &
+    key_rule_t('limit',      'shaft',           a_text,         1, '',            unset,       anything, &
+      'name of the shaft'), &
+    key_rule_t('limit',      'mesh',            a_text,         1, '',            unset,       anything, &
+      'name of the mesh'), &
     key_rule_t('limit',      'vibratory_moment', a_number,      1, 'N m',         unset,       positive, &
       'half range of the moment in continuous operation'), &
     key_rule_t('limit',      'moment',          a_number,       1, 'N m',         unset,       positive, &
       'largest magnitude of the moment, its mean included'), &
+    key_rule_t('limit',      'vibratory_force', a_number,       1, 'N',           unset,       positive, &
+      'half range of the force of the mesh in continuous operation'), &
+    key_rule_t('limit',      'force',           a_number,       1, 'N',           unset,       positive, &
+      'largest magnitude of this force, its mean included'), &
     key_rule_t('limit',      'stress',          a_number,       1, 'Pa',          unset,       positive, &
       'half range of the shear stress in continuous operation'), &
     key_rule_t('limit',      'stress_transient', a_number,      1, 'Pa',          unset,       positive, &
@@ -52,6 +61,10 @@ module nocdyn_schema_response
 
   type(relation_rule_t), parameter, public :: response_relations(*) = [ &
     relation_rule_t('response', requires, 'margin', 'operating'), &
+    relation_rule_t('limit', exactly_one, 'coupling shaft', 'mesh'), &
+    relation_rule_t('limit', at_most_one, 'coupling', 'shaft'), &
+    relation_rule_t('limit', requires, 'vibratory_force force', 'mesh'), &
+    relation_rule_t('limit', requires, 'vibratory_moment moment stress stress_transient rule', 'coupling shaft'), &
     relation_rule_t('limit', requires, 'rule', 'tensile_strength'), &
     relation_rule_t('limit', requires, 'rule', 'rated_speed'), &
     relation_rule_t('limit', requires, 'tensile_strength rated_speed c_k diameter', 'rule')]
