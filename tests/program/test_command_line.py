@@ -96,6 +96,7 @@ OPTIONS = {
     "--out": "a",
     "--set": "a=1",
     "--at": "rest",
+    "--holzer": None,
     "--threads": "1",
     "--shard": "1/2",
     "--resume": None,

@@ -27,6 +27,7 @@ module nocdyn_modes_report
 
   type, public :: modes_report_t
     type(machine_t) :: machine
+    type(linearisation_t) :: linear               !! at the operating point
     type(mode_t), allocatable :: modes(:)
     integer :: shapes = 0                         !! number of modes, from the first, whose shapes and shares are in the files
     type(string_t), allocatable :: body_names(:)      !! of the bodies of the input
@@ -54,6 +55,7 @@ contains
     call linearise(point%formulation, point%t, point%y, linear, error)
     if (allocated(error)) return
     self%machine = point%formulation%machine
+    self%linear = linear
     allocate (self%elastic, source=self%machine%elastic())
     call find_modes(point%formulation, linear, self%elastic, self%modes, error)
     if (allocated(error)) return

@@ -3,6 +3,7 @@ module nocdyn_modes_command
   use nocdyn_arguments, only: arguments_t
   use nocdyn_console, only: print_text
   use nocdyn_errors, only: error_t, exit_failed
+  use nocdyn_holzer_report, only: holzer_tables
   use nocdyn_input, only: input_t
   use nocdyn_input_files, only: analyse_files
   use nocdyn_machine, only: machine_t
@@ -34,6 +35,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(operating_point_t) :: point
     type(modes_report_t) :: report
+    character(len=:), allocatable :: csv, printed
 
     if (arguments%is_given('--at')) then
       call find_operating_point(input, machine, arguments%value('--at'), point, error)
@@ -45,8 +47,18 @@ contains
       if (error%code == exit_failed) error%message = input%shown_file() // ': ' // error%message
       return
     end if
+    if (arguments%is_given('--holzer')) then
+      call holzer_tables(report, printed, csv, error)
+      if (allocated(error)) then
+        error%message = input%shown_file() // ': ' // error%message
+        return
+      end if
+    end if
     call print_text(modes_text(input%shown_file(), report, output_units(input)))
+    if (arguments%is_given('--holzer')) call print_text(printed)
     if (folder == '') return
+    if (arguments%is_given('--holzer')) call write_file(folder, 'holzer.csv', csv, error)
+    if (allocated(error)) return
     call write_file(folder, 'modes.csv', modes_csv(report), error)
     if (.not. allocated(error)) call write_file(folder, 'modes.json', modes_json(input, report), error)
   end subroutine analyse_modes

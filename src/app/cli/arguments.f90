@@ -18,6 +18,7 @@ module nocdyn_arguments
     option_t('--out', value='DIR'), &
     option_t('--set', value='PATH=VALUE', may_repeat=.true.), &
     option_t('--at', value='equilibrium|rest|TIME'), &
+    option_t('--holzer', may_repeat=.true.), &
     option_t('--threads', value='NUMBER'), &
     option_t('--shard', value='K/N'), &
     option_t('--resume', may_repeat=.true.), &

@@ -52,13 +52,14 @@ contains
       'their stability. Excitations enter with their mean.' // nl // nl // &
       '  --out DIR          write equilibrium.json to DIR, with several files to DIR/<name of the file>' // nl // nl // &
       'Exit code 1: there is no steady state.', equilibrium_command)
-    call add_command(commands, 'modes', 'FILE...', '--out --set --at', &
+    call add_command(commands, 'modes', 'FILE...', '--out --set --at --holzer', &
       'natural frequencies, damping, shapes and energies of the modes', &
       'Linearises the machines and prints natural frequencies, damping ratios, time constants and the' // nl // &
       'distribution of the energy of each mode.' // nl // nl // &
       '  --at equilibrium   about the steady state (default); of several, the stable one nearest to the start' // nl // &
       '  --at rest          at the start angles, with zero speeds and mean torques' // nl // &
       '  --at TIME          at a time of the run [s], which is integrated up to there' // nl // &
+      '  --holzer           print the table of Holzer of each undamped mode; with --out, write holzer.csv' // nl // &
       '  --out DIR          write modes.csv and modes.json to DIR, with several files to DIR/<name of the file>', modes_command)
     call list_torsional_analyses(commands)
     call add_command(commands, 'matrices', 'FILE', '--set', 'print the matrices of the method for a machine', &

@@ -1,0 +1,84 @@
+"""nocdyn modes --holzer: the tables by hand, what is left at their ends, and what is refused."""
+
+import csv
+from math import isclose, pi, sqrt
+
+import pytest
+from conftest import SOURCE
+
+J = {"a": 10.0, "b": 20.0, "c": 30.0}
+K_1, K_2 = 1.0e4, 2.0e4
+DISCS = f"""\
+&body name = 'a' inertia = {J["a"]} /
+&body name = 'b' inertia = {J["b"]} /
+&body name = 'c' inertia = {J["c"]} /
+&coupling name = 'one' bodies = 'a', 'b' stiffness = {K_1} /
+&coupling name = 'two' bodies = 'b', 'c' stiffness = {K_2} /
+&run t_end = 1 /
+"""
+
+
+def squares():
+    """omega^2 of three discs, the roots of omega^4 - p omega^2 + q."""
+    p = K_1 * (1 / J["a"] + 1 / J["b"]) + K_2 * (1 / J["b"] + 1 / J["c"])
+    q = K_1 * K_2 * sum(J.values()) / (J["a"] * J["b"] * J["c"])
+    return [p / 2 - sqrt(p**2 / 4 - q), p / 2 + sqrt(p**2 / 4 - q)]
+
+
+def tables(nocdyn, *words):
+    outcome = nocdyn("modes", *words, "--holzer", "--out", "out")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    with open(nocdyn.folder / "out/holzer.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    return outcome.stdout, rows
+
+
+def test_three_discs_have_the_table_that_one_fills_by_hand(nocdyn):
+    printed, rows = tables(nocdyn, nocdyn.write("discs.nml", DISCS), "--at", "rest")
+    for mode, square in enumerate(squares()):
+        lines = rows[3 * mode : 3 * mode + 3]
+        assert [line["body"] for line in lines] == ["a", "b", "c"]
+        theta, total = 1.0, 0.0
+        for line, stiffness in zip(lines, (K_1, K_2, None), strict=True):
+            assert isclose(2 * pi * float(line["frequency [Hz]"]), sqrt(square), rel_tol=1e-12)
+            assert isclose(float(line["theta [1]"]), theta, rel_tol=1e-10)
+            total += J[line["body"]] * square * theta
+            if stiffness:
+                assert isclose(float(line["sum [N m]"]), total, rel_tol=1e-10)
+                assert isclose(float(line["twist [rad]"]), total / stiffness, rel_tol=1e-10)
+                theta -= total / stiffness
+        assert abs(float(lines[-1]["sum [N m]"])) < 1e-9 * J["a"] * square
+    assert printed.count("Holzer table of undamped mode") == 2
+
+
+def test_nothing_is_left_at_the_end_of_a_geared_branched_train(nocdyn):
+    _, rows = tables(nocdyn, SOURCE / "input/examples/ship_turbine/ship_turbine.nml")
+    bodies = 10
+    assert len(rows) % bodies == 0
+    assert len(rows) >= 5 * bodies
+    for first in range(0, len(rows), bodies):
+        lines = rows[first : first + bodies]
+        largest = max(abs(float(line["J omega^2 theta [N m]"])) for line in lines)
+        assert lines[-1]["by"] == ""
+        assert abs(float(lines[-1]["sum [N m]"])) < 1e-7 * largest
+        theta = {line["body"]: float(line["theta [1]"]) for line in lines}
+        for line in lines[:-1]:  # amplitudes follow from the sums, or from the ratios of the gears
+            here, there = theta[line["body"]], theta[line["to"]]
+            if line["ratio [1]"]:
+                assert isclose(there, float(line["ratio [1]"]) * here, rel_tol=1e-8, abs_tol=1e-9)
+            else:
+                assert abs(here - float(line["twist [rad]"]) - there) < 1e-8 * (abs(here) + abs(there) + abs(here - there))
+
+
+@pytest.mark.parametrize(
+    ("addition", "message"),
+    [
+        ("&coupling name = 'loop' bodies = 'a', 'c' stiffness = 5 /", "there is no table of Holzer: 'loop' closes a loop"),
+        ("&body name = 'd' inertia = 1 / &constraint name = 'sum' bodies = 'a', 'b', 'd' coefficients = 1, 1, -2 /",
+         "there is no table of Holzer: 'sum' does not join two bodies"),
+    ],
+)  # fmt: skip
+def test_machines_that_are_no_tree_have_no_table(nocdyn, addition, message):
+    outcome = nocdyn("modes", nocdyn.write("machine.nml", DISCS + addition + "\n"), "--at", "rest", "--holzer")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr.startswith(f"nocdyn: machine.nml: {message}") or message in outcome.stderr
