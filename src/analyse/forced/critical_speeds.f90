@@ -106,7 +106,7 @@ contains
     type(forced_response_t), intent(in) :: response
     type(crossing_t), intent(in) :: crossings(:)
     real(wp), allocatable, intent(out) :: speeds(:)
-    real(wp), parameter :: counts = 1.0e-4_wp   ! of the largest amplitude of all lines: smaller ones are left as they are
+    real(wp), parameter :: counts = 1.0e-2_wp   ! of the largest amplitude of all lines: smaller ones are left as they are
     integer :: i, l, q
     real(wp) :: amplitude(size(response%points))   ! its square
     real(wp) :: smallest
@@ -147,7 +147,7 @@ contains
     type(response_point_t), intent(in) :: points(3)
     real(wp), intent(in) :: amplitude(3)   !! squares of the amplitudes, the second one is the largest
     real(wp), allocatable, intent(inout) :: speeds(:)
-    real(wp), parameter :: accuracy = 1.0e-6_wp   ! relative, of the square of a peak
+    real(wp), parameter :: accuracy = 1.0e-5_wp   ! relative, of the square of a peak
     real(wp), parameter :: narrow = 1.0e-12_wp    ! relative distance of speeds
     real(wp) :: bend, distance, gain, slope, vertex, x(3), y(3)
 

@@ -19,6 +19,7 @@ module nocdyn_forced_response
 
   public :: new_forced_response
 
+  integer, parameter :: worth_threads = 16         ! points: threads wait for each other longer than they compute fewer
   real(wp), parameter :: most_values = 4.0e7_wp   ! of all speeds: 0.6 GB
 
   !> The response at one speed. Amplitudes are those of amplitude exp(i Omega t), where the angle of the reference body is zero at
@@ -141,7 +142,7 @@ contains
     type(work_t) :: work
     integer :: i
 
-    !$omp parallel private(work)
+    !$omp parallel private(work) if(size(points) >= worth_threads)
     work%band = new_band_work(self%matrix)
     allocate (work%stiffness(size(self%loss_factor)), work%moment(size(self%loss_factor), size(self%lines)))
     !$omp do schedule(dynamic, 4)

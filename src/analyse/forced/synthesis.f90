@@ -158,13 +158,20 @@ contains
     end do
     highest = maxval(top, mask=is_top)
     ! the error of a parabola, at six samples of the shortest period, is a small part of its height above the samples
-    threshold = highest - 0.1_wp * sum(abs(amplitude(part%line)) * part%multiple**2) * (pi / part%samples)**2
+    threshold = highest - 0.1_wp * sum(size_of(amplitude(part%line)) * part%multiple**2) * (pi / part%samples)**2
     refined = maxval(sign * value)
     do i = 1, part%samples
       if (.not. is_top(i) .or. top(i) < threshold) cycle
       refined = max(refined, climbed(part, amplitude, 2.0_wp * pi * (i - 1) / part%samples, sign))
     end do
   end function refined
+
+  !> The magnitude of an amplitude, without the care of `abs` for numbers near the end of their range.
+  elemental real(wp) function size_of(amplitude)
+    complex(wp), intent(in) :: amplitude
+
+    size_of = sqrt(real(amplitude, wp)**2 + aimag(amplitude)**2)
+  end function size_of
 
   pure real(wp) function climbed(part, amplitude, start, sign)
     type(periodic_t), intent(in) :: part

@@ -6,6 +6,7 @@ module nocdyn_column_names
   use nocdyn_machine, only: machine_t
   use nocdyn_output_units, only: output_units, turn_labels
   use nocdyn_near_words, only: nearest_word
+  use nocdyn_patterns, only: matches
   use nocdyn_text, only: append, joined, quoted, string_t, to_text
   use nocdyn_trajectory_columns, only: column_count, column_t, list_columns
   implicit none (type, external)
@@ -74,35 +75,6 @@ contains
     call choose_columns(input, labels, chosen, error)
     count = size(chosen)
   end subroutine count_columns
-
-  !> Whether a name is of the form of a pattern, in which * stands for any characters or none.
-  pure logical function matches(pattern, name)
-    character(len=*), intent(in) :: pattern, name
-    integer :: after_star, i, k, star   ! in `name`, `pattern`: the last star takes the characters before `after_star`
-
-    i = 1
-    k = 1
-    star = 0
-    after_star = 1
-    matches = .false.
-    do while (i <= len(name))
-      if (index(pattern(k:), '*') == 1) then
-        star = k
-        after_star = i
-        k = k + 1
-      else if (index(pattern(k:), name(i:i)) == 1) then
-        k = k + 1
-        i = i + 1
-      else if (star > 0) then
-        after_star = after_star + 1
-        i = after_star
-        k = star + 1
-      else
-        return
-      end if
-    end do
-    matches = verify(pattern(k:), '*') == 0
-  end function matches
 
   !> What to write instead of a pattern: the nearest name or pattern of names, else the patterns of all names.
   function hint_for(pattern, labels) result(text)

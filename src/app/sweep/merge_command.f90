@@ -7,12 +7,12 @@ module nocdyn_merge_command
   use nocdyn_journal_chunks, only: check_sweep
   use nocdyn_posix, only: catch_interrupts
   use nocdyn_result_folders, only: normalised_path
+  use nocdyn_sweep_design, only: find_planned_numbers
   use nocdyn_sweep_journal, only: journal_names, open_journal, sweep_journal_t
   use nocdyn_sweep_plan, only: sweep_plan_t
   use nocdyn_recorded_quantities, only: wanted_trajectories
   use nocdyn_sweep_results, only: print_results, write_results
   use nocdyn_sweep_summary, only: sweep_summary_t
-  use nocdyn_target_consistency, only: find_targets
   use nocdyn_text, only: shown_path, string_t, strings
   implicit none (type, external)
   private
@@ -42,7 +42,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(sweep_journal_t), allocatable :: journals(:)
     type(sweep_plan_t) :: plan   ! without a design, which the results do not need
-    type(string_t), allocatable :: labels(:), messages(:)
+    type(string_t), allocatable :: labels(:)
     type(sweep_summary_t) :: summary
     integer :: i
 
@@ -56,7 +56,7 @@ contains
       do i = 1, size(labels)
         labels(i)%text = header%parameters(i)%label
       end do
-      call find_targets(plan%input, labels, plan%targets, messages)
+      call find_planned_numbers(plan%input, labels, plan%numbers)
     end associate
     allocate (plan%trajectories, source=wanted_trajectories(plan%input))
     call write_results(plan, folder, journals, arguments, summary, error)

@@ -24,6 +24,7 @@ module nocdyn_sweep_results
   use nocdyn_targets, only: set_targets
   use nocdyn_text, only: shown_path, string_t, to_text
   use nocdyn_trajectory_netcdf, only: netcdf_trajectory_t
+  use nocdyn_varied_numbers, only: varied_numbers_t
   implicit none (type, external)
   private
 
@@ -146,7 +147,7 @@ contains
     type(input_t) :: input
     type(run_summary_t) :: summary
     type(netcdf_trajectory_t) :: netcdf
-    real(wp), allocatable :: values(:)
+    real(wp) :: values(size(plan%numbers%targets))
     character(len=:), allocatable :: message
     integer :: i, status
 
@@ -154,9 +155,9 @@ contains
     do i = 1, size(plan%trajectories)
       associate (variant => plan%trajectories(i))
         input = plan%input
-        call find_values(journals, variant, values, status, error)
+        call find_values(journals, variant, plan%numbers, values, status, error)
         if (allocated(error)) return
-        call set_targets(input, plan%targets, values, message)
+        call set_targets(input, plan%numbers%targets, values, message)
         if (status == status_refused .or. message /= '') then
           refused = [refused, variant]
           cycle
@@ -176,23 +177,25 @@ contains
     end do
   end subroutine write_trajectories
 
-  !> The varied numbers of one variant and its status.
-  subroutine find_values(journals, variant, values, status, error)
+  !> The values of the targets in one variant, and its status.
+  subroutine find_values(journals, variant, numbers, values, status, error)
     type(sweep_journal_t), intent(inout) :: journals(:)   !! of which one holds the variant
     integer, intent(in) :: variant
-    real(wp), allocatable, intent(out) :: values(:)
-    integer, intent(out) :: status   !! status_...
+    type(varied_numbers_t), intent(in) :: numbers
+    real(wp), intent(out) :: values(:)   !! [targets]
+    integer, intent(out) :: status       !! status_...
     type(error_t), allocatable, intent(out) :: error
     type(chunk_t) :: chunk
     integer :: i, k
 
+    values = 0.0_wp
     status = status_refused
     do k = 1, size(journals)
       i = journals(k)%entry_of(variant)
       if (i == 0) cycle
       call journals(k)%read_entry(i, chunk, error)
       if (allocated(error)) return
-      values = chunk%parameters(:, variant - chunk%first + 1)
+      call numbers%target_values(chunk%parameters(:, variant - chunk%first + 1), values)
       status = chunk%status(variant - chunk%first + 1)
       return
     end do

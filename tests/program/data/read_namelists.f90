@@ -347,14 +347,15 @@ contains
 
   subroutine read_varies()
     character(len=256) :: target
-    character(len=64) :: distribution
+    character(len=64) :: distribution, scale
     real(wp) :: low, high, mean, deviation, median, log_deviation
     integer :: count, status
-    namelist /vary/ target, distribution, low, high, mean, deviation, median, log_deviation, count
+    namelist /vary/ target, scale, distribution, low, high, mean, deviation, median, log_deviation, count
 
     rewind (unit)
     do
       distribution = 'uniform'
+      scale = 'absolute'
       low = not_given
       high = not_given
       mean = not_given
@@ -365,20 +366,24 @@ contains
       read (unit, nml=vary, iostat=status)
       if (is_iostat_end(status)) exit
       if (status /= 0) error stop 'vary'
-      print '(*(g0, 1x))', 'vary', trim(target), trim(distribution), low, high, mean, deviation, median, log_deviation, count
+      print '(*(g0, 1x))', 'vary', trim(target), trim(scale), trim(distribution), low, high, mean, deviation, median, &
+        log_deviation, count
     end do
   end subroutine read_varies
 
   subroutine read_records()
-    character(len=256) :: quantity
+    character(len=256) :: quantity, response
     character(len=64) :: statistic(8)
-    real(wp) :: from, band
-    integer :: trajectories(most_numbers), status
-    namelist /record/ quantity, statistic, from, band, trajectories
+    real(wp) :: from, band, order
+    integer :: mode, trajectories(most_numbers), status
+    namelist /record/ quantity, mode, response, order, statistic, from, band, trajectories
 
     rewind (unit)
     do
       quantity = ''
+      response = ''
+      mode = 0
+      order = not_given
       statistic = ''
       from = not_given
       band = not_given
@@ -386,7 +391,7 @@ contains
       read (unit, nml=record, iostat=status)
       if (is_iostat_end(status)) exit
       if (status /= 0) error stop 'record'
-      print '(*(g0, 1x))', 'record', trim(quantity), statistic, from, band, trajectories
+      print '(*(g0, 1x))', 'record', trim(quantity), mode, trim(response), order, statistic, from, band, trajectories
     end do
   end subroutine read_records
 

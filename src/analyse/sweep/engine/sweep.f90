@@ -13,7 +13,7 @@ module nocdyn_sweep
   use nocdyn_sweep_chunk, only: chunk_t
   use nocdyn_sweep_plan, only: sweep_plan_t
   use nocdyn_text, only: string_t
-  use omp_lib, only: omp_destroy_lock, omp_init_lock, omp_set_lock, omp_unset_lock
+  use omp_lib, only: omp_destroy_lock, omp_init_lock, omp_set_lock, omp_set_num_threads, omp_unset_lock
   implicit none (type, external)
   private
 
@@ -44,7 +44,7 @@ contains
 
     setup%has_energy_balance = needs_work_integrals(plan%statistics)
     call new_asked_formulation(plan%input, plan%machine, formulation, setup%has_energy_balance)
-    call choose_settings(plan%input, formulation, settings, notes, error)
+    if (size(plan%statistics) > 0) call choose_settings(plan%input, formulation, settings, notes, error)
     setup%lanes = merge(large_block, small_block, formulation%states <= max_states)
   end subroutine prepare_sweep
 
@@ -74,6 +74,7 @@ contains
     integer :: count, first
     logical :: is_complete
 
+    call omp_set_num_threads(1)   ! of what computes in threads of its own: the response over the speeds
     allocate (block)
     call new_sweep_block(plan, setup%lanes, setup%has_energy_balance, scheduler, block)
     do

@@ -23,6 +23,7 @@ module nocdyn_sweep_block
   use nocdyn_system, only: system_t
   use nocdyn_text, only: string_t
   use nocdyn_units, only: from_si
+  use nocdyn_variant_analyses, only: analyse_chunk
   use nocdyn_variant_machines, only: new_variant_machines, variant_machines_t, variant_needs_own_block, variant_refused
   use omp_lib, only: omp_test_lock, omp_unset_lock
   implicit none (type, external)
@@ -75,15 +76,18 @@ contains
     logical, intent(in) :: with_energy_balance   !! whether a recorded column needs the work integrals
     class(scheduler_t), target, intent(inout) :: scheduler
     type(sweep_block_t), target, intent(out) :: block
-    real(wp) :: typical(plan%design%varied)
+    real(wp) :: typical(plan%design%varied), values(size(plan%numbers%targets))
 
     block%plan => plan
     block%scheduler => scheduler
     block%observer%scheduler => scheduler
     call plan%values(1, typical)
-    call new_variant_machines(plan%input, plan%targets, lanes, with_energy_balance, block%machines, typical)
-    call prepare_integration(plan%input, block%machines%formulation, plan%statistics, block%settings, block%times, &
-                             block%stepper, block%observer%statistics_observer_t, block%message)
+    call plan%numbers%target_values(typical, values)
+    call new_variant_machines(plan%input, plan%numbers%targets, lanes, with_energy_balance, block%machines, values)
+    block%message = ''
+    if (size(plan%statistics) > 0) &
+      call prepare_integration(plan%input, block%machines%formulation, plan%statistics, block%settings, block%times, &
+                               block%stepper, block%observer%statistics_observer_t, block%message)
   end subroutine new_sweep_block
 
   !> Settings, stepper and observer of the variants that a formulation is integrated for. Statistics that begin outside of the
@@ -124,6 +128,29 @@ contains
     integer, intent(in) :: first, count
     type(chunk_t), target, intent(out) :: chunk
     logical, intent(out) :: is_complete   !! false if the computation was interrupted: the chunk is of no use
+    integer :: i
+
+    call allocate_chunk(chunk, first, count, self%plan%design%varied, self%plan%results())
+    chunk%results(:, :) = ieee_value(0.0_wp, ieee_quiet_nan)
+    chunk%status(:) = not_computed
+    if (size(self%plan%statistics) > 0) then
+      call integrate_chunk(self, chunk)
+    else
+      do i = 1, count
+        call self%plan%values(first + i - 1, chunk%parameters(:, i))
+        chunk%status(i) = status_done
+        chunk%steps(i) = 0
+      end do
+    end if
+    is_complete = all(chunk%status /= not_computed)
+    if (is_complete .and. size(self%plan%analyses) > 0) call analyse_chunk(self%plan, self%machines, self%scheduler, chunk, &
+                                                                           is_complete)
+  end subroutine compute
+
+  !> Integrates all variants of a chunk. Those that were interrupted remain `not_computed`.
+  subroutine integrate_chunk(self, chunk)
+    class(sweep_block_t), target, intent(inout) :: self
+    type(chunk_t), target, intent(inout) :: chunk
     type(chunk_ensemble_t) :: ensemble
     class(stepper_t), allocatable :: stepper
     type(solver_status_t) :: solver_status
@@ -133,13 +160,10 @@ contains
     logical :: found
 
     t = 0.0_wp
-    call allocate_chunk(chunk, first, count, self%plan%design%varied, size(self%plan%statistics))
-    chunk%results(:, :) = ieee_value(0.0_wp, ieee_quiet_nan)
-    chunk%status(:) = not_computed
     ensemble%block => self
     ensemble%chunk => chunk
     allocate (ensemble%index(self%machines%formulation%lanes), source=0)
-    allocate (ensemble%needs_own_block(count), source=.false.)
+    allocate (ensemble%needs_own_block(chunk%count), source=.false.)
     if (self%message == '') then
       allocate (stepper, source=self%stepper)
       call integrate_with(stepper, self%machines%formulation, self%settings, self%times, ensemble, self%observer, solver_status)
@@ -147,13 +171,12 @@ contains
       allocate (y(self%machines%formulation%states + self%machines%formulation%quadratures), source=0.0_wp)
       call ensemble%next(self%machines%formulation, 1, t, y, found)   ! refuses all, or notes that they need a block of their own
     end if
-    do i = 1, count
+    do i = 1, chunk%count
       if (.not. ensemble%needs_own_block(i)) cycle
       if (self%scheduler%is_cancelled()) exit
       call self%compute_in_own_block(chunk, i)
     end do
-    is_complete = all(chunk%status /= not_computed)
-  end subroutine compute
+  end subroutine integrate_chunk
 
   !> Sets the next variant that fits the lanes in one of them.
   subroutine next(self, system, lane, t, y, found)
@@ -164,6 +187,7 @@ contains
     real(wp), contiguous, intent(inout) :: y(:)
     logical, intent(out) :: found
     character(len=:), allocatable :: reason
+    real(wp) :: values(size(self%block%plan%numbers%targets))
     integer :: i, status
 
     do
@@ -172,7 +196,8 @@ contains
       if (.not. found) return
       self%next_index = i + 1
       call self%block%plan%values(self%chunk%first + i - 1, self%chunk%parameters(:, i))
-      call self%block%machines%set_variant(self%chunk%parameters(:, i), lane, y, status, reason)
+      call self%block%plan%numbers%target_values(self%chunk%parameters(:, i), values)
+      call self%block%machines%set_variant(values, lane, y, status, reason)
       select case (status)
       case (variant_refused)
         call refuse(self%chunk, i, reason)
@@ -215,17 +240,19 @@ contains
     type(integration_settings_t), intent(in) :: settings
     type(statistic_t), intent(in) :: statistics(:)
     class(statistics_observer_t), intent(inout) :: observer
+    real(wp) :: values(size(statistics))
     integer :: i
 
     if (solver_status%code(lane) == integration_interrupted) return
     chunk%steps(index) = solver_status%accepted(lane)
     if (solver_status%code(lane) == integration_done) then
       chunk%status(index) = status_done
-      call observer%results(lane, chunk%results(:, index))
+      call observer%results(lane, values)
       do i = 1, size(statistics)
-        chunk%results(i, index) = from_si(chunk%results(i, index), statistics(i)%in_unit)
+        values(i) = from_si(values(i), statistics(i)%in_unit)
+        chunk%results(statistics(i)%result, index) = values(i)
       end do
-      i = findloc(is_finite(chunk%results(:, index)), .false., dim=1)
+      i = findloc(is_finite(values), .false., dim=1)
       if (i == 0) return
       chunk%status(index) = status_failed
       chunk%reasons(index)%text = 'the result ' // statistics(i)%label // ' is not a finite number'
@@ -249,9 +276,10 @@ contains
     type(solver_status_t) :: solver_status
     character(len=:), allocatable :: message
     real(wp), allocatable :: start(:)
-    real(wp) :: times(2)
+    real(wp) :: times(2), values(size(self%plan%numbers%targets))
 
-    call self%machines%own_formulation(chunk%parameters(:, index), formulation, message)
+    call self%plan%numbers%target_values(chunk%parameters(:, index), values)
+    call self%machines%own_formulation(values, formulation, message)
     observer%scheduler => self%scheduler
     if (message == '') call prepare_integration(self%machines%input, formulation, self%plan%statistics, settings, times, &
                                                 stepper, observer%statistics_observer_t, message)

@@ -41,7 +41,7 @@ module nocdyn_variant_machines
     type(reduced_t), pointer, private :: assembled => null()   !! a variant of one lane, laid out as the block
     type(lane_parameters_t), private :: assembled_parameters
   contains
-    procedure :: set_variant, set_by_assembly, needs_assembly, own_formulation, release
+    procedure :: set_variant, set_by_assembly, needs_assembly, own_formulation, own_machine, release
   end type variant_machines_t
 
 contains
@@ -209,9 +209,19 @@ contains
     character(len=:), allocatable, intent(out) :: message   !! why there is no such machine, ''
     type(machine_t) :: machine
 
-    call assemble_variant(self%input, self%targets, values, machine, message)
+    call self%own_machine(values, machine, message)
     if (message == '') call new_asked_formulation(self%input, machine, formulation, self%has_energy_balance)
   end subroutine own_formulation
+
+  !> The machine, of one lane, of a variant. Its input is then `input`.
+  subroutine own_machine(self, values, machine, message)
+    class(variant_machines_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: values(:)   !! [targets]
+    type(machine_t), intent(out) :: machine
+    character(len=:), allocatable, intent(out) :: message   !! why there is no such machine, ''
+
+    call assemble_variant(self%input, self%targets, values, machine, message)
+  end subroutine own_machine
 
   !> Frees the block.
   subroutine release(self)

@@ -1,10 +1,12 @@
 !> The recorded quantities of a sweep: the statistics and trajectories that the groups &record ask for.
 module nocdyn_recorded_quantities
+  use nocdyn_analysis_results, only: analysis_result_t
   use nocdyn_column_names, only: explain_no_column
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_output_units, only: match_column, output_units
+  use nocdyn_recorded_analyses, only: analysis_reader_t
   use nocdyn_statistics, only: new_statistic, statistic_names, statistic_t
   use nocdyn_text, only: quoted, string_t, to_text
   implicit none (type, external)
@@ -21,24 +23,29 @@ module nocdyn_recorded_quantities
 
 contains
 
-  !> Reads the statistics, in the order of the file.
-  subroutine read_recorded_quantities(input, labels, span, variants, statistics, diagnostics)
+  !> Reads what is recorded, in the order of the file.
+  subroutine read_recorded_quantities(input, reader, labels, span, variants, statistics, analyses, diagnostics)
     type(input_t), intent(in) :: input
+    type(analysis_reader_t), intent(in) :: reader
     type(string_t), intent(in) :: labels(:)   !! of the columns of trajectory.csv
     type(time_span_t), intent(in) :: span
     integer, intent(in) :: variants           !! number of variants, huge if it is not known
     type(statistic_t), allocatable, intent(out) :: statistics(:)
+    type(analysis_result_t), allocatable, intent(out) :: analyses(:)
     type(diagnostics_t), intent(inout) :: diagnostics
     integer :: i
 
-    allocate (statistics(0))
+    allocate (statistics(0), analyses(0))
     associate (records => input%groups_named('record'))
       do i = 1, size(records)
         associate (group => input%groups(records(i)))
           if (group%has_value('quantity')) then
-            call add_statistics(input, records(i), labels, span, statistics, diagnostics)
+            call add_statistics(input, records(i), labels, span, size(analyses), statistics, diagnostics)
+          else if (group%has_value('mode') .or. group%has_value('response')) then
+            call reader%add_results(input, records(i), size(statistics), analyses, diagnostics)
           else if (.not. group%has_value('trajectories')) then
-            call diagnostics%add(group%line, records(i), 'there is nothing to record; needed: quantity or trajectories')
+            call diagnostics%add(group%line, records(i), 'there is nothing to record; needed: quantity, mode, response or ' // &
+                                 'trajectories')
           end if
           if (group%has_value('trajectories')) call check_trajectories(input, records(i), variants, diagnostics)
         end associate
@@ -81,11 +88,12 @@ contains
     end do
   end subroutine restrict_statistics
 
-  subroutine add_statistics(input, record, labels, span, statistics, diagnostics)
+  subroutine add_statistics(input, record, labels, span, others, statistics, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: record   !! index of the &record
     type(string_t), intent(in) :: labels(:)
     type(time_span_t), intent(in) :: span
+    integer, intent(in) :: others   !! results of a variant that are no statistics, so far
     type(statistic_t), allocatable, intent(inout) :: statistics(:)
     type(diagnostics_t), intent(inout) :: diagnostics
     type(statistic_t) :: statistic
@@ -102,10 +110,16 @@ contains
       if (group%has_value('band')) band = group%number('band')
       do i = 1, size(words)
         k = findloc(statistic_names == words(i)%text, .true., dim=1)
+        if (k == 0) then
+          call input%report(record, 'statistic', 'statistic = ' // quoted(words(i)%text) // ' does not belong to quantity; ' // &
+                            'needed: mode or response', diagnostics)
+          cycle
+        end if
         statistic = new_statistic(labels, column, k, span%t_start, from, band, unit)
         if (any([(statistics(k)%label == statistic%label, k=1, size(statistics))])) then
           call input%report(record, 'statistic', quoted(statistic%label) // ' is recorded already; allowed: once', diagnostics)
         else
+          statistic%result = others + size(statistics) + 1
           call append_statistic(statistics, statistic)
         end if
       end do

@@ -1,4 +1,4 @@
-!> The targets and the design of a sweep, from &sweep and &vary or from the file of a list.
+!> What varies in a sweep and its design, from &sweep and &vary or from the file of a list.
 module nocdyn_sweep_design
   use nocdyn_checksums, only: checksum_digits
   use nocdyn_designs, only: can_overflow, design_t, factor_t, grid_design, grid_size, list_design, max_variants, &
@@ -9,22 +9,21 @@ module nocdyn_sweep_design
   use nocdyn_diagnostics, only: diagnostics_t, no_line
   use nocdyn_sobol_points, only: max_dimensions
   use nocdyn_table_file, only: read_list_text
-  use nocdyn_target_consistency, only: find_targets, target_at
-  use nocdyn_targets, only: target_t
   use nocdyn_text, only: quoted, string_t, to_text
   use nocdyn_text_file, only: path_in, read_text_file
+  use nocdyn_varied_numbers, only: find_varied_numbers, varied_number_t, varied_numbers_t
   implicit none (type, external)
   private
 
-  public :: read_design, find_varied
+  public :: read_design, find_varied, find_planned_numbers
 
 contains
 
-  !> Reads targets and design. The design is allocated if there is no error. A list refuses &vary.
-  subroutine read_design(input, sweep, targets, design, list_checksum, diagnostics)
+  !> Reads what varies and the design. The design is allocated if there is no error. A list refuses &vary.
+  subroutine read_design(input, sweep, numbers, design, list_checksum, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: sweep   !! index of &sweep
-    type(target_t), allocatable, intent(out) :: targets(:)
+    type(varied_numbers_t), intent(out) :: numbers
     type(design_t), allocatable, intent(out) :: design
     character(len=:), allocatable, intent(out) :: list_checksum   !! of the bytes of the file of a list, '' if there is none
     type(diagnostics_t), intent(inout) :: diagnostics
@@ -36,16 +35,16 @@ contains
     list_checksum = ''
     associate (group => input%groups(sweep), varied => input%groups_named('vary'))
       if (group%text('design') == 'list') then
-        call read_list(input, sweep, targets, values, list_checksum, diagnostics)
+        call read_list(input, sweep, numbers, values, list_checksum, diagnostics)
         do i = 1, size(varied)
           call diagnostics%add(input%groups(varied(i))%line, varied(i), &
                                "design = 'list' takes targets and values from its file; allowed: no &vary")
         end do
-        call refuse_overrides(input, [integer ::], targets, diagnostics)
+        call refuse_overrides(input, [integer ::], numbers, diagnostics)
         if (diagnostics%count == before) allocate (design, source=list_design(values))
       else
-        call read_varied(input, sweep, varied, targets, factors, diagnostics)
-        call refuse_overrides(input, varied, targets, diagnostics)
+        call read_varied(input, sweep, varied, numbers, factors, diagnostics)
+        call refuse_overrides(input, varied, numbers, diagnostics)
         if (diagnostics%count == before) call make_design(group, factors, design)
       end if
     end associate
@@ -66,11 +65,11 @@ contains
   end subroutine make_design
 
   !> Reads the file of a list: targets in its first line, values in the others.
-  subroutine read_list(input, sweep, targets, values, list_checksum, diagnostics)
+  subroutine read_list(input, sweep, numbers, values, list_checksum, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: sweep
-    type(target_t), allocatable, intent(out) :: targets(:)
-    real(wp), allocatable, intent(out) :: values(:, :)   !! [targets, variants]
+    type(varied_numbers_t), intent(out) :: numbers
+    real(wp), allocatable, intent(out) :: values(:, :)   !! [numbers, variants]
     character(len=:), allocatable, intent(inout) :: list_checksum
     type(diagnostics_t), intent(inout) :: diagnostics
     type(error_t), allocatable :: error
@@ -78,7 +77,8 @@ contains
     character(len=:), allocatable :: file, text
     integer :: i, line
 
-    allocate (targets(0))
+    allocate (paths(0))
+    call find_varied_numbers(input, paths, [logical ::], numbers, messages)
     file = path_in(input%file(:index(input%file, '/', back=.true.)), input%groups(sweep)%text('file'))
     call read_text_file(file, text, error)
     if (allocated(error)) then
@@ -91,11 +91,11 @@ contains
       call input%report(sweep, 'file', 'file: ' // messages(i)%text, diagnostics)
     end do
     call split_units(names, paths, units)
-    call find_targets(input, paths, targets, messages)
+    call find_varied_numbers(input, paths, [(.false., i=1, size(paths))], numbers, messages)
     do i = 1, size(paths)
-      if (messages(i)%text == '' .and. units(i)%text /= '' .and. units(i)%text /= targets(i)%unit) then
+      if (messages(i)%text == '' .and. units(i)%text /= '' .and. units(i)%text /= numbers%list(i)%unit) then
         messages(i)%text = 'another unit; needed: ' // paths(i)%text
-        if (targets(i)%unit /= '') messages(i)%text = messages(i)%text // ' [' // targets(i)%unit // ']'
+        if (numbers%list(i)%unit /= '') messages(i)%text = messages(i)%text // ' [' // numbers%list(i)%unit // ']'
       end if
       if (messages(i)%text == '') cycle
       call input%report(sweep, 'file', 'file: ' // file // ':' // to_text(line) // ': column ' // to_text(i) // ', ' // &
@@ -121,17 +121,17 @@ contains
   end subroutine split_units
 
   !> Refuses overrides of numbers that vary: they would have no effect.
-  subroutine refuse_overrides(input, varied, targets, diagnostics)
+  subroutine refuse_overrides(input, varied, numbers, diagnostics)
     type(input_t), intent(in) :: input
-    integer, intent(in) :: varied(:)   !! index of the &vary of each target; empty if the targets are those of a list
-    type(target_t), intent(in) :: targets(:)
+    integer, intent(in) :: varied(:)   !! index of the &vary of each number; empty if they are those of a list
+    type(varied_numbers_t), intent(in) :: numbers
     type(diagnostics_t), intent(inout) :: diagnostics
     character(len=:), allocatable :: source
     integer :: i, t
 
     do i = 1, size(input%overrides)
       associate (text => input%overrides(i)%text)
-        t = target_at(input, targets, text(:index(text, '=') - 1))
+        t = numbers%number_at(input, text(:index(text, '=') - 1))
       end associate
       if (t == 0) cycle
       if (size(varied) == 0) then
@@ -144,23 +144,23 @@ contains
     end do
   end subroutine refuse_overrides
 
-  subroutine read_varied(input, sweep, varied, targets, factors, diagnostics)
+  subroutine read_varied(input, sweep, varied, numbers, factors, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: sweep, varied(:)
-    type(target_t), allocatable, intent(out) :: targets(:)
+    type(varied_numbers_t), intent(out) :: numbers
     type(factor_t), allocatable, intent(out) :: factors(:)
     type(diagnostics_t), intent(inout) :: diagnostics
     character(len=:), allocatable :: design
     integer :: i
 
     design = input%groups(sweep)%text('design')
-    call find_varied(input, varied, targets, diagnostics)
+    call find_varied(input, varied, numbers, diagnostics)
     allocate (factors(size(varied)))
     do i = 1, size(varied)
       factors(i) = factor_of(input%groups(varied(i)))
       call check_factor(input, varied(i), design, factors(i), diagnostics)
-      if (design == 'grid' .and. targets(i)%is_integer) call check_whole_grid(input, varied(i), targets(i), factors(i), &
-                                                                              diagnostics)
+      if (design == 'grid' .and. numbers%list(i)%is_integer) call check_whole_grid(input, varied(i), numbers%list(i), &
+                                                                                   factors(i), diagnostics)
     end do
     if (size(varied) == 0) then
       call input%report(sweep, 'design', 'design = ' // quoted(design) // ' has nothing to vary; needed: a &vary', diagnostics)
@@ -173,26 +173,47 @@ contains
     end if
   end subroutine read_varied
 
-  !> The targets of all &vary, as far as they exist.
-  subroutine find_varied(input, varied, targets, diagnostics)
+  !> The numbers of all &vary, as far as they exist.
+  subroutine find_varied(input, varied, numbers, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: varied(:)
-    type(target_t), allocatable, intent(out) :: targets(:)
+    type(varied_numbers_t), intent(out) :: numbers
     type(diagnostics_t), intent(inout) :: diagnostics
     type(string_t), allocatable :: messages(:), paths(:)
+    logical :: are_relative(size(varied))
     integer :: i
 
     allocate (paths(size(varied)))
     do i = 1, size(varied)
       paths(i)%text = ''
+      are_relative(i) = .false.
+      if (input%groups(varied(i))%has_value('scale')) are_relative(i) = input%groups(varied(i))%text('scale') == 'relative'
       if (input%groups(varied(i))%has_value('target')) paths(i)%text = input%groups(varied(i))%text('target')
     end do
-    call find_targets(input, paths, targets, messages)
+    call find_varied_numbers(input, paths, are_relative, numbers, messages)
     do i = 1, size(varied)
       if (messages(i)%text == '' .or. .not. input%groups(varied(i))%has_value('target')) cycle
       call input%report(varied(i), 'target', 'target = ' // quoted(paths(i)%text) // ': ' // messages(i)%text, diagnostics)
     end do
   end subroutine find_varied
+
+  !> The numbers of a sweep that has been planned before: those of its &vary, or of the columns of its list.
+  subroutine find_planned_numbers(input, labels, numbers)
+    type(input_t), intent(in) :: input
+    type(string_t), intent(in) :: labels(:)   !! of the numbers
+    type(varied_numbers_t), intent(out) :: numbers
+    type(string_t), allocatable :: messages(:)
+    type(diagnostics_t) :: diagnostics
+    integer, allocatable :: varied(:)
+    integer :: i
+
+    allocate (varied, source=input%groups_named('vary'))
+    if (size(varied) > 0) then
+      call find_varied(input, varied, numbers, diagnostics)
+    else
+      call find_varied_numbers(input, labels, [(.false., i=1, size(labels))], numbers, messages)
+    end if
+  end subroutine find_planned_numbers
 
   type(factor_t) function factor_of(group) result(factor)
     type(group_t), intent(in) :: group
@@ -248,10 +269,10 @@ contains
   end subroutine check_factor
 
   !> Refuses a grid of integers of which some would be rounded to the same one.
-  subroutine check_whole_grid(input, varied, target, factor, diagnostics)
+  subroutine check_whole_grid(input, varied, number, factor, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: varied   !! index of the &vary
-    type(target_t), intent(in) :: target
+    type(varied_number_t), intent(in) :: number
     type(factor_t), intent(in) :: factor
     type(diagnostics_t), intent(inout) :: diagnostics
     real(wp) :: room
@@ -259,7 +280,7 @@ contains
     if (factor%distribution /= 'uniform' .or. factor%high <= factor%low) return
     room = anint(factor%high) - anint(factor%low) + 1.0_wp
     if (factor%count <= room) return
-    call input%report(varied, 'count', 'count = ' // to_text(factor%count) // ' has repeats: ' // target%path // &
+    call input%report(varied, 'count', 'count = ' // to_text(factor%count) // ' has repeats: ' // number%path // &
                      ' is a whole number, of which low = ' // to_text(factor%low) // ' to high = ' // to_text(factor%high) // &
                      ' holds ' // to_text(nint(room)) // '; allowed: 1 to ' // to_text(nint(room)), diagnostics)
   end subroutine check_whole_grid

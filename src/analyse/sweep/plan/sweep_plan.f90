@@ -1,6 +1,7 @@
 !> The plan of a sweep: targets, design and recorded quantities, as its input describes them. All errors in the groups of the
 !> sweep are reported at once.
 module nocdyn_sweep_plan
+  use nocdyn_analysis_results, only: analysis_result_t
   use nocdyn_column_names, only: count_columns
   use nocdyn_designs, only: design_t
   use nocdyn_errors, only: error_t, exit_input, raise
@@ -14,11 +15,13 @@ module nocdyn_sweep_plan
   use nocdyn_statistics, only: statistic_t
   use nocdyn_sweep_design, only: find_varied, read_design
   use nocdyn_sweep_header, only: sweep_header_t
+  use nocdyn_recorded_analyses, only: analysis_reader_t, new_analysis_reader
   use nocdyn_recorded_quantities, only: check_quantities, read_recorded_quantities, time_span_t, wanted_trajectories
   use nocdyn_targets, only: target_t
   use nocdyn_text, only: counted, string_t
   use nocdyn_trajectory_columns, only: table_bytes
   use nocdyn_variant_columns, only: label_columns
+  use nocdyn_varied_numbers, only: varied_numbers_t
   use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
   private
@@ -31,13 +34,14 @@ module nocdyn_sweep_plan
     type(input_t) :: input                            !! of the base machine and the sweep
     type(machine_t) :: machine                        !! the base machine, one lane
     type(design_t), allocatable :: design
-    type(target_t), allocatable :: targets(:)         !! of the factors of the design
+    type(varied_numbers_t) :: numbers                 !! that the design varies
     type(statistic_t), allocatable :: statistics(:)
+    type(analysis_result_t), allocatable :: analyses(:)   !! results of modes and of the response
     integer, allocatable :: trajectories(:)           !! variants whose trajectories are written, ascending
     integer :: columns = 0                            !! of each trajectory
     character(len=:), allocatable :: list_checksum    !! of the file of a list, '' if there is none
   contains
-    procedure :: values, summary, file_bytes
+    procedure :: values, results, summary, file_bytes
   end type sweep_plan_t
 
 contains
@@ -49,6 +53,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(diagnostics_t) :: diagnostics
     type(error_t), allocatable :: failure
+    type(analysis_reader_t) :: reader
     type(string_t), allocatable :: labels(:)
     integer, allocatable :: sweeps(:)
     integer :: variants
@@ -59,14 +64,16 @@ contains
       return
     end if
     plan%input = input
-    call read_design(input, sweeps(1), plan%targets, plan%design, plan%list_checksum, diagnostics)
+    call read_design(input, sweeps(1), plan%numbers, plan%design, plan%list_checksum, diagnostics)
     variants = huge(variants)
     if (allocated(plan%design)) variants = plan%design%variants
-    call label_columns(input, plan%targets, plan%machine, labels, failure)
+    call label_columns(input, plan%numbers%targets, plan%machine, labels, failure)
+    if (.not. allocated(failure)) call new_analysis_reader(input, plan%machine, reader, failure)
     if (.not. allocated(failure)) then
-      call read_recorded_quantities(input, labels, fixed_span(input, plan%targets), variants, plan%statistics, diagnostics)
+      call read_recorded_quantities(input, reader, labels, fixed_span(input, plan%numbers%targets), variants, plan%statistics, &
+                                    plan%analyses, diagnostics)
       allocate (plan%trajectories, source=wanted_trajectories(input))
-      if (size(plan%statistics) == 0 .and. diagnostics%count == 0) call input%report(sweeps(1), 'design', &
+      if (plan%results() == 0 .and. diagnostics%count == 0) call input%report(sweeps(1), 'design', &
         'no number of the variants is kept; needed: a &record with quantity and statistic', diagnostics)
       if (size(plan%trajectories) > 0) call check_output_times(input, failure)
       if (.not. allocated(failure)) call count_columns(input, plan%machine, plan%columns, failure)
@@ -83,7 +90,7 @@ contains
     type(error_t), allocatable :: failure
     type(machine_t) :: machine
     type(string_t), allocatable :: labels(:)
-    type(target_t), allocatable :: targets(:)
+    type(varied_numbers_t) :: numbers
     integer, allocatable :: varied(:)
     integer :: i
 
@@ -93,21 +100,28 @@ contains
       if (.not. has_word(kinds, input%groups(diagnostics%list(i)%group)%kind)) return
     end do
     allocate (varied, source=input%groups_named('vary'))
-    call find_varied(input, varied, targets, diagnostics)
-    call label_columns(input, targets, machine, labels, failure)
+    call find_varied(input, varied, numbers, diagnostics)
+    call label_columns(input, numbers%targets, machine, labels, failure)
     if (size(varied) > 0 .and. .not. allocated(failure)) call check_quantities(input, labels, diagnostics)
     call merge_errors(input, diagnostics, failure, error)
   end subroutine add_plan_diagnostics
 
-  !> The values of the targets in a variant: those of the design, rounded where the target is an integer.
+  !> The numbers of a variant: those of the design, rounded where they are integers.
   pure subroutine values(self, variant, x)
     class(sweep_plan_t), intent(in) :: self
     integer, intent(in) :: variant   !! 1 to `design%variants`
-    real(wp), intent(out) :: x(:)    !! [targets]
+    real(wp), intent(out) :: x(:)    !! [numbers]
 
     call self%design%values(variant, x)
-    where (self%targets%is_integer) x = anint(x)
+    call self%numbers%round(x)
   end subroutine values
+
+  !> Number of results of each variant.
+  pure integer function results(self)
+    class(sweep_plan_t), intent(in) :: self
+
+    results = size(self%statistics) + size(self%analyses)
+  end function results
 
   !> E.g. 'random, 100000 variants that differ in 2 numbers, 7 results'.
   function summary(self) result(text)
@@ -118,7 +132,7 @@ contains
     group = self%input%single('sweep')
     text = group%text('design') // ', ' // &
            counted(self%design%variants, 'variant that differs in ', 'variants that differ in ') // &
-           counted(self%design%varied, 'number', 'numbers') // ', ' // counted(size(self%statistics), 'result', 'results')
+           counted(self%design%varied, 'number', 'numbers') // ', ' // counted(self%results(), 'result', 'results')
     if (size(self%trajectories) > 0) text = text // ', ' // counted(size(self%trajectories), 'trajectory', 'trajectories')
   end function summary
 
@@ -130,7 +144,7 @@ contains
     real(wp), parameter :: of_number = 8.0_wp, of_status = 8.0_wp
     integer :: columns
 
-    columns = size(self%targets) + size(self%statistics)
+    columns = size(self%numbers%list) + self%results()
     file_bytes = 2 * real(variants, wp) * (of_number * columns + of_status)   ! journal and sweep.nc
     if (has_table) file_bytes = file_bytes + table_bytes(variants, columns + 2)
     if (size(self%trajectories) > 0) file_bytes = file_bytes + size(self%trajectories) * &
@@ -199,16 +213,25 @@ contains
     type(sweep_header_t), intent(inout) :: header
     integer :: i
 
-    allocate (header%parameters(size(plan%targets)), header%results(size(plan%statistics)))
-    do i = 1, size(plan%targets)
-      header%parameters(i)%label = plan%targets(i)%path
-      header%parameters(i)%unit = plan%targets(i)%unit
-      header%parameters(i)%long_name = plan%targets(i)%long_name
+    allocate (header%parameters(size(plan%numbers%list)), header%results(plan%results()))
+    do i = 1, size(plan%numbers%list)
+      header%parameters(i)%label = plan%numbers%list(i)%path
+      header%parameters(i)%unit = plan%numbers%list(i)%unit
+      header%parameters(i)%long_name = plan%numbers%list(i)%long_name
     end do
     do i = 1, size(plan%statistics)
-      header%results(i)%label = plan%statistics(i)%label
-      header%results(i)%unit = plan%statistics(i)%unit
-      header%results(i)%long_name = plan%statistics(i)%long_name
+      associate (result => header%results(plan%statistics(i)%result))
+        result%label = plan%statistics(i)%label
+        result%unit = plan%statistics(i)%unit
+        result%long_name = plan%statistics(i)%long_name
+      end associate
+    end do
+    do i = 1, size(plan%analyses)
+      associate (result => header%results(plan%analyses(i)%result))
+        result%label = plan%analyses(i)%label
+        result%unit = plan%analyses(i)%unit
+        result%long_name = plan%analyses(i)%long_name
+      end associate
     end do
   end subroutine name_quantities
 

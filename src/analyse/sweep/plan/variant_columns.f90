@@ -26,7 +26,7 @@ contains
   !> Assembles the base machine and labels its columns, then those that exist only if targets which are 0 or not given are not 0.
   subroutine label_columns(input, targets, machine, labels, error)
     type(input_t), intent(in) :: input
-    type(target_t), intent(in) :: targets(:)      !! group 0 marks one that was not found
+    type(target_t), intent(in) :: targets(:)
     type(machine_t), intent(out) :: machine
     type(string_t), allocatable, intent(out) :: labels(:)
     type(error_t), allocatable, intent(out) :: error
@@ -54,7 +54,6 @@ contains
     type(target_t), intent(in) :: target
 
     hides_column = .false.
-    if (target%group == 0) return
     if (.not. has_word('coupling motor', input%groups(target%group)%kind)) return
     associate (value => input%groups(target%group)%values(target%key))
       hides_column = .not. value%has_any()

@@ -27,6 +27,7 @@ module nocdyn_statistics
   !> A result of each variant: a statistic of a column x from the time `from` on. The settling time ends when
   !> |x - x_end| <= band |x(from) - x_end| from then on. Variants of another structure have other columns, in another order.
   type, public :: statistic_t
+    integer :: result = 0                            !! its number among the results of a variant
     character(len=:), allocatable :: quantity        !! label of the column, e.g. 'moment_shaft [N m]'
     integer :: column = 0                            !! in the trajectory table of one machine, 0 if that has none
     integer :: kind = statistic_final                !! statistic_...

@@ -15,9 +15,10 @@ module nocdyn_target_consistency
 contains
 
   !> Finds the targets of several paths and checks that they are consistent.
-  subroutine find_targets(input, paths, targets, messages)
+  subroutine find_targets(input, paths, numbers, targets, messages)
     type(input_t), intent(in) :: input
     type(string_t), intent(in) :: paths(:)
+    integer, intent(in) :: numbers(:)                             !! of the paths in messages, [paths]
     type(target_t), allocatable, intent(out) :: targets(:)        !! [paths]; those with a message are not valid
     type(string_t), allocatable, intent(out) :: messages(:)       !! [paths], '' if nothing is wrong
     integer :: earlier, i
@@ -30,7 +31,8 @@ contains
       if (targets(i)%group == 0) cycle
       call check_consistency(input, targets, i, messages(i)%text)
       earlier = same_target(targets(:i - 1), targets(i))
-      if (earlier > 0) messages(i)%text = 'varies already, as number ' // to_text(earlier) // '; allowed: once'
+      if (earlier > 0) messages(i)%text = 'varies already, as number ' // to_text(numbers(earlier)) // &
+                                                '; allowed: once'
     end do
   end subroutine find_targets
 

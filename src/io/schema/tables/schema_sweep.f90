@@ -1,18 +1,19 @@
 !> Rows of the schema: the groups &sweep, &vary and &record with their keys.
 module nocdyn_schema_sweep
   use nocdyn_kinds, only: wp
-  use nocdyn_schema_rules, only: a_file, a_number, a_selector, a_text, alias_t, allowed_t, an_integer, any_number, any_times, &
-    anything, at_most_once, example_t, from_1, group_rule_t, key_rule_t, kind_rule_t, less_than, not_negative, positive, &
-    relation_rule_t, required, requires, unset
+  use nocdyn_schema_rules, only: a_file, a_number, a_selector, a_text, a_word, alias_t, allowed_t, an_integer, any_number, &
+    any_times, anything, at_most_once, at_most_one, example_t, from_1, group_rule_t, key_rule_t, kind_rule_t, less_than, &
+    not_negative, positive, relation_rule_t, required, requires, unset
   implicit none (type, external)
   private
 
+  type(allowed_t), parameter :: scales = allowed_t(words='absolute relative')
   type(allowed_t), parameter :: sample_counts = allowed_t(low=1.0_wp, high=2.0e9_wp)
 
   type(group_rule_t), parameter, public :: sweep_groups(*) = [ &
     group_rule_t('sweep',  at_most_once, '', 'Which variants a sweep computes. Other commands ignore it.'), &
     group_rule_t('vary',   any_times,    '', 'A number of the input that a sweep varies.'), &
-    group_rule_t('record', any_times,    '', 'What a sweep stores of each variant: statistics of a column, or trajectories.')]
+    group_rule_t('record', any_times,    '', 'What a sweep stores of each variant: statistics, modes, responses, trajectories.')]
 
   type(kind_rule_t), parameter, public :: sweep_kinds(*) = [ &
     kind_rule_t('sweep',  'grid',    'every combination; the last &vary runs fastest'), &
@@ -30,7 +31,13 @@ module nocdyn_schema_sweep
     kind_rule_t('record', 'mean',    'mean over time'), &
     kind_rule_t('record', 'rms',     'square root of the mean of the square'), &
     kind_rule_t('record', 'time_of_max', 'when the largest value occurs'), &
-    kind_rule_t('record', 'settling_time', 'time after from until |x - x_end| stays <= band |x_from - x_end|')]
+    kind_rule_t('record', 'settling_time', 'time after from until |x - x_end| stays <= band |x_from - x_end|'), &
+    kind_rule_t('record', 'frequency',     'of mode: with damping, about the steady state'), &
+    kind_rule_t('record', 'damping_ratio', 'of mode'), &
+    kind_rule_t('record', 'peak',          'of response: largest amplitude of the order, or half range of all orders'), &
+    kind_rule_t('record', 'peak_speed',    'of response: where the peak is'), &
+    kind_rule_t('record', 'margin',        'of response: distance of the peak to the speeds in operation, as a share'), &
+    kind_rule_t('record', 'ratio',         'of response: largest ratio to the limits of &limit over the speed')]
 
   type(key_rule_t), parameter, public :: sweep_keys(*) = [ &
     key_rule_t('sweep',      'design',          a_selector,     1, '',            required,    anything, &
@@ -42,7 +49,9 @@ module nocdyn_schema_sweep
     key_rule_t('sweep',      'file',            a_file,         1, '',            required,    anything, &
       'CSV file: paths as in target in the first line, then a line of numbers for each variant', 'list'), &
     key_rule_t('vary',       'target',          a_text,         1, '',            required,    anything, &
-      'GROUP.NAME.KEY or run.KEY; with an index (2) where the key is a list; integers are rounded'), &
+      'GROUP.NAME.KEY or run.KEY; * in NAME ties several; (2) for one value of a list'), &
+    key_rule_t('vary',       'scale',           a_word,         1, '',            "'absolute'", scales, &
+      'relative: the values multiply those of the input'), &
     key_rule_t('vary',       'low',             a_number,       1, '',            unset,       anything, &
       'smallest value', required_if='uniform'), &
     key_rule_t('vary',       'high',            a_number,       1, '',            unset,       anything, &
@@ -61,6 +70,12 @@ module nocdyn_schema_sweep
       'standard deviation of the natural logarithm', 'lognormal'), &
     key_rule_t('record',     'quantity',        a_text,         1, '',            unset,       anything, &
       'column of trajectory.csv, with or without its unit'), &
+    key_rule_t('record',     'mode',            an_integer,     1, '',            unset,       from_1, &
+      'number of an oscillation, as nocdyn modes counts them'), &
+    key_rule_t('record',     'response',        a_text,         1, '',            unset,       anything, &
+      'coupling, shaft or mesh, or a column of response.csv, in the forced response by &response'), &
+    key_rule_t('record',     'order',           a_number,       1, '',            unset,       positive, &
+      'order of the response; all together if not given'), &
     key_rule_t('record',     'from',            a_number,       1, 's',           unset,       anything, &
       'start of the time over which statistics are taken; t_start if not given'), &
     key_rule_t('record',     'trajectories',    an_integer,     any_number, '',   unset,       from_1, &
@@ -71,13 +86,18 @@ module nocdyn_schema_sweep
       'tolerance band of the settling time; 0.02 if not given', 'settling_time')]
 
   type(relation_rule_t), parameter, public :: sweep_relations(*) = [ &
-    relation_rule_t('record', requires, 'quantity', 'statistic'), &
-    relation_rule_t('record', requires, 'statistic from', 'quantity'), &
+    relation_rule_t('record', at_most_one, 'quantity', 'mode response'), &
+    relation_rule_t('record', at_most_one, 'mode', 'response'), &
+    relation_rule_t('record', requires, 'quantity mode response', 'statistic'), &
+    relation_rule_t('record', requires, 'statistic', 'quantity mode response'), &
+    relation_rule_t('record', requires, 'from', 'quantity'), &
+    relation_rule_t('record', requires, 'order', 'response'), &
     relation_rule_t('vary', less_than, 'low', 'high', 'count')]
 
   type(alias_t), parameter, public :: sweep_aliases(*) = [ &
     alias_t('sweep',  'n variants count number',       'samples'), &
-    alias_t('vary',   'sigma std sd stddev scale',     'deviation log_deviation'), &
+    alias_t('vary',   'sigma std sd stddev',     'deviation log_deviation'), &
+    alias_t('vary',   'factor relative',               'scale'), &
     alias_t('vary',   'mu average loc',                'mean median'), &
     alias_t('vary',   'min minimum from start',        'low'), &
     alias_t('vary',   'max maximum to stop',           'high'), &
@@ -92,8 +112,11 @@ module nocdyn_schema_sweep
     example_t('vary',   "target = 'load.work.viscous' low = 50.0 high = 150.0", .false.), &
     example_t('vary',   "target = 'gear.reducer.radii(2)' distribution = 'normal'|" // &
                         'mean = 3.0 deviation = 0.001', .false.), &
+    example_t('vary',   "target = 'coupling.*.stiffness' scale = 'relative' low = 0.9 high = 1.1", .false.), &
     example_t('record', "quantity = 'omega_motor'     statistic = 'final'", .false.), &
     example_t('record', "quantity = 'moment_coupling' statistic = 'max_abs', 'time_of_max' from = 2.0", .false.), &
+    example_t('record', "mode = 2 statistic = 'frequency', 'damping_ratio'", .false.), &
+    example_t('record', "response = 'coupling' order = 6 statistic = 'peak', 'peak_speed'", .false.), &
     example_t('record', 'trajectories = 1, 17, 90', .false.)]
 
 end module nocdyn_schema_sweep

@@ -1,0 +1,90 @@
+!> Results of a variant that need no motion: of its modes and of its forced response.
+module nocdyn_analysis_results
+  use nocdyn_kinds, only: wp
+  use nocdyn_text, only: to_text
+  implicit none (type, external)
+  private
+
+  public :: new_mode_result, new_response_result
+
+  integer, parameter, public :: analysis_frequency = 1       !! of the damped oscillation, as nocdyn modes has it
+  integer, parameter, public :: analysis_damping_ratio = 2
+  integer, parameter, public :: analysis_peak = 3            !! largest amplitude over the speeds
+  integer, parameter, public :: analysis_peak_speed = 4      !! where this is
+  integer, parameter, public :: analysis_margin = 5          !! distance of that speed to the speeds in operation
+  integer, parameter, public :: analysis_ratio = 6           !! largest ratio to a limit over the speeds
+
+  character(len=*), parameter, public :: analysis_names(6) = [character(len=13) :: 'frequency', 'damping_ratio', 'peak', &
+    'peak_speed', 'margin', 'ratio']
+  character(len=*), parameter, public :: analysis_owners(6) = [character(len=8) :: 'mode', 'mode', 'response', 'response', &
+    'response', 'response']   !! the key of &record that each belongs to
+
+  !> One result.
+  type, public :: analysis_result_t
+    integer :: result = 0                           !! its number among the results of a variant
+    integer :: statistic = analysis_frequency       !! analysis_...
+    integer :: mode = 0                             !! number of an oscillating mode; 0 for a result of the response
+    character(len=:), allocatable :: quantity       !! element, or column of response.csv without its unit
+    real(wp) :: order = 0.0_wp                      !! 0 stands for all orders together
+    character(len=:), allocatable :: label          !! e.g. 'moment_shaft_order_6_peak'
+    character(len=:), allocatable :: unit           !! e.g. 'N m'
+    integer :: in_unit = 0                          !! the same: index of `units`, 0: that of SI
+    character(len=:), allocatable :: long_name      !! a description
+  end type analysis_result_t
+
+contains
+
+  !> Of an oscillating mode.
+  subroutine new_mode_result(mode, statistic, self)
+    integer, intent(in) :: mode, statistic
+    type(analysis_result_t), intent(out) :: self
+
+    self%mode = mode
+    self%statistic = statistic
+    self%label = 'mode_' // to_text(mode) // '_' // trim(analysis_names(statistic))
+    self%quantity = ''
+    self%unit = ''
+    if (statistic == analysis_frequency) then
+      self%unit = 'Hz'
+      self%long_name = 'frequency of mode ' // to_text(mode) // ' with damping'
+    else
+      self%long_name = 'damping ratio of mode ' // to_text(mode)
+    end if
+  end subroutine new_mode_result
+
+  !> Of a quantity of the forced response.
+  subroutine new_response_result(quantity, column, unit, order, statistic, self)
+    character(len=*), intent(in) :: quantity   !! as a user writes it
+    character(len=*), intent(in) :: column     !! its label without unit
+    character(len=*), intent(in) :: unit       !! of its amplitude
+    real(wp), intent(in) :: order              !! 0 stands for all orders together
+    integer, intent(in) :: statistic           !! analysis_...
+    type(analysis_result_t), intent(out) :: self
+    character(len=:), allocatable :: amplitude
+
+    self%quantity = quantity
+    self%order = order
+    self%statistic = statistic
+    self%label = column
+    amplitude = 'half range of all orders of ' // column
+    if (order > 0) then
+      self%label = self%label // '_order_' // to_text(order)
+      amplitude = 'amplitude of order ' // to_text(order) // ' of ' // column
+    end if
+    self%label = self%label // '_' // trim(analysis_names(statistic))
+    self%unit = ''
+    select case (statistic)
+    case (analysis_peak)
+      self%unit = unit
+      self%long_name = 'largest ' // amplitude // ' over the speed'
+    case (analysis_peak_speed)
+      self%unit = 'rad/s'
+      self%long_name = 'speed of the largest ' // amplitude
+    case (analysis_margin)
+      self%long_name = 'distance of the largest ' // amplitude // ' to the speeds in operation, as a share of the nearest'
+    case default   ! analysis_ratio
+      self%long_name = 'largest ratio to a limit of the ' // amplitude // ' over the speed'
+    end select
+  end subroutine new_response_result
+
+end module nocdyn_analysis_results

@@ -1,0 +1,195 @@
+!> Computes the results of a machine that need no motion.
+module nocdyn_variant_analysis
+  use nocdyn_analysis_results, only: analysis_damping_ratio, analysis_frequency, analysis_margin, analysis_peak, &
+    analysis_peak_speed, analysis_ratio, analysis_result_t
+  use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
+  use nocdyn_excitation_lines, only: line_order
+  use nocdyn_input, only: input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_linearisation, only: linearisation_t, linearise
+  use nocdyn_machine, only: machine_t
+  use nocdyn_modes, only: find_modes, mode_oscillating, mode_t
+  use nocdyn_operating_point, only: find_operating_point, operating_point_t
+  use nocdyn_response_analysis, only: analyse_response, response_analysis_t
+  use nocdyn_response_quantities, only: quantity_moment, quantity_reaction, response_quantity_t
+  use nocdyn_response_settings, only: operating_distance
+  use nocdyn_response_summary, only: worst_ratio
+  use nocdyn_text, only: to_text
+  use nocdyn_units, only: from_si
+  implicit none (type, external)
+  private
+
+  public :: analyse_variant, matching_quantities, same_element
+
+contains
+
+  !> Computes the results of one machine.
+  subroutine analyse_variant(input, machine, results, values, error)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine           !! of the input, one lane
+    type(analysis_result_t), intent(in) :: results(:)
+    real(wp), intent(out) :: values(:)               !! [results]
+    type(error_t), allocatable, intent(out) :: error
+    type(response_analysis_t) :: analysis
+    type(mode_t), allocatable :: modes(:)
+    integer :: i
+
+    values = 0.0_wp
+    if (any(results%mode > 0)) then
+      call oscillating_modes(input, machine, maxval(results%mode), modes, error)
+      if (allocated(error)) return
+    end if
+    if (any(results%mode == 0)) then
+      call analyse_response(input, machine, analysis, error)
+      if (allocated(error)) return
+    end if
+    do i = 1, size(results)
+      associate (one => results(i))
+        if (one%statistic == analysis_frequency) values(i) = modes(one%mode)%frequency()
+        if (one%statistic == analysis_damping_ratio) values(i) = modes(one%mode)%damping_ratio()
+        if (one%mode == 0) call find_response_value(analysis, one, values(i), error)
+        values(i) = from_si(values(i), one%in_unit)
+      end associate
+      if (allocated(error)) return
+    end do
+  end subroutine analyse_variant
+
+  !> The oscillating modes about the steady state, by their frequencies.
+  subroutine oscillating_modes(input, machine, needed, modes, error)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: needed   !! modes
+    type(mode_t), allocatable, intent(out) :: modes(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(operating_point_t) :: point
+    type(linearisation_t) :: linear
+    type(mode_t), allocatable :: all_modes(:)
+    integer :: found, i, no_elements(0)
+
+    call find_operating_point(input, machine, 'equilibrium', point, error)
+    if (.not. allocated(error)) call linearise(point%formulation, point%t, point%y, linear, error)
+    if (.not. allocated(error)) call find_modes(point%formulation, linear, no_elements, all_modes, error)
+    if (allocated(error)) return
+    allocate (modes(count(all_modes%kind == mode_oscillating)))
+    found = 0
+    do i = 1, size(all_modes)
+      if (all_modes(i)%kind /= mode_oscillating) cycle
+      found = found + 1
+      modes(found) = all_modes(i)
+    end do
+    if (size(modes) < needed) call raise(error, exit_failed, 'mode ' // to_text(needed) // &
+      ' is recorded, but the number of oscillating modes about the steady state is ' // to_text(size(modes)))
+  end subroutine oscillating_modes
+
+  !> One result of a response.
+  subroutine find_response_value(analysis, one, value, error)
+    type(response_analysis_t), intent(in) :: analysis
+    type(analysis_result_t), intent(in) :: one
+    real(wp), intent(out) :: value   !! in SI
+    type(error_t), allocatable, intent(inout) :: error
+    integer, allocatable :: quantities(:)
+    real(wp) :: amplitude(size(analysis%response%points))
+    integer :: i, line, peak
+    logical :: is_too_near
+
+    value = 0.0_wp
+    allocate (quantities, source=matching_quantities(analysis%response%quantities, one%quantity))
+    line = line_order(analysis%response%lines, one%order)
+    if (one%order > 0 .and. line == 0) then
+      call raise(error, exit_input, 'order ' // to_text(one%order) // ' is recorded, but no excitation has it')
+    else if (size(quantities) == 0) then
+      call raise(error, exit_input, one%quantity // ' is recorded, but this machine has no such response')
+    end if
+    if (allocated(error)) return
+    do i = 1, size(amplitude)
+      amplitude(i) = largest_amplitude(analysis, i, line, quantities)
+    end do
+    peak = maxloc(amplitude, dim=1)
+    associate (speed => analysis%response%points(peak)%state%speed)
+      select case (one%statistic)
+      case (analysis_peak)
+        value = amplitude(peak)
+      case (analysis_peak_speed)
+        value = speed
+      case (analysis_margin)
+        call operating_distance(analysis%settings, speed, value, is_too_near)
+      case (analysis_ratio)
+        value = largest_ratio(analysis, line, same_element(analysis%response%quantities, one%quantity))
+      end select
+    end associate
+  end subroutine find_response_value
+
+  !> The largest amplitude of some quantities at a speed.
+  pure real(wp) function largest_amplitude(analysis, point, line, quantities) result(largest)
+    type(response_analysis_t), intent(in) :: analysis
+    integer, intent(in) :: point
+    integer, intent(in) :: line            !! 0 stands for the half range of all
+    integer, intent(in) :: quantities(:)
+    integer :: k
+
+    largest = 0.0_wp
+    associate (at => analysis%response%points(point))
+      do k = 1, size(quantities)
+        if (line > 0) largest = max(largest, abs(at%quantity(line, quantities(k))))
+        if (line == 0) largest = max(largest, at%half_range(quantities(k)))
+      end do
+    end associate
+  end function largest_amplitude
+
+  !> The largest ratio of some quantities to their limits for continuous operation over the speed.
+  pure real(wp) function largest_ratio(analysis, line, quantities) result(ratio)
+    type(response_analysis_t), intent(in) :: analysis
+    integer, intent(in) :: line            !! 0 stands for all together
+    integer, intent(in) :: quantities(:)
+    integer :: i, k
+
+    ratio = 0.0_wp
+    do i = 1, size(analysis%response%points)
+      associate (point => analysis%response%points(i))
+        if (line == 0) then
+          do k = 1, size(quantities)
+            ratio = max(ratio, worst_ratio(analysis%limits, point, quantities(k)))
+          end do
+        else
+          do k = 1, size(analysis%limits)
+            associate (limit => analysis%limits(k))
+              if (all(limit%quantity /= quantities)) cycle
+              ratio = max(ratio, abs(point%quantity(line, limit%quantity)) / limit%continuous_limit(point%state%speed))
+            end associate
+          end do
+        end if
+      end associate
+    end do
+  end function largest_ratio
+
+  !> The quantities that a name stands for: a column, or the moments of an element.
+  pure function matching_quantities(quantities, name) result(matching)
+    type(response_quantity_t), intent(in) :: quantities(:)
+    character(len=*), intent(in) :: name
+    integer, allocatable :: matching(:)
+    integer :: q
+
+    allocate (matching(0))
+    do q = 1, size(quantities)
+      if (quantities(q)%label == name .or. quantities(q)%kind == quantity_moment .and. quantities(q)%name == name) then
+        matching = [matching, q]
+      end if
+    end do
+  end function matching_quantities
+
+  !> The quantities whose limits count: a column, or moments and stress of an element.
+  pure function same_element(quantities, name) result(same)
+    type(response_quantity_t), intent(in) :: quantities(:)
+    character(len=*), intent(in) :: name
+    integer, allocatable :: same(:)
+    integer :: q
+
+    allocate (same(0))
+    do q = 1, size(quantities)
+      if (quantities(q)%label == name .or. quantities(q)%kind /= quantity_reaction .and. quantities(q)%name == name) then
+        same = [same, q]
+      end if
+    end do
+  end function same_element
+
+end module nocdyn_variant_analysis

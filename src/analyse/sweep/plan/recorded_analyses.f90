@@ -1,0 +1,219 @@
+!> The results of modes and of the forced response that the groups &record ask for.
+module nocdyn_recorded_analyses
+  use nocdyn_analysis_results, only: analysis_margin, analysis_names, analysis_owners, analysis_peak_speed, analysis_ratio, &
+    analysis_result_t, new_mode_result, new_response_result
+  use nocdyn_diagnostics, only: diagnostics_t
+  use nocdyn_errors, only: error_t
+  use nocdyn_excitation_lines, only: line_order
+  use nocdyn_forced_response, only: forced_response_t, new_forced_response
+  use nocdyn_input, only: input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_output_units, only: output_units
+  use nocdyn_response_limits, only: no_limit, read_limits, response_limit_t
+  use nocdyn_response_quantities, only: list_quantities, quantity_moment, response_quantity_t
+  use nocdyn_response_settings, only: read_response_settings, response_settings_t
+  use nocdyn_schema_text, only: suggestion
+  use nocdyn_text, only: append, quoted, string_t
+  use nocdyn_units, only: unit_for, units
+  use nocdyn_variant_analysis, only: matching_quantities, same_element
+  implicit none (type, external)
+  private
+
+  public :: new_analysis_reader, asks_for_analyses
+
+  !> What the groups &record can name: the response of the base machine.
+  type, public :: analysis_reader_t
+    integer, allocatable :: wanted_units(:)
+    type(response_settings_t) :: settings
+    type(response_quantity_t), allocatable :: quantities(:)
+    type(response_limit_t), allocatable :: limits(:)
+    type(forced_response_t), allocatable :: response   !! with its lines, if the base machine has steady states
+  contains
+    procedure :: add_results
+    procedure, private :: check_response, check_statistic
+  end type analysis_reader_t
+
+contains
+
+  !> Prepares the response of the base machine, if one is recorded.
+  subroutine new_analysis_reader(input, machine, self, error)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine   !! of the input
+    type(analysis_reader_t), intent(out) :: self
+    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable :: failure
+    type(forced_response_t), allocatable :: response
+
+    allocate (self%wanted_units, source=output_units(input))
+    allocate (self%quantities(0), self%limits(0))
+    if (.not. asks_for(input, 'response')) return
+    call read_response_settings(input, machine, self%settings, error)
+    if (allocated(error)) return
+    call list_quantities(machine, self%settings%body, self%quantities)
+    call read_limits(input, self%quantities, self%limits, error)
+    if (allocated(error)) return
+    allocate (response)
+    call new_forced_response(machine, self%settings%body, self%settings%speeds, response, failure)
+    if (.not. allocated(failure)) call move_alloc(response, self%response)
+  end subroutine new_analysis_reader
+
+  !> Whether results of modes or of the response are recorded.
+  logical function asks_for_analyses(input)
+    type(input_t), intent(in) :: input
+
+    asks_for_analyses = asks_for(input, 'mode') .or. asks_for(input, 'response')
+  end function asks_for_analyses
+
+  logical function asks_for(input, key)
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: key   !! of &record
+    integer, allocatable :: records(:)
+    integer :: i
+
+    allocate (records, source=input%groups_named('record'))
+    asks_for = any([(input%groups(records(i))%has_value(key), i=1, size(records))])
+  end function asks_for
+
+  !> Adds the results of a &record with a mode or a response.
+  subroutine add_results(self, input, record, others, results, diagnostics)
+    class(analysis_reader_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record   !! index of the group
+    integer, intent(in) :: others   !! results of a variant that are none of these, so far
+    type(analysis_result_t), allocatable, intent(inout) :: results(:)
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(analysis_result_t) :: one
+    type(string_t), allocatable :: words(:)
+    character(len=:), allocatable :: owner
+    integer :: before, i, k
+
+    owner = 'mode'
+    if (input%groups(record)%has_value('response')) owner = 'response'
+    before = diagnostics%count
+    if (owner == 'response') call self%check_response(input, record, diagnostics)
+    if (diagnostics%count > before) return
+    words = input%groups(record)%texts('statistic')
+    do i = 1, size(words)
+      k = findloc(analysis_names == words(i)%text .and. analysis_owners == owner, .true., dim=1)
+      if (k == 0) then
+        call input%report(record, 'statistic', 'statistic = ' // quoted(words(i)%text) // ' does not belong to ' // owner // &
+                          '; allowed: ' // statistics_of(owner), diagnostics)
+        cycle
+      end if
+      if (owner == 'mode') then
+        call new_mode_result(input%groups(record)%whole_number('mode'), k, one)
+      else
+        call self%check_statistic(input, record, k, diagnostics)
+        call make_response_result(self, input, record, k, one)
+      end if
+      if (any([(results(k)%label == one%label, k=1, size(results))])) then
+        call input%report(record, 'statistic', quoted(one%label) // ' is recorded already; allowed: once', diagnostics)
+      else
+        one%result = others + size(results) + 1
+        call append_result(results, one)
+      end if
+    end do
+  end subroutine add_results
+
+  !> "'peak', 'peak_speed'".
+  function statistics_of(owner) result(text)
+    character(len=*), intent(in) :: owner
+    character(len=:), allocatable :: text
+    integer :: k
+
+    text = ''
+    do k = 1, size(analysis_names)
+      if (analysis_owners(k) /= owner) cycle
+      if (text /= '') text = text // ', '
+      text = text // quoted(trim(analysis_names(k)))
+    end do
+  end function statistics_of
+
+  !> Refuses a response that the base machine does not have, and an order that nothing excites.
+  subroutine check_response(self, input, record, diagnostics)
+    class(analysis_reader_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(string_t), allocatable :: names(:)
+    integer :: q
+
+    associate (group => input%groups(record))
+      if (size(matching_quantities(self%quantities, group%text('response'))) == 0) then
+        allocate (names(0))
+        do q = 1, size(self%quantities)
+          if (self%quantities(q)%kind == quantity_moment) call append(names, self%quantities(q)%name)
+          call append(names, self%quantities(q)%label)
+        end do
+        call input%report(record, 'response', 'response = ' // quoted(group%text('response')) // ' is no coupling, shaft or ' // &
+                          'mesh, and no column of response.csv' // suggestion(group%text('response'), names), diagnostics)
+      end if
+      if (.not. group%has_value('order') .or. .not. allocated(self%response)) return
+      if (line_order(self%response%lines, group%number('order')) > 0) return
+      call input%report(record, 'order', 'no excitation has this order of ' // &
+                        quoted(input%groups(self%settings%group)%text('body')) // '; needed: an order in response_orders.csv', &
+                        diagnostics)
+    end associate
+  end subroutine check_response
+
+  !> Refuses statistics for which numbers are missing.
+  subroutine check_statistic(self, input, record, statistic, diagnostics)
+    class(analysis_reader_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record
+    integer, intent(in) :: statistic
+    type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=:), allocatable :: name
+    integer, allocatable :: quantities(:)
+    integer :: k
+
+    if (statistic == analysis_margin .and. size(self%settings%operating) == 0) then
+      call input%report(record, 'statistic', "statistic = 'margin' is the distance to the speeds in operation; needed: " // &
+                        'operating of &response', diagnostics)
+    else if (statistic == analysis_ratio) then
+      name = input%groups(record)%text('response')
+      allocate (quantities, source=same_element(self%quantities, name))
+      do k = 1, size(self%limits)
+        if (all(self%limits(k)%quantity /= quantities)) cycle
+        if (.not. input%groups(record)%has_value('order')) return
+        if (self%limits(k)%continuous_limit(self%settings%speeds(1)) < no_limit) return
+      end do
+      call input%report(record, 'statistic', "statistic = 'ratio' needs a &limit of " // quoted(name) // &
+                        '; with order one of its oscillation', diagnostics)
+    end if
+  end subroutine check_statistic
+
+  !> A result of the response, with its unit.
+  subroutine make_response_result(self, input, record, statistic, one)
+    class(analysis_reader_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record, statistic
+    type(analysis_result_t), intent(out) :: one
+    character(len=:), allocatable :: column, name
+    integer, allocatable :: quantities(:)
+
+    name = input%groups(record)%text('response')
+    allocate (quantities, source=matching_quantities(self%quantities, name))
+    associate (first => self%quantities(quantities(1)))
+      column = first%label
+      if (column /= name) column = column(:index(column, '_')) // name
+      call new_response_result(name, column, first%unit, input%groups(record)%number('order', absent=0.0_wp), statistic, one)
+    end associate
+    if (statistic /= analysis_peak_speed) return
+    one%in_unit = unit_for(one%unit, self%wanted_units)
+    if (one%in_unit > 0) one%unit = trim(units(one%in_unit)%name)
+  end subroutine make_response_result
+
+  subroutine append_result(results, one)
+    type(analysis_result_t), allocatable, intent(inout) :: results(:)
+    type(analysis_result_t), intent(in) :: one
+    type(analysis_result_t), allocatable :: longer(:)
+
+    allocate (longer(size(results) + 1))
+    longer(:size(results)) = results
+    longer(size(longer)) = one
+    call move_alloc(longer, results)
+  end subroutine append_result
+
+end module nocdyn_recorded_analyses
