@@ -25,7 +25,10 @@ def refusal(nocdyn, **groups):
         ({"sweep": ""}, "m.nml: there is no &sweep; 'nocdyn help input sweep' shows one"),
         ({"vary": ""}, "m.nml:5: &sweep: design = 'random' has nothing to vary; needed: a &vary"),
         ({"record": ""}, "m.nml:5: &sweep: no number of the variants is kept; needed: a &record with quantity and statistic"),
-        ({"record": "&record /"}, "m.nml:7: &record: there is nothing to record; needed: quantity, mode, response or trajectories"),
+        (
+            {"record": "&record /"},
+            "m.nml:7: &record: there is nothing to record; needed: quantity, mode, response or trajectories",
+        ),
         (
             {"vary": "&vary target = 'load.drag.viscus' low = 0 high = 1 /\n"},
             "m.nml:6: &vary: target = 'load.drag.viscus': viscus is not a key of &load; did you mean 'viscous'?",

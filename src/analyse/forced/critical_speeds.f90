@@ -107,24 +107,21 @@ contains
     type(crossing_t), intent(in) :: crossings(:)
     real(wp), allocatable, intent(out) :: speeds(:)
     real(wp), parameter :: counts = 1.0e-2_wp   ! of the largest amplitude of all lines: smaller ones are left as they are
+    real(wp) :: smallest, square(size(response%points), size(response%lines))   ! of the amplitudes
     integer :: i, l, q
-    real(wp) :: amplitude(size(response%points))   ! its square
-    real(wp) :: smallest
 
     allocate (speeds(0))
     associate (points => response%points)
       do q = 1, size(response%quantities)
-        smallest = 0.0_wp
         do i = 1, size(points)
-          smallest = max(smallest, maxval(real(points(i)%quantity(:, q), wp)**2 + aimag(points(i)%quantity(:, q))**2))
+          square(i, :) = real(points(i)%quantity(:, q), wp)**2 + aimag(points(i)%quantity(:, q))**2
         end do
-        smallest = smallest * counts**2
+        smallest = counts**2 * maxval(square)
         do l = 1, size(response%lines)
-          amplitude = [(real(points(i)%quantity(l, q), wp)**2 + aimag(points(i)%quantity(l, q))**2, i=1, size(points))]
           do i = 2, size(points) - 1
-            if (amplitude(i) < max(amplitude(i - 1), amplitude(i + 1)) .or. .not. amplitude(i) > smallest) cycle
+            if (square(i, l) < max(square(i - 1, l), square(i + 1, l)) .or. .not. square(i, l) > smallest) cycle
             if (has_undamped(crossings, l, points(i - 1)%state%speed, points(i + 1)%state%speed)) cycle
-            call add_vertex(points(i - 1:i + 1), amplitude(i - 1:i + 1), speeds)
+            call add_vertex(points(i - 1:i + 1), square(i - 1:i + 1, l), speeds)
           end do
         end do
       end do

@@ -7,7 +7,7 @@ module nocdyn_dynamic_stiffness
   use nocdyn_element_coordinates, only: element_coordinates_t
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_kinds, only: wp
-  use nocdyn_lapack_complex, only: complex_band_factor, complex_band_solve
+  use nocdyn_lapack_complex, only: complex_band_factor, complex_band_solve, tridiagonal_factor, tridiagonal_solve
   use nocdyn_machine, only: machine_t
   use nocdyn_ordering, only: reverse_cuthill_mckee
   use nocdyn_pattern_entries, only: entries_t
@@ -40,8 +40,9 @@ module nocdyn_dynamic_stiffness
 
   !> Work space of one thread.
   type, public :: band_work_t
-    complex(wp), allocatable :: band(:, :)   !! factors after `factor`
-    complex(wp), allocatable :: x(:)         !! forces, then coordinates, in the order of the band
+    complex(wp), allocatable :: band(:, :)         !! factors after `factor`, but for chains
+    complex(wp), allocatable :: diagonals(:, :)    !! the factors of chains, whose band is tridiagonal
+    complex(wp), allocatable :: x(:)               !! forces, then coordinates, in the order of the band
     integer, allocatable :: pivots(:)
   end type band_work_t
 
@@ -144,6 +145,7 @@ contains
     allocate (work%band(3 * matrix%width + 1, matrix%coordinates), work%x(matrix%coordinates), &
               source=(0.0_wp, 0.0_wp))
     allocate (work%pivots(matrix%coordinates))
+    if (matrix%width == 1) allocate (work%diagonals(matrix%coordinates, 4))
   end function new_band_work
 
   !> Sets and factors the matrix at a frequency.
@@ -155,7 +157,16 @@ contains
     logical, intent(out) :: singular           !! an undamped resonance, exactly
 
     call fill(self, size(work%band), frequency, stiffness, work%band)
-    call complex_band_factor(self%width, self%width, work%band, work%pivots, singular)
+    if (self%width == 1) then
+      associate (n => self%coordinates)
+        work%diagonals(:n - 1, 1) = work%band(4, :n - 1)
+        work%diagonals(:, 2) = work%band(3, :)
+        work%diagonals(:n - 1, 3) = work%band(2, 2:)
+      end associate
+      call tridiagonal_factor(work%diagonals, work%pivots, singular)
+    else
+      call complex_band_factor(self%width, self%width, work%band, work%pivots, singular)
+    end if
   end subroutine factor
 
   !> Sets the matrix, as one array.
@@ -198,7 +209,11 @@ contains
     class(dynamic_stiffness_t), intent(in) :: self
     type(band_work_t), intent(inout) :: work
 
-    call complex_band_solve(self%width, self%width, work%band, work%pivots, work%x)
+    if (self%width == 1) then
+      call tridiagonal_solve(work%diagonals, work%pivots, work%x)
+    else
+      call complex_band_solve(self%width, self%width, work%band, work%pivots, work%x)
+    end if
   end subroutine solve
 
   !> The twist of an element, after `solve` [rad].

@@ -44,7 +44,7 @@ contains
     real(wp) :: speed
 
     n = 0
-    allocate (sources(64))
+    allocate (sources(256))
     do b = 1, size(machine%banks)
       associate (bank => machine%banks(b)%bank)
         if (bank%role == role_load) cycle

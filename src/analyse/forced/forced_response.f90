@@ -129,7 +129,6 @@ contains
       new(i)%is_of_grid = are_of_grid
       call self%held%hold(speeds(i), new(i)%state, error)
       if (allocated(error)) return
-      call list_sources(self%machine, new(i)%state, new(i)%sources)
     end do
     call solve_points(self, new)
     call merge_points(self, new)
@@ -171,12 +170,13 @@ contains
   end function peak
 
   !> Solves for every line at one speed.
-  pure subroutine solve_point(self, point, work)
+  subroutine solve_point(self, point, work)
     type(forced_response_t), intent(in) :: self
     type(response_point_t), intent(inout) :: point
     type(work_t), intent(inout) :: work
     integer :: l, q
 
+    call list_sources(self%machine, point%state, point%sources)
     associate (lines => size(self%lines), quantities => size(self%quantities))
       allocate (point%frequency(lines))
       do l = 1, lines

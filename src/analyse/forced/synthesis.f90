@@ -142,27 +142,30 @@ contains
     complex(wp), intent(in) :: amplitude(:)
     real(wp), intent(in) :: value(0:)  !! samples, [0 to samples + 1]
     real(wp), intent(in) :: sign       !! 1 or -1
-    real(wp) :: bend, highest, slope, threshold, top(part%samples)
-    integer :: i
-    logical :: is_top(part%samples)
+    real(wp) :: beside, bend, highest, slope, top(part%samples)
+    integer :: candidate(part%samples), i, k, n
 
-    ! the vertices of the parabolas through the maxima among the samples
+    refined = maxval(sign * value)
+    ! the largest value is within half a sample of one that is lower by this at most, for the curvature is bounded
+    beside = 0.5_wp * sum(size_of(amplitude(part%line)) * part%multiple**2) * (pi / part%samples)**2
+    n = 0
+    highest = refined
     do i = 1, part%samples
+      if (sign * value(i) < refined - beside) cycle
       associate (before => sign * value(i - 1), here => sign * value(i), after => sign * value(i + 1))
-        is_top(i) = here >= before .and. here >= after
+        if (here < before .or. here < after) cycle
+        n = n + 1
+        candidate(n) = i
         slope = 0.5_wp * (after - before)
         bend = 2.0_wp * here - before - after
-        top(i) = here
-        if (is_top(i) .and. bend > 0) top(i) = here + 0.5_wp * slope**2 / bend
+        top(n) = here
+        if (bend > 0) top(n) = here + 0.5_wp * slope**2 / bend   ! the vertex of the parabola
+        highest = max(highest, top(n))
       end associate
     end do
-    highest = maxval(top, mask=is_top)
-    ! the error of a parabola, at six samples of the shortest period, is a small part of its height above the samples
-    threshold = highest - 0.1_wp * sum(size_of(amplitude(part%line)) * part%multiple**2) * (pi / part%samples)**2
-    refined = maxval(sign * value)
-    do i = 1, part%samples
-      if (.not. is_top(i) .or. top(i) < threshold) cycle
-      refined = max(refined, climbed(part, amplitude, 2.0_wp * pi * (i - 1) / part%samples, sign))
+    do k = 1, n   ! the error of a parabola, at six samples of the shortest period, is a small part of its height
+      if (top(k) < highest - 0.2_wp * beside) cycle
+      refined = max(refined, climbed(part, amplitude, 2.0_wp * pi * (candidate(k) - 1) / part%samples, sign))
     end do
   end function refined
 

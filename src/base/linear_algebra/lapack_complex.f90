@@ -1,4 +1,4 @@
-!> Complex linear systems, banded or dense, by LAPACK.
+!> Complex linear systems, tridiagonal, banded or dense, by LAPACK.
 !>
 !> The band has the form of `nocdyn_lapack_lu`: element (i, j) is band(lower + upper + 1 + i - j, j).
 module nocdyn_lapack_complex
@@ -6,7 +6,7 @@ module nocdyn_lapack_complex
   implicit none (type, external)
   private
 
-  public :: complex_band_factor, complex_band_solve, complex_solve
+  public :: complex_band_factor, complex_band_solve, complex_solve, tridiagonal_factor, tridiagonal_solve
 
   interface
     pure subroutine zgbtrf(m, n, kl, ku, ab, ldab, ipiv, info)
@@ -26,6 +26,25 @@ module nocdyn_lapack_complex
       complex(wp), intent(inout) :: b(ldb, nrhs)
       integer, intent(out) :: info
     end subroutine zgbtrs
+
+    pure subroutine zgttrf(n, dl, d, du, du2, ipiv, info)
+      import :: wp
+      integer, intent(in) :: n
+      complex(wp), intent(inout) :: dl(n - 1), d(n), du(n - 1)
+      complex(wp), intent(out) :: du2(n - 2)
+      integer, intent(out) :: ipiv(n)
+      integer, intent(out) :: info
+    end subroutine zgttrf
+
+    pure subroutine zgttrs(trans, n, nrhs, dl, d, du, du2, ipiv, b, ldb, info)
+      import :: wp
+      character, intent(in) :: trans
+      integer, intent(in) :: n, nrhs, ldb
+      complex(wp), intent(in) :: dl(n - 1), d(n), du(n - 1), du2(n - 2)
+      integer, intent(in) :: ipiv(n)
+      complex(wp), intent(inout) :: b(ldb, nrhs)
+      integer, intent(out) :: info
+    end subroutine zgttrs
 
     pure subroutine zgesv(n, nrhs, a, lda, ipiv, b, ldb, info)
       import :: wp
@@ -64,6 +83,30 @@ contains
     call zgbtrs('N', n, lower, upper, 1, factors, size(factors, 1), pivots, x, n, info)
     if (info /= 0) error stop 'nocdyn_lapack_complex: zgbtrs refused an argument'
   end subroutine complex_band_solve
+
+  !> Factors P A = L U of a tridiagonal matrix with row interchanges (ZGTTRF).
+  pure subroutine tridiagonal_factor(diagonals, pivots, singular)
+    complex(wp), contiguous, intent(inout) :: diagonals(:, :)   !! the one below, the main one, the one above from its first
+                                                                !! element on, and one more of the factors; shape [n, 4]
+    integer, contiguous, intent(inout) :: pivots(:)             !! row interchanges, shape [n]
+    logical, intent(out) :: singular                            !! a pivot is exactly zero: the factors cannot be used
+    integer :: info
+
+    call zgttrf(size(pivots), diagonals(:, 1), diagonals(:, 2), diagonals(:, 3), diagonals(:, 4), pivots, info)
+    if (info < 0) error stop 'nocdyn_lapack_complex: zgttrf refused an argument'
+    singular = info > 0
+  end subroutine tridiagonal_factor
+
+  !> Solves A x = b with the factors of `tridiagonal_factor` (ZGTTRS).
+  pure subroutine tridiagonal_solve(factors, pivots, x)
+    complex(wp), contiguous, intent(in) :: factors(:, :)   !! of `tridiagonal_factor`
+    integer, contiguous, intent(in) :: pivots(:)           !! of `tridiagonal_factor`
+    complex(wp), contiguous, intent(inout) :: x(:)         !! b, on return x; shape [n]
+    integer :: info
+
+    call zgttrs('N', size(x), 1, factors(:, 1), factors(:, 2), factors(:, 3), factors(:, 4), pivots, x, size(x), info)
+    if (info /= 0) error stop 'nocdyn_lapack_complex: zgttrs refused an argument'
+  end subroutine tridiagonal_solve
 
   !> Solves A x = b (ZGESV).
   pure subroutine complex_solve(matrix, x)

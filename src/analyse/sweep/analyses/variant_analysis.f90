@@ -113,7 +113,7 @@ contains
         value = speed
       case (analysis_margin)
         call operating_distance(analysis%settings, speed, value, is_too_near)
-      case (analysis_ratio)
+      case default   ! analysis_ratio
         value = largest_ratio(analysis, line, same_element(analysis%response%quantities, one%quantity))
       end select
     end associate

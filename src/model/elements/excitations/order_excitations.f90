@@ -273,20 +273,27 @@ contains
     integer, intent(in) :: element   !! numbered within the bank
     real(wp), intent(in) :: speed    !! u' [rad/s]
     type(harmonic_t), allocatable, intent(out) :: list(:)
-    integer :: i
-    integer, allocatable :: squares(:), terms(:)
+    real(wp) :: distance   ! to the last point of the table below this speed
+    integer :: below, cosine, i, n, shift, sine
 
-    associate (order => self%parameters(self%number_of('order')), square => self%parameters(self%number_of('square order')))
-      terms = pack([(i, i=1, size(order%element))], order%element == element)
-      squares = pack([(i, i=1, size(square%element))], square%element == element)
-      allocate (list(size(terms) + size(squares)))
-      do i = 1, size(terms)
-        list(i) = harmonic(order%value(1, terms(i)), value_at(self, 'sine', terms(i), element, speed), &
-                           value_at(self, 'cosine', terms(i), element, speed))
+    sine = self%number_of('sine')
+    cosine = self%number_of('cosine')
+    associate (orders => self%parameters(self%number_of('order')), squares => self%parameters(self%number_of('square order')), &
+               square_sine => self%parameters(self%number_of('square sine')), &
+               square_cosine => self%parameters(self%number_of('square cosine')))
+      call find_segment(self, element, speed, below, distance)
+      shift = below * size(orders%element)
+      allocate (list(count(orders%element == element) + count(squares%element == element)))
+      n = 0
+      do i = 1, size(orders%element)
+        if (orders%element(i) /= element) cycle
+        n = n + 1
+        list(n) = harmonic(orders%value(1, i), value_at(sine, 'sine slope'), value_at(cosine, 'cosine slope'))
       end do
-      do i = 1, size(squares)
-        list(size(terms) + i) = harmonic(square%value(1, squares(i)), speed**2 * value_at(self, 'square sine', squares(i)), &
-                                         speed**2 * value_at(self, 'square cosine', squares(i)))
+      do i = 1, size(squares%element)
+        if (squares%element(i) /= element) cycle
+        n = n + 1
+        list(n) = harmonic(squares%value(1, i), speed**2 * square_sine%value(1, i), speed**2 * square_cosine%value(1, i))
       end do
     end associate
   contains
@@ -294,31 +301,35 @@ contains
     pure type(harmonic_t) function harmonic(order, sine, cosine)
       real(wp), intent(in) :: order, sine, cosine
 
-      harmonic = harmonic_t(hypot(sine, cosine), 0.0_wp, order, atan2(cosine, sine), self%rows%last_body(element))
+      harmonic = harmonic_t(sqrt(sine**2 + cosine**2), 0.0_wp, order, atan2(cosine, sine), self%rows%last_body(element))
     end function harmonic
+
+    !> A parameter of order number i.
+    pure real(wp) function value_at(parameter, slope) result(value)
+      integer, intent(in) :: parameter
+      character(len=*), intent(in) :: slope   !! name of the parameter that has its slopes
+
+      value = self%parameters(parameter)%value(1, i + shift)
+      if (below > 0) value = value + distance * self%parameters(self%number_of(slope))%value(1, i + shift)
+    end function value_at
   end subroutine list_harmonics
 
-  !> A parameter of the first lane at a speed.
-  pure real(wp) function value_at(self, name, column, element, speed) result(value)
+  !> The segment of the table over the speed that holds a speed.
+  pure subroutine find_segment(self, element, speed, below, distance)
     class(order_excitations_t), intent(in) :: self
-    character(len=*), intent(in) :: name
-    integer, intent(in) :: column                !! in the first segment
-    integer, intent(in), optional :: element     !! numbered within the bank; absent: it does not follow the speed
-    real(wp), intent(in), optional :: speed      !! [rad/s]
-    integer :: below, stride
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: speed    !! [rad/s]
+    integer, intent(out) :: below    !! number of points below
+    real(wp), intent(out) :: distance   !! to the last of them, 0 if there is none [rad/s]
 
-    associate (numbers => self%parameters(self%number_of(name)))
-      value = numbers%value(1, column)
-      if (self%segments == 1 .or. .not. present(speed)) return
-      associate (edge => self%parameters(self%number_of('speed'))%value(1, element::self%count))
-        below = count(edge <= speed)
-        if (below == 0) return
-        stride = below * (size(numbers%element) / self%segments)
-        value = numbers%value(1, column + stride) + (speed - edge(below)) &
-                * self%parameters(self%number_of(name // ' slope'))%value(1, column + stride)
-      end associate
+    below = 0
+    distance = 0.0_wp
+    if (self%segments == 1) return
+    associate (edge => self%parameters(self%number_of('speed'))%value(1, element::self%count))
+      below = count(edge <= speed)
+      if (below > 0) distance = speed - edge(below)
     end associate
-  end function value_at
+  end subroutine find_segment
 
   !> The mean bends at the points.
   function knees(self, element) result(speeds)
