@@ -55,6 +55,7 @@ def one_line(text):
         ),
         (["--version", "now"], "--version takes no arguments"),
         (["help", "gear"], "'gear' is a group of the input: nocdyn help input gear"),
+        (["help", "torques"], "'torques' is a topic of the input: nocdyn help input torques"),
         (["--versoin"], "'--versoin' is not a command; did you mean '--version'?"),
         (
             ["help", "simulate"],
@@ -62,7 +63,10 @@ def one_line(text):
             "try 'run', 'check', 'equilibrium', 'modes', 'response', 'campbell', "
             "'matrices', 'sweep', 'merge', 'new', 'help' or 'input'",
         ),
-        (["help", "input", "boddy"], "there is no group 'boddy'; did you mean 'body'?"),
+        (["help", "input", "boddy"], "there is no topic or group 'boddy'; did you mean 'body'?\n"),
+        (["help", "input", "torsionel"], "there is no topic or group 'torsionel'; did you mean 'torsional'?\n"),
+        (["help", "input", "x" * 3000], "there is no topic or group '" + "x" * 80 + " ...'; 'nocdyn help input' lists them\n"),
+        (["help", "input", "gear", "mesh"], "'nocdyn help input' takes one topic or group; here 'gear', 'mesh'\n"),
     ],
 )
 def test_wrong_usage_is_refused_with_code_2(nocdyn, words, message):
@@ -123,13 +127,26 @@ def test_help_on_run_names_its_options(nocdyn):
     assert all(option in text for option in ("--out DIR", "--set PATH=VALUE", "--quiet"))
 
 
-def test_help_input_names_every_group_and_key_that_a_run_writes(nocdyn):
+def test_help_on_all_names_every_group_and_key_that_a_run_writes(nocdyn):
     nocdyn("run", CASE_2, "--out", "out", "-q")
-    text = nocdyn("help", "input").stdout
+    text = nocdyn("help", "input", "all").stdout
+    overview = nocdyn("help", "input").stdout
     for kind, values in f90nml.read(nocdyn.folder / "out/input.nml").items():
-        assert f"&{kind}" in text
+        assert f"&{kind}" in text and f"\n  &{kind} " in overview
         for group in values if isinstance(values, list) else [values]:
             assert all(re.search(rf"^ +{key} ", text, re.MULTILINE) for key in group)
+
+
+def test_every_topic_and_group_of_the_overview_has_help(nocdyn):
+    overview = nocdyn("help", "input").stdout
+    topics = re.findall(r"^(\w+): ", overview, re.MULTILINE)
+    assert len(topics) >= 5 and all(f"help input {word}" in overview for word in ("TOPIC", "GROUP", "all"))
+    for topic in topics:
+        groups = re.findall(r"^  &(\w+)", re.search(rf"^{topic}: .*?\n\n", overview, re.MULTILINE | re.DOTALL)[0], re.MULTILINE)
+        text = nocdyn("help", "input", topic).stdout
+        assert re.findall(r"^&(\w+), ", text, re.MULTILINE) == groups
+        for group in groups:
+            assert nocdyn("help", "input", group).stdout.split("\n\nExample")[0] in text
 
 
 @pytest.mark.parametrize("group", ["gear", "&gear", "GEAR"])

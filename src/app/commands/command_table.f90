@@ -28,7 +28,11 @@ contains
     call add_command(commands, 'new', 'FILE', '', 'write a commented input to start from', &
                      'Writes a commented input file. A file that exists is not overwritten.', new_command)
     call add_command(commands, 'help', '[COMMAND]', '', 'help on a command', &
-                     'nocdyn help input [GROUP] describes the groups and keys of an input file.')
+      'Without a COMMAND, all commands with one line each.' // nl // nl // &
+      '  nocdyn help input          the groups of an input file by topics, one line each' // nl // &
+      '  nocdyn help input TOPIC    the groups of a topic with their keys and examples' // nl // &
+      '  nocdyn help input GROUP    one group with its keys and examples' // nl // &
+      '  nocdyn help input all      all groups with their keys, and an example')
   end subroutine list_commands
 
   subroutine list_analyses(commands)

@@ -5,8 +5,8 @@ module nocdyn_help_command
   use nocdyn_console, only: print_text, report_error
   use nocdyn_errors, only: error_t, exit_done, exit_input, raise
   use nocdyn_schema, only: group_rule_index
-  use nocdyn_schema_help, only: group_help, input_help
-  use nocdyn_text, only: joined, lower_case, quoted
+  use nocdyn_schema_topics, only: input_help, input_overview, topic_index
+  use nocdyn_text, only: joined, lower_case, quoted, string_t
   implicit none (type, external)
   private
 
@@ -17,30 +17,30 @@ module nocdyn_help_command
 
 contains
 
-  !> help, help COMMAND, help input, help input GROUP.
+  !> help, help COMMAND, help input, help input TOPIC, help input GROUP, help input all.
   subroutine help_command(commands, arguments, code)
     type(command_t), intent(in) :: commands(:)
     type(arguments_t), intent(in) :: arguments
     integer, intent(out) :: code
     type(error_t), allocatable :: error
-    character(len=:), allocatable :: text, topic
+    character(len=:), allocatable :: text, word
     integer :: row
 
-    topic = ''
-    if (size(arguments%operands) > 0) topic = arguments%operands(1)%text
+    word = ''
+    if (size(arguments%operands) > 0) word = arguments%operands(1)%text
     row = 0
-    if (size(arguments%operands) == 1) row = command_index(commands, topic)
+    if (size(arguments%operands) == 1) row = command_index(commands, word)
     if (size(arguments%operands) == 0) then
       text = overview(commands)
-    else if (topic == 'input' .and. size(arguments%operands) == 1) then
-      text = input_help()
-    else if (topic == 'input' .and. size(arguments%operands) == 2) then
-      call group_help(arguments%operands(2)%text, text, error)
+    else if (word == 'input') then
+      call help_on_input(arguments%operands(2:), text, error)
     else if (row > 0) then
       text = usage(commands(row))
       if (commands(row)%help /= '') text = text // nl // nl // commands(row)%help
-    else if (group_rule_index(lower_case(topic)) > 0) then
-      call raise(error, exit_input, quoted(topic) // ' is a group of the input: nocdyn help input ' // topic)
+    else if (group_rule_index(lower_case(word)) > 0) then
+      call raise(error, exit_input, quoted(word) // ' is a group of the input: nocdyn help input ' // word)
+    else if (topic_index(lower_case(word)) > 0) then
+      call raise(error, exit_input, quoted(word) // ' is a topic of the input: nocdyn help input ' // word)
     else
       call raise(error, exit_input, 'there is no help on ' // joined(arguments%operands, ' ') // '; try ' // &
                  joined(command_names(commands), ', ') // " or 'input'")
@@ -52,6 +52,21 @@ contains
       call print_text(text)
     end if
   end subroutine help_command
+
+  !> The overview of the groups, or what a word asks for.
+  subroutine help_on_input(words, text, error)
+    type(string_t), intent(in) :: words(:)   !! after 'help input'
+    character(len=:), allocatable, intent(out) :: text
+    type(error_t), allocatable, intent(out) :: error
+
+    if (size(words) == 0) then
+      text = input_overview()
+    else if (size(words) == 1) then
+      call input_help(words(1)%text, text, error)
+    else
+      call raise(error, exit_input, "'nocdyn help input' takes one topic or group; here " // joined(words, ', '))
+    end if
+  end subroutine help_on_input
 
   !> "nocdyn run FILE... [--out DIR] [--set PATH=VALUE]... [--quiet]", on as many lines as it needs.
   pure function usage(command) result(text)
@@ -85,7 +100,7 @@ contains
       call = 'nocdyn ' // commands(i)%name // ' ' // commands(i)%operands
       text = text // nl // '  ' // call // commands(i)%summary
     end do
-    text = text // nl // '  nocdyn help input [GROUP]  the groups and keys of an input file' // nl // '  nocdyn --version' // &
+    text = text // nl // '  nocdyn help input          the groups of an input file by topics' // nl // '  nocdyn --version' // &
            nl // nl // &
            'Exit codes: 0 done, 1 a computation failed, 2 wrong usage or input, 3 a file cannot be read or written.'
   end function overview

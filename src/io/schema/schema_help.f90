@@ -1,18 +1,17 @@
-!> The schema on the terminal: help, and an example file with explanations.
+!> Groups with their keys as text on the terminal, and an example file with these explanations.
 module nocdyn_schema_help
-  use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_schema, only: examples, first_key, group_rule_index, group_rules, has_word, key_rules, kind_rules, last_key, &
-    selector_name, selector_rule
+  use nocdyn_schema, only: examples, first_key, group_rules, has_word, key_rules, kind_rules, last_key, selector_name, &
+    selector_rule
   use nocdyn_schema_rules, only: a_flag, a_number, a_selector, a_word, an_integer, body_or_ground, example_t, key_rule_t, &
     occurrence_texts
   use nocdyn_schema_sentences, only: default_text, sentences_on, unit_sentence
-  use nocdyn_schema_text, only: allowed_text, group_names, suggestion, type_text
-  use nocdyn_text, only: append, listed, lower_case, quoted, string_t
+  use nocdyn_schema_text, only: allowed_text, type_text
+  use nocdyn_text, only: append, listed, quoted, string_t
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
 
-  public :: input_help, group_help, input_template, append_examples
+  public :: input_template, append_group, append_examples
 
   integer, parameter :: longest_group = maxval(len_trim(group_rules%name))
   integer, parameter :: column = 38       !! width of type and allowed values
@@ -21,50 +20,6 @@ module nocdyn_schema_help
   character(len=*), parameter :: comment = '! '
 
 contains
-
-  !> All groups with their keys, and an example.
-  function input_help() result(text)
-    character(len=:), allocatable :: text
-    type(text_buffer_t) :: buffer
-    integer :: rule
-
-    call buffer%append_line('An input file is a Fortran namelist: groups &NAME KEY = VALUE ... / in any order, texts in quotes,')
-    call buffer%append_line('lists with commas or blanks, upper and lower case alike in groups and keys; ! begins a comment.')
-    call buffer%append_line('SI units, or the unit at the end of a key: speed_rpm, frequency_hz, phase_deg.')
-    call buffer%append_line("'nocdyn new FILE' writes the example below with these explanations.")
-    call buffer%append_line('')
-    do rule = 1, size(group_rules)
-      call append_group(buffer, rule, '')
-      call buffer%append_line('')
-    end do
-    call buffer%append_line('Example')
-    do rule = 1, size(group_rules)
-      call append_examples(buffer, rule, .true.)
-    end do
-    text = buffer%text()
-  end function input_help
-
-  !> One group with its keys and examples.
-  subroutine group_help(group, text, error)
-    character(len=*), intent(in) :: group   !! with or without &
-    character(len=:), allocatable, intent(out) :: text
-    type(error_t), allocatable, intent(out) :: error   !! there is no such group
-    type(text_buffer_t) :: buffer
-    character(len=:), allocatable :: name
-    integer :: rule
-
-    name = lower_case(group(verify(group // ' ', '&'):))
-    rule = group_rule_index(name)
-    if (rule == 0) then
-      call raise(error, exit_input, "there is no group '" // name // "'" // suggestion(name, group_names()))
-      return
-    end if
-    call append_group(buffer, rule, '')
-    call buffer%append_line('')
-    call buffer%append_line(trim(merge('Examples', 'Example ', count(examples%group == group_rules(rule)%name) > 1)))
-    call append_examples(buffer, rule, .false.)
-    text = buffer%text()
-  end subroutine group_help
 
   !> A complete input, the paper's second case, in which every key is explained.
   function input_template() result(text)

@@ -1,7 +1,7 @@
 !> The schema of an input file: every group and every key once, with type, unit, default, allowed values and help.
 !>
-!> A new key is a new row of `key_rules`; a new group is a row of `group_rules` with its keys and an example. Reading, checking,
-!> help, template and reference use the rows. The rows of large groups are in modules of their own.
+!> A new key is a new row of `key_rules`; a new group is a row of `group_rules` with its topic, its keys and an example.
+!> Reading, checking, help, template and reference use the rows. The rows of large groups are in modules of their own.
 module nocdyn_schema
   use nocdyn_kinds, only: wp
   use nocdyn_schema_constraints, only: constraint_examples, constraint_groups, constraint_keys, constraint_relations
@@ -11,8 +11,8 @@ module nocdyn_schema
   use nocdyn_schema_response, only: response_examples, response_groups, response_keys, response_relations
   use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_text, a_word, alias_t, &
     allowed_t, an_integer, any_number, any_times, anything, at_least_once, at_most_once, at_most_one, body_or_ground, &
-    exactly_once, example_t, from_2, group_rule_t, key_rule_t, kind_rule_t, less_than, not_negative, positive, relation_rule_t, &
-    required, unset
+    exactly_once, example_t, from_2, group_rule_t, in_machine, in_simulation, in_torques, key_rule_t, kind_rule_t, less_than, &
+    not_negative, positive, relation_rule_t, required, unset
   use nocdyn_schema_shafts, only: shaft_examples, shaft_groups, shaft_keys, shaft_relations
   use nocdyn_schema_sweep, only: sweep_aliases, sweep_examples, sweep_groups, sweep_keys, sweep_kinds, sweep_relations
   use nocdyn_schema_torques, only: excitation_keys, load_keys, motor_keys, torque_examples, torque_kinds, torque_relations
@@ -33,16 +33,19 @@ module nocdyn_schema
   type(allowed_t), parameter :: starts = allowed_t(words='given projected equilibrium')
 
   type(group_rule_t), parameter, public :: group_rules(*) = [ &
-    group_rule_t('case',       at_most_once,  '',         'What the file is about.'), &
-    group_rule_t('body',       at_least_once, 'body',     'A rigid body that turns about its axis.'), &
-    group_rule_t('coupling',   any_times,     'coupling', 'An elastic coupling of two bodies, or of a body and the ground.'), &
+    group_rule_t('case',       in_machine,    at_most_once,  '',         'What the file is about.'), &
+    group_rule_t('body',       in_machine,    at_least_once, 'body',     'A rigid body that turns about its axis.'), &
+    group_rule_t('coupling',   in_machine,    any_times,     'coupling', &
+                 'An elastic coupling of two bodies, or of a body and the ground.'), &
     shaft_groups, mesh_groups, constraint_groups, &
-    group_rule_t('motor',      any_times,     'torque',   'A driving torque on a body, by a law of its speed.'), &
-    group_rule_t('load',       any_times,     'torque',   'A resisting torque on a body: the sum of the terms that are given.'), &
-    group_rule_t('excitation', any_times,     'torque',   'A torque on a body, by a law of time or of its angle.'), &
+    group_rule_t('motor',      in_torques,    any_times,     'torque',   'A driving torque on a body, by a law of its speed.'), &
+    group_rule_t('load',       in_torques,    any_times,     'torque', &
+                 'A resisting torque on a body: the sum of the terms that are given.'), &
+    group_rule_t('excitation', in_torques,    any_times,     'torque', &
+                 'A torque on a body, by a law of time or of its angle.'), &
     engine_groups, &
-    group_rule_t('run',        exactly_once,  '',         'What is computed, and how.'), &
-    group_rule_t('output',     at_most_once,  '',         'What is written, in which form, and where.'), &
+    group_rule_t('run',        in_simulation, exactly_once,  '',         'What is computed, and how.'), &
+    group_rule_t('output',     in_simulation, at_most_once,  '',         'What is written, in which form, and where.'), &
     response_groups, sweep_groups]
 
   type(key_rule_t), parameter :: frame_keys(*) = [ &

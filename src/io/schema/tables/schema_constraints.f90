@@ -1,16 +1,19 @@
 !> Rows of the schema: the rigid joints, &gear, &planetary, &differential and &constraint.
 module nocdyn_schema_constraints
   use nocdyn_schema_rules, only: a_body, a_flag, a_name, a_number, an_integer, any_number, any_times, anything, body_or_ground, &
-    equal_lengths, exactly_one, example_t, from_1, group_rule_t, key_rule_t, not_zero, positive, relation_rule_t, required, unset
+    equal_lengths, exactly_one, example_t, from_1, group_rule_t, in_machine, key_rule_t, not_zero, positive, relation_rule_t, &
+    required, unset
   implicit none (type, external)
   private
 
   type(group_rule_t), parameter, public :: constraint_groups(*) = [ &
-    group_rule_t('gear',         any_times, 'constraint', 'A rigid gear: R1 omega_1 + R2 omega_2 = 0, a minus if internal.'), &
-    group_rule_t('planetary',    any_times, 'constraint', &
+    group_rule_t('gear', in_machine, any_times, 'constraint', &
+                 'A rigid gear: R1 omega_1 + R2 omega_2 = 0, a minus if internal.'), &
+    group_rule_t('planetary', in_machine, any_times, 'constraint', &
                  'A planetary gear set (Willis): z_s omega_s + z_r omega_r = (z_s + z_r) omega_c.'), &
-    group_rule_t('differential', any_times, 'constraint', 'A differential: omega_1 + omega_2 = 2 omega_case.'), &
-    group_rule_t('constraint',   any_times, 'constraint', 'Any rigid relation: the sum of coefficient * speed is 0.')]
+    group_rule_t('differential', in_machine, any_times, 'constraint', 'A differential: omega_1 + omega_2 = 2 omega_case.'), &
+    group_rule_t('constraint', in_machine, any_times, 'constraint', &
+                 'Any rigid relation: the sum of coefficient * speed is 0.')]
 
   type(key_rule_t), parameter, public :: constraint_keys(*) = [ &
     key_rule_t('gear',       'name',            a_name,         1, '',            required,    anything, &

@@ -2,8 +2,8 @@
 module nocdyn_schema_engines
   use nocdyn_kinds, only: wp
   use nocdyn_schema_rules, only: a_body, a_file, a_name, a_number, allowed_t, an_integer, any_number, any_times, anything, &
-    at_most_one, columns, equal_lengths, example_t, from_0_to_1, group_rule_t, key_rule_t, less_than, not_negative, positive, &
-    relation_rule_t, required, requires, unset
+    at_most_one, columns, equal_lengths, example_t, from_0_to_1, group_rule_t, in_torques, key_rule_t, less_than, not_negative, &
+    positive, relation_rule_t, required, requires, unset
   implicit none (type, external)
   private
 
@@ -12,7 +12,8 @@ module nocdyn_schema_engines
   type(allowed_t), parameter :: up_to_64 = allowed_t(low=0.0_wp, high=64.0_wp, excludes_low=.true.)
 
   type(group_rule_t), parameter, public :: engine_groups(*) = [ &
-    group_rule_t('engine', any_times, 'torque', 'The gas and inertia torques of the cylinders of an engine, on its cranks.')]
+    group_rule_t('engine', in_torques, any_times, 'torque', &
+                 'The gas and inertia torques of the cylinders of an engine, on its cranks.')]
 
   type(key_rule_t), parameter, public :: engine_keys(*) = [ &
     key_rule_t('engine',     'name',            a_name,         1, '',            required,    anything, &

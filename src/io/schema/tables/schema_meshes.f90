@@ -1,12 +1,12 @@
 !> Rows of the schema: the group &mesh with its keys.
 module nocdyn_schema_meshes
   use nocdyn_schema_rules, only: a_flag, a_name, a_number, an_integer, any_times, anything, body_or_ground, exactly_one, &
-    example_t, from_1, group_rule_t, key_rule_t, not_negative, positive, relation_rule_t, required, requires, unset
+    example_t, from_1, group_rule_t, in_machine, key_rule_t, not_negative, positive, relation_rule_t, required, requires, unset
   implicit none (type, external)
   private
 
   type(group_rule_t), parameter, public :: mesh_groups(*) = [ &
-    group_rule_t('mesh',     any_times,     'coupling', 'An elastic mesh of two wheels.')]
+    group_rule_t('mesh', in_machine, any_times, 'coupling', 'An elastic mesh of two wheels.')]
 
   type(key_rule_t), parameter, public :: mesh_keys(*) = [ &
     key_rule_t('mesh',       'name',            a_name,         1, '',            required,    anything, &

@@ -2,7 +2,7 @@
 module nocdyn_schema_response
   use nocdyn_kinds, only: wp
   use nocdyn_schema_rules, only: a_body, a_number, a_text, a_word, allowed_t, an_integer, any_number, any_times, anything, &
-    at_most_once, at_most_one, exactly_one, example_t, group_rule_t, key_rule_t, not_zero, positive, &
+    at_most_once, at_most_one, exactly_one, example_t, group_rule_t, in_torsional, key_rule_t, not_zero, positive, &
     relation_rule_t, required, requires, unset
   implicit none (type, external)
   private
@@ -14,8 +14,10 @@ module nocdyn_schema_response
   type(allowed_t), parameter :: margins = allowed_t(low=0.0_wp, high=0.9_wp)
 
   type(group_rule_t), parameter, public :: response_groups(*) = [ &
-    group_rule_t('response', at_most_once, '', "Speeds and orders of 'nocdyn response' and 'nocdyn campbell'."), &
-    group_rule_t('limit',    any_times,    '', 'Limits of moments, stresses and forces of a coupling, a shaft or a mesh.')]
+    group_rule_t('response', in_torsional, at_most_once, '', &
+                 "Speeds and orders of 'nocdyn response' and 'nocdyn campbell'."), &
+    group_rule_t('limit', in_torsional, any_times, '', &
+                 'Limits of moments, stresses and forces of a coupling, a shaft or a mesh.')]
 
   type(key_rule_t), parameter, public :: response_keys(*) = [ &
     key_rule_t('response',   'body',            a_body,         1, '',            required,    anything, &

@@ -10,6 +10,21 @@ module nocdyn_schema_rules
   !> divided by, which are the ones that cannot be negative, cannot be 0 or ascend, are 0 or at least so large.
   real(wp), parameter :: largest_size = 1.0e50_wp, smallest_size = 1.0e-50_wp
 
+  !> A topic of the help on an input.
+  type, public :: topic_t
+    character(len=12) :: name   !! the word of 'nocdyn help input', not that of a group
+    character(len=56) :: help
+  end type topic_t
+
+  ! Topic of a group.
+  integer, parameter, public :: in_machine = 1, in_torques = 2, in_simulation = 3, in_torsional = 4, in_sweeps = 5
+  type(topic_t), parameter, public :: topics(5) = [ &   !! `in_machine` ... `in_sweeps`, in the order in which a user needs them
+    topic_t('machine',    'bodies and what connects them'), &
+    topic_t('torques',    'what drives and loads the machine'), &
+    topic_t('simulation', 'the motion over time, and what is written'), &
+    topic_t('torsional',  'vibrations over the speed, critical speeds, limits'), &
+    topic_t('sweeps',     'many variants of a machine')]
+
   ! Occurrence of a group.
   integer, parameter, public :: exactly_once = 1, at_most_once = 2, at_least_once = 3, any_times = 4
   character(len=19), parameter, public :: occurrence_texts(4) = &   !! of `exactly_once` ... `any_times`
@@ -50,6 +65,7 @@ module nocdyn_schema_rules
   !> One group.
   type, public :: group_rule_t
     character(len=12) :: name
+    integer :: topic                  !! row of `topics`
     integer :: occurrence
     character(len=12) :: name_space   !! names are unique in a name space; '': groups without names
     character(len=96) :: help

@@ -2,15 +2,16 @@
 module nocdyn_schema_shafts
   use nocdyn_kinds, only: wp
   use nocdyn_schema_rules, only: a_name, a_number, allowed_t, an_integer, any_number, any_times, anything, at_most_one, &
-    body_or_ground, equal_lengths, example_t, group_rule_t, key_rule_t, not_negative, positive, relation_rule_t, required, &
-    requires, unset
+    body_or_ground, equal_lengths, example_t, group_rule_t, in_machine, key_rule_t, not_negative, positive, relation_rule_t, &
+    required, requires, unset
   implicit none (type, external)
   private
 
   type(allowed_t), parameter :: node_counts = allowed_t(low=0.0_wp, high=1000.0_wp)
 
   type(group_rule_t), parameter, public :: shaft_groups(*) = [ &
-    group_rule_t('shaft',    any_times,     'coupling', 'A stepped, solid or hollow elastic shaft between two bodies.')]
+    group_rule_t('shaft', in_machine, any_times, 'coupling', &
+                 'A stepped, solid or hollow elastic shaft between two bodies.')]
 
   type(key_rule_t), parameter, public :: shaft_keys(*) = [ &
     key_rule_t('shaft',      'name',            a_name,         1, '',            required,    anything, &

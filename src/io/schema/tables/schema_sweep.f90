@@ -2,7 +2,7 @@
 module nocdyn_schema_sweep
   use nocdyn_kinds, only: wp
   use nocdyn_schema_rules, only: a_file, a_number, a_selector, a_text, a_word, alias_t, allowed_t, an_integer, any_number, &
-    any_times, anything, at_most_once, at_most_one, example_t, from_1, group_rule_t, key_rule_t, kind_rule_t, less_than, &
+    any_times, anything, at_most_once, at_most_one, example_t, from_1, group_rule_t, in_sweeps, key_rule_t, kind_rule_t, less_than, &
     not_negative, positive, relation_rule_t, required, requires, unset
   implicit none (type, external)
   private
@@ -11,9 +11,10 @@ module nocdyn_schema_sweep
   type(allowed_t), parameter :: sample_counts = allowed_t(low=1.0_wp, high=2.0e9_wp)
 
   type(group_rule_t), parameter, public :: sweep_groups(*) = [ &
-    group_rule_t('sweep',  at_most_once, '', 'Which variants a sweep computes. Other commands ignore it.'), &
-    group_rule_t('vary',   any_times,    '', 'A number of the input that a sweep varies.'), &
-    group_rule_t('record', any_times,    '', 'What a sweep stores of each variant: statistics, modes, responses, trajectories.')]
+    group_rule_t('sweep', in_sweeps, at_most_once, '', 'Which variants a sweep computes. Other commands ignore it.'), &
+    group_rule_t('vary', in_sweeps, any_times, '', 'A number of the input that a sweep varies.'), &
+    group_rule_t('record', in_sweeps, any_times, '', &
+                 'What a sweep stores of each variant: statistics, modes, responses, trajectories.')]
 
   type(kind_rule_t), parameter, public :: sweep_kinds(*) = [ &
     kind_rule_t('sweep',  'grid',    'every combination; the last &vary runs fastest'), &

@@ -1,0 +1,171 @@
+!> Help on an input: an overview of its groups by topics, then one topic, one group, or everything.
+module nocdyn_schema_topics
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_schema, only: examples, group_rule_index, group_rules
+  use nocdyn_schema_help, only: append_examples, append_group
+  use nocdyn_schema_rules, only: at_least_once, exactly_once, occurrence_texts, topics
+  use nocdyn_schema_text, only: group_names, suggestion
+  use nocdyn_text, only: append, joined, lower_case, listed, quoted, shortened, string_t
+  use nocdyn_text_buffer, only: text_buffer_t
+  implicit none (type, external)
+  private
+
+  public :: input_overview, input_help, topic_index
+
+  character(len=*), parameter :: everything = 'all'   !! the word for all topics
+
+contains
+
+  !> The topics with their groups, one line each, and how to see more.
+  function input_overview() result(text)
+    character(len=:), allocatable :: text
+    type(text_buffer_t) :: buffer
+    integer :: rule, topic
+
+    call append_syntax(buffer)
+    call buffer%append_line('An input has ' // needed_groups() // '; all other groups are optional.')
+    do topic = 1, size(topics)
+      call buffer%append_line('')
+      call buffer%append_line(topic_title(topic))
+      do rule = 1, size(group_rules)
+        if (group_rules(rule)%topic /= topic) cycle
+        call buffer%append_line('  &' // group_rules(rule)%name // ' ' // trim(group_rules(rule)%help))
+      end do
+    end do
+    call buffer%append_line('')
+    call buffer%append_line('nocdyn help input TOPIC  a topic, for instance machine: its groups with their keys and examples')
+    call buffer%append_line('nocdyn help input GROUP  a group, for instance coupling: its keys and examples')
+    call buffer%append_line('nocdyn help input ' // everything // '    all groups with their keys, and an example')
+    call buffer%append_line('nocdyn new FILE          writes an input with all of these explanations, to start from')
+    text = buffer%text()
+  end function input_overview
+
+  !> A topic, a group, or everything.
+  subroutine input_help(word, text, error)
+    character(len=*), intent(in) :: word   !! name of a topic, of a group with or without &, or 'all'
+    character(len=:), allocatable, intent(out) :: text
+    type(error_t), allocatable, intent(out) :: error   !! there is no such topic or group
+    character(len=:), allocatable :: name
+    integer :: rule
+
+    name = lower_case(word(verify(word // ' ', '&'):))
+    rule = group_rule_index(name)
+    if (rule > 0) then
+      text = group_help(rule)
+    else if (topic_index(name) > 0) then
+      text = topic_help(topic_index(name))
+    else if (name == everything) then
+      text = complete_help()
+    else
+      call raise(error, exit_input, 'there is no topic or group ' // quoted(shortened(name)) // hint(name))
+    end if
+  end subroutine input_help
+
+  !> Row of `topics`, 0 if there is no such topic.
+  pure integer function topic_index(name) result(topic)
+    character(len=*), intent(in) :: name   !! in lower case
+
+    topic = findloc(topics%name == name, .true., dim=1)
+  end function topic_index
+
+  !> "; did you mean 'gear'?", or where the topics and groups are listed.
+  function hint(name) result(text)
+    character(len=*), intent(in) :: name   !! of no topic or group
+    character(len=:), allocatable :: text
+    type(string_t), allocatable :: names(:)
+    integer :: topic
+
+    allocate (names, source=group_names())
+    do topic = 1, size(topics)
+      call append(names, trim(topics(topic)%name))
+    end do
+    call append(names, everything)
+    text = suggestion(name, names)
+    if (text == '') text = "; 'nocdyn help input' lists them"
+  end function hint
+
+  !> All groups with their keys, and the example of the template.
+  function complete_help() result(text)
+    character(len=:), allocatable :: text
+    type(text_buffer_t) :: buffer
+    integer :: rule
+
+    call append_syntax(buffer)
+    call buffer%append_line("'nocdyn new FILE' writes the example below with these explanations.")
+    call buffer%append_line('')
+    do rule = 1, size(group_rules)
+      call append_group(buffer, rule, '')
+      call buffer%append_line('')
+    end do
+    call buffer%append_line('Example')
+    do rule = 1, size(group_rules)
+      call append_examples(buffer, rule, .true.)
+    end do
+    text = buffer%text()
+  end function complete_help
+
+  !> The groups of a topic with their keys and examples.
+  function topic_help(topic) result(text)
+    integer, intent(in) :: topic   !! row of `topics`
+    character(len=:), allocatable :: text
+    type(text_buffer_t) :: buffer
+    integer :: rule
+
+    call buffer%append_line(topic_title(topic))
+    call buffer%append_line('')
+    do rule = 1, size(group_rules)
+      if (group_rules(rule)%topic /= topic) cycle
+      call append_group(buffer, rule, '')
+      call buffer%append_line('')
+    end do
+    call buffer%append_line('Examples')
+    do rule = 1, size(group_rules)
+      if (group_rules(rule)%topic == topic) call append_examples(buffer, rule, .false.)
+    end do
+    text = buffer%text()
+  end function topic_help
+
+  !> One group with its keys and examples.
+  function group_help(rule) result(text)
+    integer, intent(in) :: rule   !! row of `group_rules`
+    character(len=:), allocatable :: text
+    type(text_buffer_t) :: buffer
+
+    call append_group(buffer, rule, '')
+    call buffer%append_line('')
+    call buffer%append_line(trim(merge('Examples', 'Example ', count(examples%group == group_rules(rule)%name) > 1)))
+    call append_examples(buffer, rule, .false.)
+    text = buffer%text()
+  end function group_help
+
+  subroutine append_syntax(buffer)
+    type(text_buffer_t), intent(inout) :: buffer
+
+    call buffer%append_line('An input file is a Fortran namelist: groups &NAME KEY = VALUE ... / in any order, texts in quotes,')
+    call buffer%append_line('lists with commas or blanks, upper and lower case alike in groups and keys; ! begins a comment.')
+    call buffer%append_line('SI units, or the unit at the end of a key: speed_rpm, frequency_hz, phase_deg.')
+  end subroutine append_syntax
+
+  !> "machine: bodies and what connects them".
+  pure function topic_title(topic) result(text)
+    integer, intent(in) :: topic   !! row of `topics`
+    character(len=:), allocatable :: text
+
+    text = trim(topics(topic)%name) // ': ' // trim(topics(topic)%help)
+  end function topic_title
+
+  !> The groups that no input is without: "&body at least once and &run once".
+  pure function needed_groups() result(text)
+    character(len=:), allocatable :: text
+    type(string_t), allocatable :: groups(:)
+    integer :: rule
+
+    allocate (groups(0))
+    do rule = 1, size(group_rules)
+      if (all(group_rules(rule)%occurrence /= [exactly_once, at_least_once])) cycle
+      call append(groups, '&' // trim(group_rules(rule)%name) // ' ' // trim(occurrence_texts(group_rules(rule)%occurrence)))
+    end do
+    text = listed(groups, ' and ')
+  end function needed_groups
+
+end module nocdyn_schema_topics
