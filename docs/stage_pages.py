@@ -2,7 +2,7 @@
 
 usage: stage_pages.py REFERENCE FOLDER
 
-REFERENCE is what nocdyn_input_reference prints: its groups go to the end of the page on input files. In FOLDER, links from
+REFERENCE is what nocdyn_input_reference prints: its topics go to the end of the page on input files. In FOLDER, links from
 page to page lead to the HTML files of the site, and a code block without a language is marked as text, because FORD would
 guess one.
 """
@@ -19,8 +19,8 @@ FENCED = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 
 
 def groups_of(reference):
-    """The sections of the groups, one heading level lower."""
-    return re.sub("^## ", "### ", reference[reference.index("\n## ") + 1 :], flags=re.MULTILINE)
+    """The topics with the sections of their groups, one heading level lower."""
+    return re.sub("^##", "###", reference[reference.index("\n## ") + 1 :], flags=re.MULTILINE)
 
 
 def for_ford(text):

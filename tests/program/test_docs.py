@@ -172,7 +172,7 @@ def reference():
 
 
 def keys_of_help(text):
-    """Group -> {(key, default)} as `nocdyn help input` prints them."""
+    """Group -> {(key, default)} as `nocdyn help input all` prints them."""
     groups = {}
     one_line_each = re.sub(r"\n {40,}(?=default )", " ", text.split("\nExample")[0])
     for line in one_line_each.splitlines():
@@ -185,11 +185,18 @@ def keys_of_help(text):
 
 def test_input_reference_has_the_groups_keys_and_defaults_of_the_help(nocdyn, reference):
     groups = {}
-    for section in re.split(r"^## `&", reference, flags=re.MULTILINE)[1:]:
+    for section in re.split(r"^### `&", reference, flags=re.MULTILINE)[1:]:
         rows = re.findall(r"^\| `(\w+)` \|([^|]*)\|([^|]*)\|([^|]*)\|([^|]*)\|$", section, re.MULTILINE)
         groups[section.split("`")[0]] = {(row[0], row[2].strip()) for row in rows}
-    assert groups == keys_of_help(nocdyn("help", "input").stdout)
+    assert groups == keys_of_help(nocdyn("help", "input", "all").stdout)
     assert len(groups) >= 9 and all(groups.values())
+
+
+def test_input_reference_has_the_topics_and_groups_of_the_help_in_their_order(nocdyn, reference):
+    headings = re.findall(r"^(?:## (.*)|### `&(\w+)`)$", reference, re.MULTILINE)
+    overview = nocdyn("help", "input").stdout
+    lines = re.findall(r"^(?:(\w+: .*)|  &(\w+) .*)$", overview, re.MULTILINE)
+    assert [(topic[:1].lower() + topic[1:], group) for topic, group in headings] == lines
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 module nocdyn_schema_reference
   use nocdyn_schema, only: first_key, group_rules, has_word, key_rules, kind_rules, last_key, selector_name
   use nocdyn_schema_help, only: append_examples
-  use nocdyn_schema_rules, only: key_rule_t, occurrence_texts
+  use nocdyn_schema_rules, only: key_rule_t, occurrence_texts, topics
   use nocdyn_schema_sentences, only: default_text, sentences_on, unit_sentence
   use nocdyn_schema_text, only: allowed_text, type_text
   use nocdyn_text, only: quoted, string_t
@@ -18,17 +18,30 @@ contains
   function input_reference() result(text)
     character(len=:), allocatable :: text
     type(text_buffer_t) :: buffer
-    integer :: rule
+    integer :: rule, topic
 
     call buffer%append_line('# Input reference')
     call buffer%append_line('')
     call buffer%append_line('An input file is a Fortran namelist in SI units. Groups may be in any order. A speed, a ' // &
                             'frequency or an angle may be given in rpm, Hz or degrees instead, by the key that ends in the unit.')
-    do rule = 1, size(group_rules)
-      call append_group(buffer, rule)
+    do topic = 1, size(topics)
+      call buffer%append_line('')
+      call buffer%append_line('## ' // topic_heading(topic))
+      do rule = 1, size(group_rules)
+        if (group_rules(rule)%topic == topic) call append_group(buffer, rule)
+      end do
     end do
     text = buffer%text()
   end function input_reference
+
+  !> "Machine: bodies and what connects them".
+  pure function topic_heading(topic) result(text)
+    integer, intent(in) :: topic   !! row of `topics`
+    character(len=:), allocatable :: text
+
+    text = trim(topics(topic)%name) // ': ' // trim(topics(topic)%help)
+    text(1:1) = achar(iachar(text(1:1)) + iachar('A') - iachar('a'))
+  end function topic_heading
 
   subroutine append_group(buffer, rule)
     type(text_buffer_t), intent(inout) :: buffer
@@ -37,7 +50,7 @@ contains
     integer :: k, key
 
     call buffer%append_line('')
-    call buffer%append_line('## `&' // trim(group_rules(rule)%name) // '`')
+    call buffer%append_line('### `&' // trim(group_rules(rule)%name) // '`')
     call buffer%append_line('')
     call buffer%append_line(trim(group_rules(rule)%help) // ' Given ' // &
                             trim(occurrence_texts(group_rules(rule)%occurrence)) // '.')
