@@ -2,8 +2,8 @@
 module nocdyn_schema_sweep
   use nocdyn_kinds, only: wp
   use nocdyn_schema_rules, only: a_file, a_number, a_selector, a_text, a_word, alias_t, allowed_t, an_integer, any_number, &
-    any_times, anything, at_most_once, at_most_one, example_t, from_1, group_rule_t, in_sweeps, key_rule_t, kind_rule_t, less_than, &
-    not_negative, positive, relation_rule_t, required, requires, unset
+    any_times, anything, at_most_once, at_most_one, example_t, from_1, group_rule_t, in_sweeps, key_rule_t, kind_rule_t, &
+    less_than, not_negative, positive, relation_rule_t, required, requires, unset
   implicit none (type, external)
   private
 
