@@ -183,6 +183,33 @@ def test_two_discs_with_hysteretic_damping_have_the_closed_form(nocdyn):
     assert heat == pytest.approx(0.5 * 2 * table["omega_one"][peak] * STIFFNESS * LOSS * twist**2, rel=1e-10)
 
 
+def test_a_loaded_cubic_coupling_resonates_by_its_tangent_stiffness(nocdyn):
+    """Motor, coupling k u + c u^3 and gear at a mean moment: k + 3 c u^2 between the motor and what the gear carries."""
+    stiffness, twist, mean, inertia, ratio = 500.0, 0.04, 30.0, (0.4, 0.05, 2.25), 3.0
+    cubic = (mean / twist - stiffness) / twist**2
+    tangent = stiffness + 3 * cubic * twist**2
+    assert tangent == pytest.approx(2.5 * stiffness)
+    natural = sqrt(tangent * (1 / inertia[0] + 1 / (inertia[1] + inertia[2] / ratio**2))) / (2 * pi)
+    machine = f"""\
+&body name = 'motor' inertia = {inertia[0]} /
+&body name = 'pinion' inertia = {inertia[1]} /
+&body name = 'wheel' inertia = {inertia[2]} /
+&coupling name = 'c' bodies = 'motor', 'pinion' stiffness = {stiffness} cubic_stiffness = {cubic} magnifier = 1e3 /
+&gear name = 'g' bodies = 'pinion', 'wheel' teeth = 20, 60 /
+&motor name = 'm' body = 'motor' kind = 'constant' torque = 1.0 /
+&load name = 'l' body = 'wheel' constant = {mean * ratio} constant_speed = 1e-3 /
+&excitation name = 'x' body = 'motor' kind = 'orders' orders = 1 amplitudes = 0.01 /
+&run t_end = 1 /
+&response body = 'motor' speed = {0.9 * 2 * pi * natural!r}, {1.1 * 2 * pi * natural!r} count = 21 /
+"""
+    content = analysis(nocdyn, "response", machine)
+    means = columns(nocdyn, "response.csv")["mean_moment_c"]
+    assert means == pytest.approx([-mean] * len(means), rel=1e-9)
+    critical = content["critical_speeds"][0]
+    assert critical["frequency_Hz"] == pytest.approx(natural, rel=1e-10)
+    assert critical["peak_speed_rad_s"] == pytest.approx(2 * pi * natural, rel=1e-5)
+
+
 def test_limits_bar_the_speeds_where_the_closed_form_exceeds_them(nocdyn):
     limit = 40.0
     content = analysis(nocdyn, "response", DISCS + f"&limit coupling = 'shaft' vibratory_moment = {limit} /\n")
