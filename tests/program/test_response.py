@@ -210,6 +210,19 @@ def test_a_loaded_cubic_coupling_resonates_by_its_tangent_stiffness(nocdyn):
     assert critical["peak_speed_rad_s"] == pytest.approx(2 * pi * natural, rel=1e-5)
 
 
+@pytest.mark.parametrize("rest_twist", [0.0, 0.01])
+def test_a_coupling_in_its_gap_or_at_the_edge_of_it_is_told(nocdyn, rest_twist):
+    loose = "&body name = 'three' inertia = 1 /\n&coupling name = 'claw' bodies = 'two', 'three' stiffness = 1e4 gap = 0.02"
+    loose += f" rest_twist = {rest_twist} /\n"
+    for command in ("response", "campbell"):
+        content = analysis(nocdyn, command, DISCS + loose)
+        assert content["notes"][0].startswith("'claw' has no stiffness at ")
+        assert content["notes"][0].endswith(
+            " speeds: it is inside its gap, whose edge counts as inside, or its law is level there"
+        )
+    assert analysis(nocdyn, "response", DISCS)["notes"] == []
+
+
 def test_limits_bar_the_speeds_where_the_closed_form_exceeds_them(nocdyn):
     limit = 40.0
     content = analysis(nocdyn, "response", DISCS + f"&limit coupling = 'shaft' vibratory_moment = {limit} /\n")

@@ -11,9 +11,10 @@ module nocdyn_campbell
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: sort_ascending
   use nocdyn_machine, only: machine_t
+  use nocdyn_open_gaps, only: note_open_gaps
   use nocdyn_response_settings, only: operating_distance, place_error, read_response_settings, response_settings_t
   use nocdyn_speed_modes, only: most_coordinates, new_speed_modes, speed_modes_t
-  use nocdyn_text, only: to_text
+  use nocdyn_text, only: string_t, to_text
   implicit none (type, external)
   private
 
@@ -31,6 +32,7 @@ module nocdyn_campbell
     type(crossing_t), allocatable :: crossings(:)
     real(wp), allocatable :: distance(:)             !! of each crossing to the speeds in operation, as a share; 0 inside
     logical, allocatable :: is_too_near(:)           !! whether it is within the margin
+    type(string_t), allocatable :: notes(:)
   end type campbell_t
 
 contains
@@ -56,6 +58,8 @@ contains
       call place_error(input, self%settings, failed_speed, error)
       return
     end if
+    allocate (self%notes(0))
+    call note_open_gaps(self%response, self%notes)
     allocate (self%distance(size(self%crossings)), self%is_too_near(size(self%crossings)))
     do i = 1, size(self%crossings)
       call operating_distance(self%settings, self%crossings(i)%speed, self%distance(i), self%is_too_near(i))

@@ -70,6 +70,7 @@ contains
     integer :: i
 
     call json%open_report(input%file, input%title())
+    call json%put('notes', self%notes)
     call json%put('body', body)
     call json%put('speed_rad_s', [self%speed(1), self%speed(size(self%speed))])
     if (size(self%settings%operating) > 0) then

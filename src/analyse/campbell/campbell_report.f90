@@ -21,8 +21,11 @@ contains
     type(campbell_t), intent(in) :: self
     character(len=:), allocatable :: text
     type(text_buffer_t) :: report
-    integer :: last, m
+    integer :: i, last, m
 
+    do i = 1, size(self%notes)
+      call report%append_line(file // ': note: ' // self%notes(i)%text)
+    end do
     last = size(self%speed)
     call report%append_line(file // ': natural frequencies from ' // rpm(self%speed(1)) // ' to ' // rpm(self%speed(last)) // &
                             ' rpm of ' // body // ', ' // counted(size(self%order), 'order', 'orders'))
