@@ -1,8 +1,9 @@
 """Elastic meshes: forces, deformations, backlash, modes, sweeps, refusals."""
 
+import cmath
 import csv
 import json
-from math import pi, sqrt
+from math import pi, radians, sqrt
 
 import pytest
 
@@ -94,3 +95,84 @@ def test_bad_meshes_are_refused(nocdyn, keys, words):
     )
     assert outcome.returncode == 2
     assert "bad.nml:5: &mesh 't': " in outcome.stderr and words in outcome.stderr
+
+
+# Two wheels on their own shafts, which any speed suits: the deformation x = R_1 phi_1 + R_2 phi_2 has the mass
+# 1 / (R_1^2 / J_1 + R_2^2 / J_2), and D (x - e) with D = k + i Omega c acts on it.
+RADII, INERTIAS, STIFFNESS, DAMPING = (0.05, 0.1), (0.02, 0.08), 2e8, 500.0
+ERRORS = ((20, 1e-6, 0.0), (40, 2e-7, 0.7))
+WHEELS = f"""\
+&body name = 'one' inertia = {INERTIAS[0]} speed_rpm = 3000 /
+&body name = 'two' inertia = {INERTIAS[1]} speed_rpm = INTERNAL1500 /
+&mesh name = 'teeth' bodies = 'one', 'two' teeth = 20, 40 module = 0.005 stiffness = {STIFFNESS} damping = {DAMPING}
+  transmission_error = 1e-6, 2e-7 error_phases = 0, 0.7 /
+&run t_end = 1 /
+&response body = 'one' speed_rpm = 500, 8000 count = 16 /
+"""
+EXTERNAL = WHEELS.replace("INTERNAL", "-")
+
+
+def deformed(speed, order, amplitude, phase):
+    """Complex force on the teeth for sin(order phi + phase) = Re(-i exp(i (order phi + phase)))."""
+    mass = 1 / sum(radius**2 / inertia for radius, inertia in zip(RADII, INERTIAS, strict=True))
+    frequency = order * speed
+    stiffness = STIFFNESS + 1j * frequency * DAMPING
+    error = -1j * amplitude * cmath.exp(1j * phase)
+    return stiffness * error * mass * frequency**2 / (mass * frequency**2 - stiffness)
+
+
+def respond(nocdyn, text, *words):
+    outcome = nocdyn("response", nocdyn.write("machine.nml", text), "--out", "out", *words)
+    assert outcome.returncode == 0, outcome.stderr
+    header, rows = nocdyn.table("out", "response_orders.csv")
+    return [dict(zip([label.split(" [")[0] for label in header], row, strict=True)) for row in rows]
+
+
+@pytest.mark.parametrize("text", [EXTERNAL, WHEELS.replace("INTERNAL", "").replace("teeth = 20", "internal = .true. teeth = 20")])
+def test_the_force_of_a_transmission_error_has_the_closed_form(nocdyn, text):
+    for row in respond(nocdyn, text):
+        order, amplitude, phase = next(error for error in ERRORS if error[0] == round(row["order"]))
+        force = row["force_teeth"] * cmath.exp(1j * radians(row["phase_force_teeth"]))
+        expected = deformed(row["omega_one"], order, amplitude, phase)
+        assert abs(force - expected) < 1e-9 * abs(expected)
+
+
+def test_orders_of_a_transmission_error_may_be_given(nocdyn):
+    by_teeth = respond(nocdyn, EXTERNAL)
+    given = EXTERNAL.replace("teeth = 20, 40 module = 0.005", "radii = 0.05, 0.1").replace(
+        "error_phases", "error_orders = 20, 40 error_phases"
+    )
+    assert respond(nocdyn, given) == by_teeth
+    turned = respond(nocdyn, EXTERNAL.replace("error_phases = 0, 0.7", "error_phases_deg = 0, 40.107045659157627"))
+    assert [row["phase_force_teeth"] for row in turned] == pytest.approx([row["phase_force_teeth"] for row in by_teeth])
+
+
+def test_modes_do_not_have_the_transmission_error_and_motions_refuse_it(nocdyn):
+    path = nocdyn.write("machine.nml", EXTERNAL)
+    plain = nocdyn.write("plain.nml", EXTERNAL.replace("transmission_error = 1e-6, 2e-7 error_phases = 0, 0.7", ""))
+    modes = [nocdyn("modes", each).stdout.split("steady state")[1] for each in (path, plain)]
+    assert modes[0] == modes[1]
+    assert nocdyn("run", plain, "--out", "out").returncode == 0
+    outcome = nocdyn("run", path, "--out", "refused")
+    assert outcome.returncode == 2
+    assert "machine.nml:4: &mesh 'teeth': the transmission error is part of nocdyn response, not of a motion" in outcome.stderr
+    assert not (nocdyn.folder / "refused").exists()
+    assert "note: nocdyn run refuses it" in nocdyn("check", path).stdout
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "complaint"),
+    [
+        ("phases = 0, 0.7", "phases = 0", "error_phases has 1 and transmission_error 2 values; needed: as many of each"),
+        ("error_phases", "error_orders = 1, 2, 3 error_phases", "error_orders has 3 and transmission_error 2 values"),
+        ("teeth = 20, 40 module = 0.005", "radii = 1, 2", "error_orders is missing; needed where radii stand for the teeth"),
+        ("error = 1e-6", "error = -1e-6", "transmission_error(1) = -1e-6 is out of range; allowed: >= 0 [m]"),
+        ("error_phases", "error_orders = 0, 1 error_phases", "error_orders(1) = 0 is out of range; allowed: > 0"),
+        ("transmission_error = 1e-6, 2e-7", "", "error_phases needs transmission_error"),
+    ],
+)
+def test_bad_transmission_errors_are_refused(nocdyn, old, new, complaint):
+    outcome = nocdyn("response", nocdyn.write("machine.nml", EXTERNAL.replace(old, new)), "--out", "out")
+    assert outcome.returncode == 2
+    assert f"&mesh 'teeth': {complaint}" in outcome.stderr or f"&mesh: {complaint}" in outcome.stderr
+    assert "machine.nml:4" in outcome.stderr

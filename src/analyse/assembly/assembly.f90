@@ -12,7 +12,7 @@ module nocdyn_assembly
   use nocdyn_input, only: input_t
   use nocdyn_machine, only: machine_t
   use nocdyn_massless_motion, only: massless_bodies
-  use nocdyn_mesh_assembly, only: add_mesh_form, mesh_form
+  use nocdyn_mesh_assembly, only: add_mesh_form, check_meshes, mesh_form
   use nocdyn_motor_assembly, only: add_motor_form, check_motors, motor_form
   use nocdyn_multiplier, only: new_multiplier
   use nocdyn_paper, only: new_paper
@@ -48,6 +48,7 @@ contains
     call assemble_constraints(input, body_index, machine%lanes, machine%constraints, error)
     if (.not. allocated(error)) call check_couplings(input, error)
     if (.not. allocated(error)) call check_shafts(input, error)
+    if (.not. allocated(error)) call check_meshes(input, error)
     if (.not. allocated(error)) call check_motors(input, error)
     if (.not. allocated(error)) call check_engines(input, error)
     if (.not. allocated(error)) call check_orders(input, error)

@@ -6,9 +6,10 @@
 !> vertex is the next speed.
 module nocdyn_critical_speeds
   use nocdyn_errors, only: error_t
-  use nocdyn_forced_response, only: forced_response_t, response_point_t
+  use nocdyn_forced_response, only: forced_response_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: sort_ascending
+  use nocdyn_response_points, only: response_point_t
   use nocdyn_speed_modes, only: speed_modes_t
   implicit none (type, external)
   private

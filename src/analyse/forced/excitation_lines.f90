@@ -24,7 +24,8 @@ module nocdyn_excitation_lines
   type, public :: source_t
     integer :: element = 0
     real(wp) :: frequency = 0.0_wp      !! Omega at this speed [rad/s]
-    complex(wp) :: moment = 0.0_wp      !! moment exp(i Omega t) on `to` [N m]
+    complex(wp) :: moment = 0.0_wp      !! moment exp(i Omega t) on `to` [N m], or a twist in series with the element [rad]
+    logical :: is_twist = .false.       !! the latter
   end type source_t
 
   real(wp), parameter :: same = 1.0e-9_wp   ! relative difference of equal frequencies
@@ -78,6 +79,7 @@ contains
     type(source_t), intent(inout) :: source
     complex(wp), parameter :: i = (0.0_wp, 1.0_wp)
 
+    source%is_twist = harmonic%is_twist
     source%frequency = harmonic%frequency + harmonic%order * state%omega(harmonic%body)
     source%moment = -i * harmonic%amplitude * exp(i * (harmonic%order * state%phi(harmonic%body) + harmonic%phase))
     if (source%frequency >= 0) return

@@ -11,6 +11,7 @@ module nocdyn_forced_response
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_complex, only: complex_solve
   use nocdyn_machine, only: machine_t
+  use nocdyn_response_points, only: merge_points, response_point_t
   use nocdyn_response_quantities, only: list_quantities, response_quantity_t
   use nocdyn_synthesis, only: new_synthesis, synthesis_t
   use nocdyn_text, only: to_text
@@ -21,22 +22,6 @@ module nocdyn_forced_response
 
   integer, parameter :: worth_threads = 16         ! points: threads wait for each other longer than they compute fewer
   real(wp), parameter :: most_values = 4.0e7_wp   ! of all speeds: 0.6 GB
-
-  !> The response at one speed. Amplitudes are those of amplitude exp(i Omega t), where the angle of the reference body is zero at
-  !> t = 0 and its orders are sines of its angle.
-  type, public :: response_point_t
-    logical :: is_of_grid = .true.                 !! whether it is one of the speeds that were asked for
-    type(held_state_t) :: state
-    type(source_t), allocatable :: sources(:)
-    real(wp), allocatable :: frequency(:)          !! Omega [rad/s], [lines]
-    complex(wp), allocatable :: quantity(:, :)     !! [lines, quantities]
-    complex(wp), allocatable :: angle(:, :)        !! [rad], [lines, bodies]
-    real(wp), allocatable :: heat(:)               !! mean power lost by the oscillations [W], [elements]
-    real(wp), allocatable :: mean(:)               !! [quantities]
-    real(wp), allocatable :: lowest(:), highest(:) !! of the oscillations of all lines, without the mean, [quantities]
-  contains
-    procedure :: half_range, peak
-  end type response_point_t
 
   type, public :: forced_response_t
     type(machine_t) :: machine
@@ -58,6 +43,7 @@ module nocdyn_forced_response
     type(band_work_t) :: band
     complex(wp), allocatable :: stiffness(:)    !! [elements]
     complex(wp), allocatable :: moment(:, :)    !! [elements, lines]
+    complex(wp), allocatable :: series(:)       !! twists in series with the elements [rad], [elements]
   end type work_t
 
 contains
@@ -127,11 +113,12 @@ contains
     do i = 1, size(speeds)
       failed_speed = speeds(i)
       new(i)%is_of_grid = are_of_grid
+      allocate (new(i)%state)
       call self%held%hold(speeds(i), new(i)%state, error)
       if (allocated(error)) return
     end do
     call solve_points(self, new)
-    call merge_points(self, new)
+    call merge_points(self%points, new)
   end subroutine add_points
 
   !> Solves at all points, by threads.
@@ -143,31 +130,16 @@ contains
 
     !$omp parallel private(work) if(size(points) >= worth_threads)
     work%band = new_band_work(self%matrix)
-    allocate (work%stiffness(size(self%loss_factor)), work%moment(size(self%loss_factor), size(self%lines)))
+    allocate (work%stiffness(size(self%loss_factor)), work%moment(size(self%loss_factor), size(self%lines)), &
+              work%series(size(self%loss_factor)))
     !$omp do schedule(dynamic, 4)
     do i = 1, size(points)
       call solve_point(self, points(i), work)
     end do
     !$omp end do
-    deallocate (work%stiffness, work%moment)
+    deallocate (work%stiffness, work%moment, work%series)
     !$omp end parallel
   end subroutine solve_points
-
-  !> Half the difference of the largest and the smallest value of a quantity.
-  elemental real(wp) function half_range(self, quantity)
-    class(response_point_t), intent(in) :: self
-    integer, intent(in) :: quantity
-
-    half_range = 0.5_wp * (self%highest(quantity) - self%lowest(quantity))
-  end function half_range
-
-  !> The largest magnitude of a quantity, its mean included.
-  elemental real(wp) function peak(self, quantity)
-    class(response_point_t), intent(in) :: self
-    integer, intent(in) :: quantity
-
-    peak = max(abs(self%mean(quantity) + self%highest(quantity)), abs(self%mean(quantity) + self%lowest(quantity)))
-  end function peak
 
   !> Solves for every line at one speed.
   subroutine solve_point(self, point, work)
@@ -241,23 +213,42 @@ contains
       call self%matrix%factor(frequency, work%stiffness, work%band, singular)
       if (singular) call self%matrix%factor(frequency * (1.0_wp + beside), work%stiffness, work%band, singular)
       work%band%x(:) = (0.0_wp, 0.0_wp)
-      do i = 1, size(line%source)
-        call self%matrix%add_forces(sources(line%source(i))%element, sources(line%source(i))%moment, work%band)
-      end do
+      call add_sources(self, sources(line%source), work)
       call self%matrix%solve(work%band)
       do e = 1, size(work%stiffness)
-        twist = self%matrix%twist(e, work%band)
+        twist = self%matrix%twist(e, work%band) - work%series(e)
         work%moment(e, l) = -work%stiffness(e) * twist
         point%heat(e) = point%heat(e) + 0.5_wp * frequency * aimag(work%stiffness(e)) * (real(twist, wp)**2 + aimag(twist)**2)
       end do
       do i = 1, size(line%source)
         associate (source => sources(line%source(i)))
+          if (source%is_twist) cycle
           work%moment(source%element, l) = work%moment(source%element, l) + source%moment
         end associate
       end do
       call set_angles(self, work, point%angle(l, :))
     end associate
   end subroutine solve_line
+
+  !> The forces of some harmonics, and their twists in series.
+  pure subroutine add_sources(self, sources, work)
+    type(forced_response_t), intent(in) :: self
+    type(source_t), intent(in) :: sources(:)
+    type(work_t), intent(inout) :: work
+    integer :: i
+
+    work%series(:) = (0.0_wp, 0.0_wp)
+    do i = 1, size(sources)
+      associate (e => sources(i)%element, amplitude => sources(i)%moment)
+        if (sources(i)%is_twist) then
+          work%series(e) = work%series(e) + amplitude
+          call self%matrix%add_forces(e, work%stiffness(e) * amplitude, work%band)
+        else
+          call self%matrix%add_forces(e, amplitude, work%band)
+        end if
+      end associate
+    end do
+  end subroutine add_sources
 
   !> The angles of the bodies.
   pure subroutine set_angles(self, work, angle)
@@ -338,50 +329,5 @@ contains
       frequencies(:, i) = self%points(i)%frequency
     end do
   end function frequencies
-
-  !> Merges two lists of points in the order of their speeds.
-  subroutine merge_points(self, new)
-    type(forced_response_t), intent(inout) :: self
-    type(response_point_t), intent(inout) :: new(:)   !! ascending by the size of the speed; moved
-    type(response_point_t), allocatable :: all(:)
-    integer :: i, k, n
-
-    allocate (all(size(self%points) + size(new)))
-    i = 1
-    k = 1
-    do n = 1, size(all)
-      if (k > size(new)) then
-        call move_point(self%points(i), all(n))
-        i = i + 1
-      else if (i > size(self%points)) then
-        call move_point(new(k), all(n))
-        k = k + 1
-      else if (abs(self%points(i)%state%speed) <= abs(new(k)%state%speed)) then
-        call move_point(self%points(i), all(n))
-        i = i + 1
-      else
-        call move_point(new(k), all(n))
-        k = k + 1
-      end if
-    end do
-    call move_alloc(all, self%points)
-  end subroutine merge_points
-
-  !> Moves the arrays of a point.
-  subroutine move_point(from, to)
-    type(response_point_t), intent(inout) :: from
-    type(response_point_t), intent(out) :: to
-
-    to%is_of_grid = from%is_of_grid
-    to%state = from%state
-    call move_alloc(from%sources, to%sources)
-    call move_alloc(from%frequency, to%frequency)
-    call move_alloc(from%quantity, to%quantity)
-    call move_alloc(from%angle, to%angle)
-    call move_alloc(from%heat, to%heat)
-    call move_alloc(from%mean, to%mean)
-    call move_alloc(from%lowest, to%lowest)
-    call move_alloc(from%highest, to%highest)
-  end subroutine move_point
 
 end module nocdyn_forced_response

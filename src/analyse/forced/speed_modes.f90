@@ -4,9 +4,10 @@
 !> most like it: the squares of phi_i^T M phi_j, with shapes of unit modal mass, are compared (modal assurance criterion).
 module nocdyn_speed_modes
   use nocdyn_errors, only: error_t
-  use nocdyn_forced_response, only: forced_response_t, response_point_t
+  use nocdyn_forced_response, only: forced_response_t
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: linearisation_t, mass_matrix, undamped_modes
+  use nocdyn_response_points, only: response_point_t
   implicit none (type, external)
   private
 

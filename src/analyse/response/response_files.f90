@@ -2,7 +2,6 @@
 module nocdyn_response_files
   use nocdyn_column_labels, only: column_labels_t
   use nocdyn_csv, only: write_header, write_row
-  use nocdyn_forced_response, only: response_point_t
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
@@ -10,6 +9,7 @@ module nocdyn_response_files
   use nocdyn_output_units, only: turn_labels
   use nocdyn_response_analysis, only: response_analysis_t
   use nocdyn_response_limits, only: no_limit, response_limit_t
+  use nocdyn_response_points, only: response_point_t
   use nocdyn_response_quantities, only: quantity_moment, response_quantity_t
   use nocdyn_response_summary, only: critical_t, response_summary_t, worst_ratio
   use nocdyn_text, only: string_t

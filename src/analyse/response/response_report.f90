@@ -1,8 +1,8 @@
 !> The printed report of a forced response: critical speeds, the largest synthesis of every coupling, barred ranges.
 module nocdyn_response_report
-  use nocdyn_forced_response, only: response_point_t
   use nocdyn_kinds, only: wp
   use nocdyn_response_analysis, only: response_analysis_t
+  use nocdyn_response_points, only: response_point_t
   use nocdyn_response_summary, only: critical_t, response_summary_t
   use nocdyn_table_text, only: cell, padded, text_width
   use nocdyn_text, only: counted, rounded_text, to_text

@@ -2,10 +2,11 @@
 !> speeds that its limits bar.
 module nocdyn_response_summary
   use nocdyn_critical_speeds, only: crossing_t, undamped
-  use nocdyn_forced_response, only: forced_response_t, response_point_t
+  use nocdyn_forced_response, only: forced_response_t
   use nocdyn_kinds, only: wp
   use nocdyn_response_analysis, only: response_analysis_t
   use nocdyn_response_limits, only: no_limit, response_limit_t
+  use nocdyn_response_points, only: response_point_t
   use nocdyn_response_quantities, only: quantity_moment, quantity_reaction, quantity_stress
   use nocdyn_response_settings, only: operating_distance
   implicit none (type, external)

@@ -38,6 +38,7 @@ module nocdyn_bank
     real(wp) :: order = 0.0_wp       !! oscillations per turn of the body
     real(wp) :: phase = 0.0_wp       !! at t = 0 and phi = 0 [rad]
     integer :: body = 0
+    logical :: is_twist = .false.    !! a twist in series with the element instead of a torque; its amplitude is in rad
   end type harmonic_t
 
   type, abstract, extends(described_elements_t), public :: bank_t
@@ -166,7 +167,7 @@ contains
     class(bank_t), intent(inout) :: self
   end subroutine to_mean_torque
 
-  !> The harmonics of the torque of an element in the first lane, which turns with a constant speed; `to_mean_torque` removes
+  !> The harmonics of the torque, or of a twist in series, of an element in the first lane, which turns with a constant speed; `to_mean_torque` removes
   !> them. By default there are none.
   subroutine list_harmonics(self, element, speed, list)
     class(bank_t), intent(in) :: self

@@ -1,7 +1,8 @@
 !> Rows of the schema: the group &mesh with its keys.
 module nocdyn_schema_meshes
-  use nocdyn_schema_rules, only: a_flag, a_name, a_number, an_integer, any_times, anything, body_or_ground, exactly_one, &
-    example_t, from_1, group_rule_t, in_machine, key_rule_t, not_negative, positive, relation_rule_t, required, requires, unset
+  use nocdyn_schema_rules, only: a_flag, a_name, a_number, an_integer, any_number, any_times, anything, body_or_ground, &
+    exactly_one, example_t, from_1, group_rule_t, in_machine, key_rule_t, not_negative, positive, &
+    relation_rule_t, required, requires, unset
   implicit none (type, external)
   private
 
@@ -26,12 +27,19 @@ module nocdyn_schema_meshes
     key_rule_t('mesh',       'damping',         a_number,       1, 'N s/m',       '0',         not_negative, &
       'force per rate of deformation; with backlash in contact only, at most the elastic force'), &
     key_rule_t('mesh',       'backlash',        a_number,       1, 'm',           '0',         not_negative, &
-      'play between both flanks along the line of action; no force inside')]
+      'play between both flanks along the line of action; no force inside'), &
+    key_rule_t('mesh',       'transmission_error', a_number,    any_number, 'm',  unset,       not_negative, &
+      'amplitudes of the deviation from equal motion, along the line of action; for response', fewest=1), &
+    key_rule_t('mesh',       'error_orders',    a_number,       any_number, '',   unset,       positive, &
+      'order of each in turns of the first body; if not given 1, 2, ... times its teeth', fewest=1), &
+    key_rule_t('mesh',       'error_phases',    a_number,       any_number, 'rad', unset,      anything, &
+      'phase of each: amplitude * sin(order * angle + phase)', fewest=1)]
 
   type(relation_rule_t), parameter, public :: mesh_relations(*) = [ &
     relation_rule_t('mesh', exactly_one, 'radii', 'teeth'), &
     relation_rule_t('mesh', requires, 'module', 'teeth'), &
-    relation_rule_t('mesh', requires, 'teeth', 'module')]
+    relation_rule_t('mesh', requires, 'teeth', 'module'), &
+    relation_rule_t('mesh', requires, 'error_orders error_phases', 'transmission_error')]
 
   type(example_t), parameter, public :: mesh_examples(*) = [ &
     example_t('mesh', "name = 'teeth'  bodies = 'pinion', 'machine'  radii = 2.0, 3.0|" // &

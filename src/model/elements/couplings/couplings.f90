@@ -3,7 +3,7 @@
 !> Friction in parallel with the spring resists with friction tanh(u' / friction_speed), as a slipping clutch does. Damping and
 !> friction have one work integral.
 module nocdyn_couplings
-  use nocdyn_bank, only: bank_t, quantity_t, role_coupling
+  use nocdyn_bank, only: bank_t, harmonic_t, quantity_t, role_coupling
   use nocdyn_element_rows, only: element_rows_t, rows_between
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
@@ -18,6 +18,14 @@ module nocdyn_couplings
 
   public :: new_couplings
 
+  !> Orders of the first bodies of meshes by which their wheels deviate from the ideal form.
+  type, public :: transmission_error_t
+    integer, allocatable :: coupling(:)      !! that each order belongs to, numbered within the bank
+    real(wp), allocatable :: order(:)        !! positive
+    real(wp), allocatable :: amplitude(:)    !! of sin(order phi + phase) [m]
+    real(wp), allocatable :: phase(:)        !! [rad]
+  end type transmission_error_t
+
   !> What couplings of every elastic law have in common. Parameters have the shape [lanes, couplings].
   type, public :: coupling_common_t
     type(string_t), allocatable :: names(:)
@@ -28,6 +36,7 @@ module nocdyn_couplings
     real(wp), allocatable :: friction_speed(:, :)   !! [rad/s], positive
     logical :: is_mesh = .false.                    !! whether the rows are radii: angles are deformations [m], moments forces [N]
     real(wp), allocatable :: section_modulus(:, :)  !! stress = moment / section_modulus [m3], 0: unknown; not allocated: all
+    type(transmission_error_t), allocatable :: error !! not allocated: none
   end type coupling_common_t
 
   ! gfortran 12 loses components of a structure constructor's value that is an argument
@@ -39,7 +48,9 @@ module nocdyn_couplings
   type, extends(bank_t), public :: couplings_t
     logical :: has_friction = .false.
     logical :: is_mesh = .false.   !! as in `coupling_common_t`
+    type(transmission_error_t), allocatable :: error   !! not allocated: none; forced responses have it, the law has it not
   contains
+    procedure :: list_harmonics
     procedure :: set_common
     procedure :: add_damping
     procedure :: describe
@@ -121,6 +132,7 @@ contains
     is_dissipative = any(abs(common%damping) > 0.0_wp, dim=1)
     self%has_friction = allocated(common%friction)
     self%is_mesh = common%is_mesh
+    if (allocated(common%error)) allocate (self%error, source=common%error)
     if (self%has_friction) then
       call self%add_parameter('friction', common%friction)
       call self%add_parameter('friction_speed', common%friction_speed)
@@ -165,6 +177,29 @@ contains
 
     friction = -(self%parameter(tape, 'friction') * tanh(speed_of(tape) / self%parameter(tape, 'friction_speed')))
   end function friction
+
+  !> The transmission error of a mesh.
+  subroutine list_harmonics(self, element, speed, list)
+    class(couplings_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: speed    !! u' [rad/s]
+    type(harmonic_t), allocatable, intent(out) :: list(:)
+    integer :: i, k
+    integer, allocatable :: orders(:)
+
+    if (.not. allocated(self%error)) then
+      allocate (list(0))
+      return
+    end if
+    orders = pack([(k, k=1, size(self%error%order))], self%error%coupling == element)
+    allocate (list(size(orders)))
+    do i = 1, size(list)
+      associate (error => self%error, k => orders(i))
+        list(i) = harmonic_t(error%amplitude(k), 0.0_wp, error%order(k), error%phase(k), &
+                             self%rows%body(self%rows%first(element)), is_twist=.true.)
+      end associate
+    end do
+  end subroutine list_harmonics
 
   function quantities(self) result(columns)
     class(couplings_t), intent(in) :: self
