@@ -15,6 +15,7 @@ from .peer_output import divert_to
 from .programs import Programs
 from .report import markdown, write_report
 from .throughput import Throughput
+from .torsional import Torsional
 from .whole_process import measure
 from .work_precision import WorkPrecision
 from .workloads import ROOT, WORKLOADS, Bench, Workload
@@ -79,6 +80,9 @@ def main() -> None:
             sys.exit(f"{parser.prog}: {error}")
         write_report(measured, arguments.out, arguments.build)
     print(f"bench.md, bench.json and the figures are in {arguments.out}; what the peers printed is in peers.log there")
+    disagreements = [sentence for workload in measured if isinstance(workload, Torsional) for sentence in workload.disagreements]
+    if disagreements:
+        sys.exit("\n".join(f"{parser.prog}: {sentence}" for sentence in disagreements))
 
 
 def _measure(workload: Workload, rounds: int, is_quick: bool, out: Path) -> None:
@@ -88,6 +92,8 @@ def _measure(workload: Workload, rounds: int, is_quick: bool, out: Path) -> None
     elif isinstance(workload, Scaling):
         workload.measure(rounds)
         draw_scaling(workload, out)
+    elif isinstance(workload, Torsional):
+        workload.measure(rounds)
     elif isinstance(workload, Throughput | Costs):
         workload.measure(min(rounds, MOST_SWEEPS))
     else:

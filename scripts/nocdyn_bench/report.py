@@ -14,21 +14,23 @@ from .costs import Costs
 from .rounds import Point
 from .tables import rounded, table
 from .throughput import SLOW_SAMPLE, Rate, Throughput
+from .torsional import Torsional
 from .whole_process import Workload, largest_error
 from .work_precision import WorkPrecision
 
 COLUMNS = {"states": "error", "moment": "moment"}  # kinds of errors, as heads of tables name them
-PEERS = ("heyoka", "numbalsoda", "numba", "scipy", "numpy")
+PEERS = ("heyoka", "numbalsoda", "numba", "scipy", "numpy", "opentorsion")
 VERDICTS = {
     "W1": targets.case2_verdicts,
     "W2": targets.throughput_verdicts,
     "W4": targets.stiff_case2_verdicts,
     "W3": targets.chain_verdicts,
     "W3_stiff": targets.stiff_chain_verdicts,
+    "opentorsion": targets.torsional_verdicts,
 }
 
 
-Measured = Workload | WorkPrecision | Scaling | Throughput | Costs
+Measured = Workload | WorkPrecision | Scaling | Throughput | Costs | Torsional
 
 
 def verdicts(workload: Measured) -> list[targets.Verdict]:
@@ -43,7 +45,7 @@ def markdown(workload: Measured) -> str:
         lines = _scaling(workload)
     elif isinstance(workload, Throughput):
         lines = _throughput(workload)
-    elif isinstance(workload, Costs):
+    elif isinstance(workload, Costs | Torsional):
         lines = workload.lines
     else:
         lines = _whole_process(workload)
@@ -338,6 +340,11 @@ def _content(workload: Measured) -> dict | list:
         return [{"rotors": chain.bodies, **_point(point)} for chain in workload.chains for point in workload.points[chain]]
     if isinstance(workload, Costs):
         return workload.lines
+    if isinstance(workload, Torsional):
+        return {
+            "largest_differences": {one.machine.name: one.largest for one in workload.agreements},
+            "seconds": workload.seconds,
+        }
     if isinstance(workload, Throughput):
         return {
             "variants": workload.count,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from .chains import Scaling
 from .contestant import Contestant
 from .throughput import Throughput
+from .torsional import FACTOR, Torsional
 from .work_precision import WorkPrecision
 
 GROWTH = 1.1  # largest exponent of N in the time of one step that still counts as linear
@@ -149,3 +150,8 @@ def little_memory(workload: Throughput, most: float = 500.0) -> Verdict:
         return Verdict(f"{workload.name}: memory below {most:g} MB", None)
     sizes = ", ".join(f"{megabytes:.0f} MB for {count} variants" for count, megabytes in workload.memory.items())
     return Verdict(f"{workload.name}: the process needs {sizes}; wanted below {most:g} MB", largest < most)
+
+
+def torsional_verdicts(workload: Torsional) -> list[Verdict]:
+    sentence = f"A response of 16 bodies: openTorsion takes {workload.ratio:.3g} times as long, at least {FACTOR:g} times wanted"
+    return [Verdict(sentence, workload.ratio >= FACTOR)]

@@ -16,6 +16,7 @@ from .problems import Case2, Chain
 from .programs import Programs
 from .shipped import Shipped
 from .throughput import Throughput
+from .torsional import Torsional
 from .variants import CASE2, Errors, Family
 from .work_precision import WorkPrecision
 
@@ -66,7 +67,7 @@ class Bench:
     is_quick: bool
 
 
-Workload = whole_process.Workload | WorkPrecision | Scaling | Throughput | Costs
+Workload = whole_process.Workload | WorkPrecision | Scaling | Throughput | Costs | Torsional
 
 
 def start_up(bench: Bench) -> whole_process.Workload:
@@ -287,6 +288,10 @@ def examples(bench: Bench) -> Costs:
     )
 
 
+def opentorsion(bench: Bench) -> Torsional:
+    return Torsional("opentorsion", "openTorsion: modes and forced responses", bench.nocdyn, bench.scratch)
+
+
 WORKLOADS: dict[str, Callable[[Bench], Workload]] = {
     "start_up": start_up,
     "case2": case2,
@@ -300,6 +305,7 @@ WORKLOADS: dict[str, Callable[[Bench], Workload]] = {
     "W6": w6,
     "W6_sweep": w6_sweep,
     "example_sweeps": examples,
+    "opentorsion": opentorsion,
     "step_costs": steps,
     "chunk_costs": chunks,
     "hand_out": hand_out,

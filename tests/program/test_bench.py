@@ -10,7 +10,7 @@ import pytest
 from conftest import SOURCE
 
 sys.path.insert(0, str(SOURCE / "scripts"))
-from nocdyn_bench import costs, example_sweeps, rounds, variants
+from nocdyn_bench import costs, example_sweeps, rounds, torsional_machines, torsional_results, variants
 from nocdyn_bench.contestant import Contestant, ContestantError, Run
 from nocdyn_bench.nocdyn_sweep import random_design, write_input
 from nocdyn_bench.shipped import Shipped
@@ -192,6 +192,73 @@ def test_each_contestant_of_a_sweep_has_the_loosest_tolerance_that_is_good_enoug
     assert [(rate.contestant.label, rate.best) for rate in workload.rates] == [("a", 40.0)]
     assert workload.rates[0].tolerance == pytest.approx(10**-6.1)
     assert workload.failures == ["b fails: 'gas' has no Taylor series"]
+
+
+TORSIONAL = [machine() for machine in (*torsional_machines.MACHINES, torsional_machines.timed_plant)]
+
+
+@pytest.mark.parametrize("machine", TORSIONAL, ids=lambda machine: machine.name)
+def test_nocdyn_and_opentorsion_can_describe_every_machine_that_is_compared(nocdyn, machine):
+    firsts = [shaft.first for shaft in machine.shafts]
+    assert len({*firsts, machine.bodies[-1]}) == len(firsts) + 1
+    machine.write_input(nocdyn.folder / "response.nml")
+    machine.write_input(nocdyn.folder / "modes.nml", has_torques=False)
+    outcome = nocdyn("check", "response.nml", "modes.nml")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+
+
+def test_modes_and_responses_are_read_with_their_phases(nocdyn):
+    machine = torsional_machines.damped_engine()
+    machine.write_input(nocdyn.folder / "machine.nml")
+    machine.write_input(nocdyn.folder / "modes.nml", has_torques=False)
+    for command, file in (("response", "machine.nml"), ("modes", "modes.nml")):
+        assert nocdyn(command, file, "--out", command, *(["--at", "0"] if command == "modes" else [])).returncode == 0
+    modes = torsional_results.read_modes(nocdyn.folder / "modes")
+    assert len(modes.undamped) == len(modes.poles) == len(machine.inertias) - 1
+    assert np.abs(modes.poles) == pytest.approx(modes.undamped, rel=1e-3)  # weakly damped
+    found = torsional_results.read_response(machine, nocdyn.folder / "response")
+    omegas = found.speeds[:, None] * found.orders
+    brake = machine.index("brake")  # no torque acts on it but those of its shaft and its damper
+    inertia, damping = machine.inertias["brake"], machine.viscous["brake"]
+    inertial = (1j * omegas * damping - omegas**2 * inertia) * found.angles[:, brake]
+    assert inertial == pytest.approx(-found.moments[:, -1], abs=1e-10 * np.abs(found.moments).max())
+
+
+def test_the_speeds_of_bodies_follow_through_shafts_and_gears():
+    machine = torsional_machines.branched_gears()
+    ratios = dict(zip(machine.bodies, machine.ratios))
+    assert ratios["pump"] == pytest.approx(-0.3 / 0.13)
+    assert ratios["fan"] == pytest.approx(0.3 / 0.4 * 0.15 / 0.37)
+    assert machine.orders == pytest.approx(sorted([2.0, ratios["fan"] * 5.0, -ratios["pump"], -6.0 * ratios["pump"]]))
+
+
+def test_differences_of_responses_are_relative_to_the_largest_amplitude_of_a_shaft():
+    expected = np.array([[[1.0, 2.0], [100.0, 50.0]], [[0.1, 4.0], [1.0, 1.0j]]])
+    found = expected.copy()
+    found[0, 0, 1] += 4e-6j
+    found[1, 1, 1] += 5e-5
+    assert torsional_results.difference(found, expected) == pytest.approx(1e-6)
+    found[0, 0, 0] = np.nan
+    assert torsional_results.difference(found, expected) == np.inf
+    assert torsional_results.difference(expected[:, :1], expected) == np.inf
+
+
+def test_modes_of_another_number_do_not_agree():
+    expected = torsional_results.Modes(np.array([10.0, 20.0]), np.array([-1.0 + 10.0j, -2.0 + 20.0j]))
+    near = torsional_results.Modes(np.array([10.0, 20.002]), np.array([-1.0 + 10.0j, -2.0 + 20.0j]))
+    assert near.differences(expected) == pytest.approx((1e-4, 0.0))
+    assert torsional_results.Modes(np.array([10.0]), expected.poles).differences(expected) == (np.inf, 0.0)
+
+
+def test_a_machine_in_which_opentorsion_differs_is_named(nocdyn):
+    pytest.importorskip("opentorsion")
+    from nocdyn_bench import torsional
+
+    agreement = torsional.Agreement(torsional_machines.three_rotors(), 0.0, 1e-9, 2e-8, 0.0)
+    workload = torsional.Torsional("opentorsion", "", Path(nocdyn.executable), nocdyn.folder, [agreement])
+    assert workload.disagreements == ["three_rotors: nocdyn and openTorsion differ by 2.0e-08, more than 1e-08"]
+    workload.agreements = [workload._compare(machine) for machine in (TORSIONAL[0], TORSIONAL[2])]
+    assert workload.disagreements == []
 
 
 def test_what_compiled_peers_print_goes_to_the_log(tmp_path):
