@@ -117,8 +117,8 @@ contains
     allocate (meshes, source=input%groups_named('mesh'))
     do i = 1, size(meshes)
       if (.not. any(input%groups(meshes(i))%numbers('transmission_error') > 0)) cycle
-      text = input%location(meshes(i), 'transmission_error') // ': the transmission error is part of nocdyn response, not of ' // &
-             'a motion over the time; allowed: none, or 0'
+      text = input%location(meshes(i), 'transmission_error') // ': the transmission error is part of nocdyn response, not ' // &
+             'of a motion over the time; allowed: none, or 0'
       return
     end do
   end subroutine find_obstacle_in_time
