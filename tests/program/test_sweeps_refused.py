@@ -24,7 +24,7 @@ def refusal(nocdyn, **groups):
     [
         ({"sweep": ""}, "m.nml: there is no &sweep; 'nocdyn help input sweep' shows one"),
         ({"vary": ""}, "m.nml:5: &sweep: design = 'random' has nothing to vary; needed: a &vary"),
-        ({"record": ""}, "m.nml:5: &sweep: no number of the variants is kept; needed: a &record with quantity and statistic"),
+        ({"record": ""}, "m.nml:5: &sweep: no number of the variants is kept; needed: a &record with quantity, mode or response"),
         (
             {"record": "&record /"},
             "m.nml:7: &record: there is nothing to record; needed: quantity, mode, response or trajectories",

@@ -74,7 +74,7 @@ contains
                                     plan%analyses, diagnostics)
       allocate (plan%trajectories, source=wanted_trajectories(input))
       if (plan%results() == 0 .and. diagnostics%count == 0) call input%report(sweeps(1), 'design', &
-        'no number of the variants is kept; needed: a &record with quantity and statistic', diagnostics)
+        'no number of the variants is kept; needed: a &record with quantity, mode or response', diagnostics)
       if (size(plan%trajectories) > 0) call check_output_times(input, failure)
       if (.not. allocated(failure)) call count_columns(input, plan%machine, plan%columns, failure)
     end if
