@@ -87,8 +87,8 @@ contains
     character(len=:), allocatable :: known
 
     if (size(lines) == 0) then
-      call raise(error, exit_input, input%location(settings%group) // ': nothing excites this machine; required: an &engine, ' // &
-                 "an &excitation of kind 'orders' or 'harmonic' (with a frequency), or transmission_error of a &mesh")
+      call raise(error, exit_input, input%location(settings%group) // ': nothing excites this machine; required: an ' // &
+                 "&engine, an &excitation of kind 'orders' or 'harmonic' (with a frequency), or transmission_error of a &mesh")
       return
     end if
     do i = 1, size(chosen)

@@ -167,8 +167,8 @@ contains
     class(bank_t), intent(inout) :: self
   end subroutine to_mean_torque
 
-  !> The harmonics of the torque, or of a twist in series, of an element in the first lane, which turns with a constant speed; `to_mean_torque` removes
-  !> them. By default there are none.
+  !> The harmonics of the torque, or of a twist in series, of an element in the first lane, which turns with a constant speed;
+  !> `to_mean_torque` removes them. By default there are none.
   subroutine list_harmonics(self, element, speed, list)
     class(bank_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank

@@ -85,9 +85,9 @@ contains
     call plan%numbers%target_values(typical, values)
     call new_variant_machines(plan%input, plan%numbers%targets, lanes, with_energy_balance, block%machines, values)
     block%message = ''
-    if (size(plan%statistics) > 0) &
-      call prepare_integration(plan%input, block%machines%formulation, plan%statistics, block%settings, block%times, &
-                               block%stepper, block%observer%statistics_observer_t, block%message)
+    if (size(plan%statistics) == 0) return
+    call prepare_integration(plan%input, block%machines%formulation, plan%statistics, block%settings, block%times, &
+                             block%stepper, block%observer%statistics_observer_t, block%message)
   end subroutine new_sweep_block
 
   !> Settings, stepper and observer of the variants that a formulation is integrated for. Statistics that begin outside of the
