@@ -45,7 +45,7 @@ contains
     real(wp) :: speed
 
     n = 0
-    allocate (sources(256))
+    allocate (sources(64))
     do b = 1, size(machine%banks)
       associate (bank => machine%banks(b)%bank)
         if (bank%role == role_load) cycle
@@ -71,17 +71,17 @@ contains
     sources = sources(:n)
   end subroutine list_sources
 
-  !> amplitude sin(frequency t + order phi + phase) with phi = phi_0 + omega t, as the real part of moment exp(i Omega t), Omega
-  !> > 0.
+  !> A harmonic with phi = phi_0 + omega t, as the real part of moment exp(i Omega t), Omega > 0.
   pure subroutine set_source(harmonic, state, source)
     type(harmonic_t), intent(in) :: harmonic
     type(held_state_t), intent(in) :: state
     type(source_t), intent(inout) :: source
-    complex(wp), parameter :: i = (0.0_wp, 1.0_wp)
+    real(wp) :: angle
 
     source%is_twist = harmonic%is_twist
     source%frequency = harmonic%frequency + harmonic%order * state%omega(harmonic%body)
-    source%moment = -i * harmonic%amplitude * exp(i * (harmonic%order * state%phi(harmonic%body) + harmonic%phase))
+    angle = harmonic%order * state%phi(harmonic%body)
+    source%moment = harmonic%amplitude * cmplx(cos(angle), sin(angle), wp)
     if (source%frequency >= 0) return
     source%frequency = -source%frequency
     source%moment = conjg(source%moment)

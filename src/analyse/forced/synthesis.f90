@@ -142,8 +142,9 @@ contains
     complex(wp), intent(in) :: amplitude(:)
     real(wp), intent(in) :: value(0:)  !! samples, [0 to samples + 1]
     real(wp), intent(in) :: sign       !! 1 or -1
-    real(wp) :: beside, bend, highest, slope, top(part%samples)
-    integer :: candidate(part%samples), i, k, n
+    real(wp), dimension(part%samples) :: top, vertex   ! of the parabola through a maximum and its neighbours
+    real(wp) :: beside, bend, highest, slope
+    integer :: i, k, n
 
     refined = maxval(sign * value)
     ! the largest value is within half a sample of one that is lower by this at most, for the curvature is bounded
@@ -155,17 +156,20 @@ contains
       associate (before => sign * value(i - 1), here => sign * value(i), after => sign * value(i + 1))
         if (here < before .or. here < after) cycle
         n = n + 1
-        candidate(n) = i
         slope = 0.5_wp * (after - before)
         bend = 2.0_wp * here - before - after
+        vertex(n) = real(i - 1, wp)
         top(n) = here
-        if (bend > 0) top(n) = here + 0.5_wp * slope**2 / bend   ! the vertex of the parabola
+        if (bend > 0) then
+          vertex(n) = vertex(n) + slope / bend
+          top(n) = here + 0.5_wp * slope**2 / bend
+        end if
         highest = max(highest, top(n))
       end associate
     end do
     do k = 1, n   ! the error of a parabola, at six samples of the shortest period, is a small part of its height
       if (top(k) < highest - 0.2_wp * beside) cycle
-      refined = max(refined, climbed(part, amplitude, 2.0_wp * pi * (candidate(k) - 1) / part%samples, sign))
+      refined = max(refined, climbed(part, amplitude, 2.0_wp * pi * vertex(k) / part%samples, sign))
     end do
   end function refined
 
@@ -181,7 +185,7 @@ contains
     complex(wp), intent(in) :: amplitude(:)
     real(wp), intent(in) :: start, sign
     integer, parameter :: steps = 8
-    real(wp), parameter :: accurate = 1.0e-6_wp   ! of the angle; the error of the value is its square
+    real(wp), parameter :: near = 1.0e-3_wp   ! of the top, as a share of the shortest wave's radian: a parabola errs by its cube
     complex(wp) :: power(0:maxval(part%multiple)), term
     real(wp) :: angle, first, second, value
     integer :: k, n
@@ -207,7 +211,10 @@ contains
       if (value <= climbed) return
       climbed = value
       if (.not. second < 0) return
-      if (abs(first) <= accurate * abs(second)) return
+      if (abs(first) * maxval(part%multiple) <= near * abs(second)) then
+        climbed = value - 0.5_wp * first**2 / second
+        return
+      end if
       angle = angle - max(-pi / part%samples, min(pi / part%samples, first / second))
     end do
   end function climbed

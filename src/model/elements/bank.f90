@@ -13,7 +13,7 @@ module nocdyn_bank
   implicit none (type, external)
   private
 
-  public :: append_bank, bank_of, name_length
+  public :: append_bank, bank_of, name_length, sine_harmonic
 
   integer, parameter, public :: role_coupling = 1     !! in K and C of eqs. (21), (22); stores energy
   integer, parameter, public :: role_load = 2         !! in C of eq. (22); takes energy out
@@ -30,15 +30,13 @@ module nocdyn_bank
     character(len=8) :: suffix = ''      !! last part of the column's name
   end type quantity_t
 
-  !> One harmonic of the torque of an element that turns steadily: amplitude sin(frequency t + order phi + phase), with the angle
-  !> phi of `body`.
+  !> One harmonic of the torque of an element that turns steadily, by the angle phi of `body`.
   type, public :: harmonic_t
-    real(wp) :: amplitude = 0.0_wp   !! at this speed [N m]
-    real(wp) :: frequency = 0.0_wp   !! [rad/s]
-    real(wp) :: order = 0.0_wp       !! oscillations per turn of the body
-    real(wp) :: phase = 0.0_wp       !! at t = 0 and phi = 0 [rad]
+    complex(wp) :: amplitude = 0.0_wp   !! the torque is the real part of amplitude exp(i (frequency t + order phi)) [N m]
+    real(wp) :: frequency = 0.0_wp      !! [rad/s]
+    real(wp) :: order = 0.0_wp          !! oscillations per turn of the body
     integer :: body = 0
-    logical :: is_twist = .false.    !! a twist in series with the element instead of a torque; its amplitude is in rad
+    logical :: is_twist = .false.       !! a twist in series with the element instead of a torque; its amplitude is in rad
   end type harmonic_t
 
   type, abstract, extends(described_elements_t), public :: bank_t
@@ -177,6 +175,16 @@ contains
 
     allocate (list(0))
   end subroutine list_harmonics
+
+  !> amplitude sin(frequency t + order phi + phase).
+  pure type(harmonic_t) function sine_harmonic(amplitude, frequency, order, phase, body) result(harmonic)
+    real(wp), intent(in) :: amplitude   !! [N m]
+    real(wp), intent(in) :: frequency   !! [rad/s]
+    real(wp), intent(in) :: order, phase
+    integer, intent(in) :: body
+
+    harmonic = harmonic_t(amplitude * cmplx(sin(phase), -cos(phase), wp), frequency, order, body)
+  end function sine_harmonic
 
   !> Prepares the elements for speeds that something outside of the machine holds: governors leave their throttles open. By
   !> default there is nothing to do.

@@ -3,7 +3,7 @@
 !> Friction in parallel with the spring resists with friction tanh(u' / friction_speed), as a slipping clutch does. Damping and
 !> friction have one work integral.
 module nocdyn_couplings
-  use nocdyn_bank, only: bank_t, harmonic_t, quantity_t, role_coupling
+  use nocdyn_bank, only: bank_t, harmonic_t, quantity_t, role_coupling, sine_harmonic
   use nocdyn_element_rows, only: element_rows_t, rows_between
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
@@ -195,10 +195,11 @@ contains
     allocate (list(size(orders)))
     do i = 1, size(list)
       associate (error => self%error, k => orders(i))
-        list(i) = harmonic_t(error%amplitude(k), 0.0_wp, error%order(k), error%phase(k), &
-                             self%rows%body(self%rows%first(element)), is_twist=.true.)
+        list(i) = sine_harmonic(error%amplitude(k), 0.0_wp, error%order(k), error%phase(k), &
+                                self%rows%body(self%rows%first(element)))
       end associate
     end do
+    list%is_twist = .true.
   end subroutine list_harmonics
 
   function quantities(self) result(columns)

@@ -1,6 +1,6 @@
 !> Harmonic excitations, eq. (17): M_0 sin(omega_p t + phase).
 module nocdyn_excitations
-  use nocdyn_bank, only: bank_t, harmonic_t, role_excitation
+  use nocdyn_bank, only: bank_t, harmonic_t, role_excitation, sine_harmonic
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: node_of, operator(*), operator(+), time_of
   use nocdyn_law_functions, only: sin
@@ -64,7 +64,8 @@ contains
     frequency = self%values_of('frequency')
     phase = self%values_of('phase')
     allocate (list(merge(1, 0, frequency(1, element) > 0)))
-    list(:) = harmonic_t(amplitude(1, element), frequency(1, element), 0.0_wp, phase(1, element), self%rows%last_body(element))
+    list(:) = sine_harmonic(amplitude(1, element), frequency(1, element), 0.0_wp, phase(1, element), &
+                            self%rows%last_body(element))
   end subroutine list_harmonics
 
 end module nocdyn_excitations

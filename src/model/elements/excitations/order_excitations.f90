@@ -301,7 +301,7 @@ contains
     pure type(harmonic_t) function harmonic(order, sine, cosine)
       real(wp), intent(in) :: order, sine, cosine
 
-      harmonic = harmonic_t(sqrt(sine**2 + cosine**2), 0.0_wp, order, atan2(cosine, sine), self%rows%last_body(element))
+      harmonic = harmonic_t(cmplx(cosine, -sine, wp), 0.0_wp, order, self%rows%last_body(element))
     end function harmonic
 
     !> A parameter of order number i.

@@ -3,7 +3,7 @@
 !> Engine orders have f = 0; those of one excitation that are whole multiples of one order follow from one sine and one cosine. A
 !> synchronous motor with p pole pairs pulsates during its start at twice the slip frequency: f = 2 omega_mains, order = -2 p.
 module nocdyn_wave_excitations
-  use nocdyn_bank, only: bank_t, harmonic_t, role_excitation
+  use nocdyn_bank, only: bank_t, harmonic_t, role_excitation, sine_harmonic
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: angle_of, expression_t, node_of, operator(*), operator(+), time_of
   use nocdyn_law_functions, only: cos, harmonics, sin
@@ -127,8 +127,8 @@ contains
       terms = pack([(k, k=1, size(amplitude%element))], amplitude%element == element)
       allocate (list(size(terms)))
       do i = 1, size(terms)
-        list(i) = harmonic_t(amplitude%value(1, terms(i)), frequency%value(1, terms(i)), order%value(1, terms(i)), &
-                             phase%value(1, terms(i)), self%rows%last_body(element))
+        list(i) = sine_harmonic(amplitude%value(1, terms(i)), frequency%value(1, terms(i)), order%value(1, terms(i)), &
+                                phase%value(1, terms(i)), self%rows%last_body(element))
       end do
     end associate
   end subroutine list_harmonics
