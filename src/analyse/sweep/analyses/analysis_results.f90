@@ -60,30 +60,31 @@ contains
     real(wp), intent(in) :: order              !! 0 stands for all orders together
     integer, intent(in) :: statistic           !! analysis_...
     type(analysis_result_t), intent(out) :: self
-    character(len=:), allocatable :: amplitude
+    character(len=:), allocatable :: what
 
     self%quantity = quantity
     self%order = order
     self%statistic = statistic
     self%label = column
-    amplitude = 'half range of all orders of ' // column
+    what = column // ', all orders: '
     if (order > 0) then
       self%label = self%label // '_order_' // to_text(order)
-      amplitude = 'amplitude of order ' // to_text(order) // ' of ' // column
+      what = column // ', order ' // to_text(order) // ': '
     end if
     self%label = self%label // '_' // trim(analysis_names(statistic))
     self%unit = ''
     select case (statistic)
     case (analysis_peak)
       self%unit = unit
-      self%long_name = 'largest ' // amplitude // ' over the speed'
+      self%long_name = what // 'largest half range over the speed'
+      if (order > 0) self%long_name = what // 'largest amplitude over the speed'
     case (analysis_peak_speed)
       self%unit = 'rad/s'
-      self%long_name = 'speed of the largest ' // amplitude
+      self%long_name = what // 'speed of the peak'
     case (analysis_margin)
-      self%long_name = 'distance of the largest ' // amplitude // ' to the speeds in operation, as a share of the nearest'
+      self%long_name = what // 'distance of the peak to operation'
     case default   ! analysis_ratio
-      self%long_name = 'largest ratio to a limit of the ' // amplitude // ' over the speed'
+      self%long_name = what // 'largest ratio to its limits'
     end select
   end subroutine new_response_result
 

@@ -99,7 +99,8 @@ contains
       this%is_relative = is_relative
       first = findloc(self%number, number, dim=1)
       if (first == 0) return
-      if (.not. is_relative) this%unit = self%targets(first)%unit
+      this%unit = self%targets(first)%unit
+      if (is_relative) this%unit = '1'
       this%is_integer = self%targets(first)%is_integer .and. .not. is_relative
       this%long_name = self%targets(first)%long_name
       tied = count(self%number == number)
