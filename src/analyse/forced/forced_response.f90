@@ -20,7 +20,7 @@ module nocdyn_forced_response
 
   public :: new_forced_response
 
-  integer, parameter :: worth_threads = 16         ! points: threads wait for each other longer than they compute fewer
+  real(wp), parameter :: worth_threads = 2.0e4_wp  ! coordinates of all lines and points
   real(wp), parameter :: most_values = 4.0e7_wp   ! of all speeds: 0.6 GB
 
   type, public :: forced_response_t
@@ -121,17 +121,22 @@ contains
     call merge_points(self%points, new)
   end subroutine add_points
 
-  !> Solves at all points, by threads.
+  !> Solves at all points, by threads. They wait for each other longer than they compute few points.
   subroutine solve_points(self, points)
     type(forced_response_t), intent(in) :: self
     type(response_point_t), intent(inout) :: points(:)
     type(work_t) :: work
     integer :: i
 
-    !$omp parallel private(work) if(size(points) >= worth_threads)
-    work%band = new_band_work(self%matrix)
-    allocate (work%stiffness(size(self%loss_factor)), work%moment(size(self%loss_factor), size(self%lines)), &
-              work%series(size(self%loss_factor)))
+    if (real(size(points), wp) * size(self%lines) * self%matrix%coordinates < worth_threads) then
+      call prepare_work(self, work)
+      do i = 1, size(points)
+        call solve_point(self, points(i), work)
+      end do
+      return
+    end if
+    !$omp parallel private(work)
+    call prepare_work(self, work)
     !$omp do schedule(dynamic, 4)
     do i = 1, size(points)
       call solve_point(self, points(i), work)
@@ -140,6 +145,15 @@ contains
     deallocate (work%stiffness, work%moment, work%series)
     !$omp end parallel
   end subroutine solve_points
+
+  subroutine prepare_work(self, work)
+    type(forced_response_t), intent(in) :: self
+    type(work_t), intent(out) :: work
+
+    work%band = new_band_work(self%matrix)
+    allocate (work%stiffness(size(self%loss_factor)), work%moment(size(self%loss_factor), size(self%lines)), &
+              work%series(size(self%loss_factor)))
+  end subroutine prepare_work
 
   !> Solves for every line at one speed.
   subroutine solve_point(self, point, work)
