@@ -223,6 +223,46 @@ def test_a_coupling_in_its_gap_or_at_the_edge_of_it_is_told(nocdyn, rest_twist):
     assert analysis(nocdyn, "response", DISCS)["notes"] == []
 
 
+def test_a_gap_that_opens_is_told(nocdyn):
+    """A coupling with play that a mean moment holds in contact, until the oscillation is larger than it."""
+    text = DISCS.replace("magnifier = 50.0 diameter = 0.1 bore = 0.04", "gap = 0.01")
+    assert text != DISCS
+    text += "&motor name = 'm' body = 'one' kind = 'constant' torque = 40 /\n&load name = 'l' body = 'two' constant = 20 /\n"
+    (note,) = [note for note in analysis(nocdyn, "response", text)["notes"] if "contact" in note]
+    table = columns(nocdyn, "response.csv")
+    pairs = zip(table["half_range_moment_shaft"], table["mean_moment_shaft"], strict=True)
+    opened = sum(half > abs(mean) for half, mean in pairs)
+    assert 0 < opened < len(table["mean_moment_shaft"])
+    assert note.startswith(f"'shaft' oscillates by more than its mean at {opened} of {len(table['mean_moment_shaft'])} speeds")
+
+
+def test_notes_tell_of_speeds_that_are_not_sought_or_not_driven(nocdyn):
+    near = DISCS.replace("count = 13", "count = 13 operating_rpm = 600, 1400")
+    for command in ("response", "campbell"):
+        (note,) = analysis(nocdyn, command, near)["notes"]
+        assert note == (
+            "operation with its margin is from 540 to 1540 rpm: critical speeds in it are sought only from 300 to 1500 rpm, "
+            "the speeds of &response"
+        )
+        assert analysis(nocdyn, command, near.replace("1400", "1300"))["notes"] == []
+    driven = (
+        DISCS + "&motor name = 'm' body = 'one' kind = 'constant' torque = -5 /\n&load name = 'l' body = 'two' viscous = 1 /\n"
+    )
+    (note,) = analysis(nocdyn, "response", driven)["notes"]
+    assert note.startswith("the motors or engines do not drive at ")
+    rule = "&limit coupling = 'shaft' rule = 'iacs_m68' tensile_strength = 600e6 rated_speed_rpm = 200 /\n"
+    (note,) = analysis(nocdyn, "response", DISCS + rule)["notes"]
+    assert note.endswith("the rated speed of 200 rpm is that of the body of &response, which turns with 300 to 1500 rpm")
+
+
+def test_every_command_refuses_speeds_in_the_wrong_order(nocdyn):
+    path = nocdyn.write("machine.nml", DISCS.replace("300, 1500", "1500, 300").replace("magnifier = 50.0", ""))
+    for command in ("run", "check", "modes", "response"):
+        outcome = nocdyn(command, path)
+        assert outcome.returncode == 2
+        assert "allowed: first the slower speed, then the faster one" in outcome.stderr
+
+
 def test_limits_bar_the_speeds_where_the_closed_form_exceeds_them(nocdyn):
     limit = 40.0
     content = analysis(nocdyn, "response", DISCS + f"&limit coupling = 'shaft' vibratory_moment = {limit} /\n")
@@ -315,11 +355,12 @@ HELD = "&coupling name = 'g' bodies = 'ground', 'two' stiffness = 1 /\n&run"
         (
             "speed_rpm = 300, 1500",
             "speed = 90, 30",
-            "machine.nml:6: &response: speed = 90, 30 rad/s; allowed: first the lower speed",
+            "machine.nml:6: &response: speed = 90, 30 rad/s, which is 859.437, 286.479 rpm; allowed: first the slower speed",
         ),
         ("speed_rpm = 300, 1500", "speed = -10, 30", "both with one sign"),
         ("count = 13", "orders = 3", "no excitation has the order 3 of 'one'; the orders of the excitations are 2"),
         (SHAKEN, "", "nothing excites this machine"),
+        ("&run", "&limit coupling = 'shaft' /\n&run", "&limit: nothing is limited; needed: vibratory_moment, moment, stress"),
         ("13 /", "13 /\n&limit coupling = 'shift' moment = 1 /", "there is no coupling 'shift'; did you mean 'shaft'?"),
         ("magnifier = 50.0", "magnifier = 50 relative_damping = 0.1", "relative_damping"),
         ("diameter = 0.1 bore = 0.04", "diameter = 0.04 bore = 0.1", "bore"),

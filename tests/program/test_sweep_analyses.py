@@ -237,7 +237,7 @@ def test_trajectories_of_tied_variants_are_those_of_the_variants(nocdyn):
         ),
         (
             "&record response = 'shaft' order = 4 statistic = 'peak' /",
-            "no excitation has this order of 'one'; needed: an order in response_orders.csv",
+            "order = 4: no excitation has this order of 'one'; the orders of the excitations are 2, 3",
         ),
         (
             "&record response = 'shaft' statistic = 'peak' /\n&record response = 'shaft' statistic = 'peak' /",

@@ -17,6 +17,7 @@ module nocdyn_assembly
   use nocdyn_multiplier, only: new_multiplier
   use nocdyn_paper, only: new_paper
   use nocdyn_reduced, only: new_reduced
+  use nocdyn_response_ranges, only: check_response_ranges
   use nocdyn_shaft_assembly, only: add_shafts, check_shafts, new_shaft_set, shaft_set_t
   use nocdyn_start_speeds, only: fit_start_speeds
   use nocdyn_steady_start, only: start_steadily
@@ -52,6 +53,7 @@ contains
     if (.not. allocated(error)) call check_motors(input, error)
     if (.not. allocated(error)) call check_engines(input, error)
     if (.not. allocated(error)) call check_orders(input, error)
+    if (.not. allocated(error)) call check_response_ranges(input, error)
     if (allocated(error)) return
     allocate (machine%banks(0))
     associate (n => machine%lanes)

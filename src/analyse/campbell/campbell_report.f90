@@ -30,12 +30,13 @@ contains
     call report%append_line(file // ': natural frequencies from ' // rpm(self%speed(1)) // ' to ' // rpm(self%speed(last)) // &
                             ' rpm of ' // body // ', ' // counted(size(self%order), 'order', 'orders'))
     call report%append_line('  mode' // cell(rpm(self%speed(1)) // ' rpm') // cell(rpm(self%speed(last)) // ' rpm') // &
-                            cell('lowest [Hz]') // cell('highest [Hz]') // cell('damping ratio'))
+                            cell('lowest [Hz]') // cell('highest [Hz]') // cell('damping ratio') // cell('highest'))
     do m = 1, min(self%modes%modes, most_modes)
       associate (natural => from_si(self%modes%natural(m, :), unit_hz))
         call report%append_line('  ' // repeat(' ', 4 - len(to_text(m))) // to_text(m) // cell(natural(1)) // &
                                 cell(natural(last)) // cell(minval(natural)) // cell(maxval(natural)) // &
-                                cell(rounded_text(self%modes%damping_ratio(m, last), 3)))
+                                cell(rounded_text(minval(self%modes%damping_ratio(m, :)), 3)) // &
+                                cell(rounded_text(maxval(self%modes%damping_ratio(m, :)), 3)))
       end associate
     end do
     if (self%modes%modes > most_modes) then

@@ -103,8 +103,8 @@ contains
                          * (size(self%points) + size(speeds)))
       if (values > most_values) then
         call raise(error, exit_input, 'the response of all lines at all speeds is ' // to_text(nint(values / 1.0e6_wp)) // &
-                   ' million numbers; at most ' // to_text(nint(most_values / 1.0e6_wp)) // ' million are allowed: fewer ' // &
-                   'speeds or orders')
+                   ' million numbers; at most ' // to_text(nint(most_values / 1.0e6_wp)) // ' million are allowed: ' // &
+                   'for instance count = ' // to_text(max(2, int(0.5_wp * most_values / values * size(speeds)))) // ' speeds')
         failed_speed = speeds(1)
         return
       end if

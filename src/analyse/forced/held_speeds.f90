@@ -49,7 +49,7 @@ module nocdyn_held_speeds
     real(wp), private :: last_speed = 0.0_wp         !! of these
     logical, private :: motors_hold = .false.        !! whether the motors hold the speed, else a torque
   contains
-    procedure :: hold
+    procedure :: hold, has_drive
   end type held_speeds_t
 
 contains
@@ -178,6 +178,13 @@ contains
     self%z = z
     self%last_speed = speed
   end subroutine hold
+
+  !> Whether motors or engines can hold the speed.
+  pure logical function has_drive(self)
+    class(held_speeds_t), intent(in) :: self
+
+    has_drive = size(self%sources) > 0
+  end function has_drive
 
   !> Power of the elements that drive, after `evaluate` of the balance [W].
   pure real(wp) function source_power(self)

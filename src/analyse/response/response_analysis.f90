@@ -9,8 +9,8 @@ module nocdyn_response_analysis
   use nocdyn_kinds, only: wp
   use nocdyn_limit_edges, only: refine_edges
   use nocdyn_machine, only: machine_t
-  use nocdyn_open_gaps, only: note_open_gaps
   use nocdyn_response_limits, only: read_limits, response_limit_t
+  use nocdyn_response_notes, only: note_rated_speeds, note_separation, note_steady_states
   use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
   use nocdyn_speed_modes, only: most_coordinates, new_speed_modes, speed_modes_t
   use nocdyn_synthesis, only: new_synthesis
@@ -18,7 +18,7 @@ module nocdyn_response_analysis
   implicit none (type, external)
   private
 
-  public :: analyse_response
+  public :: analyse_response, list_orders
 
   type, public :: response_analysis_t
     type(response_settings_t) :: settings
@@ -57,8 +57,12 @@ contains
         call self%response%add_points(speeds, .true., error, failed_speed)
       end if
     end associate
-    if (.not. allocated(error)) call note_open_gaps(self%response, self%notes)
     if (.not. allocated(error)) call find_peaks(self, error, failed_speed)
+    if (.not. allocated(error)) then
+      call note_steady_states(self%settings, self%response, self%notes)
+      call note_separation(self%response, self%notes)
+      call note_rated_speeds(input, self%settings, self%notes)
+    end if
     if (allocated(error)) call place_error(input, self%settings, failed_speed, error)
     call system_clock(ended)
     self%wall_time = real(ended - began, wp) / real(rate, wp)

@@ -43,15 +43,24 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer, allocatable :: groups(:)
     character(len=:), allocatable :: kind
-    integer :: i
+    integer :: before, i
 
     allocate (groups, source=input%groups_named('limit'))
     allocate (limits(0))
     do i = 1, size(groups)
+      before = size(limits)
       call find_kind(input, groups(i), quantities, kind, error)
       if (.not. allocated(error)) call add_moment_limits(input%groups(groups(i)), groups(i), kind, quantities, limits)
       if (.not. allocated(error)) call add_stress_limits(input, groups(i), kind, quantities, limits, error)
       if (allocated(error)) return
+      if (size(limits) > before) cycle
+      if (kind == 'mesh') then
+        call raise(error, exit_input, input%location(groups(i)) // ': nothing is limited; needed: vibratory_force or force')
+      else
+        call raise(error, exit_input, input%location(groups(i)) // ': nothing is limited; needed: vibratory_moment, moment, ' // &
+                   'stress, stress_transient or rule')
+      end if
+      return
     end do
   end subroutine read_limits
 

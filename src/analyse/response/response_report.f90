@@ -107,7 +107,7 @@ contains
     if (critical%is_unbounded) then
       line = line // cell('unbounded') // cell('')
     else
-      line = line // cell(rounded_text(critical%amplitude, 5)) // cell(rpm(critical%speed))
+      line = line // cell(amplitude_text(analysis, critical)) // cell(rpm(critical%speed))
     end if
     stress = ''
     if (critical%stress > 0) stress = rounded_text(critical%stress / mega, 4)
@@ -116,6 +116,18 @@ contains
     if (size(analysis%settings%operating) > 0) line = line // '  ' // margin_text(critical)
     call report%append_line(trim(line))
   end subroutine put_critical
+
+  !> The amplitude, with its unit if that is not N m: the force of a mesh.
+  function amplitude_text(analysis, critical) result(text)
+    type(response_analysis_t), intent(in) :: analysis
+    type(critical_t), intent(in) :: critical
+    character(len=:), allocatable :: text
+
+    text = rounded_text(critical%amplitude, 5)
+    associate (unit => analysis%response%quantities(critical%quantity)%unit)
+      if (unit /= 'N m') text = text // ' ' // unit
+    end associate
+  end function amplitude_text
 
   function ratio_text(ratio) result(text)
     real(wp), intent(in) :: ratio

@@ -51,9 +51,6 @@ contains
       count = group%whole_number('count')
       range = group%numbers('speed')
     end associate
-    call check_range(input, settings%group, 'speed', range, error)
-    if (.not. allocated(error)) call check_range(input, settings%group, 'operating', settings%operating, error)
-    if (allocated(error)) return
     settings%speeds = [(range(1) + (range(2) - range(1)) * (real(i, wp) / (count - 1)), i=0, count - 1)]
     settings%speeds(count) = range(2)
   end subroutine read_response_settings
@@ -88,20 +85,6 @@ contains
     is_in_file = size(groups) > 0
     if (is_in_file) is_in_file = input%groups(groups(1))%ordinal > 0
   end function is_in_file
-
-  !> Two speeds are the lowest and the highest one, in the same direction.
-  subroutine check_range(input, group, key, range, error)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: group
-    character(len=*), intent(in) :: key
-    real(wp), intent(in) :: range(:)   !! [rad/s], or empty
-    type(error_t), allocatable, intent(out) :: error
-
-    if (size(range) == 0) return
-    if (range(1) * range(2) > 0 .and. abs(range(1)) < abs(range(2))) return
-    call raise(error, exit_input, input%location(group, key) // ': ' // key // ' = ' // to_text(range(1)) // ', ' // &
-               to_text(range(2)) // ' rad/s; allowed: first the lower speed, then the higher one, both with one sign')
-  end subroutine check_range
 
   !> Distance of a critical speed to the speeds in operation, as a share of the nearer one.
   pure subroutine operating_distance(settings, speed, distance, is_too_near)

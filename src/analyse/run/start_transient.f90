@@ -50,8 +50,8 @@ contains
     allocate (transient%has_highest, source=swings .and. highest_time > span(1) .and. highest_time <= transient%until)
   end subroutine find_start_transient
 
-  !> The end of the first fast transient [s]; t_start if there is none, or if it cannot be told: of a machine of many degrees of
-  !> freedom, or one whose couplings have no stiffness at the start.
+  !> The end of the first fast transient [s]; t_start if there is none, of a start in balance, or if it cannot be told: of a
+  !> machine of many degrees of freedom, or one whose couplings have no stiffness at the start.
   real(wp) function transient_end(machine, t_start, t_end, largest_moment) result(until)
     type(machine_t), intent(in) :: machine
     real(wp), intent(in) :: t_start, t_end    !! of the run [s]
@@ -65,7 +65,7 @@ contains
     integer :: i
 
     until = t_start
-    if (machine%coordinates%freedoms > most_freedoms) return
+    if (machine%coordinates%freedoms > most_freedoms .or. allocated(machine%steady_internal)) return   ! a start in balance
     formulation = new_reduced(machine, .false.)
     allocate (y, source=formulation%start())
     call linearise(formulation, t_start, y, linear, error)

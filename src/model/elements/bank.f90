@@ -180,7 +180,8 @@ contains
   pure type(harmonic_t) function sine_harmonic(amplitude, frequency, order, phase, body) result(harmonic)
     real(wp), intent(in) :: amplitude   !! [N m]
     real(wp), intent(in) :: frequency   !! [rad/s]
-    real(wp), intent(in) :: order, phase
+    real(wp), intent(in) :: order       !! oscillations per turn of the body
+    real(wp), intent(in) :: phase       !! [rad]
     integer, intent(in) :: body
 
     harmonic = harmonic_t(amplitude * cmplx(sin(phase), -cos(phase), wp), frequency, order, body)

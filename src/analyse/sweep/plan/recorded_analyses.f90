@@ -10,11 +10,12 @@ module nocdyn_recorded_analyses
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_output_units, only: output_units
+  use nocdyn_response_analysis, only: list_orders
   use nocdyn_response_limits, only: no_limit, read_limits, response_limit_t
   use nocdyn_response_quantities, only: list_quantities, quantity_moment, response_quantity_t
   use nocdyn_response_settings, only: read_response_settings, response_settings_t
   use nocdyn_schema_text, only: suggestion
-  use nocdyn_text, only: append, quoted, string_t
+  use nocdyn_text, only: append, quoted, string_t, to_text
   use nocdyn_units, only: unit_for, units
   use nocdyn_variant_analysis, only: matching_quantities, same_element
   implicit none (type, external)
@@ -136,6 +137,7 @@ contains
     type(input_t), intent(in) :: input
     integer, intent(in) :: record
     type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=:), allocatable :: known
     type(string_t), allocatable :: names(:)
     integer :: q
 
@@ -151,8 +153,9 @@ contains
       end if
       if (.not. group%has_value('order') .or. .not. allocated(self%response)) return
       if (line_order(self%response%lines, group%number('order')) > 0) return
-      call input%report(record, 'order', 'no excitation has this order of ' // &
-                        quoted(input%groups(self%settings%group)%text('body')) // '; needed: an order in response_orders.csv', &
+      call list_orders(self%response%lines, known)
+      call input%report(record, 'order', 'order = ' // to_text(group%number('order')) // ': no excitation has this order of ' // &
+                        quoted(input%groups(self%settings%group)%text('body')) // '; the orders of the excitations are ' // known, &
                         diagnostics)
     end associate
   end subroutine check_response

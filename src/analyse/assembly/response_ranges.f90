@@ -1,0 +1,48 @@
+!> The ranges of speeds of &response, which every command checks.
+module nocdyn_response_ranges
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_input, only: input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_text, only: rounded_text, to_text
+  use nocdyn_units, only: from_si, unit_rpm
+  implicit none (type, external)
+  private
+
+  public :: check_response_ranges
+
+contains
+
+  !> Refuses ranges that begin with the faster speed, or whose ends differ in direction.
+  subroutine check_response_ranges(input, error)
+    type(input_t), intent(in) :: input
+    type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: groups(:)
+    integer :: i
+
+    allocate (groups, source=input%groups_named('response'))
+    do i = 1, size(groups)
+      associate (group => input%groups(groups(i)))
+        call check_range(input, groups(i), 'speed', group%numbers('speed'), error)
+        if (.not. allocated(error)) call check_range(input, groups(i), 'operating', group%numbers('operating'), error)
+      end associate
+      if (allocated(error)) return
+    end do
+  end subroutine check_response_ranges
+
+  !> Two speeds are the lowest and the highest one, in the same direction.
+  subroutine check_range(input, group, key, range, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: group
+    character(len=*), intent(in) :: key
+    real(wp), intent(in) :: range(:)   !! [rad/s], or empty
+    type(error_t), allocatable, intent(out) :: error
+
+    if (size(range) == 0) return
+    if (range(1) * range(2) > 0 .and. abs(range(1)) < abs(range(2))) return
+    call raise(error, exit_input, input%location(group, key) // ': ' // key // ' = ' // to_text(range(1)) // ', ' // &
+               to_text(range(2)) // ' rad/s, which is ' // rounded_text(from_si(range(1), unit_rpm), 6) // ', ' // &
+               rounded_text(from_si(range(2), unit_rpm), 6) // ' rpm; allowed: first the slower speed, then the faster one, ' // &
+               'both with one sign')
+  end subroutine check_range
+
+end module nocdyn_response_ranges

@@ -1,0 +1,137 @@
+!> Notes on a forced response: where it may be other than its reader expects.
+module nocdyn_response_notes
+  use nocdyn_bank, only: bank_of
+  use nocdyn_element_sets, only: element_names
+  use nocdyn_forced_response, only: forced_response_t
+  use nocdyn_gap_couplings, only: gap_couplings_t
+  use nocdyn_input, only: input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_response_quantities, only: quantity_moment
+  use nocdyn_response_settings, only: response_settings_t
+  use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
+  use nocdyn_units, only: from_si, unit_rpm
+  implicit none (type, external)
+  private
+
+  public :: note_steady_states, note_separation, note_rated_speeds
+
+contains
+
+  !> Notes on the speeds and the steady states: what nocdyn campbell has too.
+  subroutine note_steady_states(settings, response, notes)
+    type(response_settings_t), intent(in) :: settings
+    type(forced_response_t), intent(in) :: response
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    integer :: held, i
+
+    call note_open_gaps(response, notes)
+    held = 0
+    do i = 1, size(response%points)
+      if (abs(response%points(i)%state%torque) > 0) held = held + 1
+    end do
+    if (held > 0 .and. response%held%has_drive()) then
+      call append(notes, 'the motors or engines do not drive at ' // to_text(held) // ' of ' // &
+                         to_text(size(response%points)) // ' speeds: there a torque on the body of &response holds the ' // &
+                         'speed, the column drive_torque')
+    end if
+    call note_range(settings, notes)
+  end subroutine note_steady_states
+
+  !> Adds a note on each elastic element whose moment does not change with its twist at some speeds.
+  subroutine note_open_gaps(response, notes)
+    type(forced_response_t), intent(in) :: response
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    integer, allocatable :: elastic(:)
+    type(string_t), allocatable :: names(:)
+    integer :: e, i, open
+
+    allocate (elastic, source=response%machine%elastic())
+    allocate (names, source=element_names(response%machine, elastic))
+    do e = 1, size(elastic)
+      open = 0
+      do i = 1, size(response%points)
+        if (abs(response%points(i)%state%stiffness(elastic(e))) <= 0) open = open + 1
+      end do
+      if (open == 0) cycle
+      call append(notes, quoted(names(e)%text) // ' has no stiffness at ' // to_text(open) // ' of ' // &
+                         to_text(size(response%points)) // ' speeds: it is inside its gap, whose edge counts as inside, ' // &
+                         'or its law is level there')
+    end do
+  end subroutine note_open_gaps
+
+  !> Critical speeds within the margin of operation are not found beyond the speeds that are computed.
+  subroutine note_range(settings, notes)
+    type(response_settings_t), intent(in) :: settings
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    real(wp) :: computed(2), needed(2)
+
+    if (size(settings%operating) == 0) return
+    computed = abs([settings%speeds(1), settings%speeds(size(settings%speeds))])
+    needed = abs(settings%operating) * [1.0_wp - settings%margin, 1.0_wp + settings%margin]
+    if (computed(1) <= needed(1) .and. computed(2) >= needed(2)) return
+    computed = from_si(computed, unit_rpm)
+    needed = from_si(needed, unit_rpm)
+    call append(notes, 'operation with its margin is from ' // rounded_text(needed(1), 5) // ' to ' // &
+                       rounded_text(needed(2), 5) // ' rpm: critical speeds in it are sought only from ' // &
+                       rounded_text(computed(1), 5) // ' to ' // rounded_text(computed(2), 5) // ' rpm, the speeds of &response')
+  end subroutine note_range
+
+  !> Couplings and meshes with a gap whose oscillation is larger than their mean: they leave contact, which no linear response
+  !> has.
+  subroutine note_separation(response, notes)
+    type(forced_response_t), intent(in) :: response
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    integer :: i, open, q
+
+    do q = 1, size(response%quantities)
+      associate (one => response%quantities(q))
+        if (one%kind /= quantity_moment .or. size(one%element) /= 1) cycle
+        if (.not. has_gap(response, one%element(1))) cycle
+        open = 0
+        do i = 1, size(response%points)
+          associate (point => response%points(i))
+            if (point%half_range(q) > abs(point%mean(q)) .and. abs(point%mean(q)) > 0) open = open + 1
+          end associate
+        end do
+        if (open == 0) cycle
+        call append(notes, quoted(one%name) // ' oscillates by more than its mean at ' // to_text(open) // ' of ' // &
+                           to_text(size(response%points)) // ' speeds and leaves contact: the linear response does not hold ' // &
+                           'there; nocdyn run gives the motion')
+      end associate
+    end do
+  end subroutine note_separation
+
+  logical function has_gap(response, element)
+    type(forced_response_t), intent(in) :: response
+    integer, intent(in) :: element
+
+    has_gap = .false.
+    select type (bank => response%machine%banks(bank_of(response%machine%banks, element))%bank)
+    class is (gap_couplings_t)
+      has_gap = .true.
+    end select
+  end function has_gap
+
+  !> Rated speeds of the rule iacs_m68 that are far from those of the body of &response, to which they belong.
+  subroutine note_rated_speeds(input, settings, notes)
+    type(input_t), intent(in) :: input
+    type(response_settings_t), intent(in) :: settings
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    integer, allocatable :: limits(:)
+    real(wp) :: highest, lowest, rated   ! [rpm]
+    integer :: i
+
+    lowest = from_si(abs(settings%speeds(1)), unit_rpm)
+    highest = from_si(abs(settings%speeds(size(settings%speeds))), unit_rpm)
+    allocate (limits, source=input%groups_named('limit'))
+    do i = 1, size(limits)
+      if (.not. input%groups(limits(i))%has_value('rated_speed')) cycle
+      rated = from_si(abs(input%groups(limits(i))%number('rated_speed')), unit_rpm)
+      if (rated >= lowest .and. rated <= 2.0_wp * highest) cycle
+      call append(notes, input%location(limits(i), 'rated_speed') // ': the rated speed of ' // rounded_text(rated, 5) // &
+                         ' rpm is that of the body of &response, which turns with ' // rounded_text(lowest, 5) // ' to ' // &
+                         rounded_text(highest, 5) // ' rpm')
+    end do
+  end subroutine note_rated_speeds
+
+end module nocdyn_response_notes
