@@ -21,6 +21,7 @@ KNOWN = {
     "output": {"interval"},
 }
 COUPLING_KEYS = ("stiffness", "damping", "gap")
+WITHOUT_MOTION = {"response", "limit"}  # groups of other commands than run and sweep
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,8 @@ class Shipped:
     def check(self) -> None:
         """ValueError if a key has a law that is not known here."""
         for name, groups in self.groups.items():
+            if name in WITHOUT_MOTION:
+                continue
             strange = {key for group in groups for key in group} - KNOWN.get(name, set())
             if name not in KNOWN or strange:
                 raise ValueError(f"{self.file.name}: the peers do not know &{name} {' '.join(sorted(strange))}".rstrip())

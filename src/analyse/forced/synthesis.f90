@@ -185,7 +185,7 @@ contains
     complex(wp), intent(in) :: amplitude(:)
     real(wp), intent(in) :: start, sign
     integer, parameter :: steps = 8
-    real(wp), parameter :: near = 1.0e-3_wp   ! of the top, as a share of the shortest wave's radian: a parabola errs by its cube
+    real(wp), parameter :: near = 1.0e-4_wp   ! of the top, as a share of the shortest wave's radian: a parabola errs by its cube
     complex(wp) :: power(0:maxval(part%multiple)), term
     real(wp) :: angle, first, second, value
     integer :: k, n

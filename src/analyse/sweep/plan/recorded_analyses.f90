@@ -155,8 +155,8 @@ contains
       if (line_order(self%response%lines, group%number('order')) > 0) return
       call list_orders(self%response%lines, known)
       call input%report(record, 'order', 'order = ' // to_text(group%number('order')) // ': no excitation has this order of ' // &
-                        quoted(input%groups(self%settings%group)%text('body')) // '; the orders of the excitations are ' // known, &
-                        diagnostics)
+                        quoted(input%groups(self%settings%group)%text('body')) // '; the orders of the excitations are ' // &
+                        known, diagnostics)
     end associate
   end subroutine check_response
 
