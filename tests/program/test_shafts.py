@@ -171,3 +171,18 @@ def test_a_shaft_without_stiffness_is_refused(nocdyn):
     outcome = nocdyn("check", nocdyn.write("bad.nml", LONG.format("").replace("75e9", "0.0")))
     assert outcome.returncode == 2
     assert "bad.nml:3: &shaft 'line': shear_modulus = 0" in outcome.stderr
+
+
+def test_a_limit_of_a_coupling_that_is_a_shaft_is_told_so(nocdyn):
+    text = """&body name = 'a' inertia = 1.0 /
+&body name = 'b' inertia = 1.0 /
+&shaft name = 'axle' bodies = 'a', 'b' lengths = 1 diameters = 0.1 shear_modulus = 8e10 /
+&excitation name = 'x' body = 'a' kind = 'orders' orders = 1 amplitudes = 1 /
+&run t_end = 1 /
+&response body = 'a' speed = 10, 20 count = 3 /
+&limit coupling = 'axle' moment = 1 /
+"""
+    outcome = nocdyn("response", nocdyn.write("machine.nml", text), "--out", "out")
+    assert outcome.returncode == 2
+    assert "machine.nml:7: &limit: 'axle' is a shaft; needed: shaft in place of coupling" in outcome.stderr
+    assert nocdyn("response", nocdyn.write("machine.nml", text.replace("coupling =", "shaft =")), "--out", "out").returncode == 0

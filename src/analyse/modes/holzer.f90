@@ -5,6 +5,7 @@
 !> body, the last one of the table, the torque of everything behind passes through a coupling unchanged, and through a gear with
 !> the inverse ratio of the angles. What is left at the last body vanishes for a natural frequency.
 module nocdyn_holzer
+  use nocdyn_bank, only: bank_of
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: linearisation_t
@@ -75,7 +76,9 @@ contains
         associate (body => rows%body(first:rows%first(e + 1) - 1), c => rows%coefficient(first:rows%first(e + 1) - 1))
           if (size(body) /= 2 .or. any(abs(abs(c) - 1.0_wp) > 0) .or. abs(sum(c)) > 0) then
             call raise(error, exit_input, 'there is no table of Holzer: ' // quoted(machine%element_name(e)) // &
-                       ' is no spring between two masses; a shaft is one with as few nodes as its segments allow')
+                       trim(merge(' is no chain of springs and masses; needed: nodes of &shaft, one less than its segments', &
+                                  ' acts by radii, not between two angles; needed: &gear and &coupling                    ', &
+                                  machine%banks(bank_of(machine%banks, e))%bank%has_parts)))
             return
           end if
           if (minval(body) == 0) then

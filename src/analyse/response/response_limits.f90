@@ -72,6 +72,7 @@ contains
     character(len=:), allocatable, intent(out) :: kind   !! 'coupling', 'shaft' or 'mesh'
     type(error_t), allocatable, intent(out) :: error
     type(string_t), allocatable :: names(:)
+    character(len=*), parameter :: kinds(*) = [character(len=8) :: 'coupling', 'shaft', 'mesh']
     integer, allocatable :: groups(:)
     integer :: i
 
@@ -84,9 +85,24 @@ contains
       names(i)%text = input%groups(groups(i))%name
       if (names(i)%text == input%groups(index)%text(kind)) return
     end do
+    do i = 1, size(kinds)
+      if (kinds(i) == kind .or. .not. has_name(input, trim(kinds(i)), input%groups(index)%text(kind))) cycle
+      call raise(error, exit_input, input%location(index, kind) // ': ' // quoted(input%groups(index)%text(kind)) // &
+                 ' is a ' // trim(kinds(i)) // '; needed: ' // trim(kinds(i)) // ' in place of ' // kind)
+      return
+    end do
     call raise(error, exit_input, input%location(index, kind) // ': there is no ' // kind // ' ' // &
                quoted(input%groups(index)%text(kind)) // suggestion(input%groups(index)%text(kind), names))
   end subroutine find_kind
+
+  !> Whether a group of a kind has a name.
+  pure logical function has_name(input, kind, name)
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: kind, name
+    integer :: i
+
+    has_name = any([(input%groups(i)%kind == kind .and. input%groups(i)%name == name, i=1, size(input%groups))])
+  end function has_name
 
   !> Limits of the moment of a coupling, of those of both ends of a shaft, or of the force of a mesh.
   subroutine add_moment_limits(group, index, kind, quantities, limits)
