@@ -215,6 +215,10 @@ def test_trajectories_of_tied_variants_are_those_of_the_variants(nocdyn):
             "scale = 'rel' is not known; allowed: 'absolute', 'relative'",
         ),
         ("&record mode = 0 statistic = 'frequency' /", "mode = 0 is out of range; allowed: >= 1"),
+        (
+            "&record mode = 2 statistic = 'frequency' /",
+            "mode = 2 is out of range; the machine of the input has 1 oscillating modes about its steady state",
+        ),
         ("&record mode = 1 /", "mode needs statistic"),
         ("&record mode = 1 response = 'shaft' statistic = 'peak' /", "mode and response"),
         ("&record quantity = 'omega_one' mode = 1 statistic = 'final' /", "quantity and mode"),

@@ -19,7 +19,7 @@ module nocdyn_variant_analysis
   implicit none (type, external)
   private
 
-  public :: analyse_variant, matching_quantities, same_element
+  public :: analyse_variant, matching_quantities, oscillating_modes, same_element
 
 contains
 

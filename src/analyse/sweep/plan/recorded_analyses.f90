@@ -9,6 +9,7 @@ module nocdyn_recorded_analyses
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_modes, only: mode_t
   use nocdyn_output_units, only: output_units
   use nocdyn_response_analysis, only: list_orders
   use nocdyn_response_limits, only: no_limit, read_limits, response_limit_t
@@ -17,7 +18,7 @@ module nocdyn_recorded_analyses
   use nocdyn_schema_text, only: suggestion
   use nocdyn_text, only: append, quoted, string_t, to_text
   use nocdyn_units, only: unit_for, units
-  use nocdyn_variant_analysis, only: matching_quantities, same_element
+  use nocdyn_variant_analysis, only: matching_quantities, oscillating_modes, same_element
   implicit none (type, external)
   private
 
@@ -30,9 +31,10 @@ module nocdyn_recorded_analyses
     type(response_quantity_t), allocatable :: quantities(:)
     type(response_limit_t), allocatable :: limits(:)
     type(forced_response_t), allocatable :: response   !! with its lines, if the base machine has steady states
+    integer :: oscillations = huge(1)                   !! number of its modes; unknown if it has no steady state
   contains
     procedure :: add_results
-    procedure, private :: check_response, check_statistic
+    procedure, private :: check_mode, check_response, check_statistic
   end type analysis_reader_t
 
 contains
@@ -45,9 +47,14 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(error_t), allocatable :: failure
     type(forced_response_t), allocatable :: response
+    type(mode_t), allocatable :: modes(:)
 
     allocate (self%wanted_units, source=output_units(input))
     allocate (self%quantities(0), self%limits(0))
+    if (asks_for(input, 'mode')) then
+      call oscillating_modes(input, machine, 0, modes, failure)
+      if (.not. allocated(failure)) self%oscillations = size(modes)
+    end if
     if (.not. asks_for(input, 'response')) return
     call read_response_settings(input, machine, self%settings, error)
     if (allocated(error)) return
@@ -93,6 +100,7 @@ contains
     if (input%groups(record)%has_value('response')) owner = 'response'
     before = diagnostics%count
     if (owner == 'response') call self%check_response(input, record, diagnostics)
+    if (owner == 'mode') call self%check_mode(input, record, diagnostics)
     if (diagnostics%count > before) return
     words = input%groups(record)%texts('statistic')
     do i = 1, size(words)
@@ -130,6 +138,19 @@ contains
       text = text // quoted(trim(analysis_names(k)))
     end do
   end function statistics_of
+
+  !> Refuses a mode that the base machine does not have.
+  subroutine check_mode(self, input, record, diagnostics)
+    class(analysis_reader_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record
+    type(diagnostics_t), intent(inout) :: diagnostics
+
+    if (input%groups(record)%whole_number('mode') <= self%oscillations) return
+    call input%report(record, 'mode', 'mode = ' // to_text(input%groups(record)%whole_number('mode')) // &
+                      ' is out of range; the machine of the input has ' // to_text(self%oscillations) // &
+                      ' oscillating modes about its steady state', diagnostics)
+  end subroutine check_mode
 
   !> Refuses a response that the base machine does not have, and an order that nothing excites.
   subroutine check_response(self, input, record, diagnostics)
