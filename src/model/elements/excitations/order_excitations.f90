@@ -274,8 +274,9 @@ contains
     real(wp), intent(in) :: speed    !! u' [rad/s]
     type(harmonic_t), allocatable, intent(out) :: list(:)
     real(wp) :: distance   ! to the last point of the table below this speed
-    integer :: below, cosine, i, n, shift, sine
+    integer :: below, body, cosine, i, n, shift, sine
 
+    body = self%rows%last_body(element)
     sine = self%number_of('sine')
     cosine = self%number_of('cosine')
     associate (orders => self%parameters(self%number_of('order')), squares => self%parameters(self%number_of('square order')), &
@@ -288,22 +289,15 @@ contains
       do i = 1, size(orders%element)
         if (orders%element(i) /= element) cycle
         n = n + 1
-        list(n) = harmonic(orders%value(1, i), value_at(sine, 'sine slope'), value_at(cosine, 'cosine slope'))
+        list(n) = harmonic(orders%value(1, i), value_at(sine, 'sine slope'), value_at(cosine, 'cosine slope'), body)
       end do
       do i = 1, size(squares%element)
         if (squares%element(i) /= element) cycle
         n = n + 1
-        list(n) = harmonic(squares%value(1, i), speed**2 * square_sine%value(1, i), speed**2 * square_cosine%value(1, i))
+        list(n) = harmonic(squares%value(1, i), speed**2 * square_sine%value(1, i), speed**2 * square_cosine%value(1, i), body)
       end do
     end associate
   contains
-    !> sine sin(order u) + cosine cos(order u).
-    pure type(harmonic_t) function harmonic(order, sine, cosine)
-      real(wp), intent(in) :: order, sine, cosine
-
-      harmonic = harmonic_t(cmplx(cosine, -sine, wp), 0.0_wp, order, self%rows%last_body(element))
-    end function harmonic
-
     !> A parameter of order number i.
     pure real(wp) function value_at(parameter, slope) result(value)
       integer, intent(in) :: parameter
@@ -313,6 +307,15 @@ contains
       if (below > 0) value = value + distance * self%parameters(self%number_of(slope))%value(1, i + shift)
     end function value_at
   end subroutine list_harmonics
+
+  !> sine sin(order u) + cosine cos(order u), with the angle u of a body.
+  pure type(harmonic_t) function harmonic(order, sine, cosine, body)
+    real(wp), intent(in) :: order          !! oscillations per turn of the body
+    real(wp), intent(in) :: sine, cosine   !! [N m]
+    integer, intent(in) :: body
+
+    harmonic = harmonic_t(cmplx(cosine, -sine, wp), 0.0_wp, order, body)
+  end function harmonic
 
   !> The segment of the table over the speed that holds a speed.
   pure subroutine find_segment(self, element, speed, below, distance)
