@@ -11,7 +11,7 @@ module nocdyn_variant_analysis
   use nocdyn_modes, only: find_modes, mode_oscillating, mode_t
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
   use nocdyn_response_analysis, only: analyse_response, response_analysis_t
-  use nocdyn_response_quantities, only: quantity_moment, quantity_reaction, response_quantity_t
+  use nocdyn_response_quantities, only: quantity_moment, quantity_stress, response_quantity_t
   use nocdyn_response_settings, only: operating_distance
   use nocdyn_response_summary, only: worst_ratio
   use nocdyn_text, only: to_text
@@ -19,7 +19,10 @@ module nocdyn_variant_analysis
   implicit none (type, external)
   private
 
-  public :: analyse_variant, matching_quantities, oscillating_modes, same_element
+  public :: analyse_variant, matching_quantities, oscillating_modes
+
+  integer, parameter, public :: recorded_kinds(*) = [quantity_moment]                  !! of an element, what its name records
+  integer, parameter, public :: limited_kinds(*) = [quantity_moment, quantity_stress]  !! and whose limits count
 
 contains
 
@@ -93,7 +96,7 @@ contains
     logical :: is_too_near
 
     value = 0.0_wp
-    allocate (quantities, source=matching_quantities(analysis%response%quantities, one%quantity))
+    allocate (quantities, source=matching_quantities(analysis%response%quantities, one%quantity, recorded_kinds))
     line = line_order(analysis%response%lines, one%order)
     if (one%order > 0 .and. line == 0) then
       call raise(error, exit_input, 'order ' // to_text(one%order) // ' is recorded, but no excitation has it')
@@ -114,7 +117,8 @@ contains
       case (analysis_margin)
         call operating_distance(analysis%settings, speed, value, is_too_near)
       case default   ! analysis_ratio
-        value = largest_ratio(analysis, line, same_element(analysis%response%quantities, one%quantity))
+        value = largest_ratio(analysis, line, &
+                              matching_quantities(analysis%response%quantities, one%quantity, limited_kinds))
       end select
     end associate
   end subroutine find_response_value
@@ -162,34 +166,20 @@ contains
     end do
   end function largest_ratio
 
-  !> The quantities that a name stands for: a column, or the moments of an element.
-  pure function matching_quantities(quantities, name) result(matching)
+  !> The quantities that a name stands for: a column, or those of some kinds of an element.
+  pure function matching_quantities(quantities, name, kinds) result(matching)
     type(response_quantity_t), intent(in) :: quantities(:)
     character(len=*), intent(in) :: name
+    integer, intent(in) :: kinds(:)   !! quantity_..., of an element
     integer, allocatable :: matching(:)
     integer :: q
 
     allocate (matching(0))
     do q = 1, size(quantities)
-      if (quantities(q)%label == name .or. quantities(q)%kind == quantity_moment .and. quantities(q)%name == name) then
+      if (quantities(q)%label == name .or. any(quantities(q)%kind == kinds) .and. quantities(q)%name == name) then
         matching = [matching, q]
       end if
     end do
   end function matching_quantities
-
-  !> The quantities whose limits count: a column, or moments and stress of an element.
-  pure function same_element(quantities, name) result(same)
-    type(response_quantity_t), intent(in) :: quantities(:)
-    character(len=*), intent(in) :: name
-    integer, allocatable :: same(:)
-    integer :: q
-
-    allocate (same(0))
-    do q = 1, size(quantities)
-      if (quantities(q)%label == name .or. quantities(q)%kind /= quantity_reaction .and. quantities(q)%name == name) then
-        same = [same, q]
-      end if
-    end do
-  end function same_element
 
 end module nocdyn_variant_analysis

@@ -18,11 +18,11 @@ module nocdyn_recorded_analyses
   use nocdyn_schema_text, only: suggestion
   use nocdyn_text, only: append, quoted, string_t, to_text
   use nocdyn_units, only: unit_for, units
-  use nocdyn_variant_analysis, only: matching_quantities, oscillating_modes, same_element
+  use nocdyn_variant_analysis, only: limited_kinds, matching_quantities, oscillating_modes, recorded_kinds
   implicit none (type, external)
   private
 
-  public :: new_analysis_reader, asks_for_analyses
+  public :: new_analysis_reader
 
   !> What the groups &record can name: the response of the base machine.
   type, public :: analysis_reader_t
@@ -66,13 +66,7 @@ contains
     if (.not. allocated(failure)) call move_alloc(response, self%response)
   end subroutine new_analysis_reader
 
-  !> Whether results of modes or of the response are recorded.
-  logical function asks_for_analyses(input)
-    type(input_t), intent(in) :: input
-
-    asks_for_analyses = asks_for(input, 'mode') .or. asks_for(input, 'response')
-  end function asks_for_analyses
-
+  !> Whether a &record has a key.
   logical function asks_for(input, key)
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: key   !! of &record
@@ -163,7 +157,7 @@ contains
     integer :: q
 
     associate (group => input%groups(record))
-      if (size(matching_quantities(self%quantities, group%text('response'))) == 0) then
+      if (size(matching_quantities(self%quantities, group%text('response'), recorded_kinds)) == 0) then
         allocate (names(0))
         do q = 1, size(self%quantities)
           if (self%quantities(q)%kind == quantity_moment) call append(names, self%quantities(q)%name)
@@ -197,7 +191,7 @@ contains
                         'operating of &response', diagnostics)
     else if (statistic == analysis_ratio) then
       name = input%groups(record)%text('response')
-      allocate (quantities, source=same_element(self%quantities, name))
+      allocate (quantities, source=matching_quantities(self%quantities, name, limited_kinds))
       do k = 1, size(self%limits)
         if (all(self%limits(k)%quantity /= quantities)) cycle
         if (.not. input%groups(record)%has_value('order')) return
@@ -218,7 +212,7 @@ contains
     integer, allocatable :: quantities(:)
 
     name = input%groups(record)%text('response')
-    allocate (quantities, source=matching_quantities(self%quantities, name))
+    allocate (quantities, source=matching_quantities(self%quantities, name, recorded_kinds))
     associate (first => self%quantities(quantities(1)))
       column = first%label
       if (column /= name) column = column(:index(column, '_')) // name

@@ -14,7 +14,7 @@ module nocdyn_sweep_plan
   use nocdyn_schema, only: has_word
   use nocdyn_statistics, only: statistic_t
   use nocdyn_sweep_design, only: find_varied, read_design
-  use nocdyn_sweep_header, only: sweep_header_t
+  use nocdyn_sweep_header, only: quantity_t, sweep_header_t
   use nocdyn_recorded_analyses, only: analysis_reader_t, new_analysis_reader
   use nocdyn_recorded_quantities, only: check_quantities, read_recorded_quantities, time_span_t, wanted_trajectories
   use nocdyn_targets, only: target_t
@@ -215,25 +215,30 @@ contains
 
     allocate (header%parameters(size(plan%numbers%list)), header%results(plan%results()))
     do i = 1, size(plan%numbers%list)
-      header%parameters(i)%label = plan%numbers%list(i)%path
-      header%parameters(i)%unit = plan%numbers%list(i)%unit
-      header%parameters(i)%long_name = plan%numbers%list(i)%long_name
+      associate (one => plan%numbers%list(i))
+        call set_quantity(one%path, one%unit, one%long_name, header%parameters(i))
+      end associate
     end do
     do i = 1, size(plan%statistics)
-      associate (result => header%results(plan%statistics(i)%result))
-        result%label = plan%statistics(i)%label
-        result%unit = plan%statistics(i)%unit
-        result%long_name = plan%statistics(i)%long_name
+      associate (one => plan%statistics(i))
+        call set_quantity(one%label, one%unit, one%long_name, header%results(one%result))
       end associate
     end do
     do i = 1, size(plan%analyses)
-      associate (result => header%results(plan%analyses(i)%result))
-        result%label = plan%analyses(i)%label
-        result%unit = plan%analyses(i)%unit
-        result%long_name = plan%analyses(i)%long_name
+      associate (one => plan%analyses(i))
+        call set_quantity(one%label, one%unit, one%long_name, header%results(one%result))
       end associate
     end do
   end subroutine name_quantities
+
+  subroutine set_quantity(label, unit, long_name, quantity)
+    character(len=*), intent(in) :: label, unit, long_name
+    type(quantity_t), intent(out) :: quantity
+
+    quantity%label = label
+    quantity%unit = unit
+    quantity%long_name = long_name
+  end subroutine set_quantity
 
   !> Whether an input has groups of a sweep.
   pure logical function has_sweep(input)
