@@ -3,9 +3,11 @@
 import cmath
 import csv
 import json
-from math import pi, radians, sqrt
+from math import cos, pi, radians, sin, sqrt
 
+import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 MACHINE = """&body name = 'm' inertia = 2.0 speed = 10.0 /
 &body name = 'p' inertia = 0.5 speed = 10.0 /
@@ -147,17 +149,117 @@ def test_orders_of_a_transmission_error_may_be_given(nocdyn):
     assert [row["phase_force_teeth"] for row in turned] == pytest.approx([row["phase_force_teeth"] for row in by_teeth])
 
 
-def test_modes_do_not_have_the_transmission_error_and_motions_refuse_it(nocdyn):
+def test_modes_do_not_have_the_transmission_error(nocdyn):
     path = nocdyn.write("machine.nml", EXTERNAL)
     plain = nocdyn.write("plain.nml", EXTERNAL.replace("transmission_error = 1e-6, 2e-7 error_phases = 0, 0.7", ""))
     modes = [nocdyn("modes", each).stdout.split("steady state")[1] for each in (path, plain)]
     assert modes[0] == modes[1]
-    assert nocdyn("run", plain, "--out", "out").returncode == 0
-    outcome = nocdyn("run", path, "--out", "refused")
-    assert outcome.returncode == 2
-    assert "machine.nml:4: &mesh 'teeth': the transmission error is part of nocdyn response, not of a motion" in outcome.stderr
-    assert not (nocdyn.folder / "refused").exists()
-    assert "note: nocdyn run refuses it" in nocdyn("check", path).stdout
+
+
+# A loaded pair of wheels with errors of two orders, which the load presses together.
+TORQUE, VISCOUS = 40.0, 0.3
+LOADED = f"""{EXTERNAL.split("&run")[0].replace("1e-6, 2e-7", "AMPLITUDES")}\
+&motor name = 'drive' body = 'one' kind = 'constant' torque = {TORQUE} /
+&load name = 'brake' body = 'two' viscous = {VISCOUS} /
+"""
+
+
+def integrated(amplitudes, end):
+    """Angles and speeds at the end by an independent program: both wheels, with the gradient of x - e(phi_1) as lever arms."""
+    orders, phases = (20, 40), (0, 0.7)
+
+    def slope(_, y):
+        angles = [(a, n, n * y[0] + phase) for a, n, phase in zip(amplitudes, orders, phases, strict=True)]
+        error = sum(a * sin(angle) for a, _, angle in angles)
+        arms = (RADII[0] - sum(a * n * cos(angle) for a, n, angle in angles), RADII[1])
+        rate = arms[0] * y[2] + arms[1] * y[3]
+        force = -STIFFNESS * (RADII[0] * y[0] + RADII[1] * y[1] - error) - DAMPING * rate
+        torques = (arms[0] * force + TORQUE, arms[1] * force - VISCOUS * y[3])
+        return [y[2], y[3], *(torque / inertia for torque, inertia in zip(torques, INERTIAS, strict=True))]
+
+    start = [0.0, 0.0, 3000 * pi / 30, -1500 * pi / 30]
+    return solve_ivp(slope, (0.0, end), start, method="DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
+
+
+@pytest.mark.parametrize("method", ["rk45", "rk853", "rodas5p", "taylor"])
+@pytest.mark.parametrize("formulation", ["reduced", "paper", "multiplier"])
+def test_the_motion_with_a_transmission_error_is_that_of_another_program(nocdyn, formulation, method):
+    if method == "taylor" and formulation != "reduced":
+        pytest.skip("only the reduced formulation has series")
+    text = LOADED.replace("AMPLITUDES", "2e-5, 5e-6")
+    text += f"&run t_end = 0.05 method = '{method}' formulation = '{formulation}' rtol = 1e-10 atol = 1e-12 /\n"
+    outcome = nocdyn("run", nocdyn.write("machine.nml", text), "--out", "out")
+    assert outcome.returncode == 0, outcome.stderr
+    header, rows = nocdyn.table("out")
+    end = dict(zip(header, rows[-1], strict=True))
+    found = [end[label] for label in ("phi_one [rad]", "phi_two [rad]", "omega_one [rad/s]", "omega_two [rad/s]")]
+    assert found == pytest.approx(integrated((2e-5, 5e-6), 0.05), rel=2e-8)
+
+
+@pytest.mark.parametrize("backlash", ["", "backlash = 4e-5"])
+def test_no_energy_comes_from_a_transmission_error(nocdyn, backlash):
+    """Without damping, motor and load the energy stays, though the teeth move to and fro and part."""
+    text = EXTERNAL.split("&run")[0].replace("1e-6, 2e-7", "4e-5, 1e-5").replace(f"damping = {DAMPING}", backlash)
+    text += "&run t_end = 0.1 rtol = 1e-11 atol = 1e-13 /\n&output interval = 0.0005 /\n"
+    outcome = nocdyn("run", nocdyn.write("machine.nml", text), "--out", "out")
+    assert outcome.returncode == 0, outcome.stderr
+    header, rows = nocdyn.table("out")
+    table = dict(zip(header, zip(*rows, strict=True), strict=True))
+    energies = [k + e for k, e in zip(table["kinetic_energy [J]"], table["elastic_energy [J]"], strict=True)]
+    assert max(energies) - min(energies) < 1e-8 * energies[0]
+    assert max(table["elastic_energy [J]"]) > 1e-4 * energies[0]
+    assert not backlash or any(force == 0 for force in table["force_teeth [N]"])
+
+
+@pytest.mark.parametrize(("key", "low", "high"), [("damping", 100, 900), ("transmission_error(1)", 1e-5, 6e-5)])
+@pytest.mark.parametrize("backlash", ["", "backlash = 4e-5"])
+def test_a_sweep_with_a_transmission_error_is_its_variants_alone(nocdyn, backlash, key, low, high):
+    text = LOADED.replace("AMPLITUDES", "2e-5, 5e-6").replace(" transmission", f" {backlash} transmission")
+    if "error" in key:
+        text = text.replace("2e-5, 5e-6", "2e-5").replace("error_phases = 0, 0.7", "")
+    text += "&run t_end = 0.02 /\n&sweep design = 'random' samples = 12 /\n"
+    text += f"&vary target = 'mesh.teeth.{key}' low = {low} high = {high} /\n"
+    text += "&record quantity = 'force_teeth' statistic = 'max' /\n&record quantity = 'omega_two' statistic = 'final' /\n"
+    outcome = nocdyn("sweep", nocdyn.write("sweep.nml", text), "--out", "all", "--csv")
+    assert outcome.returncode == 0, outcome.stderr
+    with open(nocdyn.folder / "all/sweep.csv") as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    assert len(rows) == 12
+    for row in rows[:5]:
+        value = next(value for name, value in row.items() if key in name)
+        outcome = nocdyn("run", "sweep.nml", "--out", "one", "--set", f"mesh.teeth.{key}={value}", "--set", "output.points=2")
+        assert outcome.returncode == 0, outcome.stderr
+        header, table = nocdyn.table("one")
+        end = next(value for name, value in row.items() if name.startswith("omega_two"))
+        assert float(end) == pytest.approx(table[-1][header.index("omega_two [rad/s]")], rel=1e-6)
+
+
+def test_the_response_to_a_transmission_error_is_the_settled_motion_of_a_loaded_mesh(nocdyn):
+    """The error turns the load back and forth as well: its slope times the mean force is a torque on the first wheel."""
+    text = LOADED.replace("AMPLITUDES", "2e-9, 5e-10")
+    steady = TORQUE * 2 / VISCOUS * 2  # speed of wheel one, where the torque and the load are in balance
+    text += f"&run t_end = 1 /\n&response body = 'one' speed = {steady}, {1.01 * steady} count = 2 /\n"
+    force = [row["force_teeth"] * cmath.exp(1j * radians(row["phase_force_teeth"])) for row in respond(nocdyn, text)[:2]]
+    step = 2 * pi / (20 * steady) / 20
+    run = f"&run t_end = {12000 * step} start = 'equilibrium' method = 'taylor' rtol = 1e-12 atol = 1e-15 /\n"
+    run += f"&output interval = {step} /\n"
+    machine = (
+        text.split("&run")[0]
+        .replace("speed_rpm = 3000", f"speed = {steady}")
+        .replace("speed_rpm = -1500", f"speed = {-steady / 2}")
+    )
+    outcome = nocdyn("run", nocdyn.write("run.nml", machine + run), "--out", "run")
+    assert outcome.returncode == 0, outcome.stderr
+    header, rows = nocdyn.table("run")
+    times, angles, forces = (
+        np.array([row[header.index(label)] for row in rows[-400:]]) for label in ("t [s]", "phi_one [rad]", "force_teeth [N]")
+    )
+    waves = np.array([f(n * steady * times) for n in (20, 40) for f in (np.cos, np.sin)] + [np.ones_like(times)])
+    parts = np.linalg.lstsq(waves.T, forces, rcond=None)[0]
+    turned = angles[0] - steady * times[0]
+    for k, n in enumerate((20, 40)):
+        settled = (parts[2 * k] - 1j * parts[2 * k + 1]) * cmath.exp(-1j * n * turned)
+        assert abs(settled - force[k]) < 1e-6 * abs(force[k])
 
 
 @pytest.mark.parametrize(

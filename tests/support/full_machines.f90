@@ -6,15 +6,16 @@ module nocdyn_test_full_machines
                            new_curve
   use nocdyn_dc_motors, only: new_dc_motors
   use nocdyn_element_rows, only: element_rows_t, new_element_rows
-  use nocdyn_gap_couplings, only: new_gap_couplings
+  use nocdyn_gap_couplings, only: gap_couplings_t, new_gap_couplings
   use nocdyn_governed_banks, only: governor_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_mesh_phases, only: new_mesh_phases
   use nocdyn_motors, only: new_induction_motors, new_motors, new_table_motors
   use nocdyn_load_shares, only: new_load_shares, shared_load_t
   use nocdyn_loads, only: new_nonlinear_loads
   use nocdyn_order_excitations, only: new_order_excitations, order_torque_t
-  use nocdyn_polynomial_couplings, only: new_polynomial_couplings
+  use nocdyn_polynomial_couplings, only: new_polynomial_couplings, polynomial_couplings_t
   use nocdyn_saturated_couplings, only: new_saturated_couplings
   use nocdyn_table_couplings, only: new_table_couplings
   use nocdyn_table_excitations, only: new_table_excitations
@@ -42,6 +43,7 @@ contains
     machine = random_machine(seed, bodies, variants, wanted, choice)
     call add_couplings(bodies, variants, machine)
     call add_rows(seed, bodies, variants, machine)
+    call add_meshes(bodies, variants, machine)
     call add_motors(bodies, variants, machine)
     call add_loads(bodies, variants, machine)
     call add_excitations(bodies, variants, machine)
@@ -122,6 +124,34 @@ contains
                                          spread(30.0_wp * one, 1, 1), 0.2_wp * one))
     end associate
   end subroutine add_rows
+
+  !> Meshes with transmission errors, one with and one without a gap, each followed by its phase.
+  subroutine add_meshes(bodies, variants, machine)
+    integer, intent(in) :: bodies, variants(:)
+    type(machine_t), intent(inout) :: machine
+    type(coupling_common_t) :: common
+    type(gap_couplings_t) :: rattling
+    type(polynomial_couplings_t) :: tight
+    real(wp), allocatable :: stiffness(:, :, :)
+
+    stiffness = spread(lane_values(35.0_wp, variants, 1), 1, 2)
+    associate (one => lane_values(1.0_wp, variants, 1))
+      common = coupling_common_t(numbered_names('teeth', 1), new_element_rows([1, 3], [2, bodies], [0.7_wp, 1.1_wp]), &
+                                 0.6_wp * one, 0.0_wp * one, one, 0.4_wp * one)
+      allocate (common%error)
+      common%error%order = [1.0_wp, 2.5_wp]
+      common%error%amplitude = [0.2_wp, 0.07_wp]
+      common%error%phase = [0.3_wp, -1.0_wp]
+      tight = new_polynomial_couplings(common, stiffness)
+      call append_bank(machine%banks, tight)
+      call append_bank(machine%banks, new_mesh_phases(tight))
+      common%names = numbered_names('rattle', 1)
+      common%rows = new_element_rows([1, 3], [bodies, 1], [0.9_wp, -1.3_wp])
+      rattling = new_gap_couplings(common, stiffness, 0.2_wp * one)
+      call append_bank(machine%banks, rattling)
+      call append_bank(machine%banks, new_mesh_phases(rattling))
+    end associate
+  end subroutine add_meshes
 
   subroutine add_motors(bodies, variants, machine)
     integer, intent(in) :: bodies, variants(:)

@@ -52,7 +52,7 @@ contains
     call bank%evaluate(elements%time, elements%angle, elements%speed, elements%internal%value, elements%restoring, &
                        elements%applied, elements%internal%rate)
     if (.not. allocated(bank%law)) return
-    call bank%law%differentiate(1, 1, elements)
+    call bank%law%differentiate(1, 1, 1, elements)
     call bank%law%evaluate_energies(1, elements)
   end subroutine evaluate_all
 
@@ -65,7 +65,8 @@ contains
     do k = 1, size(bank%switch_element)
       associate (e => bank%switch_element(k))
         do l = 1, bank%lanes
-          call bank%choose(k, l, elements%time(l), elements%angle(l, e), elements%speed(l, e), states_of(bank, elements, l, e))
+          call bank%choose(k, l, elements%time(l), [elements%angle(l, e), elements%speed(l, e), 0.0_wp, 0.0_wp], &
+                           states_of(bank, elements, l, e))
         end do
       end associate
     end do
@@ -81,7 +82,7 @@ contains
     do k = 1, size(bank%switch_element)
       associate (e => bank%switch_element(k))
         do l = 1, bank%lanes
-          call bank%indicator(k, l, [elements%time(l), elements%angle(l, e), elements%speed(l, e)], &
+          call bank%indicator(k, l, [elements%time(l), elements%angle(l, e), elements%speed(l, e), 0.0_wp, 0.0_wp], &
                               states_of(bank, elements, l, e), indicators(l, k))
         end do
       end associate

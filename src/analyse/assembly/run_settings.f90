@@ -15,7 +15,7 @@ module nocdyn_run_settings
   implicit none (type, external)
   private
 
-  public :: check_method, check_size, choose_settings, find_lossy_element, find_obstacle_in_time, put_settings
+  public :: check_method, check_size, choose_settings, find_lossy_element, put_settings
 
   integer, parameter :: largest_matrix = 6000   ! rows; 0.3 GB each, and there are several
 
@@ -69,7 +69,7 @@ contains
     integer :: lower, rows, upper   ! half-bandwidths; stored rows of the factors, with the fill-in of pivoting
 
     allocate (notes(0))
-    call find_obstacle_in_time(input, formulation%machine, obstacle)
+    call find_lossy_element(input, formulation%machine, obstacle)
     if (obstacle /= '') call raise(error, exit_input, obstacle)
     if (allocated(error)) return
     call read_settings(input%groups(input%position('run')), settings)
@@ -103,25 +103,6 @@ contains
     settings%atol = run%number('atol')
     settings%max_steps = run%whole_number('max_steps')
   end subroutine read_settings
-
-  !> The message on an element with a property that a motion over the time does not have; '' if there is none.
-  subroutine find_obstacle_in_time(input, machine, text)
-    type(input_t), intent(in) :: input
-    type(machine_t), intent(in) :: machine
-    character(len=:), allocatable, intent(out) :: text
-    integer, allocatable :: meshes(:)
-    integer :: i
-
-    call find_lossy_element(input, machine, text)
-    if (text /= '') return
-    allocate (meshes, source=input%groups_named('mesh'))
-    do i = 1, size(meshes)
-      if (.not. any(input%groups(meshes(i))%numbers('transmission_error') > 0)) cycle
-      text = input%location(meshes(i), 'transmission_error') // ': the transmission error is part of nocdyn response, not ' // &
-             'of a motion over the time; allowed: none, or 0'
-      return
-    end do
-  end subroutine find_obstacle_in_time
 
   !> The message on an element whose relative damping has no frequency at which a viscous one stands for it over the time; '' if
   !> there is none.

@@ -1,7 +1,7 @@
 !> Every matrix and vector of the paper for a machine at its start, labelled with equation numbers: those of
 !> `nocdyn_paper_matrices`, and alpha, eqs. (41), (42), and beta, eqs. (45), (46), with phi' = omega, eqs. (32), (33).
 module nocdyn_matrix_report
-  use nocdyn_bank, only: role_coupling, role_excitation, role_motor, role_names
+  use nocdyn_bank, only: role_coupling, role_excitation, role_motor, role_names, role_phase
   use nocdyn_complement, only: coordinate_selector, extended_constraint
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_finite, only: is_finite
@@ -112,6 +112,7 @@ contains
 
   subroutine assemble(equations)
     type(equations_t), intent(inout) :: equations
+    real(wp) :: of_phases(equations%machine%bodies)
 
     associate (machine => equations%machine)
       allocate (equations%complement, source=machine%coordinates%complement(1))
@@ -122,6 +123,8 @@ contains
       call torque_vector(machine, 1, role_excitation, equations%excitation)
       call torque_vector(machine, 1, role_motor, equations%motor)
       call torque_vector(machine, 1, role_coupling, equations%rest)
+      call torque_vector(machine, 1, role_phase, of_phases)
+      equations%rest = equations%rest + of_phases
     end associate
   end subroutine assemble
 

@@ -63,6 +63,7 @@ contains
           do i = 1, size(list)
             sources(n + i)%element = bank%first + e - 1
             call set_source(list(i), state, sources(n + i))
+            if (list(i)%by_element > 0) sources(n + i)%moment = state%mean(list(i)%by_element) * sources(n + i)%moment
           end do
           n = n + size(list)
         end do

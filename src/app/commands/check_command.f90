@@ -15,7 +15,7 @@ module nocdyn_check_command
   use nocdyn_result_folders, only: result_folder
   use nocdyn_run_files, only: check_rows, check_variants, trajectory_bytes, wants_netcdf
   use nocdyn_response_settings, only: check_response
-  use nocdyn_run_settings, only: check_method, find_obstacle_in_time
+  use nocdyn_run_settings, only: check_method, find_lossy_element
   use nocdyn_sweep_plan, only: has_sweep, make_plan, sweep_plan_t
   use nocdyn_table_text, only: append_table
   use nocdyn_text, only: selected, string_t
@@ -51,7 +51,7 @@ contains
 
     call check_response(input, machine, response, error)
     if (allocated(error)) return
-    call find_obstacle_in_time(input, machine, note)
+    call find_lossy_element(input, machine, note)
     if (response == '') note = ''   ! check_method refuses what has a meaning for a response only
     if (note == '') call check_method(input, machine, error)
     if (.not. allocated(error)) call count_columns(input, machine, columns, error)

@@ -44,6 +44,7 @@ module nocdyn_system
     logical :: hides_bends = .false. !! whether a series of the solution may not show a bend of it, however near, as that of tanh
     logical :: is_shared = .false.   !! whether its lanes are variants, which share vectors and are looked at little: other costs
     logical :: may_shift = .false.   !! whether `find_far` is called after every step
+    logical :: limits_steps = .false. !! whether `limit_steps` is called before every step
     logical :: has_block_indicators = .false.   !! whether `block_indicators` is overridden; else lanes are looked at one by one
   contains
     procedure(derivative_interface), deferred :: derivative
@@ -54,6 +55,7 @@ module nocdyn_system
     procedure :: measure
     procedure :: measure_name
     procedure :: find_far
+    procedure :: limit_steps
     procedure :: shift_state
     procedure :: restore_state
     procedure :: series_obstacle
@@ -153,6 +155,15 @@ contains
 
     is_far = .false.
   end subroutine find_far
+
+  !> Shortens steps that would be too long for the search of crossings: it looks at a few times in each, however little the state
+  !> bends. By default none are.
+  subroutine limit_steps(self, columns, y, longest)
+    class(system_t), intent(inout) :: self
+    integer, intent(in) :: columns   !! at least `states`
+    real(wp), intent(in) :: y(self%lanes, columns)
+    real(wp), intent(inout) :: longest(self%lanes)   !! longest steps of the lanes [s]
+  end subroutine limit_steps
 
   !> Takes a shift out of the state of a lane, which from now on stands for y + shift, and keeps it until `restore_state`.
   subroutine shift_state(self, lane, y, shift)

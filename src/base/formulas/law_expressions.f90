@@ -2,13 +2,15 @@
 !> operations of the right side to the list of the law.
 module nocdyn_law_expressions
   use nocdyn_kinds, only: wp
-  use nocdyn_law_tape, only: law_node_t, law_tape_t, op_add, op_angle, op_fixed, op_literal, op_multiply, op_parameter, &
-    op_pick, op_reciprocal, op_scale, op_segment, op_shift, op_sine, op_speed, op_state, op_subtract, op_time, op_wave
+  use nocdyn_law_tape, only: at_element, at_phase, law_node_t, law_tape_t, op_add, op_angle, op_fixed, op_literal, op_multiply, &
+    op_parameter, op_pick, op_reciprocal, op_scale, op_segment, op_shift, op_sine, op_speed, op_state, op_subtract, op_time, &
+    op_wave
   implicit none (type, external)
   private
 
   public :: operator(+), operator(-), operator(*), operator(/), operator(**)
-  public :: angle_of, speed_of, time_of, state_of, parameter_of, pick, segment_part, literal, node_of, apply, add_list
+  public :: angle_of, speed_of, phase_of, phase_speed_of, time_of, state_of, parameter_of, pick, segment_part, literal, node_of
+  public :: apply, add_list
 
   !> A number of each element and lane. It points to the list of the law, which has to stay where it is while formulas are
   !> written.
@@ -70,7 +72,7 @@ contains
     type(law_tape_t), target, intent(inout) :: tape
     type(expression_t) :: angle
 
-    angle = apply(tape, op_angle)
+    angle = apply(tape, op_angle, at_element)
   end function angle_of
 
   !> The relative speed u' of the element [rad/s].
@@ -78,8 +80,24 @@ contains
     type(law_tape_t), target, intent(inout) :: tape
     type(expression_t) :: speed
 
-    speed = apply(tape, op_speed)
+    speed = apply(tape, op_speed, at_element)
   end function speed_of
+
+  !> The angle of the phase of the element [rad].
+  function phase_of(tape) result(angle)
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: angle
+
+    angle = apply(tape, op_angle, at_phase)
+  end function phase_of
+
+  !> The speed of the phase of the element [rad/s].
+  function phase_speed_of(tape) result(speed)
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: speed
+
+    speed = apply(tape, op_speed, at_phase)
+  end function phase_speed_of
 
   !> The time [s].
   function time_of(tape) result(time)

@@ -1,8 +1,9 @@
 !> The law of the elements of a bank as a list of elementary operations, in the order in which they are carried out.
 !>
 !> Every node of the list is a number for each element and lane. Constants follow from the parameters and from the present
-!> branches; they change where these do. Variables follow from the motion: the relative angle u and speed u' of an element, its
-!> internal states, and the time. `nocdyn_law_expressions` writes such lists from formulas, `nocdyn_law_walk` carries them out.
+!> branches; they change where these do. Variables follow from the motion: the relative angle u and speed u' of an element,
+!> those of its phase, its internal states, and the time. `nocdyn_law_expressions` writes such lists from formulas,
+!> `nocdyn_law_walk` carries them out.
 module nocdyn_law_tape
   use nocdyn_kinds, only: wp
   implicit none (type, external)
@@ -29,11 +30,12 @@ module nocdyn_law_tape
 
   public :: new_law_tape
 
+  integer, parameter, public :: at_element = 1, at_phase = 2   !! ports, of which motion an angle or a speed is
   integer, parameter, public :: unlimited = huge(1)   !! degree of a variable whose series does not end
 
   type, public :: law_node_t
     integer :: operation = op_literal
-    integer :: a = 0, b = 0             !! operands; a parameter, switch, state or part of a segment in `a`
+    integer :: a = 0, b = 0             !! operands; a parameter, switch, state, port or part of a segment in `a`
     integer :: first = 1, last = 0      !! part of `list`: columns of a parameter, choices of a pick, terms of harmonics
     integer :: degree = 0               !! of the last Taylor coefficient that can differ from zero; 0 for constants
     logical :: is_constant = .true.
@@ -52,6 +54,8 @@ module nocdyn_law_tape
     integer, allocatable :: list(:)            !! of the nodes
     integer :: restoring = 0                   !! conservative moment [N m]
     integer :: applied = 0                     !! the other moment [N m]
+    integer :: phase_restoring = 0             !! part of the conservative moment that acts on the phase [N m]
+    integer :: phase_applied = 0               !! the same of the other moment
     integer :: stored = 0                      !! potential energy of `restoring` [J]
     integer :: secant = 0                      !! K12 of eq. (3): -K12 u is a part of `restoring` [N m/rad]
     integer :: damping = 0                     !! viscous c: -c u' is a part of `applied` [N m s/rad]
@@ -66,6 +70,7 @@ module nocdyn_law_tape
     procedure :: constants
     procedure :: needed
     procedure :: input
+    procedure :: has_phase
   end type law_tape_t
 
 contains
@@ -153,21 +158,24 @@ contains
   end subroutine depend
 
   !> The node of an input, 0 where the law does not read it.
-  pure integer function input(self, operation, state)
+  pure integer function input(self, operation, number)
     class(law_tape_t), intent(in) :: self
-    integer, intent(in) :: operation         !! op_angle to op_state
-    integer, intent(in), optional :: state   !! number of an internal state
+    integer, intent(in) :: operation   !! op_angle to op_state
+    integer, intent(in) :: number      !! of an internal state, or the port of an angle or a speed; 0 for the time
     integer :: i
 
     input = 0
     do i = 1, self%count
-      if (self%node(i)%operation /= operation) cycle
-      if (present(state)) then
-        if (self%node(i)%a /= state) cycle
-      end if
-      input = i
+      if (self%node(i)%operation == operation .and. self%node(i)%a == number) input = i
     end do
   end function input
+
+  !> Whether the law reads the motion of a phase.
+  pure logical function has_phase(self)
+    class(law_tape_t), intent(in) :: self
+
+    has_phase = max(self%input(op_angle, at_phase), self%input(op_speed, at_phase)) > 0
+  end function has_phase
 
   !> The nodes that are constants, ascending.
   pure function constants(self) result(nodes)

@@ -2,7 +2,7 @@
 !> which take longer in groups.
 module nocdyn_law_numbers
   use nocdyn_kinds, only: wp
-  use nocdyn_law_tape, only: law_tape_t, op_angle, op_speed, op_state, op_time
+  use nocdyn_law_tape, only: at_element, at_phase, law_tape_t, op_angle, op_speed, op_state, op_time
   use nocdyn_law_values, only: law_program_t, new_law_program
   use nocdyn_laws, only: law_t
   implicit none (type, external)
@@ -24,8 +24,11 @@ module nocdyn_law_numbers
     real(wp), allocatable, private :: x(:, :)  !! values of all nodes, [0:nodes, slots]
     integer, private :: nodes = 0, elements = 0
     integer, private :: angle = 0, speed = 0, time = 0   !! nodes of the inputs, 0 where the law does not read them
+    integer, private :: phase = 0, phase_speed = 0       !! the same of the phase
+    integer, private :: ports = at_element               !! `at_phase` if the elements are followed by their phases
     integer, allocatable, private :: state(:)            !! the same for internal states
     integer, private :: restoring = 0, applied = 0       !! nodes of the results, 0 for none, as in `law_tape_t`
+    integer, private :: phase_restoring = 0, phase_applied = 0
     integer, private :: stored = 0, secant = 0, damping = 0, argument = 0
     integer, allocatable, private :: rate(:)
     type(law_program_t), private :: motion, energy, curve
@@ -49,12 +52,17 @@ contains
 
     associate (tape => law%tape)
       self%nodes = tape%count
-      self%angle = tape%input(op_angle)
-      self%speed = tape%input(op_speed)
-      self%time = tape%input(op_time)
+      self%angle = tape%input(op_angle, at_element)
+      self%speed = tape%input(op_speed, at_element)
+      self%phase = tape%input(op_angle, at_phase)
+      self%phase_speed = tape%input(op_speed, at_phase)
+      if (tape%has_phase()) self%ports = at_phase
+      self%time = tape%input(op_time, 0)
       allocate (self%state, source=[(tape%input(op_state, i), i=1, size(tape%rate))])
       self%restoring = tape%restoring
       self%applied = tape%applied
+      self%phase_restoring = tape%phase_restoring
+      self%phase_applied = tape%phase_applied
       self%stored = tape%stored
       self%secant = tape%secant
       self%damping = tape%damping
@@ -111,17 +119,22 @@ contains
   pure subroutine evaluate(self, time, angle, speed, internal, restoring, applied, rate)
     class(law_numbers_t), intent(inout) :: self
     real(wp), intent(in) :: time(1)   !! t [s]
-    real(wp), intent(in), dimension(self%elements) :: angle, speed            !! u [rad], u' [rad/s]
-    real(wp), intent(in) :: internal(size(self%state), self%elements)         !! internal states
-    real(wp), intent(inout), dimension(self%elements) :: restoring, applied   !! [N m]
+    real(wp), intent(in), dimension(self%elements, self%ports) :: angle, speed            !! u [rad], u' [rad/s]
+    real(wp), intent(in) :: internal(size(self%state), self%elements)                     !! internal states
+    real(wp), intent(inout), dimension(self%elements, self%ports) :: restoring, applied   !! [N m]
     real(wp), intent(inout) :: rate(size(self%state), self%elements)          !! of the internal states
     integer :: e, i
 
     do e = 1, self%elements
-      call set_inputs(self, e, [time(1), angle(e), speed(e)], internal(:, e))
+      call set_inputs(self, e, [time(1), angle(e, 1), speed(e, 1)], internal(:, e))
+      if (self%ports == at_phase) call set_phase(self, e, [angle(e, at_phase), speed(e, at_phase)])
       call self%motion%compute(self%nodes, self%x(:, e))
-      restoring(e) = restoring(e) + self%x(self%restoring, e)
-      applied(e) = applied(e) + self%x(self%applied, e)
+      restoring(e, 1) = restoring(e, 1) + self%x(self%restoring, e)
+      applied(e, 1) = applied(e, 1) + self%x(self%applied, e)
+      if (self%ports == at_phase) then
+        restoring(e, at_phase) = restoring(e, at_phase) + self%x(self%phase_restoring, e)
+        applied(e, at_phase) = applied(e, at_phase) + self%x(self%phase_applied, e)
+      end if
       do i = 1, size(self%state)
         rate(i, e) = self%x(self%rate(i), e)
       end do
@@ -147,16 +160,28 @@ contains
     end associate
   end subroutine set_inputs
 
+  !> Sets the motion of the phase of an element, after `set_inputs`.
+  pure subroutine set_phase(self, element, motion)
+    type(law_numbers_t), intent(inout) :: self
+    integer, intent(in) :: element
+    real(wp), intent(in) :: motion(2)   !! angle [rad], speed [rad/s]
+
+    self%x(self%phase, element) = motion(1)
+    self%x(self%phase_speed, element) = motion(2)
+    self%x(0, element) = 0.0_wp
+  end subroutine set_phase
+
   !> Adds the energies of the restoring moments of all elements, their secant stiffnesses and viscous dampings.
   pure subroutine evaluate_energies(self, angle, stored, secant, damping)
     class(law_numbers_t), intent(inout) :: self
-    real(wp), intent(in), dimension(self%elements) :: angle                       !! u [rad]
+    real(wp), intent(in) :: angle(self%elements, self%ports)                      !! u [rad] of elements and phases
     real(wp), intent(inout), dimension(self%elements) :: stored, secant, damping  !! [J], [N m/rad], [N m s/rad]
     integer :: e
 
     associate (x => self%x)
       do e = 1, self%elements
-        x(self%angle, e) = angle(e)
+        x(self%angle, e) = angle(e, 1)
+        if (self%ports == at_phase) x(self%phase, e) = angle(e, at_phase)
         x(0, e) = 0.0_wp
         call self%energy%compute(self%nodes, x(:, e))
         stored(e) = stored(e) + x(self%stored, e)
@@ -171,7 +196,7 @@ contains
     class(law_numbers_t), intent(inout) :: self
     integer, intent(in) :: slot              !! counted through all strips
     integer, intent(in) :: switch, branch    !! of the element
-    real(wp), intent(in) :: motion(3)        !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(in) :: motion(5)        !! t [s], u [rad], u' [rad/s], the last two of the phase as well
     real(wp), intent(in) :: internal(:)      !! internal states
     logical, intent(in) :: with_shift        !! whether the boundaries are shifted outwards
     real(wp), intent(out) :: lowest          !! in the unit of the guards
@@ -181,7 +206,8 @@ contains
     lowest = huge(lowest)
     column = size(self%guards, 1)
     if (branch > 0) column = min(branch, column)
-    call set_inputs(self, slot, motion, internal)
+    call set_inputs(self, slot, motion(:3), internal)
+    if (self%ports == at_phase) call set_phase(self, slot, motion(4:))
     associate (guards => self%guards(column, switch), x => self%x)
       call guards%program%compute(self%nodes, x(:, slot))
       do i = 1, guards%count

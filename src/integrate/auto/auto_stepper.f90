@@ -132,7 +132,7 @@ contains
       self%expanded(lane) = .false.
       if (.not. attempt%active(lane)) cycle
       if (self%was_tried(lane)) call judge_attempt(self, attempt, control, lane)
-      if (self%choice(lane)%kind == by_series .or. control%h(lane) >= control%longest) cycle
+      if (self%choice(lane)%kind == by_series .or. control%h(lane) >= control%longest(lane)) cycle
       self%expanded(lane) = wants_trial(self%choice(lane), self%data, by_series)
     end do
     if (self%data%has(by_series)) then
@@ -195,7 +195,7 @@ contains
       tried = choice%kind
       if (choice%kind == by_series .and. .not. self%has_moved(lane)) call settle(choice, self%data, by_stages, by_series)
       is_new = choice%kind == by_systems .or. modulo(choice%steps, stride) == 0
-      call count_attempt(choice, self%data, self%has_moved(lane), attempt%t(lane), min(control%h(lane), control%longest), &
+      call count_attempt(choice, self%data, self%has_moved(lane), attempt%t(lane), min(control%h(lane), control%longest(lane)), &
                          is_over)
       if (is_over) control%h(lane) = choice%h
       if (choice%kind /= tried) call change_kind(self, control, lane)
@@ -236,7 +236,7 @@ contains
       associate (choice => self%choice(lane), t => attempt%t(lane))
         if (self%expanded(lane)) then
           needed = needed_step(choice, self%data, by_series, t, self%h(lane))
-          if (self%steppers%series%plans_step(lane) .and. min(control%h(lane), control%longest) >= needed) then
+          if (self%steppers%series%plans_step(lane) .and. min(control%h(lane), control%longest(lane)) >= needed) then
             call settle(choice, self%data, by_series, choice%kind)
             call reset_control(control, lane)
           else
@@ -280,8 +280,8 @@ contains
     associate (choice => self%choice(lane), t => attempt%t(lane))
       if (.not. wants_trial(choice, self%data, kind)) return
       h = control%h(lane)
-      if (h >= control%longest) return   ! no kind can take longer steps
-      if (needed_step(choice, self%data, kind, t, h) > min(control%longest, control%t_end - t)) return
+      if (h >= control%longest(lane)) return   ! no kind can take longer steps
+      if (needed_step(choice, self%data, kind, t, h) > min(control%longest(lane), control%t_end - t)) return
       call begin_trial(choice, self%data, kind, t, h)
       control%h(lane) = h
       call change_kind(self, control, lane)

@@ -21,7 +21,8 @@ module nocdyn_step_control
   type, public :: step_control_t
     real(wp) :: rtol, atol
     real(wp) :: t_end                                  !! final time [s]
-    real(wp) :: longest                                !! largest step size [s]
+    real(wp) :: longest_step                           !! largest step size of all lanes [s]
+    real(wp), allocatable :: longest(:)                !! the same of each, [lanes]
     real(wp), allocatable :: h(:)                      !! next step size of each lane [s]
     real(wp), allocatable :: log_error(:)              !! logarithm to base 2 of the error norm of the last accepted step
     logical, allocatable :: was_rejected(:)            !! whether the last attempt was rejected
@@ -50,7 +51,8 @@ contains
     control%rtol = rtol
     control%atol = atol
     control%t_end = t_end
-    control%longest = longest
+    control%longest_step = longest
+    allocate (control%longest(lanes), source=longest)
     allocate (control%h(lanes), control%mean_square(lanes), control%log_ratio(lanes), control%factor(lanes), source=0.0_wp)
     allocate (control%size(lanes, measures), control%new_size(lanes, measures), control%kept_size(lanes, measures), &
               control%error(lanes, measures), source=0.0_wp)
@@ -109,7 +111,7 @@ contains
 
     associate (longest => control%longest, t_end => control%t_end, wanted => control%h)
       do lane = 1, lanes
-        call propose_one(longest, t_end, t(lane), wanted(lane), h(lane), t_new(lane))
+        call propose_one(longest(lane), t_end, t(lane), wanted(lane), h(lane), t_new(lane))
       end do
       control%ends_at_t_end(:) = t_new >= t_end
     end associate

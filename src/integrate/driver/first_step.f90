@@ -78,7 +78,7 @@ contains
     end if
     h = small_step
     if (min(position, slope) >= negligible) h = small_change * position / slope
-    h = min(h, control%longest, control%t_end - attempt%t(lane))
+    h = min(h, control%longest(lane), control%t_end - attempt%t(lane))
     h = max(h, smallest_step(attempt%t(lane)))
   end function euler_step
 

@@ -237,6 +237,10 @@ contains
     associate (attempt => integrator%attempt)
       integrator%running(:) = integrator%occupied .and. solver_status%code == integration_running
       attempt%active(:) = integrator%running
+      if (system%limits_steps) then
+        integrator%control%longest(:) = integrator%control%longest_step
+        call system%limit_steps(size(attempt%y, 2), attempt%y, integrator%control%longest)
+      end if
       if (stepper%chooses_steps) then
         call stepper%choose_steps(system, attempt, integrator%control)
         if (integrator%first_step > 0) then

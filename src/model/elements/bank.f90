@@ -19,8 +19,9 @@ module nocdyn_bank
   integer, parameter, public :: role_load = 2         !! in C of eq. (22); takes energy out
   integer, parameter, public :: role_motor = 3        !! in Q_m of eq. (18); puts energy in
   integer, parameter, public :: role_excitation = 4   !! in Q_0 of eq. (17); puts energy in
+  integer, parameter, public :: role_phase = 5        !! part of a coupling: the phase of an element of the bank before
 
-  character(len=*), parameter, public :: role_names(4) = ['coupling  ', 'load      ', 'motor     ', 'excitation']
+  character(len=*), parameter, public :: role_names(5) = ['coupling  ', 'load      ', 'motor     ', 'excitation', 'coupling  ']
 
   !> One quantity that a bank writes to the table of results.
   type, public :: quantity_t
@@ -37,6 +38,7 @@ module nocdyn_bank
     real(wp) :: order = 0.0_wp          !! oscillations per turn of the body
     integer :: body = 0
     logical :: is_twist = .false.       !! a twist in series with the element instead of a torque; its amplitude is in rad
+    integer :: by_element = 0           !! element of the machine whose mean moment multiplies the amplitude; 0: none
   end type harmonic_t
 
   type, abstract, extends(described_elements_t), public :: bank_t

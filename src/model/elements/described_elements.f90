@@ -4,6 +4,9 @@
 !> (`polynomial_laws_t`); the rest is written once, as formulas in `describe`, from which moments, rates, derivatives, energies,
 !> Taylor series and the choice of branches follow (`element_law_t`).
 !>
+!> An element may have a *phase*: another element, which belongs to a bank of its own that follows, and whose angle and speed the
+!> law reads beside its own. The law gives a moment for both. The phases of a bank follow one another as its elements do.
+!>
 !> An element may have *internal states*, for instance the integral of a governor or an armature current. Their rates depend
 !> on the speed of the element and on its internal states only. All elements have the same number of them.
 !>
@@ -18,7 +21,7 @@ module nocdyn_described_elements
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_law_expressions, only: expression_t, parameter_of
-  use nocdyn_law_tape, only: law_tape_t, new_law_tape
+  use nocdyn_law_tape, only: at_element, law_tape_t, new_law_tape
   use nocdyn_laws, only: law_parameter_t, strip_lanes
   use nocdyn_polynomial_laws, only: polynomial_laws_t
   implicit none (type, external)
@@ -42,6 +45,8 @@ module nocdyn_described_elements
     integer :: values = 0                         !! lanes * elements
     logical :: is_polynomial = .true.             !! whether `polynomials` gives the whole law
     integer :: states = 0                         !! internal states of each element
+    integer :: ports = at_element                 !! `at_phase` if the elements have phases
+    real(wp) :: phase_order = 0.0_wp              !! most oscillations of a law per turn of its phase
     integer :: internal_values = 0                !! lanes * states * elements
     integer, allocatable :: switch_element(:)     !! element of each switch
     character(len=24), allocatable :: switch_names(:)   !! of the boundaries, e.g. 'edge of the gap', [switches]
@@ -280,33 +285,33 @@ contains
   !> states. All arrays but `time` are flat: the lanes of its first element, then those of its second, and so on.
   subroutine evaluate(self, time, angle, speed, internal, restoring, applied, rate)
     class(described_elements_t), intent(inout) :: self
-    real(wp), intent(in) :: time(self%lanes)                                  !! t [s]
-    real(wp), intent(in) :: angle(self%values), speed(self%values)            !! u [rad], u' [rad/s]
-    real(wp), intent(in) :: internal(self%internal_values)                    !! [lanes, states, elements]
-    real(wp), intent(inout) :: restoring(self%values), applied(self%values)   !! [N m]
+    real(wp), intent(in) :: time(self%lanes)                                      !! t [s]
+    real(wp), intent(in), dimension(self%values * self%ports) :: angle, speed     !! u [rad], u' [rad/s]; phases come last
+    real(wp), intent(in) :: internal(self%internal_values)                        !! [lanes, states, elements]
+    real(wp), intent(inout), dimension(self%values * self%ports) :: restoring, applied   !! [N m]
     real(wp), intent(inout) :: rate(self%internal_values)                     !! of the internal states
 
     if (allocated(self%law)) call self%law%evaluate(time, angle, speed, internal, restoring, applied, rate)
   end subroutine evaluate
 
   !> Sets the branch of a switch in one lane to the one that contains the state.
-  subroutine choose(self, switch, lane, t, angle, speed, internal)
+  subroutine choose(self, switch, lane, t, motion_of_element, internal)
     class(described_elements_t), intent(inout) :: self
     integer, intent(in) :: switch          !! numbered within the bank
     integer, intent(in) :: lane
     real(wp), intent(in) :: t              !! [s]
-    real(wp), intent(in) :: angle, speed   !! u [rad], u' [rad/s] of the switching element
+    real(wp), intent(in) :: motion_of_element(4)   !! u [rad], u' [rad/s] of the switching element, and of its phase
     real(wp), intent(in) :: internal(:)    !! its internal states
-    real(wp) :: best, inside, motion(3)
+    real(wp) :: best, inside, motion(5)
     integer :: before, i, slot
 
     if (.not. self%law%is_ready) call self%law%make_ready()
     associate (branch => self%branch(lane, switch), e => self%switch_element(switch), numbers => self%law%numbers)
       before = branch
       slot = self%law%law%slot(lane, e)
-      motion = [time_reached(t), angle, speed]
+      motion = [time_reached(t), motion_of_element]
       if (self%choices(switch) == 0) then
-        call numbers%curve_argument(slot, motion, internal, inside)
+        call numbers%curve_argument(slot, motion(:3), internal, inside)
         branch = self%curve(lane, e)%segment(inside)
       else
         best = -huge(best)
@@ -335,7 +340,7 @@ contains
     class(described_elements_t), intent(inout) :: self
     integer, intent(in) :: switch          !! numbered within the bank
     integer, intent(in) :: lane
-    real(wp), intent(in) :: motion(3)      !! t [s], u [rad], u' [rad/s] of the switching element
+    real(wp), intent(in) :: motion(5)      !! t [s], u [rad], u' [rad/s] of the switching element, and of its phase
     real(wp), intent(in) :: internal(:)    !! its internal states
     real(wp), intent(out) :: distance
 
@@ -348,7 +353,7 @@ contains
   subroutine block_indicators(self, time, angle, speed, internal, distance)
     class(described_elements_t), intent(inout) :: self
     real(wp), intent(in) :: time(self%lanes)                         !! t [s]
-    real(wp), intent(in) :: angle(self%values), speed(self%values)   !! u [rad], u' [rad/s], [lanes, elements]
+    real(wp), intent(in), dimension(self%values * self%ports) :: angle, speed   !! u [rad], u' [rad/s]; phases come last
     real(wp), intent(in) :: internal(self%internal_values)           !! [lanes, states, elements]
     real(wp), intent(inout) :: distance(:, :)                        !! [lanes, switches]
 

@@ -8,7 +8,7 @@ module nocdyn_element_laws
   use nocdyn_kinds, only: wp
   use nocdyn_law_numbers, only: law_numbers_t, new_law_numbers
   use nocdyn_law_strips, only: fill, load, load_lanes, unload
-  use nocdyn_law_tape, only: law_tape_t, op_angle, op_speed, op_state, op_time
+  use nocdyn_law_tape, only: at_element, at_phase, law_tape_t, op_angle, op_speed, op_state, op_time
   use nocdyn_law_walk, only: walk
   use nocdyn_law_work, only: law_work_t, new_law_work
   use nocdyn_curves, only: curve_t
@@ -21,7 +21,9 @@ module nocdyn_element_laws
   type, public :: element_law_t
     type(law_t) :: law
     integer :: states = 0                       !! internal states of each element
+    integer :: ports = at_element               !! `at_phase` if the elements are followed by as many phases
     integer :: angle = 0, speed = 0, time = 0   !! nodes of the inputs, 0 where the law does not read them
+    integer :: phase = 0, phase_speed = 0       !! the same of the phase
     integer, allocatable :: state(:)            !! the same for internal states, [states]
     type(law_work_t) :: values                  !! of the moments and rates
     type(law_work_t) :: series                  !! the same with the coefficients of a series
@@ -54,9 +56,12 @@ contains
     self%law = new_law(tape, lanes, elements, strip)
     self%states = states
     allocate (self%state(states), source=0)
-    self%angle = tape%input(op_angle)
-    self%speed = tape%input(op_speed)
-    self%time = tape%input(op_time)
+    self%angle = tape%input(op_angle, at_element)
+    self%speed = tape%input(op_speed, at_element)
+    self%phase = tape%input(op_angle, at_phase)
+    self%phase_speed = tape%input(op_speed, at_phase)
+    if (tape%has_phase()) self%ports = at_phase
+    self%time = tape%input(op_time, 0)
     self%state(:) = [(tape%input(op_state, i), i=1, states)]
   end function new_element_law
 
@@ -85,7 +90,7 @@ contains
     type(law_tape_t), intent(in) :: tape
     integer, allocatable :: nodes(:)
 
-    nodes = [tape%restoring, tape%applied, tape%rate]
+    nodes = [tape%restoring, tape%applied, tape%phase_restoring, tape%phase_applied, tape%rate]
   end function motion
 
   !> Computes the constants of an element in one lane, after a change of its parameters, or of a branch alone.
@@ -101,13 +106,13 @@ contains
     if (self%is_ready) call self%numbers%set_constants(self%law, self%law%slot(lane, element))
   end subroutine refresh
 
-  !> Adds the moments, and sets the rates of the internal states.
+  !> Adds the moments, and sets the rates of the internal states. Phases follow all elements.
   subroutine evaluate(self, time, angle, speed, internal, restoring, applied, rate)
     class(element_law_t), intent(inout) :: self
     real(wp), intent(in) :: time(self%law%lanes)   !! t [s]
-    real(wp), intent(in), dimension(self%law%lanes, self%law%elements) :: angle, speed   !! u [rad], u' [rad/s]
+    real(wp), intent(in), dimension(self%law%lanes, self%law%elements, self%ports) :: angle, speed   !! u [rad], u' [rad/s]
     real(wp), intent(in) :: internal(self%law%lanes, self%states, self%law%elements)     !! internal states
-    real(wp), intent(inout), dimension(self%law%lanes, self%law%elements) :: restoring, applied   !! [N m]
+    real(wp), intent(inout), dimension(self%law%lanes, self%law%elements, self%ports) :: restoring, applied   !! [N m]
     real(wp), intent(inout) :: rate(self%law%lanes, self%states, self%law%elements)      !! of the internal states
     integer :: i, strip
 
@@ -123,6 +128,8 @@ contains
         call walk(law, values, 0, law%groups * (strip - 1) + 1)
         call unload(law, values, tape%restoring, 0, strip, 1, 1, restoring)
         call unload(law, values, tape%applied, 0, strip, 1, 1, applied)
+        call unload(law, values, tape%phase_restoring, 0, strip, 1, 1, restoring(1, 1, self%ports))
+        call unload(law, values, tape%phase_applied, 0, strip, 1, 1, applied(1, 1, self%ports))
         do i = 1, self%states
           call unload(law, values, tape%rate(i), 0, strip, self%states, i, rate)
         end do
@@ -136,12 +143,14 @@ contains
     type(law_work_t), intent(inout) :: work
     integer, intent(in) :: strip
     real(wp), intent(in) :: time(self%law%lanes)   !! t [s]
-    real(wp), intent(in), dimension(self%law%lanes, self%law%elements) :: angle, speed   !! u [rad], u' [rad/s]
+    real(wp), intent(in), dimension(self%law%lanes, self%law%elements, self%ports) :: angle, speed   !! u [rad], u' [rad/s]
     real(wp), intent(in) :: internal(self%law%lanes, self%states, self%law%elements)     !! internal states
     integer :: i
 
     call load(self%law, work, self%angle, 0, strip, 1, 1, angle)
     call load(self%law, work, self%speed, 0, strip, 1, 1, speed)
+    call load(self%law, work, self%phase, 0, strip, 1, 1, angle(1, 1, self%ports))
+    call load(self%law, work, self%phase_speed, 0, strip, 1, 1, speed(1, 1, self%ports))
     call load_lanes(self%law, work, self%time, 0, strip, time)
     do i = 1, self%states
       call load(self%law, work, self%state(i), 0, strip, self%states, i, internal)
@@ -149,9 +158,10 @@ contains
   end subroutine load_inputs
 
   !> Adds the derivatives of the moments, and sets those of the internal states.
-  subroutine differentiate(self, first, first_internal, elements)
+  subroutine differentiate(self, first, first_internal, first_cross, elements)
     class(element_law_t), intent(inout) :: self
     integer, intent(in) :: first, first_internal   !! first element and internal state of the bank in the machine
+    integer, intent(in) :: first_cross             !! first of its derivatives between elements and phases
     type(elements_t), intent(inout) :: elements
     real(wp) :: none(0)
     integer :: strip
@@ -169,8 +179,10 @@ contains
         end if
         call walk(law, work, 0, law%groups * (strip - 1) + 1)
         call differentiate_by_motion(self, strip, first, first_internal, elements)
+        if (self%ports == at_phase) call differentiate_phases(self, strip, first, first_cross, elements)
         call differentiate_by_states(self, strip, first_internal, z)
       end do
+      if (self%ports == at_phase) call to%cross%subtract_curvatures(first_cross, law%elements, to%restoring_curvature)
     end associate
   end subroutine differentiate
 
@@ -183,7 +195,7 @@ contains
 
     associate (law => self%law, tape => self%law%tape, work => self%tangents)
       if (self%angle > 0) then
-        call turn(self, strip, self%angle, 2)
+        call turn(self, strip, [self%angle], 2)
         call unload(law, work, tape%restoring, 1, strip, 1, 1, to%restoring_angle(1, first))
         call unload(law, work, tape%applied, 1, strip, 1, 1, to%applied_angle(1, first))
         do i = 1, 2   ! twice the second coefficient
@@ -191,18 +203,55 @@ contains
         end do
       end if
       if (self%speed > 0) then
-        call turn(self, strip, self%speed, 1)
+        call turn(self, strip, [self%speed], 1)
         call unload(law, work, tape%applied, 1, strip, 1, 1, to%applied_speed(1, first))
         do i = 1, self%states
           call unload(law, work, tape%rate(i), 1, strip, self%states, i, to%internal%rate_speed(1, first_internal))
         end do
       end if
       if (self%time > 0) then
-        call turn(self, strip, self%time, 1)
+        call turn(self, strip, [self%time], 1)
         call unload(law, work, tape%applied, 1, strip, 1, 1, to%applied_time(1, first))
       end if
     end associate
   end subroutine differentiate_by_motion
+
+  !> Derivatives of the moments of the elements by the motion of their phases, and of those of the phases, in a strip, after
+  !> `walk` for the values. The mixed second derivative is that along both angles, less those along each (`subtract_curvatures`).
+  subroutine differentiate_phases(self, strip, first, cross, to)
+    class(element_law_t), intent(inout) :: self
+    integer, intent(in) :: strip, first
+    integer, intent(in) :: cross   !! first derivative between elements and phases: element by phase, then phase by element
+    type(elements_t), intent(inout) :: to
+    integer :: i, phase
+
+    phase = first + self%law%elements
+    associate (law => self%law, tape => self%law%tape, work => self%tangents, x => to%cross)
+      call turn(self, strip, [self%angle], 2)
+      call unload(law, work, tape%phase_restoring, 1, strip, 2, 2, x%restoring_angle(1, cross))
+      call unload(law, work, tape%phase_applied, 1, strip, 2, 2, x%applied_angle(1, cross))
+      do i = 1, 2   ! twice the second coefficient
+        call unload(law, work, tape%phase_restoring, 2, strip, 2, 2, x%curvature(1, cross))
+      end do
+      call turn(self, strip, [self%phase], 2)
+      call unload(law, work, tape%restoring, 1, strip, 2, 1, x%restoring_angle(1, cross))
+      call unload(law, work, tape%applied, 1, strip, 2, 1, x%applied_angle(1, cross))
+      call unload(law, work, tape%phase_restoring, 1, strip, 1, 1, to%restoring_angle(1, phase))
+      call unload(law, work, tape%phase_applied, 1, strip, 1, 1, to%applied_angle(1, phase))
+      do i = 1, 2
+        call unload(law, work, tape%restoring, 2, strip, 2, 1, x%curvature(1, cross))
+        call unload(law, work, tape%phase_restoring, 2, strip, 1, 1, to%restoring_curvature(1, phase))
+      end do
+      call turn(self, strip, [self%angle, self%phase], 2)
+      call unload(law, work, tape%restoring, 2, strip, 2, 1, x%mixed(1, cross))
+      call unload(law, work, tape%phase_restoring, 2, strip, 2, 2, x%mixed(1, cross))
+      call turn(self, strip, [self%speed], 1)
+      call unload(law, work, tape%phase_applied, 1, strip, 2, 2, x%applied_speed(1, cross))
+      call turn(self, strip, [self%phase_speed], 1)
+      call unload(law, work, tape%applied, 1, strip, 2, 1, x%applied_speed(1, cross))
+      call unload(law, work, tape%phase_applied, 1, strip, 1, 1, to%applied_speed(1, phase))
+    end associate
+  end subroutine differentiate_phases
 
   pure subroutine clear_internal(first, last, internal)
     integer, intent(in) :: first, last
@@ -225,7 +274,7 @@ contains
     associate (law => self%law, tape => self%law%tape, work => self%tangents)
       do j = 1, self%states
         if (self%state(j) == 0) cycle
-        call turn(self, strip, self%state(j), 1)
+        call turn(self, strip, [self%state(j)], 1)
         call unload(law, work, tape%applied, 1, strip, self%states, j, internal%applied(1, first))
         do i = 1, self%states
           call unload(law, work, tape%rate(i), 1, strip, members * self%states, members * (i - 1) + j, &
@@ -235,21 +284,25 @@ contains
     end associate
   end subroutine differentiate_by_states
 
-  !> Computes the coefficients 1 to `last` where one input grows with the rate 1 and the others stay.
-  subroutine turn(self, strip, input, last)
+  !> Computes the coefficients 1 to `last` where some inputs grow with the rate 1 and the others stay.
+  subroutine turn(self, strip, inputs, last)
     type(element_law_t), intent(inout) :: self
     integer, intent(in) :: strip
-    integer, intent(in) :: input   !! its node
+    integer, intent(in) :: inputs(:)   !! their nodes
     integer, intent(in) :: last
     integer :: i, k
 
     call fill(self%tangents, self%angle, 1, 0.0_wp)
     call fill(self%tangents, self%speed, 1, 0.0_wp)
+    call fill(self%tangents, self%phase, 1, 0.0_wp)
+    call fill(self%tangents, self%phase_speed, 1, 0.0_wp)
     call fill(self%tangents, self%time, 1, 0.0_wp)
     do i = 1, self%states
       call fill(self%tangents, self%state(i), 1, 0.0_wp)
     end do
-    call fill(self%tangents, input, 1, 1.0_wp)
+    do i = 1, size(inputs)
+      call fill(self%tangents, inputs(i), 1, 1.0_wp)
+    end do
     do k = 1, last
       call walk(self%law, self%tangents, k, self%law%groups * (strip - 1) + 1)
     end do
@@ -271,6 +324,7 @@ contains
       end if
       do strip = 1, law%strips
         call load(law, work, self%angle, 0, strip, 1, 1, to%angle(1, first))
+        call load(law, work, self%phase, 0, strip, 1, 1, to%angle(1, first + law%elements * (self%ports - 1)))
         call walk(law, work, 0, law%groups * (strip - 1) + 1)
         call unload(law, work, tape%stored, 0, strip, 1, 1, to%stored(1, first))
         call unload(law, work, tape%secant, 0, strip, 1, 1, to%secant(1, first))
@@ -284,7 +338,7 @@ contains
     class(element_law_t), intent(inout) :: self
     integer, intent(in) :: branch(:, :)                                                  !! [lanes, switches]
     real(wp), intent(in) :: time(self%law%lanes)                                         !! t [s]
-    real(wp), intent(in), dimension(self%law%lanes, self%law%elements) :: angle, speed   !! u [rad], u' [rad/s]
+    real(wp), intent(in), dimension(self%law%lanes, self%law%elements, self%ports) :: angle, speed   !! u [rad], u' [rad/s]
     real(wp), intent(in) :: internal(self%law%lanes, self%states, self%law%elements)     !! internal states
     real(wp), intent(inout) :: g(:, :)   !! in the unit of the guards, [lanes, switches]
     integer :: e, first, i, last, strip, switch

@@ -22,6 +22,22 @@ module nocdyn_elements
     real(wp), allocatable :: rate_internal(:, :, :)   !! derivatives of the rate by the element's states, [lanes, members, states]
   end type internal_states_t
 
+  !> Derivatives of the moment of one element by the motion of another: of an element that has a phase by that of its phase, and
+  !> the other way round, one after the other. By `differentiate`; [lanes, pairs of an element with another] all.
+  type, public :: cross_slopes_t
+    integer :: count = 0
+    integer, allocatable :: element(:)              !! whose moment, [pairs]
+    integer, allocatable :: by(:)                   !! whose motion, [pairs]
+    real(wp), allocatable :: restoring_angle(:, :)  !! derivative of `restoring` by u of the other
+    real(wp), allocatable :: applied_angle(:, :)    !! derivative of `applied` by u of the other
+    real(wp), allocatable :: applied_speed(:, :)    !! derivative of `applied` by u' of the other
+    real(wp), allocatable :: curvature(:, :)        !! second derivative of `restoring` by u of the other
+    real(wp), allocatable :: mixed(:, :)            !! derivative of `restoring` by u of the other and its own
+  contains
+    procedure :: clear
+    procedure :: subtract_curvatures
+  end type cross_slopes_t
+
   !> Every element acts along a row: u = sum of coefficient * phi(body). Its moment M(t, u, u') = restoring + applied acts on
   !> these bodies as coefficient * M.
   type, public :: elements_t
@@ -44,18 +60,21 @@ module nocdyn_elements
     real(wp), allocatable :: secant(:, :)          !! secant stiffness K12 of eq. (3): -K12 u is a part of `restoring` [N m/rad]
     real(wp), allocatable :: damping(:, :)         !! viscous c: -c u' is a part of `applied` [N m s/rad]
     type(internal_states_t) :: internal
+    type(cross_slopes_t) :: cross
   contains
     procedure :: gather
     procedure :: scatter
+    procedure :: add_cross
   end type elements_t
 
 contains
 
   !> Elements along the given rows, at rest and without moments.
-  function new_elements(lanes, rows, internal) result(self)
+  function new_elements(lanes, rows, internal, phase) result(self)
     integer, intent(in) :: lanes
     type(element_rows_t), intent(in) :: rows
     integer, intent(in) :: internal(:)      !! internal states of each element, [elements]
+    integer, intent(in), optional :: phase(:)   !! the phase of each element, an element as well, or 0; absent: none
     type(elements_t) :: self
 
     self%count = rows%count()
@@ -67,7 +86,40 @@ contains
     allocate (self%applied_angle, self%applied_speed, self%applied_time, source=self%angle)
     allocate (self%stored, self%secant, self%damping, source=self%angle)
     self%internal = new_internal_states(lanes, internal)
+    self%cross = new_cross_slopes(lanes, [integer ::])
+    if (present(phase)) self%cross = new_cross_slopes(lanes, phase)
   end function new_elements
+
+  !> Of each element with a phase two pairs.
+  pure function new_cross_slopes(lanes, phase) result(self)
+    integer, intent(in) :: lanes
+    integer, intent(in) :: phase(:)   !! of each element, or 0, [elements]
+    type(cross_slopes_t) :: self
+    integer :: e
+
+    self%count = 2 * count(phase > 0)
+    allocate (self%element(self%count), self%by(self%count))
+    self%count = 0
+    do e = 1, size(phase)
+      if (phase(e) == 0) cycle
+      self%element(self%count + 1:self%count + 2) = [e, phase(e)]
+      self%by(self%count + 1:self%count + 2) = [phase(e), e]
+      self%count = self%count + 2
+    end do
+    allocate (self%restoring_angle(lanes, self%count), source=0.0_wp)
+    allocate (self%applied_angle, self%applied_speed, self%curvature, self%mixed, source=self%restoring_angle)
+  end function new_cross_slopes
+
+  !> Sets the derivatives to zero.
+  pure subroutine clear(self)
+    class(cross_slopes_t), intent(inout) :: self
+
+    self%restoring_angle(:, :) = 0.0_wp
+    self%applied_angle(:, :) = 0.0_wp
+    self%applied_speed(:, :) = 0.0_wp
+    self%curvature(:, :) = 0.0_wp
+    self%mixed(:, :) = 0.0_wp
+  end subroutine clear
 
   !> States with the value 0.
   function new_internal_states(lanes, members) result(self)
@@ -89,6 +141,20 @@ contains
     allocate (self%rate, self%applied, self%rate_speed, source=self%value)
     allocate (self%rate_internal(lanes, maxval([0, members]), self%count), source=0.0_wp)
   end function new_internal_states
+
+  !> Leaves the mixed derivatives of the pairs of some elements, where `mixed` has half of the second derivatives along both
+  !> angles.
+  pure subroutine subtract_curvatures(self, first, elements, own)
+    class(cross_slopes_t), intent(inout) :: self
+    integer, intent(in) :: first      !! pair
+    integer, intent(in) :: elements   !! how many
+    real(wp), intent(in) :: own(:, :) !! second derivatives by their own angles, of all elements
+    integer :: pair
+
+    do pair = first, first + 2 * elements - 1
+      self%mixed(:, pair) = self%mixed(:, pair) - 0.5_wp * (own(:, self%element(pair)) + self%curvature(:, pair))
+    end do
+  end subroutine subtract_curvatures
 
   !> Relative angles and speeds of the elements from those of the bodies.
   subroutine gather(self, phi, omega)
@@ -119,5 +185,25 @@ contains
       end do
     end associate
   end subroutine scatter
+
+  !> Adds the derivative of a moment by the motion of another element, as torques on the bodies by the motion of the bodies.
+  pure subroutine add_cross(self, pair, slope, matrix)
+    class(elements_t), intent(in) :: self
+    integer, intent(in) :: pair               !! of `cross`
+    real(wp), intent(in) :: slope             !! [N m/rad] or [N m s/rad]
+    real(wp), intent(inout) :: matrix(:, :)   !! [bodies, bodies]
+    integer :: i, j
+
+    associate (rows => self%rows, e => self%cross%element(pair), by => self%cross%by(pair))
+      do j = rows%first(by), rows%first(by + 1) - 1
+        do i = rows%first(e), rows%first(e + 1) - 1
+          if (min(rows%body(i), rows%body(j)) == 0) cycle
+          associate (entry => matrix(rows%body(i), rows%body(j)))
+            entry = entry + rows%coefficient(i) * rows%coefficient(j) * slope
+          end associate
+        end do
+      end do
+    end associate
+  end subroutine add_cross
 
 end module nocdyn_elements

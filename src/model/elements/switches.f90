@@ -11,6 +11,8 @@ module nocdyn_switches
   type, public :: switches_t
     integer :: count = 0
     integer, allocatable :: element(:)       !! element of each switch, numbered in the machine, [switches]
+    integer, allocatable :: phase(:)         !! its phase; the element itself if it has none
+    real(wp), allocatable :: phase_order(:)  !! most oscillations per turn of the phase; 0 if it has none
     integer, allocatable, private :: first_internal(:)   !! first internal state of that element in the machine, [switches]
     integer, allocatable, private :: last_internal(:)    !! last internal state of that element, [switches]
     integer, allocatable, private :: bank(:)     !! [switches]
@@ -31,7 +33,8 @@ contains
     integer :: i, k, next
 
     self%count = sum([(size(banks(i)%bank%switch_element), i=1, size(banks))])
-    allocate (self%element(self%count), self%first_internal(self%count), self%last_internal(self%count))
+    allocate (self%phase_order(self%count), source=0.0_wp)
+    allocate (self%element(self%count), self%phase(self%count), self%first_internal(self%count), self%last_internal(self%count))
     allocate (self%bank(self%count), self%number(self%count))
     next = 0
     do i = 1, size(banks)
@@ -41,6 +44,8 @@ contains
           self%bank(next) = i
           self%number(next) = k
           self%element(next) = bank%first + bank%switch_element(k) - 1
+          self%phase(next) = self%element(next) + (bank%ports - 1) * bank%count
+          self%phase_order(next) = bank%phase_order
           self%first_internal(next) = bank%first_internal + (bank%switch_element(k) - 1) * bank%states
           self%last_internal(next) = self%first_internal(next) + bank%states - 1
         end do
@@ -49,14 +54,15 @@ contains
   end function new_switches
 
   !> Sets the branch of a switch in one lane to the one that contains the state.
-  subroutine choose(self, banks, switch, lane, t, angle, speed, internal)
+  subroutine choose(self, banks, switch, lane, t, motion, internal)
     class(switches_t), intent(in) :: self
     type(bank_slot_t), intent(inout) :: banks(:)
     integer, intent(in) :: switch, lane   !! switch numbered in the machine
-    real(wp), intent(in) :: t, angle, speed   !! [s]; of the element of the switch [rad], [rad/s]
-    real(wp), intent(in) :: internal(:)       !! the internal states of all elements
+    real(wp), intent(in) :: t             !! [s]
+    real(wp), intent(in) :: motion(4)     !! u [rad], u' [rad/s] of the element of the switch, and of its phase
+    real(wp), intent(in) :: internal(:)   !! the internal states of all elements
 
-    call banks(self%bank(switch))%bank%choose(self%number(switch), lane, t, angle, speed, &
+    call banks(self%bank(switch))%bank%choose(self%number(switch), lane, t, motion, &
                                               internal(self%first_internal(switch):self%last_internal(switch)))
   end subroutine choose
 
@@ -65,7 +71,7 @@ contains
     class(switches_t), intent(in) :: self
     type(bank_slot_t), intent(inout) :: banks(:)
     integer, intent(in) :: switch, lane   !! switch numbered in the machine
-    real(wp), intent(in) :: motion(3)     !! t [s]; of the element of the switch u [rad], u' [rad/s]
+    real(wp), intent(in) :: motion(5)     !! t [s]; u [rad], u' [rad/s] of the element of the switch, and of its phase
     real(wp), intent(in) :: internal(:)   !! the internal states of all elements
     real(wp), intent(out) :: distance     !! in a unit of the law
 
@@ -78,8 +84,8 @@ contains
     class(switches_t), intent(in) :: self
     type(bank_slot_t), intent(inout) :: banks(:)
     real(wp), intent(in) :: time(:)                   !! t [s], [lanes]
-    !> of the elements of the switches [rad], [rad/s], [lanes, switches]
-    real(wp), contiguous, intent(in) :: angle(:, :), speed(:, :)
+    !> of the elements of the switches, and of their phases if there are any [rad], [rad/s], [lanes, switches, ports]
+    real(wp), contiguous, intent(in) :: angle(:, :, :), speed(:, :, :)
     real(wp), contiguous, intent(in) :: internal(:, :)            !! [lanes, states of all elements]
     real(wp), intent(inout) :: distance(:, :)         !! in units of the laws, [lanes, switches]
     integer :: first, i
@@ -89,7 +95,8 @@ contains
       associate (bank => banks(i)%bank)
         associate (last => first + size(bank%switch_element) - 1)
           if (last < first) cycle
-          call bank%block_indicators(time, angle(:, first:first + bank%count - 1), speed(:, first:first + bank%count - 1), &
+          call bank%block_indicators(time, angle(:, first:first + bank%count - 1, :bank%ports), &
+                                     speed(:, first:first + bank%count - 1, :bank%ports), &
                                      internal(:, bank%first_internal:bank%first_internal + bank%states * bank%count - 1), &
                                      distance(:, first:last))
           first = last + 1

@@ -127,24 +127,26 @@ contains
     call self%derivative(t, y, self%slope, self%status)
   end subroutine observe_bodies
 
-  !> Relative angle and speed of the element of a switch.
-  pure subroutine switch_motion(self, lane, switch, y, angle, speed)
+  !> Relative angle and speed of the element of a switch, and of its phase.
+  pure subroutine switch_motion(self, lane, switch, y, motion)
     class(body_formulation_t), intent(in) :: self
     integer, intent(in) :: lane, switch
     real(wp), contiguous, intent(in) :: y(:)   !! state, [states + quadratures]
-    real(wp), intent(out) :: angle, speed      !! [rad], [rad/s]
-    integer :: k
+    real(wp), intent(out) :: motion(4)         !! [rad], [rad/s], twice
+    integer :: e, k, port
 
-    angle = 0.0_wp
-    speed = 0.0_wp
-    associate (n => self%machine%bodies, e => self%machine%switches%element(switch))
-      associate (rows => self%machine%elements%rows)
-        do k = rows%first(e), rows%first(e + 1) - 1
-          if (rows%body(k) == 0) cycle
-          angle = angle + rows%coefficient(k) * y(n + rows%body(k))
-          speed = speed + rows%coefficient(k) * y(rows%body(k))
-        end do
-      end associate
+    motion = 0.0_wp
+    associate (n => self%machine%bodies, rows => self%machine%elements%rows, switches => self%machine%switches)
+      do port = 1, 2
+        e = merge(switches%element(switch), switches%phase(switch), port == 1)
+        associate (angle => motion(2 * port - 1), speed => motion(2 * port))
+          do k = rows%first(e), rows%first(e + 1) - 1
+            if (rows%body(k) == 0) cycle
+            angle = angle + rows%coefficient(k) * y(n + rows%body(k))
+            speed = speed + rows%coefficient(k) * y(rows%body(k))
+          end do
+        end associate
+      end do
     end associate
   end subroutine switch_motion
 
@@ -203,6 +205,10 @@ contains
       call elements%rows%add_coefficients(-1.0_wp, elements%restoring_angle(lane, :), self%by_angle)
       call elements%rows%add_coefficients(-1.0_wp, elements%applied_angle(lane, :), self%by_angle)
       call elements%rows%add_coefficients(-1.0_wp, elements%applied_speed(lane, :), self%by_speed)
+      do e = 1, elements%cross%count
+        call elements%add_cross(e, elements%cross%restoring_angle(lane, e) + elements%cross%applied_angle(lane, e), self%by_angle)
+        call elements%add_cross(e, elements%cross%applied_speed(lane, e), self%by_speed)
+      end do
       do e = 1, elements%count
         call elements%rows%add_moment(e, elements%applied_time(lane, e), self%by_time)
       end do
@@ -215,7 +221,7 @@ contains
     integer, intent(in) :: lane
     real(wp), intent(inout) :: dfdy(:, :)   !! [states + quadratures, states]
     real(wp), intent(inout) :: dfdt(:)      !! [states + quadratures]
-    integer :: e, k, n
+    integer :: c, e, k, n
 
     n = self%machine%bodies
     associate (elements => self%machine%elements)
@@ -226,6 +232,13 @@ contains
         call elements%rows%add_moment(e, elements%speed(lane, e) * elements%applied_angle(lane, e), &
                         dfdy(self%states + k, n + 1:2 * n))
         dfdt(self%states + k) = elements%applied_time(lane, e) * elements%speed(lane, e)
+        do c = 1, elements%cross%count
+          if (elements%cross%element(c) /= e) cycle
+          associate (cross => elements%cross, by => elements%cross%by(c), row => self%states + k)
+            call elements%rows%add_moment(by, elements%speed(lane, e) * cross%applied_speed(lane, c), dfdy(row, :n))
+            call elements%rows%add_moment(by, elements%speed(lane, e) * cross%applied_angle(lane, c), dfdy(row, n + 1:2 * n))
+          end associate
+        end do
       end do
     end associate
   end subroutine differentiate_powers

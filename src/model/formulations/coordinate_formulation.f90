@@ -19,9 +19,10 @@ module nocdyn_coordinate_formulation
     real(wp), allocatable :: twist_at_origin(:, :)       !! u_0 [rad], [lanes, elements]: `zero_twist` and the moving origin
     type(sparse_map_t) :: twists                         !! U
     type(element_coordinates_t) :: incidence             !! entries of which U is made
-    type(element_coordinates_t) :: switching             !! entries of the elements that switch
+    type(element_coordinates_t) :: switching             !! entries of the elements that switch, then of their phases
+    integer, private :: switch_ports = 1                 !! 2 if some of them have phases
     type(moving_origin_t), private :: origin
-    real(wp), allocatable, private :: switch_angle(:, :), switch_speed(:, :)   !! of the elements that switch, [lanes, switches]
+    real(wp), allocatable, private, dimension(:, :, :) :: switch_angle, switch_speed   !! their motion, [lanes, switches, ports]
   contains
     procedure :: set_coordinates
     procedure :: list_coordinates
@@ -58,6 +59,10 @@ contains
     self%twist_at_origin = self%zero_twist
     associate (machine => self%machine, incidence => self%incidence, freedoms => self%machine%coordinates%freedoms)
       self%switching = incidence%selected(machine%switches%element, with_ratio_only=.true.)
+      if (any(machine%switches%phase /= machine%switches%element)) then
+        self%switch_ports = 2
+        self%switching = incidence%selected([machine%switches%element, machine%switches%phase], with_ratio_only=.true.)
+      end if
       self%origin = new_moving_origin(machine%lanes, freedoms, incidence, machine%elastic(), has_springs_only(machine))
       has_offset = any(abs(self%zero_twist) > 0, dim=1)
       has_offset(self%origin%turning) = .true.
@@ -65,8 +70,8 @@ contains
       self%may_shift = size(self%origin%motions%free) > 0
       self%has_block_indicators = machine%lanes > 1
       if (allocated(self%switch_angle)) deallocate (self%switch_angle, self%switch_speed)
-      allocate (self%switch_angle(machine%lanes, machine%switches%count), source=0.0_wp)
-      allocate (self%switch_speed(machine%lanes, machine%switches%count), source=0.0_wp)
+      allocate (self%switch_angle(machine%lanes, machine%switches%count, self%switch_ports), source=0.0_wp)
+      allocate (self%switch_speed, source=self%switch_angle)
       allocate (couplings, source=coupling_elements(machine))
       turning = incidence%selected(couplings, with_ratio_only=.true.)
       call self%set_norm(new_error_measures(couplings, turning%first, turning%coordinate, turning%ratio, &
@@ -230,20 +235,25 @@ contains
     twist_at_zero = self%twist_at_origin(lane, element)
   end function twist_at_zero
 
-  !> Relative angle and speed of the element of a switch.
-  pure subroutine switch_motion(self, lane, switch, y, angle, speed)
+  !> Relative angle and speed of the element of a switch, and of its phase.
+  pure subroutine switch_motion(self, lane, switch, y, motion)
     class(coordinate_formulation_t), intent(in) :: self
     integer, intent(in) :: lane, switch
     real(wp), contiguous, intent(in) :: y(:)   !! state, [states + quadratures]
-    real(wp), intent(out) :: angle, speed      !! [rad], [rad/s]
-    integer :: k
+    real(wp), intent(out) :: motion(4)         !! [rad], [rad/s], twice
+    integer :: e, k, port
 
-    angle = self%twist_at_origin(lane, self%machine%switches%element(switch))
-    speed = 0.0_wp
-    associate (switching => self%switching, f => self%machine%coordinates%freedoms)
-      do k = switching%first(switch), switching%first(switch + 1) - 1
-        angle = angle + switching%ratio(lane, k) * y(f + switching%coordinate(k))
-        speed = speed + switching%ratio(lane, k) * y(switching%coordinate(k))
+    motion = 0.0_wp
+    associate (switches => self%machine%switches, switching => self%switching, f => self%machine%coordinates%freedoms)
+      do port = 1, self%switch_ports
+        e = merge(switches%element(switch), switches%phase(switch), port == 1)
+        associate (angle => motion(2 * port - 1), speed => motion(2 * port), entry => switch + (port - 1) * switches%count)
+          angle = self%twist_at_origin(lane, e)
+          do k = switching%first(entry), switching%first(entry + 1) - 1
+            angle = angle + switching%ratio(lane, k) * y(f + switching%coordinate(k))
+            speed = speed + switching%ratio(lane, k) * y(switching%coordinate(k))
+          end do
+        end associate
       end do
     end associate
   end subroutine switch_motion
@@ -254,18 +264,23 @@ contains
     real(wp), intent(in) :: t(self%lanes)                         !! [s]
     real(wp), intent(in) :: y(self%lanes, columns)
     real(wp), intent(inout) :: g(self%lanes, self%switches)
-    integer :: k, l, switch
+    integer :: e, k, l, port, switch
 
     associate (switches => self%machine%switches, angle => self%switch_angle, speed => self%switch_speed, &
                entries => self%switching, f => self%machine%coordinates%freedoms)
-      do switch = 1, self%switches
-        angle(:, switch) = self%twist_at_origin(:, switches%element(switch))
-        speed(:, switch) = 0.0_wp
-        do k = entries%first(switch), entries%first(switch + 1) - 1
-          do l = 1, self%lanes
-            angle(l, switch) = angle(l, switch) + entries%ratio(l, k) * y(l, f + entries%coordinate(k))
-            speed(l, switch) = speed(l, switch) + entries%ratio(l, k) * y(l, entries%coordinate(k))
-          end do
+      do port = 1, self%switch_ports
+        do switch = 1, self%switches
+          e = merge(switches%element(switch), switches%phase(switch), port == 1)
+          angle(:, switch, port) = self%twist_at_origin(:, e)
+          speed(:, switch, port) = 0.0_wp
+          associate (entry => switch + (port - 1) * self%switches)
+            do k = entries%first(entry), entries%first(entry + 1) - 1
+              do l = 1, self%lanes
+                angle(l, switch, port) = angle(l, switch, port) + entries%ratio(l, k) * y(l, f + entries%coordinate(k))
+                speed(l, switch, port) = speed(l, switch, port) + entries%ratio(l, k) * y(l, entries%coordinate(k))
+              end do
+            end do
+          end associate
         end do
       end do
       call switches%block_indicators(self%machine%banks, t, angle, speed, y(:, self%mechanical + 1:self%states), g)

@@ -21,6 +21,7 @@ module nocdyn_formulation
     real(wp), allocatable :: omega(:, :)     !! speeds [rad/s] after `set_state`, [lanes, 0:bodies]
     real(wp), allocatable :: zero_twist(:, :)   !! twists where the angles in the state are zero [rad], [lanes, elements]
     type(error_measures_t) :: norm              !! quantities in which errors are measured
+    real(wp), allocatable, private :: lane_state(:)   !! the state of one lane, work space, [states]
     real(wp), allocatable :: torque(:, :)    !! torques of the elements on the bodies [N m] after `observe`, [lanes, 0:bodies]
   contains
     procedure(start_interface), deferred :: start
@@ -40,6 +41,7 @@ module nocdyn_formulation
     procedure :: observe
     procedure :: refresh_lane
     procedure :: start_lane
+    procedure :: limit_steps
     procedure :: indicator_values
     procedure :: set_indicator
     procedure :: change_branch
@@ -71,14 +73,13 @@ module nocdyn_formulation
     end subroutine reactions_interface
 
     !> Relative angle and speed of the element of a switch, from the state of one lane.
-    pure subroutine motion_interface(self, lane, switch, y, angle, speed)
+    pure subroutine motion_interface(self, lane, switch, y, motion)
       import :: formulation_t, wp
       class(formulation_t), intent(in) :: self
       integer, intent(in) :: lane
       integer, intent(in) :: switch              !! 1 to `switches`
       real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
-      real(wp), intent(out) :: angle             !! [rad]
-      real(wp), intent(out) :: speed             !! [rad/s]
+      real(wp), intent(out) :: motion(4)         !! angle [rad] and speed [rad/s] of its element, then of the phase if it has one
     end subroutine motion_interface
 
   end interface
@@ -98,6 +99,8 @@ contains
       self%internal = machine%elements%internal%count
       self%states = self%mechanical + self%internal
       self%switches = machine%switches%count
+      self%limits_steps = any(machine%switches%phase_order > 0)
+      self%lane_state = spread(0.0_wp, 1, self%states)
       self%lanes = machine%lanes
       self%has_energy_balance = with_energy_balance
       self%quadratures = merge(size(machine%with_work), 0, with_energy_balance)
@@ -237,6 +240,28 @@ contains
     end do
   end subroutine start_lane
 
+  !> A step must show how the teeth of wheels with a transmission error approach and part, even in free flight.
+  subroutine limit_steps(self, columns, y, longest)
+    class(formulation_t), intent(inout) :: self
+    integer, intent(in) :: columns
+    real(wp), intent(in) :: y(self%lanes, columns)   !! [lanes, states], at least
+    real(wp), intent(inout) :: longest(self%lanes)   !! [s]
+    real(wp), parameter :: part = 0.5_wp   ! of an oscillation in a step [rad]
+    real(wp) :: motion(4)
+    integer :: lane, switch
+
+    do switch = 1, self%switches
+      associate (order => self%machine%switches%phase_order(switch))
+        if (order <= 0) cycle
+        do lane = 1, self%lanes
+          self%lane_state(:) = y(lane, :self%states)
+          call self%switch_motion(lane, switch, self%lane_state, motion)
+          longest(lane) = min(longest(lane), part / max(order * abs(motion(4)), tiny(part)))
+        end do
+      end associate
+    end do
+  end subroutine limit_steps
+
   !> Indicators of all switches of one lane: positive on the present branches, zero at their boundaries.
   subroutine indicator_values(self, lane, t, y, g)
     class(formulation_t), intent(inout) :: self
@@ -258,11 +283,11 @@ contains
     real(wp), intent(in) :: t                     !! [s]
     real(wp), contiguous, intent(in) :: y(:)      !! state, [states + quadratures]
     real(wp), contiguous, intent(inout) :: g(:)   !! [switches]
-    real(wp) :: angle, speed
+    real(wp) :: motion(4)
 
     associate (switches => self%machine%switches)
-      call self%switch_motion(lane, which, y, angle, speed)
-      call switches%indicator(self%machine%banks, which, lane, [t, angle, speed], y(self%mechanical + 1:self%states), g(which))
+      call self%switch_motion(lane, which, y, motion)
+      call switches%indicator(self%machine%banks, which, lane, [t, motion], y(self%mechanical + 1:self%states), g(which))
     end associate
   end subroutine set_indicator
 
@@ -274,11 +299,11 @@ contains
     integer, intent(in) :: which               !! switch, 1 to `switches`
     real(wp), intent(in) :: t                  !! [s]
     real(wp), contiguous, intent(in) :: y(:)   !! state, [states + quadratures]
-    real(wp) :: angle, speed
+    real(wp) :: motion(4)
 
     associate (switches => self%machine%switches)
-      call self%switch_motion(lane, which, y, angle, speed)
-      call switches%choose(self%machine%banks, which, lane, t, angle, speed, y(self%mechanical + 1:self%states))
+      call self%switch_motion(lane, which, y, motion)
+      call switches%choose(self%machine%banks, which, lane, t, motion, y(self%mechanical + 1:self%states))
     end associate
   end subroutine change_branch
 

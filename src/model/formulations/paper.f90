@@ -144,6 +144,14 @@ contains
         do e = 1, elements%count
           call elements%rows%add_coefficient(e, -elements%restoring_curvature(l, e) * elements%speed(l, e), self%work%tangent)
         end do
+        associate (cross => elements%cross)
+          do e = 1, cross%count
+            call elements%rows%add_coefficient(cross%element(e), -cross%mixed(l, e) * elements%speed(l, cross%by(e)), &
+                                               self%work%tangent)
+            call elements%add_cross(e, cross%mixed(l, e) * elements%speed(l, cross%element(e)) &
+                                    + cross%curvature(l, e) * elements%speed(l, cross%by(e)), self%work%tangent)
+          end do
+        end associate
         dfdy(l, 2 * n + 1:3 * n, n + 1:2 * n) = self%work%tangent
       end do
     end associate

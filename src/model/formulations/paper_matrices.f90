@@ -4,7 +4,7 @@
 !> called. The parts of a law beyond -K12 u - c u' (the rest twist of a coupling, the torque of a motor) are terms of Q. Every
 !> procedure overwrites its last argument and allocates nothing.
 module nocdyn_paper_matrices
-  use nocdyn_bank, only: role_coupling, role_excitation, role_load, role_motor
+  use nocdyn_bank, only: role_coupling, role_excitation, role_load, role_motor, role_phase
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_solve
   use nocdyn_machine, only: machine_t
@@ -77,7 +77,7 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
     real(wp), intent(in) :: complement(:, :)   !! L_tau, [n, freedoms]
-    integer, parameter :: roles(4) = [role_coupling, role_load, role_motor, role_excitation]
+    integer, parameter :: roles(*) = [role_coupling, role_load, role_motor, role_excitation, role_phase]
     integer :: i
 
     self%torque(:) = 0.0_wp
@@ -174,9 +174,13 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
     real(wp), intent(inout) :: tangent(:, :)   !! K_4 [N m/rad]
+    integer :: i
 
     tangent = 0.0_wp
     call machine%elements%rows%add_coefficients(-1.0_wp, machine%elements%restoring_angle(lane, :), tangent)
+    do i = 1, machine%elements%cross%count
+      call machine%elements%add_cross(i, machine%elements%cross%restoring_angle(lane, i), tangent)
+    end do
   end subroutine tangent_matrix
 
   !> F of eqs. (48)-(51): the elastic moment on each body [N m], [n].

@@ -63,8 +63,7 @@ contains
     call self%set_coordinates(with_energy_balance, is_block)
     associate (machine => self%machine, incidence => self%incidence, freedoms => self%machine%coordinates%freedoms)
       call form_responses(freedoms, is_block, self)
-      self%element_jacobian = new_reduced_jacobian(freedoms, incidence, machine%with_work(:self%quadratures), &
-                                                   machine%elements%internal)
+      self%element_jacobian = new_reduced_jacobian(freedoms, incidence, machine%with_work(:self%quadratures), machine%elements)
       self%moment = 0.0_wp * self%zero_twist
       if (machine%lanes > 1) call self%prepare_series(1)
     end associate

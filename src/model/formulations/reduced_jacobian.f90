@@ -4,11 +4,14 @@
 !> element adds a product response * ratio * dM at the position of every pair of its coordinates. These products response * ratio
 !> and the positions are computed once, so the time to fill the Jacobian is linear in their number.
 !>
+!> Where the moment of an element depends on the motion of another, which is its phase, the products are of the response of the
+!> one and the ratio of the other.
+!>
 !> An internal state z of an element with the speed u' = U q' has the rate r(u', z). The moment M(z) of the element acts on
 !> q'' = R M and on its work integral, W' = M u'.
 module nocdyn_reduced_jacobian
   use nocdyn_element_coordinates, only: element_coordinates_t
-  use nocdyn_elements, only: elements_t, internal_states_t
+  use nocdyn_elements, only: cross_slopes_t, elements_t, internal_states_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_sparse_map, only: transposed_order
@@ -18,8 +21,8 @@ module nocdyn_reduced_jacobian
 
   public :: new_reduced_jacobian
 
-  !> Order of the values: the blocks dq''/dq' and dq''/dq with the same pattern; the ones of dq/dt = q'; then, for each entry of
-  !> each element with a work integral W, dW'/dq' and dW'/dq. Then, for each internal state: for each entry of its element
+  !> Order of the values: the blocks dq''/dq' and dq''/dq with the same pattern; the ones of dq/dt = q'; then, for each coordinate
+  !> of each element with a work integral W, dW'/dq' and dW'/dq. Then, for each internal state: for each entry of its element
   !> dq''/dz and, if the entry has a ratio, dr/dq'; dr/dz of each internal state of that element; dW'/dz if the element has a
   !> work integral.
   type, public :: reduced_jacobian_t
@@ -31,8 +34,13 @@ module nocdyn_reduced_jacobian
     integer, allocatable, private :: response_entry(:)   !! entry of the response in each product
     integer, allocatable, private :: ratio_entry(:)      !! entry of the ratio in each product
     real(wp), allocatable, private :: product(:, :)      !! response * ratio, [lanes, products]
-    integer, allocatable, private :: work_element(:)     !! element of each entry of a work integral
-    real(wp), allocatable, private :: ratio(:, :)        !! ratio of these entries, [lanes, entries of work integrals]
+    integer, private :: cross_products = 0               !! the last products: those with the motion of another element
+    integer, allocatable, private :: pair(:)             !! of `cross_slopes_t`, 0 for the own motion, [products]
+    integer, private :: works = 0                        !! number of positions of dW'/dq'
+    integer, allocatable, private :: work_position(:)    !! of each part of a dW'/dq', 1 to works
+    integer, allocatable, private :: work_element(:)     !! its element
+    integer, allocatable, private :: work_pair(:)        !! its pair, 0 for the own motion
+    real(wp), allocatable, private :: ratio(:, :)        !! ratio of the moving element, [lanes, parts]
     type(element_coordinates_t), private :: incidence       !! entries of the element of each internal state
     logical, allocatable, private :: has_work_integral(:)   !! of the element of each internal state
   contains
@@ -44,76 +52,163 @@ module nocdyn_reduced_jacobian
 contains
 
   !> The positions and products of a machine.
-  function new_reduced_jacobian(freedoms, incidence, with_work, internal) result(self)
+  function new_reduced_jacobian(freedoms, incidence, with_work, elements) result(self)
     integer, intent(in) :: freedoms   !! number of coordinates
     type(element_coordinates_t), intent(in) :: incidence   !! entries of all elements
     integer, intent(in) :: with_work(:)   !! elements with work integrals
-    type(internal_states_t), intent(in) :: internal   !! they stand between the coordinates and the work integrals
+    type(elements_t), intent(in) :: elements   !! whose internal states stand between the coordinates and the work integrals
     type(reduced_jacobian_t) :: self
-    type(element_coordinates_t) :: works   ! entries of the elements with work integrals
-    integer, allocatable :: row(:), column(:), work(:)   ! `work` is the number of the work integral of each of their entries
-    integer :: element_of(size(incidence%coordinate)), c, products
+    integer, allocatable :: row(:), column(:), work(:), work_column(:)   ! `work` is the number of a work integral
+    integer :: c, products
 
     self%freedoms = freedoms
-    element_of = incidence%entry_elements()
-    products = sum(incidence%first(element_of + 1) - incidence%first(element_of), mask=any(abs(incidence%ratio) > 0.0_wp, dim=1))
-    allocate (self%element(products), self%position(products), self%response_entry(products), self%ratio_entry(products))
-    allocate (row(products), column(products))
-    allocate (self%product(size(incidence%ratio, 1), size(self%element)))
-    call form_products(freedoms, incidence, element_of, row, column, self)
+    products = most_products(incidence, elements%cross)
+    allocate (self%element(products), self%pair(products), self%position(products), row(products), column(products))
+    allocate (self%response_entry(products), self%ratio_entry(products))
+    call form_products(freedoms, incidence, elements%cross, row, column, self)
     row = row(:self%pairs)
     column = column(:self%pairs)
-    works = incidence%selected(with_work, with_ratio_only=.false.)
-    self%ratio = works%ratio
-    allocate (work(size(works%coordinate)))
-    work(:) = works%entry_elements()
-    self%work_element = with_work(work)
+    allocate (self%product, source=incidence%response(:, self%response_entry) * incidence%ratio(:, self%ratio_entry))
+    call form_works(incidence, with_work, elements%cross, work, work_column, self)
     self%pattern%row = [row, row, (freedoms + c, c=1, freedoms), &
-                        (2 * freedoms + internal%count + work((c + 1) / 2), c=1, 2 * size(work))]
+                        (2 * freedoms + elements%internal%count + work((c + 1) / 2), c=1, 2 * self%works)]
     self%pattern%column = [column, freedoms + column, (c, c=1, freedoms), &
-                           (works%coordinate(c), freedoms + works%coordinate(c), c=1, size(work))]
-    call append_internal(freedoms, incidence, with_work, internal, self)
+                           (work_column(c), freedoms + work_column(c), c=1, self%works)]
+    call append_internal(freedoms, incidence, with_work, elements%internal, self)
   end function new_reduced_jacobian
 
-  !> Forms the products of these pairs, column by column, and their distinct positions.
-  subroutine form_products(freedoms, incidence, element_of, row, column, self)
+  !> The number of products, or more.
+  pure integer function most_products(incidence, cross)
+    type(element_coordinates_t), intent(in) :: incidence
+    type(cross_slopes_t), intent(in) :: cross
+    integer :: e, k
+    logical :: has_ratio(size(incidence%coordinate))
+
+    has_ratio = [(incidence%has_ratio(k), k=1, size(incidence%coordinate))]
+    most_products = 0
+    do e = 1, size(incidence%first) - 1
+      associate (first => incidence%first(e), next => incidence%first(e + 1))
+        most_products = most_products + (next - first) * count(has_ratio(first:next - 1))
+      end associate
+    end do
+    do k = 1, cross%count
+      associate (first => incidence%first(cross%by(k)), next => incidence%first(cross%by(k) + 1), e => cross%element(k))
+        most_products = most_products + (incidence%first(e + 1) - incidence%first(e)) * count(has_ratio(first:next - 1))
+      end associate
+    end do
+  end function most_products
+
+  !> Forms the products of these pairs, column by column, and their distinct positions; those with the motion of other elements
+  !> come last.
+  subroutine form_products(freedoms, incidence, cross, row, column, self)
     integer, intent(in) :: freedoms
     type(element_coordinates_t), intent(in) :: incidence
-    integer, intent(in) :: element_of(:)          !! element of each entry
+    type(cross_slopes_t), intent(in) :: cross
     integer, intent(inout) :: row(:), column(:)   !! of each position
     type(reduced_jacobian_t), intent(inout) :: self
-    integer :: order(size(incidence%coordinate)), first(freedoms + 1)
+    integer :: order(size(incidence%coordinate)), element_of(size(incidence%coordinate)), first(freedoms + 1)
     integer :: position(freedoms)   ! position of each row in the present column, if not below `begin`
-    integer :: a, b, begin, e, i, n, q
+    integer :: b, begin, i, n, others, pair, q
 
     call transposed_order(incidence%coordinate, freedoms, order, first)
+    element_of = incidence%entry_elements()
     position = 0
     n = 0
+    others = size(self%element) + 1
     do q = 1, freedoms
       begin = self%pairs + 1
       do i = first(q), first(q + 1) - 1
         b = order(i)
         if (.not. incidence%has_ratio(b)) cycle
-        e = element_of(b)
-        do a = incidence%first(e), incidence%first(e + 1) - 1
-          associate (at => position(incidence%coordinate(a)))
-            if (at < begin) then
-              self%pairs = self%pairs + 1
-              at = self%pairs
-              row(at) = incidence%coordinate(a)
-              column(at) = q
-            end if
-            n = n + 1
-            self%element(n) = e
-            self%position(n) = at
-            self%response_entry(n) = a
-            self%ratio_entry(n) = b
-            self%product(:, n) = incidence%response(:, a) * incidence%ratio(:, b)
-          end associate
+        call add_responses(element_of(b), 0)
+        do pair = 1, cross%count
+          if (cross%by(pair) == element_of(b)) call add_responses(cross%element(pair), pair)
         end do
       end do
     end do
+    self%cross_products = size(self%element) + 1 - others
+  contains
+    !> The products of entry b with the responses of an element.
+    subroutine add_responses(element, pair)
+      integer, intent(in) :: element, pair
+      integer :: a, at
+
+      do a = incidence%first(element), incidence%first(element + 1) - 1
+        associate (of_row => position(incidence%coordinate(a)))
+          if (of_row < begin) then
+            self%pairs = self%pairs + 1
+            of_row = self%pairs
+            row(of_row) = incidence%coordinate(a)
+            column(of_row) = q
+          end if
+          if (pair == 0) then
+            n = n + 1
+            at = n
+          else
+            others = others - 1
+            at = others
+          end if
+          self%element(at) = element
+          self%pair(at) = pair
+          self%position(at) = of_row
+          self%response_entry(at) = a
+          self%ratio_entry(at) = b
+        end associate
+      end do
+    end subroutine add_responses
   end subroutine form_products
+
+  !> The parts of the derivatives of the work integrals: each coordinate of an element, and those of others on which its moment
+  !> depends.
+  subroutine form_works(incidence, with_work, cross, work, column, self)
+    type(element_coordinates_t), intent(in) :: incidence
+    integer, intent(in) :: with_work(:)
+    type(cross_slopes_t), intent(in) :: cross
+    integer, allocatable, intent(out) :: work(:), column(:)   !! number and coordinate of each position
+    type(reduced_jacobian_t), intent(inout) :: self
+    integer, allocatable :: entry(:)   ! of each part
+    integer :: before, i, most, n, pair, parts
+
+    most = sum(incidence%first(with_work + 1) - incidence%first(with_work)) &
+           + sum(incidence%first(cross%by + 1) - incidence%first(cross%by))
+    allocate (self%work_position(most), self%work_element(most), self%work_pair(most), entry(most), work(most), column(most))
+    n = 0
+    parts = 0
+    do i = 1, size(with_work)
+      before = n
+      call add_parts(with_work(i), 0)
+      do pair = 1, cross%count
+        if (cross%element(pair) == with_work(i)) call add_parts(cross%by(pair), pair)
+      end do
+    end do
+    self%works = n
+    work = work(:n)
+    self%work_position = self%work_position(:parts)
+    self%work_element = self%work_element(:parts)
+    self%work_pair = self%work_pair(:parts)
+    self%ratio = incidence%ratio(:, entry(:parts))
+  contains
+    !> The parts by the coordinates of the element whose motion the work depends on.
+    subroutine add_parts(mover, pair)
+      integer, intent(in) :: mover, pair
+      integer :: k, position
+
+      do k = incidence%first(mover), incidence%first(mover + 1) - 1
+        position = before + findloc(column(before + 1:n), incidence%coordinate(k), dim=1)
+        if (position == before) then
+          n = n + 1
+          position = n
+          work(n) = i
+          column(n) = incidence%coordinate(k)
+        end if
+        parts = parts + 1
+        entry(parts) = k
+        self%work_position(parts) = position
+        self%work_element(parts) = with_work(i)
+        self%work_pair(parts) = pair
+      end do
+    end subroutine add_parts
+  end subroutine form_works
 
   subroutine append_internal(freedoms, incidence, with_work, internal, self)
     integer, intent(in) :: freedoms
@@ -167,7 +262,7 @@ contains
 
     dfdy(:, :2 * self%pairs) = 0.0_wp
     dfdy(:, 2 * self%pairs + 1:2 * self%pairs + self%freedoms) = 1.0_wp
-    do n = 1, size(self%element)
+    do n = 1, size(self%element) - self%cross_products
       e = self%element(n)
       at = self%position(n)
       do l = 1, size(dfdy, 1)
@@ -176,19 +271,43 @@ contains
                                    + self%product(l, n) * (elements%restoring_angle(l, e) + elements%applied_angle(l, e))
       end do
     end do
-    at = 2 * self%pairs + self%freedoms
-    do n = 1, size(self%work_element)
-      e = self%work_element(n)
-      do l = 1, size(dfdy, 1)
-        associate (speed => elements%speed(l, e), ratio => self%ratio(l, n))
-          dfdy(l, at + 1) = ratio * (elements%applied(l, e) + speed * elements%applied_speed(l, e))
-          dfdy(l, at + 2) = ratio * speed * elements%applied_angle(l, e)
-        end associate
-      end do
-      at = at + 2
+    do n = n, size(self%element)
+      associate (cross => elements%cross, pair => self%pair(n), by_speed => dfdy(:, self%position(n)), &
+                 by_angle => dfdy(:, self%pairs + self%position(n)))
+        by_speed = by_speed + self%product(:, n) * cross%applied_speed(:, pair)
+        by_angle = by_angle + self%product(:, n) * (cross%restoring_angle(:, pair) + cross%applied_angle(:, pair))
+      end associate
     end do
+    at = 2 * self%pairs + self%freedoms
+    call fill_works(self, elements, dfdy(:, at + 1:at + 2 * self%works))
+    at = at + 2 * self%works
     if (elements%internal%count > 0) call fill_internal(self, elements, at, dfdy)
   end subroutine fill
+
+  !> dW'/dq' and dW'/dq of W' = M u'.
+  subroutine fill_works(self, elements, values)
+    class(reduced_jacobian_t), intent(in) :: self
+    type(elements_t), intent(in) :: elements
+    real(wp), contiguous, intent(inout) :: values(:, :)   !! [lanes, 2 * positions]
+    integer :: e, l, n
+
+    values(:, :) = 0.0_wp
+    do n = 1, size(self%work_element)
+      e = self%work_element(n)
+      associate (by_speed => values(:, 2 * self%work_position(n) - 1), by_angle => values(:, 2 * self%work_position(n)), &
+                 ratio => self%ratio(:, n), pair => self%work_pair(n), cross => elements%cross)
+        if (pair > 0) then
+          by_speed = by_speed + ratio * (elements%speed(:, e) * cross%applied_speed(:, pair))
+          by_angle = by_angle + ratio * elements%speed(:, e) * cross%applied_angle(:, pair)
+          cycle
+        end if
+        do l = 1, size(values, 1)
+          by_speed(l) = by_speed(l) + ratio(l) * (elements%applied(l, e) + elements%speed(l, e) * elements%applied_speed(l, e))
+          by_angle(l) = by_angle(l) + ratio(l) * elements%speed(l, e) * elements%applied_angle(l, e)
+        end do
+      end associate
+    end do
+  end subroutine fill_works
 
   subroutine fill_internal(self, elements, before, dfdy)
     class(reduced_jacobian_t), intent(in) :: self

@@ -72,10 +72,12 @@ contains
   subroutine number_elements(self)
     class(machine_t), intent(inout) :: self
     type(element_rows_t) :: rows
-    integer :: i, internal, total
+    integer :: e, i, internal, total
+    integer, allocatable :: phase(:)   ! of each element, 0 for none
 
     total = 0
     internal = 0
+    allocate (phase(0))
     rows = rows_between([integer ::], [integer ::])
     do i = 1, size(self%banks)
       associate (bank => self%banks(i)%bank)
@@ -85,10 +87,12 @@ contains
         total = bank%last()
         rows = joined_rows(rows, bank%rows)
         internal = internal + bank%states * bank%count
+        phase = [phase, merge(0, bank%first - 1 + [(e + bank%count, e=1, bank%count)], bank%ports == 1)]
       end associate
     end do
     self%elements = new_elements(self%lanes, rows, &
-                                 [(spread(self%banks(i)%bank%states, 1, self%banks(i)%bank%count), i=1, size(self%banks))])
+                                 [(spread(self%banks(i)%bank%states, 1, self%banks(i)%bank%count), i=1, size(self%banks))], &
+                                 phase)
     self%laws = new_polynomial_laws(self%lanes, total)
     do i = 1, size(self%banks)
       call self%banks(i)%bank%polynomials(1, self%lanes, self%laws)
@@ -206,8 +210,11 @@ contains
     associate (switches => self%switches, elements => self%elements)
       do k = 1, switches%count
         do lane = 1, self%lanes
-          call switches%choose(self%banks, k, lane, t(lane), elements%angle(lane, switches%element(k)), &
-                               elements%speed(lane, switches%element(k)), elements%internal%value(lane, :))
+          associate (e => switches%element(k), p => switches%phase(k))
+            call switches%choose(self%banks, k, lane, t(lane), [elements%angle(lane, e), elements%speed(lane, e), &
+                                                                elements%angle(lane, p), elements%speed(lane, p)], &
+                                 elements%internal%value(lane, :))
+          end associate
         end do
       end do
     end associate
@@ -303,13 +310,16 @@ contains
   subroutine differentiate_elements(self, t)
     class(machine_t), intent(inout) :: self
     real(wp), intent(in) :: t(self%lanes)   !! [s]
-    integer :: i
+    integer :: first_cross, i
 
     self%elements%time(:) = t
     call self%laws%differentiate(self%elements)
+    call self%elements%cross%clear()
+    first_cross = 1
     do i = 1, size(self%general_banks)
       associate (bank => self%banks(self%general_banks(i))%bank)
-        call bank%law%differentiate(bank%first, bank%first_internal, self%elements)
+        call bank%law%differentiate(bank%first, bank%first_internal, first_cross, self%elements)
+        if (bank%ports > 1) first_cross = first_cross + 2 * bank%count
       end associate
     end do
   end subroutine differentiate_elements

@@ -28,7 +28,7 @@ module nocdyn_element_groups
     type(input_t), pointer :: input => null()
     type(body_index_t), pointer, private :: body_index => null()
   contains
-    procedure :: values, curves, bodies, listed_bodies
+    procedure :: values, curves, bodies, listed_bodies, some
   end type element_groups_t
 
   abstract interface
@@ -102,13 +102,13 @@ contains
     form_of_group = [(form_of(groups%input%groups(groups%indices(i))), i=1, size(groups%indices))]
     do form = 1, max(1, maxval(form_of_group))
       if (form > 1 .and. .not. any(form_of_group == form)) cycle
-      call add_form(some_of(groups, form_of_group == form), form, banks)
+      call add_form(groups%some(form_of_group == form), form, banks)
     end do
   end subroutine add_banks
 
   !> Those of the groups that a mask selects.
-  type(element_groups_t) function some_of(groups, mask) result(some)
-    type(element_groups_t), intent(in) :: groups
+  type(element_groups_t) function some(groups, mask)
+    class(element_groups_t), intent(in) :: groups
     logical, intent(in) :: mask(:)   !! [groups]
     integer :: i
 
@@ -117,7 +117,7 @@ contains
     some%body_index => groups%body_index
     allocate (some%indices, source=pack(groups%indices, mask))
     allocate (some%names, source=selected(groups%names, pack([(i, i=1, size(mask))], mask)))
-  end function some_of
+  end function some
 
   !> One number of each group, [lanes, groups].
   function values(self, key, absent)

@@ -1,13 +1,15 @@
 !> The banks of elastic meshes of an input: springs along R1 phi_1 + R2 phi_2, with and without backlash.
 module nocdyn_mesh_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
-  use nocdyn_couplings, only: coupling_common_t, new_couplings, transmission_error_t
+  use nocdyn_couplings, only: coupling_common_t, couplings_t, new_couplings, transmission_error_t
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_element_rows, only: new_element_rows
   use nocdyn_gap_couplings, only: new_gap_couplings
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
+  use nocdyn_mesh_phases, only: mesh_phases_t, new_mesh_phases
+  use nocdyn_polynomial_couplings, only: new_polynomial_couplings
   use nocdyn_text, only: to_text
   implicit none (type, external)
   private
@@ -15,6 +17,7 @@ module nocdyn_mesh_assembly
   public :: mesh_form, add_mesh_form, check_meshes
 
   integer, parameter :: tight = 1, with_backlash = 2
+  integer, parameter :: forms_without_error = 2   ! as many follow with one
 
 contains
 
@@ -50,12 +53,37 @@ contains
     type(group_t), intent(in) :: group
 
     mesh_form = merge(with_backlash, tight, group%number('backlash') > 0)
+    if (size(group%numbers('transmission_error')) > 0) mesh_form = mesh_form + forms_without_error
   end function mesh_form
 
-  !> Adds the bank of the meshes of one form.
+  !> Adds the bank of the meshes of one form. With a transmission error each has a bank of its own, and its phase another.
   subroutine add_mesh_form(groups, form, banks)
     type(element_groups_t), intent(in) :: groups
     integer, intent(in) :: form
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    type(mesh_phases_t) :: phase
+    type(element_groups_t) :: one
+    integer :: e, i
+
+    if (form <= forms_without_error) then
+      call add_meshes(groups, form, banks)
+      return
+    end if
+    do i = 1, size(groups%indices)
+      one = groups%some([(e == i, e=1, size(groups%indices))])
+      call add_meshes(one, form - forms_without_error, banks)
+      select type (mesh => banks(size(banks))%bank)
+      class is (couplings_t)
+        if (mesh%error_orders == 0) cycle
+        phase = new_mesh_phases(mesh)
+      end select
+      call append_bank(banks, phase)
+    end do
+  end subroutine add_mesh_form
+
+  subroutine add_meshes(groups, form, banks)
+    type(element_groups_t), intent(in) :: groups
+    integer, intent(in) :: form   !! without that of the error
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     real(wp), dimension(groups%lanes, size(groups%indices)) :: stiffness, zero
     integer :: bodies(2, size(groups%indices)), i
@@ -72,44 +100,35 @@ contains
     shared = coupling_common_t(groups%names, new_element_rows([(2 * i - 1, i=1, size(bodies, 2) + 1)], [bodies], [radii]), &
                                groups%values('damping'), zero)
     shared%is_mesh = .true.
-    allocate (shared%error)
-    call collect_errors(groups, bodies(1, :), shared%error)
+    call read_error(groups%input%groups(groups%indices(1)), bodies(1, 1), shared%error)
     stiffness = groups%values('stiffness')
-    select case (form)
-    case (tight)
-      call append_bank(banks, new_couplings(shared, stiffness, zero))
-    case default
+    if (form == with_backlash) then
       call append_bank(banks, new_gap_couplings(shared, spread(stiffness, 1, 1), groups%values('backlash'), stiffness))
-    end select
-  end subroutine add_mesh_form
+    else if (allocated(shared%error)) then
+      call append_bank(banks, new_polynomial_couplings(shared, spread(stiffness, 1, 1), stiffness))
+    else
+      call append_bank(banks, new_couplings(shared, stiffness, zero))
+    end if
+  end subroutine add_meshes
 
-  !> The transmission errors of meshes, each of the angle of its first body. One that stands still has none.
-  subroutine collect_errors(groups, first_body, error)
-    type(element_groups_t), intent(in) :: groups
-    integer, intent(in) :: first_body(:)
-    type(transmission_error_t), intent(out) :: error
-    real(wp), allocatable :: amplitude(:), order(:), phase(:)
-    integer :: i, k, teeth(2)
+  !> The transmission error of a mesh, by the angle of its first body; not allocated: none. One that stands still has none.
+  subroutine read_error(group, first_body, error)
+    type(group_t), intent(in) :: group
+    integer, intent(in) :: first_body
+    type(transmission_error_t), allocatable, intent(out) :: error
+    integer :: k, teeth(2)
 
-    allocate (error%coupling(0), error%order(0), error%amplitude(0), error%phase(0))
-    do i = 1, size(groups%indices)
-      associate (group => groups%input%groups(groups%indices(i)))
-        amplitude = group%numbers('transmission_error')
-        if (size(amplitude) == 0 .or. first_body(i) == 0) cycle
-        order = group%numbers('error_orders')
-        if (size(order) == 0) then   ! the frequency of the teeth and its multiples
-          teeth = group%whole_numbers('teeth')
-          order = [(real(k * teeth(1), wp), k=1, size(amplitude))]
-        end if
-        phase = group%numbers('error_phases')
-        if (size(phase) == 0) phase = 0.0_wp * amplitude
-        error%coupling = [error%coupling, spread(i, 1, size(amplitude))]
-        error%order = [error%order, order]
-        error%amplitude = [error%amplitude, amplitude]
-        error%phase = [error%phase, phase]
-      end associate
-    end do
-  end subroutine collect_errors
+    if (size(group%numbers('transmission_error')) == 0 .or. first_body == 0) return
+    allocate (error)
+    error%amplitude = group%numbers('transmission_error')
+    error%order = group%numbers('error_orders')
+    if (size(error%order) == 0) then   ! the frequency of the teeth and its multiples
+      teeth = group%whole_numbers('teeth')
+      error%order = [(real(k * teeth(1), wp), k=1, size(error%amplitude))]
+    end if
+    error%phase = group%numbers('error_phases')
+    if (size(error%phase) == 0) error%phase = 0.0_wp * error%amplitude
+  end subroutine read_error
 
   !> R1 and R2 [m], the latter negative in an internal gear.
   pure function radii_of(group) result(radii)

@@ -29,7 +29,7 @@ module nocdyn_schema_meshes
     key_rule_t('mesh',       'backlash',        a_number,       1, 'm',           '0',         not_negative, &
       'play between both flanks along the line of action; no force inside'), &
     key_rule_t('mesh',       'transmission_error', a_number,    any_number, 'm',  unset,       not_negative, &
-      'amplitudes of the deviation from equal motion, along the line of action; for response', fewest=1), &
+      'amplitudes of the deviation from equal motion, along the line of action', fewest=1), &
     key_rule_t('mesh',       'error_orders',    a_number,       any_number, '',   unset,       positive, &
       'order of each in turns of the first body; if not given 1, 2, ... times its teeth', fewest=1), &
     key_rule_t('mesh',       'error_phases',    a_number,       any_number, 'rad', unset,      anything, &

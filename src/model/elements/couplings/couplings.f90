@@ -1,15 +1,20 @@
 !> Elastic couplings: the nonlinear spring of eqs. (2), (3) with viscous damping and a rest twist.
 !>
+!> A mesh with a transmission error e is a bank of its own with the phase phi, the angle of the first body; it is followed by
+!> the bank of its phase (`mesh_phases_t`). Its law has u - e(phi) in place of u. Its moment M acts along the gradient of this:
+!> along the row of the mesh, and on the first body with -e'(phi) M besides. So it has a potential.
+!>
 !> Friction in parallel with the spring resists with friction tanh(u' / friction_speed), as a slipping clutch does. Damping and
 !> friction have one work integral.
 module nocdyn_couplings
-  use nocdyn_bank, only: bank_t, harmonic_t, quantity_t, role_coupling, sine_harmonic
+  use nocdyn_bank, only: bank_t, harmonic_t, quantity_t, role_coupling
   use nocdyn_element_rows, only: element_rows_t, rows_between
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_law_expressions, only: angle_of, expression_t, node_of, operator(*), operator(-), operator(/), speed_of
-  use nocdyn_law_functions, only: tanh
-  use nocdyn_law_tape, only: law_tape_t
+  use nocdyn_law_expressions, only: angle_of, expression_t, node_of, operator(*), operator(+), operator(-), operator(/), &
+    phase_of, phase_speed_of, speed_of
+  use nocdyn_law_functions, only: cos, sin, tanh
+  use nocdyn_law_tape, only: at_phase, law_tape_t
   use nocdyn_polynomial_laws, only: coefficient_by_speed, coefficient_cubic, coefficient_damping, coefficient_linear, &
     coefficient_rest
   use nocdyn_text, only: string_t
@@ -18,9 +23,8 @@ module nocdyn_couplings
 
   public :: new_couplings
 
-  !> Orders of the first bodies of meshes by which their wheels deviate from the ideal form.
+  !> By how much the wheels of a mesh deviate from the ideal form: e(phi), a sum of orders of the angle phi of the first body.
   type, public :: transmission_error_t
-    integer, allocatable :: coupling(:)      !! that each order belongs to, numbered within the bank
     real(wp), allocatable :: order(:)        !! positive
     real(wp), allocatable :: amplitude(:)    !! of sin(order phi + phase) [m]
     real(wp), allocatable :: phase(:)        !! [rad]
@@ -36,7 +40,7 @@ module nocdyn_couplings
     real(wp), allocatable :: friction_speed(:, :)   !! [rad/s], positive
     logical :: is_mesh = .false.                    !! whether the rows are radii: angles are deformations [m], moments forces [N]
     real(wp), allocatable :: section_modulus(:, :)  !! stress = moment / section_modulus [m3], 0: unknown; not allocated: all
-    type(transmission_error_t), allocatable :: error !! not allocated: none
+    type(transmission_error_t), allocatable :: error !! of the only coupling; not allocated: none
   end type coupling_common_t
 
   ! gfortran 12 loses components of a structure constructor's value that is an argument
@@ -48,13 +52,16 @@ module nocdyn_couplings
   type, extends(bank_t), public :: couplings_t
     logical :: has_friction = .false.
     logical :: is_mesh = .false.   !! as in `coupling_common_t`
-    type(transmission_error_t), allocatable :: error   !! not allocated: none; forced responses have it, the law has it not
+    integer :: error_orders = 0    !! of the transmission error of its only coupling; 0: none
   contains
     procedure :: list_harmonics
+    procedure :: to_mean_torque
     procedure :: set_common
     procedure :: add_damping
     procedure :: describe
+    procedure :: describe_phase
     procedure :: twist_from_rest
+    procedure :: twist_speed
     procedure :: friction
     procedure :: quantities
     procedure :: observe
@@ -132,7 +139,7 @@ contains
     is_dissipative = any(abs(common%damping) > 0.0_wp, dim=1)
     self%has_friction = allocated(common%friction)
     self%is_mesh = common%is_mesh
-    if (allocated(common%error)) allocate (self%error, source=common%error)
+    if (allocated(common%error)) call add_error(self, common%error)
     if (self%has_friction) then
       call self%add_parameter('friction', common%friction)
       call self%add_parameter('friction_speed', common%friction_speed)
@@ -145,10 +152,40 @@ contains
     self%has_paper_law = .false.
   end subroutine set_common
 
-  !> Adds the damping of eq. (5) to the polynomial part of the law.
+  !> Adds the parameters of a transmission error.
+  subroutine add_error(self, error)
+    class(couplings_t), intent(inout) :: self
+    type(transmission_error_t), intent(in) :: error
+    integer :: k
+
+    if (self%count /= 1) error stop 'nocdyn_couplings: a mesh with a transmission error has a bank of its own'
+    self%ports = at_phase
+    self%error_orders = size(error%order)
+    self%phase_order = maxval([0.0_wp, error%order])
+    associate (owner => [(1, k=1, self%error_orders)], a => error%amplitude)
+      call self%add_parameter('error order', spread(error%order, 1, self%lanes), .false., owner)
+      call self%add_parameter('error sine', spread(a * cos(error%phase), 1, self%lanes), .false., owner)
+      call self%add_parameter('error cosine', spread(a * sin(error%phase), 1, self%lanes), .false., owner)
+    end associate
+  end subroutine add_error
+
+  !> Without the transmission error, whose mean is zero.
+  subroutine to_mean_torque(self)
+    class(couplings_t), intent(inout) :: self
+    integer :: i
+
+    if (self%error_orders == 0) return
+    do i = 1, size(self%parameters)
+      if (any(self%parameters(i)%name == [character(len=12) :: 'error sine', 'error cosine'])) self%parameters(i)%value = 0.0_wp
+    end do
+    call self%prepare_law()
+  end subroutine to_mean_torque
+
+  !> Adds the damping of eq. (5) to the polynomial part of the law; that of a mesh with a transmission error is not in it.
   subroutine add_damping(self)
     class(couplings_t), intent(inout) :: self
 
+    if (self%error_orders > 0) return
     call self%add_term('damping', coefficient_by_speed, -1.0_wp)
     call self%add_term('damping', coefficient_damping, 1.0_wp)
   end subroutine add_damping
@@ -158,16 +195,67 @@ contains
     type(law_tape_t), target, intent(inout) :: tape
 
     if (self%has_friction) tape%applied = node_of(self%friction(tape))
+    if (self%error_orders == 0) return
+    tape%applied = node_of(-(self%parameter(tape, 'damping') * self%twist_speed(tape)))
+    tape%damping = node_of(self%parameter(tape, 'damping'))
   end subroutine describe
 
-  !> w = u - rest_twist [rad].
+  !> The moments on the phase, from those of the mesh, which are described: M times the derivative -e' of the twist by the phase.
+  subroutine describe_phase(self, tape)
+    class(couplings_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: moment, slope
+
+    if (self%error_orders == 0) return
+    slope = error_slope(self, tape)
+    moment = slope
+    moment%node = tape%restoring
+    tape%phase_restoring = node_of(-(slope * moment))
+    moment%node = tape%applied
+    tape%phase_applied = node_of(-(slope * moment))
+  end subroutine describe_phase
+
+  !> w = u - rest_twist [rad], of a mesh less the transmission error.
   function twist_from_rest(self, tape) result(w)
     class(couplings_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape
-    type(expression_t) :: w
+    type(expression_t) :: angle, w
+    integer :: k
 
     w = angle_of(tape) - self%parameter(tape, 'rest_twist')
+    do k = 1, self%error_orders
+      angle = self%parameter(tape, 'error order', [k]) * phase_of(tape)
+      w = w - self%parameter(tape, 'error sine', [k]) * sin(angle)
+      w = w - self%parameter(tape, 'error cosine', [k]) * cos(angle)
+    end do
   end function twist_from_rest
+
+  !> The derivative of the twist by the time: u', of a mesh u' - e'(phi) phi' [rad/s].
+  function twist_speed(self, tape) result(speed)
+    class(couplings_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: speed
+
+    speed = speed_of(tape)
+    if (self%error_orders > 0) speed = speed - error_slope(self, tape) * phase_speed_of(tape)
+  end function twist_speed
+
+  !> e'(phi) [m/rad].
+  function error_slope(self, tape) result(slope)
+    class(couplings_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: angle, order, part, slope
+    integer :: k
+
+    do k = 1, self%error_orders
+      order = self%parameter(tape, 'error order', [k])
+      angle = order * phase_of(tape)
+      part = order * self%parameter(tape, 'error sine', [k]) * cos(angle) &
+             - order * self%parameter(tape, 'error cosine', [k]) * sin(angle)
+      if (k > 1) part = slope + part
+      slope = part
+    end do
+  end function error_slope
 
   !> The moment of friction on the second body [N m].
   function friction(self, tape)
@@ -175,7 +263,7 @@ contains
     type(law_tape_t), target, intent(inout) :: tape
     type(expression_t) :: friction
 
-    friction = -(self%parameter(tape, 'friction') * tanh(speed_of(tape) / self%parameter(tape, 'friction_speed')))
+    friction = -(self%parameter(tape, 'friction') * tanh(self%twist_speed(tape) / self%parameter(tape, 'friction_speed')))
   end function friction
 
   !> The transmission error of a mesh.
@@ -184,21 +272,16 @@ contains
     integer, intent(in) :: element   !! numbered within the bank
     real(wp), intent(in) :: speed    !! u' [rad/s]
     type(harmonic_t), allocatable, intent(out) :: list(:)
-    integer :: i, k
-    integer, allocatable :: orders(:)
+    integer :: k
 
-    if (.not. allocated(self%error)) then
-      allocate (list(0))
-      return
-    end if
-    orders = pack([(k, k=1, size(self%error%order))], self%error%coupling == element)
-    allocate (list(size(orders)))
-    do i = 1, size(list)
-      associate (error => self%error, k => orders(i))
-        list(i) = sine_harmonic(error%amplitude(k), 0.0_wp, error%order(k), error%phase(k), &
-                                self%rows%body(self%rows%first(element)))
-      end associate
-    end do
+    allocate (list(self%error_orders))
+    if (size(list) == 0) return
+    associate (order => self%values_of('error order'), sine => self%values_of('error sine'), &
+               cosine => self%values_of('error cosine'))
+      do k = 1, size(list)
+        list(k) = harmonic_t(cmplx(cosine(1, k), -sine(1, k), wp), 0.0_wp, order(1, k), self%rows%body(self%rows%first(element)))
+      end do
+    end associate
     list%is_twist = .true.
   end subroutine list_harmonics
 

@@ -8,8 +8,7 @@ module nocdyn_gap_couplings
   use nocdyn_couplings, only: coupling_common_t, couplings_t
   use nocdyn_described_elements, only: boundary_width
   use nocdyn_kinds, only: wp
-  use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), operator(+), operator(-), pick, &
-    speed_of
+  use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), operator(+), operator(-), pick
   use nocdyn_law_functions, only: add_guard, larger, polynomial, ratio, size_of
   use nocdyn_law_tape, only: law_tape_t
   use nocdyn_polynomial_couplings, only: add_coefficients, coefficients_of
@@ -78,14 +77,16 @@ contains
     moment = by_branch(tape, [0, 1, 1, 1, 1, 1, 1]) * elastic
     damped = by_branch(tape, [0, 1, 0, 0, 1, 0, 0]) * self%parameter(tape, 'damping')
     tape%restoring = node_of(-moment)
-    tape%applied = node_of(by_branch(tape, [0, 0, -1, 1, 0, -1, 1]) * elastic - damped * speed_of(tape))
+    tape%applied = node_of(by_branch(tape, [0, 0, -1, 1, 0, -1, 1]) * elastic - damped * self%twist_speed(tape))
     if (self%has_friction) then
-      tape%applied = node_of(by_branch(tape, [0, 0, -1, 1, 0, -1, 1]) * elastic - damped * speed_of(tape) + self%friction(tape))
+      tape%applied = node_of(by_branch(tape, [0, 0, -1, 1, 0, -1, 1]) * elastic - damped * self%twist_speed(tape) &
+                             + self%friction(tape))
     end if
     tape%stored = node_of(by_branch(tape, [0, 1, 1, 1, 1, 1, 1]) * x &
                           * polynomial([((1.0_wp / (k + 1)) * p(k), k=1, self%order)], x))
     tape%secant = node_of(ratio(moment, w))
     tape%damping = node_of(damped)
+    call self%describe_phase(tape)
     call guard_branches(self, tape, w, half, p)
   end subroutine describe
 
@@ -121,7 +122,7 @@ contains
       beyond = merge(0, separating - free, side > 0)
       depth = real(side, wp) * w - half
       elastic = real(side, wp) * polynomial(p, real(side, wp) * depth)
-      viscous = real(side, wp) * self%parameter(tape, 'damping') * speed_of(tape)
+      viscous = real(side, wp) * self%parameter(tape, 'damping') * self%twist_speed(tape)
       call add_guard(1, free, -(scale * depth), shift)
       call add_guard(1, contact + beyond, scale * depth, shift)
       call add_guard(1, contact + beyond, elastic - viscous, shift)

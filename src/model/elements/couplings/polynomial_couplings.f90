@@ -24,15 +24,16 @@ module nocdyn_polynomial_couplings
 contains
 
   !> Couplings with the elastic moment sum p_k w^k.
-  function new_polynomial_couplings(common, coefficient) result(bank)
+  function new_polynomial_couplings(common, coefficient, stiffness) result(bank)
     type(coupling_common_t), intent(in) :: common   !! names, bodies, damping, rest twists, friction
     real(wp), intent(in) :: coefficient(:, :, :)       !! p_k [N m/rad^k], shape [order, lanes, couplings]
+    real(wp), intent(in), optional :: stiffness(:, :)  !! of the key, [N m/rad]; p_1 is this where there are no others
     type(polynomial_couplings_t) :: bank
     integer :: e
 
     call bank%set_common(common)
     call bank%add_damping()
-    call add_coefficients(bank, coefficient, bank%order)
+    call add_coefficients(bank, coefficient, bank%order, stiffness)
     bank%elastic = pack([(e, e=1, bank%count)], [(any(abs(coefficient(:, :, e)) > 0.0_wp), e=1, bank%count)])
     call bank%prepare_law()
   end function new_polynomial_couplings
@@ -97,6 +98,7 @@ contains
     tape%stored = node_of(w * polynomial([((1.0_wp / (k + 1)) * p(k), k=1, self%order)], w))
     tape%secant = node_of(p(1))
     if (self%order > 1) tape%secant = node_of(p(1) + polynomial(p(2:), w))
+    call self%describe_phase(tape)
   end subroutine describe
 
 end module nocdyn_polynomial_couplings

@@ -48,9 +48,10 @@ contains
         associate (bank => machine%banks(numbers(i))%bank)
           call bank%law%prepare_series(order)
           timed(i) = is_timed(bank)
-          associate (first => strip * (bank%first - 1) / w + 1, last => (strip * bank%last() - 1) / w + 1)
+          associate (first => strip * (bank%first - 1) / w + 1, &
+                     last => (strip * (bank%last() + (bank%ports - 1) * bank%count) - 1) / w + 1)
             self%has_forcing(first:last) = self%has_forcing(first:last) .or. timed(i)
-            self%has_angle(first:last) = self%has_angle(first:last) .or. bank%law%angle > 0
+            self%has_angle(first:last) = self%has_angle(first:last) .or. max(bank%law%angle, bank%law%phase) > 0
           end associate
         end associate
       end do
@@ -191,9 +192,16 @@ contains
       slots = law%law%strip * law%law%elements
       call feed(work, law%angle, k, before, slots, motion(:, :, :, 1))
       call feed(work, law%speed, k, before, slots, motion(:, :, :, 2))
+      if (law%ports > 1) then
+        call feed(work, law%phase, k, before + slots, slots, motion(:, :, :, 1))
+        call feed(work, law%phase_speed, k, before + slots, slots, motion(:, :, :, 2))
+      end if
       call walk(law%law, work, k, law%law%groups * (strip - 1) + 1)
       call drain(work, tape%restoring, k, before, slots, groups, restoring)
       call drain(work, tape%applied, k, before, slots, groups, applied)
+      if (law%ports == 1) return
+      call drain(work, tape%phase_restoring, k, before + slots, slots, groups, restoring)
+      call drain(work, tape%phase_applied, k, before + slots, slots, groups, applied)
     end associate
   end subroutine add_bank
 
