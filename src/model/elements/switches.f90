@@ -11,7 +11,9 @@ module nocdyn_switches
   type, public :: switches_t
     integer :: count = 0
     integer, allocatable :: element(:)       !! element of each switch, numbered in the machine, [switches]
-    integer, allocatable :: phase(:)         !! its phase; the element itself if it has none
+    integer, allocatable :: moving(:)        !! elements whose motion they look at: bank by bank its elements, then their phases
+    integer, allocatable :: place(:)         !! of the element of each switch in `moving`, [switches]
+    integer, allocatable :: phase_place(:)   !! of its phase; that of the element itself if it has none, [switches]
     real(wp), allocatable :: phase_order(:)  !! most oscillations per turn of the phase; 0 if it has none
     integer, allocatable, private :: first_internal(:)   !! first internal state of that element in the machine, [switches]
     integer, allocatable, private :: last_internal(:)    !! last internal state of that element, [switches]
@@ -30,11 +32,12 @@ contains
   function new_switches(banks) result(self)
     type(bank_slot_t), intent(in) :: banks(:)
     type(switches_t) :: self
-    integer :: i, k, next
+    integer :: e, i, k, next
 
     self%count = sum([(size(banks(i)%bank%switch_element), i=1, size(banks))])
     allocate (self%phase_order(self%count), source=0.0_wp)
-    allocate (self%element(self%count), self%phase(self%count), self%first_internal(self%count), self%last_internal(self%count))
+    allocate (self%moving(0), self%place(self%count), self%phase_place(self%count))
+    allocate (self%element(self%count), self%first_internal(self%count), self%last_internal(self%count))
     allocate (self%bank(self%count), self%number(self%count))
     next = 0
     do i = 1, size(banks)
@@ -44,11 +47,13 @@ contains
           self%bank(next) = i
           self%number(next) = k
           self%element(next) = bank%first + bank%switch_element(k) - 1
-          self%phase(next) = self%element(next) + (bank%ports - 1) * bank%count
+          self%place(next) = size(self%moving) + bank%switch_element(k)
+          self%phase_place(next) = self%place(next) + (bank%ports - 1) * bank%count
           self%phase_order(next) = bank%phase_order
           self%first_internal(next) = bank%first_internal + (bank%switch_element(k) - 1) * bank%states
           self%last_internal(next) = self%first_internal(next) + bank%states - 1
         end do
+        if (k > 1) self%moving = [self%moving, (bank%first - 1 + e, e=1, bank%ports * bank%count)]
       end associate
     end do
   end function new_switches
@@ -84,22 +89,23 @@ contains
     class(switches_t), intent(in) :: self
     type(bank_slot_t), intent(inout) :: banks(:)
     real(wp), intent(in) :: time(:)                   !! t [s], [lanes]
-    !> of the elements of the switches, and of their phases if there are any [rad], [rad/s], [lanes, switches, ports]
-    real(wp), contiguous, intent(in) :: angle(:, :, :), speed(:, :, :)
+    real(wp), contiguous, intent(in) :: angle(:, :), speed(:, :)  !! of the elements `moving` [rad], [rad/s], [lanes, moving]
     real(wp), contiguous, intent(in) :: internal(:, :)            !! [lanes, states of all elements]
     real(wp), intent(inout) :: distance(:, :)         !! in units of the laws, [lanes, switches]
-    integer :: first, i
+    integer :: first, i, moving
 
     first = 1
+    moving = 0
     do i = 1, size(banks)
       associate (bank => banks(i)%bank)
         associate (last => first + size(bank%switch_element) - 1)
           if (last < first) cycle
-          call bank%block_indicators(time, angle(:, first:first + bank%count - 1, :bank%ports), &
-                                     speed(:, first:first + bank%count - 1, :bank%ports), &
+          call bank%block_indicators(time, angle(:, moving + 1:moving + bank%ports * bank%count), &
+                                     speed(:, moving + 1:moving + bank%ports * bank%count), &
                                      internal(:, bank%first_internal:bank%first_internal + bank%states * bank%count - 1), &
                                      distance(:, first:last))
           first = last + 1
+          moving = moving + bank%ports * bank%count
         end associate
       end associate
     end do

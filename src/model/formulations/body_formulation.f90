@@ -138,7 +138,7 @@ contains
     motion = 0.0_wp
     associate (n => self%machine%bodies, rows => self%machine%elements%rows, switches => self%machine%switches)
       do port = 1, 2
-        e = merge(switches%element(switch), switches%phase(switch), port == 1)
+        e = switches%moving(merge(switches%place(switch), switches%phase_place(switch), port == 1))
         associate (angle => motion(2 * port - 1), speed => motion(2 * port))
           do k = rows%first(e), rows%first(e + 1) - 1
             if (rows%body(k) == 0) cycle

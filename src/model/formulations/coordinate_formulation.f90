@@ -19,10 +19,9 @@ module nocdyn_coordinate_formulation
     real(wp), allocatable :: twist_at_origin(:, :)       !! u_0 [rad], [lanes, elements]: `zero_twist` and the moving origin
     type(sparse_map_t) :: twists                         !! U
     type(element_coordinates_t) :: incidence             !! entries of which U is made
-    type(element_coordinates_t) :: switching             !! entries of the elements that switch, then of their phases
-    integer, private :: switch_ports = 1                 !! 2 if some of them have phases
+    type(element_coordinates_t) :: switching             !! entries of the elements that the switches look at
     type(moving_origin_t), private :: origin
-    real(wp), allocatable, private, dimension(:, :, :) :: switch_angle, switch_speed   !! their motion, [lanes, switches, ports]
+    real(wp), allocatable, private, dimension(:, :) :: switch_angle, switch_speed   !! their motion, [lanes, elements]
   contains
     procedure :: set_coordinates
     procedure :: list_coordinates
@@ -58,11 +57,7 @@ contains
     self%zero_twist = self%machine%start_twist()
     self%twist_at_origin = self%zero_twist
     associate (machine => self%machine, incidence => self%incidence, freedoms => self%machine%coordinates%freedoms)
-      self%switching = incidence%selected(machine%switches%element, with_ratio_only=.true.)
-      if (any(machine%switches%phase /= machine%switches%element)) then
-        self%switch_ports = 2
-        self%switching = incidence%selected([machine%switches%element, machine%switches%phase], with_ratio_only=.true.)
-      end if
+      self%switching = incidence%selected(machine%switches%moving, with_ratio_only=.true.)
       self%origin = new_moving_origin(machine%lanes, freedoms, incidence, machine%elastic(), has_springs_only(machine))
       has_offset = any(abs(self%zero_twist) > 0, dim=1)
       has_offset(self%origin%turning) = .true.
@@ -70,7 +65,7 @@ contains
       self%may_shift = size(self%origin%motions%free) > 0
       self%has_block_indicators = machine%lanes > 1
       if (allocated(self%switch_angle)) deallocate (self%switch_angle, self%switch_speed)
-      allocate (self%switch_angle(machine%lanes, machine%switches%count, self%switch_ports), source=0.0_wp)
+      allocate (self%switch_angle(machine%lanes, size(machine%switches%moving)), source=0.0_wp)
       allocate (self%switch_speed, source=self%switch_angle)
       allocate (couplings, source=coupling_elements(machine))
       turning = incidence%selected(couplings, with_ratio_only=.true.)
@@ -241,22 +236,33 @@ contains
     integer, intent(in) :: lane, switch
     real(wp), contiguous, intent(in) :: y(:)   !! state, [states + quadratures]
     real(wp), intent(out) :: motion(4)         !! [rad], [rad/s], twice
-    integer :: e, k, port
 
     motion = 0.0_wp
-    associate (switches => self%machine%switches, switching => self%switching, f => self%machine%coordinates%freedoms)
-      do port = 1, self%switch_ports
-        e = merge(switches%element(switch), switches%phase(switch), port == 1)
-        associate (angle => motion(2 * port - 1), speed => motion(2 * port), entry => switch + (port - 1) * switches%count)
-          angle = self%twist_at_origin(lane, e)
-          do k = switching%first(entry), switching%first(entry + 1) - 1
-            angle = angle + switching%ratio(lane, k) * y(f + switching%coordinate(k))
-            speed = speed + switching%ratio(lane, k) * y(switching%coordinate(k))
-          end do
-        end associate
-      end do
+    associate (switches => self%machine%switches)
+      call place_motion(self, lane, switches%place(switch), y, motion(1), motion(2))
+      if (switches%phase_place(switch) == switches%place(switch)) return
+      call place_motion(self, lane, switches%phase_place(switch), y, motion(3), motion(4))
     end associate
   end subroutine switch_motion
+
+  !> The motion of an element that switches look at.
+  pure subroutine place_motion(self, lane, place, y, angle, speed)
+    class(coordinate_formulation_t), intent(in) :: self
+    integer, intent(in) :: lane
+    integer, intent(in) :: place               !! in `moving` of the switches
+    real(wp), contiguous, intent(in) :: y(:)   !! state, [states + quadratures]
+    real(wp), intent(out) :: angle, speed      !! [rad], [rad/s]
+    integer :: k
+
+    angle = self%twist_at_origin(lane, self%machine%switches%moving(place))
+    speed = 0.0_wp
+    associate (switching => self%switching, f => self%machine%coordinates%freedoms)
+      do k = switching%first(place), switching%first(place + 1) - 1
+        angle = angle + switching%ratio(lane, k) * y(f + switching%coordinate(k))
+        speed = speed + switching%ratio(lane, k) * y(switching%coordinate(k))
+      end do
+    end associate
+  end subroutine place_motion
 
   subroutine block_indicators(self, columns, t, y, g)
     class(coordinate_formulation_t), intent(inout) :: self
@@ -264,23 +270,18 @@ contains
     real(wp), intent(in) :: t(self%lanes)                         !! [s]
     real(wp), intent(in) :: y(self%lanes, columns)
     real(wp), intent(inout) :: g(self%lanes, self%switches)
-    integer :: e, k, l, port, switch
+    integer :: i, k, l
 
     associate (switches => self%machine%switches, angle => self%switch_angle, speed => self%switch_speed, &
                entries => self%switching, f => self%machine%coordinates%freedoms)
-      do port = 1, self%switch_ports
-        do switch = 1, self%switches
-          e = merge(switches%element(switch), switches%phase(switch), port == 1)
-          angle(:, switch, port) = self%twist_at_origin(:, e)
-          speed(:, switch, port) = 0.0_wp
-          associate (entry => switch + (port - 1) * self%switches)
-            do k = entries%first(entry), entries%first(entry + 1) - 1
-              do l = 1, self%lanes
-                angle(l, switch, port) = angle(l, switch, port) + entries%ratio(l, k) * y(l, f + entries%coordinate(k))
-                speed(l, switch, port) = speed(l, switch, port) + entries%ratio(l, k) * y(l, entries%coordinate(k))
-              end do
-            end do
-          end associate
+      do i = 1, size(switches%moving)
+        angle(:, i) = self%twist_at_origin(:, switches%moving(i))
+        speed(:, i) = 0.0_wp
+        do k = entries%first(i), entries%first(i + 1) - 1
+          do l = 1, self%lanes
+            angle(l, i) = angle(l, i) + entries%ratio(l, k) * y(l, f + entries%coordinate(k))
+            speed(l, i) = speed(l, i) + entries%ratio(l, k) * y(l, entries%coordinate(k))
+          end do
         end do
       end do
       call switches%block_indicators(self%machine%banks, t, angle, speed, y(:, self%mechanical + 1:self%states), g)

@@ -210,7 +210,7 @@ contains
     associate (switches => self%switches, elements => self%elements)
       do k = 1, switches%count
         do lane = 1, self%lanes
-          associate (e => switches%element(k), p => switches%phase(k))
+          associate (e => switches%element(k), p => switches%moving(switches%phase_place(k)))
             call switches%choose(self%banks, k, lane, t(lane), [elements%angle(lane, e), elements%speed(lane, e), &
                                                                 elements%angle(lane, p), elements%speed(lane, p)], &
                                  elements%internal%value(lane, :))
