@@ -200,7 +200,8 @@ def test_a_sweep_of_three_ranks_is_gone_on_with_by_any_number(nocdyn, discs, who
     assert journals == "out/sweep.journal and 2 of ranks" and 0 < int(number) < SAMPLES
     words = (discs, "--out", "out", "--resume", *LONG)
     outcome = ranks_outcome(nocdyn, ranks, *words) if ranks else nocdyn("sweep", *words)
-    assert (outcome.returncode, outcome.stderr) == (0, "")
+    told = [line for line in outcome.stderr.splitlines() if " per second" not in line]  # a slow machine shows the progress
+    assert (outcome.returncode, told) == (0, [])
     assert outcome.stdout.startswith(f"{discs}: reusing {number} of {SAMPLES} variants from out/sweep.journal and 2 of ranks\n")
     assert nocdyn.summary("out")["variants_computed"] == SAMPLES - int(number)
     assert_ends_as(nocdyn, whole)
