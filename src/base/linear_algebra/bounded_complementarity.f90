@@ -1,0 +1,86 @@
+!> Complementarity with bounds: the forces x between given bounds that belong to a = W x + b, where a(i) is zero unless x(i) is
+!> at a bound, at least zero where it is the lower one and at most zero where it is the upper one.
+!>
+!> These are the conditions for the least of x^T W x / 2 + b^T x, with W symmetric and positive semidefinite; a is unique, and
+!> the forces that are not at their bounds are those of least norm. The active set changes by one force at a time:
+!> J. Nocedal, S. J. Wright, Numerical Optimization, 2nd ed., algorithm 16.3. Joints with dry friction at rest are of this kind:
+!> Ch. Glocker, F. Pfeiffer, Nonlinear Dynamics 4 (1993) 465-480.
+module nocdyn_bounded_complementarity
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack, only: pseudo_inverse
+  implicit none (type, external)
+  private
+
+  public :: solve_bounded_complementarity, null_tolerance
+
+  integer, parameter, public :: is_free = 0, at_lower = -1, at_upper = 1   !! where a force is
+  real(wp), parameter :: null_tolerance = 1.0e-11_wp                       !! singular values of W below it count as zero
+  real(wp), parameter :: rounding = 1.0e-12_wp                             ! of a, relative to the largest of its terms
+
+contains
+
+  !> Solves the problem. Bounds may be huge.
+  subroutine solve_bounded_complementarity(w, b, lower, upper, x, a, state, is_solved)
+    real(wp), intent(in) :: w(:, :)              !! [n, n], in any unit
+    real(wp), intent(in) :: b(:)                 !! [n], that of a
+    real(wp), intent(in) :: lower(:), upper(:)   !! lower <= upper, [n], that of x
+    real(wp), intent(out) :: x(:), a(:)          !! [n]
+    integer, intent(out) :: state(:)             !! is_free, at_lower or at_upper, [n]
+    logical, intent(out) :: is_solved            !! false after too many changes of the active set
+    integer :: change, worst
+    real(wp) :: wrong(size(b))
+
+    x = min(max(0.0_wp, lower), upper)
+    state = is_free
+    where (upper - lower <= 0) state = at_lower
+    is_solved = .false.
+    do change = 1, 50 * (size(b) + 1)
+      call move_free(w, b, lower, upper, x, state)
+      a = matmul(w, x) + b
+      wrong = 0.0_wp
+      where (state == at_lower) wrong = -a
+      where (state == at_upper) wrong = a
+      where (upper - lower <= 0) wrong = 0.0_wp
+      where (wrong <= rounding * (abs(b) + matmul(abs(w), abs(x)))) wrong = 0.0_wp
+      is_solved = all(wrong <= 0)
+      if (is_solved) return
+      worst = maxloc(wrong, dim=1)
+      state(worst) = is_free
+    end do
+  end subroutine solve_bounded_complementarity
+
+  !> Moves the free forces to where their a is zero; those that reach a bound on the way stay there.
+  subroutine move_free(w, b, lower, upper, x, state)
+    real(wp), intent(in) :: w(:, :), b(:), lower(:), upper(:)   !! as in `solve_bounded_complementarity`
+    real(wp), intent(inout) :: x(:)
+    integer, intent(inout) :: state(:)
+    integer, allocatable :: bound(:), free(:)
+    real(wp), allocatable :: wanted(:)
+    real(wp) :: share, step
+    integer :: first, i
+
+    do
+      free = pack([(i, i=1, size(x))], state == is_free)
+      if (size(free) == 0) return
+      bound = pack([(i, i=1, size(x))], state /= is_free)
+      wanted = -matmul(pseudo_inverse(w(free, free), null_tolerance), matmul(w(free, bound), x(bound)) + b(free))
+      step = 1.0_wp
+      first = 0
+      do i = 1, size(free)
+        associate (limit => merge(upper(free(i)), lower(free(i)), wanted(i) > x(free(i))))
+          if (wanted(i) >= lower(free(i)) .and. wanted(i) <= upper(free(i))) cycle
+          share = (limit - x(free(i))) / (wanted(i) - x(free(i)))
+        end associate
+        if (first > 0 .and. share >= step) cycle
+        step = share
+        first = i
+      end do
+      x(free) = x(free) + step * (wanted - x(free))
+      if (first == 0) return
+      i = free(first)
+      state(i) = merge(at_upper, at_lower, wanted(first) > upper(i))
+      x(i) = merge(upper(i), lower(i), state(i) == at_upper)
+    end do
+  end subroutine move_free
+
+end module nocdyn_bounded_complementarity
