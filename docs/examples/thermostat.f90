@@ -80,7 +80,7 @@ contains
     integer, intent(in) :: lane
     integer, intent(in) :: which
     real(wp), intent(in) :: t
-    real(wp), contiguous, intent(in) :: y(:)
+    real(wp), contiguous, intent(inout) :: y(:)
 
     self%is_on(lane) = .not. self%is_on(lane)
   end subroutine change_branch

@@ -183,7 +183,7 @@ contains
     integer, intent(in) :: lane
     integer, intent(in) :: which
     real(wp), intent(in) :: t
-    real(wp), contiguous, intent(in) :: y(:)
+    real(wp), contiguous, intent(inout) :: y(:)
 
     self%branch(lane) = merge(3 - 2 * which, 0, self%branch(lane) == 0)
   end subroutine play_cross
@@ -257,7 +257,7 @@ contains
     integer, intent(in) :: lane
     integer, intent(in) :: which
     real(wp), intent(in) :: t
-    real(wp), contiguous, intent(in) :: y(:)
+    real(wp), contiguous, intent(inout) :: y(:)
 
     self%passed(which, lane) = .true.
     self%calls(which) = self%calls(which) + 1
@@ -321,7 +321,7 @@ contains
     integer, intent(in) :: lane
     integer, intent(in) :: which
     real(wp), intent(in) :: t
-    real(wp), contiguous, intent(in) :: y(:)
+    real(wp), contiguous, intent(inout) :: y(:)
 
     self%side(lane) = -self%side(lane)
   end subroutine relay_cross

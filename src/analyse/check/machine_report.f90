@@ -1,6 +1,6 @@
 !> The report of `nocdyn check` on a machine: bodies, gears, coordinates, redundant constraints.
 module nocdyn_machine_report
-  use nocdyn_bank, only: role_coupling, role_excitation, role_load, role_motor, role_names
+  use nocdyn_bank, only: role_clutch, role_coupling, role_excitation, role_freewheel, role_load, role_motor, role_names
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_rigid_trains, only: ratio_tolerance
@@ -132,6 +132,12 @@ contains
       call report%append(', ' // counted(elements_of(machine, roles(i)), trim(role_names(roles(i))), &
                                          trim(role_names(roles(i))) // 's'))
     end do
+    if (elements_of(machine, role_clutch) > 0) then
+      call report%append(', ' // counted(elements_of(machine, role_clutch), 'clutch', 'clutches'))
+    end if
+    if (elements_of(machine, role_freewheel) > 0) then
+      call report%append(', ' // counted(elements_of(machine, role_freewheel), 'freewheel', 'freewheels'))
+    end if
     call put_line(report, counted(machine%coordinates%freedoms, 'degree', 'degrees') // ' of freedom')
     call put_groups(report, machine)
     call put_line(report, 'coordinates: ' // joined(selected(machine%names, named_coordinates(machine)), ', ', max_lines))

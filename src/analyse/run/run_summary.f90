@@ -4,6 +4,7 @@ module nocdyn_run_summary
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_finite, only: is_finite
   use nocdyn_input, only: input_t
+  use nocdyn_joint_events, only: named_event_t, put_joint_events
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -58,6 +59,7 @@ module nocdyn_run_summary
     type(energy_balance_t), allocatable :: energy_balance  !! from the start to the last row; not allocated if there are no rows
     type(run_limit_t), allocatable :: limits(:)     !! by &limit; not allocated before the first row
     real(wp) :: wall_time = 0.0_wp                  !! of integration and writing of the trajectory [s]
+    type(named_event_t), allocatable :: events(:)   !! of joints; not allocated if there are no joints
   end type run_summary_t
 
 contains
@@ -183,6 +185,7 @@ contains
     call put_counts(json, summary)
     call put_method(json, summary)
     if (allocated(summary%energy_balance)) call put_energy_balance(json, summary%energy_balance)
+    if (allocated(summary%events)) call put_joint_events(json, summary%events)
     call put_columns(json, summary)
     call json%close()
     text = json%text()

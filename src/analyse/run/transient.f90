@@ -9,6 +9,7 @@ module nocdyn_transient
   use nocdyn_input, only: input_t
   use nocdyn_integration, only: integrate
   use nocdyn_integration_settings, only: integration_settings_t
+  use nocdyn_joint_events, only: list_joint_events
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_missed_states, only: note_missed_state
@@ -94,7 +95,7 @@ contains
     class(run_output_t), target, intent(inout) :: output   !! receives the rows
     type(run_summary_t), intent(out) :: summary
     type(error_t), allocatable, intent(out) :: error
-    class(formulation_t), allocatable :: formulation
+    class(formulation_t), allocatable, target :: formulation
     type(run_observer_t) :: observer
     type(integration_settings_t) :: settings
     type(string_t), allocatable :: notes(:)
@@ -114,6 +115,7 @@ contains
     call start_observer(observer, input, formulation, times, error)
     if (allocated(error)) return
     observer%output => output
+    observer%table%columns%formulation%joints%leader => formulation%joints%mode
     call output%start(selected(observer%table%labels, observer%chosen), size(times), error)
     if (allocated(error)) return
     allocate (summary%labels, source=observer%table%labels)
@@ -184,6 +186,7 @@ contains
     call system_clock(ended)
     if (allocated(error)) return   ! a setting was refused
     summary%has_run = .true.
+    if (formulation%joints%count > 0) call list_joint_events(formulation, summary%events)
     summary%wall_time = real(ended - began, wp) / real(rate, wp)
     if (observer%not_finite > 0 .and. any(summary%solver_status%code(1) == [integration_done, integration_interrupted])) then
       summary%solver_status%code(1) = integration_not_finite

@@ -7,6 +7,7 @@ module nocdyn_input_files
   use nocdyn_errors, only: error_t, exit_done
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
+  use nocdyn_joint_assembly, only: refuse_joints
   use nocdyn_machine, only: machine_t
   use nocdyn_output_times, only: check_output_times
   use nocdyn_result_folders, only: out_folder, refuse_shared_folders, result_folder
@@ -63,6 +64,9 @@ contains
     end if
     do i = 1, size(readings)
       associate (reading => readings(i))
+        if (.not. allocated(reading%error) .and. arguments%command /= 'check') then
+          call refuse_joints(reading%input, 'nocdyn ' // arguments%command, reading%error)
+        end if
         if (.not. allocated(reading%error)) call assemble_machine(reading%input, machine, reading%error)
         if (.not. allocated(reading%error)) call analyse(arguments, reading%input, machine, folders(i)%text, reading%error)
         if (allocated(reading%error)) call report_error(reading%error, code)

@@ -268,13 +268,14 @@ contains
   end subroutine block_indicators
 
   !> A lane changes to the branch on the other side of an indicator's zero. The indicator must be zero or positive there
-  !> afterwards. A boundary that is moved outwards a little, so that it is positive, prevents that rounding crosses back.
+  !> afterwards. A boundary that is moved outwards a little, so that it is positive, prevents that rounding crosses back. The
+  !> state may jump.
   subroutine change_branch(self, lane, which, t, y)
     class(system_t), intent(inout) :: self
     integer, intent(in) :: lane
     integer, intent(in) :: which               !! index of the indicator function
     real(wp), intent(in) :: t
-    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+    real(wp), contiguous, intent(inout) :: y(:)   !! [states + quadratures]
 
     error stop 'nocdyn_system: a system with switches overrides change_branch'
   end subroutine change_branch

@@ -11,6 +11,7 @@ module nocdyn_curves
   public :: new_curve
 
   integer, parameter, public :: interpolation_linear = 1, interpolation_cubic = 2
+  integer, parameter, public :: interpolation_steps = 3      !! the value of each point until the next; 0 before the first
   integer, parameter, public :: extrapolation_linear = 1     !! with the slope at the end
   integer, parameter, public :: extrapolation_constant = 2   !! with the value at the end
 
@@ -57,6 +58,10 @@ contains
     allocate (self%origin(0:n), self%area(0:n), self%coefficient(0:3, 0:n), source=0.0_wp)
     self%origin(:) = [x(1), x]
     self%coefficient(0, :) = [y(1), y]
+    if (interpolation == interpolation_steps) then
+      self%coefficient(0, 0) = 0.0_wp
+      secant = 0.0_wp
+    end if
     self%coefficient(1, 1:n - 1) = secant
     slope = [secant, secant(n - 1)]
     if (interpolation == interpolation_cubic .and. n > 2) then

@@ -54,7 +54,7 @@ contains
   subroutine start_switching(switching, system, attempt, lane, solver_status)
     type(switching_t), intent(inout) :: switching
     class(system_t), intent(inout) :: system
-    type(step_attempt_t), intent(in) :: attempt
+    type(step_attempt_t), intent(inout) :: attempt
     integer, intent(in) :: lane
     type(solver_status_t), intent(inout) :: solver_status
 
@@ -227,7 +227,7 @@ contains
   subroutine cross_boundaries(switching, system, attempt, lane, solver_status)
     type(switching_t), intent(inout) :: switching
     class(system_t), intent(inout) :: system
-    type(step_attempt_t), intent(in) :: attempt
+    type(step_attempt_t), intent(inout) :: attempt   !! its state may jump
     integer, intent(in) :: lane
     type(solver_status_t), intent(inout) :: solver_status
     real(wp) :: limit
@@ -248,6 +248,7 @@ contains
       call system%indicator_values(lane, attempt%t(lane), switching%y, switching%g)
       limit = -tiny(limit)   ! an indicator that is zero now may be at the start of its branch
     end do
+    attempt%y(lane, :attempt%components) = switching%y
     if (crossed) solver_status%code(lane) = integration_chattering
     switching%pending(lane) = 0
     call set_start(switching%roots, lane, switching%g)

@@ -20,8 +20,11 @@ module nocdyn_bank
   integer, parameter, public :: role_motor = 3        !! in Q_m of eq. (18); puts energy in
   integer, parameter, public :: role_excitation = 4   !! in Q_0 of eq. (17); puts energy in
   integer, parameter, public :: role_phase = 5        !! part of a coupling: the phase of an element of the bank before
+  integer, parameter, public :: role_clutch = 6       !! locks or slips; takes energy out
+  integer, parameter, public :: role_freewheel = 7    !! the same in one direction
 
-  character(len=*), parameter, public :: role_names(5) = ['coupling  ', 'load      ', 'motor     ', 'excitation', 'coupling  ']
+  character(len=*), parameter, public :: role_names(*) = ['coupling  ', 'load      ', 'motor     ', 'excitation', 'coupling  ', &
+                                                               'clutch    ', 'freewheel ']
 
   !> One quantity that a bank writes to the table of results.
   type, public :: quantity_t

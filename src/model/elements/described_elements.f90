@@ -50,7 +50,8 @@ module nocdyn_described_elements
     integer :: internal_values = 0                !! lanes * states * elements
     integer, allocatable :: switch_element(:)     !! element of each switch
     character(len=24), allocatable :: switch_names(:)   !! of the boundaries, e.g. 'edge of the gap', [switches]
-    integer, allocatable :: choices(:)            !! branches of each switch, 0 where they are the segments of `curve`, [switches]
+    integer, allocatable :: choices(:)            !! branches of each switch, [switches]; 0: the segments of `curve`; negative:
+                                                  !! something else than guards chooses them
     integer, allocatable :: branch(:, :)          !! present branch of each switch, 1 or more, or a segment; [lanes, switches]
     type(law_parameter_t), allocatable :: parameters(:)
     type(polynomial_term_t), allocatable :: terms(:)   !! of the polynomial part of the law
@@ -70,6 +71,7 @@ module nocdyn_described_elements
     procedure :: refresh_lane
     procedure :: evaluate
     procedure :: choose
+    procedure :: set_branch
     procedure :: indicator
     procedure :: block_indicators
     procedure :: list_parameters
@@ -170,7 +172,7 @@ contains
   subroutine add_switches(self, names, choices)
     class(described_elements_t), intent(inout) :: self
     character(len=*), intent(in) :: names(:)   !! of the boundaries, [elements]
-    integer, intent(in) :: choices             !! number of branches, 0 if they are the segments of `curve`
+    integer, intent(in) :: choices             !! as in the type
     integer :: e
 
     self%switch_names = [character(len=len(self%switch_names)) :: self%switch_names, names]
@@ -305,6 +307,7 @@ contains
     real(wp) :: best, inside, motion(5)
     integer :: before, i, slot
 
+    if (self%choices(switch) < 0) return
     if (.not. self%law%is_ready) call self%law%make_ready()
     associate (branch => self%branch(lane, switch), e => self%switch_element(switch), numbers => self%law%numbers)
       before = branch
@@ -326,6 +329,17 @@ contains
       if (branch /= before) call refresh_element(self, lane, e, .true.)
     end associate
   end subroutine choose
+
+  !> Sets the branch of a switch in one lane.
+  subroutine set_branch(self, switch, lane, branch)
+    class(described_elements_t), intent(inout) :: self
+    integer, intent(in) :: switch   !! numbered within the bank
+    integer, intent(in) :: lane, branch
+
+    if (self%branch(lane, switch) == branch) return
+    self%branch(lane, switch) = branch
+    call refresh_element(self, lane, self%switch_element(switch), .true.)
+  end subroutine set_branch
 
   !> Number of a switch among those of its element.
   pure integer function number_in_element(self, switch)

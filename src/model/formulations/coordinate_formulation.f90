@@ -6,7 +6,7 @@ module nocdyn_coordinate_formulation
   use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates, twist_map
   use nocdyn_element_sets, only: coupling_elements, has_springs_only
   use nocdyn_error_measures, only: new_error_measures
-  use nocdyn_formulation, only: formulation_t
+  use nocdyn_joint_formulation, only: joint_formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_moving_origin, only: moving_origin_t, new_moving_origin
@@ -15,7 +15,7 @@ module nocdyn_coordinate_formulation
   private
 
   !> Extensions compute the accelerations.
-  type, abstract, extends(formulation_t), public :: coordinate_formulation_t
+  type, abstract, extends(joint_formulation_t), public :: coordinate_formulation_t
     real(wp), allocatable :: twist_at_origin(:, :)       !! u_0 [rad], [lanes, elements]: `zero_twist` and the moving origin
     type(sparse_map_t) :: twists                         !! U
     type(element_coordinates_t) :: incidence             !! entries of which U is made
@@ -37,6 +37,9 @@ module nocdyn_coordinate_formulation
     procedure :: angle_at_zero
     procedure :: twist_at_zero
     procedure :: switch_motion
+    procedure :: accelerate
+    procedure :: joint_rate
+    procedure :: push
     procedure :: block_indicators
     procedure :: reactions
   end type coordinate_formulation_t
@@ -72,6 +75,7 @@ contains
       call self%set_norm(new_error_measures(couplings, turning%first, turning%coordinate, turning%ratio, &
                                             self%origin%motions%free, freedoms, self%states, without_bands=is_block))
     end associate
+    call self%prepare_joints()
   end subroutine set_coordinates
 
   !> Registers the arrays that may differ from variant to variant.
@@ -287,6 +291,54 @@ contains
       call switches%block_indicators(self%machine%banks, t, angle, speed, y(:, self%mechanical + 1:self%states), g)
     end associate
   end subroutine block_indicators
+
+  !> q'' = (L_tau^T J L_tau)^-1 L_tau^T T.
+  subroutine accelerate(self, acceleration)
+    class(coordinate_formulation_t), intent(inout) :: self
+    real(wp), intent(inout) :: acceleration(:)   !! [rad/s2], [freedoms]
+    integer :: b, k
+
+    acceleration(:) = 0.0_wp
+    associate (coordinates => self%machine%coordinates)
+      do b = 1, self%machine%bodies
+        do k = coordinates%first(b), coordinates%first(b + 1) - 1
+          associate (entry => acceleration(coordinates%coordinate(k)))
+            entry = entry + coordinates%response(1, k) * self%torque(1, b)
+          end associate
+        end do
+      end do
+    end associate
+  end subroutine accelerate
+
+  !> The slip of a joint, or its derivative.
+  pure real(wp) function joint_rate(self, joint, rates)
+    class(coordinate_formulation_t), intent(in) :: self
+    integer, intent(in) :: joint
+    real(wp), intent(in) :: rates(:)   !! q' [rad/s] or q'' [rad/s2], [freedoms] at least
+    integer :: k
+
+    joint_rate = 0.0_wp
+    associate (map => self%incidence, e => self%joints%element(joint))
+      do k = map%first(e), map%first(e + 1) - 1
+        joint_rate = joint_rate + map%ratio(1, k) * rates(map%coordinate(k))
+      end do
+    end associate
+  end function joint_rate
+
+  !> Adds the response to the moment or the impulse of a joint.
+  pure subroutine push(self, joint, moment, rates)
+    class(coordinate_formulation_t), intent(in) :: self
+    integer, intent(in) :: joint
+    real(wp), intent(in) :: moment        !! [N m] or [N m s]
+    real(wp), intent(inout) :: rates(:)   !! q'' [rad/s2] or q' [rad/s], [freedoms] at least
+    integer :: k
+
+    associate (map => self%incidence, e => self%joints%element(joint))
+      do k = map%first(e), map%first(e + 1) - 1
+        rates(map%coordinate(k)) = rates(map%coordinate(k)) + map%response(1, k) * moment
+      end do
+    end associate
+  end subroutine push
 
   !> Reactions from the torques of the last `observe`.
   subroutine reactions(self, lane, lambda)

@@ -1,12 +1,15 @@
 !> A machine as a first-order system: the common part of the three formulations.
 module nocdyn_formulation
   use nocdyn_error_measures, only: error_measures_t
+  use nocdyn_joint_sets, only: joint_sets_t, new_joint_sets
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_system, only: system_t
   use nocdyn_text, only: quoted
   implicit none (type, external)
   private
+
+  public :: observe_elements, start_branches, indicate_branch, choose_branch   ! for extensions that add to them
 
   !> Extensions choose the mechanical states, the first of which are the speeds and angles of some bodies. The internal states
   !> of the elements follow. If there is an energy balance, the work integrals of the elements `machine%with_work` come last, as
@@ -21,6 +24,7 @@ module nocdyn_formulation
     real(wp), allocatable :: omega(:, :)     !! speeds [rad/s] after `set_state`, [lanes, 0:bodies]
     real(wp), allocatable :: zero_twist(:, :)   !! twists where the angles in the state are zero [rad], [lanes, elements]
     type(error_measures_t) :: norm              !! quantities in which errors are measured
+    type(joint_sets_t) :: joints                !! clutches and freewheels; see `joint_formulation_t`
     real(wp), allocatable, private :: lane_state(:)   !! the state of one lane, work space, [states]
     real(wp), allocatable :: torque(:, :)    !! torques of the elements on the bodies [N m] after `observe`, [lanes, 0:bodies]
   contains
@@ -38,13 +42,13 @@ module nocdyn_formulation
     procedure :: component_name
     procedure :: measure
     procedure :: measure_name
-    procedure :: observe
+    procedure :: observe => observe_elements
     procedure :: refresh_lane
-    procedure :: start_lane
+    procedure :: start_lane => start_branches
     procedure :: limit_steps
     procedure :: indicator_values
-    procedure :: set_indicator
-    procedure :: change_branch
+    procedure :: set_indicator => indicate_branch
+    procedure :: change_branch => change_to_branch
     procedure :: switch_name
   end type formulation_t
 
@@ -99,6 +103,7 @@ contains
       self%internal = machine%elements%internal%count
       self%states = self%mechanical + self%internal
       self%switches = machine%switches%count
+      self%joints = new_joint_sets(machine%banks, machine%switches)
       self%limits_steps = any(machine%switches%phase_order > 0)
       self%lane_state = spread(0.0_wp, 1, self%states)
       self%lanes = machine%lanes
@@ -134,7 +139,7 @@ contains
   !> Evaluates bodies, elements and torques at a state, so that they and the reactions can be read.
   !>
   !> The branches of the laws are chosen by the state. So the formulation must be another one than that of the integrator.
-  subroutine observe(self, t, y)
+  subroutine observe_elements(self, t, y)
     class(formulation_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
     real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states], at least
@@ -143,7 +148,7 @@ contains
     if (self%switches > 0) call self%machine%choose_branches(t)
     call self%machine%evaluate_elements(t)
     call self%machine%elements%scatter(self%torque)
-  end subroutine observe
+  end subroutine observe_elements
 
   !> Sets the motion of bodies and elements from the state.
   subroutine gather(self, y)
@@ -226,7 +231,7 @@ contains
   end subroutine refresh_lane
 
   !> Prepares a lane that starts at time t and state y, with new parameters perhaps.
-  subroutine start_lane(self, lane, t, y)
+  subroutine start_branches(self, lane, t, y)
     class(formulation_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t                  !! [s]
@@ -236,9 +241,9 @@ contains
     call self%refresh_lane(lane)
     call self%norm%start_lane(lane, y, self%zero_twist(lane, :), self%machine%laws%rest(lane, :))
     do switch = 1, self%switches
-      call self%change_branch(lane, switch, t, y)
+      if (self%joints%joint_of(switch) == 0) call choose_branch(self, lane, switch, t, y)
     end do
-  end subroutine start_lane
+  end subroutine start_branches
 
   !> A step must show how the teeth of wheels with a transmission error approach and part, even in free flight.
   subroutine limit_steps(self, columns, y, longest)
@@ -277,7 +282,7 @@ contains
   end subroutine indicator_values
 
   !> One of them.
-  subroutine set_indicator(self, which, lane, t, y, g)
+  subroutine indicate_branch(self, which, lane, t, y, g)
     class(formulation_t), intent(inout) :: self
     integer, intent(in) :: which, lane            !! switch, 1 to `switches`; lane
     real(wp), intent(in) :: t                     !! [s]
@@ -289,11 +294,11 @@ contains
       call self%switch_motion(lane, which, y, motion)
       call switches%indicator(self%machine%banks, which, lane, [t, motion], y(self%mechanical + 1:self%states), g(which))
     end associate
-  end subroutine set_indicator
+  end subroutine indicate_branch
 
   !> Puts one lane on the branch to which its state belongs, after it has crossed a boundary. Boundaries are shifted outwards,
   !> so that the state is inside the new branch.
-  subroutine change_branch(self, lane, which, t, y)
+  subroutine choose_branch(self, lane, which, t, y)
     class(formulation_t), intent(inout) :: self
     integer, intent(in) :: lane
     integer, intent(in) :: which               !! switch, 1 to `switches`
@@ -305,7 +310,18 @@ contains
       call self%switch_motion(lane, which, y, motion)
       call switches%choose(self%machine%banks, which, lane, t, motion, y(self%mechanical + 1:self%states))
     end associate
-  end subroutine change_branch
+  end subroutine choose_branch
+
+  !> The same for an integrator, which lets the state jump.
+  subroutine change_to_branch(self, lane, which, t, y)
+    class(formulation_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    integer, intent(in) :: which                  !! switch, 1 to `switches`
+    real(wp), intent(in) :: t                     !! [s]
+    real(wp), contiguous, intent(inout) :: y(:)   !! state, [states + quadratures]
+
+    call choose_branch(self, lane, which, t, y)
+  end subroutine change_to_branch
 
   !> Name of the boundaries of a switch, for messages, e.g. "edge of the gap of coupling 'mesh'".
   function switch_name(self, which) result(name)

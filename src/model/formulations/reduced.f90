@@ -25,6 +25,7 @@ module nocdyn_reduced
     type(reduced_jacobian_t), private :: element_jacobian   !! R diag U
     type(reduced_series_t), private :: series_kernel        !! Taylor recurrence, after `prepare_series`
     real(wp), allocatable, private :: moment(:, :)             !! M [N m], [lanes, elements], work space
+    real(wp), allocatable, private :: free_jacobian(:, :)      !! without locked joints, if there are joints, [lanes, positions]
   contains
     procedure :: formulate
     procedure :: update_inertia
@@ -65,6 +66,8 @@ contains
       call form_responses(freedoms, is_block, self)
       self%element_jacobian = new_reduced_jacobian(freedoms, incidence, machine%with_work(:self%quadratures), machine%elements)
       self%moment = 0.0_wp * self%zero_twist
+      if (allocated(self%free_jacobian)) deallocate (self%free_jacobian)
+      if (self%joints%count > 0) allocate (self%free_jacobian(machine%lanes, size(self%element_jacobian%pattern%row)))
       if (machine%lanes > 1) call self%prepare_series(1)
     end associate
   end subroutine formulate
@@ -131,6 +134,7 @@ contains
     call self%reset_origin(lane)
     call self%machine%refresh_lane(lane)
     call self%series_kernel%refresh_lane(lane, self%machine%laws, self%twists, self%accelerations)
+    if (self%joints%count > 0) call self%prepare_joints()
   end subroutine refresh_lane
 
   !> q'' = R M, and the derivatives of internal states and work integrals.
@@ -147,6 +151,7 @@ contains
     end if
     call fill_derivative(self, self%lanes * self%machine%coordinates%freedoms, self%lanes * self%internal, self%quadratures, &
                          t, y, dydt)
+    if (self%joints%count > 0) call self%hold(dydt(1, :self%machine%coordinates%freedoms))
   end subroutine derivative
 
   !> The same with arrays of one dimension: speeds, angles, internal states and work integrals follow one another.
@@ -183,12 +188,13 @@ contains
     call self%machine%evaluate_elements(t)
   end subroutine evaluate_at
 
-  !> There is none: every law has a series.
+  !> Every law has a series, but not the moments of locked joints.
   subroutine series_obstacle(self, obstacle)
     class(reduced_t), intent(in) :: self
     character(len=:), allocatable, intent(out) :: obstacle
 
     obstacle = ''
+    if (self%joints%count > 0) obstacle = 'clutches and freewheels have no Taylor series'
   end subroutine series_obstacle
 
   !> Allocates the recurrence for series up to an order.
@@ -243,21 +249,52 @@ contains
     associate (machine => self%machine, elements => self%machine%elements)
       call evaluate_at(self, self%lanes * f, self%lanes * self%internal, t, y)
       call machine%differentiate_elements(t)
-      call self%element_jacobian%fill(elements, dfdy)
+      if (self%joints%count > 0) then
+        call self%element_jacobian%fill(elements, self%free_jacobian)
+      else
+        call self%element_jacobian%fill(elements, dfdy)
+      end if
       call self%accelerations%multiply(elements%applied_time, dfdt)
       dfdt(:, f + 1:self%states) = 0.0_wp
       do k = 1, self%quadratures
         e = machine%with_work(k)
         dfdt(:, self%states + k) = elements%applied_time(:, e) * elements%speed(:, e)
       end do
+      if (self%joints%count > 0) call hold_jacobian(self, self%states + self%quadratures, dfdy, dfdt)
     end associate
   end subroutine jacobian
 
+  !> The Jacobian where some joints may be locked: each column has the accelerations that these leave.
+  subroutine hold_jacobian(self, components, dfdy, dfdt)
+    class(reduced_t), intent(inout) :: self
+    integer, intent(in) :: components                          !! states + quadratures
+    real(wp), intent(inout) :: dfdy(components, self%states)   !! of the only lane
+    real(wp), intent(inout) :: dfdt(components)
+    integer :: k
+
+    dfdy = 0.0_wp
+    associate (pattern => self%element_jacobian%pattern, f => self%machine%coordinates%freedoms)
+      do k = 1, size(pattern%row)
+        dfdy(pattern%row(k), pattern%column(k)) = self%free_jacobian(1, k)
+      end do
+      do k = 1, self%states
+        call self%hold(dfdy(:f, k))
+      end do
+      call self%hold(dfdt(:f))
+    end associate
+  end subroutine hold_jacobian
+
+  !> All positions where there are joints.
   function jacobian_pattern(self) result(pattern)
     class(reduced_t), intent(in) :: self
     type(pattern_t) :: pattern
+    integer :: i, j
 
     pattern = self%element_jacobian%pattern
+    if (self%joints%count == 0) return
+    associate (components => self%states + self%quadratures)
+      pattern = pattern_t([((i, i=1, components), j=1, self%states)], [((j, i=1, components), j=1, self%states)])
+    end associate
   end function jacobian_pattern
 
 end module nocdyn_reduced

@@ -5,6 +5,7 @@ module nocdyn_sweep
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_integration_settings, only: integration_settings_t
+  use nocdyn_joint_assembly, only: refuse_joints
   use nocdyn_kinds, only: wp
   use nocdyn_run_settings, only: choose_settings
   use nocdyn_scheduler, only: scheduler_t
@@ -46,6 +47,9 @@ contains
     call new_asked_formulation(plan%input, plan%machine, formulation, setup%has_energy_balance)
     if (size(plan%statistics) > 0) call choose_settings(plan%input, formulation, settings, notes, error)
     setup%lanes = merge(large_block, small_block, formulation%states <= max_states)
+    if (formulation%joints%count == 0) return
+    setup%lanes = 1   ! whose joints may be in different sets
+    if (size(plan%analyses) > 0) call refuse_joints(plan%input, 'a sweep of modes or responses', error)
   end subroutine prepare_sweep
 
   !> Computes the variants that `scheduler` hands out, by threads with a block of lanes each.

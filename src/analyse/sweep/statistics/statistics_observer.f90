@@ -73,6 +73,7 @@ contains
     end do
     allocate (self%default_value, source=value_of_zero_column(found))
     call distribute(self, found, columns)
+    if (allocated(self%sampled%recorded%formulation)) self%sampled%recorded%formulation%joints%leader => block%joints%mode
     allocate (self%is_complete(block%lanes), source=.false.)
     select type (block)
     class is (reduced_t)

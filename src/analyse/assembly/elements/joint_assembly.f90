@@ -1,0 +1,150 @@
+!> The banks of the clutches and freewheels of an input.
+module nocdyn_joint_assembly
+  use nocdyn_bank, only: append_bank, bank_slot_t, role_clutch, role_freewheel
+  use nocdyn_curves, only: curve_t, extrapolation_constant, interpolation_cubic, interpolation_linear, interpolation_steps, &
+                           new_curve
+  use nocdyn_element_groups, only: element_groups_t
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_friction_joints, only: joint_ranges_t, new_friction_joints
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_text, only: to_text
+  implicit none (type, external)
+  private
+
+  public :: clutch_form, freewheel_form, add_clutch_form, add_freewheel_form, check_joints, refuse_joints
+
+  integer, parameter :: engaged = 1, with_engagement = 2
+
+contains
+
+  !> Refuses clutches that hold less than they slip.
+  subroutine check_joints(input, error)
+    type(input_t), intent(in) :: input
+    type(error_t), allocatable, intent(out) :: error
+    integer :: i
+
+    do i = 1, size(input%groups)
+      associate (group => input%groups(i))
+        if (group%kind /= 'clutch' .or. .not. group%has_value('static_capacity')) cycle
+        if (group%number('static_capacity') >= group%number('capacity')) cycle
+        call raise(error, exit_input, input%location(i, 'static_capacity') // ': static_capacity = ' // &
+                   to_text(group%number('static_capacity')) // ' is below capacity = ' // to_text(group%number('capacity')) // &
+                   '; allowed: at least that of slip [N m]')
+        return
+      end associate
+    end do
+  end subroutine check_joints
+
+  !> The group of the first joint of an input, 0 if there is none.
+  pure integer function first_joint(input)
+    type(input_t), intent(in) :: input
+
+    do first_joint = 1, size(input%groups)
+      if (input%groups(first_joint)%kind == 'clutch' .or. input%groups(first_joint)%kind == 'freewheel') return
+    end do
+    first_joint = 0
+  end function first_joint
+
+  !> Refuses joints where it is not known which of them are locked.
+  subroutine refuse_joints(input, what, error)
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: what   !! does not know it, e.g. 'nocdyn modes'
+    type(error_t), allocatable, intent(out) :: error
+
+    if (first_joint(input) == 0) return
+    call raise(error, exit_input, input%location(first_joint(input)) // ': ' // what // ' does not know which joints are ' // &
+               'locked; allowed: no clutches and freewheels; a locked one is a &gear with teeth = 1, 1 and internal = .true.')
+  end subroutine refuse_joints
+
+  !> Form of the law of a group &clutch.
+  pure integer function clutch_form(group)
+    type(group_t), intent(in) :: group
+
+    clutch_form = engaged
+    if (group%has_value('times') .or. group%has_value('table_time')) clutch_form = with_engagement
+  end function clutch_form
+
+  !> That of a group &freewheel.
+  pure integer function freewheel_form(group)
+    type(group_t), intent(in) :: group
+
+    freewheel_form = merge(engaged, 0, group%kind == 'freewheel')
+  end function freewheel_form
+
+  !> Adds the bank of the clutches of one form.
+  subroutine add_clutch_form(groups, form, banks)
+    type(element_groups_t), intent(in) :: groups
+    integer, intent(in) :: form
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    type(joint_ranges_t) :: ranges
+    type(curve_t), allocatable :: engagement(:, :)
+    integer :: i, lane
+
+    if (size(groups%indices) == 0) return
+    ranges%sliding_most = groups%values('capacity')
+    ranges%sliding_least = -ranges%sliding_most
+    ranges%most = groups%values('static_capacity', absent=-1.0_wp)
+    where (ranges%most < 0) ranges%most = ranges%sliding_most
+    ranges%least = -ranges%most
+    associate (from => groups%bodies('bodies', 1), to => groups%bodies('bodies', 2))
+      if (form == engaged) then
+        call append_bank(banks, new_friction_joints(role_clutch, groups%names, from, to, ranges))
+        return
+      end if
+      allocate (engagement(groups%lanes, size(groups%indices)))
+      do i = 1, size(groups%indices)
+        do lane = 1, groups%lanes
+          engagement(lane, i) = engagement_of(groups%input%groups(groups%indices(i)))
+        end do
+      end do
+      call append_bank(banks, new_friction_joints(role_clutch, groups%names, from, to, ranges, engagement))
+    end associate
+  end subroutine add_clutch_form
+
+  !> The engagement of a clutch over the time.
+  function engagement_of(group) result(curve)
+    type(group_t), intent(in) :: group
+    type(curve_t) :: curve
+    real(wp), allocatable :: levels(:), times(:)
+
+    if (group%has_value('table_time')) then
+      curve = new_curve(group%numbers('table_time'), group%numbers('table_level'), &
+                        merge(interpolation_cubic, interpolation_linear, group%text('interpolation') == 'cubic'), &
+                        extrapolation_constant)
+      return
+    end if
+    times = group%numbers('times')
+    levels = group%numbers('levels')
+    if (size(times) == 1) then   ! a curve has two points
+      times = [times, times + 1.0_wp]
+      levels = [levels, levels]
+    end if
+    curve = new_curve(times, levels, interpolation_steps, extrapolation_constant)
+  end function engagement_of
+
+  !> Adds the bank of the freewheels: forward, the driven body is pushed, never pulled back.
+  subroutine add_freewheel_form(groups, form, banks)
+    type(element_groups_t), intent(in) :: groups
+    integer, intent(in) :: form
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    type(joint_ranges_t) :: ranges
+    integer :: i
+
+    if (size(groups%indices) == 0 .or. form /= engaged) return
+    ranges%most = groups%values('capacity', absent=huge(1.0_wp))
+    ranges%least = 0.0_wp * groups%values('capacity')
+    ranges%sliding_most = merge(0.0_wp, ranges%most, ranges%most >= huge(1.0_wp))
+    ranges%sliding_least = ranges%least
+    do i = 1, size(groups%indices)
+      if (groups%input%groups(groups%indices(i))%text('direction') == 'forward') cycle
+      ranges%least(:, i) = -ranges%most(:, i)
+      ranges%sliding_least(:, i) = -ranges%sliding_most(:, i)
+      ranges%most(:, i) = 0.0_wp
+      ranges%sliding_most(:, i) = 0.0_wp
+    end do
+    call append_bank(banks, new_friction_joints(role_freewheel, groups%names, groups%bodies('bodies', 1), &
+                                                groups%bodies('bodies', 2), ranges))
+  end subroutine add_freewheel_form
+
+end module nocdyn_joint_assembly

@@ -1,0 +1,81 @@
+!> The events of clutches and freewheels in a run, with their names, and their form in summary.json.
+module nocdyn_joint_events
+  use nocdyn_bank, only: bank_of, role_names
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_friction_joints, only: locked, slips_backwards, slips_forwards
+  use nocdyn_json, only: json_t
+  use nocdyn_kinds, only: wp
+  implicit none (type, external)
+  private
+
+  public :: list_joint_events, put_joint_events
+
+  !> A joint that locks or begins to slip.
+  type, public :: named_event_t
+    real(wp) :: time = 0.0_wp                  !! [s]
+    character(len=:), allocatable :: joint     !! e.g. "clutch engage"
+    integer :: from = locked, to = locked      !! modes
+    real(wp) :: slip = 0.0_wp                  !! speed of the first body less that of the second before it [rad/s]
+    real(wp) :: torque = 0.0_wp                !! on the second body after it [N m]
+  end type named_event_t
+
+contains
+
+  !> The events that a formulation has noted, in the order of time.
+  subroutine list_joint_events(formulation, events)
+    class(formulation_t), intent(in) :: formulation
+    type(named_event_t), allocatable, intent(out) :: events(:)
+    integer :: i
+
+    allocate (events(formulation%joints%happened))
+    do i = 1, size(events)
+      associate (event => formulation%joints%events(i), machine => formulation%machine)
+        associate (element => formulation%joints%element(event%joint))
+          events(i)%joint = trim(role_names(machine%banks(bank_of(machine%banks, element))%bank%role)) // ' ' // &
+                            machine%element_name(element)
+        end associate
+        events(i)%time = event%time
+        events(i)%from = event%from
+        events(i)%to = event%to
+        events(i)%slip = event%slip
+        events(i)%torque = event%torque
+      end associate
+    end do
+  end subroutine list_joint_events
+
+  !> Writes them as the list joint_events.
+  subroutine put_joint_events(json, events)
+    type(json_t), intent(inout) :: json
+    type(named_event_t), intent(in) :: events(:)
+    integer :: i
+
+    call json%open_list('joint_events')
+    do i = 1, size(events)
+      call json%open()
+      call json%put('time', events(i)%time)
+      call json%put('joint', events(i)%joint)
+      call json%put('from', mode_word(events(i)%from))
+      call json%put('to', mode_word(events(i)%to))
+      call json%put('slip_rad_s', events(i)%slip)
+      call json%put('torque_N_m', events(i)%torque)
+      call json%close()
+    end do
+    call json%close_list()
+  end subroutine put_joint_events
+
+  !> A mode, by the slip of the first body against the second: its opposite is u'.
+  pure function mode_word(mode) result(word)
+    integer, intent(in) :: mode
+    character(len=:), allocatable :: word
+
+    select case (mode)
+    case (slips_forwards)
+      word = 'slips behind'
+    case (slips_backwards)
+      word = 'slips ahead'
+    case default
+      word = 'locked'
+    end select
+  end function mode_word
+
+end module nocdyn_joint_events

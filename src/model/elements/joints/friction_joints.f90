@@ -1,0 +1,163 @@
+!> Joints of two bodies that lock: clutches, brakes and freewheels.
+!>
+!> A locked joint is a row u' = 0 of L_lambda, whose reaction is its moment M; it slips where M would leave the range
+!> from `least` to `most`. Slipping forwards (u' > 0) the joint has its least moment, slipping backwards its greatest: Coulomb
+!> friction, with other numbers than at rest. A clutch has a range about zero; a freewheel has a range on one side of it and
+!> overruns on the other. All grow with the engagement, a table over the time or 1.
+!>
+!> The mode is a branch of the law that is not chosen by guards: which joints lock follows from all of them together
+!> (`nocdyn_joint_sets`).
+module nocdyn_friction_joints
+  use nocdyn_bank, only: bank_t, quantity_t
+  use nocdyn_curves, only: curve_t
+  use nocdyn_element_rows, only: rows_between
+  use nocdyn_elements, only: elements_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), pick, time_of
+  use nocdyn_law_tape, only: law_tape_t
+  use nocdyn_tables, only: add_table, curve_value, guard_segment
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  public :: new_friction_joints
+
+  integer, parameter, public :: locked = 1, slips_forwards = 2, slips_backwards = 3   !! modes
+
+  !> The ranges of the moments of joints with full engagement [N m], shape [lanes, joints] all. Those at rest may be huge.
+  type, public :: joint_ranges_t
+    real(wp), allocatable :: least(:, :), most(:, :)                   !! at rest
+    real(wp), allocatable :: sliding_least(:, :), sliding_most(:, :)   !! slipping; 0 where there is no such slip
+  end type joint_ranges_t
+
+  type, extends(bank_t), public :: friction_joints_t
+    integer :: mode_switch = 1   !! of each element, the switch of its mode
+  contains
+    procedure :: describe
+    procedure :: range_at_rest
+    procedure :: range_of_slip
+    procedure :: mode_of
+    procedure :: set_mode
+    procedure :: quantities
+    procedure :: observe
+  end type friction_joints_t
+
+contains
+
+  !> A bank of joints.
+  function new_friction_joints(role, names, from, to, ranges, engagement) result(bank)
+    integer, intent(in) :: role                 !! role_clutch or role_freewheel
+    type(string_t), intent(in) :: names(:)
+    integer, intent(in) :: from(:), to(:)       !! bodies, 0 = ground
+    type(joint_ranges_t), intent(in) :: ranges
+    type(curve_t), intent(in), optional :: engagement(:, :)   !! over the time [s], shape [lanes, joints]; absent: 1
+    type(friction_joints_t) :: bank
+    integer :: e
+
+    call bank%connect(role, size(ranges%least, 1), names, rows_between(from, to))
+    bank%is_polynomial = .false.
+    bank%has_paper_law = .false.
+    bank%elastic = [integer ::]
+    call bank%add_parameter('least', ranges%least, is_key=.false.)
+    call bank%add_parameter('most', ranges%most, is_key=.false.)
+    call bank%add_parameter('sliding least', ranges%sliding_least, is_key=.false.)
+    call bank%add_parameter('sliding most', ranges%sliding_most, is_key=.false.)
+    if (present(engagement)) then
+      call add_table(bank, engagement)
+      bank%mode_switch = 2
+    end if
+    call bank%add_switches([('locking', e=1, bank%count)], -1)
+    call bank%prepare_law()
+  end function new_friction_joints
+
+  subroutine describe(self, tape)
+    class(friction_joints_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: moment
+
+    moment = pick(self%mode_switch, [literal(tape, 0.0_wp), self%parameter(tape, 'sliding least'), &
+                                     self%parameter(tape, 'sliding most')])
+    if (allocated(self%curve)) then
+      moment = moment * curve_value(tape, time_of(tape))
+      call guard_segment(tape, time_of(tape), is_time=.true.)
+    end if
+    tape%applied = node_of(moment)
+  end subroutine describe
+
+  !> The range of the moment at rest [N m].
+  pure subroutine range_at_rest(self, element, t, least, most)
+    class(friction_joints_t), intent(in) :: self
+    integer, intent(in) :: element     !! numbered within the bank
+    real(wp), intent(in) :: t          !! [s]
+    real(wp), intent(out) :: least, most   !! [N m]
+
+    least = engaged(self, element, t, self%parameters(self%number_of('least'))%value(1, element))
+    most = engaged(self, element, t, self%parameters(self%number_of('most'))%value(1, element))
+  end subroutine range_at_rest
+
+  !> The moments of slip backwards and forwards [N m].
+  pure subroutine range_of_slip(self, element, t, least, most)
+    class(friction_joints_t), intent(in) :: self
+    integer, intent(in) :: element     !! numbered within the bank
+    real(wp), intent(in) :: t          !! [s]
+    real(wp), intent(out) :: least, most   !! [N m]
+
+    least = engaged(self, element, t, self%parameters(self%number_of('sliding least'))%value(1, element))
+    most = engaged(self, element, t, self%parameters(self%number_of('sliding most'))%value(1, element))
+  end subroutine range_of_slip
+
+  !> A moment by the engagement; one without bounds stays so.
+  pure real(wp) function engaged(self, element, t, moment)
+    class(friction_joints_t), intent(in) :: self
+    integer, intent(in) :: element
+    real(wp), intent(in) :: t        !! [s]
+    real(wp), intent(in) :: moment   !! with full engagement [N m]
+
+    engaged = moment
+    if (.not. allocated(self%curve) .or. abs(moment) >= huge(moment)) return
+    engaged = moment * self%curve(1, element)%value(t)
+  end function engaged
+
+  !> The mode of a joint of the first lane.
+  pure integer function mode_of(self, element)
+    class(friction_joints_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+
+    mode_of = self%branch(1, element + (self%mode_switch - 1) * self%count)
+  end function mode_of
+
+  !> Sets it.
+  subroutine set_mode(self, element, mode)
+    class(friction_joints_t), intent(inout) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    integer, intent(in) :: mode
+
+    call self%set_branch(element + (self%mode_switch - 1) * self%count, 1, mode)
+  end subroutine set_mode
+
+  function quantities(self) result(columns)
+    class(friction_joints_t), intent(in) :: self
+    type(quantity_t), allocatable :: columns(:)
+    integer :: e
+
+    allocate (columns(2))
+    columns(1) = quantity_t('torque', 'N m', [(e, e=1, self%count)])
+    columns(2) = quantity_t('slip', 'rad/s', [(e, e=1, self%count)])
+  end function quantities
+
+  !> The torque on the second body, and the speed of the first body less that of the second.
+  pure subroutine observe(self, elements, quantity, lane, values)
+    class(friction_joints_t), intent(in) :: self
+    type(elements_t), intent(in) :: elements
+    integer, intent(in) :: quantity
+    integer, intent(in) :: lane
+    real(wp), intent(out) :: values(:)   !! [elements of the bank]
+
+    if (quantity == 1) then
+      values = elements%applied(lane, self%first:self%last())
+    else
+      values = 0.0_wp - elements%speed(lane, self%first:self%last())
+    end if
+  end subroutine observe
+
+end module nocdyn_friction_joints

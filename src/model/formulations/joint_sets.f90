@@ -1,0 +1,318 @@
+!> Which joints of a machine are locked, and the moments of those that are.
+!>
+!> The joints that are locked are a *set*; each is one more row u' = 0. With the response R of the coordinates' accelerations
+!> to the moments and W = U R, the moments of the locked joints are -W^+ u'', with the accelerations u'' of their slips without
+!> them: q'' is projected on the complement of the rows that hold. W^+ of each set is found once and kept. W is singular where
+!> some of the locks are redundant; the least norm shares the moment between them.
+!>
+!> After an event, which joints lock is a complementarity problem over all that are at rest together: a joint whose moment is
+!> inside its range stays, one at a bound slips away from it, or would if redundant others did not hold it. Its moment then is
+!> that of slip, which may be smaller than at rest, and the others are looked at again.
+module nocdyn_joint_sets
+  use nocdyn_bank, only: bank_slot_t
+  use nocdyn_bounded_complementarity, only: at_upper, is_free, null_tolerance, solve_bounded_complementarity
+  use nocdyn_friction_joints, only: friction_joints_t, locked, slips_backwards, slips_forwards
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack, only: pseudo_inverse
+  use nocdyn_switches, only: switches_t
+  implicit none (type, external)
+  private
+
+  public :: new_joint_sets
+
+  real(wp), parameter, public :: rest_width = 1.0e-10_wp      !! a slip below it is none, relative to the speeds
+  real(wp), parameter, public :: boundary_shift = 1.0e-12_wp  !! shift of boundaries outwards, relative to speeds or moments
+
+  !> A set with its W^+.
+  type :: joint_set_t
+    logical, allocatable :: is_locked(:)
+    real(wp), allocatable :: inverse(:, :)
+  end type joint_set_t
+
+  !> A joint that has locked or begun to slip.
+  type, public :: joint_event_t
+    real(wp) :: time = 0.0_wp     !! [s]
+    integer :: joint = 0
+    integer :: from = 0, to = 0   !! modes
+    real(wp) :: slip = 0.0_wp     !! speed of the first body less that of the second before it [rad/s]
+    real(wp) :: torque = 0.0_wp   !! moment after it [N m]
+  end type joint_event_t
+
+  type, public :: joint_sets_t
+    integer :: count = 0
+    integer, allocatable :: element(:)       !! of the machine, [joints] as all that follow
+    integer, allocatable :: bank(:), number(:)   !! its bank, and its number there
+    integer, allocatable :: joint_of(:)      !! joint of each switch of the machine, 0 for none, [switches]
+    integer, allocatable :: mode(:)
+    integer, pointer, contiguous :: leader(:) => null()   !! modes of the motion that is observed; null: by the state
+    real(wp), allocatable :: rate(:)         !! accelerations of the slips u'' without the moments of locked joints [rad/s2], or
+                                             !! slips, whose moments then are impulses
+    real(wp), allocatable :: moment(:)       !! of the locked joints [N m]
+    real(wp), allocatable :: shift(:)        !! by which the boundary of a slip lies beyond zero [rad/s]
+    real(wp) :: moment_shift = 0.0_wp        !! by which those of the moments lie beyond their ranges [N m]
+    real(wp), allocatable :: weight(:, :)    !! W [1/(kg m2)]
+    type(joint_event_t), allocatable :: events(:)   !! the first `happened` are in use
+    integer :: happened = 0
+    type(joint_set_t), allocatable, private :: sets(:)
+    integer, private :: present = 0          !! set
+  contains
+    procedure :: start
+    procedure :: find_moments
+    procedure :: assume
+    procedure :: decide
+    procedure :: note
+    procedure :: indicator
+    procedure :: follow
+    procedure :: is_open
+    procedure, private :: choose_set
+  end type joint_sets_t
+
+contains
+
+  !> The joints of a machine, none of which is locked.
+  function new_joint_sets(banks, switches) result(self)
+    type(bank_slot_t), intent(in) :: banks(:)
+    type(switches_t), intent(in) :: switches
+    type(joint_sets_t) :: self
+    integer :: b, e, k, next
+
+    allocate (self%element(0), self%bank(0), self%number(0), self%joint_of(switches%count))
+    self%joint_of(:) = 0
+    next = 0
+    do b = 1, size(banks)
+      select type (bank => banks(b)%bank)
+      class is (friction_joints_t)
+        do e = 1, bank%count
+          self%element = [self%element, bank%first - 1 + e]
+          self%bank = [self%bank, b]
+          self%number = [self%number, e]
+          k = next + (bank%mode_switch - 1) * bank%count + e
+          self%joint_of(k) = size(self%element)
+        end do
+      end select
+      next = next + size(banks(b)%bank%switch_element)
+    end do
+    self%count = size(self%element)
+    allocate (self%mode(self%count), source=slips_forwards)
+    allocate (self%rate(self%count), self%moment(self%count), self%shift(self%count), source=0.0_wp)
+    allocate (self%weight(self%count, self%count), source=0.0_wp)
+    allocate (self%sets(0), self%events(16))
+  end function new_joint_sets
+
+  !> Forgets sets and events, before a motion that may have other parameters.
+  subroutine start(self)
+    class(joint_sets_t), intent(inout) :: self
+
+    deallocate (self%sets)
+    allocate (self%sets(0))
+    self%present = 0
+    self%happened = 0
+  end subroutine start
+
+  !> The moments of the locked joints, from the accelerations `rate` without them.
+  subroutine find_moments(self)
+    class(joint_sets_t), intent(inout) :: self
+    integer :: i, j, row, column
+
+    if (self%present == 0) call self%choose_set()
+    associate (set => self%sets(self%present))
+      self%moment(:) = 0.0_wp
+      column = 0
+      do j = 1, self%count
+        if (.not. set%is_locked(j)) cycle
+        column = column + 1
+        row = 0
+        do i = 1, self%count
+          if (.not. set%is_locked(i)) cycle
+          row = row + 1
+          self%moment(i) = self%moment(i) - set%inverse(row, column) * self%rate(j)
+        end do
+      end do
+    end associate
+  end subroutine find_moments
+
+  !> Takes the modes of the motion that is observed.
+  subroutine follow(self, banks)
+    class(joint_sets_t), intent(inout) :: self
+    type(bank_slot_t), intent(inout) :: banks(:)
+    integer :: j
+
+    if (all(self%mode == self%leader)) return
+    self%mode(:) = self%leader
+    do j = 1, self%count
+      call set_mode(self, banks, j)
+    end do
+    self%present = 0
+  end subroutine follow
+
+  !> Whether a joint cannot have any moment.
+  logical function is_open(self, banks, joint, t)
+    class(joint_sets_t), intent(in) :: self
+    type(bank_slot_t), intent(in) :: banks(:)
+    integer, intent(in) :: joint
+    real(wp), intent(in) :: t   !! [s]
+    real(wp) :: least, most, sliding(2)
+
+    call find_ranges(self, banks, joint, t, least, most, sliding)
+    is_open = most <= least
+  end function is_open
+
+  !> Finds or makes the set of the present modes.
+  subroutine choose_set(self)
+    class(joint_sets_t), intent(inout) :: self
+    type(joint_set_t), allocatable :: longer(:)
+    integer, allocatable :: which(:)
+    integer :: i
+
+    do i = 1, size(self%sets)
+      self%present = i
+      if (all(self%sets(i)%is_locked .eqv. self%mode == locked)) return
+    end do
+    allocate (longer(size(self%sets) + 1))
+    longer(:size(self%sets)) = self%sets
+    call move_alloc(longer, self%sets)
+    self%present = size(self%sets)
+    associate (set => self%sets(self%present))
+      set%is_locked = self%mode == locked
+      which = pack([(i, i=1, self%count)], set%is_locked)
+      set%inverse = pseudo_inverse(self%weight(which, which), null_tolerance)
+    end associate
+  end subroutine choose_set
+
+  !> Locks the joints at rest without any moment, until `decide`; the others slip.
+  subroutine assume(self, banks, is_at_rest, slip)
+    class(joint_sets_t), intent(inout) :: self
+    type(bank_slot_t), intent(inout) :: banks(:)
+    logical, intent(in) :: is_at_rest(:)   !! [joints]
+    real(wp), intent(in) :: slip(:)        !! u' [rad/s], [joints]
+    integer :: j
+
+    self%mode(:) = merge(locked, merge(slips_forwards, slips_backwards, slip > 0), is_at_rest)
+    do j = 1, self%count
+      call set_mode(self, banks, j)
+    end do
+    self%present = 0
+  end subroutine assume
+
+  !> Decides the modes of the joints at rest at a time t; those of the others are by their slips. `rate` has the accelerations
+  !> without any moment of the joints at rest.
+  subroutine decide(self, banks, t, is_at_rest, slip, is_solved)
+    class(joint_sets_t), intent(inout) :: self
+    type(bank_slot_t), intent(inout) :: banks(:)
+    real(wp), intent(in) :: t                !! [s]
+    logical, intent(in) :: is_at_rest(:)     !! [joints]
+    real(wp), intent(in) :: slip(:)          !! u' [rad/s], [joints]
+    logical, intent(out) :: is_solved
+    integer, allocatable :: resting(:)
+    integer :: i
+
+    where (.not. is_at_rest) self%mode = merge(slips_forwards, slips_backwards, slip > 0)
+    self%shift(:) = 0.0_wp
+    resting = pack([(i, i=1, self%count)], is_at_rest)
+    call decide_resting(self, banks, t, resting, is_solved)
+    do i = 1, self%count
+      call set_mode(self, banks, i)
+    end do
+    self%present = 0
+  end subroutine decide
+
+  !> Decides the modes of the joints at rest: whenever some slip, the others are looked at again.
+  subroutine decide_resting(self, banks, t, resting, is_solved)
+    class(joint_sets_t), intent(inout) :: self
+    type(bank_slot_t), intent(in) :: banks(:)
+    real(wp), intent(in) :: t            !! [s]
+    integer, intent(in) :: resting(:)    !! joints
+    logical, intent(out) :: is_solved
+    real(wp), dimension(size(resting)) :: a, least, most, x
+    real(wp) :: sliding(2, size(resting))
+    integer :: i, state(size(resting))
+    logical :: has_changed
+
+    do i = 1, size(resting)
+      call find_ranges(self, banks, resting(i), t, least(i), most(i), sliding(:, i))
+    end do
+    self%mode(resting) = locked
+    has_changed = .true.
+    do while (has_changed)
+      has_changed = .false.
+      call solve_bounded_complementarity(self%weight(resting, resting), self%rate(resting), least, most, x, a, state, is_solved)
+      if (.not. is_solved) return
+      do i = 1, size(resting)
+        if (self%mode(resting(i)) /= locked .or. state(i) == is_free) cycle
+        self%mode(resting(i)) = slips_forwards
+        if (state(i) == at_upper .or. (least(i) >= most(i) .and. a(i) < 0)) self%mode(resting(i)) = slips_backwards
+        most(i) = sliding(merge(1, 2, self%mode(resting(i)) == slips_forwards), i)
+        has_changed = has_changed .or. abs(most(i) - x(i)) > 0
+        least(i) = most(i)
+      end do
+    end do
+  end subroutine decide_resting
+
+  !> The moments between which a joint is at rest, and those of its slips forwards and backwards.
+  subroutine find_ranges(self, banks, joint, t, least, most, sliding)
+    class(joint_sets_t), intent(in) :: self
+    type(bank_slot_t), intent(in) :: banks(:)
+    integer, intent(in) :: joint
+    real(wp), intent(in) :: t   !! [s]
+    real(wp), intent(out) :: least, most, sliding(2)   !! [N m]
+
+    select type (bank => banks(self%bank(joint))%bank)
+    class is (friction_joints_t)
+      call bank%range_at_rest(self%number(joint), t, least, most)
+      call bank%range_of_slip(self%number(joint), t, sliding(1), sliding(2))
+    class default
+      error stop 'nocdyn_joint_sets: a joint is in a bank of joints'
+    end select
+  end subroutine find_ranges
+
+  subroutine set_mode(self, banks, joint)
+    class(joint_sets_t), intent(in) :: self
+    type(bank_slot_t), intent(inout) :: banks(:)
+    integer, intent(in) :: joint
+
+    select type (bank => banks(self%bank(joint))%bank)
+    class is (friction_joints_t)
+      call bank%set_mode(self%number(joint), self%mode(joint))
+    end select
+  end subroutine set_mode
+
+  !> Keeps an event of a joint whose mode was `from`.
+  subroutine note(self, t, joint, from, slip)
+    class(joint_sets_t), intent(inout) :: self
+    real(wp), intent(in) :: t      !! [s]
+    integer, intent(in) :: joint, from
+    real(wp), intent(in) :: slip   !! u' before [rad/s]
+    type(joint_event_t), allocatable :: longer(:)
+
+    if (self%happened == size(self%events)) then
+      allocate (longer(2 * self%happened))
+      longer(:self%happened) = self%events
+      call move_alloc(longer, self%events)
+    end if
+    self%happened = self%happened + 1
+    self%events(self%happened) = joint_event_t(t, joint, from, self%mode(joint), 0.0_wp - slip, self%moment(joint))
+  end subroutine note
+
+  !> Positive in the present mode of a joint: its slip, or how far its moment is inside the range [N m].
+  real(wp) function indicator(self, banks, joint, t, slip) result(g)
+    class(joint_sets_t), intent(in) :: self
+    type(bank_slot_t), intent(in) :: banks(:)
+    integer, intent(in) :: joint
+    real(wp), intent(in) :: t      !! [s]
+    real(wp), intent(in) :: slip   !! u' [rad/s]
+    real(wp) :: least, most, sliding(2)
+
+    select case (self%mode(joint))
+    case (slips_forwards)
+      g = slip + self%shift(joint)
+    case (slips_backwards)
+      g = self%shift(joint) - slip
+    case default
+      call find_ranges(self, banks, joint, t, least, most, sliding)
+      associate (moment => self%moment(joint))
+        g = min(most - moment, moment - least) + self%moment_shift
+      end associate
+    end select
+  end function indicator
+
+end module nocdyn_joint_sets

@@ -1,0 +1,259 @@
+"""Clutches, brakes and freewheels: when they lock and slip, their torques and heat, against other computations."""
+
+import csv
+import random
+from math import pi, sin
+
+import numpy as np
+import pytest
+
+BODY = "&body name = '{}' inertia = {} speed = {} /\n"
+
+
+def run(nocdyn, text, *words):
+    outcome = nocdyn("run", nocdyn.write("machine.nml", text), "--out", "out", *words)
+    assert outcome.returncode == 0, outcome.stderr
+    header, rows = nocdyn.table("out")
+    return dict(zip(header, zip(*rows, strict=True), strict=True)), nocdyn.summary("out")["joint_events"]
+
+
+def changes(events):
+    return [(event["joint"].split()[1], event["to"]) for event in events]
+
+
+# CoupledClutches of the Modelica Standard Library: four inertias of 1, clutches of 10 N m sliding and 11 N m at rest.
+KINK = 1.25  # where the first clutch opens
+
+
+def coupled_clutches():
+    times = sorted([1.5 * i / 3000 for i in range(3001)] + [KINK - 1e-6])
+    levels = [max(0.0, sin(0.4 * pi * t + pi / 2)) if t < KINK else 0.0 for t in times]
+    clutch = "&clutch name = 'clutch{}' bodies = 'J{}', 'J{}' capacity = 10 static_capacity = 11\n  {} /\n"
+    table = "interpolation = 'cubic'"
+    for key, values in (("table_time", times), ("table_level", levels)):
+        lines = [", ".join(map(repr, values[i : i + 5])) for i in range(0, len(values), 5)]
+        table += f"\n  {key} = " + ",\n    ".join(lines)
+    text = "".join(BODY.format(f"J{i}", 1, 10 if i == 1 else 0) for i in range(1, 5))
+    text += clutch.format(1, 1, 2, table) + clutch.format(2, 2, 3, "times = 0.4 levels = 1")
+    text += clutch.format(3, 3, 4, "times = 0.9 levels = 1")
+    text += f"&excitation name = 'torque' body = 'J1' amplitude = 10 frequency = {10 * pi!r} /\n"
+    return text + "&run t_end = 1.5 method = 'METHOD' rtol = 1e-12 atol = 1e-13 /\n&output interval = 0.1 /\n"
+
+
+@pytest.mark.parametrize("method", ["rk45", "rk853", "rodas5p", "auto"])
+def test_coupled_clutches_lock_and_slip_when_those_of_modelica_do(nocdyn, method):
+    table, events = run(nocdyn, coupled_clutches().replace("METHOD", method))
+    assert changes(events) == [
+        ("clutch2", "locked"),
+        ("clutch1", "locked"),
+        ("clutch1", "slips ahead"),
+        ("clutch1", "locked"),
+        ("clutch1", "slips ahead"),
+        ("clutch3", "locked"),
+    ]
+    expected = [0.709621474694, 0.791662359155, 0.831108506138, 0.906850192798, 1.000295859895, 1.143967492473]
+    assert [event["time"] for event in events] == pytest.approx(expected, abs=1e-9)
+    speeds = [3.247058272419] + [2.463187166650] * 3
+    angles = [7.486119099114, 4.107137416329, 2.710464436231, 1.173743877601]
+    for i in range(4):
+        assert table[f"omega_J{i + 1} [rad/s]"][-1] == pytest.approx(speeds[i], abs=1e-8)
+        assert table[f"phi_J{i + 1} [rad]"][-1] == pytest.approx(angles[i], abs=1e-8)
+    assert max(map(abs, table["energy_residual [J]"])) < 1e-9 * 50
+
+
+# Two inertias at 30 and 10 rad/s: the clutch brings them to 20 rad/s within J_1 * 10 rad/s / capacity.
+PAIR = BODY.format("one", 2.0, 30) + BODY.format("two", 2.0, 10)
+PAIR += "&clutch name = 'c' bodies = 'one', 'two' capacity = 40 KEYS /\n"
+
+
+@pytest.mark.parametrize("method", ["auto", "rk45", "rodas4"])
+def test_a_clutch_locks_after_the_time_of_the_closed_form_and_keeps_the_heat(nocdyn, method):
+    table, events = run(nocdyn, PAIR.replace("KEYS", "") + f"&run t_end = 1 method = '{method}' /\n")
+    assert changes(events) == [("c", "locked")]
+    assert events[0]["time"] == pytest.approx(0.5, abs=1e-12)
+    assert table["omega_one [rad/s]"][-1] == pytest.approx(20, abs=1e-12)
+    assert table["slip_c [rad/s]"][-1] == pytest.approx(0, abs=1e-12)
+    assert (table["torque_c [N m]"][10], table["torque_c [N m]"][-1]) == (40, 0)
+    heat = 2 * (30**2 + 10**2 - 2 * 20**2) / 2
+    assert nocdyn.summary("out")["energy_account"]["work_in_J"]["clutch c"] == pytest.approx(-heat, rel=1e-12)
+
+
+def test_engagement_over_the_time_opens_and_closes(nocdyn):
+    ramp = "table_time = 0, 1 table_level = 0, 1"
+    _, events = run(nocdyn, PAIR.replace("KEYS", ramp) + "&run t_end = 2 rtol = 1e-10 /\n")
+    assert events[0]["time"] == pytest.approx(1.0, abs=1e-9)  # 40 t^2 / 2 = 20
+    pulses = "times = 0.2, 0.4, 0.6 levels = 1, 0, 0.5"
+    table, events = run(nocdyn, PAIR.replace("KEYS", pulses) + "&run t_end = 2 /\n&output interval = 0.1 /\n")
+    assert [table["torque_c [N m]"][i] for i in (1, 3, 5, 7)] == [0, 40, 0, 20]
+    assert events[0]["time"] == pytest.approx(0.6 + (0.5 - 0.2) * 2, abs=1e-12)
+
+
+def test_a_brake_holds_until_the_torque_is_above_what_it_holds_at_rest(nocdyn):
+    text = BODY.format("drum", 3.0, 0) + "&clutch name = 'brake' bodies = 'drum', 'ground' capacity = 50 static_capacity = 60 /\n"
+    text += "&excitation name = 'load' body = 'drum' kind = 'ramp' amplitude = 100 time = 0 duration = 1 /\n"
+    table, events = run(nocdyn, text + "&run t_end = 1 rtol = 1e-10 /\n&output interval = 0.1 /\n")
+    assert changes(events) == [("brake", "slips ahead")]
+    assert events[0]["time"] == pytest.approx(0.6, abs=1e-9)
+    assert table["torque_brake [N m]"][5] == pytest.approx(50, abs=1e-9)  # the load, on the ground
+    assert table["phi_drum [rad]"][6] == pytest.approx(0, abs=1e-12)
+    assert table["omega_drum [rad/s]"][-1] == pytest.approx((80 - 50) * 0.4 / 3, rel=1e-9)
+
+
+@pytest.mark.parametrize(("direction", "first", "second"), [("forward", "one", "two"), ("backward", "two", "one")])
+def test_a_freewheel_drives_in_one_direction_and_overruns_in_the_other(nocdyn, direction, first, second):
+    """The motor drives both for half a second; then it is braked, and the load runs on until the motor has caught up."""
+    text = BODY.format("one", 1.0, 0) + BODY.format("two", 3.0, 0)
+    text += f"&freewheel name = 'f' bodies = '{first}', '{second}' direction = '{direction}' /\n"
+    text += "&excitation name = 'motor' body = 'one' kind = 'table' table_time = 0, 0.5, 0.500000000001, 1, 1.000000000001, 9\n"
+    text += "  table_torque = 8, 8, -2, -2, 8, 8 /\n"
+    table, events = run(nocdyn, text + "&run t_end = 2 rtol = 1e-10 atol = 1e-12 /\n&output interval = 0.05 /\n")
+    assert [event["to"] == "locked" for event in events] == [False, True]
+    assert [event["time"] for event in events] == pytest.approx([0.5, 1.125], abs=1e-9)  # 8 * 0.125 makes up for 2 * 0.5
+    assert table["omega_two [rad/s]"][10] == pytest.approx(1.0, rel=1e-9)
+    assert table["omega_one [rad/s]"][20] == pytest.approx(0.0, abs=1e-9)
+    assert abs(table["torque_f [N m]"][5]) == pytest.approx(6.0, rel=1e-9)
+    assert table["omega_one [rad/s]"][-1] == pytest.approx(1.0 + 2.0 * 0.875, rel=1e-9)
+
+
+def test_a_freewheel_slips_above_its_capacity(nocdyn):
+    text = BODY.format("one", 1.0, 0) + BODY.format("two", 3.0, 0)
+    text += "&freewheel name = 'f' bodies = 'one', 'two' capacity = 3 /\n"
+    text += "&excitation name = 'motor' body = 'one' kind = 'step' amplitude = 8 time = 0.5 /\n"
+    table, events = run(nocdyn, text + "&run t_end = 1 /\n&output interval = 0.1 /\n")
+    assert changes(events) == [("f", "slips ahead")]
+    assert table["omega_two [rad/s]"][-1] == pytest.approx(0.5, rel=1e-9)
+    assert table["omega_one [rad/s]"][-1] == pytest.approx(2.5, rel=1e-9)
+
+
+def test_redundant_locks_share_the_moment(nocdyn):
+    text = PAIR.replace("KEYS", "") + "&clutch name = 'd' bodies = 'one', 'two' capacity = 40 /\n"
+    text += "&excitation name = 'pull' body = 'one' kind = 'step' amplitude = 10 time = 0.5 /\n"
+    table, events = run(nocdyn, text + "&run t_end = 1 /\n&output interval = 0.1 /\n")
+    assert [event["time"] for event in events] == pytest.approx([0.25, 0.25], abs=1e-12)
+    assert table["torque_c [N m]"][-1] == pytest.approx(2.5, rel=1e-9)
+    assert table["torque_d [N m]"][-1] == pytest.approx(2.5, rel=1e-9)
+
+
+# Random trains against time stepping with impulses: v_1 = v_0 + J^-1 (h T + B p), each |p| at most h times its capacity.
+STEP, END = 2e-5, 0.5
+
+
+class Train:
+    def __init__(self, seed):
+        chance = random.Random(seed)
+        self.bodies = chance.randint(3, 5)
+        self.inertia = [chance.uniform(0.5, 3) for _ in range(self.bodies)]
+        self.speed = [chance.uniform(-5, 5) for _ in range(self.bodies)]
+        self.torque = [(chance.uniform(5, 30), chance.uniform(5, 40)) for _ in range(self.bodies)]
+        self.joints = []
+        for i in range(chance.randint(3, 6)):
+            pair = chance.sample(range(-1, self.bodies), 2)
+            least = -chance.uniform(3, 25)
+            self.joints.append((pair, least, 0.0 if i == 2 else -least))  # the third is a freewheel that slips
+
+    def text(self):
+        names = [*(f"b{i}" for i in range(self.bodies)), "ground"]
+        text = "".join(BODY.format(names[i], self.inertia[i], self.speed[i]) for i in range(self.bodies))
+        for i, (amplitude, frequency) in enumerate(self.torque):
+            text += f"&excitation name = 'e{i}' body = 'b{i}' amplitude = {amplitude} frequency = {frequency} /\n"
+        for i, ((one, two), least, most) in enumerate(self.joints):
+            kind = "clutch" if most else "freewheel direction = 'backward'"
+            text += f"&{kind.split()[0]} name = 'j{i}' bodies = '{names[one]}', '{names[two]}' capacity = {-least} "
+            text += kind.partition(" ")[2] + " /\n"
+        return text + f"&run t_end = {END} rtol = 1e-9 atol = 1e-11 /\n&output points = 11 /\n"
+
+    def stepped(self):
+        rows = np.zeros((len(self.joints), self.bodies))
+        for i, ((one, two), _, _) in enumerate(self.joints):
+            if one >= 0:
+                rows[i, one] -= 1
+            if two >= 0:
+                rows[i, two] += 1
+        weight = rows / self.inertia @ rows.T
+        least = [STEP * joint[1] for joint in self.joints]
+        most = [STEP * joint[2] for joint in self.joints]
+        speed, impulse = np.array(self.speed), np.zeros(len(self.joints))
+        free = np.array([[amplitude * sin(frequency * STEP * (k + 0.5)) for amplitude, frequency in self.torque]
+                         for k in range(round(END / STEP))]) * STEP / self.inertia  # fmt: skip
+        for push in free:
+            speed = speed + push
+            slips = rows @ speed
+            for _ in range(40):
+                before = impulse.copy()
+                for i in range(len(impulse)):
+                    wanted = impulse[i] - (slips[i] + weight[i] @ impulse) / weight[i, i]
+                    impulse[i] = min(max(wanted, least[i]), most[i])
+                if abs(impulse - before).max() < 1e-12:
+                    break
+            speed = speed + rows.T @ impulse / self.inertia
+        return speed
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_trains_move_as_time_stepping_with_impulses_says(nocdyn, seed):
+    train = Train(seed)
+    table, events = run(nocdyn, train.text())
+    assert events
+    speeds = [table[f"omega_b{i} [rad/s]"][-1] for i in range(train.bodies)]
+    assert speeds == pytest.approx(train.stepped(), abs=40 * STEP * max(t[0] / j for t, j in zip(train.torque, train.inertia)))
+    assert max(map(abs, table["energy_residual [J]"])) < 1e-6
+
+
+def test_a_sweep_over_capacities_is_its_variants_alone(nocdyn):
+    text = PAIR.replace("KEYS", "") + "&excitation name = 'e' body = 'one' amplitude = 90 frequency = 20 /\n&run t_end = 1 /\n"
+    text += "&sweep design = 'random' samples = 24 /\n&vary target = 'clutch.c.capacity' low = 20 high = 80 /\n"
+    for quantity, statistic in (("torque_c", "max"), ("omega_two", "final"), ("work_out", "final")):
+        text += f"&record quantity = '{quantity}' statistic = '{statistic}' /\n"
+    outcome = nocdyn("sweep", nocdyn.write("sweep.nml", text), "--out", "all", "--csv")
+    assert outcome.returncode == 0, outcome.stderr
+    with open(nocdyn.folder / "all/sweep.csv") as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    assert len(rows) == 24
+    for row in rows[:6]:
+        capacity = float(next(value for name, value in row.items() if "capacity" in name))
+        table, _ = run(nocdyn, text, "--set", f"clutch.c.capacity={capacity}", "--set", "output.points=2")
+        most = nocdyn.summary("out")["columns"]["torque_c [N m]"]["max"]
+        found = {name.split(" [")[0]: value for name, value in row.items()}
+        assert float(next(v for n, v in found.items() if n.startswith("omega_two"))) == pytest.approx(
+            table["omega_two [rad/s]"][-1], rel=1e-5
+        )
+        assert float(next(v for n, v in found.items() if n.startswith("torque_c"))) == pytest.approx(most, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ("capacity = -1", "capacity = -1 is out of range; allowed: >= 0 [N m]"),
+        ("capacity = 5 static_capacity = 4", "static_capacity = 4 is below capacity = 5; allowed: at least that of slip"),
+        ("capacity = 5 times = 1, 0.5 levels = 1, 0", "times(2) = 0.5"),
+        ("capacity = 5 times = 1 levels = 1.5", "levels(1) = 1.5 is out of range"),
+        ("capacity = 5 times = 1, 2 levels = 1", "levels has 1 value and times has 2 values"),
+        (
+            "capacity = 5 times = 1 levels = 1 table_time = 0, 1 table_level = 0, 1",
+            "times and table_time are both given; allowed: one of them",
+        ),
+        ("", "capacity is missing"),
+    ],
+)
+def test_bad_clutches_are_refused(nocdyn, keys, words):
+    text = BODY.format("one", 1, 0) + BODY.format("two", 1, 0)
+    text += f"&clutch name = 'c' bodies = 'one', 'two' {keys} /\n&run t_end = 1 /\n"
+    outcome = nocdyn("check", nocdyn.write("bad.nml", text))
+    assert outcome.returncode == 2
+    assert "bad.nml:3: &clutch" in outcome.stderr and words in outcome.stderr
+
+
+@pytest.mark.parametrize(
+    ("command", "change", "words"),
+    [
+        ("modes", "", "nocdyn modes does not know which joints are locked"),
+        ("equilibrium", "", "nocdyn equilibrium does not know which joints are locked"),
+        ("run", "run.formulation=paper", "formulation = 'paper' does not know which joints are locked"),
+        ("run", "run.start=equilibrium", "start = 'equilibrium' does not know which joints are locked"),
+        ("run", "run.method=taylor", "method = 'taylor' cannot be used: clutches and freewheels have no Taylor series"),
+    ],
+)
+def test_what_does_not_know_the_joints_refuses_them(nocdyn, command, change, words):
+    path = nocdyn.write("machine.nml", PAIR.replace("KEYS", "") + "&run t_end = 1 /\n")
+    outcome = nocdyn(command, path, *(["--set", change] if change else []))
+    assert outcome.returncode == 2 and words in outcome.stderr
