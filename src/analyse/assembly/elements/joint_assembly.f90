@@ -26,7 +26,8 @@ contains
 
     do i = 1, size(input%groups)
       associate (group => input%groups(i))
-        if (group%kind /= 'clutch' .or. .not. group%has_value('static_capacity')) cycle
+        if (group%kind /= 'clutch') cycle
+        if (.not. group%has_value('static_capacity')) cycle
         if (group%number('static_capacity') >= group%number('capacity')) cycle
         call raise(error, exit_input, input%location(i, 'static_capacity') // ': static_capacity = ' // &
                    to_text(group%number('static_capacity')) // ' is below capacity = ' // to_text(group%number('capacity')) // &
