@@ -134,6 +134,30 @@ def test_redundant_locks_share_the_moment(nocdyn):
     assert table["torque_d [N m]"][-1] == pytest.approx(2.5, rel=1e-9)
 
 
+def test_a_dog_clutch_locks_by_an_impact_and_lets_go(nocdyn):
+    """Momentum stays, the energy of the impact is lost in the clutch; a friction clutch beside it has no time to act."""
+    text = PAIR.replace("capacity = 40 KEYS", "kind = 'dog' times = 0.2, 0.6 levels = 1, 0") + BODY.format("three", 1.0, 10)
+    text += "&clutch name = 'slow' bodies = 'two', 'three' capacity = 5 /\n"
+    text += "&excitation name = 'pull' body = 'one' kind = 'step' amplitude = 6 time = 0.4 /\n"
+    table, events = run(nocdyn, text + "&run t_end = 1 rtol = 1e-10 /\n&output interval = 0.05 /\n")
+    struck = next(event for event in events if event["joint"] == "clutch c")
+    assert (struck["to"], struck["time"]) == ("locked", pytest.approx(0.2, abs=1e-12))
+    assert struck["impulse_N_m_s"] == pytest.approx(20.0, rel=1e-12)  # 2 kg m2 from 30 to 20 rad/s
+    assert table["omega_one [rad/s]"][5] == pytest.approx(20 - 5 * 0.05 / 4, rel=1e-9)
+    assert table["slip_c [rad/s]"][10] == pytest.approx(0, abs=1e-12)
+    freed = next(event for event in events if event["from"] == "locked" and event["joint"] == "clutch c")
+    assert freed["time"] == pytest.approx(0.6, abs=1e-12)
+    assert nocdyn.summary("out")["energy_account"]["work_in_J"]["clutch c"] == pytest.approx(-200, rel=1e-12)
+    assert max(map(abs, table["energy_residual [J]"])) < 1e-9 * 1000
+
+
+def test_a_freewheel_that_starts_the_wrong_way_strikes(nocdyn):
+    text = BODY.format("one", 1.0, 6) + BODY.format("two", 2.0, 0) + "&freewheel name = 'f' bodies = 'one', 'two' /\n"
+    table, _ = run(nocdyn, text + "&run t_end = 1 /\n&output points = 3 /\n")
+    assert table["omega_two [rad/s]"][1:] == pytest.approx((2.0, 2.0), rel=1e-12)
+    assert nocdyn.summary("out")["energy_account"]["work_in_J"]["freewheel f"] == pytest.approx(-12, rel=1e-12)
+
+
 # Random trains against time stepping with impulses: v_1 = v_0 + J^-1 (h T + B p), each |p| at most h times its capacity.
 STEP, END = 2e-5, 0.5
 

@@ -17,6 +17,7 @@ module nocdyn_joint_events
     integer :: from = locked, to = locked      !! modes
     real(wp) :: slip = 0.0_wp                  !! speed of the first body less that of the second before it [rad/s]
     real(wp) :: torque = 0.0_wp                !! on the second body after it [N m]
+    real(wp) :: impulse = 0.0_wp               !! of an impact [N m s]
   end type named_event_t
 
 contains
@@ -39,6 +40,7 @@ contains
         events(i)%to = event%to
         events(i)%slip = event%slip
         events(i)%torque = event%torque
+        events(i)%impulse = event%impulse
       end associate
     end do
   end subroutine list_joint_events
@@ -58,6 +60,7 @@ contains
       call json%put('to', mode_word(events(i)%to))
       call json%put('slip_rad_s', events(i)%slip)
       call json%put('torque_N_m', events(i)%torque)
+      if (abs(events(i)%impulse) > 0) call json%put('impulse_N_m_s', events(i)%impulse)
       call json%close()
     end do
     call json%close_list()

@@ -231,16 +231,18 @@ contains
     integer, intent(in) :: which        !! the joint, or by_state: those without slip are at rest
     real(wp), intent(in) :: t           !! [s]
     real(wp), intent(inout) :: y(:)     !! [states] at least
-    logical :: is_at_rest(self%joints%count), is_solved
+    logical :: is_at_rest(self%joints%count), is_solved, is_struck
     real(wp) :: slip(self%joints%count), moments, speed
     integer :: j
 
     associate (joints => self%joints, elements => self%machine%elements)
       speed = max(1.0_wp, maxval(abs(y(:size(self%moving)))))
+      is_struck = .false.
+      if (which /= by_state) call strike(self, t, rest_width * speed, y, is_struck)
       do j = 1, joints%count
         slip(j) = self%joint_rate(j, y)
-        is_at_rest(j) = abs(slip(j)) <= rest_width * speed .or. j == which
-        if (which /= by_state) is_at_rest(j) = is_at_rest(j) .or. joints%mode(j) == locked
+        is_at_rest(j) = abs(slip(j)) <= rest_width * speed
+        if (which /= by_state .and. .not. is_struck) is_at_rest(j) = is_at_rest(j) .or. joints%mode(j) == locked .or. j == which
       end do
       call joints%assume(self%machine%banks, is_at_rest, slip)
       call self%find_held_moments(t, y(:self%states))
@@ -253,6 +255,31 @@ contains
       call self%hold(y)
     end associate
   end subroutine settle_joints
+
+  !> Changes the speeds where joints lock with a slip. The energy that is lost is work of these joints.
+  subroutine strike(self, t, tolerance, y, is_struck)
+    class(joint_formulation_t), intent(inout) :: self
+    real(wp), intent(in) :: t            !! [s]
+    real(wp), intent(in) :: tolerance    !! of a slip that is none [rad/s]
+    real(wp), intent(inout) :: y(:)      !! [states] at least
+    logical, intent(out) :: is_struck
+    real(wp) :: before(self%joints%count)
+    integer :: j, work
+
+    associate (joints => self%joints)
+      before = [(self%joint_rate(j, y), j=1, joints%count)]
+      call joints%find_impact(self%machine%banks, t, before, tolerance, joints%impulse, is_struck)
+      if (.not. is_struck) return
+      do j = 1, joints%count
+        call self%push(j, joints%impulse(j), y)
+      end do
+      if (size(y) <= self%states) return
+      do j = 1, joints%count
+        work = self%states + findloc(self%machine%with_work, joints%element(j), dim=1)
+        y(work) = y(work) + 0.5_wp * joints%impulse(j) * (before(j) + self%joint_rate(j, y))
+      end do
+    end associate
+  end subroutine strike
 
   !> The same at an event in a motion, which is noted.
   subroutine settle_at_event(self, which, t, y)
@@ -269,9 +296,11 @@ contains
     call self%find_held_moments(t, y(:self%states))
     do j = 1, self%joints%count
       if (self%joints%mode(j) == before(j)) cycle
-      if (self%joints%is_open(self%machine%banks, j, t)) cycle
+      if (before(j) /= locked) then   ! it is not, and cannot be
+        if (self%joints%is_open(self%machine%banks, j, t)) cycle
+      end if
       self%joints%moment(j) = self%machine%elements%applied(1, self%joints%element(j))
-      call self%joints%note(t, j, before(j), slip(j))
+      call self%joints%note(t, j, before(j), slip(j), self%joints%impulse(j))
     end do
   end subroutine settle_at_event
 

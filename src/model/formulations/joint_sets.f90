@@ -36,6 +36,7 @@ module nocdyn_joint_sets
     integer :: from = 0, to = 0   !! modes
     real(wp) :: slip = 0.0_wp     !! speed of the first body less that of the second before it [rad/s]
     real(wp) :: torque = 0.0_wp   !! moment after it [N m]
+    real(wp) :: impulse = 0.0_wp  !! of an impact [N m s]
   end type joint_event_t
 
   type, public :: joint_sets_t
@@ -48,6 +49,7 @@ module nocdyn_joint_sets
     real(wp), allocatable :: rate(:)         !! accelerations of the slips u'' without the moments of locked joints [rad/s2], or
                                              !! slips, whose moments then are impulses
     real(wp), allocatable :: moment(:)       !! of the locked joints [N m]
+    real(wp), allocatable :: impulse(:)      !! of the last impact [N m s]; 0 after other events
     real(wp), allocatable :: shift(:)        !! by which the boundary of a slip lies beyond zero [rad/s]
     real(wp) :: moment_shift = 0.0_wp        !! by which those of the moments lie beyond their ranges [N m]
     real(wp), allocatable :: weight(:, :)    !! W [1/(kg m2)]
@@ -60,6 +62,7 @@ module nocdyn_joint_sets
     procedure :: find_moments
     procedure :: assume
     procedure :: decide
+    procedure :: find_impact
     procedure :: note
     procedure :: indicator
     procedure :: follow
@@ -94,7 +97,7 @@ contains
     end do
     self%count = size(self%element)
     allocate (self%mode(self%count), source=slips_forwards)
-    allocate (self%rate(self%count), self%moment(self%count), self%shift(self%count), source=0.0_wp)
+    allocate (self%rate(self%count), self%moment(self%count), self%shift(self%count), self%impulse(self%count), source=0.0_wp)
     allocate (self%weight(self%count, self%count), source=0.0_wp)
     allocate (self%sets(0), self%events(16))
   end function new_joint_sets
@@ -216,6 +219,36 @@ contains
     self%present = 0
   end subroutine decide
 
+  elemental logical function is_unbounded(moment)
+    real(wp), intent(in) :: moment   !! [N m]
+
+    is_unbounded = abs(moment) >= huge(moment)
+  end function is_unbounded
+
+  !> The impulses that end slips which joints without bounds do not allow; those of others are zero, as friction has no time.
+  subroutine find_impact(self, banks, t, slip, tolerance, impulse, is_struck)
+    class(joint_sets_t), intent(in) :: self
+    type(bank_slot_t), intent(in) :: banks(:)
+    real(wp), intent(in) :: t            !! [s]
+    real(wp), intent(in) :: slip(:)      !! u' [rad/s], [joints]
+    real(wp), intent(in) :: tolerance    !! of a slip that is none [rad/s]
+    real(wp), intent(out) :: impulse(:)  !! [N m s], [joints]
+    logical, intent(out) :: is_struck    !! whether there are any
+    real(wp), dimension(self%count) :: least, most, slip_after
+    real(wp) :: sliding(2)
+    integer :: j, state(self%count)
+
+    impulse = 0.0_wp
+    do j = 1, self%count
+      call find_ranges(self, banks, j, t, least(j), most(j), sliding)
+    end do
+    where (.not. is_unbounded(least)) least = 0.0_wp
+    where (.not. is_unbounded(most)) most = 0.0_wp
+    is_struck = any(slip > tolerance .and. is_unbounded(least)) .or. any(slip < -tolerance .and. is_unbounded(most))
+    if (.not. is_struck) return
+    call solve_bounded_complementarity(self%weight, slip, least, most, impulse, slip_after, state, is_struck)
+  end subroutine find_impact
+
   !> Decides the modes of the joints at rest: whenever some slip, the others are looked at again.
   subroutine decide_resting(self, banks, t, resting, is_solved)
     class(joint_sets_t), intent(inout) :: self
@@ -277,11 +310,12 @@ contains
   end subroutine set_mode
 
   !> Keeps an event of a joint whose mode was `from`.
-  subroutine note(self, t, joint, from, slip)
+  subroutine note(self, t, joint, from, slip, impulse)
     class(joint_sets_t), intent(inout) :: self
-    real(wp), intent(in) :: t      !! [s]
+    real(wp), intent(in) :: t         !! [s]
     integer, intent(in) :: joint, from
-    real(wp), intent(in) :: slip   !! u' before [rad/s]
+    real(wp), intent(in) :: slip      !! u' before [rad/s]
+    real(wp), intent(in) :: impulse   !! [N m s]
     type(joint_event_t), allocatable :: longer(:)
 
     if (self%happened == size(self%events)) then
@@ -290,7 +324,7 @@ contains
       call move_alloc(longer, self%events)
     end if
     self%happened = self%happened + 1
-    self%events(self%happened) = joint_event_t(t, joint, from, self%mode(joint), 0.0_wp - slip, self%moment(joint))
+    self%events(self%happened) = joint_event_t(t, joint, from, self%mode(joint), 0.0_wp - slip, self%moment(joint), impulse)
   end subroutine note
 
   !> Positive in the present mode of a joint: its slip, or how far its moment is inside the range [N m].
@@ -302,13 +336,15 @@ contains
     real(wp), intent(in) :: slip   !! u' [rad/s]
     real(wp) :: least, most, sliding(2)
 
+    call find_ranges(self, banks, joint, t, least, most, sliding)
     select case (self%mode(joint))
     case (slips_forwards)
       g = slip + self%shift(joint)
+      if (is_unbounded(least)) g = -1.0_wp   ! there is no such slip
     case (slips_backwards)
       g = self%shift(joint) - slip
+      if (is_unbounded(most)) g = -1.0_wp
     case default
-      call find_ranges(self, banks, joint, t, least, most, sliding)
       associate (moment => self%moment(joint))
         g = min(most - moment, moment - least) + self%moment_shift
       end associate

@@ -15,6 +15,7 @@ module nocdyn_joint_assembly
   public :: clutch_form, freewheel_form, add_clutch_form, add_freewheel_form, check_joints, refuse_joints
 
   integer, parameter :: engaged = 1, with_engagement = 2
+  integer, parameter :: forms_of_friction = 2   ! as many follow of dog clutches
 
 contains
 
@@ -27,6 +28,7 @@ contains
     do i = 1, size(input%groups)
       associate (group => input%groups(i))
         if (group%kind /= 'clutch') cycle
+        if (group%text('kind') /= 'friction') cycle
         if (.not. group%has_value('static_capacity')) cycle
         if (group%number('static_capacity') >= group%number('capacity')) cycle
         call raise(error, exit_input, input%location(i, 'static_capacity') // ': static_capacity = ' // &
@@ -62,8 +64,12 @@ contains
   pure integer function clutch_form(group)
     type(group_t), intent(in) :: group
 
-    clutch_form = engaged
-    if (group%has_value('times') .or. group%has_value('table_time')) clutch_form = with_engagement
+    clutch_form = merge(with_engagement, engaged, group%has_value('times'))
+    if (group%text('kind') == 'dog') then
+      clutch_form = clutch_form + forms_of_friction
+    else if (group%has_value('table_time')) then
+      clutch_form = with_engagement
+    end if
   end function clutch_form
 
   !> That of a group &freewheel.
@@ -83,13 +89,18 @@ contains
     integer :: i, lane
 
     if (size(groups%indices) == 0) return
-    ranges%sliding_most = groups%values('capacity')
+    if (form > forms_of_friction) then
+      ranges%most = spread(spread(huge(1.0_wp), 1, groups%lanes), 2, size(groups%indices))
+      ranges%sliding_most = 0.0_wp * ranges%most
+    else
+      ranges%sliding_most = groups%values('capacity')
+      ranges%most = groups%values('static_capacity', absent=-1.0_wp)
+      where (ranges%most < 0) ranges%most = ranges%sliding_most
+    end if
     ranges%sliding_least = -ranges%sliding_most
-    ranges%most = groups%values('static_capacity', absent=-1.0_wp)
-    where (ranges%most < 0) ranges%most = ranges%sliding_most
     ranges%least = -ranges%most
     associate (from => groups%bodies('bodies', 1), to => groups%bodies('bodies', 2))
-      if (form == engaged) then
+      if (form == engaged .or. form == engaged + forms_of_friction) then
         call append_bank(banks, new_friction_joints(role_clutch, groups%names, from, to, ranges))
         return
       end if
@@ -109,7 +120,7 @@ contains
     type(curve_t) :: curve
     real(wp), allocatable :: levels(:), times(:)
 
-    if (group%has_value('table_time')) then
+    if (has_table(group)) then
       curve = new_curve(group%numbers('table_time'), group%numbers('table_level'), &
                         merge(interpolation_cubic, interpolation_linear, group%text('interpolation') == 'cubic'), &
                         extrapolation_constant)
@@ -123,6 +134,14 @@ contains
     end if
     curve = new_curve(times, levels, interpolation_steps, extrapolation_constant)
   end function engagement_of
+
+  !> Whether the engagement is a table.
+  logical function has_table(group)
+    type(group_t), intent(in) :: group
+
+    has_table = .false.
+    if (group%text('kind') == 'friction') has_table = group%has_value('table_time')
+  end function has_table
 
   !> Adds the bank of the freewheels: forward, the driven body is pushed, never pulled back.
   subroutine add_freewheel_form(groups, form, banks)

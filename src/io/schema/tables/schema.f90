@@ -7,7 +7,7 @@ module nocdyn_schema
   use nocdyn_schema_constraints, only: constraint_examples, constraint_groups, constraint_keys, constraint_relations
   use nocdyn_schema_couplings, only: coupling_examples, coupling_keys, coupling_relations
   use nocdyn_schema_engines, only: engine_examples, engine_groups, engine_keys, engine_relations
-  use nocdyn_schema_joints, only: joint_examples, joint_groups, joint_keys, joint_relations
+  use nocdyn_schema_joints, only: joint_examples, joint_groups, joint_keys, joint_kinds, joint_relations
   use nocdyn_schema_meshes, only: mesh_examples, mesh_groups, mesh_keys, mesh_relations
   use nocdyn_schema_response, only: response_examples, response_groups, response_keys, response_relations
   use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_text, a_word, alias_t, &
@@ -95,7 +95,7 @@ module nocdyn_schema
     key_rule_t('output',     'directory',       a_folder,       1, '',            "''",        anything, &
       "folder of the results; '' means results/ and the name of the input file")]
 
-  type(kind_rule_t), parameter, public :: kind_rules(*) = [torque_kinds, sweep_kinds]
+  type(kind_rule_t), parameter, public :: kind_rules(*) = [joint_kinds, torque_kinds, sweep_kinds]
 
   type(key_rule_t), parameter, public :: key_rules(*) = &
     [frame_keys, coupling_keys, shaft_keys, mesh_keys, constraint_keys, joint_keys, motor_keys, load_keys, &

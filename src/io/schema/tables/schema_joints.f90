@@ -1,8 +1,8 @@
 !> Rows of the schema: the joints that lock, &clutch and &freewheel.
 module nocdyn_schema_joints
   use nocdyn_kinds, only: wp
-  use nocdyn_schema_rules, only: a_name, a_number, a_word, allowed_t, any_number, any_times, anything, at_most_one, &
-    body_or_ground, equal_lengths, example_t, group_rule_t, in_machine, interpolations, key_rule_t, not_negative, &
+  use nocdyn_schema_rules, only: a_name, a_number, a_selector, a_word, allowed_t, any_number, any_times, anything, at_most_one, &
+    body_or_ground, equal_lengths, example_t, group_rule_t, in_machine, interpolations, key_rule_t, kind_rule_t, not_negative, &
     relation_rule_t, required, requires, unset
   implicit none (type, external)
   private
@@ -17,25 +17,31 @@ module nocdyn_schema_joints
     group_rule_t('freewheel', in_machine, any_times, 'torque', &
                  'A freewheel: it locks in one direction and overruns in the other.')]
 
+  type(kind_rule_t), parameter, public :: joint_kinds(*) = [ &
+    kind_rule_t('clutch', 'friction', 'friction of a capacity; it locks where its slip ends'), &
+    kind_rule_t('clutch', 'dog',      'teeth that lock at once, by an impact if there is a slip, and hold any torque')]
+
   type(key_rule_t), parameter, public :: joint_keys(*) = [ &
     key_rule_t('clutch',     'name',            a_name,         1, '',            required,    anything, &
       'name in messages and results'), &
     key_rule_t('clutch',     'bodies',          body_or_ground, 2, '',            required,    anything, &
       "the two bodies; one may be 'ground': a brake"), &
+    key_rule_t('clutch',     'kind',            a_selector,     1, '',            "'friction'", anything, &
+      'how it transmits its torque'), &
     key_rule_t('clutch',     'capacity',        a_number,       1, 'N m',         required,    not_negative, &
-      'friction torque while it slips'), &
+      'friction torque while it slips', 'friction'), &
     key_rule_t('clutch',     'static_capacity', a_number,       1, 'N m',         unset,       not_negative, &
-      'largest torque while it is locked; the same as capacity if not given'), &
+      'largest torque while it is locked; the same as capacity if not given', 'friction'), &
     key_rule_t('clutch',     'times',           a_number,       any_number, 's',  unset,       anything, &
       'times at which the engagement changes; before the first it is 0', fewest=1, ascends=.true.), &
     key_rule_t('clutch',     'levels',          a_number,       any_number, '',   unset,       shares, &
-      'engagement from each of these times on: its share of the capacities', fewest=1), &
+      'engagement from each of these times on: its share of the capacities; dog: engaged if not 0', fewest=1), &
     key_rule_t('clutch',     'table_time',      a_number,       any_number, 's',  unset,       anything, &
-      'times of the points of a table of the engagement, ascending', fewest=2, ascends=.true.), &
+      'times of the points of a table of the engagement, ascending', 'friction', fewest=2, ascends=.true.), &
     key_rule_t('clutch',     'table_level',     a_number,       any_number, '',   unset,       shares, &
-      'engagement at these times', fewest=2), &
+      'engagement at these times', 'friction', fewest=2), &
     key_rule_t('clutch',     'interpolation',   a_word,         1, '',            linear,      interpolations, &
-      'between points: straight lines, or the monotone cubic of Fritsch and Butland'), &
+      'between points: straight lines, or the monotone cubic of Fritsch and Butland', 'friction'), &
     key_rule_t('freewheel',  'name',            a_name,         1, '',            required,    anything, &
       'name in messages and results'), &
     key_rule_t('freewheel',  'bodies',          body_or_ground, 2, '',            required,    anything, &

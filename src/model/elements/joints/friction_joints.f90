@@ -1,9 +1,10 @@
-!> Joints of two bodies that lock: clutches, brakes and freewheels.
+!> Joints of two bodies that lock: clutches, brakes, dog clutches and freewheels.
 !>
 !> A locked joint is a row u' = 0 of L_lambda, whose reaction is its moment M; it slips where M would leave the range
 !> from `least` to `most`. Slipping forwards (u' > 0) the joint has its least moment, slipping backwards its greatest: Coulomb
 !> friction, with other numbers than at rest. A clutch has a range about zero; a freewheel has a range on one side of it and
-!> overruns on the other. All grow with the engagement, a table over the time or 1.
+!> overruns on the other. A dog clutch has no bounds, nor has a freewheel without a capacity on its side: where one locks with a
+!> slip, there is an impact. All grow with the engagement, a table over the time or 1.
 !>
 !> The mode is a branch of the law that is not chosen by guards: which joints lock follows from all of them together
 !> (`nocdyn_joint_sets`).
@@ -106,7 +107,7 @@ contains
     most = engaged(self, element, t, self%parameters(self%number_of('sliding most'))%value(1, element))
   end subroutine range_of_slip
 
-  !> A moment by the engagement; one without bounds stays so.
+  !> A moment by the engagement; one without bounds stays so with any.
   pure real(wp) function engaged(self, element, t, moment)
     class(friction_joints_t), intent(in) :: self
     integer, intent(in) :: element
@@ -114,8 +115,11 @@ contains
     real(wp), intent(in) :: moment   !! with full engagement [N m]
 
     engaged = moment
-    if (.not. allocated(self%curve) .or. abs(moment) >= huge(moment)) return
-    engaged = moment * self%curve(1, element)%value(t)
+    if (.not. allocated(self%curve)) return
+    associate (level => self%curve(1, element)%value(t))
+      if (abs(moment) < huge(moment)) engaged = moment * level
+      if (abs(moment) >= huge(moment) .and. level <= 0) engaged = 0.0_wp
+    end associate
   end function engaged
 
   !> The mode of a joint of the first lane.
