@@ -124,6 +124,7 @@ contains
     call solve(formulation, settings, times, observer, summary, error)
     if (summary%has_run) call complete_summary(input, observer, error, summary)
     if (.not. summary%has_run .or. allocated(error) .or. allocated(formulation%machine%steady_internal)) return
+    if (formulation%joints%count > 0) return   ! which of them a steady state has locked is not known
     associate (last => observer%table%columns%formulation)
       call last%set_state(reshape(observer%last_state, [1, size(observer%last_state)]))
       call note_missed_state(formulation%machine, observer%last_time, last%omega(1, 1:), summary%notes)

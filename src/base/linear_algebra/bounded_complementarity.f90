@@ -32,7 +32,7 @@ contains
 
     x = min(max(0.0_wp, lower), upper)
     state = is_free
-    where (upper - lower <= 0) state = at_lower
+    where (upper <= lower) state = at_lower
     is_solved = .false.
     do change = 1, 50 * (size(b) + 1)
       call move_free(w, b, lower, upper, x, state)
@@ -40,7 +40,7 @@ contains
       wrong = 0.0_wp
       where (state == at_lower) wrong = -a
       where (state == at_upper) wrong = a
-      where (upper - lower <= 0) wrong = 0.0_wp
+      where (upper <= lower) wrong = 0.0_wp
       where (wrong <= rounding * (abs(b) + matmul(abs(w), abs(x)))) wrong = 0.0_wp
       is_solved = all(wrong <= 0)
       if (is_solved) return
