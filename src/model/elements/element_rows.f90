@@ -17,6 +17,7 @@ module nocdyn_element_rows
     procedure :: last_body
     procedure :: combine
     procedure :: add_moment
+    procedure :: add_product
     procedure :: add_coefficient
     procedure :: add_coefficients
   end type element_rows_t
@@ -99,22 +100,34 @@ contains
     end do
   end subroutine add_moment
 
+  !> Adds k c d^T with the rows c and d of two elements: the torques on the bodies where the moment of one grows with the motion of
+  !> the other.
+  pure subroutine add_product(self, element, by, factor, matrix)
+    class(element_rows_t), intent(in) :: self
+    integer, intent(in) :: element            !! whose moment
+    integer, intent(in) :: by                 !! whose motion
+    real(wp), intent(in) :: factor            !! k
+    real(wp), intent(inout) :: matrix(:, :)   !! [bodies, bodies]
+    integer :: i, j
+
+    do j = self%first(by), self%first(by + 1) - 1
+      do i = self%first(element), self%first(element + 1) - 1
+        if (min(self%body(i), self%body(j)) == 0) cycle
+        associate (entry => matrix(self%body(i), self%body(j)))
+          entry = entry + self%coefficient(i) * self%coefficient(j) * factor
+        end associate
+      end do
+    end do
+  end subroutine add_product
+
   !> Adds the pattern of eq. (21), -k c c^T with the row c: -k on the diagonal and k beside it for an element between two bodies.
   pure subroutine add_coefficient(self, element, factor, matrix)
     class(element_rows_t), intent(in) :: self
     integer, intent(in) :: element
     real(wp), intent(in) :: factor            !! k
     real(wp), intent(inout) :: matrix(:, :)   !! [bodies, bodies]
-    integer :: i, j
 
-    do j = self%first(element), self%first(element + 1) - 1
-      do i = self%first(element), self%first(element + 1) - 1
-        if (min(self%body(i), self%body(j)) == 0) cycle
-        associate (entry => matrix(self%body(i), self%body(j)))
-          entry = entry - self%coefficient(i) * self%coefficient(j) * factor
-        end associate
-      end do
-    end do
+    call self%add_product(element, element, -factor, matrix)
   end subroutine add_coefficient
 
   !> Adds the pattern of eq. (21) for all elements, with k = common * factor.

@@ -64,7 +64,6 @@ module nocdyn_elements
   contains
     procedure :: gather
     procedure :: scatter
-    procedure :: add_cross
   end type elements_t
 
 contains
@@ -185,25 +184,5 @@ contains
       end do
     end associate
   end subroutine scatter
-
-  !> Adds the derivative of a moment by the motion of another element, as torques on the bodies by the motion of the bodies.
-  pure subroutine add_cross(self, pair, slope, matrix)
-    class(elements_t), intent(in) :: self
-    integer, intent(in) :: pair               !! of `cross`
-    real(wp), intent(in) :: slope             !! [N m/rad] or [N m s/rad]
-    real(wp), intent(inout) :: matrix(:, :)   !! [bodies, bodies]
-    integer :: i, j
-
-    associate (rows => self%rows, e => self%cross%element(pair), by => self%cross%by(pair))
-      do j = rows%first(by), rows%first(by + 1) - 1
-        do i = rows%first(e), rows%first(e + 1) - 1
-          if (min(rows%body(i), rows%body(j)) == 0) cycle
-          associate (entry => matrix(rows%body(i), rows%body(j)))
-            entry = entry + rows%coefficient(i) * rows%coefficient(j) * slope
-          end associate
-        end do
-      end do
-    end associate
-  end subroutine add_cross
 
 end module nocdyn_elements

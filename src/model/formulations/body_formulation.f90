@@ -206,8 +206,10 @@ contains
       call elements%rows%add_coefficients(-1.0_wp, elements%applied_angle(lane, :), self%by_angle)
       call elements%rows%add_coefficients(-1.0_wp, elements%applied_speed(lane, :), self%by_speed)
       do e = 1, elements%cross%count
-        call elements%add_cross(e, elements%cross%restoring_angle(lane, e) + elements%cross%applied_angle(lane, e), self%by_angle)
-        call elements%add_cross(e, elements%cross%applied_speed(lane, e), self%by_speed)
+        associate (x => elements%cross, rows => elements%rows)
+          call rows%add_product(x%element(e), x%by(e), x%restoring_angle(lane, e) + x%applied_angle(lane, e), self%by_angle)
+          call rows%add_product(x%element(e), x%by(e), x%applied_speed(lane, e), self%by_speed)
+        end associate
       end do
       do e = 1, elements%count
         call elements%rows%add_moment(e, elements%applied_time(lane, e), self%by_time)

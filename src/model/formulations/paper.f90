@@ -148,7 +148,7 @@ contains
           do e = 1, cross%count
             call elements%rows%add_coefficient(cross%element(e), -cross%mixed(l, e) * elements%speed(l, cross%by(e)), &
                                                self%work%tangent)
-            call elements%add_cross(e, cross%mixed(l, e) * elements%speed(l, cross%element(e)) &
+            call elements%rows%add_product(cross%element(e), cross%by(e), cross%mixed(l, e) * elements%speed(l, cross%element(e)) &
                                     + cross%curvature(l, e) * elements%speed(l, cross%by(e)), self%work%tangent)
           end do
         end associate

@@ -178,9 +178,11 @@ contains
 
     tangent = 0.0_wp
     call machine%elements%rows%add_coefficients(-1.0_wp, machine%elements%restoring_angle(lane, :), tangent)
-    do i = 1, machine%elements%cross%count
-      call machine%elements%add_cross(i, machine%elements%cross%restoring_angle(lane, i), tangent)
-    end do
+    associate (cross => machine%elements%cross)
+      do i = 1, cross%count
+        call machine%elements%rows%add_product(cross%element(i), cross%by(i), cross%restoring_angle(lane, i), tangent)
+      end do
+    end associate
   end subroutine tangent_matrix
 
   !> F of eqs. (48)-(51): the elastic moment on each body [N m], [n].
