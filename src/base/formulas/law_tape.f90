@@ -47,6 +47,15 @@ module nocdyn_law_tape
     real(wp) :: value = 0.0_wp          !! of a literal
   end type law_node_t
 
+  !> What a law reads; nodes, 0 where it does not.
+  type, public :: law_inputs_t
+    integer :: ports = at_element               !! `at_phase` if the elements are followed by as many phases
+    integer :: angle = 0, speed = 0             !! of the element
+    integer :: phase = 0, phase_speed = 0       !! of its phase
+    integer :: time = 0
+    integer, allocatable :: state(:)            !! internal states, [states]
+  end type law_inputs_t
+
   !> What a law gives; nodes, 0 where it gives none.
   type, public :: law_tape_t
     integer :: count = 0
@@ -69,8 +78,7 @@ module nocdyn_law_tape
     procedure :: append
     procedure :: constants
     procedure :: needed
-    procedure :: input
-    procedure :: has_phase
+    procedure :: inputs
   end type law_tape_t
 
 contains
@@ -157,6 +165,22 @@ contains
     node%has_branch = node%has_branch .or. on%has_branch
   end subroutine depend
 
+  !> The nodes of all inputs.
+  pure function inputs(self)
+    class(law_tape_t), intent(in) :: self
+    type(law_inputs_t) :: inputs
+    integer :: i
+
+    inputs%angle = input(self, op_angle, at_element)
+    inputs%speed = input(self, op_speed, at_element)
+    inputs%phase = input(self, op_angle, at_phase)
+    inputs%phase_speed = input(self, op_speed, at_phase)
+    if (max(inputs%phase, inputs%phase_speed) > 0) inputs%ports = at_phase
+    inputs%time = input(self, op_time, 0)
+    allocate (inputs%state(size(self%rate)))
+    inputs%state(:) = [(input(self, op_state, i), i=1, size(self%rate))]
+  end function inputs
+
   !> The node of an input, 0 where the law does not read it.
   pure integer function input(self, operation, number)
     class(law_tape_t), intent(in) :: self
@@ -169,13 +193,6 @@ contains
       if (self%node(i)%operation == operation .and. self%node(i)%a == number) input = i
     end do
   end function input
-
-  !> Whether the law reads the motion of a phase.
-  pure logical function has_phase(self)
-    class(law_tape_t), intent(in) :: self
-
-    has_phase = max(self%input(op_angle, at_phase), self%input(op_speed, at_phase)) > 0
-  end function has_phase
 
   !> The nodes that are constants, ascending.
   pure function constants(self) result(nodes)

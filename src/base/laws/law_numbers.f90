@@ -2,7 +2,7 @@
 !> which take longer in groups.
 module nocdyn_law_numbers
   use nocdyn_kinds, only: wp
-  use nocdyn_law_tape, only: at_element, at_phase, law_tape_t, op_angle, op_speed, op_state, op_time
+  use nocdyn_law_tape, only: at_phase, law_inputs_t, law_tape_t
   use nocdyn_law_values, only: law_program_t, new_law_program
   use nocdyn_laws, only: law_t
   implicit none (type, external)
@@ -19,14 +19,10 @@ module nocdyn_law_numbers
     type(law_program_t) :: program
   end type guards_t
 
-  type, public :: law_numbers_t
+  type, extends(law_inputs_t), public :: law_numbers_t
     logical :: is_small = .false.              !! whether all values are computed so
     real(wp), allocatable, private :: x(:, :)  !! values of all nodes, [0:nodes, slots]
     integer, private :: nodes = 0, elements = 0
-    integer, private :: angle = 0, speed = 0, time = 0   !! nodes of the inputs, 0 where the law does not read them
-    integer, private :: phase = 0, phase_speed = 0       !! the same of the phase
-    integer, private :: ports = at_element               !! `at_phase` if the elements are followed by their phases
-    integer, allocatable, private :: state(:)            !! the same for internal states
     integer, private :: restoring = 0, applied = 0       !! nodes of the results, 0 for none, as in `law_tape_t`
     integer, private :: phase_restoring = 0, phase_applied = 0
     integer, private :: stored = 0, secant = 0, damping = 0, argument = 0
@@ -48,17 +44,11 @@ contains
     type(law_t), intent(in) :: law
     integer, intent(in) :: motion(:)   !! nodes of moments and rates
     type(law_numbers_t) :: self
-    integer :: i, slots
+    integer :: slots
 
     associate (tape => law%tape)
       self%nodes = tape%count
-      self%angle = tape%input(op_angle, at_element)
-      self%speed = tape%input(op_speed, at_element)
-      self%phase = tape%input(op_angle, at_phase)
-      self%phase_speed = tape%input(op_speed, at_phase)
-      if (tape%has_phase()) self%ports = at_phase
-      self%time = tape%input(op_time, 0)
-      allocate (self%state, source=[(tape%input(op_state, i), i=1, size(tape%rate))])
+      self%law_inputs_t = tape%inputs()
       self%restoring = tape%restoring
       self%applied = tape%applied
       self%phase_restoring = tape%phase_restoring

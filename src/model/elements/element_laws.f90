@@ -8,7 +8,7 @@ module nocdyn_element_laws
   use nocdyn_kinds, only: wp
   use nocdyn_law_numbers, only: law_numbers_t, new_law_numbers
   use nocdyn_law_strips, only: fill, load, load_lanes, unload
-  use nocdyn_law_tape, only: at_element, at_phase, law_tape_t, op_angle, op_speed, op_state, op_time
+  use nocdyn_law_tape, only: at_phase, law_inputs_t, law_tape_t
   use nocdyn_law_walk, only: walk
   use nocdyn_law_work, only: law_work_t, new_law_work
   use nocdyn_curves, only: curve_t
@@ -18,13 +18,9 @@ module nocdyn_element_laws
 
   public :: new_element_law
 
-  type, public :: element_law_t
+  type, extends(law_inputs_t), public :: element_law_t
     type(law_t) :: law
     integer :: states = 0                       !! internal states of each element
-    integer :: ports = at_element               !! `at_phase` if the elements are followed by as many phases
-    integer :: angle = 0, speed = 0, time = 0   !! nodes of the inputs, 0 where the law does not read them
-    integer :: phase = 0, phase_speed = 0       !! the same of the phase
-    integer, allocatable :: state(:)            !! the same for internal states, [states]
     type(law_work_t) :: values                  !! of the moments and rates
     type(law_work_t) :: series                  !! the same with the coefficients of a series
     type(law_work_t), private :: tangents       !! the same with two coefficients more
@@ -51,18 +47,10 @@ contains
     integer, intent(in) :: states   !! of each element
     integer, intent(in) :: strip    !! lanes of a strip: 1 of a block of one lane, else whole groups
     type(element_law_t) :: self
-    integer :: i
 
     self%law = new_law(tape, lanes, elements, strip)
     self%states = states
-    allocate (self%state(states), source=0)
-    self%angle = tape%input(op_angle, at_element)
-    self%speed = tape%input(op_speed, at_element)
-    self%phase = tape%input(op_angle, at_phase)
-    self%phase_speed = tape%input(op_speed, at_phase)
-    if (tape%has_phase()) self%ports = at_phase
-    self%time = tape%input(op_time, 0)
-    self%state(:) = [(tape%input(op_state, i), i=1, states)]
+    self%law_inputs_t = tape%inputs()
   end function new_element_law
 
   !> Allocates the work space for values and guards when they are first asked for: most machines of a sweep are only looked at.
