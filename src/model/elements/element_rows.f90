@@ -100,8 +100,8 @@ contains
     end do
   end subroutine add_moment
 
-  !> Adds k c d^T with the rows c and d of two elements: the torques on the bodies where the moment of one grows with the motion of
-  !> the other.
+  !> Adds k c d^T with the rows c and d of two elements: the torques on the bodies where the moment of one grows with the motion
+  !> of the other.
   pure subroutine add_product(self, element, by, factor, matrix)
     class(element_rows_t), intent(in) :: self
     integer, intent(in) :: element            !! whose moment

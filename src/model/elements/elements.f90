@@ -35,6 +35,8 @@ module nocdyn_elements
     real(wp), allocatable :: mixed(:, :)            !! derivative of `restoring` by u of the other and its own
   contains
     procedure :: clear
+    procedure :: moved
+    procedure :: mover
     procedure :: subtract_curvatures
   end type cross_slopes_t
 
@@ -119,6 +121,26 @@ contains
     self%curvature(:, :) = 0.0_wp
     self%mixed(:, :) = 0.0_wp
   end subroutine clear
+
+  !> The element whose moment depends on the motion of another by a pair, 0 if the pair is none of its; by pair 0 its own.
+  pure integer function moved(self, pair, by)
+    class(cross_slopes_t), intent(in) :: self
+    integer, intent(in) :: pair   !! or 0
+    integer, intent(in) :: by     !! element that moves
+
+    moved = by
+    if (pair > 0) moved = merge(self%element(pair), 0, self%by(pair) == by)
+  end function moved
+
+  !> The element on whose motion the moment of another depends by a pair, in the same way.
+  pure integer function mover(self, pair, element)
+    class(cross_slopes_t), intent(in) :: self
+    integer, intent(in) :: pair      !! or 0
+    integer, intent(in) :: element   !! whose moment
+
+    mover = element
+    if (pair > 0) mover = merge(self%by(pair), 0, self%element(pair) == element)
+  end function mover
 
   !> States with the value 0.
   function new_internal_states(lanes, members) result(self)

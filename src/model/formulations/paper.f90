@@ -148,8 +148,9 @@ contains
           do e = 1, cross%count
             call elements%rows%add_coefficient(cross%element(e), -cross%mixed(l, e) * elements%speed(l, cross%by(e)), &
                                                self%work%tangent)
-            call elements%rows%add_product(cross%element(e), cross%by(e), cross%mixed(l, e) * elements%speed(l, cross%element(e)) &
-                                    + cross%curvature(l, e) * elements%speed(l, cross%by(e)), self%work%tangent)
+            call elements%rows%add_product(cross%element(e), cross%by(e), &
+                                           cross%mixed(l, e) * elements%speed(l, cross%element(e)) &
+                                           + cross%curvature(l, e) * elements%speed(l, cross%by(e)), self%work%tangent)
           end do
         end associate
         dfdy(l, 2 * n + 1:3 * n, n + 1:2 * n) = self%work%tangent

@@ -34,8 +34,7 @@ module nocdyn_reduced_jacobian
     integer, allocatable, private :: response_entry(:)   !! entry of the response in each product
     integer, allocatable, private :: ratio_entry(:)      !! entry of the ratio in each product
     real(wp), allocatable, private :: product(:, :)      !! response * ratio, [lanes, products]
-    integer, private :: cross_products = 0               !! the last products: those with the motion of another element
-    integer, allocatable, private :: pair(:)             !! of `cross_slopes_t`, 0 for the own motion, [products]
+    integer, allocatable, private :: pair(:)             !! of `cross_slopes_t`, 0 for the own motion
     integer, private :: works = 0                        !! number of positions of dW'/dq'
     integer, allocatable, private :: work_position(:)    !! of each part of a dW'/dq', 1 to works
     integer, allocatable, private :: work_element(:)     !! its element
@@ -62,14 +61,14 @@ contains
     integer :: c, products
 
     self%freedoms = freedoms
-    products = most_products(incidence, elements%cross)
+    products = product_count(incidence, elements%cross)
     allocate (self%element(products), self%pair(products), self%position(products), row(products), column(products))
     allocate (self%response_entry(products), self%ratio_entry(products))
     call form_products(freedoms, incidence, elements%cross, row, column, self)
     row = row(:self%pairs)
     column = column(:self%pairs)
     allocate (self%product, source=incidence%response(:, self%response_entry) * incidence%ratio(:, self%ratio_entry))
-    call form_works(incidence, with_work, elements%cross, work, work_column, self)
+    call form_works(freedoms, incidence, with_work, elements%cross, work, work_column, self)
     self%pattern%row = [row, row, (freedoms + c, c=1, freedoms), &
                         (2 * freedoms + elements%internal%count + work((c + 1) / 2), c=1, 2 * self%works)]
     self%pattern%column = [column, freedoms + column, (c, c=1, freedoms), &
@@ -77,29 +76,24 @@ contains
     call append_internal(freedoms, incidence, with_work, elements%internal, self)
   end function new_reduced_jacobian
 
-  !> The number of products, or more.
-  pure integer function most_products(incidence, cross)
+  !> The number of products.
+  pure integer function product_count(incidence, cross) result(products)
     type(element_coordinates_t), intent(in) :: incidence
     type(cross_slopes_t), intent(in) :: cross
-    integer :: e, k
-    logical :: has_ratio(size(incidence%coordinate))
+    integer :: b, e, element_of(size(incidence%coordinate)), pair
 
-    has_ratio = [(incidence%has_ratio(k), k=1, size(incidence%coordinate))]
-    most_products = 0
-    do e = 1, size(incidence%first) - 1
-      associate (first => incidence%first(e), next => incidence%first(e + 1))
-        most_products = most_products + (next - first) * count(has_ratio(first:next - 1))
-      end associate
+    element_of = incidence%entry_elements()
+    products = 0
+    do b = 1, size(element_of)
+      if (.not. incidence%has_ratio(b)) cycle
+      do pair = 0, cross%count
+        e = cross%moved(pair, element_of(b))
+        if (e > 0) products = products + incidence%first(e + 1) - incidence%first(e)
+      end do
     end do
-    do k = 1, cross%count
-      associate (first => incidence%first(cross%by(k)), next => incidence%first(cross%by(k) + 1), e => cross%element(k))
-        most_products = most_products + (incidence%first(e + 1) - incidence%first(e)) * count(has_ratio(first:next - 1))
-      end associate
-    end do
-  end function most_products
+  end function product_count
 
-  !> Forms the products of these pairs, column by column, and their distinct positions; those with the motion of other elements
-  !> come last.
+  !> Forms the products of these pairs, column by column, and their distinct positions.
   subroutine form_products(freedoms, incidence, cross, row, column, self)
     integer, intent(in) :: freedoms
     type(element_coordinates_t), intent(in) :: incidence
@@ -108,106 +102,84 @@ contains
     type(reduced_jacobian_t), intent(inout) :: self
     integer :: order(size(incidence%coordinate)), element_of(size(incidence%coordinate)), first(freedoms + 1)
     integer :: position(freedoms)   ! position of each row in the present column, if not below `begin`
-    integer :: b, begin, i, n, others, pair, q
+    integer :: a, b, begin, e, i, n, pair, q
 
     call transposed_order(incidence%coordinate, freedoms, order, first)
     element_of = incidence%entry_elements()
     position = 0
     n = 0
-    others = size(self%element) + 1
     do q = 1, freedoms
       begin = self%pairs + 1
       do i = first(q), first(q + 1) - 1
         b = order(i)
         if (.not. incidence%has_ratio(b)) cycle
-        call add_responses(element_of(b), 0)
-        do pair = 1, cross%count
-          if (cross%by(pair) == element_of(b)) call add_responses(cross%element(pair), pair)
+        do pair = 0, cross%count
+          e = cross%moved(pair, element_of(b))
+          if (e == 0) cycle
+          do a = incidence%first(e), incidence%first(e + 1) - 1
+            call find_position(incidence%coordinate(a), q, begin, position(incidence%coordinate(a)), self%pairs, row, column)
+            n = n + 1
+            self%element(n) = e
+            self%pair(n) = pair
+            self%position(n) = position(incidence%coordinate(a))
+            self%response_entry(n) = a
+            self%ratio_entry(n) = b
+          end do
         end do
       end do
     end do
-    self%cross_products = size(self%element) + 1 - others
-  contains
-    !> The products of entry b with the responses of an element.
-    subroutine add_responses(element, pair)
-      integer, intent(in) :: element, pair
-      integer :: a, at
-
-      do a = incidence%first(element), incidence%first(element + 1) - 1
-        associate (of_row => position(incidence%coordinate(a)))
-          if (of_row < begin) then
-            self%pairs = self%pairs + 1
-            of_row = self%pairs
-            row(of_row) = incidence%coordinate(a)
-            column(of_row) = q
-          end if
-          if (pair == 0) then
-            n = n + 1
-            at = n
-          else
-            others = others - 1
-            at = others
-          end if
-          self%element(at) = element
-          self%pair(at) = pair
-          self%position(at) = of_row
-          self%response_entry(at) = a
-          self%ratio_entry(at) = b
-        end associate
-      end do
-    end subroutine add_responses
   end subroutine form_products
+
+  !> The position of a row in the present column, if it is not below `begin`; else the next one.
+  pure subroutine find_position(row_of, column_of, begin, position, last, row, column)
+    integer, intent(in) :: row_of, column_of, begin
+    integer, intent(inout) :: position, last      !! last: number of positions
+    integer, intent(inout) :: row(:), column(:)   !! of each position
+
+    if (position >= begin) return
+    last = last + 1
+    position = last
+    row(position) = row_of
+    column(position) = column_of
+  end subroutine find_position
 
   !> The parts of the derivatives of the work integrals: each coordinate of an element, and those of others on which its moment
   !> depends.
-  subroutine form_works(incidence, with_work, cross, work, column, self)
+  subroutine form_works(freedoms, incidence, with_work, cross, work, column, self)
+    integer, intent(in) :: freedoms
     type(element_coordinates_t), intent(in) :: incidence
     integer, intent(in) :: with_work(:)
     type(cross_slopes_t), intent(in) :: cross
     integer, allocatable, intent(out) :: work(:), column(:)   !! number and coordinate of each position
     type(reduced_jacobian_t), intent(inout) :: self
     integer, allocatable :: entry(:)   ! of each part
-    integer :: before, i, most, n, pair, parts
+    integer :: position(freedoms)      ! position of each coordinate in the present work integral, if not below `begin`
+    integer :: begin, e, i, k, n, pair
 
-    most = sum(incidence%first(with_work + 1) - incidence%first(with_work)) &
-           + sum(incidence%first(cross%by + 1) - incidence%first(cross%by))
-    allocate (self%work_position(most), self%work_element(most), self%work_pair(most), entry(most), work(most), column(most))
+    n = sum(incidence%first(with_work + 1) - incidence%first(with_work)) &
+        + sum(incidence%first(cross%by + 1) - incidence%first(cross%by))   ! at most
+    allocate (self%work_position(n), self%work_element(n), self%work_pair(n), entry(n), work(n), column(n))
+    position = 0
     n = 0
-    parts = 0
     do i = 1, size(with_work)
-      before = n
-      call add_parts(with_work(i), 0)
-      do pair = 1, cross%count
-        if (cross%element(pair) == with_work(i)) call add_parts(cross%by(pair), pair)
+      begin = self%works + 1
+      do pair = 0, cross%count
+        e = cross%mover(pair, with_work(i))
+        if (e == 0) cycle
+        do k = incidence%first(e), incidence%first(e + 1) - 1
+          call find_position(i, incidence%coordinate(k), begin, position(incidence%coordinate(k)), self%works, work, column)
+          n = n + 1
+          entry(n) = k
+          self%work_position(n) = position(incidence%coordinate(k))
+          self%work_element(n) = with_work(i)
+          self%work_pair(n) = pair
+        end do
       end do
     end do
-    self%works = n
-    work = work(:n)
-    self%work_position = self%work_position(:parts)
-    self%work_element = self%work_element(:parts)
-    self%work_pair = self%work_pair(:parts)
-    self%ratio = incidence%ratio(:, entry(:parts))
-  contains
-    !> The parts by the coordinates of the element whose motion the work depends on.
-    subroutine add_parts(mover, pair)
-      integer, intent(in) :: mover, pair
-      integer :: k, position
-
-      do k = incidence%first(mover), incidence%first(mover + 1) - 1
-        position = before + findloc(column(before + 1:n), incidence%coordinate(k), dim=1)
-        if (position == before) then
-          n = n + 1
-          position = n
-          work(n) = i
-          column(n) = incidence%coordinate(k)
-        end if
-        parts = parts + 1
-        entry(parts) = k
-        self%work_position(parts) = position
-        self%work_element(parts) = with_work(i)
-        self%work_pair(parts) = pair
-      end do
-    end subroutine add_parts
+    self%work_position = self%work_position(:n)
+    self%work_element = self%work_element(:n)
+    self%work_pair = self%work_pair(:n)
+    self%ratio = incidence%ratio(:, entry(:n))
   end subroutine form_works
 
   subroutine append_internal(freedoms, incidence, with_work, internal, self)
@@ -262,21 +234,21 @@ contains
 
     dfdy(:, :2 * self%pairs) = 0.0_wp
     dfdy(:, 2 * self%pairs + 1:2 * self%pairs + self%freedoms) = 1.0_wp
-    do n = 1, size(self%element) - self%cross_products
+    do n = 1, size(self%element)
       e = self%element(n)
       at = self%position(n)
+      if (self%pair(n) > 0) then
+        associate (cross => elements%cross, pair => self%pair(n), by_speed => dfdy(:, at), by_angle => dfdy(:, self%pairs + at))
+          by_speed = by_speed + self%product(:, n) * cross%applied_speed(:, pair)
+          by_angle = by_angle + self%product(:, n) * (cross%restoring_angle(:, pair) + cross%applied_angle(:, pair))
+        end associate
+        cycle
+      end if
       do l = 1, size(dfdy, 1)
         dfdy(l, at) = dfdy(l, at) + self%product(l, n) * elements%applied_speed(l, e)
         dfdy(l, self%pairs + at) = dfdy(l, self%pairs + at) &
                                    + self%product(l, n) * (elements%restoring_angle(l, e) + elements%applied_angle(l, e))
       end do
-    end do
-    do n = n, size(self%element)
-      associate (cross => elements%cross, pair => self%pair(n), by_speed => dfdy(:, self%position(n)), &
-                 by_angle => dfdy(:, self%pairs + self%position(n)))
-        by_speed = by_speed + self%product(:, n) * cross%applied_speed(:, pair)
-        by_angle = by_angle + self%product(:, n) * (cross%restoring_angle(:, pair) + cross%applied_angle(:, pair))
-      end associate
     end do
     at = 2 * self%pairs + self%freedoms
     call fill_works(self, elements, dfdy(:, at + 1:at + 2 * self%works))
