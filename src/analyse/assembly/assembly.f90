@@ -10,8 +10,7 @@ module nocdyn_assembly
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
-  use nocdyn_joint_assembly, only: add_clutch_form, add_freewheel_form, check_joints, clutch_form, freewheel_form, &
-    refuse_joints
+  use nocdyn_joint_assembly, only: add_clutch_form, add_freewheels, check_joints, clutch_form, refuse_joints
   use nocdyn_machine, only: machine_t
   use nocdyn_massless_motion, only: massless_bodies
   use nocdyn_mesh_assembly, only: add_mesh_form, check_meshes, mesh_form
@@ -63,7 +62,7 @@ contains
       call add_banks(new_element_groups(input, 'coupling', n, body_index), coupling_form, add_coupling_form, machine%banks)
       call add_banks(new_element_groups(input, 'mesh', n, body_index), mesh_form, add_mesh_form, machine%banks)
       call add_banks(new_element_groups(input, 'clutch', n, body_index), clutch_form, add_clutch_form, machine%banks)
-      call add_banks(new_element_groups(input, 'freewheel', n, body_index), freewheel_form, add_freewheel_form, machine%banks)
+      call add_freewheels(new_element_groups(input, 'freewheel', n, body_index), machine%banks)
       call add_banks(new_element_groups(input, 'motor', n, body_index), motor_form, add_motor_form, machine%banks)
       call add_banks(new_element_groups(input, 'load', n, body_index), load_form, add_load_form, machine%banks)
       call add_banks(new_element_groups(input, 'excitation', n, body_index), excitation_form, add_excitation_form, machine%banks)

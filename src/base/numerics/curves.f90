@@ -8,10 +8,9 @@ module nocdyn_curves
   implicit none (type, external)
   private
 
-  public :: new_curve
+  public :: new_curve, new_steps
 
   integer, parameter, public :: interpolation_linear = 1, interpolation_cubic = 2
-  integer, parameter, public :: interpolation_steps = 3      !! the value of each point until the next; 0 before the first
   integer, parameter, public :: extrapolation_linear = 1     !! with the slope at the end
   integer, parameter, public :: extrapolation_constant = 2   !! with the value at the end
 
@@ -24,7 +23,7 @@ module nocdyn_curves
   !> Segment s lies between points s and s + 1, segment 0 before the first point, segment `points` behind the last one. The
   !> polynomial of a segment may be evaluated anywhere.
   type, public :: curve_t
-    real(wp), allocatable, private :: knot(:)            !! ascending, at least 2
+    real(wp), allocatable, private :: knot(:)            !! ascending, at least 2; or 1, of steps
     real(wp), allocatable, private :: origin(:)          !! where the polynomial of each segment begins, [0:points]
     real(wp), allocatable, private :: coefficient(:, :)  !! of the powers of x - origin, [0:3, 0:points]
     real(wp), allocatable, private :: area(:)            !! integral from the first point to the origin, [0:points]
@@ -58,10 +57,6 @@ contains
     allocate (self%origin(0:n), self%area(0:n), self%coefficient(0:3, 0:n), source=0.0_wp)
     self%origin(:) = [x(1), x]
     self%coefficient(0, :) = [y(1), y]
-    if (interpolation == interpolation_steps) then
-      self%coefficient(0, 0) = 0.0_wp
-      secant = 0.0_wp
-    end if
     self%coefficient(1, 1:n - 1) = secant
     slope = [secant, secant(n - 1)]
     if (interpolation == interpolation_cubic .and. n > 2) then
@@ -77,6 +72,23 @@ contains
       self%area(i + 1) = integral_to(self, i, x(i + 1))
     end do
   end function new_curve
+
+  !> The value of each point until the next one; 0 before the first.
+  function new_steps(x, y) result(self)
+    real(wp), intent(in) :: x(:)   !! ascending, at least 1
+    real(wp), intent(in) :: y(:)   !! [points]
+    type(curve_t) :: self
+    integer :: i, n
+
+    n = size(x)
+    allocate (self%knot, source=x)
+    allocate (self%origin(0:n), self%area(0:n), self%coefficient(0:3, 0:n), source=0.0_wp)
+    self%origin(:) = [x(1), x]
+    self%coefficient(0, 1:) = y
+    do i = 1, n - 1
+      self%area(i + 1) = integral_to(self, i, x(i + 1))
+    end do
+  end function new_steps
 
   !> Slopes at the points: weighted harmonic means of the adjacent secants, 0 at extremes.
   pure function monotone_slopes(h, secant) result(slope)

@@ -133,7 +133,7 @@ contains
   !> The position of a row in the present column, if it is not below `begin`; else the next one.
   pure subroutine find_position(row_of, column_of, begin, position, last, row, column)
     integer, intent(in) :: row_of, column_of, begin
-    integer, intent(inout) :: position, last      !! last: number of positions
+    integer, intent(inout) :: position, last      !! of them, last is the number
     integer, intent(inout) :: row(:), column(:)   !! of each position
 
     if (position >= begin) return

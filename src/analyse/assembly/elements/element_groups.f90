@@ -12,7 +12,7 @@ module nocdyn_element_groups
   implicit none (type, external)
   private
 
-  public :: new_body_index, bodies_of, new_element_groups, add_banks
+  public :: new_body_index, bodies_of, new_element_groups, add_banks, group_curve
 
   !> Finds the bodies of an input by name.
   type, public :: body_index_t
@@ -166,22 +166,30 @@ contains
     character(len=*), intent(in) :: x, y                      !! keys of the lists
     character(len=*), intent(in), optional :: extrapolation   !! that of the group if absent
     type(curve_t), allocatable :: curves(:, :)
-    character(len=:), allocatable :: beyond
-    integer :: i, inside, lane, outside
+    integer :: i, lane
 
     allocate (curves(self%lanes, size(self%indices)))
     do i = 1, size(self%indices)
-      associate (group => self%input%groups(self%indices(i)))
-        if (present(extrapolation)) beyond = extrapolation
-        if (.not. present(extrapolation)) beyond = group%text('extrapolation')
-        inside = merge(interpolation_cubic, interpolation_linear, group%text('interpolation') == 'cubic')
-        outside = merge(extrapolation_constant, extrapolation_linear, beyond == 'constant')
-        curves(1, i) = new_curve(group%numbers(x), group%numbers(y), inside, outside)
-        do lane = 2, self%lanes
-          curves(lane, i) = curves(1, i)
-        end do
-      end associate
+      curves(1, i) = group_curve(self%input%groups(self%indices(i)), x, y, extrapolation)
+      do lane = 2, self%lanes
+        curves(lane, i) = curves(1, i)
+      end do
     end do
   end function curves
+
+  !> The table of one group.
+  type(curve_t) function group_curve(group, x, y, extrapolation) result(curve)
+    type(group_t), intent(in) :: group
+    character(len=*), intent(in) :: x, y                      !! keys of the lists
+    character(len=*), intent(in), optional :: extrapolation   !! that of the group if absent
+    character(len=:), allocatable :: beyond
+    integer :: inside, outside
+
+    if (present(extrapolation)) beyond = extrapolation
+    if (.not. present(extrapolation)) beyond = group%text('extrapolation')
+    inside = merge(interpolation_cubic, interpolation_linear, group%text('interpolation') == 'cubic')
+    outside = merge(extrapolation_constant, extrapolation_linear, beyond == 'constant')
+    curve = new_curve(group%numbers(x), group%numbers(y), inside, outside)
+  end function group_curve
 
 end module nocdyn_element_groups

@@ -1,9 +1,8 @@
 !> The banks of the clutches and freewheels of an input.
 module nocdyn_joint_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t, role_clutch, role_freewheel
-  use nocdyn_curves, only: curve_t, extrapolation_constant, interpolation_cubic, interpolation_linear, interpolation_steps, &
-                           new_curve
-  use nocdyn_element_groups, only: element_groups_t
+  use nocdyn_curves, only: curve_t, new_steps
+  use nocdyn_element_groups, only: element_groups_t, group_curve
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_friction_joints, only: joint_ranges_t, new_friction_joints
   use nocdyn_input, only: group_t, input_t
@@ -12,7 +11,7 @@ module nocdyn_joint_assembly
   implicit none (type, external)
   private
 
-  public :: clutch_form, freewheel_form, add_clutch_form, add_freewheel_form, check_joints, refuse_joints
+  public :: clutch_form, add_clutch_form, add_freewheels, check_joints, refuse_joints
 
   integer, parameter :: engaged = 1, with_engagement = 2
   integer, parameter :: forms_of_friction = 2   ! as many follow of dog clutches
@@ -23,15 +22,15 @@ contains
   subroutine check_joints(input, error)
     type(input_t), intent(in) :: input
     type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: clutches(:)
     integer :: i
 
-    do i = 1, size(input%groups)
-      associate (group => input%groups(i))
-        if (group%kind /= 'clutch') cycle
-        if (group%text('kind') /= 'friction') cycle
+    allocate (clutches, source=input%groups_named('clutch', 'friction'))
+    do i = 1, size(clutches)
+      associate (group => input%groups(clutches(i)))
         if (.not. group%has_value('static_capacity')) cycle
         if (group%number('static_capacity') >= group%number('capacity')) cycle
-        call raise(error, exit_input, input%location(i, 'static_capacity') // ': static_capacity = ' // &
+        call raise(error, exit_input, input%location(clutches(i), 'static_capacity') // ': static_capacity = ' // &
                    to_text(group%number('static_capacity')) // ' is below capacity = ' // to_text(group%number('capacity')) // &
                    '; allowed: at least that of slip [N m]')
         return
@@ -39,24 +38,16 @@ contains
     end do
   end subroutine check_joints
 
-  !> The group of the first joint of an input, 0 if there is none.
-  pure integer function first_joint(input)
-    type(input_t), intent(in) :: input
-
-    do first_joint = 1, size(input%groups)
-      if (input%groups(first_joint)%kind == 'clutch' .or. input%groups(first_joint)%kind == 'freewheel') return
-    end do
-    first_joint = 0
-  end function first_joint
-
   !> Refuses joints where it is not known which of them are locked.
   subroutine refuse_joints(input, what, error)
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: what   !! does not know it, e.g. 'nocdyn modes'
     type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: joints(:)
 
-    if (first_joint(input) == 0) return
-    call raise(error, exit_input, input%location(first_joint(input)) // ': ' // what // ' does not know which joints are ' // &
+    allocate (joints, source=[input%groups_named('clutch'), input%groups_named('freewheel')])
+    if (size(joints) == 0) return
+    call raise(error, exit_input, input%location(minval(joints)) // ': ' // what // ' does not know which joints are ' // &
                'locked; allowed: no clutches and freewheels; a locked one is a &gear with teeth = 1, 1 and internal = .true.')
   end subroutine refuse_joints
 
@@ -64,20 +55,9 @@ contains
   pure integer function clutch_form(group)
     type(group_t), intent(in) :: group
 
-    clutch_form = merge(with_engagement, engaged, group%has_value('times'))
-    if (group%text('kind') == 'dog') then
-      clutch_form = clutch_form + forms_of_friction
-    else if (group%has_value('table_time')) then
-      clutch_form = with_engagement
-    end if
+    clutch_form = merge(with_engagement, engaged, group%has_value('times') .or. group%has_value('table_time'))
+    if (group%text('kind') == 'dog') clutch_form = clutch_form + forms_of_friction
   end function clutch_form
-
-  !> That of a group &freewheel.
-  pure integer function freewheel_form(group)
-    type(group_t), intent(in) :: group
-
-    freewheel_form = merge(engaged, 0, group%kind == 'freewheel')
-  end function freewheel_form
 
   !> Adds the bank of the clutches of one form.
   subroutine add_clutch_form(groups, form, banks)
@@ -115,43 +95,24 @@ contains
   end subroutine add_clutch_form
 
   !> The engagement of a clutch over the time.
-  function engagement_of(group) result(curve)
+  type(curve_t) function engagement_of(group) result(curve)
     type(group_t), intent(in) :: group
-    type(curve_t) :: curve
-    real(wp), allocatable :: levels(:), times(:)
 
-    if (has_table(group)) then
-      curve = new_curve(group%numbers('table_time'), group%numbers('table_level'), &
-                        merge(interpolation_cubic, interpolation_linear, group%text('interpolation') == 'cubic'), &
-                        extrapolation_constant)
-      return
+    if (group%has_value('times')) then
+      curve = new_steps(group%numbers('times'), group%numbers('levels'))
+    else
+      curve = group_curve(group, 'table_time', 'table_level', 'constant')
     end if
-    times = group%numbers('times')
-    levels = group%numbers('levels')
-    if (size(times) == 1) then   ! a curve has two points
-      times = [times, times + 1.0_wp]
-      levels = [levels, levels]
-    end if
-    curve = new_curve(times, levels, interpolation_steps, extrapolation_constant)
   end function engagement_of
 
-  !> Whether the engagement is a table.
-  logical function has_table(group)
-    type(group_t), intent(in) :: group
-
-    has_table = .false.
-    if (group%text('kind') == 'friction') has_table = group%has_value('table_time')
-  end function has_table
-
   !> Adds the bank of the freewheels: forward, the driven body is pushed, never pulled back.
-  subroutine add_freewheel_form(groups, form, banks)
+  subroutine add_freewheels(groups, banks)
     type(element_groups_t), intent(in) :: groups
-    integer, intent(in) :: form
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(joint_ranges_t) :: ranges
     integer :: i
 
-    if (size(groups%indices) == 0 .or. form /= engaged) return
+    if (size(groups%indices) == 0) return
     ranges%most = groups%values('capacity', absent=huge(1.0_wp))
     ranges%least = 0.0_wp * groups%values('capacity')
     ranges%sliding_most = merge(0.0_wp, ranges%most, ranges%most >= huge(1.0_wp))
@@ -165,6 +126,6 @@ contains
     end do
     call append_bank(banks, new_friction_joints(role_freewheel, groups%names, groups%bodies('bodies', 1), &
                                                 groups%bodies('bodies', 2), ranges))
-  end subroutine add_freewheel_form
+  end subroutine add_freewheels
 
 end module nocdyn_joint_assembly
