@@ -14,6 +14,7 @@ module nocdyn_assembly
   use nocdyn_machine, only: machine_t
   use nocdyn_massless_motion, only: massless_bodies
   use nocdyn_mesh_assembly, only: add_mesh_form, check_meshes, mesh_form
+  use nocdyn_motion_assembly, only: add_cardans, add_drive_form, drive_form
   use nocdyn_motor_assembly, only: add_motor_form, check_motors, motor_form
   use nocdyn_multiplier, only: new_multiplier
   use nocdyn_paper, only: new_paper
@@ -63,6 +64,8 @@ contains
       call add_banks(new_element_groups(input, 'mesh', n, body_index), mesh_form, add_mesh_form, machine%banks)
       call add_banks(new_element_groups(input, 'clutch', n, body_index), clutch_form, add_clutch_form, machine%banks)
       call add_freewheels(new_element_groups(input, 'freewheel', n, body_index), machine%banks)
+      call add_cardans(new_element_groups(input, 'cardan', n, body_index), machine%banks)
+      call add_banks(new_element_groups(input, 'drive', n, body_index), drive_form, add_drive_form, machine%banks)
       call add_banks(new_element_groups(input, 'motor', n, body_index), motor_form, add_motor_form, machine%banks)
       call add_banks(new_element_groups(input, 'load', n, body_index), load_form, add_load_form, machine%banks)
       call add_banks(new_element_groups(input, 'excitation', n, body_index), excitation_form, add_excitation_form, machine%banks)

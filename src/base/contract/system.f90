@@ -44,6 +44,7 @@ module nocdyn_system
     logical :: hides_bends = .false. !! whether a series of the solution may not show a bend of it, however near, as that of tanh
     logical :: is_shared = .false.   !! whether its lanes are variants, which share vectors and are looked at little: other costs
     logical :: may_shift = .false.   !! whether `find_far` is called after every step
+    logical :: projects = .false.    !! whether `project_state` is called after every step
     logical :: limits_steps = .false. !! whether `limit_steps` is called before every step
     logical :: has_block_indicators = .false.   !! whether `block_indicators` is overridden; else lanes are looked at one by one
   contains
@@ -55,6 +56,7 @@ module nocdyn_system
     procedure :: measure
     procedure :: measure_name
     procedure :: find_far
+    procedure :: project_state
     procedure :: limit_steps
     procedure :: shift_state
     procedure :: restore_state
@@ -155,6 +157,14 @@ contains
 
     is_far = .false.
   end subroutine find_far
+
+  !> Puts the state of a lane after a step back on the invariants of the equations, which it has left by the error of the step.
+  subroutine project_state(self, lane, t, y)
+    class(system_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(inout) :: y(:)   !! [states + quadratures]
+  end subroutine project_state
 
   !> Shortens steps that would be too long for the search of crossings: it looks at a few times in each, however little the state
   !> bends. By default none are.

@@ -8,13 +8,13 @@
 module nocdyn_bounded_complementarity
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pseudo_inverse
+  use nocdyn_semidefinite, only: null_tolerance
   implicit none (type, external)
   private
 
-  public :: solve_bounded_complementarity, null_tolerance
+  public :: solve_bounded_complementarity
 
   integer, parameter, public :: is_free = 0, at_lower = -1, at_upper = 1   !! where a force is
-  real(wp), parameter :: null_tolerance = 1.0e-11_wp                       !! singular values of W below it count as zero
   real(wp), parameter :: rounding = 1.0e-12_wp                             ! of a, relative to the largest of its terms
 
 contains

@@ -34,6 +34,8 @@ module nocdyn_curves
     procedure :: segment
     procedure :: segment_number
     procedure :: value
+    procedure :: derivatives
+    procedure :: integral_to
   end type curve_t
 
 contains
@@ -214,9 +216,24 @@ contains
     end associate
   end function value
 
+  !> The value and the first three derivatives of the polynomial of a segment.
+  pure function derivatives(self, segment, x) result(y)
+    class(curve_t), intent(in) :: self
+    integer, intent(in) :: segment   !! 0 to points
+    real(wp), intent(in) :: x
+    real(wp) :: y(0:3)
+
+    associate (d => x - self%origin(segment), c => self%coefficient(:, segment))
+      y(0) = c(1) + d * (c(2) + d * (c(3) + d * c(4)))
+      y(1) = c(2) + d * (2.0_wp * c(3) + 3.0_wp * d * c(4))
+      y(2) = 2.0_wp * c(3) + 6.0_wp * d * c(4)
+      y(3) = 6.0_wp * c(4)
+    end associate
+  end function derivatives
+
   !> The integral from the first point to x.
   pure function integral_to(self, segment, x) result(integral)
-    type(curve_t), intent(in) :: self
+    class(curve_t), intent(in) :: self
     integer, intent(in) :: segment   !! that contains x
     real(wp), intent(in) :: x
     real(wp) :: d, integral

@@ -13,7 +13,7 @@ module nocdyn_integration
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
   use nocdyn_time_stepping, only: advance_lanes, begin_attempts, fill_lanes, integrator_t, prepare_integrator, &
-    release_lanes, shift_states
+    project_states, release_lanes, shift_states
   implicit none (type, external)
   private
 
@@ -88,6 +88,7 @@ contains
         end if
         if (integrator%wants_steps) call observe_steps(integrator, stepper, observer)
         call advance_lanes(integrator, times)
+        if (system%projects) call project_states(integrator, system)
         if (integrator%may_shift) call shift_states(integrator, system, observer)
         call stepper%accept(integrator%accepted)
         if (integrator%has_switches) call change_branches(integrator, stepper, system, observer, solver_status)

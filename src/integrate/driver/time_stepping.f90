@@ -21,7 +21,8 @@ module nocdyn_time_stepping
   implicit none (type, external)
   private
 
-  public :: prepare_integrator, fill_lanes, evaluate_starts, begin_attempts, advance_lanes, shift_states, release_lanes
+  public :: prepare_integrator, fill_lanes, evaluate_starts, begin_attempts, advance_lanes, project_states, &
+    shift_states, release_lanes
 
   type, public :: integrator_t
     type(step_attempt_t) :: attempt
@@ -285,6 +286,22 @@ contains
       end do
     end associate
   end subroutine advance_lanes
+
+  !> Lets the system put the states of the lanes that have moved back on its invariants.
+  subroutine project_states(integrator, system)
+    type(integrator_t), intent(inout) :: integrator
+    class(system_t), intent(inout) :: system
+    integer :: lane
+
+    associate (attempt => integrator%attempt)
+      do lane = 1, attempt%lanes
+        if (.not. integrator%accepted(lane)) cycle
+        integrator%sample(:) = attempt%y(lane, :attempt%components)
+        call system%project_state(lane, attempt%t(lane), integrator%sample)
+        attempt%y(lane, :attempt%components) = integrator%sample
+      end do
+    end associate
+  end subroutine project_states
 
   !> Lets the system shift the states of the lanes that have moved, if any lane has gone far.
   subroutine shift_states(integrator, system, observer)

@@ -22,9 +22,14 @@ module nocdyn_bank
   integer, parameter, public :: role_phase = 5        !! part of a coupling: the phase of an element of the bank before
   integer, parameter, public :: role_clutch = 6       !! locks or slips; takes energy out
   integer, parameter, public :: role_freewheel = 7    !! the same in one direction
+  integer, parameter, public :: role_cardan = 8       !! joints with a ratio that depends on the position
+  integer, parameter, public :: role_crank = 9
+  integer, parameter, public :: role_relation = 10
+  integer, parameter, public :: role_drive = 11       !! prescribed motion; puts energy in
 
-  character(len=*), parameter, public :: role_names(*) = ['coupling  ', 'load      ', 'motor     ', 'excitation', 'coupling  ', &
-                                                               'clutch    ', 'freewheel ']
+  character(len=*), parameter, public :: role_names(*) = [character(len=10) :: 'coupling', 'load', 'motor', 'excitation', &
+                                                          'coupling', 'clutch', 'freewheel', 'cardan', 'crank', 'relation', &
+                                                          'drive']
 
   !> One quantity that a bank writes to the table of results.
   type, public :: quantity_t
@@ -161,7 +166,7 @@ contains
   pure logical function is_source(self)
     class(bank_t), intent(in) :: self
 
-    is_source = self%role == role_motor .or. self%role == role_excitation
+    is_source = any(self%role == [role_motor, role_excitation, role_drive])
   end function is_source
 
   !> Replaces torques that keep changing, with the time or with the angle of a turning body, by their means. By default there

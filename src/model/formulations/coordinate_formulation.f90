@@ -38,8 +38,8 @@ module nocdyn_coordinate_formulation
     procedure :: twist_at_zero
     procedure :: switch_motion
     procedure :: accelerate
-    procedure :: joint_rate
-    procedure :: push
+    procedure :: element_rate
+    procedure :: push_element
     procedure :: block_indicators
     procedure :: reactions
   end type coordinate_formulation_t
@@ -310,35 +310,35 @@ contains
     end associate
   end subroutine accelerate
 
-  !> The slip of a joint, or its derivative.
-  pure real(wp) function joint_rate(self, joint, rates)
+  !> The rate of an element.
+  pure real(wp) function element_rate(self, element, rates)
     class(coordinate_formulation_t), intent(in) :: self
-    integer, intent(in) :: joint
+    integer, intent(in) :: element
     real(wp), intent(in) :: rates(:)   !! q' [rad/s] or q'' [rad/s2], [freedoms] at least
     integer :: k
 
-    joint_rate = 0.0_wp
-    associate (map => self%incidence, e => self%joints%element(joint))
-      do k = map%first(e), map%first(e + 1) - 1
-        joint_rate = joint_rate + map%ratio(1, k) * rates(map%coordinate(k))
+    element_rate = 0.0_wp
+    associate (map => self%incidence)
+      do k = map%first(element), map%first(element + 1) - 1
+        element_rate = element_rate + map%ratio(1, k) * rates(map%coordinate(k))
       end do
     end associate
-  end function joint_rate
+  end function element_rate
 
-  !> Adds the response to the moment or the impulse of a joint.
-  pure subroutine push(self, joint, moment, rates)
+  !> Adds the response to the moment or the impulse of an element.
+  pure subroutine push_element(self, element, moment, rates)
     class(coordinate_formulation_t), intent(in) :: self
-    integer, intent(in) :: joint
+    integer, intent(in) :: element
     real(wp), intent(in) :: moment        !! [N m] or [N m s]
     real(wp), intent(inout) :: rates(:)   !! q'' [rad/s2] or q' [rad/s], [freedoms] at least
     integer :: k
 
-    associate (map => self%incidence, e => self%joints%element(joint))
-      do k = map%first(e), map%first(e + 1) - 1
+    associate (map => self%incidence)
+      do k = map%first(element), map%first(element + 1) - 1
         rates(map%coordinate(k)) = rates(map%coordinate(k)) + map%response(1, k) * moment
       end do
     end associate
-  end subroutine push
+  end subroutine push_element
 
   !> Reactions from the torques of the last `observe`.
   subroutine reactions(self, lane, lambda)

@@ -1,27 +1,17 @@
 !> Formulations with joints that lock: clutches and freewheels (`nocdyn_joint_sets`), in a block of one lane.
-!>
-!> Locked joints add their moments to those of the elements, so that q'' is that on the complement of all rows that hold.
-!> Extensions say how the slips follow from the states, and how the states answer to the moments of joints.
 module nocdyn_joint_formulation
-  use nocdyn_formulation, only: choose_branch, formulation_t, indicate_branch, observe_elements, start_branches
+  use nocdyn_formulation, only: choose_branch, indicate_branch, observe_elements, start_branches
   use nocdyn_friction_joints, only: locked
   use nocdyn_joint_sets, only: boundary_shift, rest_width
   use nocdyn_kinds, only: wp
+  use nocdyn_row_formulation, only: row_formulation_t
   implicit none (type, external)
   private
 
   integer, parameter :: by_state = 0   ! no joint
 
-  type, abstract, extends(formulation_t), public :: joint_formulation_t
-    real(wp), allocatable :: acceleration(:)             !! of the first states without locked joints, work space, [moving]
-    real(wp), allocatable, private :: joint_state(:, :)  !! work space, [1, states]
+  type, abstract, extends(row_formulation_t), public :: joint_formulation_t
   contains
-    procedure :: prepare_joints
-    procedure :: hold
-    procedure(accelerate_interface), deferred :: accelerate
-    procedure(rate_interface), deferred :: joint_rate
-    procedure(push_interface), deferred :: push
-    procedure, private :: find_held_moments
     procedure, private :: settle_joints
     procedure :: observe => observe_with_joints
     procedure :: start_lane => start_with_joints
@@ -29,34 +19,6 @@ module nocdyn_joint_formulation
     procedure :: set_indicator => indicate_one
     procedure :: change_branch => change_with_joints
   end type joint_formulation_t
-
-  abstract interface
-
-    !> The accelerations of the first states from the torques `torque` on the bodies, in a block of one lane.
-    subroutine accelerate_interface(self, acceleration)
-      import :: joint_formulation_t, wp
-      class(joint_formulation_t), intent(inout) :: self
-      real(wp), intent(inout) :: acceleration(:)   !! [rad/s2], [moving]
-    end subroutine accelerate_interface
-
-    !> The slip of a joint from the speeds of the first states, or its derivative from their accelerations.
-    pure real(wp) function rate_interface(self, joint, rates)
-      import :: joint_formulation_t, wp
-      class(joint_formulation_t), intent(in) :: self
-      integer, intent(in) :: joint
-      real(wp), intent(in) :: rates(:)   !! [rad/s] or [rad/s2], [moving] at least
-    end function rate_interface
-
-    !> Adds what the moment or the impulse of a joint does to the accelerations or speeds of the first states.
-    pure subroutine push_interface(self, joint, moment, rates)
-      import :: joint_formulation_t, wp
-      class(joint_formulation_t), intent(in) :: self
-      integer, intent(in) :: joint
-      real(wp), intent(in) :: moment        !! [N m] or [N m s]
-      real(wp), intent(inout) :: rates(:)   !! [moving] at least
-    end subroutine push_interface
-
-  end interface
 
 contains
 
@@ -66,8 +28,11 @@ contains
     real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
     real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states], at least
 
-    call observe_elements(self, t, y)
-    if (self%joints%count > 0) call observe_joints(self, t(1), y(1, :self%states))
+    if (self%joints%count > 0) then
+      call observe_joints(self, t(1), y(1, :self%states))
+    else
+      call observe_elements(self, t, y)
+    end if
   end subroutine observe_with_joints
 
   !> Evaluates the elements where some joints may be locked, in a block of one lane.
@@ -75,15 +40,19 @@ contains
     class(joint_formulation_t), intent(inout) :: self
     real(wp), intent(in) :: t      !! [s]
     real(wp), intent(in) :: y(:)   !! [states]
-    real(wp) :: moved(size(y))
+    real(wp) :: moved(size(y)), near(size(y))
 
-    if (associated(self%joints%leader)) then
-      call self%joints%follow(self%machine%banks)
-    else
-      moved = y
+    near = y
+    if (associated(self%joints%leader)) call self%joints%follow(self%machine%banks)
+    if (self%joints%motions%count > 0) call self%project(t, near)
+    self%joint_state(1, :) = near
+    call self%gather(self%joint_state)
+    call self%machine%choose_branches([t])
+    if (.not. associated(self%joints%leader)) then
+      moved = near
       call self%settle_joints(by_state, t, moved)
     end if
-    call self%find_held_moments(t, y)
+    call self%find_held_moments(t, near)
     call self%machine%elements%scatter(self%torque)
   end subroutine observe_joints
 
@@ -118,7 +87,7 @@ contains
     real(wp), contiguous, intent(inout) :: g(:)   !! [switches]
     integer :: switch
 
-    if (any(self%joints%mode == locked)) call self%find_held_moments(t, y(:self%states))
+    if (any(self%joints%mode(:self%joints%locking) == locked)) call self%find_held_moments(t, y(:self%states))
     do switch = 1, self%switches
       if (self%joints%joint_of(switch) > 0) then
         call set_joint_indicator(self, switch, t, y, g)
@@ -172,58 +141,6 @@ contains
     end if
   end subroutine change_with_joints
 
-  !> How the joints of the machine act on one another in the first lane.
-  subroutine prepare_joints(self)
-    class(joint_formulation_t), intent(inout) :: self
-    integer :: i, j
-
-    call self%joints%start()
-    if (self%joints%count == 0) return
-    self%acceleration = spread(0.0_wp, 1, size(self%moving))
-    self%joint_state = reshape(spread(0.0_wp, 1, self%states), [1, self%states])
-    do j = 1, self%joints%count
-      self%acceleration(:) = 0.0_wp
-      call self%push(j, 1.0_wp, self%acceleration)
-      do i = 1, self%joints%count
-        self%joints%weight(i, j) = self%joint_rate(i, self%acceleration)
-      end do
-    end do
-  end subroutine prepare_joints
-
-  !> The moments of the locked joints at a state of a block of one lane, where the branches are known; they are put among those of
-  !> the elements.
-  subroutine find_held_moments(self, t, y)
-    class(joint_formulation_t), intent(inout) :: self
-    real(wp), intent(in) :: t      !! [s]
-    real(wp), intent(in) :: y(:)   !! [states]
-
-    self%joint_state(1, :) = y
-    call self%gather(self%joint_state)
-    call self%machine%evaluate_elements([t])
-    call self%machine%elements%scatter(self%torque)
-    call self%accelerate(self%acceleration)
-    call self%hold(self%acceleration)
-  end subroutine find_held_moments
-
-  !> Adds the moments of the locked joints to the accelerations of the first states, and puts them among those of the elements.
-  subroutine hold(self, acceleration)
-    class(joint_formulation_t), intent(inout) :: self
-    real(wp), intent(inout) :: acceleration(:)   !! [rad/s2], [moving] at least; or speeds [rad/s]
-    integer :: j
-
-    associate (joints => self%joints)
-      do j = 1, joints%count
-        joints%rate(j) = self%joint_rate(j, acceleration)
-      end do
-      call joints%find_moments()
-      do j = 1, joints%count
-        if (joints%mode(j) /= locked) cycle
-        call self%push(j, joints%moment(j), acceleration)
-        self%machine%elements%applied(1, joints%element(j)) = joints%moment(j)
-      end do
-    end associate
-  end subroutine hold
-
   !> Decides which joints are locked at a state of a block of one lane: of those that are at rest, the one that has just come to
   !> rest or reached its capacity among them. Slips that are left over from rounding are taken out of the speeds.
   subroutine settle_joints(self, which, t, y)
@@ -236,12 +153,13 @@ contains
     integer :: j
 
     associate (joints => self%joints, elements => self%machine%elements)
+      if (joints%motions%count > 0) call self%project(t, y)
       speed = max(1.0_wp, maxval(abs(y(:size(self%moving)))))
       is_struck = .false.
       if (which /= by_state) call strike(self, t, rest_width * speed, y, is_struck)
       do j = 1, joints%count
         slip(j) = self%joint_rate(j, y)
-        is_at_rest(j) = abs(slip(j)) <= rest_width * speed
+        is_at_rest(j) = abs(slip(j)) <= rest_width * speed .or. j > joints%locking
         if (which /= by_state .and. .not. is_struck) is_at_rest(j) = is_at_rest(j) .or. joints%mode(j) == locked .or. j == which
       end do
       call joints%assume(self%machine%banks, is_at_rest, slip)
@@ -252,7 +170,7 @@ contains
       end do
       moments = sum(abs(elements%applied(1, :))) + sum(abs(elements%restoring(1, :)))
       joints%moment_shift = boundary_shift * max(moments, tiny(moments))
-      call self%hold(y)
+      call self%hold(joints%motions%speed, y)
     end associate
   end subroutine settle_joints
 
@@ -263,19 +181,23 @@ contains
     real(wp), intent(in) :: tolerance    !! of a slip that is none [rad/s]
     real(wp), intent(inout) :: y(:)      !! [states] at least
     logical, intent(out) :: is_struck
-    real(wp) :: before(self%joints%count)
+    real(wp), dimension(self%joints%count) :: before, slip
     integer :: j, work
 
     associate (joints => self%joints)
       before = [(self%joint_rate(j, y), j=1, joints%count)]
-      call joints%find_impact(self%machine%banks, t, before, tolerance, joints%impulse, is_struck)
+      slip = before
+      slip(joints%locking + 1:) = 0.0_wp
+      call joints%find_impact(self%machine%banks, t, slip, tolerance, joints%impulse, is_struck)
       if (.not. is_struck) return
       do j = 1, joints%count
         call self%push(j, joints%impulse(j), y)
       end do
       if (size(y) <= self%states) return
       do j = 1, joints%count
-        work = self%states + findloc(self%machine%with_work, joints%element(j), dim=1)
+        work = findloc(self%machine%with_work, joints%element(j), dim=1)
+        if (work == 0) cycle   ! it has none
+        work = self%states + work
         y(work) = y(work) + 0.5_wp * joints%impulse(j) * (before(j) + self%joint_rate(j, y))
       end do
     end associate
@@ -294,7 +216,7 @@ contains
     slip = [(self%joint_rate(j, y), j=1, self%joints%count)]
     call self%settle_joints(which, t, y)
     call self%find_held_moments(t, y(:self%states))
-    do j = 1, self%joints%count
+    do j = 1, self%joints%locking
       if (self%joints%mode(j) == before(j)) cycle
       if (before(j) /= locked) then   ! it is not, and cannot be
         if (self%joints%is_open(self%machine%banks, j, t)) cycle

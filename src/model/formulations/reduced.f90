@@ -13,7 +13,7 @@ module nocdyn_reduced
   use nocdyn_reduced_jacobian, only: new_reduced_jacobian, reduced_jacobian_t
   use nocdyn_reduced_series, only: new_reduced_series, reduced_series_t
   use nocdyn_sparse_map, only: new_sparse_map, sparse_map_t, transposed_order
-  use nocdyn_system, only: pattern_t
+  use nocdyn_system, only: evaluation_fatal, pattern_t
   implicit none (type, external)
   private
 
@@ -151,8 +151,22 @@ contains
     end if
     call fill_derivative(self, self%lanes * self%machine%coordinates%freedoms, self%lanes * self%internal, self%quadratures, &
                          t, y, dydt)
-    if (self%joints%count > 0) call self%hold(dydt(1, :self%machine%coordinates%freedoms))
+    if (self%joints%count > 0) call hold_derivative(self, self%states + self%quadratures, t(1), dydt, status(1))
   end subroutine derivative
+
+  !> Adds what the joints that hold do.
+  subroutine hold_derivative(self, components, t, dydt, status)
+    class(reduced_t), intent(inout) :: self
+    integer, intent(in) :: components             !! states + quadratures
+    real(wp), intent(in) :: t                     !! [s]
+    real(wp), intent(inout) :: dydt(components)   !! of the only lane
+    integer, intent(inout) :: status
+
+    call self%move_rows(t)
+    call self%hold(self%joints%motions%acceleration, dydt(:self%machine%coordinates%freedoms))
+    call self%add_powers(dydt(self%states + 1:))
+    if (self%joints%lost > 0) status = evaluation_fatal
+  end subroutine hold_derivative
 
   !> The same with arrays of one dimension: speeds, angles, internal states and work integrals follow one another.
   subroutine fill_derivative(self, n, internal, quadratures, t, y, dydt)
@@ -248,8 +262,10 @@ contains
     f = self%machine%coordinates%freedoms
     associate (machine => self%machine, elements => self%machine%elements)
       call evaluate_at(self, self%lanes * f, self%lanes * self%internal, t, y)
+      if (self%joints%motions%count > 0) call self%find_accelerations(t(1), self%acceleration)
       call machine%differentiate_elements(t)
       if (self%joints%count > 0) then
+        call self%differentiate_rows(self%acceleration)
         call self%element_jacobian%fill(elements, self%free_jacobian)
       else
         call self%element_jacobian%fill(elements, dfdy)
@@ -264,7 +280,7 @@ contains
     end associate
   end subroutine jacobian
 
-  !> The Jacobian where some joints may be locked: each column has the accelerations that these leave.
+  !> The Jacobian where joints hold: each column has the accelerations that these leave.
   subroutine hold_jacobian(self, components, dfdy, dfdt)
     class(reduced_t), intent(inout) :: self
     integer, intent(in) :: components                          !! states + quadratures
@@ -278,9 +294,9 @@ contains
         dfdy(pattern%row(k), pattern%column(k)) = self%free_jacobian(1, k)
       end do
       do k = 1, self%states
-        call self%hold(dfdy(:f, k))
+        call self%hold_column(k, dfdy(:f, k), dfdy(self%states + 1:, k))
       end do
-      call self%hold(dfdt(:f))
+      call self%hold_column(0, dfdt(:f), dfdt(self%states + 1:))
     end associate
   end subroutine hold_jacobian
 

@@ -8,6 +8,7 @@ module nocdyn_schema
   use nocdyn_schema_couplings, only: coupling_examples, coupling_keys, coupling_relations
   use nocdyn_schema_engines, only: engine_examples, engine_groups, engine_keys, engine_relations
   use nocdyn_schema_joints, only: joint_examples, joint_groups, joint_keys, joint_kinds, joint_relations
+  use nocdyn_schema_motions, only: motion_examples, motion_groups, motion_keys, motion_kinds, motion_relations
   use nocdyn_schema_meshes, only: mesh_examples, mesh_groups, mesh_keys, mesh_relations
   use nocdyn_schema_response, only: response_examples, response_groups, response_keys, response_relations
   use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_text, a_word, alias_t, &
@@ -38,7 +39,7 @@ module nocdyn_schema
     group_rule_t('body',       in_machine,    at_least_once, 'body',     'A rigid body that turns about its axis.'), &
     group_rule_t('coupling',   in_machine,    any_times,     'coupling', &
                  'An elastic coupling of two bodies, or of a body and the ground.'), &
-    shaft_groups, mesh_groups, constraint_groups, joint_groups, &
+    shaft_groups, mesh_groups, constraint_groups, joint_groups, motion_groups, &
     group_rule_t('motor',      in_torques,    any_times,     'torque',   'A driving torque on a body, by a law of its speed.'), &
     group_rule_t('load',       in_torques,    any_times,     'torque', &
                  'A resisting torque on a body: the sum of the terms that are given.'), &
@@ -95,17 +96,17 @@ module nocdyn_schema
     key_rule_t('output',     'directory',       a_folder,       1, '',            "''",        anything, &
       "folder of the results; '' means results/ and the name of the input file")]
 
-  type(kind_rule_t), parameter, public :: kind_rules(*) = [joint_kinds, torque_kinds, sweep_kinds]
+  type(kind_rule_t), parameter, public :: kind_rules(*) = [joint_kinds, motion_kinds, torque_kinds, sweep_kinds]
 
   type(key_rule_t), parameter, public :: key_rules(*) = &
-    [frame_keys, coupling_keys, shaft_keys, mesh_keys, constraint_keys, joint_keys, motor_keys, load_keys, &
+    [frame_keys, coupling_keys, shaft_keys, mesh_keys, constraint_keys, joint_keys, motion_keys, motor_keys, load_keys, &
      excitation_keys, engine_keys, response_keys, sweep_keys]
 
   type(relation_rule_t), parameter, public :: relation_rules(*) = [ &
     relation_rule_t('run', less_than, 't_start', 't_end'), &
     relation_rule_t('output', at_most_one, 'interval', 'points'), &
-    coupling_relations, shaft_relations, mesh_relations, constraint_relations, joint_relations, torque_relations, &
-    engine_relations, &
+    coupling_relations, shaft_relations, mesh_relations, constraint_relations, joint_relations, motion_relations, &
+    torque_relations, engine_relations, &
     response_relations, sweep_relations]
 
   type(alias_t), parameter, public :: aliases(*) = sweep_aliases
@@ -117,7 +118,8 @@ module nocdyn_schema
     example_t('body',       "name = 'machine'  inertia = 5.0"), &
     example_t('run',        "t_end = 10.0  method = 'rk45'  rtol = 1.0e-9  atol = 1.0e-9"), &
     example_t('output',     'interval = 0.01'), &
-    coupling_examples, shaft_examples, mesh_examples, constraint_examples, joint_examples, torque_examples, engine_examples, &
+    coupling_examples, shaft_examples, mesh_examples, constraint_examples, joint_examples, motion_examples, torque_examples, &
+    engine_examples, &
     response_examples, sweep_examples]
 
   ! One value for each row of `group_rules`. The rows of `key_rules` of a group are consecutive.

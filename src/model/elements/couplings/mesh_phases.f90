@@ -1,22 +1,20 @@
 !> The phases of meshes with a transmission error: the angles of their first bodies, on which the error depends. Their moments are
 !> part of the law of the mesh, whose bank comes before.
 module nocdyn_mesh_phases
-  use nocdyn_bank, only: bank_t, harmonic_t, quantity_t, role_phase
-  use nocdyn_element_rows, only: rows_between
+  use nocdyn_bank, only: harmonic_t
   use nocdyn_couplings, only: couplings_t
   use nocdyn_kinds, only: wp
+  use nocdyn_phases, only: phases_t
   implicit none (type, external)
   private
 
   public :: new_mesh_phases
 
-  type, extends(bank_t), public :: mesh_phases_t
+  type, extends(phases_t), public :: mesh_phases_t
     real(wp), allocatable :: order(:)          !! of the transmission error e of the mesh
     complex(wp), allocatable :: slope(:)       !! e'(phi) is the sum of the real parts of slope exp(i order phi) [m/rad]
   contains
     procedure :: list_harmonics
-    procedure :: quantities
-    procedure :: named_count
   end type mesh_phases_t
 
 contains
@@ -27,8 +25,7 @@ contains
     type(mesh_phases_t) :: bank
     type(harmonic_t), allocatable :: error(:)
 
-    call bank%connect(role_phase, mesh%lanes, mesh%names, rows_between([0], mesh%rows%body(:1)))
-    bank%elastic = [integer ::]
+    call bank%connect_phases(mesh%lanes, mesh%names, mesh%rows%body(:1))
     bank%with_work = mesh%with_work
     call mesh%list_harmonics(1, 0.0_wp, error)
     bank%order = error%order
@@ -49,20 +46,5 @@ contains
     end do
     list%by_element = self%first - 1
   end subroutine list_harmonics
-
-  !> There are none, as the columns are those of the mesh.
-  function quantities(self) result(columns)
-    class(mesh_phases_t), intent(in) :: self
-    type(quantity_t), allocatable :: columns(:)
-
-    allocate (columns(0))
-  end function quantities
-
-  !> None has a name of its own.
-  pure integer function named_count(self)
-    class(mesh_phases_t), intent(in) :: self
-
-    named_count = 0
-  end function named_count
 
 end module nocdyn_mesh_phases

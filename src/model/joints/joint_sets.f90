@@ -1,19 +1,15 @@
-!> Which joints of a machine are locked, and the moments of those that are.
-!>
-!> The joints that are locked are a *set*; each is one more row u' = 0. With the response R of the coordinates' accelerations
-!> to the moments and W = U R, the moments of the locked joints are -W^+ u'', with the accelerations u'' of their slips without
-!> them: q'' is projected on the complement of the rows that hold. W^+ of each set is found once and kept. W is singular where
-!> some of the locks are redundant; the least norm shares the moment between them.
+!> Clutches and freewheels of a machine, which lock and slip, among the rows that hold (`nocdyn_held_rows`).
 !>
 !> After an event, which joints lock is a complementarity problem over all that are at rest together: a joint whose moment is
 !> inside its range stays, one at a bound slips away from it, or would if redundant others did not hold it. Its moment then is
-!> that of slip, which may be smaller than at rest, and the others are looked at again.
+!> that of slip, which may be smaller than at rest, and the others are looked at again. A row that moves has no bounds.
 module nocdyn_joint_sets
   use nocdyn_bank, only: bank_slot_t
-  use nocdyn_bounded_complementarity, only: at_upper, is_free, null_tolerance, solve_bounded_complementarity
+  use nocdyn_bounded_complementarity, only: at_upper, is_free, solve_bounded_complementarity
   use nocdyn_friction_joints, only: friction_joints_t, locked, slips_backwards, slips_forwards
+  use nocdyn_held_rows, only: held_rows_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lapack, only: pseudo_inverse
+  use nocdyn_row_motions, only: new_row_motions
   use nocdyn_switches, only: switches_t
   implicit none (type, external)
   private
@@ -22,12 +18,6 @@ module nocdyn_joint_sets
 
   real(wp), parameter, public :: rest_width = 1.0e-10_wp      !! a slip below it is none, relative to the speeds
   real(wp), parameter, public :: boundary_shift = 1.0e-12_wp  !! shift of boundaries outwards, relative to speeds or moments
-
-  !> A set with its W^+.
-  type :: joint_set_t
-    logical, allocatable :: is_locked(:)
-    real(wp), allocatable :: inverse(:, :)
-  end type joint_set_t
 
   !> A joint that has locked or begun to slip.
   type, public :: joint_event_t
@@ -39,27 +29,17 @@ module nocdyn_joint_sets
     real(wp) :: impulse = 0.0_wp  !! of an impact [N m s]
   end type joint_event_t
 
-  type, public :: joint_sets_t
-    integer :: count = 0
-    integer, allocatable :: element(:)       !! of the machine, [joints] as all that follow
-    integer, allocatable :: bank(:), number(:)   !! its bank, and its number there
+  type, extends(held_rows_t), public :: joint_sets_t
+    integer, allocatable :: bank(:), number(:)   !! bank of each joint, and its number there, [joints] as all that follow
     integer, allocatable :: joint_of(:)      !! joint of each switch of the machine, 0 for none, [switches]
-    integer, allocatable :: mode(:)
     integer, pointer, contiguous :: leader(:) => null()   !! modes of the motion that is observed; null: by the state
-    real(wp), allocatable :: rate(:)         !! accelerations of the slips u'' without the moments of locked joints [rad/s2], or
-                                             !! slips, whose moments then are impulses
-    real(wp), allocatable :: moment(:)       !! of the locked joints [N m]
     real(wp), allocatable :: impulse(:)      !! of the last impact [N m s]; 0 after other events
     real(wp), allocatable :: shift(:)        !! by which the boundary of a slip lies beyond zero [rad/s]
     real(wp) :: moment_shift = 0.0_wp        !! by which those of the moments lie beyond their ranges [N m]
-    real(wp), allocatable :: weight(:, :)    !! W [1/(kg m2)]
     type(joint_event_t), allocatable :: events(:)   !! the first `happened` are in use
     integer :: happened = 0
-    type(joint_set_t), allocatable, private :: sets(:)
-    integer, private :: present = 0          !! set
   contains
     procedure :: start
-    procedure :: find_moments
     procedure :: assume
     procedure :: decide
     procedure :: find_impact
@@ -67,7 +47,6 @@ module nocdyn_joint_sets
     procedure :: indicator
     procedure :: follow
     procedure :: is_open
-    procedure, private :: choose_set
   end type joint_sets_t
 
 contains
@@ -79,6 +58,7 @@ contains
     type(joint_sets_t) :: self
     integer :: b, e, k, next
 
+    self%motions = new_row_motions(banks)
     allocate (self%element(0), self%bank(0), self%number(0), self%joint_of(switches%count))
     self%joint_of(:) = 0
     next = 0
@@ -95,44 +75,24 @@ contains
       end select
       next = next + size(banks(b)%bank%switch_element)
     end do
+    self%locking = size(self%element)
+    self%driver = [spread(0, 1, self%locking), self%motions%driver]
+    self%element = [self%element, self%motions%element]
+    self%bank = [self%bank, self%motions%bank]
+    self%number = [self%number, self%motions%number]
     self%count = size(self%element)
-    allocate (self%mode(self%count), source=slips_forwards)
-    allocate (self%rate(self%count), self%moment(self%count), self%shift(self%count), self%impulse(self%count), source=0.0_wp)
-    allocate (self%weight(self%count, self%count), source=0.0_wp)
-    allocate (self%sets(0), self%events(16))
+    call self%allocate_rows(slips_forwards)
+    allocate (self%shift(self%count), self%impulse(self%count), source=0.0_wp)
+    allocate (self%events(16))
   end function new_joint_sets
 
   !> Forgets sets and events, before a motion that may have other parameters.
   subroutine start(self)
     class(joint_sets_t), intent(inout) :: self
 
-    deallocate (self%sets)
-    allocate (self%sets(0))
-    self%present = 0
+    call self%forget_sets()
     self%happened = 0
   end subroutine start
-
-  !> The moments of the locked joints, from the accelerations `rate` without them.
-  subroutine find_moments(self)
-    class(joint_sets_t), intent(inout) :: self
-    integer :: i, j, row, column
-
-    if (self%present == 0) call self%choose_set()
-    associate (set => self%sets(self%present))
-      self%moment(:) = 0.0_wp
-      column = 0
-      do j = 1, self%count
-        if (.not. set%is_locked(j)) cycle
-        column = column + 1
-        row = 0
-        do i = 1, self%count
-          if (.not. set%is_locked(i)) cycle
-          row = row + 1
-          self%moment(i) = self%moment(i) - set%inverse(row, column) * self%rate(j)
-        end do
-      end do
-    end associate
-  end subroutine find_moments
 
   !> Takes the modes of the motion that is observed.
   subroutine follow(self, banks)
@@ -142,10 +102,10 @@ contains
 
     if (all(self%mode == self%leader)) return
     self%mode(:) = self%leader
-    do j = 1, self%count
+    do j = 1, self%locking
       call set_mode(self, banks, j)
     end do
-    self%present = 0
+    call self%change_set()
   end subroutine follow
 
   !> Whether a joint cannot have any moment.
@@ -160,28 +120,6 @@ contains
     is_open = most <= least
   end function is_open
 
-  !> Finds or makes the set of the present modes.
-  subroutine choose_set(self)
-    class(joint_sets_t), intent(inout) :: self
-    type(joint_set_t), allocatable :: longer(:)
-    integer, allocatable :: which(:)
-    integer :: i
-
-    do i = 1, size(self%sets)
-      self%present = i
-      if (all(self%sets(i)%is_locked .eqv. self%mode == locked)) return
-    end do
-    allocate (longer(size(self%sets) + 1))
-    longer(:size(self%sets)) = self%sets
-    call move_alloc(longer, self%sets)
-    self%present = size(self%sets)
-    associate (set => self%sets(self%present))
-      set%is_locked = self%mode == locked
-      which = pack([(i, i=1, self%count)], set%is_locked)
-      set%inverse = pseudo_inverse(self%weight(which, which), null_tolerance)
-    end associate
-  end subroutine choose_set
-
   !> Locks the joints at rest without any moment, until `decide`; the others slip.
   subroutine assume(self, banks, is_at_rest, slip)
     class(joint_sets_t), intent(inout) :: self
@@ -191,10 +129,10 @@ contains
     integer :: j
 
     self%mode(:) = merge(locked, merge(slips_forwards, slips_backwards, slip > 0), is_at_rest)
-    do j = 1, self%count
+    do j = 1, self%locking
       call set_mode(self, banks, j)
     end do
-    self%present = 0
+    call self%change_set()
   end subroutine assume
 
   !> Decides the modes of the joints at rest at a time t; those of the others are by their slips. `rate` has the accelerations
@@ -213,10 +151,10 @@ contains
     self%shift(:) = 0.0_wp
     resting = pack([(i, i=1, self%count)], is_at_rest)
     call decide_resting(self, banks, t, resting, is_solved)
-    do i = 1, self%count
+    do i = 1, self%locking
       call set_mode(self, banks, i)
     end do
-    self%present = 0
+    call self%change_set()
   end subroutine decide
 
   elemental logical function is_unbounded(moment)
@@ -293,8 +231,10 @@ contains
     class is (friction_joints_t)
       call bank%range_at_rest(self%number(joint), t, least, most)
       call bank%range_of_slip(self%number(joint), t, sliding(1), sliding(2))
-    class default
-      error stop 'nocdyn_joint_sets: a joint is in a bank of joints'
+    class default   ! a row that moves
+      least = -huge(least)
+      most = huge(most)
+      sliding = 0.0_wp
     end select
   end subroutine find_ranges
 

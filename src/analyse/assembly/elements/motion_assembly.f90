@@ -1,0 +1,89 @@
+!> The banks of the joints of an input whose ratio depends on the position, and of its prescribed motions.
+module nocdyn_motion_assembly
+  use nocdyn_bank, only: append_bank, bank_slot_t
+  use nocdyn_cardan_rows, only: new_cardan_rows
+  use nocdyn_curves, only: curve_t, extrapolation_linear, interpolation_cubic, new_curve
+  use nocdyn_drives, only: drive_motion_t, new_drives
+  use nocdyn_element_groups, only: element_groups_t
+  use nocdyn_input, only: group_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_phases, only: new_phases
+  implicit none (type, external)
+  private
+
+  public :: add_cardans, drive_form, add_drive_form
+
+  integer, parameter :: by_formula = 1, by_table = 2
+  integer, parameter :: forms_of_speed = 2   ! as many follow of angles
+
+contains
+
+  !> Adds the bank of the cardan joints and that of their drivers.
+  subroutine add_cardans(groups, banks)
+    type(element_groups_t), intent(in) :: groups
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+
+    if (size(groups%indices) == 0) return
+    call append_bank(banks, new_cardan_rows(groups%names, groups%bodies('bodies', 2), groups%values('angle'), &
+                                            groups%values('phase')))
+    call append_bank(banks, new_phases(groups%lanes, groups%names, groups%bodies('bodies', 1)))
+  end subroutine add_cardans
+
+  !> Form of the motion of a group &drive.
+  pure integer function drive_form(group)
+    type(group_t), intent(in) :: group
+
+    drive_form = merge(by_table, by_formula, group%has_value('table_time'))
+    if (group%text('kind') == 'angle') drive_form = drive_form + forms_of_speed
+  end function drive_form
+
+  !> Adds the bank of the drives of one form.
+  subroutine add_drive_form(groups, form, banks)
+    type(element_groups_t), intent(in) :: groups
+    integer, intent(in) :: form
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    type(drive_motion_t) :: given
+    logical :: are_angles
+    real(wp) :: t_start
+
+    if (size(groups%indices) == 0) return
+    are_angles = form > forms_of_speed
+    t_start = groups%input%groups(groups%input%position('run'))%number('t_start')
+    given%frequency = groups%values('frequency', absent=1.0_wp)
+    given%phase = groups%values('phase')
+    if (are_angles) then
+      given%speed = 0.0_wp * given%phase
+      given%amplitude = groups%values('angle_amplitude', absent=0.0_wp)
+    else
+      given%speed = groups%values('speed')
+      given%amplitude = groups%values('speed_amplitude', absent=0.0_wp)
+    end if
+    if (modulo(form, forms_of_speed) == by_formula) then
+      call append_bank(banks, new_drives(groups%names, groups%bodies('body', 1), t_start, are_angles, given))
+    else
+      call append_bank(banks, new_drives(groups%names, groups%bodies('body', 1), t_start, are_angles, given, &
+                                         drive_tables(groups, are_angles)))
+    end if
+  end subroutine add_drive_form
+
+  !> The tables of drives. A table of angles has no kinks, also at its ends.
+  function drive_tables(groups, are_angles) result(tables)
+    type(element_groups_t), intent(in) :: groups
+    logical, intent(in) :: are_angles
+    type(curve_t), allocatable :: tables(:, :)
+    integer :: i
+
+    if (are_angles) then
+      allocate (tables(groups%lanes, size(groups%indices)))
+      do i = 1, size(groups%indices)
+        associate (group => groups%input%groups(groups%indices(i)))
+          tables(:, i) = new_curve(group%numbers('table_time'), group%numbers('table_angle'), interpolation_cubic, &
+                                   extrapolation_linear)
+        end associate
+      end do
+    else
+      tables = groups%curves('table_time', 'table_speed', 'constant')
+    end if
+  end function drive_tables
+
+end module nocdyn_motion_assembly

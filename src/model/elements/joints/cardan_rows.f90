@@ -1,0 +1,58 @@
+!> Cardan joints (Hooke's joints) of two shafts at an angle: tan(phi_2) = tan(phi_1) / cos(angle), where phi_1 is zero when the
+!> fork of the first shaft lies in the plane of both shafts.
+!>
+!> The second shaft then leads by an angle that oscillates twice in a turn; its speed lies between cos(angle) and 1 / cos(angle)
+!> times that of the first: H. Chr. Seherr-Thoss, F. Schmelz, E. Aucktor, Universal Joints and Driveshafts, section 1.2.
+module nocdyn_cardan_rows
+  use nocdyn_bank, only: role_cardan
+  use nocdyn_element_rows, only: rows_between
+  use nocdyn_kinds, only: wp
+  use nocdyn_moving_rows, only: moving_rows_t
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  public :: new_cardan_rows
+
+  type, extends(moving_rows_t), public :: cardan_rows_t
+  contains
+    procedure :: motion
+  end type cardan_rows_t
+
+contains
+
+  !> A bank of joints; their first shafts are the drivers.
+  function new_cardan_rows(names, driven, angle, phase) result(bank)
+    type(string_t), intent(in) :: names(:)
+    integer, intent(in) :: driven(:)        !! bodies of the second shafts
+    real(wp), intent(in) :: angle(:, :)     !! between the shafts [rad], [lanes, joints]
+    real(wp), intent(in) :: phase(:, :)     !! angle of the first fork where the angle of its body is zero [rad], [lanes, joints]
+    type(cardan_rows_t) :: bank
+
+    call bank%connect_rows_only(role_cardan, size(angle, 1), names, rows_between(0 * driven, driven))
+    call bank%add_parameter('angle', angle)
+    call bank%add_parameter('phase', phase)
+  end function new_cardan_rows
+
+  !> phi_2 = phi_1 + atan2((1 - c) sin phi_1 cos phi_1, c cos^2 phi_1 + sin^2 phi_1), c = cos(angle).
+  pure subroutine motion(self, element, v, g)
+    class(cardan_rows_t), intent(in) :: self
+    integer, intent(in) :: element
+    real(wp), intent(in) :: v          !! angle of the first body [rad]
+    real(wp), intent(out) :: g(0:3)    !! of the second [rad]
+    real(wp) :: bend, c, d(0:2), s, shift
+
+    shift = self%parameters(2)%value(1, element)
+    c = cos(self%parameters(1)%value(1, element))
+    bend = sin(self%parameters(1)%value(1, element))**2
+    s = sin(v + shift)
+    d(0) = 1.0_wp - bend * (1.0_wp - s**2)
+    d(1) = bend * sin(2.0_wp * (v + shift))
+    d(2) = 2.0_wp * bend * cos(2.0_wp * (v + shift))
+    g(0) = v + atan2((1.0_wp - c) * s * cos(v + shift), c + (1.0_wp - c) * s**2)
+    g(1) = c / d(0)
+    g(2) = -c * d(1) / d(0)**2
+    g(3) = c * (2.0_wp * d(1)**2 / d(0) - d(2)) / d(0)**2
+  end subroutine motion
+
+end module nocdyn_cardan_rows

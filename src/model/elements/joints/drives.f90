@@ -1,0 +1,111 @@
+!> Drives: prescribed motions of bodies, u = g(t) + constant with g = 0 at the start. Their moments are reactions.
+!>
+!> Speed: u' = speed + table(t) + amplitude sin(frequency t + phase). Angle: u = table(t) + amplitude sin(frequency t + phase) +
+!> constant, with a table whose slope is continuous. The boundaries of the branches are the points of the tables.
+module nocdyn_drives
+  use nocdyn_bank, only: role_drive
+  use nocdyn_curves, only: curve_t
+  use nocdyn_element_rows, only: rows_between
+  use nocdyn_kinds, only: wp
+  use nocdyn_law_expressions, only: literal, node_of, time_of
+  use nocdyn_law_tape, only: law_tape_t
+  use nocdyn_moving_rows, only: moving_rows_t
+  use nocdyn_tables, only: add_table, guard_segment
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  public :: new_drives
+
+  !> Numbers of drives, shape [lanes, drives] all.
+  type, public :: drive_motion_t
+    real(wp), allocatable :: speed(:, :)        !! [rad/s], not of angles
+    real(wp), allocatable :: amplitude(:, :)    !! [rad/s], [rad] of angles
+    real(wp), allocatable :: frequency(:, :)    !! [rad/s], positive
+    real(wp), allocatable :: phase(:, :)        !! at t = 0 [rad]
+  end type drive_motion_t
+
+  type, extends(moving_rows_t), public :: drives_t
+    logical :: prescribe_angles = .false.
+    real(wp) :: t_start = 0.0_wp   !! [s]
+  contains
+    procedure :: describe
+    procedure :: motion
+  end type drives_t
+
+contains
+
+  !> A bank of drives, each of one body.
+  function new_drives(names, body, t_start, prescribe_angles, given, table) result(bank)
+    type(string_t), intent(in) :: names(:)
+    integer, intent(in) :: body(:)
+    real(wp), intent(in) :: t_start            !! [s]
+    logical, intent(in) :: prescribe_angles
+    type(drive_motion_t), intent(in) :: given
+    type(curve_t), intent(in), optional :: table(:, :)   !! [rad/s] or [rad] over [s], [lanes, drives]
+    type(drives_t) :: bank
+
+    bank%is_driven_by_time = .true.
+    bank%prescribe_angles = prescribe_angles
+    bank%t_start = t_start
+    call bank%connect_rows_only(role_drive, size(given%speed, 1), names, rows_between(0 * body, body))
+    call bank%add_parameter('speed', given%speed, is_key=.not. prescribe_angles)
+    call bank%add_parameter(merge('angle_amplitude', 'speed_amplitude', prescribe_angles), given%amplitude)
+    call bank%add_parameter('frequency', given%frequency)
+    call bank%add_parameter('phase', given%phase)
+    if (.not. present(table)) return
+    bank%is_polynomial = .false.
+    call add_table(bank, table)
+    call bank%prepare_law()
+  end function new_drives
+
+  !> No moment but the reaction; the points of the tables.
+  subroutine describe(self, tape)
+    class(drives_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+
+    if (.not. allocated(self%curve)) error stop 'nocdyn_drives: there are no tables'
+    tape%applied = node_of(literal(tape, 0.0_wp))
+    call guard_segment(tape, time_of(tape), is_time=.true.)
+  end subroutine describe
+
+  pure subroutine motion(self, element, v, g)
+    class(drives_t), intent(in) :: self
+    integer, intent(in) :: element
+    real(wp), intent(in) :: v          !! time [s]
+    real(wp), intent(out) :: g(0:3)    !! [rad]
+    real(wp) :: sine(0:3), table(0:3)
+
+    associate (amplitude => self%parameters(2)%value(1, element), frequency => self%parameters(3)%value(1, element), &
+               x => self%parameters(3)%value(1, element) * v + self%parameters(4)%value(1, element), &
+               start => self%parameters(3)%value(1, element) * self%t_start + self%parameters(4)%value(1, element))
+      table = 0.0_wp
+      if (self%prescribe_angles) then
+        sine = amplitude * [sin(x) - sin(start), frequency * cos(x), -frequency**2 * sin(x), -frequency**3 * cos(x)]
+      else
+        sine = amplitude * [(cos(start) - cos(x)) / frequency, sin(x), frequency * cos(x), -frequency**2 * sin(x)]
+        sine(:1) = sine(:1) + self%parameters(1)%value(1, element) * [v - self%t_start, 1.0_wp]
+      end if
+    end associate
+    if (allocated(self%curve)) table = table_motion(self, element, v)
+    g = sine + table
+  end subroutine motion
+
+  !> The part of a table, on its present branch.
+  pure function table_motion(self, element, t) result(g)
+    class(drives_t), intent(in) :: self
+    integer, intent(in) :: element
+    real(wp), intent(in) :: t   !! [s]
+    real(wp) :: g(0:3)
+
+    associate (curve => self%curve(1, element), segment => self%branch(1, element), t_start => self%t_start)
+      g = curve%derivatives(segment, t)
+      if (self%prescribe_angles) then
+        g(0) = g(0) - curve%value(t_start)
+      else
+        g = [curve%integral_to(segment, t) - curve%integral_to(curve%segment(t_start), t_start), g(:2)]
+      end if
+    end associate
+  end function table_motion
+
+end module nocdyn_drives

@@ -1,0 +1,63 @@
+!> Rows of L_lambda that move: u = g(v) + constant along the row of an element, with the angle v of its *driver*, another element,
+!> or with the time v = t: joints whose ratio depends on the position, and prescribed motions.
+!>
+!> The moment of a row is a reaction. It acts on the element as M and on the driver as -g'(v) M, so that the joint itself has no
+!> power. `nocdyn_joint_sets` finds it. The drivers are elements of a bank of their own, which follows.
+module nocdyn_moving_rows
+  use nocdyn_bank, only: bank_t, quantity_t
+  use nocdyn_element_rows, only: element_rows_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  !> Extensions set `element_unit` and say what g is.
+  type, abstract, extends(bank_t), public :: moving_rows_t
+    logical :: is_driven_by_time = .false.   !! whether v is the time; else a bank of drivers follows
+    character(len=3) :: moment_unit = 'N m'  !! of the moments on the elements; N where these are sliders
+  contains
+    procedure(motion_interface), deferred :: motion
+    procedure :: connect_rows_only
+    procedure :: quantities => torques_of_rows
+  end type moving_rows_t
+
+  abstract interface
+
+    !> g and its first three derivatives by v.
+    pure subroutine motion_interface(self, element, v, g)
+      import :: moving_rows_t, wp
+      class(moving_rows_t), intent(in) :: self
+      integer, intent(in) :: element     !! numbered within the bank
+      real(wp), intent(in) :: v          !! [rad] or [s]
+      real(wp), intent(out) :: g(0:3)    !! [rad] or [m] by powers of the unit of v
+    end subroutine motion_interface
+
+  end interface
+
+contains
+
+  !> Sets the connectivity; the elements have no moments of their own and store nothing.
+  subroutine connect_rows_only(self, role, lanes, names, rows)
+    class(moving_rows_t), intent(inout) :: self
+    integer, intent(in) :: role                 !! role_...
+    integer, intent(in) :: lanes
+    type(string_t), intent(in) :: names(:)      !! [elements]
+    type(element_rows_t), intent(in) :: rows    !! of the elements
+
+    call self%connect(role, lanes, names, rows)
+    self%elastic = [integer ::]
+    self%has_paper_law = .false.
+    if (.not. self%is_driven_by_time) self%with_work = [integer ::]
+  end subroutine connect_rows_only
+
+  !> The moments on the elements.
+  function torques_of_rows(self) result(columns)
+    class(moving_rows_t), intent(in) :: self
+    type(quantity_t), allocatable :: columns(:)
+    integer :: e
+
+    allocate (columns(1))
+    columns(1) = quantity_t(merge('force ', 'torque', self%moment_unit == 'N'), self%moment_unit, [(e, e=1, self%count)])
+  end function torques_of_rows
+
+end module nocdyn_moving_rows

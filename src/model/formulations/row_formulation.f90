@@ -1,0 +1,276 @@
+!> Formulations with rows that hold beside those of the coordinates: locked joints, and rows that move (`nocdyn_held_rows`), in a
+!> block of one lane.
+!>
+!> The rows that hold add their moments to those of the elements, so that q'' is that on the complement of all of them. Where some
+!> move, errors of the integration would let the state leave them: after each step and before each observation it is put back by
+!> the least change, weighted by the inertias; E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, section IV.4.
+!> Extensions say how elements move with the states, and how the states answer to the moments of elements.
+module nocdyn_row_formulation
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_friction_joints, only: locked
+  use nocdyn_kinds, only: wp
+  implicit none (type, external)
+  private
+
+  type, abstract, extends(formulation_t), public :: row_formulation_t
+    real(wp), allocatable :: acceleration(:)    !! of the first states, work space, [moving]
+    real(wp), allocatable :: joint_state(:, :)  !! work space, [1, states]
+  contains
+    procedure(accelerate_interface), deferred :: accelerate
+    procedure(rate_interface), deferred :: element_rate
+    procedure(push_interface), deferred :: push_element
+    procedure :: prepare_joints
+    procedure :: joint_rate
+    procedure :: push
+    procedure :: move_rows
+    procedure :: hold
+    procedure :: find_accelerations
+    procedure :: find_held_moments
+    procedure :: add_powers
+    procedure :: differentiate_rows
+    procedure :: hold_column
+    procedure :: project
+    procedure :: project_state
+  end type row_formulation_t
+
+  abstract interface
+
+    !> The accelerations of the first states from the torques `torque` on the bodies, in a block of one lane.
+    subroutine accelerate_interface(self, acceleration)
+      import :: row_formulation_t, wp
+      class(row_formulation_t), intent(inout) :: self
+      real(wp), intent(inout) :: acceleration(:)   !! [rad/s2], [moving]
+    end subroutine accelerate_interface
+
+    !> The rate u' of an element from the speeds of the first states, or u'' from their accelerations.
+    pure real(wp) function rate_interface(self, element, rates)
+      import :: row_formulation_t, wp
+      class(row_formulation_t), intent(in) :: self
+      integer, intent(in) :: element
+      real(wp), intent(in) :: rates(:)   !! [rad/s] or [rad/s2], [moving] at least
+    end function rate_interface
+
+    !> Adds what the moment or the impulse of an element does to the accelerations or speeds of the first states.
+    pure subroutine push_interface(self, element, moment, rates)
+      import :: row_formulation_t, wp
+      class(row_formulation_t), intent(in) :: self
+      integer, intent(in) :: element
+      real(wp), intent(in) :: moment        !! [N m] or [N m s]
+      real(wp), intent(inout) :: rates(:)   !! [moving] at least
+    end subroutine push_interface
+
+  end interface
+
+contains
+
+  !> The rate of the row of a joint from the speeds of the first states, a slip where it locks, or its derivative; a part of the
+  !> latter where it moves.
+  pure real(wp) function joint_rate(self, joint, rates)
+    class(row_formulation_t), intent(in) :: self
+    integer, intent(in) :: joint
+    real(wp), intent(in) :: rates(:)   !! [rad/s] or [rad/s2], [moving] at least
+
+    joint_rate = self%element_rate(self%joints%element(joint), rates)
+    associate (driver => self%joints%driver(joint))
+      if (driver > 0) joint_rate = joint_rate - self%joints%slope(joint) * self%element_rate(driver, rates)
+    end associate
+  end function joint_rate
+
+  !> Adds what the moment or the impulse of a joint does to the accelerations or speeds of the first states.
+  pure subroutine push(self, joint, moment, rates)
+    class(row_formulation_t), intent(in) :: self
+    integer, intent(in) :: joint
+    real(wp), intent(in) :: moment        !! [N m] or [N m s]
+    real(wp), intent(inout) :: rates(:)   !! [moving] at least
+
+    call self%push_element(self%joints%element(joint), moment, rates)
+    associate (driver => self%joints%driver(joint))
+      if (driver > 0) call self%push_element(driver, -self%joints%slope(joint) * moment, rates)
+    end associate
+  end subroutine push
+
+  !> How the joints of the machine act on one another in the first lane, at the start.
+  subroutine prepare_joints(self)
+    class(row_formulation_t), intent(inout) :: self
+    real(wp) :: twist(self%lanes, self%machine%elements%count)
+    integer, allocatable :: elements(:)
+    integer :: i, j
+
+    self%projects = self%joints%motions%count > 0
+    if (self%joints%count == 0) return
+    self%acceleration = spread(0.0_wp, 1, size(self%moving))
+    self%joint_state = reshape(spread(0.0_wp, 1, self%states), [1, self%states])
+    elements = [self%joints%element, self%joints%driver]
+    do j = 1, size(elements)
+      if (elements(j) == 0) cycle
+      self%acceleration(:) = 0.0_wp
+      call self%push_element(elements(j), 1.0_wp, self%acceleration)
+      do i = 1, size(elements)
+        if (elements(i) > 0) self%joints%mutual(i, j) = self%element_rate(elements(i), self%acceleration)
+      end do
+    end do
+    twist = self%machine%start_twist()
+    call self%joints%motions%set_start(self%machine%banks, twist(1, :))
+    call self%joints%start()
+  end subroutine prepare_joints
+
+  !> The moments of the joints that hold at a state of a block of one lane, where the branches are known; they are put among those
+  !> of the elements.
+  subroutine find_held_moments(self, t, y)
+    class(row_formulation_t), intent(inout) :: self
+    real(wp), intent(in) :: t      !! [s]
+    real(wp), intent(in) :: y(:)   !! [states]
+
+    self%joint_state(1, :) = y
+    call self%gather(self%joint_state)
+    call self%machine%evaluate_elements([t])
+    call self%find_accelerations(t, self%acceleration)
+  end subroutine find_held_moments
+
+  !> The accelerations of the first states from the moments of the elements, to which those of the joints that hold are added.
+  subroutine find_accelerations(self, t, acceleration)
+    class(row_formulation_t), intent(inout) :: self
+    real(wp), intent(in) :: t                    !! [s]
+    real(wp), intent(inout) :: acceleration(:)   !! [rad/s2], [moving]
+
+    call self%machine%elements%scatter(self%torque)
+    call self%accelerate(acceleration)
+    call self%move_rows(t)
+    call self%hold(self%joints%motions%acceleration, acceleration)
+  end subroutine find_accelerations
+
+  !> Moves the rows to the position of the elements.
+  subroutine move_rows(self, t)
+    class(row_formulation_t), intent(inout) :: self
+    real(wp), intent(in) :: t   !! [s]
+
+    if (self%joints%motions%count == 0) return
+    associate (elements => self%machine%elements)
+      call self%joints%motions%move(self%machine%banks, t, elements%angle(1, :), elements%speed(1, :))
+    end associate
+    call self%joints%weigh()
+  end subroutine move_rows
+
+  !> Adds the moments of the joints that hold to the accelerations of the first states, and puts them among those of the elements.
+  subroutine hold(self, demand, acceleration)
+    class(row_formulation_t), intent(inout) :: self
+    real(wp), intent(in) :: demand(:)            !! what the rates of the rows that move must be [rad/s2], [rows that move]
+    real(wp), intent(inout) :: acceleration(:)   !! [rad/s2], [moving] at least; or speeds [rad/s]
+    integer :: j
+
+    associate (joints => self%joints, applied => self%machine%elements%applied)
+      do j = 1, joints%count
+        joints%rate(j) = self%joint_rate(j, acceleration)
+        if (j > joints%locking) joints%rate(j) = joints%rate(j) - demand(j - joints%locking)
+      end do
+      call joints%find_moments()
+      do j = 1, joints%count
+        if (joints%mode(j) /= locked) cycle
+        call self%push(j, joints%moment(j), acceleration)
+        applied(1, joints%element(j)) = joints%moment(j)
+        if (joints%driver(j) > 0) applied(1, joints%driver(j)) = -joints%slope(j) * joints%moment(j)
+      end do
+    end associate
+  end subroutine hold
+
+  !> Adds the powers of prescribed motions to those of the elements.
+  subroutine add_powers(self, powers)
+    class(row_formulation_t), intent(in) :: self
+    real(wp), intent(inout) :: powers(:)   !! [W], [quadratures]
+    integer :: j, k
+
+    do j = self%joints%locking + 1, self%joints%count
+      if (self%joints%driver(j) > 0 .or. size(powers) == 0) cycle
+      k = findloc(self%machine%with_work, self%joints%element(j), dim=1)
+      powers(k) = powers(k) + self%joints%moment(j) * self%machine%elements%speed(1, self%joints%element(j))
+    end do
+  end subroutine add_powers
+
+  !> The derivatives by the position of the moments of the rows that move on their drivers, which turn with it; after
+  !> `find_accelerations` and the derivatives of the laws. The moments and accelerations are kept for `hold_column`.
+  subroutine differentiate_rows(self, acceleration)
+    class(row_formulation_t), intent(inout) :: self
+    real(wp), intent(in) :: acceleration(:)   !! [rad/s2], [moving]
+    integer :: i
+
+    associate (joints => self%joints, motions => self%joints%motions, elements => self%machine%elements)
+      motions%held(:) = joints%moment(joints%locking + 1:)
+      do i = 1, motions%count
+        associate (driver => motions%driver(i))
+          if (driver == 0) cycle
+          motions%driver_acceleration(i) = self%element_rate(driver, acceleration)
+          elements%applied_angle(1, driver) = elements%applied_angle(1, driver) - motions%g(2, i) * motions%held(i)
+        end associate
+      end do
+    end associate
+  end subroutine differentiate_rows
+
+  !> Adds what the joints that hold do to a column of the Jacobian.
+  subroutine hold_column(self, column, accelerations, powers)
+    class(row_formulation_t), intent(inout) :: self
+    integer, intent(in) :: column                !! state; 0: derivatives by the time
+    real(wp), intent(inout) :: accelerations(:)  !! derivatives of those of the first states without joints that hold, [moving]
+    real(wp), intent(inout) :: powers(:)         !! derivatives of those of the elements with work, [quadratures]
+    real(wp) :: demand(self%joints%motions%count), unit(size(self%moving))
+    integer :: i, k
+
+    associate (motions => self%joints%motions, n => size(self%moving), speed => self%machine%elements%speed)
+      unit = 0.0_wp
+      if (column > 0 .and. column <= 2 * n) unit(1 + modulo(column - 1, n)) = 1.0_wp
+      do i = 1, motions%count
+        demand(i) = merge(motions%g(3, i), 0.0_wp, column == 0 .and. motions%driver(i) == 0)
+        if (motions%driver(i) == 0) cycle
+        demand(i) = 2.0_wp * motions%g(2, i) * speed(1, motions%driver(i))
+        if (column > n) demand(i) = motions%g(3, i) * speed(1, motions%driver(i))**2 &
+                                    + motions%g(2, i) * motions%driver_acceleration(i)
+        demand(i) = demand(i) * self%element_rate(motions%driver(i), unit)
+      end do
+      call self%hold(demand, accelerations)
+      call self%add_powers(powers)
+      if (column > n .or. column == 0) return
+      do i = 1, merge(motions%count, 0, size(powers) > 0)
+        if (motions%driver(i) > 0) cycle
+        k = findloc(self%machine%with_work, motions%element(i), dim=1)
+        powers(k) = powers(k) + motions%held(i) * self%element_rate(motions%element(i), unit)
+      end do
+    end associate
+  end subroutine hold_column
+
+  !> Puts the state after a step back on the rows that move.
+  subroutine project_state(self, lane, t, y)
+    class(row_formulation_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(inout) :: y(:)   !! [states + quadratures]
+
+    if (lane == 1) call self%project(t, y)
+  end subroutine project_state
+
+  !> Puts a state of a block of one lane back on the rows that move: by the least changes of the positions and speeds, weighted by
+  !> the inertias. Joints that are locked stay so.
+  subroutine project(self, t, y)
+    class(row_formulation_t), intent(inout) :: self
+    real(wp), intent(in) :: t          !! [s]
+    real(wp), intent(inout) :: y(:)    !! [states] at least
+    integer, parameter :: most_steps = 8
+    real(wp), parameter :: rounding = 4.0_wp * epsilon(1.0_wp)
+    integer :: step
+    logical :: is_near
+
+    associate (n => size(self%moving), motions => self%joints%motions, elements => self%machine%elements)
+      do step = 1, most_steps
+        self%joint_state(1, :) = y(:self%states)
+        call self%gather(self%joint_state)
+        call self%move_rows(t)
+        is_near = all(abs(motions%position) <= rounding * (1.0_wp + abs(elements%angle(1, motions%element)) &
+                                                           + abs(motions%constant)))
+        if (is_near) exit
+        self%acceleration(:) = 0.0_wp
+        call self%hold(-motions%position, self%acceleration)
+        y(n + 1:2 * n) = y(n + 1:2 * n) + self%acceleration
+      end do
+      call self%hold(motions%speed, y(:n))
+    end associate
+  end subroutine project
+
+end module nocdyn_row_formulation

@@ -1,0 +1,191 @@
+!> The rows of L_lambda that hold now: those of locked joints and those that move (`nocdyn_row_motions`), in a block of one lane.
+!>
+!> The joints that hold are a *set*; each is one more row u' = 0, or u' - g' v' = 0 where it moves. With the response R of the
+!> accelerations to the moments and W = U R, the moments of the set are -W^+ u'', with the accelerations u'' of its rows without
+!> them: q'' is projected on the complement of the rows that hold. W^+ of each set is found once and kept, unless rows move: then
+!> W is formed from the slopes g' at each position. W is singular where some of the rows are redundant; the least norm shares the
+!> moment between them.
+module nocdyn_held_rows
+  use nocdyn_friction_joints, only: locked
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack, only: pseudo_inverse
+  use nocdyn_row_motions, only: row_motions_t
+  use nocdyn_semidefinite, only: new_semidefinite, null_tolerance, semidefinite_t
+  implicit none (type, external)
+  private
+
+  !> A set with its W^+.
+  type :: joint_set_t
+    logical, allocatable :: is_locked(:)
+    real(wp), allocatable :: inverse(:, :)
+  end type joint_set_t
+
+  type, public :: held_rows_t
+    integer :: count = 0                     !! joints that lock, and rows that move
+    integer :: locking = 0                   !! the first of them: clutches and freewheels
+    type(row_motions_t) :: motions           !! of the others
+    integer, allocatable :: element(:)       !! of the machine, [joints] as all that follow
+    integer, allocatable :: driver(:)        !! element whose motion moves the row, 0 for none
+    integer, allocatable :: mode(:)          !! `locked` where the row holds
+    real(wp), allocatable :: slope(:)        !! g' at the present position, 0 without a driver
+    real(wp), allocatable :: rate(:)         !! accelerations of the rows u'' without the moments of the set [rad/s2], or
+                                             !! slips, whose moments then are impulses
+    real(wp), allocatable :: moment(:)       !! of the joints that hold [N m]
+    real(wp), allocatable :: mutual(:, :)    !! responses of all elements and then all drivers to their moments [1/(kg m2)],
+                                             !! [2 joints, 2 joints]
+    real(wp), allocatable :: weight(:, :)    !! W [1/(kg m2)], [joints, joints]
+    integer :: lost = 0                      !! a joint whose row has become a combination of others on the way
+    logical, private :: is_known = .false.   !! whether the set is that of the present modes and slopes
+    type(joint_set_t), allocatable, private :: sets(:)   !! without rows that move
+    integer, private :: present = 0          !! one of them
+    type(semidefinite_t), private :: system  !! W of the rows that hold, where some move
+    integer, allocatable, private :: holding(:)   !! joints that hold, the first `system%order` are in use
+    integer, private :: rank_at_start = 0    !! of the rows that move
+  contains
+    procedure :: allocate_rows
+    procedure :: forget_sets
+    procedure :: weigh
+    procedure :: change_set
+    procedure :: find_moments
+    procedure, private :: find_moving_moments
+    procedure, private :: watch_rank
+    procedure, private :: choose_set
+  end type held_rows_t
+
+contains
+
+  !> Locks the rows that move, and no joints.
+  subroutine allocate_rows(self, mode)
+    class(held_rows_t), intent(inout) :: self
+    integer, intent(in) :: mode   !! of the joints that are not locked
+
+    associate (n => self%count)
+      allocate (self%mode(n), source=mode)
+      self%mode(self%locking + 1:) = locked
+      allocate (self%rate(n), self%moment(n), self%slope(n), source=0.0_wp)
+      allocate (self%weight(n, n), self%mutual(2 * n, 2 * n), source=0.0_wp)
+      allocate (self%sets(0), self%holding(n))
+      self%system = new_semidefinite(merge(n, 0, self%motions%count > 0))
+    end associate
+  end subroutine allocate_rows
+
+  !> Forgets all sets, as `mutual` has changed. The rows that move start at the present slopes.
+  subroutine forget_sets(self)
+    class(held_rows_t), intent(inout) :: self
+    integer :: dependent, j
+
+    deallocate (self%sets)
+    allocate (self%sets(0))
+    self%lost = 0
+    call self%weigh()
+    if (self%motions%count == 0) return
+    call self%system%find_rank(self%weight, [(j, j=self%locking + 1, self%count)], self%rank_at_start, dependent)
+  end subroutine forget_sets
+
+  !> Forms W with the slopes of the present position.
+  subroutine weigh(self)
+    class(held_rows_t), intent(inout) :: self
+    integer :: i, j
+
+    self%slope(self%locking + 1:) = merge(self%motions%g(1, :), 0.0_wp, self%motions%driver > 0)
+    associate (n => self%count, w => self%mutual, s => self%slope)
+      do j = 1, n
+        do i = 1, n
+          self%weight(i, j) = w(i, j) - s(i) * w(n + i, j) - s(j) * (w(i, n + j) - s(i) * w(n + i, n + j))
+        end do
+      end do
+    end associate
+    self%is_known = .false.
+  end subroutine weigh
+
+  !> Takes note that modes have changed.
+  pure subroutine change_set(self)
+    class(held_rows_t), intent(inout) :: self
+
+    self%is_known = .false.
+  end subroutine change_set
+
+  !> The moments of the locked joints, from the accelerations `rate` without them.
+  subroutine find_moments(self)
+    class(held_rows_t), intent(inout) :: self
+    integer :: i, j, row, column
+
+    if (self%motions%count > 0) then
+      call self%find_moving_moments()
+      return
+    end if
+    if (.not. self%is_known) call self%choose_set()
+    associate (set => self%sets(self%present))
+      self%moment(:) = 0.0_wp
+      column = 0
+      do j = 1, self%count
+        if (.not. set%is_locked(j)) cycle
+        column = column + 1
+        row = 0
+        do i = 1, self%count
+          if (.not. set%is_locked(i)) cycle
+          row = row + 1
+          self%moment(i) = self%moment(i) - set%inverse(row, column) * self%rate(j)
+        end do
+      end do
+    end associate
+  end subroutine find_moments
+
+  !> The same where rows move.
+  subroutine find_moving_moments(self)
+    class(held_rows_t), intent(inout) :: self
+    real(wp) :: x(self%count)
+    integer :: j, n
+
+    if (.not. self%is_known) then
+      n = 0
+      do j = 1, self%count
+        if (self%mode(j) /= locked) cycle
+        n = n + 1
+        self%holding(n) = j
+      end do
+      call self%system%set_matrix(self%weight, self%holding, n)
+      if (self%system%is_singular) call self%watch_rank()
+      self%is_known = .true.
+    end if
+    n = self%system%order
+    x(:n) = self%rate(self%holding(:n))
+    call self%system%solve(x(:n))
+    self%moment(:) = 0.0_wp
+    self%moment(self%holding(:n)) = -x(:n)
+  end subroutine find_moving_moments
+
+  !> Looks whether the rows that move have become combinations of one another. Locks may be.
+  subroutine watch_rank(self)
+    class(held_rows_t), intent(inout) :: self
+    integer :: dependent, j, rank
+
+    call self%system%find_rank(self%weight, [(j, j=self%locking + 1, self%count)], rank, dependent)
+    if (rank < self%rank_at_start) self%lost = dependent
+    call self%system%set_matrix(self%weight, self%holding, count(self%mode == locked))
+  end subroutine watch_rank
+
+  !> Finds or makes the set of the present modes.
+  subroutine choose_set(self)
+    class(held_rows_t), intent(inout) :: self
+    type(joint_set_t), allocatable :: longer(:)
+    integer, allocatable :: which(:)
+    integer :: i
+
+    self%is_known = .true.
+    do i = 1, size(self%sets)
+      self%present = i
+      if (all(self%sets(i)%is_locked .eqv. self%mode == locked)) return
+    end do
+    allocate (longer(size(self%sets) + 1))
+    longer(:size(self%sets)) = self%sets
+    call move_alloc(longer, self%sets)
+    self%present = size(self%sets)
+    associate (set => self%sets(self%present))
+      set%is_locked = self%mode == locked
+      which = pack([(i, i=1, self%count)], set%is_locked)
+      set%inverse = pseudo_inverse(self%weight(which, which), null_tolerance)
+    end associate
+  end subroutine choose_set
+
+end module nocdyn_held_rows

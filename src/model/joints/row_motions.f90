@@ -1,0 +1,94 @@
+!> The rows of L_lambda that move, of all banks of a machine in a block of one lane (`nocdyn_moving_rows`), at a position:
+!> u - g(v) - constant = 0, u' - g' v' = 0 and u'' - g' v'' = g'' v'^2, or with the time v = t.
+module nocdyn_row_motions
+  use nocdyn_bank, only: bank_slot_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_moving_rows, only: moving_rows_t
+  implicit none (type, external)
+  private
+
+  public :: new_row_motions
+
+  type, public :: row_motions_t
+    integer :: count = 0
+    integer, allocatable :: element(:)       !! of the machine, [rows] as all that follow
+    integer, allocatable :: driver(:)        !! element whose angle is v, 0: v is the time
+    integer, allocatable :: bank(:), number(:)   !! its bank, and its number there
+    real(wp), allocatable :: constant(:)     !! u - g(v) at the start [rad] or [m]
+    real(wp), allocatable :: g(:, :)         !! g and its derivatives at the present position, [0:3, rows]
+    real(wp), allocatable :: position(:)     !! u - g(v) - constant
+    real(wp), allocatable :: speed(:)        !! what u' - g' v' is: 0, or g' of the time
+    real(wp), allocatable :: acceleration(:) !! what u'' - g' v'' is: g'' v'^2
+    ! for the derivatives of the accelerations:
+    real(wp), allocatable :: held(:)         !! moments [N m]
+    real(wp), allocatable :: driver_acceleration(:)   !! v''
+  contains
+    procedure :: set_start
+    procedure :: move
+  end type row_motions_t
+
+contains
+
+  !> The rows of all banks.
+  function new_row_motions(banks) result(self)
+    type(bank_slot_t), intent(in) :: banks(:)
+    type(row_motions_t) :: self
+    integer :: b, e
+
+    allocate (self%element(0), self%driver(0), self%bank(0), self%number(0))
+    do b = 1, size(banks)
+      select type (bank => banks(b)%bank)
+      class is (moving_rows_t)
+        do e = 1, bank%count
+          self%element = [self%element, bank%first - 1 + e]
+          self%driver = [self%driver, merge(0, bank%last() + e, bank%is_driven_by_time)]
+          self%bank = [self%bank, b]
+          self%number = [self%number, e]
+        end do
+      end select
+    end do
+    self%count = size(self%element)
+    allocate (self%constant(self%count), source=0.0_wp)
+    allocate (self%position, self%speed, self%acceleration, self%held, self%driver_acceleration, source=self%constant)
+    allocate (self%g(0:3, self%count), source=0.0_wp)
+  end function new_row_motions
+
+  !> Sets the constants so that a position at the start fulfils the rows. Prescribed motions are zero there.
+  subroutine set_start(self, banks, angle)
+    class(row_motions_t), intent(inout) :: self
+    type(bank_slot_t), intent(in) :: banks(:)
+    real(wp), intent(in) :: angle(:)   !! u of all elements [rad]
+
+    self%constant(:) = 0.0_wp
+    call self%move(banks, 0.0_wp, angle, 0.0_wp * angle)
+    self%constant(:) = merge(self%position, angle(self%element), self%driver > 0)
+  end subroutine set_start
+
+  !> Sets g and what the rows demand at a position.
+  pure subroutine move(self, banks, t, angle, speed)
+    class(row_motions_t), intent(inout) :: self
+    type(bank_slot_t), intent(in) :: banks(:)
+    real(wp), intent(in) :: t                    !! [s]
+    real(wp), intent(in) :: angle(:), speed(:)   !! of all elements, [rad], [rad/s]
+    integer :: i
+    real(wp) :: v
+
+    do i = 1, self%count
+      v = t
+      if (self%driver(i) > 0) v = angle(self%driver(i))
+      select type (bank => banks(self%bank(i))%bank)
+      class is (moving_rows_t)
+        call bank%motion(self%number(i), v, self%g(:, i))
+      end select
+      self%position(i) = angle(self%element(i)) - self%g(0, i) - self%constant(i)
+      if (self%driver(i) > 0) then
+        self%speed(i) = 0.0_wp
+        self%acceleration(i) = self%g(2, i) * speed(self%driver(i))**2
+      else
+        self%speed(i) = self%g(1, i)
+        self%acceleration(i) = self%g(2, i)
+      end if
+    end do
+  end subroutine move
+
+end module nocdyn_row_motions
