@@ -15,6 +15,7 @@ module nocdyn_assembly
   use nocdyn_massless_motion, only: massless_bodies
   use nocdyn_mesh_assembly, only: add_mesh_form, check_meshes, mesh_form
   use nocdyn_motion_assembly, only: add_cardans, add_drive_form, drive_form
+  use nocdyn_moving_start, only: fit_moving_rows
   use nocdyn_motor_assembly, only: add_motor_form, check_motors, motor_form
   use nocdyn_multiplier, only: new_multiplier
   use nocdyn_paper, only: new_paper
@@ -77,6 +78,8 @@ contains
     call analyse_machine_constraints(input, body_index, machine, error)
     if (allocated(error)) return
     call shafts%place_nodes(machine)
+    call fit_moving_rows(input, machine, given_speeds(input, machine%nodes), error)
+    if (allocated(error)) return
     call start_machine(input, machine, error)
   end subroutine assemble_machine
 

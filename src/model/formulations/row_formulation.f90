@@ -210,9 +210,9 @@ contains
     class(row_formulation_t), intent(inout) :: self
     integer, intent(in) :: column                !! state; 0: derivatives by the time
     real(wp), intent(inout) :: accelerations(:)  !! derivatives of those of the first states without joints that hold, [moving]
-    real(wp), intent(inout) :: powers(:)         !! derivatives of those of the elements with work, [quadratures]
+    real(wp), intent(inout) :: powers(:)         !! derivatives of those of the elements with work at these moments, [quadratures]
     real(wp) :: demand(self%joints%motions%count), unit(size(self%moving))
-    integer :: i, k
+    integer :: i
 
     associate (motions => self%joints%motions, n => size(self%moving), speed => self%machine%elements%speed)
       unit = 0.0_wp
@@ -227,12 +227,6 @@ contains
       end do
       call self%hold(demand, accelerations)
       call self%add_powers(powers)
-      if (column > n .or. column == 0) return
-      do i = 1, merge(motions%count, 0, size(powers) > 0)
-        if (motions%driver(i) > 0) cycle
-        k = findloc(self%machine%with_work, motions%element(i), dim=1)
-        powers(k) = powers(k) + motions%held(i) * self%element_rate(motions%element(i), unit)
-      end do
     end associate
   end subroutine hold_column
 
