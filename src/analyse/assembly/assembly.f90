@@ -5,6 +5,7 @@ module nocdyn_assembly
   use nocdyn_constraint_assembly, only: assemble_constraints, constraint_groups
   use nocdyn_coordinates, only: build_coordinates
   use nocdyn_coupling_assembly, only: add_coupling_form, check_couplings, coupling_form
+  use nocdyn_crank_assembly, only: add_cranks, check_cranks
   use nocdyn_element_groups, only: add_banks, bodies_of, body_index_t, element_groups_t, new_body_index, new_element_groups
   use nocdyn_engine_checks, only: check_engines, check_orders
   use nocdyn_errors, only: error_t, exit_input, raise
@@ -14,7 +15,7 @@ module nocdyn_assembly
   use nocdyn_machine, only: machine_t
   use nocdyn_massless_motion, only: massless_bodies
   use nocdyn_mesh_assembly, only: add_mesh_form, check_meshes, mesh_form
-  use nocdyn_motion_assembly, only: add_cardans, add_drive_form, drive_form
+  use nocdyn_motion_assembly, only: add_cardans, add_drive_form, add_relations, check_motions, drive_form
   use nocdyn_moving_start, only: fit_moving_rows
   use nocdyn_motor_assembly, only: add_motor_form, check_motors, motor_form
   use nocdyn_multiplier, only: new_multiplier
@@ -54,6 +55,8 @@ contains
     if (.not. allocated(error)) call check_shafts(input, error)
     if (.not. allocated(error)) call check_meshes(input, error)
     if (.not. allocated(error)) call check_joints(input, error)
+    if (.not. allocated(error)) call check_motions(input, error)
+    if (.not. allocated(error)) call check_cranks(input, error)
     if (.not. allocated(error)) call check_motors(input, error)
     if (.not. allocated(error)) call check_engines(input, error)
     if (.not. allocated(error)) call check_orders(input, error)
@@ -66,6 +69,7 @@ contains
       call add_banks(new_element_groups(input, 'clutch', n, body_index), clutch_form, add_clutch_form, machine%banks)
       call add_freewheels(new_element_groups(input, 'freewheel', n, body_index), machine%banks)
       call add_cardans(new_element_groups(input, 'cardan', n, body_index), machine%banks)
+      call add_relations(new_element_groups(input, 'relation', n, body_index), machine%banks)
       call add_banks(new_element_groups(input, 'drive', n, body_index), drive_form, add_drive_form, machine%banks)
       call add_banks(new_element_groups(input, 'motor', n, body_index), motor_form, add_motor_form, machine%banks)
       call add_banks(new_element_groups(input, 'load', n, body_index), load_form, add_load_form, machine%banks)
@@ -74,6 +78,7 @@ contains
     end associate
     call new_shaft_set(input, body_index, shafts)
     call add_shafts(shafts, machine)
+    call add_cranks(new_element_groups(input, 'crank', machine%lanes, body_index), machine)
     call machine%number_elements()
     call analyse_machine_constraints(input, body_index, machine, error)
     if (allocated(error)) return

@@ -166,7 +166,7 @@ contains
   pure logical function is_source(self)
     class(bank_t), intent(in) :: self
 
-    is_source = any(self%role == [role_motor, role_excitation, role_drive])
+    is_source = any(self%role == [role_motor, role_excitation, role_crank, role_drive])
   end function is_source
 
   !> Replaces torques that keep changing, with the time or with the angle of a turning body, by their means. By default there

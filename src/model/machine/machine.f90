@@ -46,6 +46,7 @@ module nocdyn_machine
     type(geared_group_t), allocatable :: groups(:)
     type(coordinates_t) :: coordinates
   contains
+    procedure :: add_nodes
     procedure :: number_elements
     procedure :: list_parameters
     procedure :: to_mean_torque
@@ -67,6 +68,25 @@ module nocdyn_machine
   end type machine_t
 
 contains
+
+  !> Adds bodies that the input does not name, after the others.
+  subroutine add_nodes(self, names, inertia)
+    class(machine_t), intent(inout) :: self
+    type(string_t), intent(in) :: names(:)   !! [nodes]
+    real(wp), intent(in) :: inertia(:)       !! [kg m2], kg of bodies that move along a line, [nodes]
+    real(wp) :: zero(self%lanes, size(names))
+    integer :: length(2)
+
+    zero = 0.0_wp
+    self%nodes = self%nodes + size(names)
+    self%bodies = self%bodies + size(names)
+    self%constraints%bodies = self%bodies
+    self%names = [self%names, names]
+    length = [self%lanes, self%bodies]
+    self%start_angle = reshape([self%start_angle, zero], length)
+    self%start_speed = reshape([self%start_speed, zero], length)
+    self%inertia = reshape([self%inertia, spread(inertia, 1, self%lanes)], length)
+  end subroutine add_nodes
 
   !> Numbers the elements of all banks consecutively, and collects their laws and switches. Call it once all banks are set.
   subroutine number_elements(self)

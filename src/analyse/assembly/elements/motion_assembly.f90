@@ -5,18 +5,86 @@ module nocdyn_motion_assembly
   use nocdyn_curves, only: curve_t, extrapolation_linear, interpolation_cubic, new_curve
   use nocdyn_drives, only: drive_motion_t, new_drives
   use nocdyn_element_groups, only: element_groups_t
-  use nocdyn_input, only: group_t
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_phases, only: new_phases
+  use nocdyn_relation_rows, only: new_relation_rows
+  use nocdyn_splines, only: new_spline, spline_t
+  use nocdyn_text, only: to_text
   implicit none (type, external)
   private
 
-  public :: add_cardans, drive_form, add_drive_form
+  public :: check_motions, add_cardans, add_relations, drive_form, add_drive_form
 
   integer, parameter :: by_formula = 1, by_table = 2
   integer, parameter :: forms_of_speed = 2   ! as many follow of angles
 
 contains
+
+  !> Refuses cams that do not return, gears that turn back, and drives that jump.
+  subroutine check_motions(input, error)
+    type(input_t), intent(in) :: input
+    type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: relations(:)
+    character(len=:), allocatable :: text
+    integer :: i
+
+    allocate (relations, source=input%groups_named('relation'))
+    do i = 1, size(relations)
+      call find_table_mistake(input%groups(relations(i)), text)
+      if (text == '') cycle
+      call raise(error, exit_input, input%location(relations(i), 'table_driven') // ': table_driven: ' // text)
+      return
+    end do
+  end subroutine check_motions
+
+  !> What is wrong with the table of a relation, '' if nothing is.
+  subroutine find_table_mistake(group, text)
+    type(group_t), intent(in) :: group
+    character(len=:), allocatable, intent(out) :: text
+    integer, parameter :: looks = 20   ! at the slope of each segment
+    real(wp), allocatable :: x(:), y(:)
+    real(wp) :: slope(0:3), way
+    type(spline_t) :: spline
+    integer :: i
+
+    text = ''
+    allocate (x, source=group%numbers('table_angle'))
+    allocate (y, source=group%numbers('table_driven'))
+    way = y(size(y)) - y(1)
+    select case (group%text('kind'))
+    case ('cam')
+      if (abs(way) > 1.0e-12_wp * maxval(abs(y))) text = 'a cam returns: the last value must be the first, ' // to_text(y(1)) // &
+        "; kind = 'gear' advances from turn to turn, kind = 'lever' does not repeat"
+    case ('gear')
+      spline = new_spline(x, y, .true.)
+      do i = 0, looks * (size(x) - 1) - 1
+        slope = spline%derivatives(x(1 + i / looks) + modulo(i, looks) * (x(2 + i / looks) - x(1 + i / looks)) / looks)
+        if (slope(1) * way > 0) cycle
+        text = 'non-circular gears turn in one direction, but the spline through the points turns back near ' // &
+               'table_angle = ' // to_text(x(1 + i / looks)) // " rad; kind = 'cam' may go to and fro"
+        return
+      end do
+    end select
+  end subroutine find_table_mistake
+
+  !> Adds the bank of the relations and that of their drivers.
+  subroutine add_relations(groups, banks)
+    type(element_groups_t), intent(in) :: groups
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    type(spline_t) :: splines(size(groups%indices))
+    integer :: i
+
+    if (size(groups%indices) == 0) return
+    do i = 1, size(groups%indices)
+      associate (group => groups%input%groups(groups%indices(i)))
+        splines(i) = new_spline(group%numbers('table_angle'), group%numbers('table_driven'), group%text('kind') /= 'lever')
+      end associate
+    end do
+    call append_bank(banks, new_relation_rows(groups%lanes, groups%names, groups%bodies('bodies', 2), splines))
+    call append_bank(banks, new_phases(groups%lanes, groups%names, groups%bodies('bodies', 1)))
+  end subroutine add_relations
 
   !> Adds the bank of the cardan joints and that of their drivers.
   subroutine add_cardans(groups, banks)

@@ -291,18 +291,11 @@ contains
     type(shaft_set_t), intent(in) :: set
     type(machine_t), intent(inout) :: machine
     type(coupling_common_t) :: shared
-    real(wp), allocatable :: longer(:, :), zero(:, :)
+    real(wp), allocatable :: zero(:, :)
     integer :: b, k
 
     if (size(set%shafts) == 0) return
-    machine%nodes = size(set%names)
-    machine%names = [machine%names, set%names]
-    allocate (longer(machine%lanes, machine%bodies + machine%nodes), source=0.0_wp)
-    machine%start_angle = reshape([machine%start_angle, longer(:, machine%bodies + 1:)], shape(longer))
-    machine%start_speed = reshape([machine%start_speed, longer(:, machine%bodies + 1:)], shape(longer))
-    machine%inertia = reshape([machine%inertia, longer(:, machine%bodies + 1:)], shape(longer))
-    machine%bodies = machine%bodies + machine%nodes
-    machine%constraints%bodies = machine%bodies
+    call machine%add_nodes(set%names, 0.0_wp * set%share)
     do k = 1, size(set%bodies)
       b = set%bodies(k)
       if (b > 0) machine%inertia(:, b) = machine%inertia(:, b) + set%inertia(k)

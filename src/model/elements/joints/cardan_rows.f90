@@ -30,8 +30,8 @@ contains
     type(cardan_rows_t) :: bank
 
     call bank%connect_rows_only(role_cardan, size(angle, 1), names, rows_between(0 * driven, driven))
-    call bank%add_parameter('angle', angle)
-    call bank%add_parameter('phase', phase)
+    call bank%add_parameter('angle', angle, is_key=.false.)
+    call bank%add_parameter('phase', phase, is_key=.false.)
   end function new_cardan_rows
 
   !> phi_2 = phi_1 + atan2((1 - c) sin phi_1 cos phi_1, c cos^2 phi_1 + sin^2 phi_1), c = cos(angle).

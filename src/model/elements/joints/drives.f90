@@ -49,10 +49,10 @@ contains
     bank%prescribe_angles = prescribe_angles
     bank%t_start = t_start
     call bank%connect_rows_only(role_drive, size(given%speed, 1), names, rows_between(0 * body, body))
-    call bank%add_parameter('speed', given%speed, is_key=.not. prescribe_angles)
-    call bank%add_parameter(merge('angle_amplitude', 'speed_amplitude', prescribe_angles), given%amplitude)
-    call bank%add_parameter('frequency', given%frequency)
-    call bank%add_parameter('phase', given%phase)
+    call bank%add_parameter('speed', given%speed, is_key=.false.)
+    call bank%add_parameter('amplitude', given%amplitude, is_key=.false.)
+    call bank%add_parameter('frequency', given%frequency, is_key=.false.)
+    call bank%add_parameter('phase', given%phase, is_key=.false.)
     if (.not. present(table)) return
     bank%is_polynomial = .false.
     call add_table(bank, table)

@@ -1,0 +1,181 @@
+!> The slider-cranks of an input: their pistons and rods, which become bodies after all others, and the banks of their rows and
+!> forces.
+module nocdyn_crank_assembly
+  use nocdyn_bank, only: append_bank
+  use nocdyn_crank_rows, only: crank_rows_t, new_crank_rows, slider_crank_t
+  use nocdyn_curves, only: curve_t, extrapolation_linear, interpolation_cubic, new_curve
+  use nocdyn_element_groups, only: element_groups_t
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_fourier, only: fourier_coefficients
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_phases, only: new_phases
+  use nocdyn_piston_forces, only: new_piston_force, periodic_force_t
+  use nocdyn_text, only: append, string_t, to_text
+  implicit none (type, external)
+  private
+
+  public :: check_cranks, add_cranks
+
+  real(wp), parameter :: pi = acos(-1.0_wp), degree = pi / 180.0_wp
+  integer, parameter :: samples = 4096   ! of a cycle: the forces between them follow from points that are less dense
+
+contains
+
+  !> Refuses cranks that cannot turn, and forces that are not those of one cycle.
+  subroutine check_cranks(input, error)
+    type(input_t), intent(in) :: input
+    type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: cranks(:)
+    integer :: i
+
+    allocate (cranks, source=input%groups_named('crank'))
+    do i = 1, size(cranks)
+      associate (group => input%groups(cranks(i)))
+        if (group%number('crank_radius') + abs(group%number('offset')) >= group%number('rod_length')) then
+          call raise(error, exit_input, input%location(cranks(i), 'offset') // ': offset = ' // to_text(group%number('offset')) // &
+                     ' m: the rod of ' // to_text(group%number('rod_length')) // ' m does not reach the piston at all angles; ' // &
+                     'allowed: crank_radius + |offset| below rod_length')
+          return
+        end if
+        if (group%number('rod_mass') > 0 .and. .not. group%has_value('rod_center')) then
+          call raise(error, exit_input, input%location(cranks(i), 'rod_mass') // ': rod_mass = ' // &
+                     to_text(group%number('rod_mass')) // ' kg, but rod_center is missing')
+          return
+        end if
+        call check_cycle(input, cranks(i), error)
+        if (allocated(error)) return
+      end associate
+    end do
+  end subroutine check_cranks
+
+  !> The crank angles are those of one cycle.
+  subroutine check_cycle(input, index, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: rounding = 1.0e-9_wp   ! relative
+    real(wp), allocatable :: angle(:)
+
+    associate (group => input%groups(index))
+      allocate (angle, source=group%numbers('crank_angles'))
+      if (size(angle) == 0) return
+      if (all(group%whole_number('stroke') /= [2, 4])) then
+        call raise(error, exit_input, input%location(index, 'stroke') // ': stroke = ' // &
+                   to_text(group%whole_number('stroke')) // '; allowed: 2 or 4')
+        return
+      end if
+      associate (n => size(angle), cycle => cycle_of(group))
+        associate (span => angle(n) - angle(1), step => maxval(angle(2:) - angle(:n - 1)))
+          if (span <= cycle * (1.0_wp + rounding) .and. span + step >= cycle * (1.0_wp - rounding)) return
+        end associate
+        call raise(error, exit_input, input%location(index, 'crank_angles') // ': the crank angles from ' // &
+                   to_text(angle(1) / degree) // ' to ' // to_text(angle(n) / degree) // ' deg are not those of one cycle; ' // &
+                   'needed: ' // to_text(nint(cycle / degree)) // ' deg with stroke = ' // to_text(group%whole_number('stroke')))
+      end associate
+    end associate
+  end subroutine check_cycle
+
+  !> Angle of the crank over one cycle of the force [rad].
+  pure real(wp) function cycle_of(group)
+    type(group_t), intent(in) :: group
+
+    cycle_of = pi * group%whole_number('stroke')
+  end function cycle_of
+
+  !> Adds the pistons and rods and the banks of their rows and forces to a machine.
+  subroutine add_cranks(groups, machine)
+    type(element_groups_t), intent(in) :: groups
+    type(machine_t), intent(inout) :: machine
+    integer, allocatable :: body(:)
+    integer :: i
+
+    if (size(groups%indices) == 0) return
+    allocate (body, source=groups%bodies('body', 1))
+    do i = 1, size(groups%indices)
+      call add_crank(groups%input%groups(groups%indices(i)), groups%names(i), body(i), machine)
+    end do
+  end subroutine add_cranks
+
+  !> One crank, whose rows are a bank of their own. A rod without an inertia of its own is a part of the piston and of the body.
+  subroutine add_crank(group, name, body, machine)
+    type(group_t), intent(in) :: group
+    type(string_t), intent(in) :: name
+    integer, intent(in) :: body
+    type(machine_t), intent(inout) :: machine
+    character(len=*), parameter :: part_names(*) = [character(len=10) :: 'piston', 'rod along', 'rod across', 'rod angle']
+    type(crank_rows_t) :: bank
+    type(string_t), allocatable :: nodes(:)
+    real(wp), allocatable :: inertia(:)
+    integer :: k, piston
+    real(wp) :: share   ! of the rod at the piston
+
+    share = group%number('rod_center', absent=0.0_wp) / group%number('rod_length')
+    associate (rod => group%number('rod_mass'))
+      if (group%has_value('rod_inertia')) then
+        inertia = [group%number('piston_mass'), rod, rod, group%number('rod_inertia')]
+      else
+        inertia = [group%number('piston_mass') + share * rod]
+        machine%inertia(:, body) = machine%inertia(:, body) + (1.0_wp - share) * rod * group%number('crank_radius')**2
+      end if
+    end associate
+    allocate (nodes(0))
+    do k = 1, size(inertia)
+      call append(nodes, name%text // '[' // trim(part_names(k)) // ']')
+    end do
+    piston = machine%bodies + 1
+    call machine%add_nodes(nodes, inertia)
+    bank = new_crank_rows(machine%lanes, spread(name, 1, size(inertia)), [(piston - 1 + k, k=1, size(inertia))], crank_of(group))
+    do k = 1, size(inertia)
+      machine%start_angle(:, piston - 1 + k) = bank%position(k, machine%start_angle(1, body))
+    end do
+    call append_bank(machine%banks, bank)
+    call append_bank(machine%banks, new_phases(machine%lanes, spread(name, 1, size(inertia)), spread(body, 1, size(inertia))))
+    if (.not. group%has_value('crank_angles')) return
+    call append_bank(machine%banks, new_piston_force(machine%lanes, name, piston, group%number('phase'), force_of(group)))
+    call append_bank(machine%banks, new_phases(machine%lanes, [name], [body]))
+  end subroutine add_crank
+
+  type(slider_crank_t) function crank_of(group) result(crank)
+    type(group_t), intent(in) :: group
+
+    crank = slider_crank_t(group%number('crank_radius'), group%number('rod_length'), group%number('offset'), &
+                           group%number('phase'), group%number('rod_center', absent=0.0_wp))
+  end function crank_of
+
+  !> The force on the piston away from the crank over the angle of the crank, from its points by their harmonics.
+  function force_of(group) result(force)
+    type(group_t), intent(in) :: group
+    type(periodic_force_t) :: force
+    type(curve_t) :: curve
+    real(wp), allocatable :: angle(:), values(:)
+    real(wp) :: sampled(samples)
+    integer :: i, last
+
+    allocate (angle, source=group%numbers('crank_angles'))
+    if (group%has_value('forces')) then
+      values = -group%numbers('forces')
+    else
+      values = (group%number('crankcase_pressure') - group%numbers('pressures')) * 0.25_wp * pi * group%number('bore')**2
+    end if
+    last = size(angle)
+    associate (cycle => cycle_of(group))
+      if (angle(last) - angle(1) > cycle - 0.5_wp * (angle(last) - angle(last - 1))) then   ! the first point again
+        values(1) = 0.5_wp * (values(1) + values(last))
+        last = last - 1
+      end if
+      curve = new_curve([angle(:last) - cycle, angle(:last), angle(:last) + cycle], [values(:last), values(:last), values(:last)], &
+                        interpolation_cubic, extrapolation_linear)
+      do i = 1, samples
+        sampled(i) = curve%value(angle(1) + modulo(cycle * (i - 1) / samples - angle(1), cycle))
+      end do
+      force%base = 2.0_wp * pi / cycle
+      associate (n => int(group%number('harmonics_up_to') / force%base + 1.0e-9_wp))
+        allocate (force%sine(n), force%cosine(n))
+      end associate
+    end associate
+    call fourier_coefficients(sampled, force%mean, force%sine, force%cosine)
+  end function force_of
+
+end module nocdyn_crank_assembly

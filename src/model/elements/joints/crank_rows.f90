@@ -1,0 +1,185 @@
+!> Slider-cranks: the rows by which pistons and rods move with their cranks. With the crank radius r, the rod length l and the
+!> offset e of the piston's line beside the axis of the crank, and the angle v from where the crank points along this line, the
+!> piston is at x = r cos(v) + sqrt(l^2 - p^2), p = r sin(v) - e; F. Freudenstein, Trans. ASME 77 (1955) 853 for e = 0 likewise.
+!>
+!> A rod with an inertia of its own has three rows more: the position of its centre of mass along the line and across, and its
+!> angle asin(p / l). Without one its mass is on its two ends.
+module nocdyn_crank_rows
+  use nocdyn_bank, only: quantity_t, role_crank
+  use nocdyn_element_rows, only: rows_between
+  use nocdyn_elements, only: elements_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_moving_rows, only: moving_rows_t
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  public :: new_crank_rows
+
+  integer, parameter :: part_piston = 1, part_rod_along = 2, part_rod_across = 3   ! the elements; the fourth is the rod's angle
+
+  !> Dimensions of a slider-crank.
+  type, public :: slider_crank_t
+    real(wp) :: crank_radius = 0.0_wp   !! r [m]
+    real(wp) :: rod_length = 0.0_wp     !! l [m], more than r + |e|
+    real(wp) :: offset = 0.0_wp         !! e [m]
+    real(wp) :: phase = 0.0_wp          !! v where the angle of the body is zero [rad]
+    real(wp) :: rod_center = 0.0_wp     !! centre of mass of the rod, distance from the crank pin [m]
+  end type slider_crank_t
+
+  type, extends(moving_rows_t), public :: crank_rows_t
+    type(slider_crank_t) :: crank
+  contains
+    procedure :: motion
+    procedure :: position
+    procedure :: quantities => columns_of_cranks
+    procedure :: observe => observe_cranks
+    procedure :: named_count
+  end type crank_rows_t
+
+contains
+
+  !> The rows of one slider-crank; the crank is the driver of all.
+  function new_crank_rows(lanes, names, driven, crank) result(bank)
+    integer, intent(in) :: lanes
+    type(string_t), intent(in) :: names(:)           !! that of the crank, [elements]
+    integer, intent(in) :: driven(:)                 !! piston, and what stands for the rod; [elements], 1 or 4
+    type(slider_crank_t), intent(in) :: crank
+    type(crank_rows_t) :: bank
+
+    call bank%connect_rows_only(role_crank, lanes, names, rows_between(0 * driven, driven))
+    bank%crank = crank
+  end function new_crank_rows
+
+  pure subroutine motion(self, element, v, g)
+    class(crank_rows_t), intent(in) :: self
+    integer, intent(in) :: element
+    real(wp), intent(in) :: v          !! angle of the body [rad]
+    real(wp), intent(out) :: g(0:3)    !! [m] or [rad]
+
+    associate (crank => self%crank, share => self%crank%rod_center / self%crank%rod_length)
+      select case (element)
+      case (part_piston)
+        g = piston_motion(crank, v)
+      case (part_rod_along)
+        g = share * piston_motion(crank, v) + (1.0_wp - share) * turned_arm(crank, v)
+      case (part_rod_across)
+        g = (1.0_wp - share) * crossed_arm(crank, v)
+      case default
+        call rod_motion(crank, v, g)
+      end select
+    end associate
+  end subroutine motion
+
+  !> g alone.
+  pure real(wp) function position(self, element, v)
+    class(crank_rows_t), intent(in) :: self
+    integer, intent(in) :: element
+    real(wp), intent(in) :: v   !! angle of the body [rad]
+    real(wp) :: g(0:3)
+
+    call self%motion(element, v, g)
+    position = g(0)
+  end function position
+
+  !> r cos(v), the crank pin along the line of the piston, and its derivatives.
+  pure function turned_arm(crank, v) result(g)
+    type(slider_crank_t), intent(in) :: crank
+    real(wp), intent(in) :: v   !! [rad]
+    real(wp) :: g(0:3)          !! [m]
+
+    associate (a => v + crank%phase)
+      g = crank%crank_radius * [cos(a), -sin(a), -cos(a), sin(a)]
+    end associate
+  end function turned_arm
+
+  !> p = r sin(v) - e, the crank pin across it.
+  pure function crossed_arm(crank, v) result(g)
+    type(slider_crank_t), intent(in) :: crank
+    real(wp), intent(in) :: v   !! [rad]
+    real(wp) :: g(0:3)          !! [m]
+
+    associate (a => v + crank%phase)
+      g = crank%crank_radius * [sin(a), cos(a), -sin(a), -cos(a)]
+    end associate
+    g(0) = g(0) - crank%offset
+  end function crossed_arm
+
+  !> Position of the piston from the axis of the crank.
+  pure function piston_motion(crank, v) result(g)
+    type(slider_crank_t), intent(in) :: crank
+    real(wp), intent(in) :: v   !! angle of the body [rad]
+    real(wp) :: g(0:3)          !! [m]
+
+    g = turned_arm(crank, v) + rod_reach(crank, crossed_arm(crank, v))
+  end function piston_motion
+
+  !> w = sqrt(l^2 - p^2), by w w' = -p p' and its derivatives.
+  pure function rod_reach(crank, p) result(w)
+    type(slider_crank_t), intent(in) :: crank
+    real(wp), intent(in) :: p(0:3)   !! [m]
+    real(wp) :: w(0:3)               !! [m]
+
+    w(0) = sqrt(crank%rod_length**2 - p(0)**2)
+    w(1) = -p(0) * p(1) / w(0)
+    w(2) = -(p(1)**2 + p(0) * p(2) + w(1)**2) / w(0)
+    w(3) = -(3.0_wp * p(1) * p(2) + p(0) * p(3) + 3.0_wp * w(1) * w(2)) / w(0)
+  end function rod_reach
+
+  !> The angle beta of the rod: sin(beta) = p / l, w beta' = p' and its derivatives.
+  pure subroutine rod_motion(crank, v, beta)
+    type(slider_crank_t), intent(in) :: crank
+    real(wp), intent(in) :: v             !! [rad]
+    real(wp), intent(out) :: beta(0:3)    !! [rad]
+    real(wp) :: p(0:3), w(0:3)
+
+    p = crossed_arm(crank, v)
+    w = rod_reach(crank, p)
+    beta(0) = asin(p(0) / crank%rod_length)
+    beta(1) = p(1) / w(0)
+    beta(2) = (p(2) - w(1) * beta(1)) / w(0)
+    beta(3) = (p(3) - 2.0_wp * w(1) * beta(2) - w(2) * beta(1)) / w(0)
+  end subroutine rod_motion
+
+  !> Position, speed and force of the piston, and the torque of piston and rod on the crank.
+  function columns_of_cranks(self) result(columns)
+    class(crank_rows_t), intent(in) :: self
+    type(quantity_t), allocatable :: columns(:)
+
+    allocate (columns(4))
+    columns(1) = quantity_t('position', 'm', [part_piston])
+    columns(2) = quantity_t('velocity', 'm/s', [part_piston])
+    columns(3) = quantity_t('force', 'N', [part_piston])
+    columns(4) = quantity_t('torque', 'N m', [part_piston])
+  end function columns_of_cranks
+
+  pure subroutine observe_cranks(self, elements, quantity, lane, values)
+    class(crank_rows_t), intent(in) :: self
+    type(elements_t), intent(in) :: elements
+    integer, intent(in) :: quantity
+    integer, intent(in) :: lane
+    real(wp), intent(out) :: values(:)   !! [elements of the bank]
+
+    associate (first => self%first, last => self%last())
+      select case (quantity)
+      case (1)
+        values = elements%angle(lane, first:last)
+      case (2)
+        values = elements%speed(lane, first:last)
+      case (3)
+        values = elements%applied(lane, first:last)
+      case default
+        values = 0.0_wp
+        values(part_piston) = sum(elements%applied(lane, last + 1:last + self%count))
+      end select
+    end associate
+  end subroutine observe_cranks
+
+  !> All rows have the name of the crank.
+  pure integer function named_count(self)
+    class(crank_rows_t), intent(in) :: self
+
+    named_count = 1
+  end function named_count
+
+end module nocdyn_crank_rows
