@@ -40,9 +40,11 @@ def coupled_clutches():
     return text + "&run t_end = 1.5 method = 'METHOD' rtol = 1e-12 atol = 1e-13 /\n&output interval = 0.1 /\n"
 
 
+@pytest.mark.parametrize("formulation", ["reduced", "multiplier", "paper"])
 @pytest.mark.parametrize("method", ["rk45", "rk853", "rodas5p", "auto"])
-def test_coupled_clutches_lock_and_slip_when_those_of_modelica_do(nocdyn, method):
-    table, events = run(nocdyn, coupled_clutches().replace("METHOD", method))
+def test_coupled_clutches_lock_and_slip_when_those_of_modelica_do(nocdyn, method, formulation):
+    text = coupled_clutches().replace("METHOD", method).replace("rtol", f"formulation = '{formulation}' rtol")
+    table, events = run(nocdyn, text)
     assert changes(events) == [
         ("clutch2", "locked"),
         ("clutch1", "locked"),
@@ -272,7 +274,6 @@ def test_bad_clutches_are_refused(nocdyn, keys, words):
     [
         ("modes", "", "nocdyn modes does not know which joints are locked"),
         ("equilibrium", "", "nocdyn equilibrium does not know which joints are locked"),
-        ("run", "run.formulation=paper", "formulation = 'paper' does not know which joints are locked"),
         ("run", "run.start=equilibrium", "start = 'equilibrium' does not know which joints are locked"),
         ("run", "run.method=taylor", "method = 'taylor' cannot be used: clutches and freewheels have no Taylor series"),
     ],

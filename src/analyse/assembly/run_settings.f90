@@ -5,7 +5,6 @@ module nocdyn_run_settings
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_integration_settings, only: integration_settings_t
-  use nocdyn_joint_assembly, only: refuse_joints
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -22,7 +21,7 @@ module nocdyn_run_settings
 
 contains
 
-  !> Refuses machines with joints that lock, and those that are too large for the dense matrices, for `paper` and `multiplier`.
+  !> Refuses machines that are too large for the dense matrices, for `paper` and `multiplier`.
   subroutine check_size(input, machine, error)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
@@ -33,8 +32,7 @@ contains
     formulation = input%groups(input%position('run'))%text('formulation')
     order = merge(3, 2, formulation == 'paper') * machine%bodies
     if (formulation == 'reduced') return
-    call refuse_joints(input, 'formulation = ' // quoted(formulation), error)
-    if (allocated(error) .or. order <= largest_matrix) return
+    if (order <= largest_matrix) return
     call raise(error, exit_input, input%location(input%position('run'), 'formulation') // ': formulation = ' // &
                quoted(formulation) // ' needs dense matrices of ' // to_text(order) // &
                ' rows for this machine; at most ' // to_text(largest_matrix) // ' are allowed; ' // &

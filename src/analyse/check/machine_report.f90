@@ -1,9 +1,11 @@
 !> The report of `nocdyn check` on a machine: bodies, gears, coordinates, redundant constraints.
 module nocdyn_machine_report
-  use nocdyn_bank, only: role_clutch, role_coupling, role_excitation, role_freewheel, role_load, role_motor, role_names
+  use nocdyn_bank, only: role_cardan, role_clutch, role_coupling, role_crank, role_drive, role_excitation, role_freewheel, &
+    role_load, role_motor, role_names, role_relation
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_rigid_trains, only: ratio_tolerance
+  use nocdyn_row_motions, only: new_row_motions, row_motions_t
   use nocdyn_text, only: append, counted, joined, quoted, rounded_text, selected, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
@@ -123,8 +125,12 @@ contains
     type(machine_t), intent(in) :: machine
     character(len=:), allocatable :: text
     type(text_buffer_t) :: report
+    type(row_motions_t) :: motions
     type(string_t), allocatable :: notes(:)
-    integer, parameter :: roles(4) = [role_coupling, role_motor, role_load, role_excitation]
+    integer, parameter :: roles(*) = [role_coupling, role_motor, role_load, role_excitation]   ! said even if there are none
+    integer, parameter :: others(*) = [role_clutch, role_freewheel, role_cardan, role_crank, role_relation, role_drive]
+    character(len=*), parameter :: plurals(*) = [character(len=10) :: 'clutches', 'freewheels', 'cardans', 'cranks', 'relations', &
+                                                 'drives']
     integer :: i
 
     call report%append(file // ': ' // counted(machine%bodies - machine%nodes, 'body', 'bodies') // counted_constraints(machine))
@@ -132,13 +138,12 @@ contains
       call report%append(', ' // counted(elements_of(machine, roles(i)), trim(role_names(roles(i))), &
                                          trim(role_names(roles(i))) // 's'))
     end do
-    if (elements_of(machine, role_clutch) > 0) then
-      call report%append(', ' // counted(elements_of(machine, role_clutch), 'clutch', 'clutches'))
-    end if
-    if (elements_of(machine, role_freewheel) > 0) then
-      call report%append(', ' // counted(elements_of(machine, role_freewheel), 'freewheel', 'freewheels'))
-    end if
-    call put_line(report, counted(machine%coordinates%freedoms, 'degree', 'degrees') // ' of freedom')
+    do i = 1, size(others)
+      if (elements_of(machine, others(i)) == 0) cycle
+      call report%append(', ' // counted(elements_of(machine, others(i)), trim(role_names(others(i))), trim(plurals(i))))
+    end do
+    motions = new_row_motions(machine%banks)
+    call put_line(report, counted(machine%coordinates%freedoms - motions%count, 'degree', 'degrees') // ' of freedom')
     call put_groups(report, machine)
     call put_line(report, 'coordinates: ' // joined(selected(machine%names, named_coordinates(machine)), ', ', max_lines))
     call put_relations(report, machine)

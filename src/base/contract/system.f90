@@ -57,6 +57,7 @@ module nocdyn_system
     procedure :: measure_name
     procedure :: find_far
     procedure :: project_state
+    procedure :: evaluation_obstacle
     procedure :: limit_steps
     procedure :: shift_state
     procedure :: restore_state
@@ -165,6 +166,14 @@ contains
     real(wp), intent(in) :: t
     real(wp), contiguous, intent(inout) :: y(:)   !! [states + quadratures]
   end subroutine project_state
+
+  !> Why the equations cannot be evaluated where they last failed, '' if nothing is known.
+  function evaluation_obstacle(self) result(text)
+    class(system_t), intent(in) :: self
+    character(len=:), allocatable :: text
+
+    text = ''
+  end function evaluation_obstacle
 
   !> Shortens steps that would be too long for the search of crossings: it looks at a few times in each, however little the state
   !> bends. By default none are.

@@ -114,7 +114,7 @@ contains
     class(system_t), intent(in) :: system
     real(wp), intent(in) :: rtol, atol   !! tolerances of the integration
     character(len=:), allocatable :: sentence
-    character(len=:), allocatable :: when
+    character(len=:), allocatable :: reason, when
 
     when = 't = ' // rounded_text(solver_status%t(lane), digits) // ' s'
     select case (solver_status%code(lane))
@@ -133,7 +133,9 @@ contains
     case (integration_rhs_failed)
       sentence = 'the equations cannot be evaluated beyond ' // when // ', and a shorter step does not help'
       if (solver_status%steps(lane) == 0) sentence = 'the equations cannot be evaluated at the start, ' // when
-      sentence = sentence // ': check the start values and the parameters'
+      reason = system%evaluation_obstacle()
+      if (reason == '') reason = 'check the start values and the parameters'
+      sentence = sentence // ': ' // reason
     case (integration_idle)
       sentence = 'nothing has been integrated'
     case (integration_stopped)

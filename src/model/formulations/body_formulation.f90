@@ -3,7 +3,7 @@ module nocdyn_body_formulation
   use nocdyn_element_coordinates, only: new_element_coordinates
   use nocdyn_element_sets, only: coupling_elements
   use nocdyn_error_measures, only: error_measures_t, new_error_measures
-  use nocdyn_formulation, only: formulation_t
+  use nocdyn_joint_formulation, only: joint_formulation_t, observe_with_joints
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
@@ -15,9 +15,10 @@ module nocdyn_body_formulation
   public :: start_of_bodies, observe_bodies, jacobian_of_bodies   ! for extensions that add to them
 
   !> Extensions compute the accelerations. The first 2n states are omega, phi; further mechanical states may follow.
-  type, abstract, extends(formulation_t), public :: body_formulation_t
+  type, abstract, extends(joint_formulation_t), public :: body_formulation_t
     character(len=10) :: word = ''               !! name of the formulation in the input
     real(wp), allocatable :: slope(:, :)         !! y' at the last observed state, [lanes, states + quadratures]
+    real(wp), allocatable, private :: near(:, :) !! the state that is observed, [lanes, states]
     integer, allocatable :: status(:)            !! evaluation_... of that evaluation, [lanes]
     real(wp), allocatable :: mobility(:, :, :)   !! matrix of omega' = mobility T [1/(kg m2)], [bodies, bodies, lanes]
     ! work space of the Jacobian, one lane:
@@ -33,6 +34,9 @@ module nocdyn_body_formulation
     procedure :: jacobian => jacobian_of_bodies
     procedure :: series_obstacle
     procedure :: switch_motion
+    procedure :: accelerate
+    procedure :: element_rate
+    procedure :: push_element
   end type body_formulation_t
 
 contains
@@ -51,6 +55,7 @@ contains
     call self%allocate_state([(b, b=1, machine%bodies)], mechanical, with_energy_balance)
     allocate (self%slope(self%lanes, self%states + self%quadratures), source=0.0_wp)
     allocate (self%status(self%lanes), source=evaluation_ok)
+    allocate (self%near(self%lanes, self%states), source=0.0_wp)
     allocate (self%mobility(machine%bodies, machine%bodies, self%lanes))
     allocate (self%by_angle(machine%bodies, machine%bodies), self%by_speed(machine%bodies, machine%bodies))
     allocate (self%by_time(machine%bodies), self%by_state(machine%bodies))
@@ -59,6 +64,7 @@ contains
     end do
     allocate (self%zero_twist(self%lanes, machine%elements%count), source=0.0_wp)
     call self%set_norm(measures_of_bodies(machine, self%states))
+    call self%prepare_joints()
   end subroutine set_machine
 
   !> The measures of errors: every state is one body's.
@@ -120,6 +126,14 @@ contains
     real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
     real(wp), contiguous, intent(in) :: y(:, :)   !! state, [lanes, states], at least
 
+    if (self%joints%count > 0) then
+      call observe_with_joints(self, t, y)
+      self%near(:, :) = y(:, :self%states)
+      if (self%projects) call self%project(t(1), self%near(1, :))
+      call self%derivative(t, self%near, self%slope, self%status)
+      call self%machine%elements%scatter(self%torque)
+      return
+    end if
     if (self%switches > 0) then
       call self%gather(y)
       call self%machine%choose_branches(t)
@@ -179,6 +193,10 @@ contains
     call self%machine%differentiate_elements(t)
     dfdy = 0.0_wp
     dfdt = 0.0_wp
+    if (self%joints%count > 0) then
+      call self%find_accelerations(t(1), self%acceleration)
+      call self%differentiate_rows(self%acceleration)
+    end if
     do l = 1, self%lanes
       call differentiate_torques(self, l)
       do b = 1, n
@@ -190,6 +208,7 @@ contains
       call differentiate_powers(self, l, dfdy(l, :, :), dfdt(l, :))
       call differentiate_internal(self, l, dfdy(l, :, :))
     end do
+    if (self%joints%count > 0) call self%hold_columns(components, dfdy(1, :, :), dfdt(1, :))
   end subroutine fill_of_bodies
 
   !> Derivatives of the torques T of one lane, from those of the elements.
@@ -270,6 +289,44 @@ contains
       end do
     end associate
   end subroutine differentiate_internal
+
+  !> omega' = mobility T.
+  subroutine accelerate(self, acceleration)
+    class(body_formulation_t), intent(inout) :: self
+    real(wp), intent(inout) :: acceleration(:)   !! [rad/s2], [bodies]
+
+    call multiply(self%mobility(:, :, 1), self%torque(1, 1:), acceleration)
+  end subroutine accelerate
+
+  !> The rate of an element.
+  pure real(wp) function element_rate(self, element, rates)
+    class(body_formulation_t), intent(in) :: self
+    integer, intent(in) :: element
+    real(wp), intent(in) :: rates(:)   !! omega [rad/s] or omega' [rad/s2], [bodies] at least
+    integer :: k
+
+    element_rate = 0.0_wp
+    associate (rows => self%machine%elements%rows)
+      do k = rows%first(element), rows%first(element + 1) - 1
+        if (rows%body(k) > 0) element_rate = element_rate + rows%coefficient(k) * rates(rows%body(k))
+      end do
+    end associate
+  end function element_rate
+
+  !> Adds the response to the moment or the impulse of an element.
+  pure subroutine push_element(self, element, moment, rates)
+    class(body_formulation_t), intent(in) :: self
+    integer, intent(in) :: element
+    real(wp), intent(in) :: moment        !! [N m] or [N m s]
+    real(wp), intent(inout) :: rates(:)   !! [bodies] at least
+    integer :: k
+
+    associate (rows => self%machine%elements%rows, n => self%machine%bodies)
+      do k = rows%first(element), rows%first(element + 1) - 1
+        if (rows%body(k) > 0) rates(:n) = rates(:n) + rows%coefficient(k) * moment * self%mobility(:, rows%body(k), 1)
+      end do
+    end associate
+  end subroutine push_element
 
   !> Product of a matrix and a vector, added up column by column.
   pure subroutine multiply(matrix, vector, product)

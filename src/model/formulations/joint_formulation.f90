@@ -8,6 +8,8 @@ module nocdyn_joint_formulation
   implicit none (type, external)
   private
 
+  public :: observe_with_joints   ! for extensions that add to it
+
   integer, parameter :: by_state = 0   ! no joint
 
   type, abstract, extends(row_formulation_t), public :: joint_formulation_t

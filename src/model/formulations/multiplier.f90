@@ -70,6 +70,7 @@ contains
     dydt(:, n + 1:2 * n) = y(:, :n)
     if (self%internal > 0) dydt(:, self%mechanical + 1:self%states) = self%machine%elements%internal%rate
     if (self%quadratures > 0) call self%machine%power(dydt(:, self%states + 1:))
+    if (self%joints%count > 0) call self%hold_derivative(self%states + self%quadratures, t(1), dydt, status(1))
   end subroutine derivative
 
   !> The multipliers of the last evaluation, shared with redundant rows.
@@ -79,6 +80,11 @@ contains
     real(wp), intent(out) :: lambda(:)   !! [rows]
     integer :: i
 
+    if (self%joints%count > 0) then   ! with the moments of the joints that hold
+      self%solution(:self%machine%bodies, lane) = self%torque(lane, 1:)
+      self%solution(self%machine%bodies + 1:, lane) = 0.0_wp
+      call lu_solve(self%factors(:, :, lane), self%pivots(:, lane), self%solution(:, lane))
+    end if
     lambda = 0.0_wp
     do i = 1, size(self%kept)
       lambda(self%kept(i)) = self%solution(self%machine%bodies + i, lane)

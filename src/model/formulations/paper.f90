@@ -113,6 +113,7 @@ contains
     end do
     if (self%internal > 0) dydt(:, self%mechanical + 1:self%states) = self%machine%elements%internal%rate
     if (self%quadratures > 0) call self%machine%power(dydt(:, self%states + 1:))
+    if (self%joints%count > 0) call self%hold_derivative(self%states + self%quadratures, t(1), dydt, status(1))
   end subroutine derivative
 
   !> The Jacobian of the bodies and the rows of F' = K_4 omega.

@@ -4,7 +4,7 @@
 !> called. The parts of a law beyond -K12 u - c u' (the rest twist of a coupling, the torque of a motor) are terms of Q. Every
 !> procedure overwrites its last argument and allocates nothing.
 module nocdyn_paper_matrices
-  use nocdyn_bank, only: role_coupling, role_excitation, role_load, role_motor, role_phase
+  use nocdyn_bank, only: role_clutch, role_coupling, role_crank, role_excitation, role_freewheel, role_load, role_motor, role_phase
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_solve
   use nocdyn_machine, only: machine_t
@@ -77,7 +77,8 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
     real(wp), intent(in) :: complement(:, :)   !! L_tau, [n, freedoms]
-    integer, parameter :: roles(*) = [role_coupling, role_load, role_motor, role_excitation, role_phase]
+    integer, parameter :: roles(*) = [role_coupling, role_load, role_motor, role_excitation, role_phase, role_clutch, &
+                                   role_freewheel, role_crank]
     integer :: i
 
     self%torque(:) = 0.0_wp
@@ -127,7 +128,7 @@ contains
   end subroutine inertia_matrix
 
   !> The terms of Q, eq. (16), from the banks of one role, [n]: Q_0 of eq. (17) from the excitations, Q_m of eqs. (18), (20)
-  !> from the motors, and from couplings and loads the parts beyond K phi and C omega.
+  !> from the motors, and from couplings and loads the parts beyond K phi and C omega, and those of slipping joints.
   subroutine torque_vector(machine, lane, role, torque)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane

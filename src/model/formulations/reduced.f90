@@ -13,7 +13,7 @@ module nocdyn_reduced
   use nocdyn_reduced_jacobian, only: new_reduced_jacobian, reduced_jacobian_t
   use nocdyn_reduced_series, only: new_reduced_series, reduced_series_t
   use nocdyn_sparse_map, only: new_sparse_map, sparse_map_t, transposed_order
-  use nocdyn_system, only: evaluation_fatal, pattern_t
+  use nocdyn_system, only: pattern_t
   implicit none (type, external)
   private
 
@@ -151,22 +151,8 @@ contains
     end if
     call fill_derivative(self, self%lanes * self%machine%coordinates%freedoms, self%lanes * self%internal, self%quadratures, &
                          t, y, dydt)
-    if (self%joints%count > 0) call hold_derivative(self, self%states + self%quadratures, t(1), dydt, status(1))
+    if (self%joints%count > 0) call self%hold_derivative(self%states + self%quadratures, t(1), dydt, status(1))
   end subroutine derivative
-
-  !> Adds what the joints that hold do.
-  subroutine hold_derivative(self, components, t, dydt, status)
-    class(reduced_t), intent(inout) :: self
-    integer, intent(in) :: components             !! states + quadratures
-    real(wp), intent(in) :: t                     !! [s]
-    real(wp), intent(inout) :: dydt(components)   !! of the only lane
-    integer, intent(inout) :: status
-
-    call self%move_rows(t)
-    call self%hold(self%joints%motions%acceleration, dydt(:self%machine%coordinates%freedoms))
-    call self%add_powers(dydt(self%states + 1:))
-    if (self%joints%lost > 0) status = evaluation_fatal
-  end subroutine hold_derivative
 
   !> The same with arrays of one dimension: speeds, angles, internal states and work integrals follow one another.
   subroutine fill_derivative(self, n, internal, quadratures, t, y, dydt)
@@ -202,13 +188,13 @@ contains
     call self%machine%evaluate_elements(t)
   end subroutine evaluate_at
 
-  !> Every law has a series, but not the moments of locked joints.
+  !> Every law has a series, but not the moments of joints.
   subroutine series_obstacle(self, obstacle)
     class(reduced_t), intent(in) :: self
     character(len=:), allocatable, intent(out) :: obstacle
 
     obstacle = ''
-    if (self%joints%count > 0) obstacle = 'clutches and freewheels have no Taylor series'
+    if (self%joints%count > 0) obstacle = 'joints that lock or move have no Taylor series'
   end subroutine series_obstacle
 
   !> Allocates the recurrence for series up to an order.
@@ -293,10 +279,7 @@ contains
       do k = 1, size(pattern%row)
         dfdy(pattern%row(k), pattern%column(k)) = self%free_jacobian(1, k)
       end do
-      do k = 1, self%states
-        call self%hold_column(k, dfdy(:f, k), dfdy(self%states + 1:, k))
-      end do
-      call self%hold_column(0, dfdt(:f), dfdt(self%states + 1:))
+      call self%hold_columns(self%states + self%quadratures, dfdy, dfdt)
     end associate
   end subroutine hold_jacobian
 

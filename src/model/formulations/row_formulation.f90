@@ -6,9 +6,12 @@
 !> the least change, weighted by the inertias; E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, section IV.4.
 !> Extensions say how elements move with the states, and how the states answer to the moments of elements.
 module nocdyn_row_formulation
+  use nocdyn_bank, only: bank_of, role_names
   use nocdyn_formulation, only: formulation_t
   use nocdyn_friction_joints, only: locked
   use nocdyn_kinds, only: wp
+  use nocdyn_system, only: evaluation_fatal
+  use nocdyn_text, only: quoted
   implicit none (type, external)
   private
 
@@ -28,9 +31,12 @@ module nocdyn_row_formulation
     procedure :: find_held_moments
     procedure :: add_powers
     procedure :: differentiate_rows
-    procedure :: hold_column
+    procedure :: hold_derivative
+    procedure :: hold_columns
+    procedure, private :: hold_column
     procedure :: project
     procedure :: project_state
+    procedure :: evaluation_obstacle
   end type row_formulation_t
 
   abstract interface
@@ -205,6 +211,34 @@ contains
     end associate
   end subroutine differentiate_rows
 
+  !> Adds what the joints that hold do to a derivative, whose elements are evaluated.
+  subroutine hold_derivative(self, components, t, dydt, status)
+    class(row_formulation_t), intent(inout) :: self
+    integer, intent(in) :: components             !! states + quadratures
+    real(wp), intent(in) :: t                     !! [s]
+    real(wp), intent(inout) :: dydt(components)   !! of the only lane
+    integer, intent(inout) :: status
+
+    call self%move_rows(t)
+    call self%hold(self%joints%motions%acceleration, dydt(:size(self%moving)))
+    call self%add_powers(dydt(self%states + 1:))
+    if (self%joints%lost > 0) status = evaluation_fatal
+  end subroutine hold_derivative
+
+  !> Adds what the joints that hold do to a Jacobian with all positions, after `differentiate_rows`.
+  subroutine hold_columns(self, components, dfdy, dfdt)
+    class(row_formulation_t), intent(inout) :: self
+    integer, intent(in) :: components                          !! states + quadratures
+    real(wp), intent(inout) :: dfdy(components, self%states)   !! of the only lane
+    real(wp), intent(inout) :: dfdt(components)
+    integer :: k
+
+    do k = 1, self%states
+      call self%hold_column(k, dfdy(:size(self%moving), k), dfdy(self%states + 1:, k))
+    end do
+    call self%hold_column(0, dfdt(:size(self%moving)), dfdt(self%states + 1:))
+  end subroutine hold_columns
+
   !> Adds what the joints that hold do to a column of the Jacobian.
   subroutine hold_column(self, column, accelerations, powers)
     class(row_formulation_t), intent(inout) :: self
@@ -263,8 +297,24 @@ contains
         call self%hold(-motions%position, self%acceleration)
         y(n + 1:2 * n) = y(n + 1:2 * n) + self%acceleration
       end do
+      if (.not. is_near) self%joints%lost = self%joints%locking + maxloc(abs(motions%position), dim=1)
       call self%hold(motions%speed, y(:n))
     end associate
   end subroutine project
+
+  !> Where the rank of the rows that move has changed, or they contradict one another.
+  function evaluation_obstacle(self) result(text)
+    class(row_formulation_t), intent(in) :: self
+    character(len=:), allocatable :: text
+
+    text = ''
+    if (self%joints%lost == 0) return
+    associate (machine => self%machine, element => self%joints%element(self%joints%lost))
+      associate (bank => machine%banks(bank_of(machine%banks, element))%bank)
+        text = trim(role_names(bank%role)) // ' ' // quoted(bank%names(element - bank%first + 1)%text) // ' has become a ' // &
+               'combination of other joints and drives, or contradicts them: a dead centre, or a loop that locks'
+      end associate
+    end associate
+  end function evaluation_obstacle
 
 end module nocdyn_row_formulation

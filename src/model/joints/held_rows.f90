@@ -34,7 +34,7 @@ module nocdyn_held_rows
     real(wp), allocatable :: mutual(:, :)    !! responses of all elements and then all drivers to their moments [1/(kg m2)],
                                              !! [2 joints, 2 joints]
     real(wp), allocatable :: weight(:, :)    !! W [1/(kg m2)], [joints, joints]
-    integer :: lost = 0                      !! a joint whose row has become a combination of others on the way
+    integer :: lost = 0                      !! a row that moves with which the rank has changed on the way, 0: none
     logical, private :: is_known = .false.   !! whether the set is that of the present modes and slopes
     type(joint_set_t), allocatable, private :: sets(:)   !! without rows that move
     integer, private :: present = 0          !! one of them
@@ -145,7 +145,7 @@ contains
         self%holding(n) = j
       end do
       call self%system%set_matrix(self%weight, self%holding, n)
-      if (self%system%is_singular) call self%watch_rank()
+      if (self%system%is_singular .or. self%rank_at_start < self%motions%count) call self%watch_rank()
       self%is_known = .true.
     end if
     n = self%system%order
@@ -155,13 +155,14 @@ contains
     self%moment(self%holding(:n)) = -x(:n)
   end subroutine find_moving_moments
 
-  !> Looks whether the rows that move have become combinations of one another. Locks may be.
+  !> Looks whether the rank of the rows that move is still that of the start. Locks may be combinations of them.
   subroutine watch_rank(self)
     class(held_rows_t), intent(inout) :: self
     integer :: dependent, j, rank
 
     call self%system%find_rank(self%weight, [(j, j=self%locking + 1, self%count)], rank, dependent)
     if (rank < self%rank_at_start) self%lost = dependent
+    if (rank > self%rank_at_start) self%lost = self%count
     call self%system%set_matrix(self%weight, self%holding, count(self%mode == locked))
   end subroutine watch_rank
 

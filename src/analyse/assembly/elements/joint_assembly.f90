@@ -38,17 +38,27 @@ contains
     end do
   end subroutine check_joints
 
-  !> Refuses joints where it is not known which of them are locked.
+  !> Refuses joints where it is not known which of them are locked, or where they are.
   subroutine refuse_joints(input, what, error)
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: what   !! does not know it, e.g. 'nocdyn modes'
     type(error_t), allocatable, intent(out) :: error
-    integer, allocatable :: joints(:)
+    character(len=*), parameter :: moving(*) = [character(len=8) :: 'cardan', 'crank', 'relation', 'drive']
+    integer :: i
 
-    allocate (joints, source=[input%groups_named('clutch'), input%groups_named('freewheel')])
-    if (size(joints) == 0) return
-    call raise(error, exit_input, input%location(minval(joints)) // ': ' // what // ' does not know which joints are ' // &
-               'locked; allowed: no clutches and freewheels; a locked one is a &gear with teeth = 1, 1 and internal = .true.')
+    do i = 1, size(input%groups)
+      associate (group => input%groups(i))
+        if (group%kind == 'clutch' .or. group%kind == 'freewheel') then
+          call raise(error, exit_input, input%location(i) // ': ' // what // ' does not know which joints are locked; ' // &
+                     'allowed: no clutches and freewheels; a locked one is a &gear with teeth = 1, 1 and internal = .true.')
+          return
+        else if (any(moving == group%kind)) then
+          call raise(error, exit_input, input%location(i) // ': ' // what // ' is for machines whose ratios are constant; ' // &
+                     'allowed: no cardans, cranks, relations and drives')
+          return
+        end if
+      end associate
+    end do
   end subroutine refuse_joints
 
   !> Form of the law of a group &clutch.
