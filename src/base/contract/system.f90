@@ -167,7 +167,7 @@ contains
     real(wp), contiguous, intent(inout) :: y(:)   !! [states + quadratures]
   end subroutine project_state
 
-  !> Why the equations cannot be evaluated where they last failed, '' if nothing is known.
+  !> Why the equations cannot be evaluated, or hardly, where they were evaluated last; '' if nothing is known.
   function evaluation_obstacle(self) result(text)
     class(system_t), intent(in) :: self
     character(len=:), allocatable :: text

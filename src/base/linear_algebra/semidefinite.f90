@@ -13,6 +13,8 @@ module nocdyn_semidefinite
   type, public :: semidefinite_t
     integer :: order = 0                               !! rows of the present matrix
     logical :: is_singular = .false.
+    integer :: weakest = 0                             !! row with the least pivot
+    real(wp) :: least_pivot = 1.0_wp                   !! of the scaled matrix
     real(wp), allocatable, private :: factor(:, :)     !! of the scaled matrix, its pseudo-inverse if singular
     real(wp), allocatable, private :: scale(:)         !! 1 / sqrt(diagonal)
     real(wp), allocatable, private :: work(:, :)       !! right-hand side
@@ -62,10 +64,14 @@ contains
     call fill(self, matrix, chosen)
     info = 0
     if (order > 0) call dpotrf('L', order, self%factor, size(self%factor, 1), info)
-    self%is_singular = info /= 0
-    do k = 1, order
-      if (self%factor(k, k)**2 <= null_tolerance) self%is_singular = .true.
+    self%weakest = info
+    self%least_pivot = merge(0.0_wp, 1.0_wp, info > 0)
+    do k = 1, merge(order, 0, info == 0)
+      if (self%factor(k, k)**2 > self%least_pivot) cycle
+      self%weakest = k
+      self%least_pivot = self%factor(k, k)**2
     end do
+    self%is_singular = self%least_pivot <= null_tolerance
     if (.not. self%is_singular) return
     call fill(self, matrix, chosen)
     self%factor(:order, :order) = pseudo_inverse(self%factor(:order, :order), null_tolerance)

@@ -179,7 +179,9 @@ contains
     if (solver_status%component(lane) > 0) what = system%component_name(solver_status%component(lane))
     if (solver_status%measure(lane) > 0) what = system%measure_name(solver_status%measure(lane))
     sentence = 'the step size became too small at ' // when // ' (h = ' // rounded_text(solver_status%h(lane), digits) // ' s): '
-    if (what /= '') then
+    if (system%evaluation_obstacle() /= '') then
+      sentence = sentence // system%evaluation_obstacle()
+    else if (what /= '') then
       sentence = sentence // 'the error of the ' // what // ' cannot be kept within rtol = ' // &
         rounded_text(rtol, digits) // ', atol = ' // rounded_text(atol, digits) // &
         '; loosen the tolerances, or look for a jump or a singularity there'

@@ -302,17 +302,19 @@ contains
     end associate
   end subroutine project
 
-  !> Where the rank of the rows that move has changed, or they contradict one another.
+  !> Where the rank of the rows that move has changed, or is about to, or they contradict one another.
   function evaluation_obstacle(self) result(text)
     class(row_formulation_t), intent(in) :: self
     character(len=:), allocatable :: text
+    integer :: row
 
     text = ''
-    if (self%joints%lost == 0) return
-    associate (machine => self%machine, element => self%joints%element(self%joints%lost))
+    row = self%joints%nearly_lost()
+    if (row == 0) return
+    associate (machine => self%machine, element => self%joints%element(row))
       associate (bank => machine%banks(bank_of(machine%banks, element))%bank)
-        text = trim(role_names(bank%role)) // ' ' // quoted(bank%names(element - bank%first + 1)%text) // ' has become a ' // &
-               'combination of other joints and drives, or contradicts them: a dead centre, or a loop that locks'
+        text = trim(role_names(bank%role)) // ' ' // quoted(bank%names(element - bank%first + 1)%text) // ' is at a dead ' // &
+               'centre, or in a loop that locks: other joints and drives prescribe the same motion there, or another one'
       end associate
     end associate
   end function evaluation_obstacle

@@ -47,6 +47,7 @@ module nocdyn_held_rows
     procedure :: weigh
     procedure :: change_set
     procedure :: find_moments
+    procedure :: nearly_lost
     procedure, private :: find_moving_moments
     procedure, private :: watch_rank
     procedure, private :: choose_set
@@ -154,6 +155,17 @@ contains
     self%moment(:) = 0.0_wp
     self%moment(self%holding(:n)) = -x(:n)
   end subroutine find_moving_moments
+
+  !> A row that moves and is a combination of others, or almost one, at the last position; 0: none.
+  pure integer function nearly_lost(self)
+    class(held_rows_t), intent(in) :: self
+    real(wp), parameter :: small = 1.0e-6_wp   ! a pivot
+
+    nearly_lost = self%lost
+    if (nearly_lost > 0 .or. self%motions%count == 0 .or. self%system%least_pivot > small) return
+    if (self%system%weakest > 0) nearly_lost = self%holding(self%system%weakest)
+    if (nearly_lost <= self%locking) nearly_lost = 0
+  end function nearly_lost
 
   !> Looks whether the rank of the rows that move is still that of the start. Locks may be combinations of them.
   subroutine watch_rank(self)

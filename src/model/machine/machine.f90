@@ -364,8 +364,8 @@ contains
     integer :: i
 
     call self%laws%refresh_lane(lane)
-    do i = 1, size(self%general_banks)
-      call self%banks(self%general_banks(i))%bank%refresh_lane(lane)
+    do i = 1, size(self%banks)
+      call self%banks(i)%bank%refresh_lane(lane)
     end do
   end subroutine refresh_lane
 

@@ -73,16 +73,23 @@ contains
   subroutine add_relations(groups, banks)
     type(element_groups_t), intent(in) :: groups
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    type(spline_t) :: splines(size(groups%indices))
-    integer :: i
+    integer :: first(size(groups%indices) + 1), i
+    logical :: repeats(size(groups%indices))
+    real(wp), allocatable :: driven(:), driving(:)
 
     if (size(groups%indices) == 0) return
+    allocate (driven(0), driving(0))
+    first(1) = 1
     do i = 1, size(groups%indices)
       associate (group => groups%input%groups(groups%indices(i)))
-        splines(i) = new_spline(group%numbers('table_angle'), group%numbers('table_driven'), group%text('kind') /= 'lever')
+        driving = [driving, group%numbers('table_angle')]
+        driven = [driven, group%numbers('table_driven')]
+        repeats(i) = group%text('kind') /= 'lever'
+        first(i + 1) = size(driving) + 1
       end associate
     end do
-    call append_bank(banks, new_relation_rows(groups%lanes, groups%names, groups%bodies('bodies', 2), splines))
+    call append_bank(banks, new_relation_rows(groups%lanes, groups%names, groups%bodies('bodies', 2), first, &
+                                              transpose(reshape([driving, driven], [size(driving), 2])), repeats))
     call append_bank(banks, new_phases(groups%lanes, groups%names, groups%bodies('bodies', 1)))
   end subroutine add_relations
 

@@ -28,9 +28,9 @@ module nocdyn_crank_rows
   end type slider_crank_t
 
   type, extends(moving_rows_t), public :: crank_rows_t
-    type(slider_crank_t) :: crank
   contains
     procedure :: motion
+    procedure, private :: crank
     procedure :: position
     procedure :: quantities => columns_of_cranks
     procedure :: observe => observe_cranks
@@ -48,7 +48,8 @@ contains
     type(crank_rows_t) :: bank
 
     call bank%connect_rows_only(role_crank, lanes, names, rows_between(0 * driven, driven))
-    bank%crank = crank
+    call bank%add_parameter('dimensions', spread([crank%crank_radius, crank%rod_length, crank%offset, crank%phase, &
+                                                  crank%rod_center], 1, lanes), .false., spread(1, 1, 5))
   end function new_crank_rows
 
   pure subroutine motion(self, element, v, g)
@@ -57,19 +58,31 @@ contains
     real(wp), intent(in) :: v          !! angle of the body [rad]
     real(wp), intent(out) :: g(0:3)    !! [m] or [rad]
 
-    associate (crank => self%crank, share => self%crank%rod_center / self%crank%rod_length)
-      select case (element)
-      case (part_piston)
-        g = piston_motion(crank, v)
-      case (part_rod_along)
-        g = share * piston_motion(crank, v) + (1.0_wp - share) * turned_arm(crank, v)
-      case (part_rod_across)
-        g = (1.0_wp - share) * crossed_arm(crank, v)
-      case default
-        call rod_motion(crank, v, g)
-      end select
-    end associate
+    type(slider_crank_t) :: crank
+    real(wp) :: share   ! of the rod between the crank pin and its centre of mass
+
+    crank = self%crank()
+    share = crank%rod_center / crank%rod_length
+    select case (element)
+    case (part_piston)
+      g = piston_motion(crank, v)
+    case (part_rod_along)
+      g = share * piston_motion(crank, v) + (1.0_wp - share) * turned_arm(crank, v)
+    case (part_rod_across)
+      g = (1.0_wp - share) * crossed_arm(crank, v)
+    case default
+      call rod_motion(crank, v, g)
+    end select
   end subroutine motion
+
+  !> Its dimensions in the first lane.
+  pure type(slider_crank_t) function crank(self)
+    class(crank_rows_t), intent(in) :: self
+
+    associate (x => self%parameters(1)%value(1, :))
+      crank = slider_crank_t(x(1), x(2), x(3), x(4), x(5))
+    end associate
+  end function crank
 
   !> g alone.
   pure real(wp) function position(self, element, v)

@@ -4,7 +4,7 @@ module nocdyn_relation_rows
   use nocdyn_element_rows, only: rows_between
   use nocdyn_kinds, only: wp
   use nocdyn_moving_rows, only: moving_rows_t
-  use nocdyn_splines, only: spline_t
+  use nocdyn_splines, only: new_spline, spline_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -12,24 +12,52 @@ module nocdyn_relation_rows
   public :: new_relation_rows
 
   type, extends(moving_rows_t), public :: relation_rows_t
+    integer, allocatable :: points(:)          !! first point of each element, [elements + 1]
+    logical, allocatable :: repeats(:)         !! whether its table does, [elements]
     type(spline_t), allocatable :: spline(:)   !! of each element, in the first lane
   contains
     procedure :: motion
+    procedure :: refresh_lane
   end type relation_rows_t
 
 contains
 
   !> A bank of relations; their first bodies are the drivers.
-  function new_relation_rows(lanes, names, driven, spline) result(bank)
+  function new_relation_rows(lanes, names, driven, first, points, repeats) result(bank)
     integer, intent(in) :: lanes
     type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: driven(:)          !! the second bodies
-    type(spline_t), intent(in) :: spline(:)   !! [relations]
+    integer, intent(in) :: driven(:)        !! the second bodies
+    integer, intent(in) :: first(:)         !! first point of each relation, [relations + 1]
+    real(wp), intent(in) :: points(:, :)    !! angles of the first and second bodies [rad], [2, points]
+    logical, intent(in) :: repeats(:)       !! [relations]
     type(relation_rows_t) :: bank
+    integer :: e, k
 
     call bank%connect_rows_only(role_relation, lanes, names, rows_between(0 * driven, driven))
-    allocate (bank%spline, source=spline)
+    allocate (bank%spline(size(driven)))
+    bank%points = first
+    bank%repeats = repeats
+    associate (owner => [((e, k=first(e), first(e + 1) - 1), e=1, size(driven))])
+      call bank%add_parameter('driving', spread(points(1, :), 1, lanes), .false., owner)
+      call bank%add_parameter('driven', spread(points(2, :), 1, lanes), .false., owner)
+    end associate
+    call bank%refresh_lane(1)
   end function new_relation_rows
+
+  !> The splines through the points of the first lane.
+  subroutine refresh_lane(self, lane)
+    class(relation_rows_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    integer :: e
+
+    if (lane > 1) return
+    do e = 1, self%count
+      associate (first => self%points(e), last => self%points(e + 1) - 1)
+        self%spline(e) = new_spline(self%parameters(1)%value(1, first:last), self%parameters(2)%value(1, first:last), &
+                                    self%repeats(e))
+      end associate
+    end do
+  end subroutine refresh_lane
 
   pure subroutine motion(self, element, v, g)
     class(relation_rows_t), intent(in) :: self
