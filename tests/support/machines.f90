@@ -1,21 +1,27 @@
 !> Machines for tests.
 module nocdyn_test_machines
-  use nocdyn_bank, only: bank_slot_t, bank_t
+  use nocdyn_bank, only: append_bank, bank_slot_t, bank_t
+  use nocdyn_cardan_rows, only: new_cardan_rows
   use nocdyn_constraint_analysis, only: analyse_constraints
   use nocdyn_constraints, only: constraints_t, new_constraints
   use nocdyn_coordinates, only: build_coordinates
   use nocdyn_couplings, only: coupling_common_t, new_couplings
+  use nocdyn_crank_rows, only: new_crank_rows, slider_crank_t
+  use nocdyn_drives, only: drive_motion_t, new_drives
   use nocdyn_errors, only: error_t
   use nocdyn_excitations, only: new_excitations
   use nocdyn_kinds, only: wp
   use nocdyn_loads, only: new_loads
   use nocdyn_machine, only: machine_t
   use nocdyn_motors, only: new_motors
+  use nocdyn_phases, only: new_phases
+  use nocdyn_piston_forces, only: new_piston_force, periodic_force_t
+  use nocdyn_relation_rows, only: new_relation_rows
   use nocdyn_text, only: string_t, strings, to_text
   implicit none (type, external)
   private
 
-  public :: paper_machine, damped_chain, long_chain, branched_train, gear_loop, machine_of_bodies
+  public :: paper_machine, damped_chain, long_chain, branched_train, gear_loop, moving_machine, machine_of_bodies
   public :: install, gear_rows, numbered_names, finish, row
 
 contains
@@ -112,6 +118,40 @@ contains
                                     row([0.2_wp, 0.3_wp, 0.3_wp, 0.5_wp, 0.5_wp, 0.4_wp, 0.4_wp, 0.2_wp]))
     call finish(machine, [integer ::], 1)
   end function gear_loop
+
+  !> Two geared bodies, of which the second drives the third by a cardan joint, that the fourth by a cam, and both a slider-crank
+  !> with a heavy rod and a force on the piston; an elastic coupling to the fifth, which a drive moves.
+  function moving_machine() result(machine)
+    type(machine_t) :: machine
+    type(string_t) :: names(4)
+    integer :: k
+
+    machine = machine_of_bodies(row([4.0_wp, 2.0_wp, 6.0_wp, 1.0_wp, 3.0_wp]))
+    call machine%add_nodes(numbered_names('part', 4), [1.5_wp, 0.8_wp, 0.8_wp, 0.1_wp])
+    machine%nodes = 0
+    call install(machine%banks, new_couplings(coupling_common_t(numbered_names('shaft', 1), [4], [5], row([0.5_wp]), &
+                                                                row([0.0_wp])), row([60.0_wp]), row([4.0_wp])))
+    call install(machine%banks, new_motors(numbered_names('motor', 1), [1], row([150.0_wp]), row([8.0_wp]), &
+                                           row([0.3_wp])))
+    call append_bank(machine%banks, new_cardan_rows(numbered_names('cardan', 1), [3], row([0.4_wp]), row([0.3_wp])))
+    call append_bank(machine%banks, new_phases(1, numbered_names('cardan', 1), [2]))
+    call append_bank(machine%banks, new_relation_rows(1, numbered_names('cam', 1), [4], [1, 6], &
+                                                      reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.8_wp, 3.0_wp, 0.3_wp, 5.0_wp, -0.6_wp, &
+                                                               6.0_wp, 0.0_wp], [2, 5]), [.true.]))
+    call append_bank(machine%banks, new_phases(1, numbered_names('cam', 1), [3]))
+    names = numbered_names('crank', 4)
+    call append_bank(machine%banks, new_crank_rows(1, names, [6, 7, 8, 9], &
+                                                   slider_crank_t(0.5_wp, 1.2_wp, 0.2_wp, 0.7_wp, 0.4_wp)))
+    call append_bank(machine%banks, new_phases(1, names, [3, 3, 3, 3]))
+    call append_bank(machine%banks, new_piston_force(1, names(1), 6, 0.7_wp, &
+                                                     periodic_force_t(0.5_wp, 3.0_wp, [2.0_wp, 1.0_wp], [0.5_wp, -4.0_wp])))
+    call append_bank(machine%banks, new_phases(1, names(:1), [3]))
+    call append_bank(machine%banks, new_drives(numbered_names('drive', 1), [5], 0.0_wp, .false., &
+                                               drive_motion_t(row([2.0_wp]), row([3.0_wp]), row([1.7_wp]), row([0.4_wp]))))
+    machine%constraints = gear_rows(9, reshape([1, 2], [2, 1]), row([2.0_wp, 3.0_wp]))
+    machine%start_angle(1, 6:9) = [(0.3_wp * k, k=1, 4)]
+    call finish(machine, [integer ::], 1)
+  end function moving_machine
 
   !> Bodies at rest without elements and constraints.
   function machine_of_bodies(inertia) result(machine)
