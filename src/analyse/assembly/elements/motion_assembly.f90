@@ -26,7 +26,7 @@ contains
   subroutine check_motions(input, error)
     type(input_t), intent(in) :: input
     type(error_t), allocatable, intent(out) :: error
-    integer, allocatable :: relations(:)
+    integer, allocatable :: drives(:), relations(:)
     character(len=:), allocatable :: text
     integer :: i
 
@@ -37,7 +37,32 @@ contains
       call raise(error, exit_input, input%location(relations(i), 'table_driven') // ': table_driven: ' // text)
       return
     end do
+    allocate (drives, source=input%groups_named('drive'))
+    do i = 1, size(drives)
+      call find_jump(input%groups(drives(i)), text)
+      if (text == '') cycle
+      call raise(error, exit_input, input%location(drives(i), 'table_time') // ': table_time' // text)
+      return
+    end do
   end subroutine check_motions
+
+  !> What is wrong with the times of a drive, '' if nothing is.
+  pure subroutine find_jump(group, text)
+    type(group_t), intent(in) :: group
+    character(len=:), allocatable, intent(out) :: text
+    real(wp), allocatable :: times(:)
+    integer :: i
+
+    text = ''
+    allocate (times, source=group%numbers('table_time'))
+    do i = 2, size(times)
+      if (times(i) > times(i - 1)) cycle
+      text = '(' // to_text(i) // ') = ' // to_text(times(i)) // ' must be greater than table_time(' // to_text(i - 1) // ') = ' &
+             // to_text(times(i - 1)) // ' s'
+      if (times(i) >= times(i - 1)) text = text // ': a jump needs an infinite torque; allowed: a ramp'
+      return
+    end do
+  end subroutine find_jump
 
   !> What is wrong with the table of a relation, '' if nothing is.
   subroutine find_table_mistake(group, text)

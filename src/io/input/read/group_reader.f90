@@ -35,7 +35,7 @@ contains
     type(group_t), intent(inout) :: group          !! `rule`, `kind` and `line` are set
     type(diagnostics_t), intent(inout) :: diagnostics
     type(raw_group_t), allocatable :: raw
-    integer :: i
+    integer :: i, k
 
     allocate (raw, source=new_raw_group(index, group%rule, group%line, source%is_malformed))
     call take_assignments(namelist, source, raw, diagnostics)
@@ -52,7 +52,7 @@ contains
     do i = 1, size(relations%list)
       associate (relation => relations%list(i))
         if (all(relation%form /= [equal_lengths, columns]) .or. size(relation%second) == 0) cycle
-        if (.not. belongs(group, relations%selector, relation%first(1))) cycle
+        if (.not. all([(belongs(group, relations%selector, relation%first(k)), k=1, size(relation%first))])) cycle
         if (relation%form == equal_lengths) then
           call read_table(folder, relation%second(1), relation%first, raw, group, diagnostics)
         else

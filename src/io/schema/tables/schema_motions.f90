@@ -96,7 +96,7 @@ module nocdyn_schema_motions
     key_rule_t('drive',      'speed',           a_number,       1, 'rad/s',       '0',         anything, &
       'constant speed; 0 holds the body still', 'speed'), &
     key_rule_t('drive',      'table_time',      a_number,       any_number, 's',  unset,       anything, &
-      'times of the points of a table, ascending', fewest=2, ascends=.true.), &
+      'times of the points of a table, ascending', fewest=2), &
     key_rule_t('drive',      'table_speed',     a_number,       any_number, 'rad/s', unset,    anything, &
       'speed at these times: a ramp between two of them; constant before the first and after the last', 'speed', fewest=2), &
     key_rule_t('drive',      'table_angle',     a_number,       any_number, 'rad', unset,      anything, &
