@@ -51,16 +51,7 @@ contains
     call set_bodies(input, machine)
     body_index = new_body_index(machine%names)
     call assemble_constraints(input, body_index, machine%lanes, machine%constraints, error)
-    if (.not. allocated(error)) call check_couplings(input, error)
-    if (.not. allocated(error)) call check_shafts(input, error)
-    if (.not. allocated(error)) call check_meshes(input, error)
-    if (.not. allocated(error)) call check_joints(input, error)
-    if (.not. allocated(error)) call check_motions(input, error)
-    if (.not. allocated(error)) call check_cranks(input, error)
-    if (.not. allocated(error)) call check_motors(input, error)
-    if (.not. allocated(error)) call check_engines(input, error)
-    if (.not. allocated(error)) call check_orders(input, error)
-    if (.not. allocated(error)) call check_response_ranges(input, error)
+    if (.not. allocated(error)) call check_groups(input, error)
     if (allocated(error)) return
     allocate (machine%banks(0))
     associate (n => machine%lanes)
@@ -87,6 +78,23 @@ contains
     if (allocated(error)) return
     call start_machine(input, machine, error)
   end subroutine assemble_machine
+
+  !> Refuses values that do not fit together, which the schema does not know.
+  subroutine check_groups(input, error)
+    type(input_t), intent(in) :: input
+    type(error_t), allocatable, intent(out) :: error
+
+    call check_couplings(input, error)
+    if (.not. allocated(error)) call check_shafts(input, error)
+    if (.not. allocated(error)) call check_meshes(input, error)
+    if (.not. allocated(error)) call check_joints(input, error)
+    if (.not. allocated(error)) call check_motions(input, error)
+    if (.not. allocated(error)) call check_cranks(input, error)
+    if (.not. allocated(error)) call check_motors(input, error)
+    if (.not. allocated(error)) call check_engines(input, error)
+    if (.not. allocated(error)) call check_orders(input, error)
+    if (.not. allocated(error)) call check_response_ranges(input, error)
+  end subroutine check_groups
 
   subroutine set_bodies(input, machine)
     type(input_t), target, intent(in) :: input

@@ -5,7 +5,6 @@ module nocdyn_machine_report
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_rigid_trains, only: ratio_tolerance
-  use nocdyn_row_motions, only: new_row_motions, row_motions_t
   use nocdyn_text, only: append, counted, joined, quoted, rounded_text, selected, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
@@ -125,7 +124,6 @@ contains
     type(machine_t), intent(in) :: machine
     character(len=:), allocatable :: text
     type(text_buffer_t) :: report
-    type(row_motions_t) :: motions
     type(string_t), allocatable :: notes(:)
     integer, parameter :: roles(*) = [role_coupling, role_motor, role_load, role_excitation]   ! said even if there are none
     integer, parameter :: others(*) = [role_clutch, role_freewheel, role_cardan, role_crank, role_relation, role_drive]
@@ -142,8 +140,7 @@ contains
       if (elements_of(machine, others(i)) == 0) cycle
       call report%append(', ' // counted(elements_of(machine, others(i)), trim(role_names(others(i))), trim(plurals(i))))
     end do
-    motions = new_row_motions(machine%banks)
-    call put_line(report, counted(machine%coordinates%freedoms - motions%count, 'degree', 'degrees') // ' of freedom')
+    call put_line(report, counted(machine%freedoms(), 'degree', 'degrees') // ' of freedom')
     call put_groups(report, machine)
     call put_line(report, 'coordinates: ' // joined(selected(machine%names, named_coordinates(machine)), ', ', max_lines))
     call put_relations(report, machine)

@@ -141,7 +141,7 @@ contains
     summary%bodies = machine%bodies - machine%nodes
     summary%gears = constraint_count(machine, 'gear')
     summary%constraints = machine%constraints%rows()
-    summary%freedoms = machine%coordinates%freedoms
+    summary%freedoms = machine%freedoms()
     allocate (summary%coordinates, source=selected(machine%names, named_coordinates(machine)))
     allocate (summary%notes, source=machine_notes(machine))
   end subroutine describe_machine

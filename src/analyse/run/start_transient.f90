@@ -66,6 +66,7 @@ contains
 
     until = t_start
     if (machine%coordinates%freedoms > most_freedoms .or. allocated(machine%steady_internal)) return   ! a start in balance
+    if (machine%freedoms() < machine%coordinates%freedoms) return   ! rows that move are not among the linear equations
     formulation = new_reduced(machine, .false.)
     allocate (y, source=formulation%start())
     call linearise(formulation, t_start, y, linear, error)

@@ -54,6 +54,7 @@ module nocdyn_bank
     type(element_rows_t) :: rows                  !! bodies of the elements; M acts on them by the coefficients
     integer, allocatable :: with_work(:)          !! elements whose work is integrated, numbered within the bank
     integer, allocatable :: elastic(:)            !! elements that can have a restoring moment, numbered within the bank
+    integer :: moving_rows = 0                    !! rows of L_lambda that its elements hold always (`nocdyn_moving_rows`)
     integer :: role = role_coupling               !! role_...: term of eq. (12) to which the bank belongs
     integer :: first_value = 1                    !! index of lane 1 of `first` in the flat arrays of the machine
     logical :: has_polynomial_potential = .true.  !! whether `polynomials` gives its whole restoring moment

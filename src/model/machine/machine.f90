@@ -47,6 +47,7 @@ module nocdyn_machine
     type(coordinates_t) :: coordinates
   contains
     procedure :: add_nodes
+    procedure :: freedoms
     procedure :: number_elements
     procedure :: list_parameters
     procedure :: to_mean_torque
@@ -74,19 +75,23 @@ contains
     class(machine_t), intent(inout) :: self
     type(string_t), intent(in) :: names(:)   !! [nodes]
     real(wp), intent(in) :: inertia(:)       !! [kg m2], kg of bodies that move along a line, [nodes]
-    real(wp) :: zero(self%lanes, size(names))
-    integer :: length(2)
 
-    zero = 0.0_wp
     self%nodes = self%nodes + size(names)
     self%bodies = self%bodies + size(names)
     self%constraints%bodies = self%bodies
     self%names = [self%names, names]
-    length = [self%lanes, self%bodies]
-    self%start_angle = reshape([self%start_angle, zero], length)
-    self%start_speed = reshape([self%start_speed, zero], length)
-    self%inertia = reshape([self%inertia, spread(inertia, 1, self%lanes)], length)
+    self%start_angle = reshape([self%start_angle, spread(0.0_wp * inertia, 1, self%lanes)], [self%lanes, self%bodies])
+    self%start_speed = reshape([self%start_speed, spread(0.0_wp * inertia, 1, self%lanes)], [self%lanes, self%bodies])
+    self%inertia = reshape([self%inertia, spread(inertia, 1, self%lanes)], [self%lanes, self%bodies])
   end subroutine add_nodes
+
+  !> Degrees of freedom.
+  pure integer function freedoms(self)
+    class(machine_t), intent(in) :: self
+    integer :: i
+
+    freedoms = self%coordinates%freedoms - sum([(self%banks(i)%bank%moving_rows, i=1, size(self%banks))])
+  end function freedoms
 
   !> Numbers the elements of all banks consecutively, and collects their laws and switches. Call it once all banks are set.
   subroutine number_elements(self)

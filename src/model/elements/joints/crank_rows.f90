@@ -1,4 +1,4 @@
-!> Slider-cranks: the rows by which pistons and rods move with their cranks. With the crank radius r, the rod length l and the
+!> The rows of slider-cranks, by which pistons and rods move with their cranks. With the crank radius r, the rod length l and the
 !> offset e of the piston's line beside the axis of the crank, and the angle v from where the crank points along this line, the
 !> piston is at x = r cos(v) + sqrt(l^2 - p^2), p = r sin(v) - e; F. Freudenstein, Trans. ASME 77 (1955) 853 for e = 0 likewise.
 !>

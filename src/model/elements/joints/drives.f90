@@ -1,7 +1,8 @@
-!> Drives: prescribed motions of bodies, u = g(t) + constant with g = 0 at the start. Their moments are reactions.
+!> Prescribed motions of bodies, u = g(t) + constant with g = 0 at the start. Their moments are reactions.
 !>
-!> Speed: u' = speed + table(t) + amplitude sin(frequency t + phase). Angle: u = table(t) + amplitude sin(frequency t + phase) +
-!> constant, with a table whose slope is continuous. The boundaries of the branches are the points of the tables.
+!> Of a speed, u' = speed + table(t) + amplitude sin(frequency t + phase); of an angle, u = table(t) + amplitude
+!> sin(frequency t + phase) + constant, with a table whose slope is continuous. The boundaries of the branches are the points of
+!> the tables.
 module nocdyn_drives
   use nocdyn_bank, only: role_drive
   use nocdyn_curves, only: curve_t

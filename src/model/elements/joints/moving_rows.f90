@@ -47,6 +47,7 @@ contains
     call self%connect(role, lanes, names, rows)
     self%elastic = [integer ::]
     self%has_paper_law = .false.
+    self%moving_rows = self%count
     if (.not. self%is_driven_by_time) self%with_work = [integer ::]
   end subroutine connect_rows_only
 

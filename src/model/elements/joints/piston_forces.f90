@@ -30,6 +30,7 @@ module nocdyn_piston_forces
 
 contains
 
+  !> The bank of one force.
   function new_piston_force(lanes, name, piston, phase, force) result(bank)
     integer, intent(in) :: lanes
     type(string_t), intent(in) :: name
