@@ -275,7 +275,7 @@ def test_bad_clutches_are_refused(nocdyn, keys, words):
         ("modes", "", "nocdyn modes does not know which joints are locked"),
         ("equilibrium", "", "nocdyn equilibrium does not know which joints are locked"),
         ("run", "run.start=equilibrium", "start = 'equilibrium' does not know which joints are locked"),
-        ("run", "run.method=taylor", "method = 'taylor' cannot be used: clutches and freewheels have no Taylor series"),
+        ("run", "run.method=taylor", "method = 'taylor' cannot be used: joints that lock or move have no Taylor series"),
     ],
 )
 def test_what_does_not_know_the_joints_refuses_them(nocdyn, command, change, words):

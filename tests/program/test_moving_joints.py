@@ -347,7 +347,9 @@ def test_sweeps_over_moving_joints_are_their_runs(nocdyn):
     text += "&coupling name = 'k' bodies = 'b', 'c' stiffness = 100 damping = 0.5 /\n"
     text += "&cardan name = 'j' bodies = 'a', 'b' angle = 0.5 /\n"
     text += "&crank name = 'q' body = 'a' crank_radius = 0.1 rod_length = 0.4 piston_mass = 0.3 /\n"
-    text += "&relation name = 'r' bodies = 'c', 'e' table_angle = 0, 2, 4, 6 table_driven = 0, 0.5, 0.1, 0 /\n" + FREE.format("e", 0.1)
+    text += "&relation name = 'r' bodies = 'c', 'e' table_angle = 0, 2, 4, 6 table_driven = 0, 0.5, 0.1, 0 /\n" + FREE.format(
+        "e", 0.1
+    )
     text += "&drive name = 'd' body = 'c' speed = -5 speed_amplitude = 1 frequency = 3 phase_deg = 90 /\n&run t_end = 1 /\n"
     vary = [("cardan.j.angle", 0.6), ("crank.q.crank_radius", 0.2), ("drive.d.speed_amplitude", 2)]
     sweep = "&sweep design = 'grid' /\n" + "".join(f"&vary target = '{k}' low = {v} high = {v} count = 1 /\n" for k, v in vary)
@@ -379,17 +381,32 @@ FORCES = "crank_angles_deg = 0, 30, 60, 90, 120, 150, 180, 210 forces = 1, 2, 3,
     [
         (PAIR.replace("30", "90"), ":3: &cardan 'j': angle_deg = 90 is out of range; allowed: "),
         (PAIR.replace("'b' inertia = 2", "'b' inertia = 2 speed = 3"), ":3: &cardan 'j': the start speeds violate it: "),
-        (CRANK.format("").replace("0.05", "0.3"), ":2: &crank 'p': rod_length = 0.2 is out of range; allowed: > crank_radius = 0.3"),
+        (
+            CRANK.format("").replace("0.05", "0.3"),
+            ":2: &crank 'p': rod_length = 0.2 is out of range; allowed: > crank_radius = 0.3",
+        ),
         (CRANK.format("offset = 0.16"), ":2: &crank 'p': offset = 0.16 m: the rod of 0.2 m does not reach the piston at all"),
         (CRANK.format("rod_mass = 1"), ":2: &crank 'p': rod_mass = 1 kg, but rod_center is missing"),
         (CRANK.format(FORCES), "the crank angles from 0 to 210 deg are not those of one cycle; needed: 360 deg with stroke = 2"),
         (CRANK.format(FORCES + " stroke = 3"), ":2: &crank 'p': stroke = 3; allowed: 2 or 4"),
         (RELATION.format("table_angle = 0, 1, 2 table_driven = 0, 1, 2"), ":3: &relation 'r': table_driven: a cam returns: "),
-        (RELATION.format("kind = 'gear' table_angle = 0, 1, 2 table_driven = 0, 5, 2"), "the spline through the points turns back"),
-        (RELATION.format("table_angle = 0, 2, 1 table_driven = 0, 1, 0"), "table_angle(3) = 1 must be greater than table_angle(2) = 2"),
-        (DRIVE.format("table_time = 0, 1, 1, 2 table_speed = 0, 0, 5, 5"), "table_time(3) = 1 must be greater than table_time(2) = 1 s: a jump needs an infinite torque; allowed: a ramp"),
+        (
+            RELATION.format("kind = 'gear' table_angle = 0, 1, 2 table_driven = 0, 5, 2"),
+            "the spline through the points turns back",
+        ),
+        (
+            RELATION.format("table_angle = 0, 2, 1 table_driven = 0, 1, 0"),
+            "table_angle(3) = 1 must be greater than table_angle(2) = 2",
+        ),
+        (
+            DRIVE.format("table_time = 0, 1, 1, 2 table_speed = 0, 0, 5, 5"),
+            "table_time(3) = 1 must be greater than table_time(2) = 1 s: a jump needs an infinite torque; allowed: a ramp",
+        ),
         (DRIVE.format("speed = 3").replace("inertia = 1", "inertia = 1 speed = 2"), "that begins with a ramp"),
-        (DRIVE.format("") + "&drive name = 'e' body = 'a' speed = 1 /\n", "other drives and joints already prescribe this motion"),
+        (
+            DRIVE.format("") + "&drive name = 'e' body = 'a' speed = 1 /\n",
+            "other drives and joints already prescribe this motion",
+        ),
         (DRIVE.format("speed_amplitude = 3"), ":2: &drive 'd': speed_amplitude needs frequency"),
     ],
 )
@@ -408,7 +425,9 @@ def test_analyses_about_a_steady_state_refuse_moving_joints(nocdyn, command):
 
 def test_a_dead_centre_ends_the_run_with_the_name_of_the_joint(nocdyn):
     text = FREE.format("a", 0.02) + FREE.format("b", 0.02) + "&relation name = 'p' bodies = 'a', 'b'\n"
-    text += "  table_angle_deg = 0, 45, 90, 135, 180, 225, 270, 315, 360 table_driven_deg = 0, 30, 45, 30, 0, -30, -45, -30, 0 /\n"
+    text += (
+        "  table_angle_deg = 0, 45, 90, 135, 180, 225, 270, 315, 360 table_driven_deg = 0, 30, 45, 30, 0, -30, -45, -30, 0 /\n"
+    )
     text += "&drive name = 'd' body = 'b' speed = 1 /\n" + RUN
     outcome = nocdyn("run", nocdyn.write("machine.nml", text), "--out", "out")
     assert outcome.returncode == 1

@@ -103,8 +103,8 @@ contains
     call pivoted_rank(columns, rank_tolerance, rank, pivots)
     do i = rank + 1, size(pivots)
       if (machine%banks(start%motions%bank(pivots(i)))%bank%role /= role_drive) cycle
-      call raise(error, exit_input, row_location(input, machine, start, pivots(i)) // ': other drives and joints already ' // &
-                 'prescribe this motion; allowed: one drive of each motion')
+      call raise(error, exit_input, input%location(group_of(input, machine, start, pivots(i))) // ': other drives and ' // &
+                 'joints already prescribe this motion; allowed: one drive of each motion')
       return
     end do
   end subroutine refuse_dependent_drives
@@ -116,6 +116,7 @@ contains
     logical, intent(in) :: is_given(:)
     type(moving_start_t), intent(inout) :: start
     type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: demand
     real(wp), allocatable :: change(:), equations(:, :), missing(:)
     integer, allocatable :: given(:)
     integer :: b, i
@@ -136,16 +137,17 @@ contains
     end if
     start%speed = start%speed - change
     i = maxloc(residuals(start), dim=1)
-    call raise(error, exit_input, row_location(input, machine, start, i) // ': the start speeds violate it: they differ by ' // &
-               rounded_text(dot_product(start%a(i, :), start%speed) - start%demand(i), 6) // &
-               demand_text(start, i) // "; &run start = 'projected' takes the nearest speeds that fit")
+    call describe_demand(start, i, demand)
+    call raise(error, exit_input, input%location(group_of(input, machine, start, i)) // ': the start speeds violate it: ' // &
+               'they differ by ' // rounded_text(dot_product(start%a(i, :), start%speed) - start%demand(i), 6) // demand // &
+               "; &run start = 'projected' takes the nearest speeds that fit")
   end subroutine follow_rows
 
   !> What a row demands, for messages.
-  function demand_text(start, row) result(text)
+  subroutine describe_demand(start, row, text)
     type(moving_start_t), intent(in) :: start
     integer, intent(in) :: row
-    character(len=:), allocatable :: text
+    character(len=:), allocatable, intent(out) :: text
 
     if (start%motions%driver(row) == 0) then
       text = ' rad/s from those of the drive, ' // to_text(start%demand(row)) // ' rad/s; allowed: these, or a drive ' // &
@@ -153,7 +155,7 @@ contains
     else
       text = ' rad/s (m/s of a slider) at this position, where the ratio is ' // rounded_text(start%motions%g(1, row), 12)
     end if
-  end function demand_text
+  end subroutine describe_demand
 
   !> The nearest speeds, weighted by the inertias.
   subroutine project_start(machine, start)
@@ -184,22 +186,21 @@ contains
     machine%start_speed(:, :) = spread(matmul(start%complement, start%speed), 1, machine%lanes)
   end subroutine set_speeds
 
-  !> File, line and group of a row.
-  function row_location(input, machine, start, row) result(text)
+  !> The group of a row.
+  integer function group_of(input, machine, start, row) result(group)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
     type(moving_start_t), intent(in) :: start
     integer, intent(in) :: row
-    character(len=:), allocatable :: text
     integer, allocatable :: groups(:)
     integer :: i
 
     associate (bank => machine%banks(start%motions%bank(row))%bank, number => start%motions%number(row))
       allocate (groups, source=input%groups_named(trim(role_names(bank%role))))
       do i = 1, size(groups)
-        if (input%groups(groups(i))%name == bank%names(number)%text) text = input%location(groups(i))
+        if (input%groups(groups(i))%name == bank%names(number)%text) group = groups(i)
       end do
     end associate
-  end function row_location
+  end function group_of
 
 end module nocdyn_moving_start

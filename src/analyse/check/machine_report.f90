@@ -127,8 +127,8 @@ contains
     type(string_t), allocatable :: notes(:)
     integer, parameter :: roles(*) = [role_coupling, role_motor, role_load, role_excitation]   ! said even if there are none
     integer, parameter :: others(*) = [role_clutch, role_freewheel, role_cardan, role_crank, role_relation, role_drive]
-    character(len=*), parameter :: plurals(*) = [character(len=10) :: 'clutches', 'freewheels', 'cardans', 'cranks', 'relations', &
-                                                 'drives']
+    character(len=*), parameter :: plurals(*) = [character(len=10) :: 'clutches', 'freewheels', 'cardans', 'cranks', &
+                                                 'relations', 'drives']
     integer :: i
 
     call report%append(file // ': ' // counted(machine%bodies - machine%nodes, 'body', 'bodies') // counted_constraints(machine))

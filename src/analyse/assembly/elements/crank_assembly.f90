@@ -34,9 +34,9 @@ contains
     do i = 1, size(cranks)
       associate (group => input%groups(cranks(i)))
         if (group%number('crank_radius') + abs(group%number('offset')) >= group%number('rod_length')) then
-          call raise(error, exit_input, input%location(cranks(i), 'offset') // ': offset = ' // to_text(group%number('offset')) // &
-                     ' m: the rod of ' // to_text(group%number('rod_length')) // ' m does not reach the piston at all angles; ' // &
-                     'allowed: crank_radius + |offset| below rod_length')
+          call raise(error, exit_input, input%location(cranks(i), 'offset') // ': offset = ' // &
+                     to_text(group%number('offset')) // ' m: the rod of ' // to_text(group%number('rod_length')) // ' m does not reach the piston at all ' // &
+                     'angles; allowed: crank_radius + |offset| below rod_length')
           return
         end if
         if (group%number('rod_mass') > 0 .and. .not. group%has_value('rod_center')) then
@@ -165,8 +165,8 @@ contains
         values(1) = 0.5_wp * (values(1) + values(last))
         last = last - 1
       end if
-      curve = new_curve([angle(:last) - cycle, angle(:last), angle(:last) + cycle], [values(:last), values(:last), values(:last)], &
-                        interpolation_cubic, extrapolation_linear)
+      curve = new_curve([angle(:last) - cycle, angle(:last), angle(:last) + cycle], &
+                        [values(:last), values(:last), values(:last)], interpolation_cubic, extrapolation_linear)
       do i = 1, samples
         sampled(i) = curve%value(angle(1) + modulo(cycle * (i - 1) / samples - angle(1), cycle))
       end do

@@ -91,6 +91,7 @@ contains
                'table_angle = ' // to_text(x(1 + i / looks)) // " rad; kind = 'cam' may go to and fro"
         return
       end do
+    case default   ! a lever may be anything
     end select
   end subroutine find_table_mistake
 

@@ -98,7 +98,7 @@ module nocdyn_schema_motions
     key_rule_t('drive',      'table_time',      a_number,       any_number, 's',  unset,       anything, &
       'times of the points of a table, ascending', fewest=2), &
     key_rule_t('drive',      'table_speed',     a_number,       any_number, 'rad/s', unset,    anything, &
-      'speed at these times: a ramp between two of them; constant before the first and after the last', 'speed', fewest=2), &
+      'speed at these times, with ramps between them; constant before the first and after the last', 'speed', fewest=2), &
     key_rule_t('drive',      'table_angle',     a_number,       any_number, 'rad', unset,      anything, &
       'angle at these times; a monotone cubic between them, straight on beyond them', 'angle', fewest=2), &
     key_rule_t('drive',      'table_file',      a_file,         1, '',            unset,       anything, &
