@@ -36,6 +36,11 @@ def example_sweeps(folder: Path, scratch: Path, files: list[Path], methods: list
     ]
 
 
+def with_springs(files: list[Path]) -> list[Path]:
+    """Those of the files that have a coupling with a stiffness."""
+    return [file for file in files if any("stiffness" in group for group in Shipped(file, "").of("coupling"))]
+
+
 def family_of(file: Path) -> Family:
     """Variants of the first coupling that has a stiffness."""
     coupling = next(group for group in Shipped(file, "").of("coupling") if "stiffness" in group)

@@ -154,4 +154,4 @@ class Shipped:
     def write_input(self, file: Path) -> None:
         """With the tables where they are."""
         text = self.file.read_text(encoding="utf-8")
-        file.write_text(re.sub(r"(table_file = ')", rf"\1{self.file.resolve().parent}/", text), encoding="utf-8")
+        file.write_text(re.sub(r"((?:table|pressure)_file = ')", rf"\1{self.file.resolve().parent}/", text), encoding="utf-8")

@@ -9,7 +9,7 @@ from pathlib import Path
 from . import whole_process
 from .chains import Scaling
 from .costs import Case, Costs, Sweeping, chunk_costs, hand_out_costs, step_costs
-from .example_sweeps import example_sweeps
+from .example_sweeps import example_sweeps, with_springs
 from .nocdyn_sweep import sweepers
 from .peers import heyoka, heyoka_sweep, numbalsoda, numbalsoda_sweep, scipy, scipy_sweep
 from .problems import Case2, Chain
@@ -280,7 +280,7 @@ def w6_sweep(bench: Bench) -> Throughput:
 
 
 def examples(bench: Bench) -> Costs:
-    files = sorted(EXAMPLES.glob("*/*.nml"))
+    files = with_springs(sorted(EXAMPLES.glob("*/*.nml")))
     return Costs(
         "example_sweeps",
         "What a sweep of each shipped example costs",

@@ -688,6 +688,238 @@ def differential():
     }
 
 
+def coupled_clutches():
+    """Speeds and angles of four inertias; mode: the sign of the slip of each clutch, 0 where it is locked."""
+    m = example("coupled_clutches")
+    inertia, clutches, torque = m.inertia(), list(m.clutch.values()), m.excitation["torque"]
+    curve = Curve((np.array(clutches[0]["table_time"]), clutches[0]["table_level"]), cubic=True, constant=True)
+
+    def levels(t, middle):
+        return [curve(curve.segment(middle), t), *(float(middle > group["times"]) for group in clutches[1:])]
+
+    def solve(t, mode, middle):
+        """Accelerations and torques of the clutches, those of locked ones from the rows that hold."""
+        held = [i for i in range(3) if mode[i] == 0]
+        torques = np.array([mode[i] * clutches[i]["capacity"] * levels(t, middle)[i] for i in range(3)])
+        applied = np.array([torque["amplitude"] * np.sin(torque["frequency"] * t), 0, 0, 0])
+        applied[:3] -= torques
+        applied[1:] += torques
+        rows = np.array([np.eye(4)[i] - np.eye(4)[i + 1] for i in held]).reshape(-1, 4)
+        matrix = np.block([[np.diag(inertia), rows.T], [rows, np.zeros((len(held), len(held)))]])
+        found = np.linalg.solve(matrix, np.concatenate([applied, np.zeros(len(held))]))
+        torques[held] = found[4:]
+        return found[:4], torques
+
+    def rate(t, y, mode, middle):
+        return [*y[4:], *solve(t, mode, middle)[0]]
+
+    def borders(mode):
+        for i in range(3):
+
+            def other(sign, i=i):
+                return (*mode[:i], sign, *mode[i + 1 :])
+
+            if mode[i]:
+                closes = clutches[i].get("times", 0.0)  # before, it does not lock
+                yield lambda t, y, i=i, t_0=closes: mode[i] * (y[4 + i] - y[5 + i]) if t >= t_0 else 1.0, other(0)
+            else:
+                for sign in (1, -1):
+                    yield (
+                        lambda t, y, i=i, s=sign: clutches[i]["static_capacity"] * levels(t, t)[i] - s * solve(t, mode, t)[1][i],
+                        other(sign),
+                    )
+
+    breaks = [*clutches[0]["table_time"], *(group["times"] for group in clutches[1:])]
+    start = [0.0] * 4 + list(m.start("speed", *m.body))
+    motion = motion_of(rate, start, m.end(), (1, 1, 1), borders, breaks)
+    y = motion.at(m.end())
+    locks = [begin for (begin, _, mode, _), (_, _, before, _) in zip(motion.pieces[1:], motion.pieces) if mode != before]
+    assert len(locks) == 6
+    return {f"omega_J{i + 1} [rad/s]": y[4 + i] for i in range(4)} | {f"phi_J{i + 1} [rad]": y[i] for i in range(4)}
+
+
+def hooke(group, angle):
+    """Angle behind a cardan joint and its first two derivatives by the angle before it, which is zero at the start."""
+    phase = group.get("phase", 0.0)
+    c, s = np.cos(group["angle"]), np.sin(group["angle"]) ** 2
+
+    def turned(x):
+        return x + np.arctan2((1 - c) * np.sin(x) * np.cos(x), c + (1 - c) * np.sin(x) ** 2)
+
+    d = 1 - s * np.cos(angle + phase) ** 2
+    return turned(angle + phase) - turned(phase), c / d, -c * s * np.sin(2 * (angle + phase)) / d**2
+
+
+def car_driveline():
+    """Angles of engine, output shaft and vehicle; mode: whether the clutch slips."""
+    m = example("car_driveline")
+    j = {name: m.inertia(name) for name in m.body}
+    teeth = {name: m.gear[name]["teeth"] for name in m.gear}
+    to_input = -teeth["first"][1] / teeth["first"][0]
+    to_axle = -teeth["final"][0] / teeth["final"][1]
+    clutch, shafts, resistance = m.clutch["dry"], m.coupling["half_shafts"], m.load["resistance"]
+    curve = Curve((np.array(clutch["table_time"]), clutch["table_level"]), constant=True)
+
+    def geometry(v):
+        """Angle of the axle, its derivatives by that of the output, the inertia at the output and half its derivative."""
+        s, s1, s2 = hooke(m.cardan["front"], v)
+        p, p1, p2 = hooke(m.cardan["rear"], s)
+        p1, p2 = p1 * s1, p2 * s1**2 + p1 * s2
+        behind = j["pinion"] + j["axle"] * to_axle**2
+        inertia = j["output"] + j["input"] * to_input**2 + j["shaft"] * s1**2 + behind * p1**2
+        return to_axle * p, to_axle * p1, to_axle * p2, inertia, j["shaft"] * s1 * s2 + behind * p1 * p2
+
+    def drive(y):
+        return m.motor["throttle"]["torque"] - m.load["friction"]["viscous"] * y[3]
+
+    def behind(y):
+        axle, axle1, _, inertia, change = geometry(y[1])
+        moment = shafts["stiffness"] * (y[2] - axle) + shafts["damping"] * (y[5] - axle1 * y[4])
+        drag = resistance["viscous"] * y[5] + resistance["quadratic"] * abs(y[5]) * y[5]
+        return axle1 * moment - change * y[4] ** 2, inertia, -(moment + drag) / j["vehicle"]
+
+    def accelerations(t, y, slips, middle):
+        """Of engine, output, vehicle."""
+        load, inertia, vehicle = behind(y)
+        if not slips:
+            output = (load + to_input * drive(y)) / (inertia + j["engine"] * to_input**2)
+            return [to_input * output, output, vehicle]
+        torque = clutch["capacity"] * curve(curve.segment(middle), t)
+        return [(drive(y) - torque) / j["engine"], (load + to_input * torque) / inertia, vehicle]
+
+    def rate(t, y, slips, middle):
+        return [*y[3:], *accelerations(t, y, slips, middle)]
+
+    def borders(slips):
+        if slips:
+            yield lambda t, y: y[3] - to_input * y[4], False
+
+    start = [0.0, 0.0, 0.0, *m.start("speed", "engine"), 0.0, 0.0]
+    motion = motion_of(rate, start, m.end(), True, borders, clutch["table_time"])
+    y = motion.at(m.end())
+    axle, axle1, *_ = geometry(y[1])
+    engine_acceleration = accelerations(m.end(), y, False, m.end())[0]
+    return {
+        "omega_engine [rad/s]": y[3],
+        "omega_vehicle [rad/s]": y[5],
+        "omega_shaft [rad/s]": hooke(m.cardan["front"], y[1])[1] * y[4],
+        "omega_axle [rad/s]": axle1 * y[4],
+        "torque_dry [N m]": drive(y) - j["engine"] * engine_acceleration,
+        "twist_half_shafts [rad]": y[2] - axle,
+        "max omega_vehicle [rad/s]": motion.largest(lambda t, y, mode: y[5]),
+    }
+
+
+def compressor():
+    """Angles of rotor and flywheel."""
+    m = example("compressor")
+    rotor, flywheel = m.inertia()
+    shaft, motor, crank = m.coupling["shaft"], m.motor["motor"], m.crank["piston"]
+    r, length, share = crank["crank_radius"], crank["rod_length"], crank["rod_center"] / crank["rod_length"]
+    lines = (m.folder / crank["pressure_file"]).read_text().splitlines()[2:]
+    degrees, pressure = np.array([line.split(",") for line in lines], dtype=float).T
+    angles = np.radians(degrees)
+    points = np.concatenate([angles - 2 * np.pi, angles, angles + 2 * np.pi])
+    curve = Curve((points, np.tile(crank["crankcase_pressure"] - pressure, 3)), cubic=True)
+    samples = 2 * np.pi * np.arange(4096) / 4096
+    harmonics = np.fft.rfft([curve(curve.segment(x), x) for x in samples])[: crank["harmonics_up_to"] + 1] / 2048
+    harmonics[0] /= 2
+    area = np.pi / 4 * crank["bore"] ** 2
+
+    def force(v):
+        return area * np.real(np.sum(harmonics * np.exp(1j * np.arange(len(harmonics)) * v)))
+
+    def motions(v):
+        """First and second derivatives of what moves with the crank: piston, rod along and across, rod angle."""
+        p, p1, p2 = r * np.sin(v), r * np.cos(v), -r * np.sin(v)
+        w = np.sqrt(length**2 - p**2)
+        w1 = -p * p1 / w
+        w2 = -(p1**2 + p * p2 + w1**2) / w
+        first = [-p + w1, -p + share * w1, (1 - share) * p1, p1 / w]
+        return np.array(first), np.array([-p1 + w2, -p1 + share * w2, (1 - share) * p2, (p2 - w1 * p1 / w) / w])
+
+    masses = np.array([crank["piston_mass"], crank["rod_mass"], crank["rod_mass"], crank["rod_inertia"]])
+
+    def torques(y):
+        moment = shaft["stiffness"] * (y[1] - y[0]) + shaft["damping"] * (y[3] - y[2])
+        return motor["a"] - motor["b"] * y[2], moment
+
+    def rate(t, y, *_):
+        drive, moment = torques(y)
+        first, second = motions(y[1])
+        inertia = flywheel + masses @ first**2
+        turn = (force(y[1]) * first[0] - moment - masses @ (first * second) * y[3] ** 2) / inertia
+        return [y[2], y[3], (drive + moment) / rotor, turn]
+
+    motion = motion_of(rate, np.zeros(4), m.end())
+    y = motion.at(m.end())
+    first, second = motions(y[1])
+    acceleration = rate(m.end(), y)[3]
+    return {
+        "phi_flywheel [rad]": y[1],
+        "omega_rotor [rad/s]": y[2],
+        "omega_flywheel [rad/s]": y[3],
+        "position_piston [m]": r * np.cos(y[1]) + np.sqrt(length**2 - (r * np.sin(y[1])) ** 2),
+        "velocity_piston [m/s]": first[0] * y[3],
+        "gas_force_piston [N]": force(y[1]),
+        "force_piston [N]": masses[0] * (first[0] * acceleration + second[0] * y[3] ** 2) - force(y[1]),
+        "min moment_shaft [N m]": motion.largest(lambda t, y, mode: shaft["stiffness"] * (y[1] - y[0]), sign=-1),
+    }
+
+
+def hybrid():
+    """Angles of engine, ring and vehicle; mode: whether the freewheel holds the engine."""
+    m = example("hybrid")
+    j = {name: m.inertia(name) for name in m.body}
+    sun, ring = m.planetary["split"]["teeth"]
+    carrier, back = (sun + ring) / sun, -ring / sun  # the sun turns with carrier * engine + back * ring
+    to_axle = m.gear["final"]["teeth"][0] / m.gear["final"]["teeth"][1]
+    shafts = m.coupling["half_shafts"]
+    inertia = np.array([[j["engine"], 0.0], [0.0, j["motor"] + j["axle"] * to_axle**2]])
+    inertia += j["generator"] * np.outer([carrier, back], [carrier, back])
+    tables = {name: Curve((np.array(group["table_time"]), group["table_torque"])) for name, group in m.excitation.items()}
+
+    def torques(t, y, middle):
+        """Generalised ones on engine and ring, and that of the half shafts."""
+        traction, control, fuel = (tables[name](tables[name].segment(middle), t) for name in ("traction", "control", "fuel"))
+        moment = shafts["stiffness"] * (y[2] - to_axle * y[1]) + shafts["damping"] * (y[5] - to_axle * y[4])
+        at_engine = fuel - m.load["drag"]["viscous"] * y[3] + carrier * control
+        return np.array([at_engine, traction + to_axle * moment + back * control]), moment
+
+    def accelerations(t, y, holds, middle):
+        applied, moment = torques(t, y, middle)
+        ring = [0.0, applied[1] / inertia[1, 1]]
+        found = ring if holds else np.linalg.solve(inertia, applied)
+        return [*found, -(moment + m.load["resistance"]["viscous"] * y[5]) / j["vehicle"]]
+
+    def rate(t, y, holds, middle):
+        return [*y[3:], *accelerations(t, y, holds, middle)]
+
+    def held(t, y):
+        """The torque on the engine that would turn it forward."""
+        applied, _ = torques(t, y, t)
+        return applied[0] - inertia[0, 1] * applied[1] / inertia[1, 1]
+
+    def borders(holds):
+        if holds:
+            yield lambda t, y: -held(t, y), False
+        else:
+            yield lambda t, y: y[3], True
+
+    breaks = [time for group in m.excitation.values() for time in group["table_time"]]
+    motion = motion_of(rate, np.zeros(6), m.end(), False, borders, breaks)
+    y = motion.at(m.end())
+    return {
+        "omega_engine [rad/s]": y[3],
+        "omega_motor [rad/s]": y[4],
+        "omega_generator [rad/s]": carrier * y[3] + back * y[4],
+        "omega_vehicle [rad/s]": y[5],
+        "phi_engine [rad]": y[0],
+        "max omega_generator [rad/s]": motion.largest(lambda t, y, mode: carrier * y[3] + back * y[4]),
+        "min torque_backstop [N m]": motion.largest(lambda t, y, mode: held(t, y) if mode else 0.0, sign=-1),
+    }
+
+
 def natural_frequencies(inertia, stiffness):
     """[Hz], without damping and without the rigid motion."""
     return np.sqrt(eigh(stiffness, inertia, eigvals_only=True)[1:]) / (2 * np.pi)
@@ -768,6 +1000,10 @@ EXAMPLE_MACHINES = (
     ieee_first_benchmark,
     dc_governed,
     differential,
+    coupled_clutches,
+    car_driveline,
+    compressor,
+    hybrid,
     motor_coupling_gear,
     kloss_run_up,
     fan_law,

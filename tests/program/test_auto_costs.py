@@ -25,7 +25,7 @@ EVALUATIONS = {"rk853": 15, "rodas5p": 8, "taylor": 1}
 
 def counts_of(nocdyn, path, method, tolerances):
     outcome = nocdyn("run", path, "--quiet", "--out", "out", "--set", f"run.method={method}", *tolerances)
-    if method == "taylor" and "has no Taylor series" in outcome.stderr:
+    if method == "taylor" and "no Taylor series" in outcome.stderr:
         return None
     assert outcome.returncode == 0, outcome.stderr
     return nocdyn.summary("out")

@@ -1,6 +1,6 @@
 !> The list of the columns of trajectory.csv with their labels.
 module nocdyn_trajectory_columns
-  use nocdyn_bank, only: quantity_t
+  use nocdyn_bank, only: quantity_t, role_crank
   use nocdyn_constraints, only: constraints_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -40,6 +40,7 @@ contains
     type(column_t), allocatable, intent(out) :: columns(:)
     type(string_t), allocatable, intent(out) :: labels(:)
     type(quantity_t), allocatable :: quantities(:)
+    character(len=:), allocatable :: name
     integer :: b, bank, count, e, kind, q
 
     count = column_count(machine)
@@ -47,10 +48,14 @@ contains
     count = 0
     call add_column(columns, labels, count, column_t(column_time), 't [s]')
     do b = 1, machine%bodies
-      call add_column(columns, labels, count, column_t(column_angle, index=b), 'phi_' // machine%names(b)%text // ' [rad]')
+      name = 'phi_' // machine%names(b)%text // ' [rad]'
+      if (is_straight(machine, b)) name = 'x_' // machine%names(b)%text // ' [m]'
+      call add_column(columns, labels, count, column_t(column_angle, index=b), name)
     end do
     do b = 1, machine%bodies
-      call add_column(columns, labels, count, column_t(column_speed, index=b), 'omega_' // machine%names(b)%text // ' [rad/s]')
+      name = 'omega_' // machine%names(b)%text // ' [rad/s]'
+      if (is_straight(machine, b)) name = 'v_' // machine%names(b)%text // ' [m/s]'
+      call add_column(columns, labels, count, column_t(column_speed, index=b), name)
     end do
     do bank = 1, size(machine%banks)
       quantities = machine%banks(bank)%bank%quantities()
@@ -69,6 +74,21 @@ contains
       call add_column(columns, labels, count, column_t(kind), trim(energy_labels(kind)))
     end do
   end subroutine list_columns
+
+  !> Whether a body moves along a line: pistons and rods of cranks, but not the angles of rods.
+  logical function is_straight(machine, body)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: body
+    integer :: e, i
+
+    is_straight = .false.
+    do i = 1, size(machine%banks)
+      associate (bank => machine%banks(i)%bank)
+        if (bank%role /= role_crank .or. bank%moving_rows == 0) cycle
+        is_straight = is_straight .or. any([(bank%rows%last_body(e) == body, e=1, min(bank%count, 3))])
+      end associate
+    end do
+  end function is_straight
 
   pure subroutine add_column(columns, labels, count, column, label)
     type(column_t), intent(inout) :: columns(:)

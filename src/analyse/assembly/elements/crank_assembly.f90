@@ -35,8 +35,8 @@ contains
       associate (group => input%groups(cranks(i)))
         if (group%number('crank_radius') + abs(group%number('offset')) >= group%number('rod_length')) then
           call raise(error, exit_input, input%location(cranks(i), 'offset') // ': offset = ' // &
-                     to_text(group%number('offset')) // ' m: the rod of ' // to_text(group%number('rod_length')) // ' m does ' // &
-                     'not reach the piston at all angles; allowed: crank_radius + |offset| below rod_length')
+                     to_text(group%number('offset')) // ' m: the rod of ' // to_text(group%number('rod_length')) // ' m ' // &
+                     'does not reach the piston at all angles; allowed: crank_radius + |offset| below rod_length')
           return
         end if
         if (group%number('rod_mass') > 0 .and. .not. group%has_value('rod_center')) then
