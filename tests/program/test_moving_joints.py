@@ -6,6 +6,7 @@ from math import asin, atan2, cos, pi, radians, sin, sqrt
 
 import numpy as np
 import pytest
+from conftest import SOURCE
 
 BODY = "&body name = '{}' inertia = {} speed = {} /\n"
 FREE = "&body name = '{}' inertia = {} /\n"
@@ -417,10 +418,72 @@ def test_what_does_not_fit_is_refused_by_line_and_group(nocdyn, text, message):
     assert said.count("\n") == 1
 
 
-@pytest.mark.parametrize("command", ["modes", "equilibrium", "response", "campbell"])
-def test_analyses_about_a_steady_state_refuse_moving_joints(nocdyn, command):
-    said = refusal(nocdyn, PAIR + RUN + "&response body = 'a' speed_rpm = 100, 200 /\n", command)
-    assert said.startswith(f"nocdyn: machine.nml:3: &cardan 'j': nocdyn {command} is for machines whose ratios are constant")
+@pytest.mark.parametrize("command", ["modes", "equilibrium", "response", "campbell", "matrices"])
+def test_analyses_about_a_steady_state_refuse_what_has_no_mean_ratio(nocdyn, command):
+    response = "&response body = 'a' speed_rpm = 100, 200 /\n"
+    groups = [DRIVE.format(""), RELATION.format("table_angle = 0, 1, 2 table_driven = 0, 1, 0")]
+    for text in [*groups, PAIR] if command == "matrices" else groups:
+        said = refusal(nocdyn, text + RUN + response, command)
+        allowed = "cardans, cranks, relations, drives" if command == "matrices" else "drives, cams and levers"
+        assert f"nocdyn {command} is for machines whose ratios are constant; allowed: no {allowed}" in said
+
+
+# Means over a turn, where a steady state is looked at.
+
+
+def test_modes_and_steady_states_have_the_mean_ratio_of_a_cardan_joint(nocdyn):
+    text = driveline("reduced", "auto")
+    gear = "&gear name = 'j' bodies = 'fork', 'shaft' teeth = 1, 1 internal = .true. /\n"
+    other = "".join(gear if line.startswith("&cardan") else line for line in text.splitlines(keepends=True))
+    for command, name in (("modes", "modes.csv"), ("equilibrium", "equilibrium.json")):
+        said = nocdyn(command, nocdyn.write("machine.nml", text), "--out", "means")
+        assert said.returncode == 0, said.stderr
+        assert "note: means over a turn stand for the ratios, inertias and torques of cardan 'j'" in said.stdout
+        assert nocdyn(command, nocdyn.write("machine.nml", other), "--out", "gear").returncode == 0
+        found, expected = ((nocdyn.folder / folder / name).read_text() for folder in ("means", "gear"))
+        assert found == expected
+
+
+def test_start_speeds_that_fit_the_position_do_not_hinder_the_modes(nocdyn):
+    text = PAIR.replace("'b' inertia = 2", f"'b' inertia = 2 speed = {10 / cos(radians(30))!r}")
+    text += FREE.format("c", 1) + "&coupling name = 'k' bodies = 'b', 'c' stiffness = 100 /\n"
+    outcome = nocdyn("modes", nocdyn.write("machine.nml", text + RUN), "--at", "rest", "--out", "modes")
+    assert outcome.returncode == 0, outcome.stderr
+    modes = json.loads((nocdyn.folder / "modes/modes.json").read_text())["modes"]
+    frequency = sqrt(100 * (1 / 3 + 1 / 1)) / (2 * pi)
+    assert [mode["undamped_frequency_Hz"] for mode in modes if mode["kind"] == "oscillating"] == pytest.approx([frequency])
+
+
+def test_the_response_of_a_compressor_is_that_of_its_settled_motion(nocdyn):
+    """Mean inertia and torque by orders against the motion with the crank; they differ by the square of the speed's ripple."""
+    source = SOURCE / "input/examples/compressor"
+    nocdyn.write("indicator.csv", (source / "indicator.csv").read_text())
+    text = (source / "compressor.nml").read_text()
+    table = run(nocdyn, text, "--set", "run.t_end=8", "--set", "run.rtol=1e-8")
+    turned = column(table, "phi_flywheel")
+    last = turned > turned[-1] - 4 * 2 * pi
+    moment = (column(table, "moment_shaft") + column(table, "damping_shaft"))[last]
+    t = column(table, "t")[last]
+    speed = float((turned[-1] - turned[last][0]) / (t[-1] - t[0]))
+    steady = nocdyn("equilibrium", nocdyn.write("machine.nml", text), "--out", "steady")
+    assert steady.returncode == 0, steady.stderr
+    values = json.loads((nocdyn.folder / "steady/equilibrium.json").read_text())["steady_states"][0]["values"]
+    assert values["omega_rotor [rad/s]"] == pytest.approx(speed, rel=1e-3)
+    assert values["moment_shaft [N m]"] == pytest.approx(moment.mean(), rel=5e-3)
+    asked = f"&response body = 'rotor' speed = {speed * 0.999!r}, {speed * 1.001!r} count = 3 /\n"
+    outcome = nocdyn("response", nocdyn.write("machine.nml", text + asked), "--out", "response")
+    assert outcome.returncode == 0, outcome.stderr
+    header, rows = nocdyn.table("response", "response.csv")
+    half = next(i for i, name in enumerate(header) if name.startswith("half_range_moment_shaft"))
+    assert rows[1][half] == pytest.approx(np.ptp(moment) / 2, rel=1e-2)
+
+
+def test_a_crank_is_as_exact_after_a_thousand_turns(nocdyn):
+    table = run(nocdyn, SLIDER + "&run t_end = 65 /\n&output points = 101 /\n")
+    turned = column(table, "phi_a")
+    assert turned[-1] > 1000 * 2 * pi
+    drift = [x - piston(0.05, 0.2, 0, v) for v, x in zip(turned, column(table, "position_p"), strict=True)]
+    assert max(map(abs, drift)) < 1e-11
 
 
 def test_a_dead_centre_ends_the_run_with_the_name_of_the_joint(nocdyn):

@@ -59,8 +59,10 @@ contains
       call add_banks(new_element_groups(input, 'mesh', n, body_index), mesh_form, add_mesh_form, machine%banks)
       call add_banks(new_element_groups(input, 'clutch', n, body_index), clutch_form, add_clutch_form, machine%banks)
       call add_freewheels(new_element_groups(input, 'freewheel', n, body_index), machine%banks)
-      call add_cardans(new_element_groups(input, 'cardan', n, body_index), machine%banks)
-      call add_relations(new_element_groups(input, 'relation', n, body_index), machine%banks)
+      if (.not. input%takes_means) then
+        call add_cardans(new_element_groups(input, 'cardan', n, body_index), machine%banks)
+        call add_relations(new_element_groups(input, 'relation', n, body_index), machine%banks)
+      end if
       call add_banks(new_element_groups(input, 'drive', n, body_index), drive_form, add_drive_form, machine%banks)
       call add_banks(new_element_groups(input, 'motor', n, body_index), motor_form, add_motor_form, machine%banks)
       call add_banks(new_element_groups(input, 'load', n, body_index), load_form, add_load_form, machine%banks)
@@ -169,8 +171,13 @@ contains
         call build_coordinates(machine%constraints, machine%names, machine%trains, machine%groups, machine%inertia, wanted, &
                                findloc(complement_names == run%text('complement'), .true., dim=1), machine%coordinates, error)
       end if
-      if (.not. allocated(error)) call fit_start_speeds(machine, given_speeds(input, machine%nodes), &
-                                                        run%text('start') == 'projected', offending_row, error)
+      if (.not. allocated(error)) then
+        call fit_start_speeds(machine, given_speeds(input, machine%nodes), run%text('start') == 'projected', offending_row, error)
+        if (allocated(error) .and. input%takes_means) then   ! the speeds fit the ratios at the start, perhaps
+          deallocate (error)
+          call fit_start_speeds(machine, given_speeds(input, machine%nodes), .true., offending_row, error)
+        end if
+      end if
     end associate
     if (.not. allocated(error)) return
     if (offending_row > 0) then

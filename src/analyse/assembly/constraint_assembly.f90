@@ -22,14 +22,19 @@ module nocdyn_constraint_assembly
 
 contains
 
-  !> Indices of the groups that are constraint rows, in the order of the file.
+  !> Indices of the groups that are constraint rows, in the order of the file. Where means stand for ratios that depend on the
+  !> position, joints with such ratios are.
   function constraint_groups(input) result(indices)
     type(input_t), intent(in) :: input
     integer, allocatable :: indices(:)
     character(len=*), parameter :: kinds(4) = [character(len=12) :: 'gear', 'planetary', 'differential', 'constraint']
     integer :: i
 
-    indices = pack([(i, i=1, size(input%groups))], [(any(kinds == input%groups(i)%kind), i=1, size(input%groups))])
+    character(len=*), parameter :: varying(2) = [character(len=8) :: 'cardan', 'relation']
+
+    indices = pack([(i, i=1, size(input%groups))], &
+                   [(any(kinds == input%groups(i)%kind) .or. (input%takes_means .and. any(varying == input%groups(i)%kind)), &
+                     i=1, size(input%groups))])
   end function constraint_groups
 
   !> All rows in the order of the file. Two columns of the results with the same name are an error.
@@ -67,6 +72,10 @@ contains
       joint%bodies = [bodies_of(group, 'sides', body_index), bodies_of(group, 'case', body_index)]
       joint%coefficients = [1.0_wp, 1.0_wp, -2.0_wp]
       joint%members = [character(len=7) :: '', '', 'case']
+    case ('cardan', 'relation')
+      joint%bodies = bodies_of(group, 'bodies', body_index)
+      joint%coefficients = [mean_ratio(group), -1.0_wp]
+      joint%members = [character(len=7) :: '', '']
     case ('constraint')
       joint%bodies = bodies_of(group, 'bodies', body_index)
       joint%coefficients = group%numbers('coefficients')
@@ -76,6 +85,17 @@ contains
       error stop 'nocdyn_constraint_assembly: this group is no constraint'
     end select
   end subroutine read_joint
+
+  !> The mean over a turn of the ratio of a joint.
+  pure real(wp) function mean_ratio(group)
+    type(group_t), intent(in) :: group
+
+    mean_ratio = 1.0_wp
+    if (group%kind == 'cardan') return
+    associate (x => group%numbers('table_angle'), y => group%numbers('table_driven'))
+      mean_ratio = (y(size(y)) - y(1)) / (x(size(x)) - x(1))
+    end associate
+  end function mean_ratio
 
   !> Eq. (8): R1 omega_1 + R2 omega_2 = 0, a minus for an internal gear.
   !>

@@ -48,6 +48,7 @@ module nocdyn_input
     character(len=:), allocatable :: file
     type(string_t), allocatable :: overrides(:)   !! PATH=VALUE, as given
     type(group_t), allocatable :: groups(:)       !! single groups that the file does not have come last
+    logical :: takes_means = .false.              !! whether means stand for ratios that depend on the position
   contains
     procedure :: groups_named   !! indices of the groups with a name, perhaps only those of one law
     procedure :: position       !! index of the group of a kind that occurs once

@@ -281,23 +281,24 @@ contains
     real(wp), intent(in) :: t          !! [s]
     real(wp), intent(inout) :: y(:)    !! [states] at least
     integer, parameter :: most_steps = 8
-    real(wp), parameter :: rounding = 4.0_wp * epsilon(1.0_wp)
+    real(wp), parameter :: rounding = 4.0_wp * epsilon(1.0_wp), far = 1.0e-9_wp   ! relative to the terms of a row
     integer :: step
-    logical :: is_near
+    real(wp) :: terms(self%joints%motions%count)
 
     associate (n => size(self%moving), motions => self%joints%motions, elements => self%machine%elements)
       do step = 1, most_steps
         self%joint_state(1, :) = y(:self%states)
         call self%gather(self%joint_state)
         call self%move_rows(t)
-        is_near = all(abs(motions%position) <= rounding * (1.0_wp + abs(elements%angle(1, motions%element)) &
-                                                           + abs(motions%constant)))
-        if (is_near) exit
+        terms = motions%size_of_terms(elements%angle(1, :))
+        if (all(abs(motions%position) <= rounding * terms)) exit
         self%acceleration(:) = 0.0_wp
         call self%hold(-motions%position, self%acceleration)
         y(n + 1:2 * n) = y(n + 1:2 * n) + self%acceleration
       end do
-      if (.not. is_near) self%joints%lost = self%joints%locking + maxloc(abs(motions%position), dim=1)
+      if (any(abs(motions%position) > far * terms)) then
+        self%joints%lost = self%joints%locking + maxloc(abs(motions%position) / terms, dim=1)
+      end if
       call self%hold(motions%speed, y(:n))
     end associate
   end subroutine project

@@ -25,6 +25,7 @@ module nocdyn_row_motions
   contains
     procedure :: set_start
     procedure :: move
+    procedure :: size_of_terms
   end type row_motions_t
 
 contains
@@ -90,5 +91,18 @@ contains
       end if
     end do
   end subroutine move
+
+  !> The sizes of the terms of u - g(v) - constant, of which its rounding errors are parts.
+  pure function size_of_terms(self, angle) result(terms)
+    class(row_motions_t), intent(in) :: self
+    real(wp), intent(in) :: angle(:)   !! of all elements [rad]
+    real(wp) :: terms(self%count)
+    integer :: i
+
+    do i = 1, self%count
+      terms(i) = 1.0_wp + abs(angle(self%element(i))) + abs(self%constant(i)) + abs(self%g(0, i))
+      if (self%driver(i) > 0) terms(i) = terms(i) + abs(self%g(1, i)) * abs(angle(self%driver(i)))
+    end do
+  end function size_of_terms
 
 end module nocdyn_row_motions

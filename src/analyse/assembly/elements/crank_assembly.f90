@@ -10,6 +10,7 @@ module nocdyn_crank_assembly
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_order_excitations, only: new_order_excitations, order_torque_t
   use nocdyn_phases, only: new_phases
   use nocdyn_piston_forces, only: new_piston_force, periodic_force_t
   use nocdyn_text, only: append, string_t, to_text
@@ -94,7 +95,11 @@ contains
     if (size(groups%indices) == 0) return
     allocate (body, source=groups%bodies('body', 1))
     do i = 1, size(groups%indices)
-      call add_crank(groups%input%groups(groups%indices(i)), groups%names(i), body(i), machine)
+      if (groups%input%takes_means) then
+        call add_mean_crank(groups%input%groups(groups%indices(i)), groups%names(i), body(i), machine)
+      else
+        call add_crank(groups%input%groups(groups%indices(i)), groups%names(i), body(i), machine)
+      end if
     end do
   end subroutine add_cranks
 
@@ -109,17 +114,8 @@ contains
     type(string_t), allocatable :: nodes(:)
     real(wp), allocatable :: inertia(:)
     integer :: k, piston
-    real(wp) :: share   ! of the rod at the piston
 
-    share = group%number('rod_center', absent=0.0_wp) / group%number('rod_length')
-    associate (rod => group%number('rod_mass'))
-      if (group%has_value('rod_inertia')) then
-        inertia = [group%number('piston_mass'), rod, rod, group%number('rod_inertia')]
-      else
-        inertia = [group%number('piston_mass') + share * rod]
-        machine%inertia(:, body) = machine%inertia(:, body) + (1.0_wp - share) * rod * group%number('crank_radius')**2
-      end if
-    end associate
+    call find_masses(group, body, machine, inertia)
     allocate (nodes(0))
     do k = 1, size(inertia)
       call append(nodes, name%text // '[' // trim(part_names(k)) // ']')
@@ -136,6 +132,74 @@ contains
     call append_bank(machine%banks, new_piston_force(machine%lanes, name, piston, group%number('phase'), force_of(group)))
     call append_bank(machine%banks, new_phases(machine%lanes, [name], [body]))
   end subroutine add_crank
+
+  !> The masses of piston and rod and the inertia of the rod. One without its own is a part of the piston and of the body.
+  subroutine find_masses(group, body, machine, inertia)
+    type(group_t), intent(in) :: group
+    integer, intent(in) :: body
+    type(machine_t), intent(inout) :: machine
+    real(wp), allocatable, intent(out) :: inertia(:)   !! [kg], [kg m2], of each row
+    real(wp) :: share   ! of the rod at the piston
+
+    share = group%number('rod_center', absent=0.0_wp) / group%number('rod_length')
+    associate (rod => group%number('rod_mass'))
+      if (group%has_value('rod_inertia')) then
+        inertia = [group%number('piston_mass'), rod, rod, group%number('rod_inertia')]
+      else
+        inertia = [group%number('piston_mass') + share * rod]
+        machine%inertia(:, body) = machine%inertia(:, body) + (1.0_wp - share) * rod * group%number('crank_radius')**2
+      end if
+    end associate
+  end subroutine find_masses
+
+  !> The mean inertia of a crank in place of it, and its torque by orders: F x' of the force, and -J' omega^2 / 2 of the inertia
+  !> J = sum of m x'^2 over what moves.
+  subroutine add_mean_crank(group, name, body, machine)
+    type(group_t), intent(in) :: group
+    type(string_t), intent(in) :: name
+    integer, intent(in) :: body
+    type(machine_t), intent(inout) :: machine
+    integer, parameter :: most_orders = 12   ! of the inertia
+    type(order_torque_t) :: torque
+    type(order_torque_t), allocatable :: torques(:, :)   ! [lanes, 1]
+    type(periodic_force_t) :: force
+    type(crank_rows_t) :: rows
+    real(wp), allocatable :: masses(:)
+    real(wp), dimension(samples) :: gas, inertia, change
+    real(wp) :: angle, g(0:3), mean, mean_inertia
+    integer :: i, k
+
+    call find_masses(group, body, machine, masses)
+    rows = new_crank_rows(1, spread(name, 1, size(masses)), [(0, k=1, size(masses))], crank_of(group))
+    force%base = 1.0_wp
+    allocate (force%sine(0), force%cosine(0))
+    if (group%has_value('crank_angles')) force = force_of(group)
+    inertia = 0.0_wp
+    change = 0.0_wp
+    do i = 1, samples
+      angle = 2.0_wp * pi / force%base * (i - 1) / samples
+      do k = size(masses), 1, -1
+        call rows%motion(k, angle, g)
+        inertia(i) = inertia(i) + masses(k) * g(1)**2
+        change(i) = change(i) - masses(k) * g(1) * g(2)
+      end do
+      gas(i) = g(1) * force%value(angle + group%number('phase'))
+    end do
+    allocate (torque%square_sine(nint(most_orders / force%base)), torque%square_cosine(nint(most_orders / force%base)))
+    call fourier_coefficients(inertia, mean_inertia, torque%square_sine, torque%square_cosine)
+    machine%inertia(:, body) = machine%inertia(:, body) + mean_inertia
+    call fourier_coefficients(change, mean, torque%square_sine, torque%square_cosine)
+    torque%square_order = [(k * force%base, k=1, size(torque%square_sine))]
+    torque%order = [(k * force%base, k=1, size(force%sine))]
+    torque%speed = [0.0_wp]
+    allocate (torque%mean(1), torque%sine(size(torque%order), 1), torque%cosine(size(torque%order), 1))
+    call fourier_coefficients(gas, torque%mean(1), torque%sine(:, 1), torque%cosine(:, 1))
+    allocate (torques(machine%lanes, 1))   ! gfortran 12: `spread` copies the pointers to allocatable components
+    do i = 1, machine%lanes
+      torques(i, 1) = torque
+    end do
+    call append_bank(machine%banks, new_order_excitations([name], [body], torques))
+  end subroutine add_mean_crank
 
   type(slider_crank_t) function crank_of(group) result(crank)
     type(group_t), intent(in) :: group

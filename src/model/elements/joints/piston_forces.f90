@@ -18,6 +18,8 @@ module nocdyn_piston_forces
     real(wp) :: base = 1.0_wp                 !! 1, or 1/2 of a cycle of two turns
     real(wp) :: mean = 0.0_wp                 !! [N]
     real(wp), allocatable :: sine(:), cosine(:)   !! [N]
+  contains
+    procedure :: value
   end type periodic_force_t
 
   type, extends(bank_t), public :: piston_forces_t
@@ -54,6 +56,16 @@ contains
     call bank%add_parameter('cosine', spread(force%cosine, 1, lanes), .false., [(1, k=1, bank%orders)])
     call bank%prepare_law()
   end function new_piston_force
+
+  !> The force at an angle of the crank [N].
+  pure real(wp) function value(self, angle)
+    class(periodic_force_t), intent(in) :: self
+    real(wp), intent(in) :: angle   !! [rad]
+    integer :: k
+
+    value = self%mean + sum([(self%sine(k) * sin(k * self%base * angle) + self%cosine(k) * cos(k * self%base * angle), &
+                              k=1, size(self%sine))])
+  end function value
 
   subroutine describe(self, tape)
     class(piston_forces_t), intent(in) :: self
