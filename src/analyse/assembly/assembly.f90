@@ -53,22 +53,7 @@ contains
     call assemble_constraints(input, body_index, machine%lanes, machine%constraints, error)
     if (.not. allocated(error)) call check_groups(input, error)
     if (allocated(error)) return
-    allocate (machine%banks(0))
-    associate (n => machine%lanes)
-      call add_banks(new_element_groups(input, 'coupling', n, body_index), coupling_form, add_coupling_form, machine%banks)
-      call add_banks(new_element_groups(input, 'mesh', n, body_index), mesh_form, add_mesh_form, machine%banks)
-      call add_banks(new_element_groups(input, 'clutch', n, body_index), clutch_form, add_clutch_form, machine%banks)
-      call add_freewheels(new_element_groups(input, 'freewheel', n, body_index), machine%banks)
-      if (.not. input%takes_means) then
-        call add_cardans(new_element_groups(input, 'cardan', n, body_index), machine%banks)
-        call add_relations(new_element_groups(input, 'relation', n, body_index), machine%banks)
-      end if
-      call add_banks(new_element_groups(input, 'drive', n, body_index), drive_form, add_drive_form, machine%banks)
-      call add_banks(new_element_groups(input, 'motor', n, body_index), motor_form, add_motor_form, machine%banks)
-      call add_banks(new_element_groups(input, 'load', n, body_index), load_form, add_load_form, machine%banks)
-      call add_banks(new_element_groups(input, 'excitation', n, body_index), excitation_form, add_excitation_form, machine%banks)
-      call add_engines(new_element_groups(input, 'engine', n, body_index), machine%banks)
-    end associate
+    call add_elements(input, body_index, machine)
     call new_shaft_set(input, body_index, shafts)
     call add_shafts(shafts, machine)
     call add_cranks(new_element_groups(input, 'crank', machine%lanes, body_index), machine)
@@ -97,6 +82,30 @@ contains
     if (.not. allocated(error)) call check_orders(input, error)
     if (.not. allocated(error)) call check_response_ranges(input, error)
   end subroutine check_groups
+
+  !> Adds the banks of all elements that join or turn bodies of the input.
+  subroutine add_elements(input, body_index, machine)
+    type(input_t), target, intent(in) :: input
+    type(body_index_t), target, intent(in) :: body_index
+    type(machine_t), intent(inout) :: machine
+
+    allocate (machine%banks(0))
+    associate (n => machine%lanes)
+      call add_banks(new_element_groups(input, 'coupling', n, body_index), coupling_form, add_coupling_form, machine%banks)
+      call add_banks(new_element_groups(input, 'mesh', n, body_index), mesh_form, add_mesh_form, machine%banks)
+      call add_banks(new_element_groups(input, 'clutch', n, body_index), clutch_form, add_clutch_form, machine%banks)
+      call add_freewheels(new_element_groups(input, 'freewheel', n, body_index), machine%banks)
+      if (.not. input%takes_means) then
+        call add_cardans(new_element_groups(input, 'cardan', n, body_index), machine%banks)
+        call add_relations(new_element_groups(input, 'relation', n, body_index), machine%banks)
+      end if
+      call add_banks(new_element_groups(input, 'drive', n, body_index), drive_form, add_drive_form, machine%banks)
+      call add_banks(new_element_groups(input, 'motor', n, body_index), motor_form, add_motor_form, machine%banks)
+      call add_banks(new_element_groups(input, 'load', n, body_index), load_form, add_load_form, machine%banks)
+      call add_banks(new_element_groups(input, 'excitation', n, body_index), excitation_form, add_excitation_form, machine%banks)
+      call add_engines(new_element_groups(input, 'engine', n, body_index), machine%banks)
+    end associate
+  end subroutine add_elements
 
   subroutine set_bodies(input, machine)
     type(input_t), target, intent(in) :: input

@@ -165,8 +165,8 @@ contains
     type(periodic_force_t) :: force
     type(crank_rows_t) :: rows
     real(wp), allocatable :: masses(:)
-    real(wp), dimension(samples) :: gas, inertia, change
-    real(wp) :: angle, g(0:3), mean, mean_inertia
+    real(wp), dimension(samples) :: change, gas, inertia
+    real(wp) :: mean, mean_inertia
     integer :: i, k
 
     call find_masses(group, body, machine, masses)
@@ -174,22 +174,14 @@ contains
     force%base = 1.0_wp
     allocate (force%sine(0), force%cosine(0))
     if (group%has_value('crank_angles')) force = force_of(group)
-    inertia = 0.0_wp
-    change = 0.0_wp
-    do i = 1, samples
-      angle = 2.0_wp * pi / force%base * (i - 1) / samples
-      do k = size(masses), 1, -1
-        call rows%motion(k, angle, g)
-        inertia(i) = inertia(i) + masses(k) * g(1)**2
-        change(i) = change(i) - masses(k) * g(1) * g(2)
-      end do
-      gas(i) = g(1) * force%value(angle + group%number('phase'))
-    end do
-    allocate (torque%square_sine(nint(most_orders / force%base)), torque%square_cosine(nint(most_orders / force%base)))
+    call sample_turn(rows, masses, force, group%number('phase'), inertia, change, gas)
+    associate (n => nint(most_orders / force%base))
+      torque%square_order = [(k * force%base, k=1, n)]
+      allocate (torque%square_sine(n), torque%square_cosine(n))
+    end associate
     call fourier_coefficients(inertia, mean_inertia, torque%square_sine, torque%square_cosine)
     machine%inertia(:, body) = machine%inertia(:, body) + mean_inertia
     call fourier_coefficients(change, mean, torque%square_sine, torque%square_cosine)
-    torque%square_order = [(k * force%base, k=1, size(torque%square_sine))]
     torque%order = [(k * force%base, k=1, size(force%sine))]
     torque%speed = [0.0_wp]
     allocate (torque%mean(1), torque%sine(size(torque%order), 1), torque%cosine(size(torque%order), 1))
@@ -200,6 +192,29 @@ contains
     end do
     call append_bank(machine%banks, new_order_excitations([name], [body], torques))
   end subroutine add_mean_crank
+
+  !> Inertia, its torque over the square of the speed, and torque of the force of a crank over one cycle of the force.
+  subroutine sample_turn(rows, masses, force, phase, inertia, change, gas)
+    type(crank_rows_t), intent(in) :: rows
+    real(wp), intent(in) :: masses(:)            !! of each row [kg], [kg m2]
+    type(periodic_force_t), intent(in) :: force
+    real(wp), intent(in) :: phase                !! angle of the crank where that of its body is zero [rad]
+    real(wp), intent(out), dimension(samples) :: inertia, change, gas   !! [kg m2], [kg m2], [N m]
+    real(wp) :: angle, g(0:3)
+    integer :: i, k
+
+    inertia = 0.0_wp
+    change = 0.0_wp
+    do i = 1, samples
+      angle = 2.0_wp * pi / force%base * (i - 1) / samples
+      do k = size(masses), 1, -1   ! the piston comes last
+        call rows%motion(k, angle, g)
+        inertia(i) = inertia(i) + masses(k) * g(1)**2
+        change(i) = change(i) - masses(k) * g(1) * g(2)
+      end do
+      gas(i) = g(1) * force%value(angle + phase)
+    end do
+  end subroutine sample_turn
 
   type(slider_crank_t) function crank_of(group) result(crank)
     type(group_t), intent(in) :: group
