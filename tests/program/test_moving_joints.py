@@ -494,8 +494,52 @@ def test_a_dead_centre_ends_the_run_with_the_name_of_the_joint(nocdyn):
     text += "&drive name = 'd' body = 'b' speed = 1 /\n" + RUN
     outcome = nocdyn("run", nocdyn.write("machine.nml", text), "--out", "out")
     assert outcome.returncode == 1
-    assert "drive 'd' is at a dead centre, or in a loop that locks" in outcome.stderr
+    assert "drive 'd' contradicts other joints and drives there" in outcome.stderr
     assert "trajectory.partial.csv" in json.dumps(nocdyn.files("out"))
+
+
+TURN_BACK = "table_time = 0, 1, 3 table_speed = 0, 5, -5"
+
+
+@pytest.mark.parametrize(
+    ("drive", "joint", "time", "name"),
+    [
+        ("speed = 5", "&clutch name = 'b' bodies = 'a', 'ground' kind = 'dog' times = 1 levels = 1 /\n", 1, "clutch 'b'"),
+        (TURN_BACK, "&freewheel name = 'f' bodies = 'a', 'ground' direction = 'backward' /\n", 2, "drive 'd'"),
+    ],
+)
+def test_a_lock_against_a_drive_ends_the_run_with_its_name(nocdyn, drive, joint, time, name):
+    text = DRIVE.format(drive) + joint + "&run t_end = 3 /\n"
+    outcome = nocdyn("run", nocdyn.write("machine.nml", text), "--out", "out")
+    assert outcome.returncode == 1
+    assert f"t = {time} s" in outcome.stderr and f"{name} contradicts other joints and drives there" in outcome.stderr
+    assert nocdyn.files("out") == ["input.nml", "summary.json", "trajectory.partial.csv"]
+
+
+def test_a_freewheel_lets_a_drive_start_in_its_direction(nocdyn):
+    text = DRIVE.format("table_time = 0, 1, 2 table_speed = 0, 5, 1")
+    text += "&freewheel name = 'f' bodies = 'a', 'ground' direction = 'backward' /\n"
+    table = run(nocdyn, text + "&run t_end = 3 /\n&output points = 7 /\n")
+    assert column(table, "omega_a") == pytest.approx([0, 2.5, 5, 3, 1, 1, 1], abs=1e-12)
+    assert column(table, "torque_d") == pytest.approx([5, 5, -4, -4, 0, 0, 0], abs=1e-9)
+
+
+def test_extremes_are_those_of_the_motion_where_a_ramp_ends(nocdyn):
+    run(nocdyn, DRIVE.format("table_time = 2, 4 table_speed = 1, 3") + "&run t_start = 3 t_end = 5 /\n")
+    columns = nocdyn.summary("out")["columns"]
+    assert columns["omega_a [rad/s]"]["max"] == pytest.approx(3, abs=1e-12)
+    assert columns["energy_residual [J]"]["max"] < 1e-9
+
+
+def test_many_cranks_start_together(nocdyn):
+    text = "".join(
+        f"&body name = 'b{i}' inertia = 0.05 speed = 100 /\n&crank name = 'c{i}' body = 'b{i}' crank_radius = 0.05\n"
+        f"  rod_length = 0.2 piston_mass = 1 rod_mass = 1 rod_center = 0.07 rod_inertia = 0.004 phase_deg = {i * 60} /\n"
+        for i in range(6)
+    )
+    text += "".join(f"&coupling name = 'k{i}' bodies = 'b{i}', 'b{i + 1}' stiffness = 1e5 damping = 5 /\n" for i in range(5))
+    table = run(nocdyn, text + "&run t_end = 0.1 /\n")
+    assert max(abs(column(table, "energy_residual"))) < 1e-5 * column(table, "kinetic_energy")[0]
 
 
 def test_start_speeds_can_be_projected_on_a_joint(nocdyn):

@@ -79,13 +79,13 @@ contains
     call machine%coordinates%project(1, machine%inertia(1, :), machine%start_speed(1, :), start%speed)
   end subroutine form_rows
 
-  !> How far the speeds are from fulfilling each row, relative to its terms.
+  !> How far the speeds are from fulfilling each row, relative to the largest speeds.
   pure function residuals(start) result(residual)
     type(moving_start_t), intent(in) :: start
     real(wp) :: residual(size(start%demand))
 
     residual = abs(matmul(start%a, start%speed) - start%demand)
-    residual = residual / max(matmul(abs(start%a), abs(start%speed)) + abs(start%demand), tiny(1.0_wp))
+    residual = residual / max(maxval(abs(start%a), dim=2) * maxval(abs(start%speed)) + abs(start%demand), tiny(1.0_wp))
   end function residuals
 
   !> Two drives that move the same bodies have no torques of their own.

@@ -16,6 +16,8 @@ module nocdyn_bounded_complementarity
 
   integer, parameter, public :: is_free = 0, at_lower = -1, at_upper = 1   !! where a force is
   real(wp), parameter :: rounding = 1.0e-12_wp                             ! of a, relative to the largest of its terms
+  real(wp), parameter :: inconsistent = 1.0e-7_wp                          ! a of free forces that no forces can make zero, likewise
+  real(wp), parameter :: far = 1.0e30_wp                                   ! beyond all bounds that are not huge
 
 contains
 
@@ -26,8 +28,9 @@ contains
     real(wp), intent(in) :: lower(:), upper(:)   !! lower <= upper, [n], that of x
     real(wp), intent(out) :: x(:), a(:)          !! [n]
     integer, intent(out) :: state(:)             !! is_free, at_lower or at_upper, [n]
-    logical, intent(out) :: is_solved            !! false after too many changes of the active set
+    logical, intent(out) :: is_solved            !! false without such forces, or after too many changes of the active set
     integer :: change, worst
+    logical :: is_endless
     real(wp) :: wrong(size(b))
 
     x = min(max(0.0_wp, lower), upper)
@@ -35,8 +38,9 @@ contains
     where (upper <= lower) state = at_lower
     is_solved = .false.
     do change = 1, 50 * (size(b) + 1)
-      call move_free(w, b, lower, upper, x, state)
+      call move_free(w, b, lower, upper, x, state, is_endless)
       a = matmul(w, x) + b
+      if (is_endless) return
       wrong = 0.0_wp
       where (state == at_lower) wrong = -a
       where (state == at_upper) wrong = a
@@ -50,20 +54,26 @@ contains
   end subroutine solve_bounded_complementarity
 
   !> Moves the free forces to where their a is zero; those that reach a bound on the way stay there.
-  subroutine move_free(w, b, lower, upper, x, state)
+  subroutine move_free(w, b, lower, upper, x, state, is_endless)
     real(wp), intent(in) :: w(:, :), b(:), lower(:), upper(:)   !! as in `solve_bounded_complementarity`
     real(wp), intent(inout) :: x(:)
     integer, intent(inout) :: state(:)
+    logical, intent(out) :: is_endless   !! whether no forces make the a of the free ones zero
     integer, allocatable :: bound(:), free(:)
-    real(wp), allocatable :: wanted(:)
+    real(wp), allocatable :: rest(:), wanted(:)
     real(wp) :: share, step
     integer :: first, i
 
+    is_endless = .false.
     do
       free = pack([(i, i=1, size(x))], state == is_free)
+      is_endless = .false.
       if (size(free) == 0) return
       bound = pack([(i, i=1, size(x))], state /= is_free)
       wanted = -matmul(pseudo_inverse(w(free, free), null_tolerance), matmul(w(free, bound), x(bound)) + b(free))
+      rest = matmul(w(free, free), wanted) + matmul(w(free, bound), x(bound)) + b(free)
+      is_endless = maxval(abs(rest)) > inconsistent * (maxval(abs(b(free))) + maxval(abs(matmul(w(free, bound), x(bound)))))
+      if (is_endless) wanted = x(free) - far * rest / maxval(abs(rest))   ! without resistance a force grows up to a bound
       step = 1.0_wp
       first = 0
       do i = 1, size(free)
@@ -75,6 +85,7 @@ contains
         step = share
         first = i
       end do
+      if (first == 0 .and. is_endless) return
       x(free) = x(free) + step * (wanted - x(free))
       if (first == 0) return
       i = free(first)

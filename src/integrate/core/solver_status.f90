@@ -125,6 +125,11 @@ contains
     case (integration_too_many_steps)
       sentence = too_many_sentence(solver_status, lane, system, when)
     case (integration_chattering)
+      reason = system%evaluation_obstacle()
+      if (reason /= '') then
+        sentence = 'no motion fits all joints beyond ' // when // ': ' // reason
+        return
+      end if
       sentence = 'the solution chatters at ' // when // ', at the ' // system%switch_name(solver_status%last_crossing(lane)) // &
         ' (' // to_text(solver_status%crossings(lane)) // ' changes of branches so far): the equations on both sides of the ' // &
         'boundary drive it back; make the change smooth'

@@ -46,10 +46,10 @@ contains
 
     near = y
     if (associated(self%joints%leader)) call self%joints%follow(self%machine%banks)
-    if (self%joints%motions%count > 0) call self%project(t, near)
     self%joint_state(1, :) = near
     call self%gather(self%joint_state)
     call self%machine%choose_branches([t])
+    if (self%joints%motions%count > 0) call self%project(t, near)
     if (.not. associated(self%joints%leader)) then
       moved = near
       call self%settle_joints(by_state, t, moved)

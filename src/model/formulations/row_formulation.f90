@@ -314,8 +314,8 @@ contains
     if (row == 0) return
     associate (machine => self%machine, element => self%joints%element(row))
       associate (bank => machine%banks(bank_of(machine%banks, element))%bank)
-        text = trim(role_names(bank%role)) // ' ' // quoted(bank%names(element - bank%first + 1)%text) // ' is at a dead ' // &
-               'centre, or in a loop that locks: other joints and drives prescribe the same motion there, or another one'
+        text = trim(role_names(bank%role)) // ' ' // quoted(bank%names(element - bank%first + 1)%text) // ' contradicts ' // &
+               'other joints and drives there, or does not differ from them: a dead centre, or a loop that locks'
       end associate
     end associate
   end function evaluation_obstacle

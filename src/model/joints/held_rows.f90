@@ -34,7 +34,7 @@ module nocdyn_held_rows
     real(wp), allocatable :: mutual(:, :)    !! responses of all elements and then all drivers to their moments [1/(kg m2)],
                                              !! [2 joints, 2 joints]
     real(wp), allocatable :: weight(:, :)    !! W [1/(kg m2)], [joints, joints]
-    integer :: lost = 0                      !! a row that moves with which the rank has changed on the way, 0: none
+    integer :: lost = 0                      !! a row with which the rank has changed, or that others contradict, 0: none
     logical, private :: is_known = .false.   !! whether the set is that of the present modes and slopes
     type(joint_set_t), allocatable, private :: sets(:)   !! without rows that move
     integer, private :: present = 0          !! one of them

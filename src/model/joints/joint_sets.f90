@@ -163,9 +163,10 @@ contains
     is_unbounded = abs(moment) >= huge(moment)
   end function is_unbounded
 
-  !> The impulses that end slips which joints without bounds do not allow; those of others are zero, as friction has no time.
+  !> The impulses that end slips which joints without bounds do not allow; those of others are zero, as friction has no time. A
+  !> slip that none can end is `lost`: another joint or a drive does not let it.
   subroutine find_impact(self, banks, t, slip, tolerance, impulse, is_struck)
-    class(joint_sets_t), intent(in) :: self
+    class(joint_sets_t), intent(inout) :: self
     type(bank_slot_t), intent(in) :: banks(:)
     real(wp), intent(in) :: t            !! [s]
     real(wp), intent(in) :: slip(:)      !! u' [rad/s], [joints]
@@ -175,6 +176,7 @@ contains
     real(wp), dimension(self%count) :: least, most, slip_after
     real(wp) :: sliding(2)
     integer :: j, state(self%count)
+    logical :: is_solved, is_wrong(self%count)
 
     impulse = 0.0_wp
     do j = 1, self%count
@@ -182,9 +184,11 @@ contains
     end do
     where (.not. is_unbounded(least)) least = 0.0_wp
     where (.not. is_unbounded(most)) most = 0.0_wp
-    is_struck = any(slip > tolerance .and. is_unbounded(least)) .or. any(slip < -tolerance .and. is_unbounded(most))
+    is_wrong = (slip > tolerance .and. is_unbounded(least)) .or. (slip < -tolerance .and. is_unbounded(most))
+    is_struck = any(is_wrong)
     if (.not. is_struck) return
-    call solve_bounded_complementarity(self%weight, slip, least, most, impulse, slip_after, state, is_struck)
+    call solve_bounded_complementarity(self%weight, slip, least, most, impulse, slip_after, state, is_solved)
+    if (.not. is_solved) self%lost = findloc(is_wrong, .true., dim=1)
   end subroutine find_impact
 
   !> Decides the modes of the joints at rest: whenever some slip, the others are looked at again.
@@ -207,7 +211,10 @@ contains
     do while (has_changed)
       has_changed = .false.
       call solve_bounded_complementarity(self%weight(resting, resting), self%rate(resting), least, most, x, a, state, is_solved)
-      if (.not. is_solved) return
+      if (.not. is_solved) then   ! other rows contradict one of these
+        self%lost = resting(maxloc(abs(a), dim=1))
+        return
+      end if
       do i = 1, size(resting)
         if (self%mode(resting(i)) /= locked .or. state(i) == is_free) cycle
         self%mode(resting(i)) = slips_forwards
