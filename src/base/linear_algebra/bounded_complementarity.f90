@@ -16,7 +16,7 @@ module nocdyn_bounded_complementarity
 
   integer, parameter, public :: is_free = 0, at_lower = -1, at_upper = 1   !! where a force is
   real(wp), parameter :: rounding = 1.0e-12_wp                             ! of a, relative to the largest of its terms
-  real(wp), parameter :: inconsistent = 1.0e-7_wp                          ! a of free forces that no forces can make zero, likewise
+  real(wp), parameter :: inconsistent = 1.0e-7_wp                          ! a of free forces that none can make zero, likewise
   real(wp), parameter :: far = 1.0e30_wp                                   ! beyond all bounds that are not huge
 
 contains

@@ -125,14 +125,7 @@ contains
     case (integration_too_many_steps)
       sentence = too_many_sentence(solver_status, lane, system, when)
     case (integration_chattering)
-      reason = system%evaluation_obstacle()
-      if (reason /= '') then
-        sentence = 'no motion fits all joints beyond ' // when // ': ' // reason
-        return
-      end if
-      sentence = 'the solution chatters at ' // when // ', at the ' // system%switch_name(solver_status%last_crossing(lane)) // &
-        ' (' // to_text(solver_status%crossings(lane)) // ' changes of branches so far): the equations on both sides of the ' // &
-        'boundary drive it back; make the change smooth'
+      sentence = chattering_sentence(solver_status, lane, system, when)
     case (integration_not_finite)
       sentence = not_finite_sentence(solver_status, lane, system, when)
     case (integration_rhs_failed)
@@ -151,6 +144,24 @@ contains
       error stop 'nocdyn_solver_status: an integration that is running has no failure message'
     end select
   end function failure_message
+
+  !> The message about a lane that changes its branches without end.
+  function chattering_sentence(solver_status, lane, system, when) result(sentence)
+    type(solver_status_t), intent(in) :: solver_status
+    integer, intent(in) :: lane
+    class(system_t), intent(in) :: system
+    character(len=*), intent(in) :: when
+    character(len=:), allocatable :: sentence
+
+    sentence = system%evaluation_obstacle()
+    if (sentence /= '') then
+      sentence = 'no motion fits all joints beyond ' // when // ': ' // sentence
+      return
+    end if
+    sentence = 'the solution chatters at ' // when // ', at the ' // system%switch_name(solver_status%last_crossing(lane)) // &
+      ' (' // to_text(solver_status%crossings(lane)) // ' changes of branches so far): the equations on both sides of the ' // &
+      'boundary drive it back; make the change smooth'
+  end function chattering_sentence
 
   !> The message about a lane that has taken `max_steps` steps.
   function too_many_sentence(solver_status, lane, system, when) result(sentence)
