@@ -4,7 +4,7 @@ module nocdyn_cylinder_torques
   use nocdyn_input, only: group_t
   use nocdyn_kinds, only: wp
   use nocdyn_order_excitations, only: order_torque_t
-  use nocdyn_slider_cranks, only: gas_harmonics, inertia_harmonics, slider_crank_t
+  use nocdyn_slider_cranks, only: close_cycle, gas_harmonics, inertia_harmonics, slider_crank_t
   implicit none (type, external)
   private
 
@@ -43,7 +43,7 @@ contains
 
   !> Angle of the crank in a cycle [rad].
   pure real(wp) function cycle_of(group)
-    type(group_t), intent(in) :: group   !! &engine
+    type(group_t), intent(in) :: group   !! &engine or &crank
 
     cycle_of = pi * group%whole_number('stroke')
   end function cycle_of
@@ -80,7 +80,7 @@ contains
     type(order_torque_t) :: torque
     real(wp), allocatable :: angle(:), pressure(:)
     real(wp) :: cycle
-    integer :: k, last
+    integer :: k
 
     cycle = cycle_of(group)
     associate (n => int(group%number('harmonics_up_to') * cycle / (2.0_wp * pi) + 1.0e-9_wp))
@@ -92,12 +92,8 @@ contains
     allocate (pressure, source=group%numbers(pressures))
     if (size(pressure) == 0) return
     allocate (angle, source=group%numbers('crank_angles'))
-    last = size(angle)
-    if (angle(last) - angle(1) > cycle - 0.5_wp * (angle(last) - angle(last - 1))) then   ! the first point again
-      pressure(1) = 0.5_wp * (pressure(1) + pressure(last))
-      last = last - 1
-    end if
-    call gas_harmonics(slider_crank(group), cycle, angle(:last), pressure(:last) - group%number('crankcase_pressure'), &
+    call close_cycle(cycle, angle, pressure)
+    call gas_harmonics(slider_crank(group), cycle, angle, pressure - group%number('crankcase_pressure'), &
                        torque%mean(1), torque%sine(:, 1), torque%cosine(:, 1))
   end function gas_torque
 

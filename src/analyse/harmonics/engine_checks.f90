@@ -10,7 +10,7 @@ module nocdyn_engine_checks
   implicit none (type, external)
   private
 
-  public :: check_engines, check_orders
+  public :: check_engines, check_orders, check_stroke, check_crank_angles
 
   real(wp), parameter :: pi = acos(-1.0_wp), degree = pi / 180.0_wp
   real(wp), parameter :: rounding = 1.0e-9_wp   ! relative, of angles and orders
@@ -33,7 +33,7 @@ contains
         if (text == '') call check_cycle(group, key, text)
         if (text == '' .and. group%has_value('orders')) call find_table_obstacle(group, key, text)
         if (text == '') call check_loads(group, key, text)
-        if (text == '' .and. group%has_value('pressures')) call check_pressures(group, key, text)
+        if (text == '' .and. group%has_value('pressures')) call check_crank_angles(group, key, text)
         if (text == '') call check_names(input, group, key, text)
       end associate
       if (text == '') cycle
@@ -55,11 +55,8 @@ contains
       text = to_text(cylinders) // ' cylinders; allowed: at most ' // to_text(most_cylinders)
       return
     end if
-    key = 'stroke'
-    if (all(group%whole_number('stroke') /= [2, 4])) then
-      text = 'stroke = ' // to_text(group%whole_number('stroke')) // '; allowed: 2 or 4'
-      return
-    end if
+    call check_stroke(group, key, text)
+    if (text /= '') return
     key = 'misfire'
     if (group%whole_number('misfire') > cylinders) then
       text = 'misfire = ' // to_text(group%whole_number('misfire')) // '; allowed: 0 to ' // to_text(cylinders) // &
@@ -78,6 +75,17 @@ contains
     if (abs(group%number('mean_torque', absent=0.0_wp)) > 0) return
     text = 'it has no torque; needed: orders, table_file, pressures, pressure_file, reciprocating_mass or mean_torque'
   end subroutine check_cylinders
+
+  !> The stroke is one of those that there are.
+  subroutine check_stroke(group, key, text)
+    type(group_t), intent(in) :: group
+    character(len=:), allocatable, intent(out) :: key, text   !! which key is wrong, and what about it, '' if nothing
+
+    text = ''
+    key = 'stroke'
+    if (all(group%whole_number('stroke') /= [2, 4])) text = 'stroke = ' // to_text(group%whole_number('stroke')) // &
+      '; allowed: 2 or 4'
+  end subroutine check_stroke
 
   !> Firing angles and orders fit the cycle.
   subroutine check_cycle(group, key, text)
@@ -132,7 +140,7 @@ contains
   end subroutine check_loads
 
   !> The crank angles are those of one cycle.
-  subroutine check_pressures(group, key, text)
+  subroutine check_crank_angles(group, key, text)
     type(group_t), intent(in) :: group
     character(len=:), allocatable, intent(out) :: key, text   !! which key is wrong, and what about it, '' if nothing
     real(wp), allocatable :: angle(:)
@@ -150,7 +158,7 @@ contains
                ' deg with stroke = ' // to_text(group%whole_number('stroke'))
       end associate
     end associate
-  end subroutine check_pressures
+  end subroutine check_crank_angles
 
   !> No torque has the name of a cylinder.
   subroutine check_names(input, group, key, text)

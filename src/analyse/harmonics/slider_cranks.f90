@@ -6,7 +6,7 @@ module nocdyn_slider_cranks
   implicit none (type, external)
   private
 
-  public :: lever, gas_harmonics, inertia_harmonics
+  public :: lever, gas_harmonics, inertia_harmonics, close_cycle, sample_cycle
 
   type, public :: slider_crank_t
     real(wp) :: bore = 0.0_wp           !! diameter of the piston [m]
@@ -15,7 +15,7 @@ module nocdyn_slider_cranks
   end type slider_crank_t
 
   real(wp), parameter :: pi = acos(-1.0_wp)
-  integer, parameter :: samples = 4096   ! of a cycle: the pressure between them follows from points that are less dense
+  integer, parameter, public :: samples = 4096   !! of a cycle: the pressure between them follows from points that are less dense
 
 contains
 
@@ -29,6 +29,35 @@ contains
     lever = crank%crank_radius * sin(theta) * (1.0_wp + ratio * cos(theta) / sqrt(1.0_wp - (ratio * sin(theta))**2))
   end function lever
 
+  !> Takes the last point of a cycle away if it is the first one again, which then has the mean of both values.
+  pure subroutine close_cycle(cycle, theta, values)
+    real(wp), intent(in) :: cycle                               !! [rad]
+    real(wp), allocatable, intent(inout) :: theta(:), values(:) !! points, ascending; [rad], of any unit
+    integer :: last
+
+    last = size(theta)
+    if (theta(last) - theta(1) <= cycle - 0.5_wp * (theta(last) - theta(last - 1))) return
+    values(1) = 0.5_wp * (values(1) + values(last))
+    theta = theta(:last - 1)
+    values = values(:last - 1)
+  end subroutine close_cycle
+
+  !> The values at equal distances over a cycle from the angle 0 on, by a monotone cubic through points that repeat.
+  function sample_cycle(cycle, theta, values) result(sampled)
+    real(wp), intent(in) :: cycle       !! [rad]
+    real(wp), intent(in) :: theta(:)    !! points of less than a cycle, ascending [rad]
+    real(wp), intent(in) :: values(:)   !! at the points
+    real(wp) :: sampled(samples)
+    type(curve_t) :: curve
+    integer :: i
+
+    curve = new_curve([theta - cycle, theta, theta + cycle], [values, values, values], interpolation_cubic, &
+                      extrapolation_linear)
+    do i = 1, samples
+      sampled(i) = curve%value(theta(1) + modulo(cycle * (i - 1) / samples - theta(1), cycle))
+    end do
+  end function sample_cycle
+
   !> Mean and harmonics of the gas torque, sums of sine_k sin(k x) + cosine_k cos(k x), x = 2 pi theta / cycle.
   subroutine gas_harmonics(crank, cycle, theta, pressure, mean, sine, cosine)
     type(slider_crank_t), intent(in) :: crank
@@ -37,15 +66,12 @@ contains
     real(wp), intent(in) :: pressure(:)               !! at the points, above that of the crankcase [Pa]
     real(wp), intent(out) :: mean                     !! [N m]
     real(wp), intent(out) :: sine(:), cosine(:)       !! [N m], [harmonics]
-    type(curve_t) :: curve
-    real(wp) :: angle, torque(samples)
+    real(wp) :: torque(samples)
     integer :: i
 
-    curve = new_curve([theta - cycle, theta, theta + cycle], [pressure, pressure, pressure], interpolation_cubic, &
-                      extrapolation_linear)
+    torque = sample_cycle(cycle, theta, pressure)
     do i = 1, samples
-      angle = cycle * (i - 1) / samples
-      torque(i) = curve%value(theta(1) + modulo(angle - theta(1), cycle)) * 0.25_wp * pi * crank%bore**2 * lever(crank, angle)
+      torque(i) = torque(i) * 0.25_wp * pi * crank%bore**2 * lever(crank, cycle * (i - 1) / samples)
     end do
     call fourier_coefficients(torque, mean, sine, cosine)
   end subroutine gas_harmonics

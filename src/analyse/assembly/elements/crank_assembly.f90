@@ -3,8 +3,9 @@
 module nocdyn_crank_assembly
   use nocdyn_bank, only: append_bank
   use nocdyn_crank_rows, only: crank_rows_t, new_crank_rows, slider_crank_t
-  use nocdyn_curves, only: curve_t, extrapolation_linear, interpolation_cubic, new_curve
+  use nocdyn_cylinder_torques, only: cycle_of
   use nocdyn_element_groups, only: element_groups_t
+  use nocdyn_engine_checks, only: check_crank_angles, check_stroke
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_fourier, only: fourier_coefficients
   use nocdyn_input, only: group_t, input_t
@@ -13,14 +14,15 @@ module nocdyn_crank_assembly
   use nocdyn_order_excitations, only: new_order_excitations, order_torque_t
   use nocdyn_phases, only: new_phases
   use nocdyn_piston_forces, only: new_piston_force, periodic_force_t
+  use nocdyn_slider_cranks, only: close_cycle, sample_cycle, samples
   use nocdyn_text, only: append, string_t, to_text
+  use nocdyn_torque_assembly, only: in_lanes
   implicit none (type, external)
   private
 
   public :: check_cranks, add_cranks
 
-  real(wp), parameter :: pi = acos(-1.0_wp), degree = pi / 180.0_wp
-  integer, parameter :: samples = 4096   ! of a cycle: the forces between them follow from points that are less dense
+  real(wp), parameter :: pi = acos(-1.0_wp)
 
 contains
 
@@ -28,6 +30,7 @@ contains
   subroutine check_cranks(input, error)
     type(input_t), intent(in) :: input
     type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: key, text
     integer, allocatable :: cranks(:)
     integer :: i
 
@@ -45,45 +48,15 @@ contains
                      to_text(group%number('rod_mass')) // ' kg, but rod_center is missing')
           return
         end if
-        call check_cycle(input, cranks(i), error)
-        if (allocated(error)) return
+        if (.not. group%has_value('crank_angles')) cycle
+        call check_stroke(group, key, text)
+        if (text == '') call check_crank_angles(group, key, text)
+        if (text == '') cycle
+        call raise(error, exit_input, input%location(cranks(i), key) // ': ' // text)
+        return
       end associate
     end do
   end subroutine check_cranks
-
-  !> The crank angles are those of one cycle.
-  subroutine check_cycle(input, index, error)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
-    real(wp), parameter :: rounding = 1.0e-9_wp   ! relative
-    real(wp), allocatable :: angle(:)
-
-    associate (group => input%groups(index))
-      allocate (angle, source=group%numbers('crank_angles'))
-      if (size(angle) == 0) return
-      if (all(group%whole_number('stroke') /= [2, 4])) then
-        call raise(error, exit_input, input%location(index, 'stroke') // ': stroke = ' // &
-                   to_text(group%whole_number('stroke')) // '; allowed: 2 or 4')
-        return
-      end if
-      associate (n => size(angle), cycle => cycle_of(group))
-        associate (span => angle(n) - angle(1), step => maxval(angle(2:) - angle(:n - 1)))
-          if (span <= cycle * (1.0_wp + rounding) .and. span + step >= cycle * (1.0_wp - rounding)) return
-        end associate
-        call raise(error, exit_input, input%location(index, 'crank_angles') // ': the crank angles from ' // &
-                   to_text(angle(1) / degree) // ' to ' // to_text(angle(n) / degree) // ' deg are not those of one cycle; ' // &
-                   'needed: ' // to_text(nint(cycle / degree)) // ' deg with stroke = ' // to_text(group%whole_number('stroke')))
-      end associate
-    end associate
-  end subroutine check_cycle
-
-  !> Angle of the crank over one cycle of the force [rad].
-  pure real(wp) function cycle_of(group)
-    type(group_t), intent(in) :: group
-
-    cycle_of = pi * group%whole_number('stroke')
-  end function cycle_of
 
   !> Adds the pistons and rods and the banks of their rows and forces to a machine.
   subroutine add_cranks(groups, machine)
@@ -161,13 +134,12 @@ contains
     type(machine_t), intent(inout) :: machine
     integer, parameter :: most_orders = 12   ! of the inertia
     type(order_torque_t) :: torque
-    type(order_torque_t), allocatable :: torques(:, :)   ! [lanes, 1]
     type(periodic_force_t) :: force
     type(crank_rows_t) :: rows
     real(wp), allocatable :: masses(:)
     real(wp), dimension(samples) :: change, gas, inertia
     real(wp) :: mean, mean_inertia
-    integer :: i, k
+    integer :: k
 
     call find_masses(group, body, machine, masses)
     rows = new_crank_rows(1, spread(name, 1, size(masses)), [(0, k=1, size(masses))], crank_of(group))
@@ -186,11 +158,7 @@ contains
     torque%speed = [0.0_wp]
     allocate (torque%mean(1), torque%sine(size(torque%order), 1), torque%cosine(size(torque%order), 1))
     call fourier_coefficients(gas, torque%mean(1), torque%sine(:, 1), torque%cosine(:, 1))
-    allocate (torques(machine%lanes, 1))   ! gfortran 12: `spread` copies the pointers to allocatable components
-    do i = 1, machine%lanes
-      torques(i, 1) = torque
-    end do
-    call append_bank(machine%banks, new_order_excitations([name], [body], torques))
+    call append_bank(machine%banks, new_order_excitations([name], [body], in_lanes([torque], machine%lanes)))
   end subroutine add_mean_crank
 
   !> Inertia, its torque over the square of the speed, and torque of the force of a crank over one cycle of the force.
@@ -227,10 +195,7 @@ contains
   function force_of(group) result(force)
     type(group_t), intent(in) :: group
     type(periodic_force_t) :: force
-    type(curve_t) :: curve
     real(wp), allocatable :: angle(:), values(:)
-    real(wp) :: sampled(samples)
-    integer :: i, last
 
     allocate (angle, source=group%numbers('crank_angles'))
     if (group%has_value('forces')) then
@@ -238,23 +203,14 @@ contains
     else
       values = (group%number('crankcase_pressure') - group%numbers('pressures')) * 0.25_wp * pi * group%number('bore')**2
     end if
-    last = size(angle)
     associate (cycle => cycle_of(group))
-      if (angle(last) - angle(1) > cycle - 0.5_wp * (angle(last) - angle(last - 1))) then   ! the first point again
-        values(1) = 0.5_wp * (values(1) + values(last))
-        last = last - 1
-      end if
-      curve = new_curve([angle(:last) - cycle, angle(:last), angle(:last) + cycle], &
-                        [values(:last), values(:last), values(:last)], interpolation_cubic, extrapolation_linear)
-      do i = 1, samples
-        sampled(i) = curve%value(angle(1) + modulo(cycle * (i - 1) / samples - angle(1), cycle))
-      end do
+      call close_cycle(cycle, angle, values)
       force%base = 2.0_wp * pi / cycle
       associate (n => int(group%number('harmonics_up_to') / force%base + 1.0e-9_wp))
         allocate (force%sine(n), force%cosine(n))
       end associate
+      call fourier_coefficients(sample_cycle(cycle, angle, values), force%mean, force%sine, force%cosine)
     end associate
-    call fourier_coefficients(sampled, force%mean, force%sine, force%cosine)
   end function force_of
 
 end module nocdyn_crank_assembly

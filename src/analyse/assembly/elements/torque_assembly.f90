@@ -18,7 +18,7 @@ module nocdyn_torque_assembly
   implicit none (type, external)
   private
 
-  public :: load_form, add_load_form, excitation_form, add_excitation_form, add_engines
+  public :: load_form, add_load_form, excitation_form, add_excitation_form, add_engines, in_lanes
 
   integer, parameter :: viscous = 1, nonlinear = 2, table = 3     ! forms of loads
   ! forms of excitations, and `table`
