@@ -11,7 +11,7 @@ module nocdyn_assembly
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
-  use nocdyn_joint_assembly, only: add_clutch_form, add_freewheels, check_joints, clutch_form, refuse_joints
+  use nocdyn_joint_assembly, only: add_bearings, add_clutch_form, add_freewheels, check_joints, clutch_form, refuse_joints
   use nocdyn_machine, only: machine_t
   use nocdyn_massless_motion, only: massless_bodies
   use nocdyn_mesh_assembly, only: add_mesh_form, check_meshes, mesh_form
@@ -95,6 +95,7 @@ contains
       call add_banks(new_element_groups(input, 'mesh', n, body_index), mesh_form, add_mesh_form, machine%banks)
       call add_banks(new_element_groups(input, 'clutch', n, body_index), clutch_form, add_clutch_form, machine%banks)
       call add_freewheels(new_element_groups(input, 'freewheel', n, body_index), machine%banks)
+      call add_bearings(new_element_groups(input, 'body', n, body_index), machine%banks)
       if (.not. input%takes_means) then
         call add_cardans(new_element_groups(input, 'cardan', n, body_index), machine%banks)
         call add_relations(new_element_groups(input, 'relation', n, body_index), machine%banks)

@@ -1,24 +1,25 @@
 !> The banks of the clutches and freewheels of an input.
 module nocdyn_joint_assembly
-  use nocdyn_bank, only: append_bank, bank_slot_t, role_clutch, role_freewheel
+  use nocdyn_bank, only: append_bank, bank_slot_t, role_bearing, role_clutch, role_freewheel
   use nocdyn_curves, only: curve_t, new_steps
   use nocdyn_element_groups, only: element_groups_t, group_curve
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_friction_joints, only: joint_ranges_t, new_friction_joints
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
+  use nocdyn_loads, only: new_nonlinear_loads
   use nocdyn_text, only: quoted, to_text
   implicit none (type, external)
   private
 
-  public :: clutch_form, add_clutch_form, add_freewheels, check_joints, refuse_joints, joints_with_means
+  public :: clutch_form, add_clutch_form, add_freewheels, add_bearings, check_joints, refuse_joints, joints_with_means
 
   integer, parameter :: engaged = 1, with_engagement = 2
-  integer, parameter :: forms_of_friction = 2   ! as many follow of dog clutches
+  integer, parameter :: forms_of_friction = 2   ! as many follow of dog clutches, and then of friction by a table
 
 contains
 
-  !> Refuses clutches that hold less than they slip.
+  !> Refuses clutches that hold less than they slip, and tables that do not begin with the slip.
   subroutine check_joints(input, error)
     type(input_t), intent(in) :: input
     type(error_t), allocatable, intent(out) :: error
@@ -27,16 +28,33 @@ contains
 
     allocate (clutches, source=input%groups_named('clutch', 'friction'))
     do i = 1, size(clutches)
-      associate (group => input%groups(clutches(i)))
-        if (.not. group%has_value('static_capacity')) cycle
-        if (group%number('static_capacity') >= group%number('capacity')) cycle
-        call raise(error, exit_input, input%location(clutches(i), 'static_capacity') // ': static_capacity = ' // &
-                   to_text(group%number('static_capacity')) // ' is below capacity = ' // to_text(group%number('capacity')) // &
-                   '; allowed: at least that of slip [N m]')
-        return
-      end associate
+      call check_clutch(input, clutches(i), input%groups(clutches(i)), error)
+      if (allocated(error)) return
     end do
   end subroutine check_joints
+
+  subroutine check_clutch(input, index, group, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index
+    type(group_t), intent(in) :: group   !! with this index
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: slip(:)
+
+    allocate (slip, source=group%numbers('table_slip'))
+    if (size(slip) > 0) then
+      if (slip(1) > 0) call raise(error, exit_input, input%location(index, 'table_slip') // ': table_slip begins with ' // &
+                                  to_text(slip(1)) // '; allowed: 0 [rad/s] first, then the slips in either direction')
+    else if (group%is_given('interpolation') .and. .not. group%has_value('table_time')) then
+      call raise(error, exit_input, input%location(index, 'interpolation') // ': there is no table; ' // &
+                 'interpolation is for table_time and table_slip')
+    end if
+    if (allocated(error) .or. .not. group%has_value('static_capacity')) return
+    if (group%number('static_capacity') < sliding_capacity(group)) then
+      call raise(error, exit_input, input%location(index, 'static_capacity') // ': static_capacity = ' // &
+                 to_text(group%number('static_capacity')) // ' is below capacity = ' // to_text(sliding_capacity(group)) // &
+                 '; allowed: at least that of slip [N m]')
+    end if
+  end subroutine check_clutch
 
   !> Refuses joints where it is not known which of them are locked, or where they are.
   subroutine refuse_joints(input, what, error)
@@ -48,7 +66,12 @@ contains
 
     do i = 1, size(input%groups)
       associate (group => input%groups(i))
-        if (group%kind == 'clutch' .or. group%kind == 'freewheel') then
+        if (group%kind == 'body') then
+          if (input%takes_means .or. group%number('bearing_friction') <= 0) cycle
+          call raise(error, exit_input, input%location(i, 'bearing_friction') // ': ' // what // ' does not know whether the ' // &
+                     'bearings slip; allowed: bearing_friction = 0')
+          return
+        else if (group%kind == 'clutch' .or. group%kind == 'freewheel') then
           call raise(error, exit_input, input%location(i) // ': ' // what // ' does not know which joints are locked; ' // &
                      'allowed: no clutches and freewheels; a locked one is a &gear with teeth = 1, 1 and internal = .true.')
           return
@@ -94,42 +117,81 @@ contains
 
     clutch_form = merge(with_engagement, engaged, group%has_value('times') .or. group%has_value('table_time'))
     if (group%text('kind') == 'dog') clutch_form = clutch_form + forms_of_friction
+    if (group%has_value('table_slip')) clutch_form = clutch_form + 2 * forms_of_friction
   end function clutch_form
 
-  !> Adds the bank of the clutches of one form.
+  !> Adds the bank of the clutches of one form; those with a table over the slip have a bank each.
   subroutine add_clutch_form(groups, form, banks)
     type(element_groups_t), intent(in) :: groups
     integer, intent(in) :: form
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    integer :: e, i
+
+    if (form <= 2 * forms_of_friction) then
+      if (size(groups%indices) > 0) call add_clutches(groups, form, banks)
+      return
+    end if
+    do i = 1, size(groups%indices)
+      call add_clutches(groups%some([(e == i, e=1, size(groups%indices))]), form, banks)
+    end do
+  end subroutine add_clutch_form
+
+  !> Adds a bank of clutches.
+  subroutine add_clutches(groups, form, banks)
+    type(element_groups_t), intent(in) :: groups
+    integer, intent(in) :: form
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(joint_ranges_t) :: ranges
-    type(curve_t), allocatable :: engagement(:, :)
+    type(curve_t), allocatable :: engagement(:, :), over_slip   ! not allocated: absent
     integer :: i, lane
 
-    if (size(groups%indices) == 0) return
-    if (form > forms_of_friction) then
-      ranges%most = spread(spread(huge(1.0_wp), 1, groups%lanes), 2, size(groups%indices))
-      ranges%sliding_most = 0.0_wp * ranges%most
-    else
-      ranges%sliding_most = groups%values('capacity')
-      ranges%most = groups%values('static_capacity', absent=-1.0_wp)
-      where (ranges%most < 0) ranges%most = ranges%sliding_most
-    end if
-    ranges%sliding_least = -ranges%sliding_most
-    ranges%least = -ranges%most
-    associate (from => groups%bodies('bodies', 1), to => groups%bodies('bodies', 2))
-      if (form == engaged .or. form == engaged + forms_of_friction) then
-        call append_bank(banks, new_friction_joints(role_clutch, groups%names, from, to, ranges))
-        return
-      end if
+    associate (group => groups%input%groups(groups%indices(1)))
+      if (form > 2 * forms_of_friction) allocate (over_slip, source=group_curve(group, 'table_slip', 'table_capacity', 'constant'))
+    end associate
+    ranges = clutch_ranges(groups, form)
+    if (modulo(form - engaged, forms_of_friction) + engaged == with_engagement) then
       allocate (engagement(groups%lanes, size(groups%indices)))
       do i = 1, size(groups%indices)
         do lane = 1, groups%lanes
           engagement(lane, i) = engagement_of(groups%input%groups(groups%indices(i)))
         end do
       end do
-      call append_bank(banks, new_friction_joints(role_clutch, groups%names, from, to, ranges, engagement))
-    end associate
-  end subroutine add_clutch_form
+    end if
+    call append_bank(banks, new_friction_joints(role_clutch, groups%names, groups%bodies('bodies', 1), &
+                                                groups%bodies('bodies', 2), ranges, engagement, over_slip))
+  end subroutine add_clutches
+
+  !> The ranges of the moments of clutches of one form.
+  type(joint_ranges_t) function clutch_ranges(groups, form) result(ranges)
+    type(element_groups_t), intent(in) :: groups
+    integer, intent(in) :: form
+    integer :: i
+
+    allocate (ranges%most(groups%lanes, size(groups%indices)), source=huge(1.0_wp))
+    allocate (ranges%sliding_most, source=0.0_wp * ranges%most)
+    if (form <= forms_of_friction .or. form > 2 * forms_of_friction) then
+      do i = 1, size(groups%indices)
+        ranges%sliding_most(:, i) = sliding_capacity(groups%input%groups(groups%indices(i)))
+      end do
+      ranges%most = groups%values('static_capacity', absent=-1.0_wp)
+      where (ranges%most < 0) ranges%most = ranges%sliding_most
+    end if
+    ranges%sliding_least = -ranges%sliding_most
+    ranges%least = -ranges%most
+  end function clutch_ranges
+
+  !> The friction of a clutch that begins to slip [N m].
+  pure real(wp) function sliding_capacity(group)
+    type(group_t), intent(in) :: group
+    real(wp), allocatable :: table(:)
+
+    if (group%has_value('capacity')) then
+      sliding_capacity = group%number('capacity')
+    else
+      allocate (table, source=group%numbers('table_capacity'))
+      sliding_capacity = table(1)
+    end if
+  end function sliding_capacity
 
   !> The engagement of a clutch over the time.
   type(curve_t) function engagement_of(group) result(curve)
@@ -164,5 +226,34 @@ contains
     call append_bank(banks, new_friction_joints(role_freewheel, groups%names, groups%bodies('bodies', 1), &
                                                 groups%bodies('bodies', 2), ranges))
   end subroutine add_freewheels
+
+  !> Adds the bank of the bearings with friction. Where means are taken, a constant load stands for the friction.
+  subroutine add_bearings(bodies, banks)
+    type(element_groups_t), intent(in) :: bodies
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    type(element_groups_t) :: groups
+    type(joint_ranges_t) :: ranges
+    integer, allocatable :: body(:)
+    integer :: i
+
+    groups = bodies%some([(bodies%input%groups(bodies%indices(i))%number('bearing_friction') > 0, i=1, size(bodies%indices))])
+    if (size(groups%indices) == 0) return
+    body = pack([(i, i=1, size(bodies%indices))], &
+                [(bodies%input%groups(bodies%indices(i))%number('bearing_friction') > 0, i=1, size(bodies%indices))])
+    ranges%most = groups%values('bearing_friction')
+    ranges%least = -ranges%most
+    ranges%sliding_most = ranges%most
+    ranges%sliding_least = ranges%least
+    if (bodies%input%takes_means) then
+      do i = 1, size(body)
+        groups%names(i)%text = 'bearing_' // groups%names(i)%text
+      end do
+      associate (none => 0.0_wp * ranges%most)
+        call append_bank(banks, new_nonlinear_loads(groups%names, body, none, none, ranges%most, none + 1.0_wp))
+      end associate
+    else
+      call append_bank(banks, new_friction_joints(role_bearing, groups%names, 0 * body, body, ranges))
+    end if
+  end subroutine add_bearings
 
 end module nocdyn_joint_assembly

@@ -57,6 +57,8 @@ module nocdyn_schema
       'name in couplings, gears, torques and results'), &
     key_rule_t('body',       'inertia',         a_number,       1, 'kg m2',       required,    not_negative, &
       'moment of inertia about the axis; 0 where a body with an inertia is geared to it'), &
+    key_rule_t('body',       'bearing_friction', a_number,      1, 'N m',         '0',         not_negative, &
+      'dry friction of its bearings: against the motion, and up to as much at rest'), &
     key_rule_t('body',       'angle',           a_number,       1, 'rad',         '0',         anything, &
       'angle at the start'), &
     key_rule_t('body',       'speed',           a_number,       1, 'rad/s',       '0',         anything, &

@@ -2,8 +2,8 @@
 module nocdyn_schema_joints
   use nocdyn_kinds, only: wp
   use nocdyn_schema_rules, only: a_name, a_number, a_selector, a_word, allowed_t, any_number, any_times, anything, at_most_one, &
-    body_or_ground, equal_lengths, example_t, group_rule_t, in_machine, interpolations, key_rule_t, kind_rule_t, not_negative, &
-    relation_rule_t, required, requires, unset
+    body_or_ground, equal_lengths, exactly_one, example_t, group_rule_t, in_machine, interpolations, key_rule_t, kind_rule_t, &
+    not_negative, relation_rule_t, required, unset
   implicit none (type, external)
   private
 
@@ -28,8 +28,12 @@ module nocdyn_schema_joints
       "the two bodies; one may be 'ground': a brake"), &
     key_rule_t('clutch',     'kind',            a_selector,     1, '',            "'friction'", anything, &
       'how it transmits its torque'), &
-    key_rule_t('clutch',     'capacity',        a_number,       1, 'N m',         required,    not_negative, &
+    key_rule_t('clutch',     'capacity',        a_number,       1, 'N m',         unset,       not_negative, &
       'friction torque while it slips', 'friction'), &
+    key_rule_t('clutch',     'table_slip',      a_number,       any_number, 'rad/s', unset,    not_negative, &
+      'speeds of slip of the points of a table of the capacity, from 0 on', 'friction', fewest=2, ascends=.true.), &
+    key_rule_t('clutch',     'table_capacity',  a_number,       any_number, 'N m', unset,      not_negative, &
+      'friction torque at these speeds; beyond the last point as there', 'friction', fewest=2), &
     key_rule_t('clutch',     'static_capacity', a_number,       1, 'N m',         unset,       not_negative, &
       'largest torque while it is locked; the same as capacity if not given', 'friction'), &
     key_rule_t('clutch',     'times',           a_number,       any_number, 's',  unset,       anything, &
@@ -52,8 +56,9 @@ module nocdyn_schema_joints
       'torque above which it slips; it never does if not given')]
 
   type(relation_rule_t), parameter, public :: joint_relations(*) = [ &
+    relation_rule_t('clutch', exactly_one, 'capacity', 'table_slip table_capacity'), &
+    relation_rule_t('clutch', equal_lengths, 'table_slip table_capacity', ''), &
     relation_rule_t('clutch', at_most_one, 'times levels', 'table_time table_level'), &
-    relation_rule_t('clutch', requires, 'interpolation', 'table_time'), &
     relation_rule_t('clutch', equal_lengths, 'times levels', ''), &
     relation_rule_t('clutch', equal_lengths, 'table_time table_level', '')]
 

@@ -4,17 +4,21 @@
 !> from `least` to `most`. Slipping forwards (u' > 0) the joint has its least moment, slipping backwards its greatest: Coulomb
 !> friction, with other numbers than at rest. A clutch has a range about zero; a freewheel has a range on one side of it and
 !> overruns on the other. A dog clutch has no bounds, nor has a freewheel without a capacity on its side: where one locks with a
-!> slip, there is an impact. All grow with the engagement, a table over the time or 1.
+!> slip, there is an impact. All grow with the engagement, a table over the time or 1. The friction while a joint slips may depend
+!> on the speed of the slip, by a table.
 !>
 !> The mode is a branch of the law that is not chosen by guards: which joints lock follows from all of them together
 !> (`nocdyn_joint_sets`).
 module nocdyn_friction_joints
-  use nocdyn_bank, only: bank_t, quantity_t
-  use nocdyn_curves, only: curve_t
+  use nocdyn_bank, only: bank_t, quantity_t, role_bearing
+  use nocdyn_curves, only: curve_t, segment_begin, segment_cubic, segment_end, segment_half_curvature, segment_origin, &
+    segment_slope, segment_value
+  use nocdyn_described_elements, only: boundary_width
   use nocdyn_element_rows, only: rows_between
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), pick, time_of
+  use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), operator(+), operator(-), pick, speed_of, time_of
+  use nocdyn_law_functions, only: add_guard
   use nocdyn_law_tape, only: law_tape_t
   use nocdyn_tables, only: add_table, curve_value, guard_segment
   use nocdyn_text, only: string_t
@@ -33,6 +37,7 @@ module nocdyn_friction_joints
 
   type, extends(bank_t), public :: friction_joints_t
     integer :: mode_switch = 1   !! of each element, the switch of its mode
+    type(curve_t), allocatable :: over_slip   !! friction while it slips [N m] over the speed of the slip [rad/s] of all elements
   contains
     procedure :: describe
     procedure :: range_at_rest
@@ -46,12 +51,14 @@ module nocdyn_friction_joints
 contains
 
   !> A bank of joints.
-  function new_friction_joints(role, names, from, to, ranges, engagement) result(bank)
-    integer, intent(in) :: role                 !! role_clutch or role_freewheel
+  function new_friction_joints(role, names, from, to, ranges, engagement, over_slip) result(bank)
+    integer, intent(in) :: role                 !! role_clutch, role_freewheel or role_bearing
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: from(:), to(:)       !! bodies, 0 = ground
     type(joint_ranges_t), intent(in) :: ranges
     type(curve_t), intent(in), optional :: engagement(:, :)   !! over the time [s], shape [lanes, joints]; absent: 1
+    type(curve_t), intent(in), optional :: over_slip          !! friction of all while they slip [N m], over the speed [rad/s] from
+                                                              !! 0 on; absent: that of the ranges
     type(friction_joints_t) :: bank
     integer :: e
 
@@ -68,6 +75,10 @@ contains
       bank%mode_switch = 2
     end if
     call bank%add_switches([('locking', e=1, bank%count)], -1)
+    if (present(over_slip)) then
+      allocate (bank%over_slip, source=over_slip)
+      call bank%add_switches([('point in the table', e=1, bank%count)], over_slip%points())
+    end if
     call bank%prepare_law()
   end function new_friction_joints
 
@@ -76,14 +87,52 @@ contains
     type(law_tape_t), target, intent(inout) :: tape
     type(expression_t) :: moment
 
-    moment = pick(self%mode_switch, [literal(tape, 0.0_wp), self%parameter(tape, 'sliding least'), &
-                                     self%parameter(tape, 'sliding most')])
+    if (allocated(self%over_slip)) then
+      moment = friction_over_slip(self, tape)
+    else
+      moment = pick(self%mode_switch, [literal(tape, 0.0_wp), self%parameter(tape, 'sliding least'), &
+                                       self%parameter(tape, 'sliding most')])
+    end if
     if (allocated(self%curve)) then
       moment = moment * curve_value(tape, time_of(tape))
       call guard_segment(tape, time_of(tape), is_time=.true.)
     end if
     tape%applied = node_of(moment)
   end subroutine describe
+
+  !> The friction by the table, whose segments are the branches of the last switch. They begin at a slip of 0, backwards too.
+  function friction_over_slip(self, tape) result(moment)
+    class(friction_joints_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: distance, moment, slip, square
+    real(wp) :: edge
+    integer :: k, switch
+
+    switch = self%mode_switch + 1
+    slip = pick(self%mode_switch, [literal(tape, 0.0_wp), literal(tape, 1.0_wp), literal(tape, -1.0_wp)]) * speed_of(tape)
+    distance = slip - part(segment_origin)
+    moment = part(segment_value) + distance * (part(segment_slope) + distance * (part(segment_half_curvature) &
+                                                                                 + part(segment_cubic) * distance))
+    moment = pick(self%mode_switch, [literal(tape, 0.0_wp), literal(tape, -1.0_wp), literal(tape, 1.0_wp)]) * moment
+    square = speed_of(tape) * speed_of(tape)   ! as guards have no picks
+    do k = 1, self%over_slip%points()
+      edge = self%over_slip%segment_number(k, segment_begin)
+      if (k > 1) call add_guard(switch, k, square - literal(tape, edge**2), literal(tape, boundary_width * edge**2))
+      edge = self%over_slip%segment_number(k, segment_end)
+      if (edge < huge(edge)) call add_guard(switch, k, literal(tape, edge**2) - square, literal(tape, boundary_width * edge**2))
+    end do
+
+  contains
+
+    !> One of the numbers of the present segment.
+    type(expression_t) function part(which)
+      integer, intent(in) :: which   !! segment_...
+      integer :: i
+
+      part = pick(switch, [(literal(tape, self%over_slip%segment_number(i, which)), i=1, self%over_slip%points())])
+    end function part
+
+  end function friction_over_slip
 
   !> The range of the moment at rest [N m].
   pure subroutine range_at_rest(self, element, t, least, most)
@@ -144,6 +193,11 @@ contains
     type(quantity_t), allocatable :: columns(:)
     integer :: e
 
+    if (self%role == role_bearing) then   ! its slip is the speed of the body
+      allocate (columns(1))
+      columns(1) = quantity_t('bearing', 'N m', [(e, e=1, self%count)])
+      return
+    end if
     allocate (columns(2))
     columns(1) = quantity_t('torque', 'N m', [(e, e=1, self%count)])
     columns(2) = quantity_t('slip', 'rad/s', [(e, e=1, self%count)])
