@@ -12,6 +12,7 @@ module nocdyn_assembly
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
   use nocdyn_joint_assembly, only: add_bearings, add_clutch_form, add_freewheels, check_joints, clutch_form, refuse_joints
+  use nocdyn_loss_assembly, only: add_losses, check_losses
   use nocdyn_machine, only: machine_t
   use nocdyn_massless_motion, only: massless_bodies
   use nocdyn_mesh_assembly, only: add_mesh_form, check_meshes, mesh_form
@@ -74,6 +75,7 @@ contains
     call check_couplings(input, error)
     if (.not. allocated(error)) call check_shafts(input, error)
     if (.not. allocated(error)) call check_meshes(input, error)
+    if (.not. allocated(error)) call check_losses(input, error)
     if (.not. allocated(error)) call check_joints(input, error)
     if (.not. allocated(error)) call check_motions(input, error)
     if (.not. allocated(error)) call check_cranks(input, error)
@@ -99,6 +101,9 @@ contains
       if (.not. input%takes_means) then
         call add_cardans(new_element_groups(input, 'cardan', n, body_index), machine%banks)
         call add_relations(new_element_groups(input, 'relation', n, body_index), machine%banks)
+        call add_losses(new_element_groups(input, 'gear', n, body_index), machine%banks)
+        call add_losses(new_element_groups(input, 'planetary', n, body_index), machine%banks)
+        call add_losses(new_element_groups(input, 'mesh', n, body_index), machine%banks)
       end if
       call add_banks(new_element_groups(input, 'drive', n, body_index), drive_form, add_drive_form, machine%banks)
       call add_banks(new_element_groups(input, 'motor', n, body_index), motor_form, add_motor_form, machine%banks)

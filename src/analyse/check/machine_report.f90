@@ -1,7 +1,7 @@
 !> The report of `nocdyn check` on a machine: bodies, gears, coordinates, redundant constraints.
 module nocdyn_machine_report
   use nocdyn_bank, only: role_bearing, role_cardan, role_clutch, role_coupling, role_crank, role_drive, role_excitation, &
-    role_freewheel, role_load, role_motor, role_names, role_relation
+    role_freewheel, role_load, role_loss, role_motor, role_names, role_relation
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_rigid_trains, only: ratio_tolerance
@@ -127,9 +127,9 @@ contains
     type(string_t), allocatable :: notes(:)
     integer, parameter :: roles(*) = [role_coupling, role_motor, role_load, role_excitation]   ! said even if there are none
     integer, parameter :: others(*) = [role_clutch, role_freewheel, role_cardan, role_crank, role_relation, role_drive, &
-                                       role_bearing]
+                                       role_bearing, role_loss]
     character(len=*), parameter :: plurals(*) = [character(len=10) :: 'clutches', 'freewheels', 'cardans', 'cranks', &
-                                                 'relations', 'drives', 'bearings']
+                                                 'relations', 'drives', 'bearings', 'losses']
     integer :: i
 
     call report%append(file // ': ' // counted(machine%bodies - machine%nodes, 'body', 'bodies') // counted_constraints(machine))

@@ -2,7 +2,7 @@
 module nocdyn_joint_events
   use nocdyn_bank, only: bank_of, role_names
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_friction_joints, only: locked, slips_backwards, slips_forwards
+  use nocdyn_friction_joints, only: direction_of, locked
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   implicit none (type, external)
@@ -71,10 +71,10 @@ contains
     integer, intent(in) :: mode
     character(len=:), allocatable :: word
 
-    select case (mode)
-    case (slips_forwards)
+    select case (direction_of(mode))
+    case (1)
       word = 'slips behind'
-    case (slips_backwards)
+    case (-1)
       word = 'slips ahead'
     case default
       word = 'locked'

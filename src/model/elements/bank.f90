@@ -27,10 +27,11 @@ module nocdyn_bank
   integer, parameter, public :: role_relation = 10
   integer, parameter, public :: role_drive = 11       !! prescribed motion; puts energy in
   integer, parameter, public :: role_bearing = 12     !! dry friction on the ground; takes energy out
+  integer, parameter, public :: role_loss = 13        !! friction of teeth; takes energy out
 
   character(len=*), parameter, public :: role_names(*) = [character(len=10) :: 'coupling', 'load', 'motor', 'excitation', &
                                                           'coupling', 'clutch', 'freewheel', 'cardan', 'crank', 'relation', &
-                                                          'drive', 'bearing']
+                                                          'drive', 'bearing', 'loss']
 
   !> One quantity that a bank writes to the table of results.
   type, public :: quantity_t

@@ -103,7 +103,7 @@ contains
       self%internal = machine%elements%internal%count
       self%states = self%mechanical + self%internal
       self%switches = machine%switches%count
-      self%joints = new_joint_sets(machine%banks, machine%switches)
+      self%joints = new_joint_sets(machine%banks, machine%switches, machine%elements%count)
       self%limits_steps = any(machine%switches%phase_order > 0)
       self%lane_state = spread(0.0_wp, 1, self%states)
       self%lanes = machine%lanes

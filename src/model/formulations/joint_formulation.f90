@@ -89,7 +89,9 @@ contains
     real(wp), contiguous, intent(inout) :: g(:)   !! [switches]
     integer :: switch
 
-    if (any(self%joints%mode(:self%joints%locking) == locked)) call self%find_held_moments(t, y(:self%states))
+    if (any(self%joints%mode(:self%joints%locking) == locked) .or. self%joints%teeth%count > 0) then
+      call self%find_held_moments(t, y(:self%states))
+    end if
     do switch = 1, self%switches
       if (self%joints%joint_of(switch) > 0) then
         call set_joint_indicator(self, switch, t, y, g)
@@ -111,7 +113,9 @@ contains
       call indicate_branch(self, which, lane, t, y, g)
       return
     end if
-    if (self%joints%mode(self%joints%joint_of(which)) == locked) call self%find_held_moments(t, y(:self%states))
+    associate (joint => self%joints%joint_of(which))
+      if (self%joints%mode(joint) == locked .or. self%joints%has_teeth(joint)) call self%find_held_moments(t, y(:self%states))
+    end associate
     call set_joint_indicator(self, which, t, y, g)
   end subroutine indicate_one
 
@@ -162,7 +166,8 @@ contains
       do j = 1, joints%count
         slip(j) = self%joint_rate(j, y)
         is_at_rest(j) = abs(slip(j)) <= rest_width * speed .or. j > joints%locking
-        if (which /= by_state .and. .not. is_struck) is_at_rest(j) = is_at_rest(j) .or. joints%mode(j) == locked .or. j == which
+        if (which /= by_state .and. .not. is_struck) is_at_rest(j) = is_at_rest(j) .or. joints%mode(j) == locked &
+                                                                     .or. (j == which .and. joints%has_stopped(j, slip(j)))
       end do
       call joints%assume(self%machine%banks, is_at_rest, slip)
       call self%find_held_moments(t, y(:self%states))
@@ -220,6 +225,8 @@ contains
     call self%find_held_moments(t, y(:self%states))
     do j = 1, self%joints%locking
       if (self%joints%mode(j) == before(j)) cycle
+      if (self%joints%teeth%count > 0 .and. all([before(j), self%joints%mode(j)] /= locked)) cycle   ! another wheel drives, or
+                                                                       ! others hold the joint while it is at a bound
       if (before(j) /= locked) then   ! it is not, and cannot be
         if (self%joints%is_open(self%machine%banks, j, t)) cycle
       end if

@@ -5,7 +5,7 @@
 !> procedure overwrites its last argument and allocates nothing.
 module nocdyn_paper_matrices
   use nocdyn_bank, only: role_bearing, role_clutch, role_coupling, role_crank, role_excitation, role_freewheel, role_load, &
-    role_motor, role_phase
+    role_loss, role_motor, role_phase
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_solve
   use nocdyn_machine, only: machine_t
@@ -79,7 +79,7 @@ contains
     integer, intent(in) :: lane
     real(wp), intent(in) :: complement(:, :)   !! L_tau, [n, freedoms]
     integer, parameter :: roles(*) = [role_coupling, role_load, role_motor, role_excitation, role_phase, role_clutch, &
-                                   role_freewheel, role_crank, role_bearing]
+                                   role_freewheel, role_crank, role_bearing, role_loss]
     integer :: i
 
     self%torque(:) = 0.0_wp

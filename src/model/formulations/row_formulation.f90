@@ -18,6 +18,7 @@ module nocdyn_row_formulation
   type, abstract, extends(formulation_t), public :: row_formulation_t
     real(wp), allocatable :: acceleration(:)    !! of the first states, work space, [moving]
     real(wp), allocatable :: joint_state(:, :)  !! work space, [1, states]
+    integer, allocatable, private :: work_of(:) !! work integral of each joint whose moment does work, 0 of others, [joints]
   contains
     procedure(accelerate_interface), deferred :: accelerate
     procedure(rate_interface), deferred :: element_rate
@@ -28,12 +29,14 @@ module nocdyn_row_formulation
     procedure :: move_rows
     procedure :: hold
     procedure :: find_accelerations
+    procedure, private :: hold_accelerations
     procedure :: find_held_moments
     procedure :: add_powers
     procedure :: differentiate_rows
     procedure :: hold_derivative
     procedure :: hold_columns
     procedure, private :: hold_column
+    procedure, private :: drag_derivative
     procedure :: project
     procedure :: project_state
     procedure :: evaluation_obstacle
@@ -106,6 +109,9 @@ contains
     if (self%joints%count == 0) return
     self%acceleration = spread(0.0_wp, 1, size(self%moving))
     self%joint_state = reshape(spread(0.0_wp, 1, self%states), [1, self%states])
+    self%work_of = [(merge(findloc(self%machine%with_work, self%joints%element(j), dim=1), 0, &
+                           self%joints%driver(j) == 0 .and. (j > self%joints%locking .or. self%joints%has_teeth(j)) &
+                           .and. self%quadratures > 0), j=1, self%joints%count)]
     elements = [self%joints%element, self%joints%driver]
     do j = 1, size(elements)
       if (elements(j) == 0) cycle
@@ -115,6 +121,8 @@ contains
         if (elements(i) > 0) self%joints%mutual(i, j) = self%element_rate(elements(i), self%acceleration)
       end do
     end do
+    call self%joints%teeth%find_coefficients(self%machine%banks, self%machine%elements%rows, self%machine%coordinates, &
+                                             self%machine%constraints%rows(), self%machine%bodies)
     twist = self%machine%start_twist()
     call self%joints%motions%set_start(self%machine%banks, twist(1, :))
     call self%joints%start()
@@ -141,9 +149,27 @@ contains
 
     call self%machine%elements%scatter(self%torque)
     call self%accelerate(acceleration)
-    call self%move_rows(t)
-    call self%hold(self%joints%motions%acceleration, acceleration)
+    call self%hold_accelerations(t, acceleration)
   end subroutine find_accelerations
+
+  !> Adds the moments of the joints that hold, and of teeth with losses, to the accelerations without them.
+  subroutine hold_accelerations(self, t, acceleration)
+    class(row_formulation_t), intent(inout) :: self
+    real(wp), intent(in) :: t                    !! [s]
+    real(wp), intent(inout) :: acceleration(:)   !! [rad/s2], [moving] at least
+
+    call self%move_rows(t)
+    associate (joints => self%joints, teeth => self%joints%teeth, elements => self%machine%elements)
+      if (teeth%count == 0) then
+        call self%hold(joints%motions%acceleration, acceleration)
+      else
+        call teeth%apply(elements)
+        call teeth%choose_shares(self%machine%banks, joints%mode, elements%speed(1, :))
+        call self%hold(joints%motions%acceleration, acceleration, teeth%drag())
+        call teeth%add_moments(joints%moment)
+      end if
+    end associate
+  end subroutine hold_accelerations
 
   !> Moves the rows to the position of the elements.
   subroutine move_rows(self, t)
@@ -158,10 +184,11 @@ contains
   end subroutine move_rows
 
   !> Adds the moments of the joints that hold to the accelerations of the first states, and puts them among those of the elements.
-  subroutine hold(self, demand, acceleration)
+  subroutine hold(self, demand, acceleration, drag)
     class(row_formulation_t), intent(inout) :: self
     real(wp), intent(in) :: demand(:)            !! what the rates of the rows that move must be [rad/s2], [rows that move]
     real(wp), intent(inout) :: acceleration(:)   !! [rad/s2], [moving] at least; or speeds [rad/s]
+    real(wp), intent(in), optional :: drag(:)    !! of teeth [N m], [losses]; absent: those that turn have no moments
     integer :: j
 
     associate (joints => self%joints, applied => self%machine%elements%applied)
@@ -169,9 +196,9 @@ contains
         joints%rate(j) = self%joint_rate(j, acceleration)
         if (j > joints%locking) joints%rate(j) = joints%rate(j) - demand(j - joints%locking)
       end do
-      call joints%find_moments()
+      call joints%find_moments(drag)
       do j = 1, joints%count
-        if (joints%mode(j) /= locked) cycle
+        if (.not. joints%is_active(j, present(drag))) cycle
         call self%push(j, joints%moment(j), acceleration)
         applied(1, joints%element(j)) = joints%moment(j)
         if (joints%driver(j) > 0) applied(1, joints%driver(j)) = -joints%slope(j) * joints%moment(j)
@@ -179,16 +206,16 @@ contains
     end associate
   end subroutine hold
 
-  !> Adds the powers of prescribed motions to those of the elements.
+  !> Adds the powers of prescribed motions, and of teeth with losses, to those of the elements.
   subroutine add_powers(self, powers)
     class(row_formulation_t), intent(in) :: self
     real(wp), intent(inout) :: powers(:)   !! [W], [quadratures]
-    integer :: j, k
+    integer :: j
 
-    do j = self%joints%locking + 1, self%joints%count
-      if (self%joints%driver(j) > 0 .or. size(powers) == 0) cycle
-      k = findloc(self%machine%with_work, self%joints%element(j), dim=1)
-      powers(k) = powers(k) + self%joints%moment(j) * self%machine%elements%speed(1, self%joints%element(j))
+    do j = 1, self%joints%count
+      associate (k => self%work_of(j))
+        if (k > 0) powers(k) = powers(k) + self%joints%moment(j) * self%machine%elements%speed(1, self%joints%element(j))
+      end associate
     end do
   end subroutine add_powers
 
@@ -200,6 +227,8 @@ contains
     integer :: i
 
     associate (joints => self%joints, motions => self%joints%motions, elements => self%machine%elements)
+      self%joints%teeth%held_load(:) = joints%teeth%load
+      self%joints%teeth%held_moment(:) = joints%moment(joints%teeth%joint)
       motions%held(:) = joints%moment(joints%locking + 1:)
       do i = 1, motions%count
         associate (driver => motions%driver(i))
@@ -219,8 +248,7 @@ contains
     real(wp), intent(inout) :: dydt(components)   !! of the only lane
     integer, intent(inout) :: status
 
-    call self%move_rows(t)
-    call self%hold(self%joints%motions%acceleration, dydt(:size(self%moving)))
+    call self%hold_accelerations(t, dydt(:size(self%moving)))
     call self%add_powers(dydt(self%states + 1:))
     if (self%joints%lost > 0) status = evaluation_fatal
   end subroutine hold_derivative
@@ -259,10 +287,71 @@ contains
                                     + motions%g(2, i) * motions%driver_acceleration(i)
         demand(i) = demand(i) * self%element_rate(motions%driver(i), unit)
       end do
-      call self%hold(demand, accelerations)
-      call self%add_powers(powers)
+      if (self%joints%teeth%count > 0) then
+        call self%hold(demand, accelerations, self%drag_derivative(column, unit))
+        call self%add_powers(powers)
+        if (column <= n .and. column > 0) call add_held_powers(self, unit, powers)
+      else
+        call self%hold(demand, accelerations)
+        call self%add_powers(powers)
+      end if
     end associate
   end subroutine hold_column
+
+  !> The derivatives of the drags of teeth without the effect of the joints that hold, by a state or the time.
+  function drag_derivative(self, column, unit) result(drag)
+    class(row_formulation_t), intent(in) :: self
+    integer, intent(in) :: column       !! as in `hold_column`
+    real(wp), intent(in) :: unit(:)     !! the speed or the position that changes, [moving]
+    real(wp) :: drag(self%joints%teeth%count)
+    real(wp) :: moment
+    integer :: c, e, i
+
+    drag = 0.0_wp
+    associate (elements => self%machine%elements, teeth => self%joints%teeth, n => size(self%moving))
+      do e = 1, elements%count
+        moment = 0.0_wp
+        if (column == 0) moment = elements%applied_time(1, e)
+        if (column > 0 .and. column <= n) moment = elements%applied_speed(1, e) * self%element_rate(e, unit)
+        if (column > n .and. column <= 2 * n) then
+          moment = (elements%restoring_angle(1, e) + elements%applied_angle(1, e)) * self%element_rate(e, unit)
+        end if
+        drag = drag + teeth%by_moment(:, e) * moment
+      end do
+      do c = 1, elements%cross%count
+        associate (x => elements%cross)
+          moment = merge(x%applied_speed(1, c), x%restoring_angle(1, c) + x%applied_angle(1, c), column <= n)
+          if (column == 0 .or. column > 2 * n) cycle
+          drag = drag + teeth%by_moment(:, x%element(c)) * moment * self%element_rate(x%by(c), unit)
+        end associate
+      end do
+      if (column > self%mechanical) then
+        e = elements%internal%element(column - self%mechanical)
+        drag = drag + teeth%by_moment(:, e) * elements%internal%applied(1, column - self%mechanical)
+      end if
+      drag = teeth%share * drag
+      if (column == 0 .or. column > n) return
+      do i = 1, teeth%count
+        drag(i) = drag(i) + teeth%share_slope(i) * teeth%held_load(i) * self%element_rate(self%joints%element(teeth%joint(i)), unit)
+      end do
+    end associate
+  end function drag_derivative
+
+  !> Adds what the change of a speed does to the powers of teeth at their present moments.
+  subroutine add_held_powers(self, unit, powers)
+    class(row_formulation_t), intent(in) :: self
+    real(wp), intent(in) :: unit(:)         !! the speed that changes, [moving]
+    real(wp), intent(inout) :: powers(:)    !! [W s/rad], [quadratures]
+    integer :: i
+
+    associate (joints => self%joints, teeth => self%joints%teeth)
+      do i = 1, teeth%count
+        associate (k => self%work_of(teeth%joint(i)))
+          if (k > 0) powers(k) = powers(k) + teeth%held_moment(i) * self%element_rate(joints%element(teeth%joint(i)), unit)
+        end associate
+      end do
+    end associate
+  end subroutine add_held_powers
 
   !> Puts the state after a step back on the rows that move.
   subroutine project_state(self, lane, t, y)

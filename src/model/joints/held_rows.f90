@@ -5,12 +5,16 @@
 !> them: q'' is projected on the complement of the rows that hold. W^+ of each set is found once and kept, unless rows move: then
 !> W is formed from the slopes g' at each position. W is singular where some of the rows are redundant; the least norm shares the
 !> moment between them.
+!>
+!> Teeth with losses that turn hold no row, but their moments x = -s (T + V x) depend on those of the set and are found with them.
 module nocdyn_held_rows
   use nocdyn_friction_joints, only: locked
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pseudo_inverse
+  use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_row_motions, only: row_motions_t
   use nocdyn_semidefinite, only: new_semidefinite, null_tolerance, semidefinite_t
+  use nocdyn_tooth_loads, only: tooth_loads_t
   implicit none (type, external)
   private
 
@@ -24,6 +28,7 @@ module nocdyn_held_rows
     integer :: count = 0                     !! joints that lock, and rows that move
     integer :: locking = 0                   !! the first of them: clutches and freewheels
     type(row_motions_t) :: motions           !! of the others
+    type(tooth_loads_t) :: teeth             !! those of the first that are teeth with losses
     integer, allocatable :: element(:)       !! of the machine, [joints] as all that follow
     integer, allocatable :: driver(:)        !! element whose motion moves the row, 0 for none
     integer, allocatable :: mode(:)          !! `locked` where the row holds
@@ -41,6 +46,12 @@ module nocdyn_held_rows
     type(semidefinite_t), private :: system  !! W of the rows that hold, where some move
     integer, allocatable, private :: holding(:)   !! joints that hold, the first `system%order` are in use
     integer, private :: rank_at_start = 0    !! of the rows that move
+    ! where there are teeth with losses:
+    logical, private :: has_factors = .false.      !! whether they are those of the present modes, slopes and shares
+    real(wp), allocatable, private :: with_teeth(:, :)    !! equations of all moments
+    real(wp), allocatable, private :: factors(:, :), inverse(:, :)   !! their LU factors; their pseudoinverse if these are singular
+    real(wp), allocatable, private :: share(:)            !! of the factors, [losses]
+    integer, allocatable, private :: pivots(:)
   contains
     procedure :: allocate_rows
     procedure :: forget_sets
@@ -48,7 +59,10 @@ module nocdyn_held_rows
     procedure :: change_set
     procedure :: find_moments
     procedure :: nearly_lost
+    procedure :: is_active
     procedure, private :: find_moving_moments
+    procedure, private :: find_moments_with_teeth
+    procedure, private :: factor_with_teeth
     procedure, private :: watch_rank
     procedure, private :: choose_set
   end type held_rows_t
@@ -67,6 +81,8 @@ contains
       allocate (self%weight(n, n), self%mutual(2 * n, 2 * n), source=0.0_wp)
       allocate (self%sets(0), self%holding(n))
       self%system = new_semidefinite(merge(n, 0, self%motions%count > 0))
+      if (self%teeth%count == 0) return
+      allocate (self%with_teeth(n, n), self%factors(n, n), self%inverse(0, 0), self%pivots(n), self%share(self%teeth%count))
     end associate
   end subroutine allocate_rows
 
@@ -96,7 +112,9 @@ contains
         end do
       end do
     end associate
+    call self%teeth%weigh(self%element, self%driver, self%slope)
     self%is_known = .false.
+    self%has_factors = .false.
   end subroutine weigh
 
   !> Takes note that modes have changed.
@@ -104,13 +122,30 @@ contains
     class(held_rows_t), intent(inout) :: self
 
     self%is_known = .false.
+    self%has_factors = .false.
   end subroutine change_set
 
-  !> The moments of the locked joints, from the accelerations `rate` without them.
-  subroutine find_moments(self)
+  !> Whether a joint has a moment that follows from those of others: it is locked, or teeth with losses that turn.
+  pure logical function is_active(self, joint, with_losses)
+    class(held_rows_t), intent(in) :: self
+    integer, intent(in) :: joint
+    logical, intent(in) :: with_losses   !! whether teeth that turn count
+
+    is_active = self%mode(joint) == locked
+    if (with_losses .and. joint <= self%locking) is_active = is_active .or. self%teeth%loss_of(joint) > 0
+  end function is_active
+
+  !> The moments of the locked joints, from the accelerations `rate` without them; and those of the teeth that turn, from their
+  !> drags without them.
+  subroutine find_moments(self, drag)
     class(held_rows_t), intent(inout) :: self
+    real(wp), intent(in), optional :: drag(:)   !! s T [N m], [losses]; absent: teeth that turn have no moments
     integer :: i, j, row, column
 
+    if (present(drag) .and. self%teeth%count > 0) then
+      call self%find_moments_with_teeth(drag)
+      return
+    end if
     if (self%motions%count > 0) then
       call self%find_moving_moments()
       return
@@ -155,6 +190,62 @@ contains
     self%moment(:) = 0.0_wp
     self%moment(self%holding(:n)) = -x(:n)
   end subroutine find_moving_moments
+
+  !> The same with teeth that have losses.
+  subroutine find_moments_with_teeth(self, drag)
+    class(held_rows_t), intent(inout) :: self
+    real(wp), intent(in) :: drag(:)   !! s T [N m], [losses]
+    integer :: j
+
+    if (any(abs(self%share - self%teeth%share) > 0)) self%has_factors = .false.
+    if (.not. self%has_factors) call self%factor_with_teeth()
+    do j = 1, self%count
+      self%moment(j) = 0.0_wp
+      if (self%mode(j) == locked) then
+        self%moment(j) = -self%rate(j)
+        if (self%weight(j, j) > 0) self%moment(j) = self%moment(j) / self%weight(j, j)
+      else if (self%is_active(j, .true.)) then
+        self%moment(j) = -drag(self%teeth%loss_of(j))
+      end if
+    end do
+    if (size(self%inverse) > 0) then
+      self%moment(:) = matmul(self%inverse, self%moment)
+    else
+      call lu_solve(self%factors, self%pivots, self%moment)
+    end if
+  end subroutine find_moments_with_teeth
+
+  !> Factors the equations of all moments: rows of W where joints are locked, x + s V x where teeth turn, x elsewhere.
+  subroutine factor_with_teeth(self)
+    class(held_rows_t), intent(inout) :: self
+    real(wp) :: pivots(self%count)
+    integer :: j
+    logical :: is_singular
+
+    self%share(:) = self%teeth%share
+    do j = 1, self%count
+      self%factors(j, :) = 0.0_wp
+      if (self%mode(j) == locked) then
+        self%factors(j, :) = self%weight(j, :)
+        if (self%weight(j, j) > 0) self%factors(j, :) = self%factors(j, :) / self%weight(j, j)
+      else
+        self%factors(j, j) = 1.0_wp
+        if (self%is_active(j, .true.)) then
+          associate (loss => self%teeth%loss_of(j))
+            self%factors(j, :) = self%factors(j, :) + self%share(loss) * self%teeth%by_joint(loss, :)
+          end associate
+        end if
+      end if
+    end do
+    if (size(self%inverse) > 0) deallocate (self%inverse)
+    if (.not. allocated(self%inverse)) allocate (self%inverse(0, 0))
+    self%with_teeth = self%factors
+    call lu_factor(self%factors, self%pivots, is_singular)
+    pivots = [(abs(self%factors(j, j)), j=1, self%count)]
+    if (minval(pivots) <= null_tolerance * maxval(pivots)) is_singular = .true.
+    if (is_singular) self%inverse = pseudo_inverse(self%with_teeth, null_tolerance)
+    self%has_factors = .true.
+  end subroutine factor_with_teeth
 
   !> A row that moves and is a combination of others, or almost one, at the last position; 0: none.
   pure integer function nearly_lost(self)

@@ -6,11 +6,14 @@
 module nocdyn_joint_sets
   use nocdyn_bank, only: bank_slot_t
   use nocdyn_bounded_complementarity, only: at_upper, is_free, solve_bounded_complementarity
-  use nocdyn_friction_joints, only: friction_joints_t, locked, slips_backwards, slips_forwards
+  use nocdyn_friction_joints, only: direction_of, first_wheel_drives, friction_joints_t, locked, slips_backwards, slips_forwards
   use nocdyn_held_rows, only: held_rows_t
+  use nocdyn_joint_choices, only: joint_choices_t
   use nocdyn_kinds, only: wp
   use nocdyn_row_motions, only: new_row_motions
   use nocdyn_switches, only: switches_t
+  use nocdyn_tooth_loads, only: new_tooth_loads
+  use nocdyn_tooth_losses, only: tooth_losses_t
   implicit none (type, external)
   private
 
@@ -47,14 +50,17 @@ module nocdyn_joint_sets
     procedure :: indicator
     procedure :: follow
     procedure :: is_open
+    procedure :: has_teeth
+    procedure :: has_stopped
   end type joint_sets_t
 
 contains
 
   !> The joints of a machine, none of which is locked.
-  function new_joint_sets(banks, switches) result(self)
+  function new_joint_sets(banks, switches, elements) result(self)
     type(bank_slot_t), intent(in) :: banks(:)
     type(switches_t), intent(in) :: switches
+    integer, intent(in) :: elements   !! of the machine
     type(joint_sets_t) :: self
     integer :: b, e, k, next
 
@@ -81,6 +87,7 @@ contains
     self%bank = [self%bank, self%motions%bank]
     self%number = [self%number, self%motions%number]
     self%count = size(self%element)
+    self%teeth = new_tooth_loads(banks, self%bank, self%number, elements)
     call self%allocate_rows(slips_forwards)
     allocate (self%shift(self%count), self%impulse(self%count), source=0.0_wp)
     allocate (self%events(16))
@@ -107,6 +114,24 @@ contains
     end do
     call self%change_set()
   end subroutine follow
+
+  !> Whether a joint is one of teeth with losses.
+  pure logical function has_teeth(self, joint)
+    class(joint_sets_t), intent(in) :: self
+    integer, intent(in) :: joint
+
+    has_teeth = self%teeth%loss_of(joint) > 0
+  end function has_teeth
+
+  !> Whether a joint whose mode ends does so because its slip has ended. The mode of teeth may end where the other wheel drives.
+  pure logical function has_stopped(self, joint, slip)
+    class(joint_sets_t), intent(in) :: self
+    integer, intent(in) :: joint
+    real(wp), intent(in) :: slip   !! u' [rad/s]
+
+    has_stopped = .true.
+    if (self%has_teeth(joint)) has_stopped = direction_of(self%mode(joint)) * slip + self%shift(joint) <= 0
+  end function has_stopped
 
   !> Whether a joint cannot have any moment.
   logical function is_open(self, banks, joint, t)
@@ -149,8 +174,12 @@ contains
 
     where (.not. is_at_rest) self%mode = merge(slips_forwards, slips_backwards, slip > 0)
     self%shift(:) = 0.0_wp
-    resting = pack([(i, i=1, self%count)], is_at_rest)
-    call decide_resting(self, banks, t, resting, is_solved)
+    if (self%teeth%count > 0) then
+      call decide_with_teeth(self, banks, t, is_at_rest, slip, is_solved)
+    else
+      resting = pack([(i, i=1, self%count)], is_at_rest)
+      call decide_resting(self, banks, t, resting, is_solved)
+    end if
     do i = 1, self%locking
       call set_mode(self, banks, i)
     end do
@@ -226,6 +255,46 @@ contains
     end do
   end subroutine decide_resting
 
+  !> The same where some are teeth with losses: which of their wheels drives is decided even where they turn.
+  subroutine decide_with_teeth(self, banks, t, is_at_rest, slip, is_solved)
+    class(joint_sets_t), intent(inout) :: self
+    type(bank_slot_t), intent(in) :: banks(:)
+    real(wp), intent(in) :: t                !! [s]
+    logical, intent(in) :: is_at_rest(:)     !! [joints]
+    real(wp), intent(in) :: slip(:)          !! u' [rad/s], [joints]
+    logical, intent(out) :: is_solved
+    type(joint_choices_t) :: choices
+    integer :: j
+    real(wp) :: slope, speed
+
+    allocate (choices%w, source=self%weight)
+    allocate (choices%v, source=0.0_wp * self%weight)
+    allocate (choices%rate, source=self%rate)
+    allocate (choices%is_at_rest, source=is_at_rest)
+    allocate (choices%slip, source=slip)
+    allocate (choices%mode, source=self%mode)
+    allocate (choices%moment, source=self%moment)
+    allocate (choices%least, choices%most, choices%load, choices%driving, choices%driven, source=0.0_wp * slip)
+    allocate (choices%sliding(2, self%count), source=0.0_wp)
+    choices%has_teeth = [(self%has_teeth(j), j=1, self%count)]
+    do j = 1, self%count
+      call find_ranges(self, banks, j, t, choices%least(j), choices%most(j), choices%sliding(:, j))
+      if (.not. choices%has_teeth(j)) cycle
+      speed = merge(0.0_wp, slip(j), is_at_rest(j))
+      choices%v(j, :) = self%teeth%by_joint(self%teeth%loss_of(j), :)
+      choices%load(j) = self%teeth%applied(self%teeth%loss_of(j))
+      select type (bank => banks(self%bank(j))%bank)
+      class is (tooth_losses_t)
+        call bank%share(self%number(j), .true., speed, choices%driving(j), slope)
+        call bank%share(self%number(j), .false., speed, choices%driven(j), slope)
+      end select
+    end do
+    call choices%choose()
+    self%mode(:) = choices%mode
+    is_solved = choices%doubtful == 0
+    if (.not. is_solved) self%lost = choices%doubtful
+  end subroutine decide_with_teeth
+
   !> The moments between which a joint is at rest, and those of its slips forwards and backwards.
   subroutine find_ranges(self, banks, joint, t, least, most, sliding)
     class(joint_sets_t), intent(in) :: self
@@ -235,6 +304,9 @@ contains
     real(wp), intent(out) :: least, most, sliding(2)   !! [N m]
 
     select type (bank => banks(self%bank(joint))%bank)
+    class is (tooth_losses_t)
+      call bank%range_under_load(self%number(joint), self%teeth%load(self%teeth%loss_of(joint)), least, most)
+      sliding = 0.0_wp
     class is (friction_joints_t)
       call bank%range_at_rest(self%number(joint), t, least, most)
       call bank%range_of_slip(self%number(joint), t, sliding(1), sliding(2))
@@ -274,7 +346,8 @@ contains
     self%events(self%happened) = joint_event_t(t, joint, from, self%mode(joint), 0.0_wp - slip, self%moment(joint), impulse)
   end subroutine note
 
-  !> Positive in the present mode of a joint: its slip, or how far its moment is inside the range [N m].
+  !> Positive in the present mode of a joint: its slip, or how far its moment is inside the range [N m]. Teeth that turn change
+  !> their mode with the sign of their torque as well.
   real(wp) function indicator(self, banks, joint, t, slip) result(g)
     class(joint_sets_t), intent(in) :: self
     type(bank_slot_t), intent(in) :: banks(:)
@@ -284,18 +357,25 @@ contains
     real(wp) :: least, most, sliding(2)
 
     call find_ranges(self, banks, joint, t, least, most, sliding)
-    select case (self%mode(joint))
-    case (slips_forwards)
-      g = slip + self%shift(joint)
-      if (is_unbounded(least)) g = -1.0_wp   ! there is no such slip
-    case (slips_backwards)
-      g = self%shift(joint) - slip
-      if (is_unbounded(most)) g = -1.0_wp
-    case default
-      associate (moment => self%moment(joint))
+    associate (mode => self%mode(joint), moment => self%moment(joint))
+      if (mode == locked) then
         g = min(most - moment, moment - least) + self%moment_shift
-      end associate
-    end select
+      else
+        g = direction_of(mode) * slip + self%shift(joint)
+        if (mode == slips_forwards .and. is_unbounded(least)) g = -1.0_wp   ! there is no such slip
+        if (mode == slips_backwards .and. is_unbounded(most)) g = -1.0_wp
+        if (self%has_teeth(joint)) g = min(g, power_of_driver(self, joint, mode) + self%moment_shift)
+      end if
+    end associate
   end function indicator
+
+  !> Positive where that wheel of turning teeth drives that the mode says [N m].
+  pure real(wp) function power_of_driver(self, joint, mode)
+    class(joint_sets_t), intent(in) :: self
+    integer, intent(in) :: joint, mode
+
+    power_of_driver = direction_of(mode) * self%teeth%load(self%teeth%loss_of(joint))
+    if (first_wheel_drives(mode)) power_of_driver = -power_of_driver
+  end function power_of_driver
 
 end module nocdyn_joint_sets

@@ -44,9 +44,6 @@ contains
     if (size(slip) > 0) then
       if (slip(1) > 0) call raise(error, exit_input, input%location(index, 'table_slip') // ': table_slip begins with ' // &
                                   to_text(slip(1)) // '; allowed: 0 [rad/s] first, then the slips in either direction')
-    else if (group%is_given('interpolation') .and. .not. group%has_value('table_time')) then
-      call raise(error, exit_input, input%location(index, 'interpolation') // ': there is no table; ' // &
-                 'interpolation is for table_time and table_slip')
     end if
     if (allocated(error) .or. .not. group%has_value('static_capacity')) return
     if (group%number('static_capacity') < sliding_capacity(group)) then

@@ -14,7 +14,7 @@ module nocdyn_mesh_assembly
   implicit none (type, external)
   private
 
-  public :: mesh_form, add_mesh_form, check_meshes
+  public :: mesh_form, add_mesh_form, check_meshes, radii_of
 
   integer, parameter :: tight = 1, with_backlash = 2
   integer, parameter :: forms_without_error = 2   ! as many follow with one

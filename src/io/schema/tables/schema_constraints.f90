@@ -1,8 +1,8 @@
 !> Rows of the schema: the rigid joints, &gear, &planetary, &differential and &constraint.
 module nocdyn_schema_constraints
-  use nocdyn_schema_rules, only: a_body, a_flag, a_name, a_number, an_integer, any_number, any_times, anything, body_or_ground, &
-    equal_lengths, exactly_one, example_t, from_1, group_rule_t, in_machine, key_rule_t, not_zero, positive, relation_rule_t, &
-    required, unset
+  use nocdyn_schema_rules, only: a_body, a_flag, a_name, a_number, an_integer, any_number, any_times, anything, &
+    at_most_one, body_or_ground, efficiencies, equal_lengths, exactly_one, example_t, from_1, group_rule_t, in_machine, &
+    key_rule_t, not_negative, not_zero, positive, relation_rule_t, required, requires, reverse_efficiencies, unset
   implicit none (type, external)
   private
 
@@ -26,6 +26,16 @@ module nocdyn_schema_constraints
       'numbers of teeth, in the order of the bodies'), &
     key_rule_t('gear',       'internal',        a_flag,         1, '',            '.false.',   anything, &
       'an internal gear: both wheels turn in the same direction'), &
+    key_rule_t('gear',        'efficiency',      a_number,       1, '',            unset,       efficiencies, &
+      'power that the second wheel gets of what the first one puts in; 1 without losses'), &
+    key_rule_t('gear',        'reverse_efficiency', a_number,   1, '',            unset,       reverse_efficiencies, &
+      'the same where the second wheel drives; as efficiency if not given; 0 or less: self-locking'), &
+    key_rule_t('gear',        'table_speed',     a_number,       any_number, 'rad/s', unset,    not_negative, &
+      'speeds of the first wheel of the points of a table of efficiencies, from 0 on', fewest=2, ascends=.true.), &
+    key_rule_t('gear',        'table_efficiency', a_number,      any_number, '',   unset,       efficiencies, &
+      'efficiency at these speeds; beyond the last point as there', fewest=2), &
+    key_rule_t('gear',        'table_reverse', a_number, any_number, '', unset,     reverse_efficiencies, &
+      'reverse efficiency at these speeds', fewest=2), &
     key_rule_t('planetary',  'name',            a_name,         1, '',            required,    anything, &
       'name in results and messages'), &
     key_rule_t('planetary',  'sun',             body_or_ground, 1, '',            required,    anything, &
@@ -36,6 +46,16 @@ module nocdyn_schema_constraints
       'the carrier; its inertia includes the mass of the planets, whose spin is neglected'), &
     key_rule_t('planetary',  'teeth',           an_integer,     2, '',            required,    from_1, &
       'numbers of teeth of sun and ring; the ring has more', ascends=.true.), &
+    key_rule_t('planetary',   'efficiency',      a_number,       1, '',            unset,       efficiencies, &
+      'power that the ring gets of what the sun puts in, in the frame of the carrier; 1 without losses'), &
+    key_rule_t('planetary',   'reverse_efficiency', a_number,   1, '',            unset,       reverse_efficiencies, &
+      'the same where the ring drives; as efficiency if not given; 0 or less: self-locking'), &
+    key_rule_t('planetary',   'table_speed',     a_number,       any_number, 'rad/s', unset,    not_negative, &
+      'speeds of the sun against the carrier of the points of a table of efficiencies, from 0 on', fewest=2, ascends=.true.), &
+    key_rule_t('planetary',   'table_efficiency', a_number,      any_number, '',   unset,       efficiencies, &
+      'efficiency at these speeds; beyond the last point as there', fewest=2), &
+    key_rule_t('planetary',   'table_reverse', a_number, any_number, '', unset,     reverse_efficiencies, &
+      'reverse efficiency at these speeds', fewest=2), &
     key_rule_t('differential', 'name',          a_name,         1, '',            required,    anything, &
       'name in results and messages'), &
     key_rule_t('differential', 'sides',         body_or_ground, 2, '',            required,    anything, &
@@ -51,6 +71,14 @@ module nocdyn_schema_constraints
 
   type(relation_rule_t), parameter, public :: constraint_relations(*) = [ &
     relation_rule_t('gear', exactly_one, 'radii', 'teeth'), &
+    relation_rule_t('gear', at_most_one, 'efficiency reverse_efficiency', 'table_speed table_efficiency'), &
+    relation_rule_t('gear', requires, 'reverse_efficiency', 'efficiency'), &
+    relation_rule_t('gear', requires, 'table_reverse', 'table_efficiency'), &
+    relation_rule_t('gear', equal_lengths, 'table_speed table_efficiency', ''), &
+    relation_rule_t('planetary', at_most_one, 'efficiency reverse_efficiency', 'table_speed table_efficiency'), &
+    relation_rule_t('planetary', requires, 'reverse_efficiency', 'efficiency'), &
+    relation_rule_t('planetary', requires, 'table_reverse', 'table_efficiency'), &
+    relation_rule_t('planetary', equal_lengths, 'table_speed table_efficiency', ''), &
     relation_rule_t('constraint', equal_lengths, 'bodies coefficients', '')]
 
   type(example_t), parameter, public :: constraint_examples(*) = [ &

@@ -3,7 +3,7 @@ module nocdyn_schema_joints
   use nocdyn_kinds, only: wp
   use nocdyn_schema_rules, only: a_name, a_number, a_selector, a_word, allowed_t, any_number, any_times, anything, at_most_one, &
     body_or_ground, equal_lengths, exactly_one, example_t, group_rule_t, in_machine, interpolations, key_rule_t, kind_rule_t, &
-    not_negative, relation_rule_t, required, unset
+    not_negative, relation_rule_t, required, requires, unset
   implicit none (type, external)
   private
 
@@ -59,6 +59,7 @@ module nocdyn_schema_joints
     relation_rule_t('clutch', exactly_one, 'capacity', 'table_slip table_capacity'), &
     relation_rule_t('clutch', equal_lengths, 'table_slip table_capacity', ''), &
     relation_rule_t('clutch', at_most_one, 'times levels', 'table_time table_level'), &
+    relation_rule_t('clutch', requires, 'interpolation', 'table_time table_slip'), &
     relation_rule_t('clutch', equal_lengths, 'times levels', ''), &
     relation_rule_t('clutch', equal_lengths, 'table_time table_level', '')]
 

@@ -1,8 +1,8 @@
 !> Rows of the schema: the group &mesh with its keys.
 module nocdyn_schema_meshes
-  use nocdyn_schema_rules, only: a_flag, a_name, a_number, an_integer, any_number, any_times, anything, body_or_ground, &
-    exactly_one, example_t, from_1, group_rule_t, in_machine, key_rule_t, not_negative, positive, &
-    relation_rule_t, required, requires, unset
+  use nocdyn_schema_rules, only: a_flag, a_name, a_number, an_integer, any_number, any_times, anything, at_most_one, &
+    body_or_ground, efficiencies, equal_lengths, exactly_one, example_t, from_1, group_rule_t, in_machine, key_rule_t, &
+    not_negative, positive, relation_rule_t, required, requires, reverse_efficiencies, unset
   implicit none (type, external)
   private
 
@@ -33,12 +33,26 @@ module nocdyn_schema_meshes
     key_rule_t('mesh',       'error_orders',    a_number,       any_number, '',   unset,       positive, &
       'order of each in turns of the first body; if not given 1, 2, ... times its teeth', fewest=1), &
     key_rule_t('mesh',       'error_phases',    a_number,       any_number, 'rad', unset,      anything, &
-      'phase of each: amplitude * sin(order * angle + phase)', fewest=1)]
+      'phase of each: amplitude * sin(order * angle + phase)', fewest=1), &
+    key_rule_t('mesh',        'efficiency',      a_number,       1, '',            unset,       efficiencies, &
+      'power that the second wheel gets of what the first one puts in; 1 without losses'), &
+    key_rule_t('mesh',        'reverse_efficiency', a_number,   1, '',            unset,       reverse_efficiencies, &
+      'the same where the second wheel drives; as efficiency if not given; 0 or less: self-locking'), &
+    key_rule_t('mesh',        'table_speed',     a_number,       any_number, 'rad/s', unset,    not_negative, &
+      'speeds of the first wheel of the points of a table of efficiencies, from 0 on', fewest=2, ascends=.true.), &
+    key_rule_t('mesh',        'table_efficiency', a_number,      any_number, '',   unset,       efficiencies, &
+      'efficiency at these speeds; beyond the last point as there', fewest=2), &
+    key_rule_t('mesh',        'table_reverse', a_number, any_number, '', unset,     reverse_efficiencies, &
+      'reverse efficiency at these speeds', fewest=2)]
 
   type(relation_rule_t), parameter, public :: mesh_relations(*) = [ &
     relation_rule_t('mesh', exactly_one, 'radii', 'teeth'), &
     relation_rule_t('mesh', requires, 'module', 'teeth'), &
     relation_rule_t('mesh', requires, 'teeth', 'module'), &
+    relation_rule_t('mesh', at_most_one, 'efficiency reverse_efficiency', 'table_speed table_efficiency'), &
+    relation_rule_t('mesh', requires, 'reverse_efficiency', 'efficiency'), &
+    relation_rule_t('mesh', requires, 'table_reverse', 'table_efficiency'), &
+    relation_rule_t('mesh', equal_lengths, 'table_speed table_efficiency', ''), &
     relation_rule_t('mesh', requires, 'error_orders error_phases', 'transmission_error')]
 
   type(example_t), parameter, public :: mesh_examples(*) = [ &

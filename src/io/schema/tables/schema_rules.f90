@@ -120,6 +120,8 @@ module nocdyn_schema_rules
   type(allowed_t), parameter, public :: anything = allowed_t()
   type(allowed_t), parameter, public :: positive = allowed_t(low=0.0_wp, excludes_low=.true.)
   type(allowed_t), parameter, public :: not_negative = allowed_t(low=0.0_wp)
+  type(allowed_t), parameter, public :: efficiencies = allowed_t(low=0.0_wp, high=1.0_wp, excludes_low=.true.)
+  type(allowed_t), parameter, public :: reverse_efficiencies = allowed_t(low=-10.0_wp, high=1.0_wp)
   type(allowed_t), parameter, public :: not_zero = allowed_t(excludes_zero=.true.)
   type(allowed_t), parameter, public :: from_1 = allowed_t(low=1.0_wp)
   type(allowed_t), parameter, public :: from_2 = allowed_t(low=2.0_wp)

@@ -25,9 +25,11 @@ module nocdyn_friction_joints
   implicit none (type, external)
   private
 
-  public :: new_friction_joints
+  public :: new_friction_joints, first_wheel_drives, direction_of
 
   integer, parameter, public :: locked = 1, slips_forwards = 2, slips_backwards = 3   !! modes
+  !> Modes of teeth with losses whose first wheel drives; in those above the second one does.
+  integer, parameter, public :: driven_forwards = 4, driven_backwards = 5
 
   !> The ranges of the moments of joints with full engagement [N m], shape [lanes, joints] all. Those at rest may be huge.
   type, public :: joint_ranges_t
@@ -49,6 +51,27 @@ module nocdyn_friction_joints
   end type friction_joints_t
 
 contains
+
+  !> Whether the first wheel of teeth with losses drives the second one.
+  elemental logical function first_wheel_drives(mode)
+    integer, intent(in) :: mode
+
+    first_wheel_drives = mode == driven_forwards .or. mode == driven_backwards
+  end function first_wheel_drives
+
+  !> The sign of the slip u', 0 of a locked joint.
+  elemental integer function direction_of(mode)
+    integer, intent(in) :: mode
+
+    select case (mode)
+    case (slips_forwards, driven_forwards)
+      direction_of = 1
+    case (slips_backwards, driven_backwards)
+      direction_of = -1
+    case default
+      direction_of = 0
+    end select
+  end function direction_of
 
   !> A bank of joints.
   function new_friction_joints(role, names, from, to, ranges, engagement, over_slip) result(bank)

@@ -1,0 +1,187 @@
+!> The torques T that teeth with losses transmit (`nocdyn_tooth_losses`), in a block of one lane.
+!>
+!> T is a sum of the moments of all elements: T = G M. The multipliers of the gears follow from the moments by constant
+!> coefficients, as L_lambda is constant, and the force of an elastic mesh is the moment of an element itself.
+module nocdyn_tooth_loads
+  use nocdyn_bank, only: bank_slot_t, role_coupling
+  use nocdyn_coordinates, only: coordinates_t
+  use nocdyn_element_rows, only: element_rows_t
+  use nocdyn_elements, only: elements_t
+  use nocdyn_friction_joints, only: first_wheel_drives
+  use nocdyn_kinds, only: wp
+  use nocdyn_text, only: string_t
+  use nocdyn_tooth_losses, only: tooth_losses_t
+  implicit none (type, external)
+  private
+
+  public :: new_tooth_loads
+
+  type, public :: tooth_loads_t
+    integer :: count = 0
+    integer, allocatable :: joint(:)            !! of each loss, [losses] as all that follow
+    integer, allocatable :: bank(:), number(:)  !! its bank, and its number there
+    integer, allocatable :: loss_of(:)          !! of each joint, 0 for none, [joints]
+    real(wp), allocatable :: by_moment(:, :)    !! G, [losses, elements]
+    real(wp), allocatable :: by_joint(:, :)     !! V: T by the moments of the joints at the present slopes, [losses, joints]
+    real(wp), allocatable :: applied(:)         !! T without the moments of the joints that hold and the losses [N m]
+    real(wp), allocatable :: load(:)            !! T [N m]
+    real(wp), allocatable :: share(:)           !! s: the moment is -s T while the wheels turn
+    real(wp), allocatable :: share_slope(:)     !! its derivative by the speed [s/rad]
+    ! for the derivatives of the accelerations:
+    real(wp), allocatable :: held_load(:), held_moment(:)   !! [N m]
+  contains
+    procedure :: find_coefficients
+    procedure :: weigh
+    procedure :: apply
+    procedure :: choose_shares
+    procedure :: drag
+    procedure :: add_moments
+  end type tooth_loads_t
+
+contains
+
+  !> The losses of all banks.
+  function new_tooth_loads(banks, bank_of_joint, number_of_joint, elements) result(self)
+    type(bank_slot_t), intent(in) :: banks(:)
+    integer, intent(in) :: bank_of_joint(:), number_of_joint(:)   !! [joints]
+    integer, intent(in) :: elements
+    type(tooth_loads_t) :: self
+    integer :: j
+
+    allocate (self%joint(0))
+    allocate (self%loss_of(size(bank_of_joint)), source=0)
+    do j = 1, size(bank_of_joint)
+      select type (bank => banks(bank_of_joint(j))%bank)
+      class is (tooth_losses_t)
+        self%joint = [self%joint, j]
+        self%loss_of(j) = size(self%joint)
+      end select
+    end do
+    self%count = size(self%joint)
+    self%bank = bank_of_joint(self%joint)
+    self%number = number_of_joint(self%joint)
+    allocate (self%by_moment(self%count, merge(elements, 0, self%count > 0)), source=0.0_wp)
+    allocate (self%by_joint(self%count, size(bank_of_joint)), source=0.0_wp)
+    allocate (self%applied(self%count), source=0.0_wp)
+    allocate (self%load, self%share, self%share_slope, self%held_load, self%held_moment, source=self%applied)
+  end function new_tooth_loads
+
+  !> Sets G at the start.
+  subroutine find_coefficients(self, banks, rows, coordinates, constraints, bodies)
+    class(tooth_loads_t), intent(inout) :: self
+    type(bank_slot_t), intent(in) :: banks(:)
+    type(element_rows_t), intent(in) :: rows             !! of the elements
+    type(coordinates_t), intent(inout) :: coordinates
+    integer, intent(in) :: constraints, bodies           !! numbers of them
+    real(wp) :: lambda(constraints), torque(bodies), by_torque(self%count, bodies)
+    integer :: b, e, i, k
+
+    if (self%count == 0) return
+    do b = 1, bodies
+      torque = 0.0_wp
+      torque(b) = 1.0_wp
+      lambda = 0.0_wp
+      call coordinates%reactions_of_torques(1, torque, lambda)
+      do i = 1, self%count
+        by_torque(i, b) = 0.0_wp
+        select type (bank => banks(self%bank(i))%bank)
+        class is (tooth_losses_t)
+          associate (row => bank%row(self%number(i)))
+            if (row > 0) by_torque(i, b) = bank%factor(self%number(i)) * lambda(row)
+          end associate
+        end select
+      end do
+    end do
+    self%by_moment(:, :) = 0.0_wp
+    do e = 1, size(self%by_moment, 2)
+      do k = rows%first(e), rows%first(e + 1) - 1
+        if (rows%body(k) > 0) self%by_moment(:, e) = self%by_moment(:, e) + rows%coefficient(k) * by_torque(:, rows%body(k))
+      end do
+    end do
+    do i = 1, self%count
+      select type (bank => banks(self%bank(i))%bank)
+      class is (tooth_losses_t)
+        if (bank%row(self%number(i)) > 0) cycle
+        self%by_moment(i, mesh_named(banks, bank%names(self%number(i)))) = bank%factor(self%number(i))
+      end select
+    end do
+  end subroutine find_coefficients
+
+  !> The element of a mesh.
+  pure integer function mesh_named(banks, name)
+    type(bank_slot_t), intent(in) :: banks(:)
+    type(string_t), intent(in) :: name
+    integer :: b, e
+
+    mesh_named = 0
+    do b = 1, size(banks)
+      associate (bank => banks(b)%bank)
+        if (bank%role /= role_coupling) cycle
+        do e = 1, bank%count
+          if (bank%names(e)%text == name%text) mesh_named = bank%first - 1 + e
+        end do
+      end associate
+    end do
+    if (mesh_named == 0) error stop 'nocdyn_tooth_loads: there is no such mesh'
+  end function mesh_named
+
+  !> Forms V at the slopes of the present position.
+  pure subroutine weigh(self, element, driver, slope)
+    class(tooth_loads_t), intent(inout) :: self
+    integer, intent(in) :: element(:), driver(:)   !! of each joint; 0: no driver
+    real(wp), intent(in) :: slope(:)               !! g', [joints]
+    integer :: j
+
+    do j = 1, merge(size(element), 0, self%count > 0)
+      self%by_joint(:, j) = self%by_moment(:, element(j))
+      if (driver(j) > 0) self%by_joint(:, j) = self%by_joint(:, j) - slope(j) * self%by_moment(:, driver(j))
+    end do
+  end subroutine weigh
+
+  !> Finds T without the moments of the joints that hold and the losses, after the laws of all elements.
+  pure subroutine apply(self, elements)
+    class(tooth_loads_t), intent(inout) :: self
+    type(elements_t), intent(in) :: elements
+    integer :: e
+
+    self%applied(:) = 0.0_wp
+    do e = 1, elements%count
+      self%applied(:) = self%applied + self%by_moment(:, e) * (elements%restoring(1, e) + elements%applied(1, e))
+    end do
+  end subroutine apply
+
+  !> Sets the shares that are lost at the present modes and speeds.
+  pure subroutine choose_shares(self, banks, mode, speed)
+    class(tooth_loads_t), intent(inout) :: self
+    type(bank_slot_t), intent(in) :: banks(:)
+    integer, intent(in) :: mode(:)       !! of the joints
+    real(wp), intent(in) :: speed(:)     !! of all elements [rad/s]
+    integer :: i
+
+    do i = 1, self%count
+      select type (bank => banks(self%bank(i))%bank)
+      class is (tooth_losses_t)
+        call bank%share(self%number(i), first_wheel_drives(mode(self%joint(i))), speed(bank%first - 1 + self%number(i)), &
+                        self%share(i), self%share_slope(i))
+      end select
+    end do
+  end subroutine choose_shares
+
+  !> -M of the losses while the wheels turn, without the effect of the joints that hold and of other losses [N m]; for locked
+  !> wheels it is not used.
+  pure function drag(self)
+    class(tooth_loads_t), intent(in) :: self
+    real(wp) :: drag(self%count)
+
+    drag = self%share * self%applied
+  end function drag
+
+  !> Adds what the moments of all joints do to T.
+  pure subroutine add_moments(self, moment)
+    class(tooth_loads_t), intent(inout) :: self
+    real(wp), intent(in) :: moment(:)   !! [N m], [joints]
+
+    self%load(:) = self%applied + matmul(self%by_joint, moment)
+  end subroutine add_moments
+
+end module nocdyn_tooth_loads
