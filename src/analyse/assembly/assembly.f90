@@ -11,7 +11,8 @@ module nocdyn_assembly
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
-  use nocdyn_joint_assembly, only: add_bearings, add_clutch_form, add_freewheels, check_joints, clutch_form, refuse_joints
+  use nocdyn_joint_assembly, only: add_bearings, add_clutch_form, add_freewheels, check_joints, clutch_form
+  use nocdyn_joint_simplifications, only: refuse_joints
   use nocdyn_loss_assembly, only: add_losses, check_losses
   use nocdyn_machine, only: machine_t
   use nocdyn_massless_motion, only: massless_bodies

@@ -7,7 +7,7 @@ module nocdyn_input_files
   use nocdyn_errors, only: error_t, exit_done
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
-  use nocdyn_joint_assembly, only: joints_with_means, refuse_joints
+  use nocdyn_joint_simplifications, only: refuse_joints, simplification_notes
   use nocdyn_machine, only: machine_t
   use nocdyn_output_times, only: check_output_times
   use nocdyn_result_folders, only: out_folder, refuse_shared_folders, result_folder
@@ -69,22 +69,24 @@ contains
           call refuse_joints(reading%input, 'nocdyn ' // arguments%command, reading%error)
         end if
         if (.not. allocated(reading%error)) call assemble_machine(reading%input, machine, reading%error)
-        if (.not. (allocated(reading%error) .or. arguments%is_given('--quiet'))) call note_means(reading%input)
+        if (.not. (allocated(reading%error) .or. arguments%is_given('--quiet'))) call note_simplifications(reading%input)
         if (.not. allocated(reading%error)) call analyse(arguments, reading%input, machine, folders(i)%text, reading%error)
         if (allocated(reading%error)) call report_error(reading%error, code)
       end associate
     end do
   end subroutine analyse_files
 
-  !> Says which joints turn as they do in the mean of a turn.
-  subroutine note_means(input)
+  !> Says what an analysis about a steady state replaces or leaves out.
+  subroutine note_simplifications(input)
     type(input_t), intent(in) :: input
-    character(len=:), allocatable :: joints
+    type(string_t), allocatable :: notes(:)
+    integer :: i
 
-    joints = joints_with_means(input)
-    if (joints == '') return
-    call print_text(input%shown_file() // ': note: means over a turn stand for the ratios, inertias and torques of ' // joints)
-  end subroutine note_means
+    allocate (notes, source=simplification_notes(input))
+    do i = 1, size(notes)
+      call print_text(input%shown_file() // ': note: ' // notes(i)%text)
+    end do
+  end subroutine note_simplifications
 
   !> Reads and checks a file, and finds the folder of its results.
   subroutine read_one(arguments, number, reading, folder, always_writes)

@@ -6,7 +6,7 @@
 !> the least change, weighted by the inertias; E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, section IV.4.
 !> Extensions say how elements move with the states, and how the states answer to the moments of elements.
 module nocdyn_row_formulation
-  use nocdyn_bank, only: bank_of, role_names
+  use nocdyn_bank, only: bank_of, role_loss, role_names
   use nocdyn_formulation, only: formulation_t
   use nocdyn_friction_joints, only: locked
   use nocdyn_kinds, only: wp
@@ -405,6 +405,8 @@ contains
       associate (bank => machine%banks(bank_of(machine%banks, element))%bank)
         text = trim(role_names(bank%role)) // ' ' // quoted(bank%names(element - bank%first + 1)%text) // ' contradicts ' // &
                'other joints and drives there, or does not differ from them: a dead centre, or a loop that locks'
+        if (bank%role == role_loss) text = 'the teeth of ' // quoted(bank%names(element - bank%first + 1)%text) // ' jam: ' // &
+          'their second wheel brakes the first one more than its inertia allows, by their low reverse efficiency'
       end associate
     end associate
   end function evaluation_obstacle

@@ -8,11 +8,11 @@ module nocdyn_joint_assembly
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_loads, only: new_nonlinear_loads
-  use nocdyn_text, only: quoted, to_text
+  use nocdyn_text, only: to_text
   implicit none (type, external)
   private
 
-  public :: clutch_form, add_clutch_form, add_freewheels, add_bearings, check_joints, refuse_joints, joints_with_means
+  public :: clutch_form, add_clutch_form, add_freewheels, add_bearings, check_joints
 
   integer, parameter :: engaged = 1, with_engagement = 2
   integer, parameter :: forms_of_friction = 2   ! as many follow of dog clutches, and then of friction by a table
@@ -52,61 +52,6 @@ contains
                  '; allowed: at least that of slip [N m]')
     end if
   end subroutine check_clutch
-
-  !> Refuses joints where it is not known which of them are locked, or where they are.
-  subroutine refuse_joints(input, what, error)
-    type(input_t), intent(in) :: input     !! joints that means stand for are allowed
-    character(len=*), intent(in) :: what   !! does not know it, e.g. 'nocdyn modes'
-    type(error_t), allocatable, intent(out) :: error
-    character(len=*), parameter :: moving(*) = [character(len=8) :: 'cardan', 'crank', 'relation', 'drive']
-    integer :: i
-
-    do i = 1, size(input%groups)
-      associate (group => input%groups(i))
-        if (group%kind == 'body') then
-          if (input%takes_means .or. group%number('bearing_friction') <= 0) cycle
-          call raise(error, exit_input, input%location(i, 'bearing_friction') // ': ' // what // ' does not know whether the ' // &
-                     'bearings slip; allowed: bearing_friction = 0')
-          return
-        else if (group%kind == 'clutch' .or. group%kind == 'freewheel') then
-          call raise(error, exit_input, input%location(i) // ': ' // what // ' does not know which joints are locked; ' // &
-                     'allowed: no clutches and freewheels; a locked one is a &gear with teeth = 1, 1 and internal = .true.')
-          return
-        else if (any(moving == group%kind) .and. .not. (input%takes_means .and. has_mean(group))) then
-          call raise(error, exit_input, input%location(i) // ': ' // what // ' is for machines whose ratios are constant; ' // &
-                     'allowed: no ' // trim(merge('drives, cams and levers            ', 'cardans, cranks, relations, drives ', &
-                                                  input%takes_means)))
-          return
-        end if
-      end associate
-    end do
-  end subroutine refuse_joints
-
-  !> The joints of an input that means stand for, e.g. "cardan 'front', crank 'piston'"; '' if there are none.
-  function joints_with_means(input) result(text)
-    type(input_t), intent(in) :: input
-    character(len=:), allocatable :: text
-    integer :: i
-
-    text = ''
-    do i = 1, merge(size(input%groups), 0, input%takes_means)
-      if (.not. has_mean(input%groups(i))) cycle
-      if (text /= '') text = text // ', '
-      text = text // input%groups(i)%kind // ' ' // quoted(input%groups(i)%name)
-    end do
-  end function joints_with_means
-
-  !> Whether the ratio of a joint has a mean that tells how its bodies turn.
-  pure logical function has_mean(group)
-    type(group_t), intent(in) :: group
-
-    select case (group%kind)
-    case ('relation')
-      has_mean = group%text('kind') == 'gear'
-    case default
-      has_mean = group%kind == 'cardan' .or. group%kind == 'crank'
-    end select
-  end function has_mean
 
   !> Form of the law of a group &clutch.
   pure integer function clutch_form(group)

@@ -5,7 +5,7 @@ module nocdyn_sweep
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_integration_settings, only: integration_settings_t
-  use nocdyn_joint_assembly, only: refuse_joints
+  use nocdyn_joint_simplifications, only: refuse_joints
   use nocdyn_kinds, only: wp
   use nocdyn_run_settings, only: choose_settings
   use nocdyn_scheduler, only: scheduler_t

@@ -1,0 +1,90 @@
+!> What analyses about a steady state make of joints: those that they refuse, those for which means over a turn stand, and losses
+!> that they leave out.
+module nocdyn_joint_simplifications
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_loss_assembly, only: has_losses
+  use nocdyn_text, only: append, quoted, string_t
+  implicit none (type, external)
+  private
+
+  public :: refuse_joints, simplification_notes
+
+contains
+
+  !> Refuses joints where it is not known which of them are locked, or where they are.
+  subroutine refuse_joints(input, what, error)
+    type(input_t), intent(in) :: input     !! joints that means stand for, and losses that are left out, are allowed
+    character(len=*), intent(in) :: what   !! does not know it, e.g. 'nocdyn modes'
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: reason
+    integer :: i
+
+    do i = 1, size(input%groups)
+      reason = refusal(input%groups(i), input%takes_means)
+      if (reason == '') cycle
+      call raise(error, exit_input, input%location(i) // ': ' // what // ' ' // reason)
+      return
+    end do
+  end subroutine refuse_joints
+
+  !> Why a group is refused, and what is allowed; '' if it is not.
+  function refusal(group, takes_means) result(text)
+    type(group_t), intent(in) :: group
+    logical, intent(in) :: takes_means   !! as in `input_t`
+    character(len=:), allocatable :: text
+
+    text = ''
+    select case (group%kind)
+    case ('body')
+      if (group%number('bearing_friction') > 0 .and. .not. takes_means) then
+        text = 'does not know whether the bearings slip; allowed: bearing_friction = 0'
+      end if
+    case ('clutch', 'freewheel')
+      text = 'does not know which joints are locked; allowed: no clutches and freewheels; a locked one is a &gear with ' // &
+             'teeth = 1, 1 and internal = .true.'
+    case ('gear', 'planetary', 'mesh')
+      if (has_losses(group) .and. .not. takes_means) text = 'does not know the losses of teeth; allowed: no efficiency'
+    case ('cardan', 'crank', 'relation', 'drive')
+      if (takes_means .and. has_mean(group)) return
+      text = 'is for machines whose ratios are constant; allowed: no cardans, cranks, relations, drives'
+      if (takes_means) text = 'is for machines whose ratios are constant; allowed: no drives, cams and levers'
+    case default
+      text = ''
+    end select
+  end function refusal
+
+  !> What an analysis about a steady state replaces or leaves out.
+  function simplification_notes(input) result(notes)
+    type(input_t), intent(in) :: input
+    type(string_t), allocatable :: notes(:)
+    character(len=:), allocatable :: losses, means
+    integer :: i
+
+    allocate (notes(0))
+    means = ''
+    losses = ''
+    if (.not. input%takes_means) return
+    do i = 1, size(input%groups)
+      associate (group => input%groups(i))
+        if (has_mean(group)) means = means // ', ' // group%kind // ' ' // quoted(group%name)
+        if (has_losses(group)) losses = losses // ', ' // group%kind // ' ' // quoted(group%name)
+      end associate
+    end do
+    if (means /= '') call append(notes, 'means over a turn stand for the ratios, inertias and torques of ' // means(3:))
+    if (losses /= '') call append(notes, 'the losses of ' // losses(3:) // ' are left out')
+  end function simplification_notes
+
+  !> Whether the ratio of a joint has a mean that tells how its bodies turn.
+  pure logical function has_mean(group)
+    type(group_t), intent(in) :: group
+
+    select case (group%kind)
+    case ('relation')
+      has_mean = group%text('kind') == 'gear'
+    case default
+      has_mean = group%kind == 'cardan' .or. group%kind == 'crank'
+    end select
+  end function has_mean
+
+end module nocdyn_joint_simplifications
