@@ -12,7 +12,7 @@ module nocdyn_assembly
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
   use nocdyn_joint_assembly, only: add_bearings, add_clutch_form, add_freewheels, check_joints, clutch_form
-  use nocdyn_joint_simplifications, only: refuse_joints
+  use nocdyn_joint_simplifications, only: left_out, refuse_joints
   use nocdyn_loss_assembly, only: add_losses, check_losses
   use nocdyn_machine, only: machine_t
   use nocdyn_massless_motion, only: massless_bodies
@@ -27,7 +27,7 @@ module nocdyn_assembly
   use nocdyn_shaft_assembly, only: add_shafts, check_shafts, new_shaft_set, shaft_set_t
   use nocdyn_start_speeds, only: fit_start_speeds
   use nocdyn_steady_start, only: start_steadily
-  use nocdyn_text, only: joined, selected
+  use nocdyn_text, only: append, joined, selected
   use nocdyn_torque_assembly, only: add_engines, add_excitation_form, add_load_form, excitation_form, load_form
   implicit none (type, external)
   private
@@ -133,12 +133,14 @@ contains
     type(input_t), intent(in) :: input
     type(machine_t), intent(inout) :: machine
     type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: losses
     type(machine_t) :: single   ! of one lane
 
     associate (run => input%groups(input%position('run')))
       if (run%text('start') /= 'equilibrium') return
-      call refuse_joints(input, "start = 'equilibrium'", error)
+      call refuse_joints(input, "start = 'equilibrium'", error, leaves_out_bearings=.true.)
       if (allocated(error)) return
+      losses = left_out(input, .true.)
       if (machine%lanes > 1) then
         call assemble_machine(input, single, error)
         if (allocated(error)) return
@@ -149,6 +151,7 @@ contains
         call start_steadily(machine, given_speeds(input, machine%nodes), run%number('t_start'), error)
         if (allocated(error)) error%message = input%location(input%position('run'), 'start') // ": start = 'equilibrium': " // &
           error%message // "; start = 'given' starts with the speeds of the bodies"
+        if (losses /= '') call append(machine%start_notes, 'the balance at the start leaves out the losses of ' // losses)
       end if
     end associate
   end subroutine start_machine

@@ -8,19 +8,24 @@ module nocdyn_joint_simplifications
   implicit none (type, external)
   private
 
-  public :: refuse_joints, simplification_notes
+  public :: refuse_joints, simplification_notes, left_out
 
 contains
 
   !> Refuses joints where it is not known which of them are locked, or where they are.
-  subroutine refuse_joints(input, what, error)
+  subroutine refuse_joints(input, what, error, leaves_out_bearings)
     type(input_t), intent(in) :: input     !! joints that means stand for, and losses that are left out, are allowed
     character(len=*), intent(in) :: what   !! does not know it, e.g. 'nocdyn modes'
     type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: leaves_out_bearings   !! whether friction of bearings is left out, too; absent: no
     character(len=:), allocatable :: reason
     integer :: i
+    logical :: allows_bearings
 
+    allows_bearings = input%takes_means
+    if (present(leaves_out_bearings)) allows_bearings = allows_bearings .or. leaves_out_bearings
     do i = 1, size(input%groups)
+      if (input%groups(i)%kind == 'body' .and. allows_bearings) cycle
       reason = refusal(input%groups(i), input%takes_means)
       if (reason == '') cycle
       call raise(error, exit_input, input%location(i) // ': ' // what // ' ' // reason)
@@ -37,14 +42,10 @@ contains
     text = ''
     select case (group%kind)
     case ('body')
-      if (group%number('bearing_friction') > 0 .and. .not. takes_means) then
-        text = 'does not know whether the bearings slip; allowed: bearing_friction = 0'
-      end if
+      if (group%number('bearing_friction') > 0) text = 'does not know whether bearings slip; allowed: bearing_friction = 0'
     case ('clutch', 'freewheel')
       text = 'does not know which joints are locked; allowed: no clutches and freewheels; a locked one is a &gear with ' // &
              'teeth = 1, 1 and internal = .true.'
-    case ('gear', 'planetary', 'mesh')
-      if (has_losses(group) .and. .not. takes_means) text = 'does not know the losses of teeth; allowed: no efficiency'
     case ('cardan', 'crank', 'relation', 'drive')
       if (takes_means .and. has_mean(group)) return
       text = 'is for machines whose ratios are constant; allowed: no cardans, cranks, relations, drives'
@@ -58,22 +59,41 @@ contains
   function simplification_notes(input) result(notes)
     type(input_t), intent(in) :: input
     type(string_t), allocatable :: notes(:)
-    character(len=:), allocatable :: losses, means
+    character(len=:), allocatable :: means
     integer :: i
 
     allocate (notes(0))
-    means = ''
-    losses = ''
     if (.not. input%takes_means) return
+    means = ''
     do i = 1, size(input%groups)
       associate (group => input%groups(i))
         if (has_mean(group)) means = means // ', ' // group%kind // ' ' // quoted(group%name)
-        if (has_losses(group)) losses = losses // ', ' // group%kind // ' ' // quoted(group%name)
       end associate
     end do
     if (means /= '') call append(notes, 'means over a turn stand for the ratios, inertias and torques of ' // means(3:))
-    if (losses /= '') call append(notes, 'the losses of ' // losses(3:) // ' are left out')
+    associate (losses => left_out(input, .false.))
+      if (losses /= '') call append(notes, 'the losses of ' // losses // ' are left out')
+    end associate
   end function simplification_notes
+
+  !> The groups whose losses a balance leaves out, e.g. "gear 'worm'"; '' if there are none.
+  function left_out(input, with_bearings) result(text)
+    type(input_t), intent(in) :: input
+    logical, intent(in) :: with_bearings   !! whether it leaves out the friction of bearings, too
+    character(len=:), allocatable :: text
+    logical :: is_left_out
+    integer :: i
+
+    text = ''
+    do i = 1, size(input%groups)
+      associate (group => input%groups(i))
+        is_left_out = has_losses(group)
+        if (group%kind == 'body' .and. with_bearings) is_left_out = group%number('bearing_friction') > 0
+        if (is_left_out) text = text // ', ' // group%kind // ' ' // quoted(group%name)
+      end associate
+    end do
+    if (text /= '') text = text(3:)
+  end function left_out
 
   !> Whether the ratio of a joint has a mean that tells how its bodies turn.
   pure logical function has_mean(group)
