@@ -258,7 +258,7 @@ def test_a_sweep_over_capacities_is_its_variants_alone(nocdyn):
             "capacity = 5 times = 1 levels = 1 table_time = 0, 1 table_level = 0, 1",
             "times and table_time are both given; allowed: one of them",
         ),
-        ("", "capacity is missing"),
+        ("", "capacity or table_slip is missing"),
     ],
 )
 def test_bad_clutches_are_refused(nocdyn, keys, words):

@@ -7,6 +7,7 @@ module nocdyn_test_machines
   use nocdyn_coordinates, only: build_coordinates
   use nocdyn_couplings, only: coupling_common_t, new_couplings
   use nocdyn_crank_rows, only: new_crank_rows, slider_crank_t
+  use nocdyn_curves, only: extrapolation_constant, interpolation_linear, new_curve
   use nocdyn_drives, only: drive_motion_t, new_drives
   use nocdyn_errors, only: error_t
   use nocdyn_excitations, only: new_excitations
@@ -18,6 +19,7 @@ module nocdyn_test_machines
   use nocdyn_piston_forces, only: new_piston_force, periodic_force_t
   use nocdyn_relation_rows, only: new_relation_rows
   use nocdyn_text, only: string_t, strings, to_text
+  use nocdyn_tooth_losses, only: new_tooth_losses, teeth_t
   implicit none (type, external)
   private
 
@@ -124,6 +126,7 @@ contains
   function moving_machine() result(machine)
     type(machine_t) :: machine
     type(string_t) :: names(4)
+    type(teeth_t) :: teeth
     integer :: k
 
     machine = machine_of_bodies(row([4.0_wp, 2.0_wp, 6.0_wp, 1.0_wp, 3.0_wp]))
@@ -149,6 +152,14 @@ contains
     call append_bank(machine%banks, new_drives(numbered_names('drive', 1), [5], 0.0_wp, .false., &
                                                drive_motion_t(row([2.0_wp]), row([3.0_wp]), row([1.7_wp]), row([0.4_wp]))))
     machine%constraints = gear_rows(9, reshape([1, 2], [2, 1]), row([2.0_wp, 3.0_wp]))
+    teeth%row = [1]
+    teeth%factor = [2.0_wp]
+    teeth%forward = row([1.0_wp])
+    teeth%backward = row([1.0_wp])
+    allocate (teeth%forward_over_speed, teeth%backward_over_speed)
+    teeth%forward_over_speed = new_curve([0.0_wp, 9.0_wp], [0.7_wp, 0.9_wp], interpolation_linear, extrapolation_constant)
+    teeth%backward_over_speed = new_curve([0.0_wp, 9.0_wp], [0.4_wp, 0.8_wp], interpolation_linear, extrapolation_constant)
+    call append_bank(machine%banks, new_tooth_losses(numbered_names('gear', 1), [0], [1], teeth))
     machine%start_angle(1, 6:9) = [(0.3_wp * k, k=1, 4)]
     call finish(machine, [integer ::], 1)
   end function moving_machine

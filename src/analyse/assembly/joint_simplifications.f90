@@ -59,7 +59,7 @@ contains
   function simplification_notes(input) result(notes)
     type(input_t), intent(in) :: input
     type(string_t), allocatable :: notes(:)
-    character(len=:), allocatable :: means
+    character(len=:), allocatable :: losses, means
     integer :: i
 
     allocate (notes(0))
@@ -71,9 +71,8 @@ contains
       end associate
     end do
     if (means /= '') call append(notes, 'means over a turn stand for the ratios, inertias and torques of ' // means(3:))
-    associate (losses => left_out(input, .false.))
-      if (losses /= '') call append(notes, 'the losses of ' // losses // ' are left out')
-    end associate
+    losses = left_out(input, .false.)
+    if (losses /= '') call append(notes, 'the losses of ' // losses // ' are left out')
   end function simplification_notes
 
   !> The groups whose losses a balance leaves out, e.g. "gear 'worm'"; '' if there are none.

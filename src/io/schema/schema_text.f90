@@ -59,6 +59,7 @@ contains
     text = ''
     if (allowed%high < huge(1.0_wp)) then
       text = number_text(allowed%low, unit) // ' to ' // number_text(allowed%high, unit)
+      if (allowed%excludes_low) text = '> ' // number_text(allowed%low, unit) // ' to ' // number_text(allowed%high, unit)
     else if (allowed%low > -huge(1.0_wp)) then
       text = '>= ' // number_text(allowed%low, unit)
       if (allowed%excludes_low) text = '> ' // number_text(allowed%low, unit)

@@ -248,7 +248,7 @@ contains
     f = self%machine%coordinates%freedoms
     associate (machine => self%machine, elements => self%machine%elements)
       call evaluate_at(self, self%lanes * f, self%lanes * self%internal, t, y)
-      if (self%joints%motions%count > 0) call self%find_accelerations(t(1), self%acceleration)
+      if (self%joints%motions%count + self%joints%teeth%count > 0) call self%find_accelerations(t(1), self%acceleration)
       call machine%differentiate_elements(t)
       if (self%joints%count > 0) then
         call self%differentiate_rows(self%acceleration)

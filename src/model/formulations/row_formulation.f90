@@ -228,7 +228,6 @@ contains
 
     associate (joints => self%joints, motions => self%joints%motions, elements => self%machine%elements)
       self%joints%teeth%held_load(:) = joints%teeth%load
-      self%joints%teeth%held_moment(:) = joints%moment(joints%teeth%joint)
       motions%held(:) = joints%moment(joints%locking + 1:)
       do i = 1, motions%count
         associate (driver => motions%driver(i))
@@ -289,12 +288,10 @@ contains
       end do
       if (self%joints%teeth%count > 0) then
         call self%hold(demand, accelerations, self%drag_derivative(column, unit))
-        call self%add_powers(powers)
-        if (column <= n .and. column > 0) call add_held_powers(self, unit, powers)
       else
         call self%hold(demand, accelerations)
-        call self%add_powers(powers)
       end if
+      call self%add_powers(powers)
     end associate
   end subroutine hold_column
 
@@ -336,22 +333,6 @@ contains
       end do
     end associate
   end function drag_derivative
-
-  !> Adds what the change of a speed does to the powers of teeth at their present moments.
-  subroutine add_held_powers(self, unit, powers)
-    class(row_formulation_t), intent(in) :: self
-    real(wp), intent(in) :: unit(:)         !! the speed that changes, [moving]
-    real(wp), intent(inout) :: powers(:)    !! [W s/rad], [quadratures]
-    integer :: i
-
-    associate (joints => self%joints, teeth => self%joints%teeth)
-      do i = 1, teeth%count
-        associate (k => self%work_of(teeth%joint(i)))
-          if (k > 0) powers(k) = powers(k) + teeth%held_moment(i) * self%element_rate(joints%element(teeth%joint(i)), unit)
-        end associate
-      end do
-    end associate
-  end subroutine add_held_powers
 
   !> Puts the state after a step back on the rows that move.
   subroutine project_state(self, lane, t, y)

@@ -27,8 +27,7 @@ module nocdyn_tooth_loads
     real(wp), allocatable :: load(:)            !! T [N m]
     real(wp), allocatable :: share(:)           !! s: the moment is -s T while the wheels turn
     real(wp), allocatable :: share_slope(:)     !! its derivative by the speed [s/rad]
-    ! for the derivatives of the accelerations:
-    real(wp), allocatable :: held_load(:), held_moment(:)   !! [N m]
+    real(wp), allocatable :: held_load(:)       !! T [N m], for the derivatives of the accelerations
   contains
     procedure :: find_coefficients
     procedure :: weigh
@@ -63,7 +62,7 @@ contains
     allocate (self%by_moment(self%count, merge(elements, 0, self%count > 0)), source=0.0_wp)
     allocate (self%by_joint(self%count, size(bank_of_joint)), source=0.0_wp)
     allocate (self%applied(self%count), source=0.0_wp)
-    allocate (self%load, self%share, self%share_slope, self%held_load, self%held_moment, source=self%applied)
+    allocate (self%load, self%share, self%share_slope, self%held_load, source=self%applied)
   end function new_tooth_loads
 
   !> Sets G at the start.

@@ -1,0 +1,329 @@
+"""Losses of teeth and bearings, and friction over the slip, against closed forms and other computations."""
+
+import random
+from math import exp, sin
+
+import numpy as np
+import pytest
+
+FORMULATIONS = ("reduced", "multiplier", "paper")
+END, STEP = 0.6, 2e-5  # of the computation by small steps [s]
+
+
+def run(nocdyn, text, *words):
+    outcome = nocdyn("run", nocdyn.write("machine.nml", text), "--out", "out", *words)
+    assert outcome.returncode == 0, outcome.stderr
+    header, rows = nocdyn.table("out")
+    return dict(zip(header, zip(*rows, strict=True), strict=True)), nocdyn.summary("out").get("joint_events", [])
+
+
+def column(table, name):
+    return np.array(next(values for key, values in table.items() if key.split(" ")[0] == name))
+
+
+def work(nocdyn, element):
+    return nocdyn.summary("out")["energy_account"]["work_in_J"][element]
+
+
+def body(name, inertia, speed=0.0, keys=""):
+    return f"&body name = '{name}' inertia = {inertia} speed = {speed} {keys} /\n"
+
+
+# Examples of the Modelica Standard Library, and values of the reference results that the Modelica Association publishes for them
+# (modelica/MAP-LIB_ReferenceResults): a column, the range of its values, and values at some times.
+LOSSY = body("one", 1) + body("two", 1.5)
+LOSSY += "&gear name = 'g' bodies = 'one', 'two' teeth = 20, 40 internal = .true. efficiency = 0.5 /\n"
+LOSSY += "&excitation name = 'drive' body = 'one' amplitude = 10 frequency_hz = 1 /\n"
+LOSSY += "&excitation name = 'load' body = 'two' kind = 'table' table_time = 0, 2 table_torque = -10, -5 /\n"
+BEARING = "&clutch name = 'bearing' bodies = 'one', 'ground' table_slip = 0, 1 table_capacity = 0.5, 1 /\n"
+STOPPING = "".join(body(name, 0.001, 10, "bearing_friction = 0.5") for name in ("one", "two"))
+STOPPING += "&gear name = 'g' bodies = 'one', 'two' teeth = 20, 20 internal = .true. efficiency = 0.25 /\n"
+STOPPING += "&excitation name = 'load' body = 'two' kind = 'step' amplitude = 1 time = 0.5 /\n"
+ONE_WAY = body("one", 1, -0.5) + body("two", 1)
+ONE_WAY += "&clutch name = 'c' bodies = 'one', 'two' capacity = 1.5 static_capacity = 37.5\n"
+ONE_WAY += "  times = 0.3, 0.95, 1.6 levels = 1, 0, 1 /\n&freewheel name = 'f' bodies = 'one', 'two' /\n"
+ONE_WAY += "&excitation name = 'drive' body = 'one' amplitude = 10 frequency_hz = 3 /\n"
+TIMES = [0.0005 * i for i in range(1001)]
+FRICTION = body("one", 1, 100) + body("two", 0.05, 90) + body("three", 1, 90)
+FRICTION += "&clutch name = 'c' bodies = 'one', 'two' capacity = 80 /\n"
+FRICTION += "&coupling name = 'spring' bodies = 'two', 'three' stiffness = 160 damping = 1 /\n"
+FRICTION += "&clutch name = 'brake' bodies = 'three', 'ground' capacity = 800 times = 0.5 levels = 1 /\n"
+FRICTION += "&excitation name = 'drive' body = 'one' kind = 'table' interpolation = 'cubic' table_file = 'drive.csv' /\n"
+EXAMPLES = {
+    "LossyGearDemo1": (LOSSY, 0.5, 0.0345436, [("omega_two", t, v) for t, v in (
+        (0.05, -0.019504331943), (0.15, 0.0), (0.19, 0.0), (0.25, 0.005698088537), (0.3, 0.013181180167),
+        (0.35, 0.008695024997), (0.4, 0.0), (0.5, -0.016261924039))]),
+    "LossyGearDemo2": (LOSSY + BEARING, 0.5, 0.0145020, [("omega_two", t, v) for t, v in (
+        (0.03, -0.013166462625), (0.06, -0.002760770102), (0.15, 0.0), (0.25, 0.000420504274), (0.28, 0.001298683914),
+        (0.3, 0.000746185083), (0.4, 0.0), (0.5, -0.009624278093))]),
+    "LossyGearDemo3": (STOPPING, 1.0, 10.0, [("omega_two", t, v) for t, v in (
+        (0.005, 7.5), (0.01, 5.0), (0.015, 2.5), (0.5, 0.0), (1.0, 0.0))]),
+    "OneWayClutch": (ONE_WAY, 2.0, 1.0610301, [("omega_one", t, v) for t, v in (
+        (0.05, -0.281313847701), (0.1, 0.097226621512), (0.2, 0.179201486136), (0.35, -0.679549652186),
+        (0.4, -0.263936877505), (0.6, -0.066703846843), (0.9, 0.097237703769), (1.2, 0.179211003301),
+        (1.4, -0.413916749451), (1.7, -0.529186127377), (2.0, -0.249978914237))]),
+    "Friction": (FRICTION, 3.0, 108.2986946, [("omega_one", t, v) for t, v in (
+        (0.05, 98.653133337), (0.2, 91.698091322), (0.4, 99.331948222), (0.6, 85.091243121), (0.8, 69.091243121),
+        (1.2, 37.091243121), (2.0, 4.449327642), (3.0, 2.289890999))]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_examples_of_modelica_move_as_published(nocdyn, example, formulation):
+    text, end, width, values = EXAMPLES[example]
+    rows = "\n".join(f"{t!r}, {200 * sin(100 * t)!r}" for t in TIMES)
+    nocdyn.write("drive.csv", rows + "\n0.500000001, 0\n")
+    text += f"&run t_end = {end} formulation = '{formulation}' rtol = 1e-8 atol = 1e-10 /\n&output interval = 0.005 /\n"
+    table, _ = run(nocdyn, text)
+    times = np.array(table["t [s]"])
+    for name, t, value in values:
+        assert column(table, name)[np.argmin(abs(times - t))] == pytest.approx(value, abs=1e-3 * width), (name, t)
+    assert abs(column(table, "energy_residual")).max() < 1e-5 * max(1.0, *column(table, "work_out"))
+
+
+def gear_pair(drive, keys, method="auto", formulation="reduced"):
+    text = body("one", 0.2) + body("two", 3.0) + f"&gear name = 'g' bodies = 'one', 'two' radii = 0.1, 0.3 {keys} /\n"
+    text += "".join(
+        f"&excitation name = 'e{b}' body = '{b}' kind = 'step' amplitude = {m} time = -1 /\n" for b, m in drive.items()
+    )
+    return text + f"&run t_end = 2 method = '{method}' formulation = '{formulation}' rtol = 1e-9 atol = 1e-11 /\n"
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("method", ["auto", "rk853", "rodas5p", "rodas4"])
+def test_the_driving_wheel_pays_for_the_loss(nocdyn, method, formulation):
+    # T = 0.1 F on the first wheel; it needs T / efficiency where it drives: 0.2 a = 6 - T / 0.8, 3 a / 3 = 3 T - 9 sign
+    text = gear_pair({"one": 6.0}, "efficiency = 0.8 reverse_efficiency = 0.6", method, formulation)
+    table, _ = run(nocdyn, text)
+    acceleration = 6.0 / (0.2 + 3.0 / 9.0 / 0.8)
+    assert column(table, "omega_one")[-1] == pytest.approx(2 * acceleration, rel=1e-9)
+    # where the second wheel drives the first one gets 0.6 of it: 0.2 a = 0.6 T, 3 a / 9 = 6 - T
+    table, _ = run(nocdyn, gear_pair({"two": 18.0}, "efficiency = 0.8 reverse_efficiency = 0.6", method, formulation))
+    acceleration = 6.0 / (3.0 / 9.0 + 0.2 / 0.6)
+    assert column(table, "omega_one")[-1] == pytest.approx(-2 * acceleration, rel=1e-9)
+    assert abs(column(table, "energy_residual")).max() < 1e-6 * column(table, "work_in")[-1]
+    lost = (1 / 0.6 - 1) * 0.5 * 0.2 * (2 * acceleration) ** 2
+    assert work(nocdyn, "loss g") == pytest.approx(-lost, rel=1e-6)
+
+
+def test_a_self_locking_gear_holds_what_its_second_wheel_bears(nocdyn):
+    table, events = run(nocdyn, gear_pair({"two": 18.0}, "efficiency = 0.4 reverse_efficiency = -0.1"))
+    assert max(abs(column(table, "omega_two"))) == 0.0 and events == []
+    assert column(table, "loss_g")[-1] == pytest.approx(6.0) and column(table, "reaction_g")[-1] == pytest.approx(-60.0)
+    # driven downwards by its first wheel, it brakes the second one: it gets -0.1 T: 0.2 a = 1 - 0.1 T, 3 a / 9 = 6 - T
+    table, events = run(nocdyn, gear_pair({"one": -1.0, "two": 18.0}, "efficiency = 0.4 reverse_efficiency = -0.1"))
+    acceleration = (1.0 - 0.1 * 6.0) / (0.2 - 0.1 * 3.0 / 9.0)
+    assert column(table, "omega_one")[-1] == pytest.approx(-2 * acceleration, rel=1e-9)
+    assert [event["to"] for event in events] in ([], ["slips ahead"])
+
+
+def test_teeth_that_jam_end_the_run_with_their_name(nocdyn):
+    text = body("one", 1e-5, 100) + body("two", 5, -10) + "&gear name = 'worm' bodies = 'one', 'two' teeth = 1, 10\n"
+    text += "  efficiency = 0.45 reverse_efficiency = -0.5 /\n"
+    text += "&excitation name = 'e' body = 'two' kind = 'step' amplitude = -100 time = 0.5 /\n&run t_end = 1 /\n"
+    outcome = nocdyn("run", nocdyn.write("jam.nml", text), "--out", "out")
+    assert outcome.returncode == 1
+    assert "beyond t = 0.5 s: the teeth of 'worm' jam: their second wheel brakes the first one" in outcome.stderr
+
+
+@pytest.mark.parametrize(("drive", "speed"), [("sun", 0.25 * (1 + 3 * 0.9)), ("carrier", 0.25 * (1 + 3 / 0.8))])
+def test_a_planetary_set_loses_by_the_motion_against_its_carrier(nocdyn, drive, speed):
+    # the torques on sun and carrier are 1 : 1 + 3 * 0.9 where the sun drives, 1 : 1 + 3 / 0.8 where the ring does
+    text = body("sun", 0.1) + body("carrier", 0.5)
+    text += "&planetary name = 'p' sun = 'sun' ring = 'ground' carrier = 'carrier' teeth = 20, 60\n"
+    text += "  efficiency = 0.9 reverse_efficiency = 0.8 /\n"
+    text += f"&excitation name = 'e' body = '{drive}' kind = 'step' amplitude = 10 time = 0 /\n"
+    text += f"&load name = 'l' body = '{'carrier' if drive == 'sun' else 'sun'}' viscous = 0.5 /\n&run t_end = 400 /\n"
+    table, _ = run(nocdyn, text, "--set", "output.interval=10")
+    # balance of the load and what arrives of 10 N m
+    arrives = 10 * 4 * speed if drive == "sun" else 10 / (4 * speed)
+    loaded = "carrier" if drive == "sun" else "sun"
+    assert column(table, f"omega_{loaded}")[-1] == pytest.approx(arrives / 0.5, rel=1e-6)
+
+
+def test_losses_follow_their_table_over_the_speed(nocdyn):
+    text = body("one", 0.2) + body("two", 3.0) + "&gear name = 'g' bodies = 'one', 'two' radii = 0.1, 0.3\n"
+    text += "  table_speed = 0, 20, 100 table_efficiency = 0.7, 0.9, 0.98 /\n"
+    text += "&excitation name = 'e' body = 'one' kind = 'step' amplitude = 6 time = 0 /\n&load name = 'l' body = 'two' viscous = 2 /\n"
+    text += "&run t_end = 60 METHOD rtol = 1e-9 atol = 1e-10 /\n&output interval = 0.1 /\n"
+    speeds = []
+    for method in ("rk853", "rodas5p"):
+        table, _ = run(nocdyn, text.replace("METHOD", f"method = '{method}'"))
+        speed, loss = column(table, "omega_one"), column(table, "loss_g")
+        arrives = -(3.0 * np.gradient(column(table, "omega_two"), 0.1) + 2 * column(table, "omega_two")) / 3
+        efficiency = np.interp(speed, [0, 20, 100], [0.7, 0.9, 0.98])
+        assert loss[5:-5] == pytest.approx((-arrives * (1 / efficiency - 1))[5:-5], rel=1e-2)
+        assert 18 * efficiency[-1] / 2 == pytest.approx(-column(table, "omega_two")[-1], rel=1e-6)
+        speeds.append(speed)
+    assert speeds[0] == pytest.approx(speeds[1], abs=1e-6)
+
+
+def test_an_elastic_mesh_loses_as_a_gear_does(nocdyn):
+    load = "&load name = 'l' body = 'two' viscous = 2 /\n&excitation name = 'e' body = 'one' kind = 'ramp' amplitude = 6 time = 0 duration = 1 /\n"
+    found = []
+    for group in ("gear name = 'g' radii = 0.1, 0.3", "mesh name = 'g' radii = 0.1, 0.3 stiffness = 1e8 damping = 1e5"):
+        text = body("one", 0.2) + body("two", 3.0) + f"&{group} bodies = 'one', 'two' efficiency = 0.9 /\n" + load
+        table, _ = run(nocdyn, text + "&run t_end = 5 rtol = 1e-8 atol = 1e-9 /\n&output interval = 0.5 /\n")
+        found.append((column(table, "omega_two"), work(nocdyn, "loss g")))
+    assert found[0][0] == pytest.approx(found[1][0], rel=1e-4, abs=1e-4)
+    assert found[0][1] == pytest.approx(found[1][1], rel=1e-3)
+
+
+def test_bearings_stop_a_body_and_hold_it(nocdyn):
+    text = (
+        body("one", 2, 10, "bearing_friction = 4")
+        + "&excitation name = 'e' body = 'one' kind = 'step' amplitude = 3.9 time = 6 /\n"
+    )
+    table, events = run(nocdyn, text + "&run t_end = 8 /\n&output interval = 1 /\n")
+    assert column(table, "phi_one")[-1] == pytest.approx(10 * 5 / 2, rel=1e-9)
+    assert [(event["joint"], event["to"]) for event in events] == [("bearing one", "locked")]
+    assert events[0]["time"] == pytest.approx(5, rel=1e-9) and column(table, "bearing_one")[-1] == pytest.approx(-3.9)
+    assert work(nocdyn, "bearing one") == pytest.approx(-100, rel=1e-9)
+
+
+@pytest.mark.parametrize("method", ["auto", "rodas5p"])
+def test_the_capacity_follows_its_table_over_the_slip(nocdyn, method):
+    # 2 slip' = -(10 + 5 slip) below 2 rad/s and -20 above: the slip is constant - 10 t, then goes to -2 by exp(-2.5 t)
+    text = body("one", 1, 12) + body("two", 1)
+    text += "&clutch name = 'c' bodies = 'one', 'two' table_slip = 0, 2 table_capacity = 10, 20 static_capacity = 15 /\n"
+    table, events = run(
+        nocdyn, text + f"&run t_end = 2 method = '{method}' rtol = 1e-10 atol = 1e-12 /\n&output interval = 0.05 /\n"
+    )
+    times, slip = np.array(table["t [s]"]), column(table, "slip_c")
+    kink = 10 / 40
+    expected = [12 - 40 * t if t < kink else max(0.0, 4 * exp(-10 * (t - kink)) - 2) for t in times]
+    assert slip == pytest.approx(expected, abs=1e-8)
+    assert events[0]["time"] == pytest.approx(kink + np.log(2) / 10, abs=1e-9)
+
+
+class LossyTrain:
+    """Random bodies with lossy gears, clutches, bearings and torques, and their motion by small steps with impulses."""
+
+    def __init__(self, seed):
+        chance = random.Random(1000 + seed)
+        self.inertia = [chance.uniform(0.5, 3) for _ in range(5)]
+        self.ratio = [chance.uniform(0.5, 2) for _ in range(2)]  # of the gears 0-1 and 2-3
+        self.efficiency = [(chance.uniform(0.6, 0.95), chance.uniform(0.3, 0.9)) for _ in range(2)]
+        first, third = chance.uniform(-5, 5), chance.uniform(-5, 5)
+        self.speed = [first, -first / self.ratio[0], third, -third / self.ratio[1], chance.uniform(-5, 5)]
+        self.torque = [(chance.uniform(5, 30), chance.uniform(5, 40)) for _ in range(5)]
+        self.clutches = [((1, 2), chance.uniform(3, 25)), ((3, 4), chance.uniform(3, 25)), ((4, -1), chance.uniform(1, 5))]
+
+    def text(self):
+        text = "".join(body(f"b{i}", j, v) for i, (j, v) in enumerate(zip(self.inertia, self.speed, strict=True)))
+        for i, (ratio, (forward, reverse)) in enumerate(zip(self.ratio, self.efficiency, strict=True)):
+            text += f"&gear name = 'g{i}' bodies = 'b{2 * i}', 'b{2 * i + 1}' radii = 1.0, {ratio!r}\n"
+            text += f"  efficiency = {forward!r} reverse_efficiency = {reverse!r} /\n"
+        for i, ((one, two), most) in enumerate(self.clutches):
+            other = f"b{two}" if two >= 0 else "ground"
+            text += f"&clutch name = 'c{i}' bodies = 'b{one}', '{other}' capacity = {most!r} /\n"
+        for i, (amplitude, frequency) in enumerate(self.torque):
+            text += f"&excitation name = 'e{i}' body = 'b{i}' amplitude = {amplitude!r} frequency = {frequency!r} /\n"
+        return text + f"&run t_end = {END} rtol = 1e-9 atol = 1e-11 /\n&output points = 11 /\n"
+
+    def stepped(self):
+        # rows of gears, of losses on their first wheels, and of clutches
+        rows = np.zeros((7, 5))
+        for i in range(2):
+            rows[i, 2 * i], rows[i, 2 * i + 1], rows[2 + i, 2 * i] = 1, self.ratio[i], 1
+        for i, ((one, two), _) in enumerate(self.clutches):
+            rows[4 + i, one] = -1
+            if two >= 0:
+                rows[4 + i, two] = 1
+        weight = rows / self.inertia @ rows.T
+        least = np.array([-np.inf] * 2 + [0.0] * 2 + [-STEP * most for _, most in self.clutches])
+        most = -least
+        shares = [(1 - 1 / forward, 1 - reverse) for forward, reverse in self.efficiency]
+        speed, impulse = np.array(self.speed), np.zeros(7)
+        for k in range(round(END / STEP)):
+            t = STEP * (k + 0.5)
+            push = np.array([amplitude * sin(frequency * t) for amplitude, frequency in self.torque])
+            speed = speed + STEP * push / self.inertia
+            slips = rows @ speed
+            for _ in range(300):
+                before = impulse.copy()
+                for i in range(7):
+                    wanted = impulse[i] - (slips[i] + weight[i] @ impulse) / weight[i, i]
+                    if i in (2, 3):  # -s T, with the share s between those of both directions of the power
+                        bounds = [-share * impulse[i - 2] for share in shares[i - 2]]
+                        least[i], most[i] = min(bounds), max(bounds)
+                    impulse[i] = min(max(wanted, least[i]), most[i])
+                if abs(impulse - before).max() < 1e-11:
+                    break
+            speed = speed + rows.T @ impulse / self.inertia
+        return speed
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_trains_with_losses_move_as_small_steps_say(nocdyn, seed):
+    train = LossyTrain(seed)
+    table, events = run(nocdyn, train.text())
+    assert events
+    speeds = [column(table, f"omega_b{i}")[-1] for i in range(5)]
+    assert speeds == pytest.approx(train.stepped(), abs=100 * STEP * max(t[0] / j for t, j in zip(train.torque, train.inertia)))
+    assert max(abs(column(table, "energy_residual"))) < 1e-6
+    for formulation in FORMULATIONS[1:]:
+        table, _ = run(nocdyn, train.text(), "--set", f"run.formulation={formulation}")
+        assert [column(table, f"omega_b{i}")[-1] for i in range(5)] == pytest.approx(speeds, abs=1e-7)
+
+
+def test_a_sweep_over_the_efficiency_is_its_runs(nocdyn):
+    text = gear_pair({"one": 6.0}, "efficiency = 0.9") + "&load name = 'l' body = 'two' viscous = 2 /\n"
+    text += "&sweep design = 'grid' /\n&vary target = 'gear.g.efficiency' low = 0.8 high = 1 count = 3 /\n"
+    text += "&record quantity = 'omega_two' statistic = 'final' /\n"
+    outcome = nocdyn("sweep", nocdyn.write("sweep.nml", text), "--out", "all", "--csv")
+    assert outcome.returncode == 0, outcome.stderr
+    lines = [line.split(",") for line in (nocdyn.folder / "all/sweep.csv").read_text().splitlines() if line[:1].isdigit()]
+    assert len(lines) == 3
+    for line in lines:
+        table, _ = run(nocdyn, text, "--set", f"gear.g.efficiency={line[1]}")
+        assert float(line[2]) == pytest.approx(column(table, "omega_two")[-1], rel=1e-8)
+
+
+GEAR = "&gear name = 'g' bodies = 'one', 'two' teeth = 20, 40 {} /\n"
+
+
+@pytest.mark.parametrize(
+    ("group", "words"),
+    [
+        (GEAR.format("efficiency = 1.1"), "efficiency = 1.1 is out of range; allowed: > 0 to 1"),
+        (GEAR.format("efficiency = 0"), "efficiency = 0 is out of range"),
+        (GEAR.format("reverse_efficiency = 0.5"), "reverse_efficiency needs efficiency"),
+        (GEAR.format("efficiency = 0.9 table_speed = 0, 1 table_efficiency = 1, 1"), "efficiency and table_speed are both given"),
+        (GEAR.format("table_speed = 1, 2 table_efficiency = 0.9, 1"), "table_speed begins with 1; allowed: 0 [rad/s] first"),
+        (
+            GEAR.format("table_speed = 0, 2 table_efficiency = 0.9, 1 table_reverse = 0.5, 0.6, 0.7"),
+            "table_reverse has 3 values; needed: 2, as table_speed",
+        ),
+        (GEAR.replace("'one', 'two'", "'ground', 'two'").format("efficiency = 0.9"), "'ground' is the first wheel"),
+        (
+            "&clutch name = 'c' bodies = 'one', 'two' table_slip = 1, 2 table_capacity = 3, 4 /\n",
+            "table_slip begins with 1; allowed: 0 [rad/s] first",
+        ),
+        (
+            "&clutch name = 'c' bodies = 'one', 'two' capacity = 4 interpolation = 'cubic' /\n",
+            "interpolation needs table_time or table_slip",
+        ),
+        (
+            "&body name = 'three' inertia = 1 bearing_friction = -1 /\n",
+            "bearing_friction = -1 is out of range; allowed: >= 0 [N m]",
+        ),
+    ],
+)
+def test_bad_losses_are_refused(nocdyn, group, words):
+    text = body("one", 1) + body("two", 1) + group + "&run t_end = 1 /\n"
+    outcome = nocdyn("check", nocdyn.write("bad.nml", text))
+    assert outcome.returncode == 2
+    assert "bad.nml:3: &" in outcome.stderr and words in outcome.stderr
+
+
+def test_analyses_about_a_steady_state_leave_losses_out_and_say_so(nocdyn):
+    text = body("one", 0.2) + body("two", 3.0, 0, "bearing_friction = 1") + GEAR.format("efficiency = 0.9")
+    text += "&excitation name = 'e' body = 'one' kind = 'step' amplitude = 6 time = 0 /\n&load name = 'l' body = 'two' viscous = 2 /\n"
+    path = nocdyn.write("steady.nml", text + "&run t_end = 1 start = 'equilibrium' /\n")
+    outcome = nocdyn("equilibrium", path)
+    assert outcome.returncode == 0 and "note: the losses of gear 'g' are left out" in outcome.stdout
+    outcome = nocdyn("run", path, "--out", "out")
+    assert outcome.returncode == 0, outcome.stderr
+    assert "the balance at the start leaves out the losses of body 'two', gear 'g'" in outcome.stdout
