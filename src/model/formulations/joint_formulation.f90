@@ -144,8 +144,29 @@ contains
       call settle_at_event(self, self%joints%joint_of(which), t, y)
     else
       call choose_branch(self, lane, which, t, y)
+      call engage_at_rest(self, findloc(self%joints%element, self%machine%switches%element(which), dim=1), t, y)
     end if
   end subroutine change_with_joints
+
+  !> Decides anew which joints are locked where the engagement of one changes that others hold at rest.
+  subroutine engage_at_rest(self, joint, t, y)
+    class(joint_formulation_t), intent(inout) :: self
+    integer, intent(in) :: joint                  !! 0: none
+    real(wp), intent(in) :: t                     !! [s]
+    real(wp), contiguous, intent(inout) :: y(:)   !! state, [states + quadratures]
+
+    if (joint == 0) return
+    if (self%joints%mode(joint) == locked) return
+    if (abs(self%joint_rate(joint, y)) <= rest_width * speed_scale(self, y)) call settle_at_event(self, joint, t, y)
+  end subroutine engage_at_rest
+
+  !> The speed by which slips that are none are measured [rad/s].
+  pure real(wp) function speed_scale(self, y)
+    class(joint_formulation_t), intent(in) :: self
+    real(wp), intent(in) :: y(:)   !! [states] at least
+
+    speed_scale = max(1.0_wp, maxval(abs(y(:size(self%moving)))))
+  end function speed_scale
 
   !> Decides which joints are locked at a state of a block of one lane: of those that are at rest, the one that has just come to
   !> rest or reached its capacity among them. Slips that are left over from rounding are taken out of the speeds.
@@ -160,7 +181,7 @@ contains
 
     associate (joints => self%joints, elements => self%machine%elements)
       if (joints%motions%count > 0) call self%project(t, y)
-      speed = max(1.0_wp, maxval(abs(y(:size(self%moving)))))
+      speed = speed_scale(self, y)
       is_struck = .false.
       if (which /= by_state) call strike(self, t, rest_width * speed, y, is_struck)
       do j = 1, joints%count
