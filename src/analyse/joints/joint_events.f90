@@ -2,7 +2,7 @@
 module nocdyn_joint_events
   use nocdyn_bank, only: bank_of, role_names
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_friction_joints, only: direction_of, locked
+  use nocdyn_friction_joints, only: direction_of, idle, locked
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   implicit none (type, external)
@@ -78,6 +78,7 @@ contains
       word = 'slips ahead'
     case default
       word = 'locked'
+      if (mode == idle) word = 'open'
     end select
   end function mode_word
 

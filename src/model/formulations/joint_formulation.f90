@@ -1,7 +1,7 @@
 !> Formulations with joints that lock: clutches and freewheels (`nocdyn_joint_sets`), in a block of one lane.
 module nocdyn_joint_formulation
   use nocdyn_formulation, only: choose_branch, indicate_branch, observe_elements, start_branches
-  use nocdyn_friction_joints, only: locked
+  use nocdyn_friction_joints, only: idle, locked
   use nocdyn_joint_sets, only: boundary_shift, rest_width
   use nocdyn_kinds, only: wp
   use nocdyn_row_formulation, only: row_formulation_t
@@ -195,6 +195,7 @@ contains
       call joints%decide(self%machine%banks, t, is_at_rest, slip, is_solved)
       do j = 1, joints%count
         if (is_at_rest(j) .and. joints%mode(j) /= locked) joints%shift(j) = boundary_shift * speed
+        if (joints%mode(j) == idle) joints%shift(j) = rest_width * speed
       end do
       moments = sum(abs(elements%applied(1, :))) + sum(abs(elements%restoring(1, :)))
       joints%moment_shift = boundary_shift * max(moments, tiny(moments))

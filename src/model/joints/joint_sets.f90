@@ -6,7 +6,8 @@
 module nocdyn_joint_sets
   use nocdyn_bank, only: bank_slot_t
   use nocdyn_bounded_complementarity, only: at_upper, is_free, solve_bounded_complementarity
-  use nocdyn_friction_joints, only: direction_of, first_wheel_drives, friction_joints_t, locked, slips_backwards, slips_forwards
+  use nocdyn_friction_joints, only: direction_of, first_wheel_drives, friction_joints_t, idle, locked, slips_backwards, &
+    slips_forwards
   use nocdyn_held_rows, only: held_rows_t
   use nocdyn_joint_choices, only: joint_choices_t
   use nocdyn_kinds, only: wp
@@ -181,6 +182,9 @@ contains
       call decide_resting(self, banks, t, resting, is_solved)
     end if
     do i = 1, self%locking
+      if (is_at_rest(i)) then
+        if (self%is_open(banks, i, t)) call rest_idly(self, i)
+      end if
       call set_mode(self, banks, i)
     end do
     call self%change_set()
@@ -220,6 +224,18 @@ contains
     if (.not. is_solved) self%lost = findloc(is_wrong, .true., dim=1)
   end subroutine find_impact
 
+  !> Sets the mode of an open joint at rest that does not begin to slip.
+  subroutine rest_idly(self, joint)
+    class(joint_sets_t), intent(inout) :: self
+    integer, intent(in) :: joint
+    real(wp), parameter :: rounding = 1.0e-12_wp
+
+    if (self%has_teeth(joint)) return
+    associate (parts => self%weight(joint, :) * self%moment, rate => self%rate(joint))
+      if (abs(rate + sum(parts)) <= rounding * (abs(rate) + sum(abs(parts)))) self%mode(joint) = idle
+    end associate
+  end subroutine rest_idly
+
   !> Decides the modes of the joints at rest: whenever some slip, the others are looked at again.
   subroutine decide_resting(self, banks, t, resting, is_solved)
     class(joint_sets_t), intent(inout) :: self
@@ -236,6 +252,7 @@ contains
       call find_ranges(self, banks, resting(i), t, least(i), most(i), sliding(:, i))
     end do
     self%mode(resting) = locked
+    self%moment(:) = 0.0_wp
     has_changed = .true.
     do while (has_changed)
       has_changed = .false.
@@ -253,6 +270,7 @@ contains
         least(i) = most(i)
       end do
     end do
+    self%moment(resting) = x
   end subroutine decide_resting
 
   !> The same where some are teeth with losses: which of their wheels drives is decided even where they turn.
@@ -291,6 +309,7 @@ contains
     end do
     call choices%choose()
     self%mode(:) = choices%mode
+    self%moment(:) = choices%moment
     is_solved = choices%doubtful == 0
     if (.not. is_solved) self%lost = choices%doubtful
   end subroutine decide_with_teeth
@@ -360,6 +379,8 @@ contains
     associate (mode => self%mode(joint), moment => self%moment(joint))
       if (mode == locked) then
         g = min(most - moment, moment - least) + self%moment_shift
+      else if (mode == idle) then
+        g = self%shift(joint) - abs(slip)
       else
         g = direction_of(mode) * slip + self%shift(joint)
         if (mode == slips_forwards .and. is_unbounded(least)) g = -1.0_wp   ! there is no such slip

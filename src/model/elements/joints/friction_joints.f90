@@ -28,8 +28,9 @@ module nocdyn_friction_joints
   public :: new_friction_joints, first_wheel_drives, direction_of
 
   integer, parameter, public :: locked = 1, slips_forwards = 2, slips_backwards = 3   !! modes
-  !> Modes of teeth with losses whose first wheel drives; in those above the second one does.
-  integer, parameter, public :: driven_forwards = 4, driven_backwards = 5
+  integer, parameter, public :: idle = 4   !! mode of a joint without a moment whose slip is held at zero by others
+  !> Modes of teeth with losses whose first wheel drives; where it is driven they are `slips_...`.
+  integer, parameter, public :: driven_forwards = 5, driven_backwards = 6
 
   !> The ranges of the moments of joints with full engagement [N m], shape [lanes, joints] all. Those at rest may be huge.
   type, public :: joint_ranges_t
@@ -59,7 +60,7 @@ contains
     first_wheel_drives = mode == driven_forwards .or. mode == driven_backwards
   end function first_wheel_drives
 
-  !> The sign of the slip u', 0 of a locked joint.
+  !> The sign of the slip u', 0 where there is none.
   elemental integer function direction_of(mode)
     integer, intent(in) :: mode
 
@@ -114,7 +115,7 @@ contains
       moment = friction_over_slip(self, tape)
     else
       moment = pick(self%mode_switch, [literal(tape, 0.0_wp), self%parameter(tape, 'sliding least'), &
-                                       self%parameter(tape, 'sliding most')])
+                                       self%parameter(tape, 'sliding most'), literal(tape, 0.0_wp)])
     end if
     if (allocated(self%curve)) then
       moment = moment * curve_value(tape, time_of(tape))
@@ -132,11 +133,11 @@ contains
     integer :: k, switch
 
     switch = self%mode_switch + 1
-    slip = pick(self%mode_switch, [literal(tape, 0.0_wp), literal(tape, 1.0_wp), literal(tape, -1.0_wp)]) * speed_of(tape)
+    slip = pick(self%mode_switch, by_direction(1.0_wp)) * speed_of(tape)
     distance = slip - part(segment_origin)
     moment = part(segment_value) + distance * (part(segment_slope) + distance * (part(segment_half_curvature) &
                                                                                  + part(segment_cubic) * distance))
-    moment = pick(self%mode_switch, [literal(tape, 0.0_wp), literal(tape, -1.0_wp), literal(tape, 1.0_wp)]) * moment
+    moment = pick(self%mode_switch, by_direction(-1.0_wp)) * moment
     square = speed_of(tape) * speed_of(tape)   ! as guards have no picks
     do k = 1, self%over_slip%points()
       edge = self%over_slip%segment_number(k, segment_begin)
@@ -154,6 +155,17 @@ contains
 
       part = pick(switch, [(literal(tape, self%over_slip%segment_number(i, which)), i=1, self%over_slip%points())])
     end function part
+
+    !> A number by the mode, its opposite where the joint slips backwards.
+    function by_direction(number) result(choices)
+      real(wp), intent(in) :: number
+      type(expression_t) :: choices(idle)
+
+      choices(locked) = literal(tape, 0.0_wp)
+      choices(slips_forwards) = literal(tape, number)
+      choices(slips_backwards) = literal(tape, -number)
+      choices(idle) = literal(tape, 0.0_wp)
+    end function by_direction
 
   end function friction_over_slip
 
