@@ -920,6 +920,65 @@ def hybrid():
     }
 
 
+def winch():
+    """Angles of motor and load; mode: the direction of the motor and whether it drives the worm, (0, None) at rest."""
+    m = example("winch")
+    j, worm, rope = {name: m.inertia(name) for name in m.body}, m.gear["worm"], m.coupling["rope"]
+    ratio = worm["teeth"][1] / worm["teeth"][0]
+    share = {True: 1 / worm["efficiency"], False: worm["reverse_efficiency"]}  # of the torque of the teeth, for the motor
+    drive = m.excitation["drive"]
+    table = Curve((np.array(drive["table_time"]), drive["table_torque"]))
+    switches, levels = m.clutch["brake"]["times"], m.clutch["brake"]["levels"]
+
+    def friction(t):
+        """Of brake and bearing."""
+        level = [level for time, level in zip(switches, levels) if time <= t][-1]
+        return level * m.clutch["brake"]["capacity"] + m.body["motor"]["bearing_friction"]
+
+    def moment(y):
+        return rope["stiffness"] * (y[1] - y[0] / ratio) + rope["damping"] * (y[3] - y[2] / ratio)
+
+    def torque(t, y, middle):
+        return table(table.segment(middle), t) - m.load["fan"]["viscous"] * y[2]
+
+    def turn(t, y, mode, middle):
+        """The acceleration of the motor."""
+        if mode[0] == 0:
+            return 0.0
+        part = share[mode[1]]
+        total = torque(t, y, middle) - mode[0] * friction(middle) + part * moment(y) / ratio
+        return total / (j["motor"] + part * j["drum"] / ratio**2)
+
+    def teeth(t, y, mode, middle):
+        return (moment(y) - j["drum"] * turn(t, y, mode, middle) / ratio) / ratio
+
+    def rate(t, y, mode, middle):
+        return [y[2], y[3], turn(t, y, mode, middle), (m.excitation["weight"]["amplitude"] - moment(y)) / j["load"]]
+
+    def borders(mode):
+        direction, drives = mode
+        if direction == 0:
+            yield lambda t, y: friction(t) - torque(t, y, t) - min(s * moment(y) / ratio for s in share.values()), (1, True)
+            yield lambda t, y: friction(t) + torque(t, y, t) + max(s * moment(y) / ratio for s in share.values()), (-1, False)
+        else:
+            sign = -direction if drives else direction
+            yield lambda t, y: direction * y[2], (0, None)
+            yield lambda t, y: sign * teeth(t, y, mode, t), (direction, not drives)
+
+    start = [*m.start("angle", "motor", "load"), 0.0, 0.0]
+    motion = motion_of(rate, start, m.end(), (0, None), borders, sorted({*drive["table_time"], *switches}))
+    y = motion.at(m.end())
+    return {
+        "phi_motor [rad]": y[0],
+        "phi_load [rad]": y[1],
+        "omega_load [rad/s]": y[3],
+        "reaction_worm [N m]": moment(y) / ratio,
+        "max omega_motor [rad/s]": motion.largest(lambda t, y, mode: y[2]),
+        "min omega_motor [rad/s]": motion.largest(lambda t, y, mode: y[2], sign=-1),
+        "min moment_rope [N m]": motion.largest(lambda t, y, mode: rope["stiffness"] * (y[1] - y[0] / ratio), sign=-1),
+    }
+
+
 def natural_frequencies(inertia, stiffness):
     """[Hz], without damping and without the rigid motion."""
     return np.sqrt(eigh(stiffness, inertia, eigvals_only=True)[1:]) / (2 * np.pi)
@@ -1004,6 +1063,7 @@ EXAMPLE_MACHINES = (
     car_driveline,
     compressor,
     hybrid,
+    winch,
     motor_coupling_gear,
     kloss_run_up,
     fan_law,

@@ -161,6 +161,15 @@ REFERENCE = {
         "max omega_generator [rad/s]": 289.0991356051,
         "min torque_backstop [N m]": -117.6780076685,
     },
+    "winch": {
+        "phi_motor [rad]": 69.10943652354,
+        "phi_load [rad]": 1.695035911651,
+        "omega_load [rad/s]": 1.098700476553e-08,
+        "reaction_worm [N m]": -18.39375076743,
+        "max omega_motor [rad/s]": 113.942806202,
+        "min omega_motor [rad/s]": -97.90514133125,
+        "min moment_rope [N m]": -860.2101992471,
+    },
     "motor_coupling_gear": {
         "phi_motor [rad]": 56.47598491122,
         "phi_wheel [rad]": 14.11521985167,

@@ -21,6 +21,9 @@ def column(table, name):
     return np.array(next(values for key, values in table.items() if key.split(" ")[0] == name))
 
 
+LOAD = "&load name = 'l' body = 'two' viscous = 2 /\n"
+
+
 def work(nocdyn, element):
     return nocdyn.summary("out")["energy_account"]["work_in_J"][element]
 
@@ -111,11 +114,22 @@ def test_a_self_locking_gear_holds_what_its_second_wheel_bears(nocdyn):
     table, events = run(nocdyn, gear_pair({"two": 18.0}, "efficiency = 0.4 reverse_efficiency = -0.1"))
     assert max(abs(column(table, "omega_two"))) == 0.0 and events == []
     assert column(table, "loss_g")[-1] == pytest.approx(6.0) and column(table, "reaction_g")[-1] == pytest.approx(-60.0)
+    notes = nocdyn.summary("out")["machine"]["notes"]
+    assert notes == ["the teeth of 'g' are self-locking: their second wheel cannot drive"]
     # driven downwards by its first wheel, it brakes the second one: it gets -0.1 T: 0.2 a = 1 - 0.1 T, 3 a / 9 = 6 - T
     table, events = run(nocdyn, gear_pair({"one": -1.0, "two": 18.0}, "efficiency = 0.4 reverse_efficiency = -0.1"))
     acceleration = (1.0 - 0.1 * 6.0) / (0.2 - 0.1 * 3.0 / 9.0)
     assert column(table, "omega_one")[-1] == pytest.approx(-2 * acceleration, rel=1e-9)
     assert [event["to"] for event in events] in ([], ["slips ahead"])
+
+
+def test_a_brake_that_closes_at_rest_shares_what_a_worm_holds(nocdyn):
+    text = gear_pair({"two": 18.0}, "efficiency = 0.4 reverse_efficiency = -0.1")
+    text += "&clutch name = 'brake' bodies = 'one', 'ground' capacity = 20 times = 1 levels = 1 /\n&output interval = 0.25 /\n"
+    table, events = run(nocdyn, text)
+    torque, times = column(table, "torque_brake"), np.array(table["t [s]"])
+    assert not any(torque[times < 1]) and torque[-1] == pytest.approx(-3.0) and min(torque) == pytest.approx(-3.0)
+    assert [(event["joint"], event["from"], event["to"]) for event in events] == [("clutch brake", "open", "locked")]
 
 
 def test_teeth_that_jam_end_the_run_with_their_name(nocdyn):
@@ -145,7 +159,7 @@ def test_a_planetary_set_loses_by_the_motion_against_its_carrier(nocdyn, drive, 
 def test_losses_follow_their_table_over_the_speed(nocdyn):
     text = body("one", 0.2) + body("two", 3.0) + "&gear name = 'g' bodies = 'one', 'two' radii = 0.1, 0.3\n"
     text += "  table_speed = 0, 20, 100 table_efficiency = 0.7, 0.9, 0.98 /\n"
-    text += "&excitation name = 'e' body = 'one' kind = 'step' amplitude = 6 time = 0 /\n&load name = 'l' body = 'two' viscous = 2 /\n"
+    text += "&excitation name = 'e' body = 'one' kind = 'step' amplitude = 6 time = 0 /\n" + LOAD
     text += "&run t_end = 60 METHOD rtol = 1e-9 atol = 1e-10 /\n&output interval = 0.1 /\n"
     speeds = []
     for method in ("rk853", "rodas5p"):
@@ -160,7 +174,7 @@ def test_losses_follow_their_table_over_the_speed(nocdyn):
 
 
 def test_an_elastic_mesh_loses_as_a_gear_does(nocdyn):
-    load = "&load name = 'l' body = 'two' viscous = 2 /\n&excitation name = 'e' body = 'one' kind = 'ramp' amplitude = 6 time = 0 duration = 1 /\n"
+    load = LOAD + "&excitation name = 'e' body = 'one' kind = 'ramp' amplitude = 6 time = 0 duration = 1 /\n"
     found = []
     for group in ("gear name = 'g' radii = 0.1, 0.3", "mesh name = 'g' radii = 0.1, 0.3 stiffness = 1e8 damping = 1e5"):
         text = body("one", 0.2) + body("two", 3.0) + f"&{group} bodies = 'one', 'two' efficiency = 0.9 /\n" + load
@@ -320,7 +334,7 @@ def test_bad_losses_are_refused(nocdyn, group, words):
 
 def test_analyses_about_a_steady_state_leave_losses_out_and_say_so(nocdyn):
     text = body("one", 0.2) + body("two", 3.0, 0, "bearing_friction = 1") + GEAR.format("efficiency = 0.9")
-    text += "&excitation name = 'e' body = 'one' kind = 'step' amplitude = 6 time = 0 /\n&load name = 'l' body = 'two' viscous = 2 /\n"
+    text += "&excitation name = 'e' body = 'one' kind = 'step' amplitude = 6 time = 0 /\n" + LOAD
     path = nocdyn.write("steady.nml", text + "&run t_end = 1 start = 'equilibrium' /\n")
     outcome = nocdyn("equilibrium", path)
     assert outcome.returncode == 0 and "note: the losses of gear 'g' are left out" in outcome.stdout

@@ -7,6 +7,7 @@ module nocdyn_machine_report
   use nocdyn_rigid_trains, only: ratio_tolerance
   use nocdyn_text, only: append, counted, joined, quoted, rounded_text, selected, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
+  use nocdyn_tooth_losses, only: tooth_losses_t
   implicit none (type, external)
   private
 
@@ -29,11 +30,29 @@ contains
     call add_redundancy_notes(machine, notes)
     if (allocated(machine%start_impulse)) call add_impulse_note(machine, notes)
     call add_loose_note(machine, notes)
+    call add_self_locking_notes(machine, notes)
     if (.not. allocated(machine%start_notes)) return
     do i = 1, size(machine%start_notes)
       call append(notes, machine%start_notes(i)%text)
     end do
   end function machine_notes
+
+  !> Names teeth that no torque on their second wheel alone can move.
+  subroutine add_self_locking_notes(machine, notes)
+    type(machine_t), intent(in) :: machine
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    integer :: b, e
+
+    do b = 1, size(machine%banks)
+      select type (bank => machine%banks(b)%bank)
+      class is (tooth_losses_t)
+        do e = 1, bank%count
+          if (bank%is_self_locking(e)) call append(notes, 'the teeth of ' // quoted(bank%names(e)%text) // &
+                                                   ' are self-locking: their second wheel cannot drive')
+        end do
+      end select
+    end do
+  end subroutine add_self_locking_notes
 
   subroutine add_redundancy_notes(machine, notes)
     type(machine_t), intent(in) :: machine

@@ -28,9 +28,9 @@ contains
     type(named_event_t), allocatable, intent(out) :: events(:)
     integer :: i
 
-    allocate (events(formulation%joints%happened))
+    allocate (events(formulation%joints%log%count))
     do i = 1, size(events)
-      associate (event => formulation%joints%events(i), machine => formulation%machine)
+      associate (event => formulation%joints%log%event(i), machine => formulation%machine)
         associate (element => formulation%joints%element(event%joint))
           events(i)%joint = trim(role_names(machine%banks(bank_of(machine%banks, element))%bank%role)) // ' ' // &
                             machine%element_name(element)

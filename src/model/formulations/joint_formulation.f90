@@ -151,7 +151,7 @@ contains
   !> Decides anew which joints are locked where the engagement of one changes that others hold at rest.
   subroutine engage_at_rest(self, joint, t, y)
     class(joint_formulation_t), intent(inout) :: self
-    integer, intent(in) :: joint                  !! 0: none
+    integer, intent(in) :: joint                  !! one of them; nothing happens if it is 0
     real(wp), intent(in) :: t                     !! [s]
     real(wp), contiguous, intent(inout) :: y(:)   !! state, [states + quadratures]
 

@@ -329,7 +329,8 @@ contains
       drag = teeth%share * drag
       if (column == 0 .or. column > n) return
       do i = 1, teeth%count
-        drag(i) = drag(i) + teeth%share_slope(i) * teeth%held_load(i) * self%element_rate(self%joints%element(teeth%joint(i)), unit)
+        e = self%joints%element(teeth%joint(i))
+        drag(i) = drag(i) + teeth%share_slope(i) * teeth%held_load(i) * self%element_rate(e, unit)
       end do
     end associate
   end function drag_derivative

@@ -49,7 +49,7 @@ module nocdyn_held_rows
     ! where there are teeth with losses:
     logical, private :: has_factors = .false.      !! whether they are those of the present modes, slopes and shares
     real(wp), allocatable, private :: with_teeth(:, :)    !! equations of all moments
-    real(wp), allocatable, private :: factors(:, :), inverse(:, :)   !! their LU factors; their pseudoinverse if these are singular
+    real(wp), allocatable, private :: factors(:, :), inverse(:, :)   !! LU factors; a pseudoinverse if they are singular
     real(wp), allocatable, private :: share(:)            !! of the factors, [losses]
     integer, allocatable, private :: pivots(:)
   contains

@@ -6,8 +6,8 @@
 !> at a time, that of least index (K. G. Murty, Linear Complementarity, Linear and Nonlinear Programming, 1988, chapter 4), and
 !> at last all combinations are tried where there are few.
 module nocdyn_joint_choices
-  use nocdyn_friction_joints, only: direction_of, driven_backwards, driven_forwards, first_wheel_drives, locked, slips_backwards, &
-    slips_forwards
+  use nocdyn_friction_joints, only: direction_of, driven_backwards, driven_forwards, first_wheel_drives, locked, &
+    slips_backwards, slips_forwards
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pseudo_inverse
   use nocdyn_semidefinite, only: null_tolerance

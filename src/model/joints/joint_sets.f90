@@ -10,6 +10,7 @@ module nocdyn_joint_sets
     slips_forwards
   use nocdyn_held_rows, only: held_rows_t
   use nocdyn_joint_choices, only: joint_choices_t
+  use nocdyn_joint_log, only: joint_event_t, joint_log_t, new_joint_log
   use nocdyn_kinds, only: wp
   use nocdyn_row_motions, only: new_row_motions
   use nocdyn_switches, only: switches_t
@@ -23,16 +24,6 @@ module nocdyn_joint_sets
   real(wp), parameter, public :: rest_width = 1.0e-10_wp      !! a slip below it is none, relative to the speeds
   real(wp), parameter, public :: boundary_shift = 1.0e-12_wp  !! shift of boundaries outwards, relative to speeds or moments
 
-  !> A joint that has locked or begun to slip.
-  type, public :: joint_event_t
-    real(wp) :: time = 0.0_wp     !! [s]
-    integer :: joint = 0
-    integer :: from = 0, to = 0   !! modes
-    real(wp) :: slip = 0.0_wp     !! speed of the first body less that of the second before it [rad/s]
-    real(wp) :: torque = 0.0_wp   !! moment after it [N m]
-    real(wp) :: impulse = 0.0_wp  !! of an impact [N m s]
-  end type joint_event_t
-
   type, extends(held_rows_t), public :: joint_sets_t
     integer, allocatable :: bank(:), number(:)   !! bank of each joint, and its number there, [joints] as all that follow
     integer, allocatable :: joint_of(:)      !! joint of each switch of the machine, 0 for none, [switches]
@@ -40,8 +31,7 @@ module nocdyn_joint_sets
     real(wp), allocatable :: impulse(:)      !! of the last impact [N m s]; 0 after other events
     real(wp), allocatable :: shift(:)        !! by which the boundary of a slip lies beyond zero [rad/s]
     real(wp) :: moment_shift = 0.0_wp        !! by which those of the moments lie beyond their ranges [N m]
-    type(joint_event_t), allocatable :: events(:)   !! the first `happened` are in use
-    integer :: happened = 0
+    type(joint_log_t) :: log                 !! of the motion
   contains
     procedure :: start
     procedure :: assume
@@ -91,7 +81,7 @@ contains
     self%teeth = new_tooth_loads(banks, self%bank, self%number, elements)
     call self%allocate_rows(slips_forwards)
     allocate (self%shift(self%count), self%impulse(self%count), source=0.0_wp)
-    allocate (self%events(16))
+    self%log = new_joint_log()
   end function new_joint_sets
 
   !> Forgets sets and events, before a motion that may have other parameters.
@@ -99,7 +89,7 @@ contains
     class(joint_sets_t), intent(inout) :: self
 
     call self%forget_sets()
-    self%happened = 0
+    self%log%count = 0
   end subroutine start
 
   !> Takes the modes of the motion that is observed.
@@ -354,15 +344,8 @@ contains
     integer, intent(in) :: joint, from
     real(wp), intent(in) :: slip      !! u' before [rad/s]
     real(wp), intent(in) :: impulse   !! [N m s]
-    type(joint_event_t), allocatable :: longer(:)
 
-    if (self%happened == size(self%events)) then
-      allocate (longer(2 * self%happened))
-      longer(:self%happened) = self%events
-      call move_alloc(longer, self%events)
-    end if
-    self%happened = self%happened + 1
-    self%events(self%happened) = joint_event_t(t, joint, from, self%mode(joint), 0.0_wp - slip, self%moment(joint), impulse)
+    call self%log%add(joint_event_t(t, joint, from, self%mode(joint), 0.0_wp - slip, self%moment(joint), impulse))
   end subroutine note
 
   !> Positive in the present mode of a joint: its slip, or how far its moment is inside the range [N m]. Teeth that turn change

@@ -25,7 +25,7 @@ module nocdyn_tooth_loads
     real(wp), allocatable :: by_joint(:, :)     !! V: T by the moments of the joints at the present slopes, [losses, joints]
     real(wp), allocatable :: applied(:)         !! T without the moments of the joints that hold and the losses [N m]
     real(wp), allocatable :: load(:)            !! T [N m]
-    real(wp), allocatable :: share(:)           !! s: the moment is -s T while the wheels turn
+    real(wp), allocatable :: share(:)           !! share s of T that is lost while the wheels turn
     real(wp), allocatable :: share_slope(:)     !! its derivative by the speed [s/rad]
     real(wp), allocatable :: held_load(:)       !! T [N m], for the derivatives of the accelerations
   contains

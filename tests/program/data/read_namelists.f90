@@ -47,18 +47,17 @@ contains
 
   subroutine read_bodies()
     character(len=64) :: name
-    real(wp) :: inertia, angle, speed
+    real(wp) :: bearing_friction, inertia, angle, speed
     integer :: status
-    namelist /body/ name, inertia, angle, speed
+    namelist /body/ name, inertia, angle, speed, bearing_friction
 
     rewind (unit)
     do
-      angle = 0.0_wp
-      speed = 0.0_wp
+      angle = 0.0_wp; speed = 0.0_wp; bearing_friction = 0.0_wp
       read (unit, nml=body, iostat=status)
       if (is_iostat_end(status)) exit
       if (status /= 0) error stop 'body'
-      print '(*(g0, 1x))', 'body', trim(name), inertia, angle, speed
+      print '(*(g0, 1x))', 'body', trim(name), inertia, angle, speed, bearing_friction
     end do
   end subroutine read_bodies
 
@@ -96,20 +95,23 @@ contains
 
   subroutine read_gears()
     character(len=64) :: name, bodies(2)
-    real(wp) :: radii(2)
+    real(wp) :: radii(2), efficiency, reverse_efficiency
     integer :: teeth(2), status
     logical :: internal
-    namelist /gear/ name, bodies, radii, teeth, internal
+    namelist /gear/ name, bodies, radii, teeth, internal, efficiency, reverse_efficiency
 
     rewind (unit)
     do
       radii = not_given
+      efficiency = not_given
+      reverse_efficiency = not_given
       teeth = 0
       internal = .false.
       read (unit, nml=gear, iostat=status)
       if (is_iostat_end(status)) exit
       if (status /= 0) error stop 'gear'
-      print '(*(g0, 1x))', 'gear', trim(name), trim(bodies(1)), trim(bodies(2)), radii, teeth, internal
+      print '(*(g0, 1x))', 'gear', trim(name), trim(bodies(1)), trim(bodies(2)), radii, teeth, internal, efficiency, &
+        reverse_efficiency
     end do
   end subroutine read_gears
 

@@ -87,9 +87,9 @@ contains
     type(curve_t), allocatable :: engagement(:, :), over_slip   ! not allocated: absent
     integer :: i, lane
 
-    associate (group => groups%input%groups(groups%indices(1)))
-      if (form > 2 * forms_of_friction) allocate (over_slip, source=group_curve(group, 'table_slip', 'table_capacity', 'constant'))
-    end associate
+    if (form > 2 * forms_of_friction) then
+      allocate (over_slip, source=group_curve(groups%input%groups(groups%indices(1)), 'table_slip', 'table_capacity', 'constant'))
+    end if
     ranges = clutch_ranges(groups, form)
     if (modulo(form - engaged, forms_of_friction) + engaged == with_engagement) then
       allocate (engagement(groups%lanes, size(groups%indices)))

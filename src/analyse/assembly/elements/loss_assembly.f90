@@ -8,7 +8,7 @@ module nocdyn_loss_assembly
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_mesh_assembly, only: radii_of
-  use nocdyn_text, only: quoted, to_text
+  use nocdyn_text, only: to_text
   use nocdyn_tooth_losses, only: new_tooth_losses, teeth_t
   implicit none (type, external)
   private
@@ -48,8 +48,8 @@ contains
                      to_text(size(group%numbers('table_reverse'))) // ' values; needed: ' // &
                      to_text(size(group%numbers('table_speed'))) // ', as table_speed')
         else if (first_is_ground(group)) then
-          call raise(error, exit_input, input%location(i) // ': ' // quoted('ground') // ' is the first wheel, which does not ' // &
-                     'turn; allowed: a body, as a gear with losses turns')
+          call raise(error, exit_input, input%location(i) // ": 'ground' is the first wheel, which does not turn; " // &
+                     'allowed: a body, as a gear with losses turns')
         end if
         if (allocated(error)) return
       end associate

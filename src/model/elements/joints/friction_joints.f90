@@ -81,8 +81,8 @@ contains
     integer, intent(in) :: from(:), to(:)       !! bodies, 0 = ground
     type(joint_ranges_t), intent(in) :: ranges
     type(curve_t), intent(in), optional :: engagement(:, :)   !! over the time [s], shape [lanes, joints]; absent: 1
-    type(curve_t), intent(in), optional :: over_slip          !! friction of all while they slip [N m], over the speed [rad/s] from
-                                                              !! 0 on; absent: that of the ranges
+    type(curve_t), intent(in), optional :: over_slip          !! friction of all while they slip [N m], over the speed
+                                                              !! [rad/s] from 0 on; absent: that of the ranges
     type(friction_joints_t) :: bank
     integer :: e
 

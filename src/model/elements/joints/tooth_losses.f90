@@ -40,6 +40,7 @@ module nocdyn_tooth_losses
     procedure :: describe
     procedure :: share
     procedure :: range_under_load
+    procedure :: is_self_locking
     procedure :: quantities
     procedure :: observe
   end type tooth_losses_t
@@ -83,7 +84,7 @@ contains
     integer, intent(in) :: element       !! numbered within the bank
     logical, intent(in) :: is_driving    !! whether the first wheel drives
     real(wp), intent(in) :: speed        !! u' [rad/s]
-    real(wp), intent(out) :: s
+    real(wp), intent(out) :: s           !! 0 without losses
     real(wp), intent(out) :: by_speed    !! [s/rad]
     real(wp) :: efficiency(0:3)
 
@@ -124,6 +125,16 @@ contains
     least = min(-driven * load, -driving * load)
     most = max(-driven * load, -driving * load)
   end subroutine range_under_load
+
+  !> Whether a torque on the second wheel alone cannot move the wheels from rest.
+  pure logical function is_self_locking(self, element)
+    class(tooth_losses_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp) :: s, slope
+
+    call self%share(element, .false., 0.0_wp, s, slope)
+    is_self_locking = s >= 1
+  end function is_self_locking
 
   !> The moment of the loss on the first wheel.
   function quantities(self) result(columns)
