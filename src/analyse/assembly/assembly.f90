@@ -12,7 +12,7 @@ module nocdyn_assembly
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
   use nocdyn_joint_assembly, only: add_bearings, add_clutch_form, add_freewheels, check_joints, clutch_form
-  use nocdyn_joint_simplifications, only: left_out, refuse_joints
+  use nocdyn_joint_simplifications, only: find_left_out, refuse_joints
   use nocdyn_loss_assembly, only: add_losses, check_losses
   use nocdyn_machine, only: machine_t
   use nocdyn_massless_motion, only: massless_bodies
@@ -91,6 +91,7 @@ contains
     type(input_t), target, intent(in) :: input
     type(body_index_t), target, intent(in) :: body_index
     type(machine_t), intent(inout) :: machine
+    integer, allocatable :: rows(:)   ! groups of the constraint rows
 
     allocate (machine%banks(0))
     associate (n => machine%lanes)
@@ -102,9 +103,10 @@ contains
       if (.not. input%takes_means) then
         call add_cardans(new_element_groups(input, 'cardan', n, body_index), machine%banks)
         call add_relations(new_element_groups(input, 'relation', n, body_index), machine%banks)
-        call add_losses(new_element_groups(input, 'gear', n, body_index), machine%banks)
-        call add_losses(new_element_groups(input, 'planetary', n, body_index), machine%banks)
-        call add_losses(new_element_groups(input, 'mesh', n, body_index), machine%banks)
+        allocate (rows, source=constraint_groups(input))
+        call add_losses(new_element_groups(input, 'gear', n, body_index), rows, machine%banks)
+        call add_losses(new_element_groups(input, 'planetary', n, body_index), rows, machine%banks)
+        call add_losses(new_element_groups(input, 'mesh', n, body_index), rows, machine%banks)
       end if
       call add_banks(new_element_groups(input, 'drive', n, body_index), drive_form, add_drive_form, machine%banks)
       call add_banks(new_element_groups(input, 'motor', n, body_index), motor_form, add_motor_form, machine%banks)
@@ -140,7 +142,7 @@ contains
       if (run%text('start') /= 'equilibrium') return
       call refuse_joints(input, "start = 'equilibrium'", error, leaves_out_bearings=.true.)
       if (allocated(error)) return
-      losses = left_out(input, .true.)
+      call find_left_out(input, .true., losses)
       if (machine%lanes > 1) then
         call assemble_machine(input, single, error)
         if (allocated(error)) return

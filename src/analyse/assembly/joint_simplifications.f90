@@ -8,7 +8,7 @@ module nocdyn_joint_simplifications
   implicit none (type, external)
   private
 
-  public :: refuse_joints, simplification_notes, left_out
+  public :: refuse_joints, list_simplifications, find_left_out
 
 contains
 
@@ -26,7 +26,7 @@ contains
     if (present(leaves_out_bearings)) allows_bearings = allows_bearings .or. leaves_out_bearings
     do i = 1, size(input%groups)
       if (input%groups(i)%kind == 'body' .and. allows_bearings) cycle
-      reason = refusal(input%groups(i), input%takes_means)
+      call find_refusal(input%groups(i), input%takes_means, reason)
       if (reason == '') cycle
       call raise(error, exit_input, input%location(i) // ': ' // what // ' ' // reason)
       return
@@ -34,10 +34,10 @@ contains
   end subroutine refuse_joints
 
   !> Why a group is refused, and what is allowed; '' if it is not.
-  function refusal(group, takes_means) result(text)
+  subroutine find_refusal(group, takes_means, text)
     type(group_t), intent(in) :: group
     logical, intent(in) :: takes_means   !! as in `input_t`
-    character(len=:), allocatable :: text
+    character(len=:), allocatable, intent(out) :: text
 
     text = ''
     select case (group%kind)
@@ -53,12 +53,12 @@ contains
     case default
       text = ''
     end select
-  end function refusal
+  end subroutine find_refusal
 
   !> What an analysis about a steady state replaces or leaves out.
-  function simplification_notes(input) result(notes)
+  subroutine list_simplifications(input, notes)
     type(input_t), intent(in) :: input
-    type(string_t), allocatable :: notes(:)
+    type(string_t), allocatable, intent(out) :: notes(:)
     character(len=:), allocatable :: losses, means
     integer :: i
 
@@ -71,15 +71,15 @@ contains
       end associate
     end do
     if (means /= '') call append(notes, 'means over a turn stand for the ratios, inertias and torques of ' // means(3:))
-    losses = left_out(input, .false.)
+    call find_left_out(input, .false., losses)
     if (losses /= '') call append(notes, 'the losses of ' // losses // ' are left out')
-  end function simplification_notes
+  end subroutine list_simplifications
 
   !> The groups whose losses a balance leaves out, e.g. "gear 'worm'"; '' if there are none.
-  function left_out(input, with_bearings) result(text)
+  subroutine find_left_out(input, with_bearings, text)
     type(input_t), intent(in) :: input
     logical, intent(in) :: with_bearings   !! whether it leaves out the friction of bearings, too
-    character(len=:), allocatable :: text
+    character(len=:), allocatable, intent(out) :: text
     logical :: is_left_out
     integer :: i
 
@@ -92,7 +92,7 @@ contains
       end associate
     end do
     if (text /= '') text = text(3:)
-  end function left_out
+  end subroutine find_left_out
 
   !> Whether the ratio of a joint has a mean that tells how its bodies turn.
   pure logical function has_mean(group)

@@ -7,7 +7,7 @@ module nocdyn_input_files
   use nocdyn_errors, only: error_t, exit_done
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
-  use nocdyn_joint_simplifications, only: refuse_joints, simplification_notes
+  use nocdyn_joint_simplifications, only: list_simplifications, refuse_joints
   use nocdyn_machine, only: machine_t
   use nocdyn_output_times, only: check_output_times
   use nocdyn_result_folders, only: out_folder, refuse_shared_folders, result_folder
@@ -82,7 +82,7 @@ contains
     type(string_t), allocatable :: notes(:)
     integer :: i
 
-    allocate (notes, source=simplification_notes(input))
+    call list_simplifications(input, notes)
     do i = 1, size(notes)
       call print_text(input%shown_file() // ': note: ' // notes(i)%text)
     end do

@@ -22,7 +22,7 @@ module nocdyn_tooth_loads
     integer, allocatable :: bank(:), number(:)  !! its bank, and its number there
     integer, allocatable :: loss_of(:)          !! of each joint, 0 for none, [joints]
     real(wp), allocatable :: by_moment(:, :)    !! G, [losses, elements]
-    real(wp), allocatable :: by_joint(:, :)     !! V: T by the moments of the joints at the present slopes, [losses, joints]
+    real(wp), allocatable :: by_joint(:, :)     !! V, T by the moments of the joints at the present slopes, [losses, joints]
     real(wp), allocatable :: applied(:)         !! T without the moments of the joints that hold and the losses [N m]
     real(wp), allocatable :: load(:)            !! T [N m]
     real(wp), allocatable :: share(:)           !! share s of T that is lost while the wheels turn

@@ -1,7 +1,6 @@
 !> The banks of the losses of teeth of an input: those of gears and planetary sets, and of elastic meshes.
 module nocdyn_loss_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
-  use nocdyn_constraint_assembly, only: constraint_groups
   use nocdyn_curves, only: curve_t, extrapolation_constant, interpolation_linear, new_curve
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_errors, only: error_t, exit_input, raise
@@ -68,8 +67,9 @@ contains
   end function first_is_ground
 
   !> Adds the banks of the losses of all groups of one kind; those with a table have a bank each.
-  subroutine add_losses(groups, banks)
+  subroutine add_losses(groups, rows, banks)
     type(element_groups_t), intent(in) :: groups   !! gears, planetary sets or meshes
+    integer, intent(in) :: rows(:)                 !! groups of the constraint rows
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     logical :: has_table(size(groups%indices)), is_lossy(size(groups%indices))
     integer :: e, i
@@ -78,18 +78,18 @@ contains
       is_lossy(i) = has_losses(groups%input%groups(groups%indices(i)))
       has_table(i) = groups%input%groups(groups%indices(i))%has_value('table_efficiency')
     end do
-    call add_bank(groups%some(is_lossy .and. .not. has_table), banks)
+    call add_bank(groups%some(is_lossy .and. .not. has_table), rows, banks)
     do i = 1, size(groups%indices)
-      if (has_table(i)) call add_bank(groups%some([(e == i, e=1, size(groups%indices))]), banks)
+      if (has_table(i)) call add_bank(groups%some([(e == i, e=1, size(groups%indices))]), rows, banks)
     end do
   end subroutine add_losses
 
   !> Adds a bank of losses.
-  subroutine add_bank(groups, banks)
+  subroutine add_bank(groups, rows, banks)
     type(element_groups_t), intent(in) :: groups
+    integer, intent(in) :: rows(:)   !! groups of the constraint rows
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(teeth_t) :: teeth
-    integer, allocatable :: rows(:)
     integer :: from(size(groups%indices)), i, to(size(groups%indices))
 
     if (size(groups%indices) == 0) return
@@ -100,7 +100,6 @@ contains
     else
       to = groups%bodies('bodies', 1)
     end if
-    allocate (rows, source=constraint_groups(groups%input))
     allocate (teeth%row(size(groups%indices)), teeth%factor(size(groups%indices)))
     do i = 1, size(groups%indices)
       teeth%row(i) = findloc(rows, groups%indices(i), dim=1)

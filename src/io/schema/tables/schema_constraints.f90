@@ -27,7 +27,7 @@ module nocdyn_schema_constraints
     key_rule_t('gear',       'internal',        a_flag,         1, '',            '.false.',   anything, &
       'an internal gear: both wheels turn in the same direction'), &
     key_rule_t('gear',        'efficiency',      a_number,       1, '',            unset,       efficiencies, &
-      'power that the second wheel gets of what the first one puts in; 1 without losses'), &
+      'share of the power that the second wheel gets where the first one drives; 1 without losses'), &
     key_rule_t('gear',        'reverse_efficiency', a_number,   1, '',            unset,       reverse_efficiencies, &
       'the same where the second wheel drives; as efficiency if not given; 0 or less: self-locking'), &
     key_rule_t('gear',        'table_speed',     a_number,       any_number, 'rad/s', unset,    not_negative, &
@@ -47,7 +47,7 @@ module nocdyn_schema_constraints
     key_rule_t('planetary',  'teeth',           an_integer,     2, '',            required,    from_1, &
       'numbers of teeth of sun and ring; the ring has more', ascends=.true.), &
     key_rule_t('planetary',   'efficiency',      a_number,       1, '',            unset,       efficiencies, &
-      'power that the ring gets of what the sun puts in, in the frame of the carrier; 1 without losses'), &
+      'share that the ring gets of the power of the sun, with the carrier at rest; 1 without losses'), &
     key_rule_t('planetary',   'reverse_efficiency', a_number,   1, '',            unset,       reverse_efficiencies, &
       'the same where the ring drives; as efficiency if not given; 0 or less: self-locking'), &
     key_rule_t('planetary',   'table_speed',     a_number,       any_number, 'rad/s', unset,    not_negative, &

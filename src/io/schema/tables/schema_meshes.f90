@@ -35,7 +35,7 @@ module nocdyn_schema_meshes
     key_rule_t('mesh',       'error_phases',    a_number,       any_number, 'rad', unset,      anything, &
       'phase of each: amplitude * sin(order * angle + phase)', fewest=1), &
     key_rule_t('mesh',        'efficiency',      a_number,       1, '',            unset,       efficiencies, &
-      'power that the second wheel gets of what the first one puts in; 1 without losses'), &
+      'share of the power that the second wheel gets where the first one drives; 1 without losses'), &
     key_rule_t('mesh',        'reverse_efficiency', a_number,   1, '',            unset,       reverse_efficiencies, &
       'the same where the second wheel drives; as efficiency if not given; 0 or less: self-locking'), &
     key_rule_t('mesh',        'table_speed',     a_number,       any_number, 'rad/s', unset,    not_negative, &
