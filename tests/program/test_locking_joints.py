@@ -153,6 +153,17 @@ def test_a_dog_clutch_locks_by_an_impact_and_lets_go(nocdyn):
     assert max(map(abs, table["energy_residual [J]"])) < 1e-9 * 1000
 
 
+def test_a_dog_clutch_beside_a_gear_of_another_ratio_ends_the_run_with_its_name(nocdyn):
+    text = BODY.format("one", 1, 10) + BODY.format("two", 1, 5) + BODY.format("three", 1, 3)
+    text += "&gear name = 'g' bodies = 'one', 'two' teeth = 20, 40 internal = .true. /\n&run t_end = 2 /\n"
+    dog = "&clutch name = 'd' kind = 'dog' bodies = 'one', '{}' times = 1 levels = 1 /\n"
+    outcome = nocdyn("run", nocdyn.write("machine.nml", text + dog.format("two")), "--out", "out")
+    assert outcome.returncode == 1
+    assert "t = 1 s: clutch 'd' contradicts the gears between its bodies: locked, it stops both" in outcome.stderr
+    _, events = run(nocdyn, text + dog.format("three"))
+    assert changes(events) == [("d", "locked")]
+
+
 def test_a_freewheel_that_starts_the_wrong_way_strikes(nocdyn):
     text = BODY.format("one", 1.0, 6) + BODY.format("two", 2.0, 0) + "&freewheel name = 'f' bodies = 'one', 'two' /\n"
     table, _ = run(nocdyn, text + "&run t_end = 1 /\n&output points = 3 /\n")

@@ -132,6 +132,7 @@ contains
       sentence = 'the equations cannot be evaluated beyond ' // when // ', and a shorter step does not help'
       if (solver_status%steps(lane) == 0) sentence = 'the equations cannot be evaluated at the start, ' // when
       reason = system%evaluation_obstacle()
+      if (reason /= '' .and. solver_status%steps(lane) > 0) sentence = 'no motion fits all joints beyond ' // when
       if (reason == '') reason = 'check the start values and the parameters'
       sentence = sentence // ': ' // reason
     case (integration_idle)

@@ -219,6 +219,9 @@ contains
       slip(joints%locking + 1:) = 0.0_wp
       call joints%find_impact(self%machine%banks, t, slip, tolerance, joints%impulse, is_struck)
       if (.not. is_struck) return
+      do j = 1, joints%locking
+        if (abs(joints%impulse(j)) > 0 .and. self%stops_both(j)) joints%lost = j
+      end do
       do j = 1, joints%count
         call self%push(j, joints%impulse(j), y)
       end do

@@ -40,6 +40,7 @@ module nocdyn_row_formulation
     procedure :: project
     procedure :: project_state
     procedure :: evaluation_obstacle
+    procedure :: stops_both
   end type row_formulation_t
 
   abstract interface
@@ -378,6 +379,7 @@ contains
   function evaluation_obstacle(self) result(text)
     class(row_formulation_t), intent(in) :: self
     character(len=:), allocatable :: text
+    character(len=:), allocatable :: name
     integer :: row
 
     text = ''
@@ -385,12 +387,44 @@ contains
     if (row == 0) return
     associate (machine => self%machine, element => self%joints%element(row))
       associate (bank => machine%banks(bank_of(machine%banks, element))%bank)
-        text = trim(role_names(bank%role)) // ' ' // quoted(bank%names(element - bank%first + 1)%text) // ' contradicts ' // &
-               'other joints and drives there, or does not differ from them: a dead centre, or a loop that locks'
-        if (bank%role == role_loss) text = 'the teeth of ' // quoted(bank%names(element - bank%first + 1)%text) // ' jam: ' // &
-          'their second wheel brakes the first one more than its inertia allows, by their low reverse efficiency'
+        name = quoted(bank%names(element - bank%first + 1)%text)
+        if (bank%role == role_loss) then
+          text = 'the teeth of ' // name // ' jam: their second wheel brakes the first one more than its inertia allows, by ' // &
+                 'their low reverse efficiency'
+        else if (self%stops_both(row)) then
+          text = trim(role_names(bank%role)) // ' ' // name // ' contradicts the gears between its bodies: locked, it stops both'
+        else
+          text = trim(role_names(bank%role)) // ' ' // name // ' contradicts other joints and drives there, or does not ' // &
+                 'differ from them: a dead centre, or a loop that locks'
+        end if
       end associate
     end associate
   end function evaluation_obstacle
+
+  !> Whether the gears of the machine keep the speeds of the bodies of a joint in another ratio than 1, in the first lane.
+  pure logical function stops_both(self, joint)
+    class(row_formulation_t), intent(in) :: self
+    integer, intent(in) :: joint
+    real(wp), parameter :: rounding = 1.0e-10_wp
+    real(wp) :: speed(size(self%machine%coordinates%body), 2)   ! of both bodies, by those of the coordinates
+    integer :: i, k
+
+    stops_both = .false.
+    associate (rows => self%machine%elements%rows, map => self%machine%coordinates, first => self%joints%element(joint))
+      if (rows%first(first + 1) - rows%first(first) /= 2) return
+      speed = 0.0_wp
+      do i = 1, 2
+        associate (body => rows%body(rows%first(first) - 1 + i))
+          if (body == 0) return
+          do k = map%first(body), map%first(body + 1) - 1
+            speed(map%coordinate(k), i) = map%ratio(1, k)
+          end do
+        end associate
+      end do
+    end associate
+    associate (a => speed(:, 1), b => speed(:, 2))
+      stops_both = norm2(sum(a * b) * a - sum(a**2) * b) <= rounding * sum(a**2) * norm2(b) .and. any(abs(a - b) > rounding)
+    end associate
+  end function stops_both
 
 end module nocdyn_row_formulation

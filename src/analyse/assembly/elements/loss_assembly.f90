@@ -118,7 +118,10 @@ contains
     real(wp) :: radii(2)
 
     torque_factor = 1.0_wp
-    if (group%kind == 'planetary' .or. (group%kind == 'gear' .and. .not. group%has_value('radii'))) return
+    if (group%kind == 'planetary') return   ! its row is that of the torque on the sun
+    if (group%kind == 'gear') then
+      if (.not. group%has_value('radii')) return
+    end if
     radii = radii_of(group)
     torque_factor = radii(1)
   end function torque_factor
