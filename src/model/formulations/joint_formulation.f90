@@ -1,7 +1,7 @@
 !> Formulations with joints that lock: clutches and freewheels (`nocdyn_joint_sets`), in a block of one lane.
 module nocdyn_joint_formulation
   use nocdyn_formulation, only: choose_branch, indicate_branch, observe_elements, start_branches
-  use nocdyn_friction_joints, only: idle, locked
+  use nocdyn_friction_joints, only: direction_of, idle, locked
   use nocdyn_joint_sets, only: boundary_shift, rest_width
   use nocdyn_kinds, only: wp
   use nocdyn_row_formulation, only: row_formulation_t
@@ -193,13 +193,16 @@ contains
       call joints%assume(self%machine%banks, is_at_rest, slip)
       call self%find_held_moments(t, y(:self%states))
       call joints%decide(self%machine%banks, t, is_at_rest, slip, is_solved)
-      do j = 1, joints%count
-        if (is_at_rest(j) .and. joints%mode(j) /= locked) joints%shift(j) = boundary_shift * speed
-        if (joints%mode(j) == idle) joints%shift(j) = rest_width * speed
-      end do
       moments = sum(abs(elements%applied(1, :))) + sum(abs(elements%restoring(1, :)))
       joints%moment_shift = boundary_shift * max(moments, tiny(moments))
+      call joints%teeth%shift_boundaries(elements)
       call self%hold(joints%motions%speed, y)
+      do j = 1, joints%count
+        if (is_at_rest(j) .and. joints%mode(j) /= locked) then   ! a drive may leave it a slip in the other direction
+          joints%shift(j) = boundary_shift * speed + max(0.0_wp, -direction_of(joints%mode(j)) * self%joint_rate(j, y))
+        end if
+        if (joints%mode(j) == idle) joints%shift(j) = rest_width * speed
+      end do
     end associate
   end subroutine settle_joints
 

@@ -34,10 +34,13 @@ module nocdyn_joint_choices
     procedure, private :: better_modes
     procedure, private :: better_teeth
     procedure, private :: better_friction
+    procedure, private :: holds_always
     procedure, private :: try_all
   end type joint_choices_t
 
-  real(wp), parameter :: rounding = 1.0e-13_wp   ! of a sum, relative to its terms
+  real(wp), parameter :: rounding = 1.0e-12_wp      ! of a torque, relative to its terms
+  real(wp), parameter :: no_slip = 1.0e-10_wp       ! acceleration of a joint at its bound that others hold, likewise
+  real(wp), parameter :: inconsistent = 1.0e-7_wp   ! acceleration of a lock that others do not allow, likewise
   integer, parameter :: most_tried = 4000
 
 contains
@@ -97,27 +100,42 @@ contains
     self%moment(:) = matmul(inverse, wanted)
   end subroutine find_moments
 
-  !> The modes that the moments speak for.
+  !> The modes that the moments speak for. The acceleration of a locked joint is not zero where other rows contradict it. What is
+  !> below the rounding errors of all equations together counts as zero.
   function better_modes(self) result(mode)
     class(joint_choices_t), intent(in) :: self
     integer :: mode(size(self%mode))
-    real(wp) :: acceleration, load
+    real(wp), dimension(size(self%mode)) :: acceleration, load, smallest
+    real(wp), parameter :: mixed = 1.0e-3_wp   ! of the largest terms, in the errors of the others
     integer :: i
+    logical :: holds_always(size(self%mode))
 
     mode = self%mode
+    holds_always = self%holds_always()
+    acceleration = self%rate + matmul(self%w, self%moment)
+    smallest = [(abs(self%rate(i)) + sum(abs(self%w(i, :) * self%moment)), i=1, size(mode))]
+    smallest = merge(inconsistent, no_slip, mode == locked) * max(smallest, mixed * maxval(smallest))
+    where (abs(acceleration) <= smallest) acceleration = 0.0_wp
+    load = self%load + matmul(self%v, self%moment)
+    smallest = [(abs(self%load(i)) + sum(abs(self%v(i, :) * self%moment)), i=1, size(mode))]
+    smallest = rounding * max(smallest, mixed * maxval(smallest))
+    where (abs(load) <= smallest) load = 0.0_wp
     do i = 1, size(mode)
-      if (.not. (self%is_at_rest(i) .or. self%has_teeth(i))) cycle
-      acceleration = self%rate(i) + sum(self%w(i, :) * self%moment)
-      if (abs(acceleration) <= rounding * (abs(self%rate(i)) + sum(abs(self%w(i, :) * self%moment)))) acceleration = 0.0_wp
       if (self%has_teeth(i)) then
-        load = self%load(i) + sum(self%v(i, :) * self%moment)
-        if (abs(load) <= rounding * (abs(self%load(i)) + sum(abs(self%v(i, :) * self%moment)))) load = 0.0_wp
-        mode(i) = self%better_teeth(i, acceleration, load)
-      else
-        mode(i) = self%better_friction(i, acceleration)
+        mode(i) = self%better_teeth(i, acceleration(i), load(i))
+      else if (self%is_at_rest(i) .and. .not. holds_always(i)) then
+        mode(i) = self%better_friction(i, acceleration(i))
       end if
     end do
   end function better_modes
+
+  !> Joints at rest whose moments have no bounds: dog clutches, and rows that move.
+  pure function holds_always(self)
+    class(joint_choices_t), intent(in) :: self
+    logical :: holds_always(size(self%mode))
+
+    holds_always = self%is_at_rest .and. self%least <= -huge(1.0_wp) .and. self%most >= huge(1.0_wp)
+  end function holds_always
 
   !> The mode of teeth. A torque T along the motion is that of a first wheel which the second one drives.
   integer function better_teeth(self, i, acceleration, load) result(mode)
@@ -132,9 +150,10 @@ contains
     if (mode == locked) then
       least = min(-self%driven(i) * load, -self%driving(i) * load)
       most = max(-self%driven(i) * load, -self%driving(i) * load)
-      tolerance = rounding * abs(self%moment(i))
+      tolerance = 0.5_wp * rounding * abs(self%moment(i))
       if (self%moment(i) < least - tolerance) direction = 1.0_wp
       if (self%moment(i) > most + tolerance) direction = -1.0_wp
+      if (abs(acceleration) > 0) direction = sign(1.0_wp, acceleration)   ! a drive moves it, for instance
       if (abs(direction) <= 0) return
     else if (self%is_at_rest(i) .and. direction * acceleration < 0) then
       mode = locked
@@ -155,6 +174,7 @@ contains
     if (mode == locked) then
       if (self%moment(i) < self%least(i)) mode = slips_forwards
       if (self%moment(i) > self%most(i)) mode = slips_backwards
+      if (abs(acceleration) > 0) mode = merge(slips_forwards, slips_backwards, acceleration > 0)
     else if (direction_of(mode) * acceleration < 0) then
       mode = locked
       if (self%most(i) <= self%least(i)) mode = merge(slips_forwards, slips_backwards, acceleration > 0)
@@ -172,6 +192,7 @@ contains
     where (self%has_teeth) choices = 2
     where (self%is_at_rest) choices = 3
     where (self%is_at_rest .and. self%has_teeth) choices = 5
+    where (self%holds_always()) choices = 1   ! that of a lock
     better = 0
     number = 0
     do while (number < min(real(most_tried, wp), product(real(choices, wp))))

@@ -368,7 +368,7 @@ contains
         g = direction_of(mode) * slip + self%shift(joint)
         if (mode == slips_forwards .and. is_unbounded(least)) g = -1.0_wp   ! there is no such slip
         if (mode == slips_backwards .and. is_unbounded(most)) g = -1.0_wp
-        if (self%has_teeth(joint)) g = min(g, power_of_driver(self, joint, mode) + self%moment_shift)
+        if (self%has_teeth(joint)) g = min(g, power_of_driver(self, joint, mode) + self%teeth%shift(self%teeth%loss_of(joint)))
       end if
     end associate
   end function indicator

@@ -27,6 +27,7 @@ module nocdyn_tooth_loads
     real(wp), allocatable :: load(:)            !! T [N m]
     real(wp), allocatable :: share(:)           !! share s of T that is lost while the wheels turn
     real(wp), allocatable :: share_slope(:)     !! its derivative by the speed [s/rad]
+    real(wp), allocatable :: shift(:)           !! by which the boundary of T lies beyond zero [N m]
     real(wp), allocatable :: held_load(:)       !! T [N m], for the derivatives of the accelerations
   contains
     procedure :: find_coefficients
@@ -35,6 +36,7 @@ module nocdyn_tooth_loads
     procedure :: choose_shares
     procedure :: drag
     procedure :: add_moments
+    procedure :: shift_boundaries
   end type tooth_loads_t
 
 contains
@@ -62,7 +64,7 @@ contains
     allocate (self%by_moment(self%count, merge(elements, 0, self%count > 0)), source=0.0_wp)
     allocate (self%by_joint(self%count, size(bank_of_joint)), source=0.0_wp)
     allocate (self%applied(self%count), source=0.0_wp)
-    allocate (self%load, self%share, self%share_slope, self%held_load, source=self%applied)
+    allocate (self%load, self%share, self%share_slope, self%shift, self%held_load, source=self%applied)
   end function new_tooth_loads
 
   !> Sets G at the start.
@@ -182,5 +184,20 @@ contains
 
     self%load(:) = self%applied + matmul(self%by_joint, moment)
   end subroutine add_moments
+
+  !> Shifts the boundaries of T beyond its rounding errors.
+  pure subroutine shift_boundaries(self, elements)
+    class(tooth_loads_t), intent(inout) :: self
+    type(elements_t), intent(in) :: elements
+    real(wp), parameter :: width = 1.0e-11_wp   ! relative to the terms of T
+    real(wp), parameter :: mixed = 1.0e-3_wp    ! of the largest width, as in `nocdyn_joint_choices`
+    integer :: e
+
+    self%shift(:) = 0.0_wp
+    do e = 1, merge(elements%count, 0, self%count > 0)
+      self%shift(:) = self%shift + width * abs(self%by_moment(:, e)) * (abs(elements%restoring(1, e)) + abs(elements%applied(1, e)))
+    end do
+    if (self%count > 0) self%shift(:) = max(self%shift, mixed * maxval(self%shift), tiny(width))
+  end subroutine shift_boundaries
 
 end module nocdyn_tooth_loads
