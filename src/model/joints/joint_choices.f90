@@ -164,7 +164,7 @@ contains
     if (direction < 0) mode = merge(slips_backwards, driven_backwards, load < 0)
   end function better_teeth
 
-  !> The mode of friction between bounds, at rest.
+  !> The mode of friction between bounds, at rest. It does not slip where its moment has no bound.
   integer function better_friction(self, i, acceleration) result(mode)
     class(joint_choices_t), intent(in) :: self
     integer, intent(in) :: i
@@ -174,7 +174,8 @@ contains
     if (mode == locked) then
       if (self%moment(i) < self%least(i)) mode = slips_forwards
       if (self%moment(i) > self%most(i)) mode = slips_backwards
-      if (abs(acceleration) > 0) mode = merge(slips_forwards, slips_backwards, acceleration > 0)
+      if (acceleration > 0 .and. self%least(i) > -huge(1.0_wp)) mode = slips_forwards
+      if (acceleration < 0 .and. self%most(i) < huge(1.0_wp)) mode = slips_backwards
     else if (direction_of(mode) * acceleration < 0) then
       mode = locked
       if (self%most(i) <= self%least(i)) mode = merge(slips_forwards, slips_backwards, acceleration > 0)
