@@ -176,6 +176,10 @@ contains
       if (self%moment(i) > self%most(i)) mode = slips_backwards
       if (acceleration > 0 .and. self%least(i) > -huge(1.0_wp)) mode = slips_forwards
       if (acceleration < 0 .and. self%most(i) < huge(1.0_wp)) mode = slips_backwards
+    else if (mode == slips_backwards .and. self%most(i) >= huge(1.0_wp)) then
+      mode = locked
+    else if (mode == slips_forwards .and. self%least(i) <= -huge(1.0_wp)) then
+      mode = locked
     else if (direction_of(mode) * acceleration < 0) then
       mode = locked
       if (self%most(i) <= self%least(i)) mode = merge(slips_forwards, slips_backwards, acceleration > 0)
