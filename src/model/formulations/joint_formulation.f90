@@ -2,6 +2,7 @@
 module nocdyn_joint_formulation
   use nocdyn_formulation, only: choose_branch, indicate_branch, observe_elements, start_branches
   use nocdyn_friction_joints, only: direction_of, idle, locked
+  use nocdyn_geared_pairs, only: has_other_ratio
   use nocdyn_joint_sets, only: boundary_shift, rest_width
   use nocdyn_kinds, only: wp
   use nocdyn_row_formulation, only: row_formulation_t
@@ -216,14 +217,15 @@ contains
     real(wp), dimension(self%joints%count) :: before, slip
     integer :: j, work
 
-    associate (joints => self%joints)
+    associate (joints => self%joints, elements => self%machine%elements)
       before = [(self%joint_rate(j, y), j=1, joints%count)]
       slip = before
       slip(joints%locking + 1:) = 0.0_wp
       call joints%find_impact(self%machine%banks, t, slip, tolerance, joints%impulse, is_struck)
       if (.not. is_struck) return
       do j = 1, joints%locking
-        if (abs(joints%impulse(j)) > 0 .and. self%stops_both(j)) joints%lost = j
+        if (abs(joints%impulse(j)) <= 0) cycle
+        if (has_other_ratio(self%machine%coordinates, elements%rows, joints%element(j))) joints%lost = j
       end do
       do j = 1, joints%count
         call self%push(j, joints%impulse(j), y)

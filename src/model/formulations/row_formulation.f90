@@ -9,6 +9,7 @@ module nocdyn_row_formulation
   use nocdyn_bank, only: bank_of, role_loss, role_names
   use nocdyn_formulation, only: formulation_t
   use nocdyn_friction_joints, only: locked
+  use nocdyn_geared_pairs, only: has_other_ratio
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: evaluation_fatal
   use nocdyn_text, only: quoted
@@ -40,7 +41,6 @@ module nocdyn_row_formulation
     procedure :: project
     procedure :: project_state
     procedure :: evaluation_obstacle
-    procedure :: stops_both
   end type row_formulation_t
 
   abstract interface
@@ -302,37 +302,22 @@ contains
     integer, intent(in) :: column       !! as in `hold_column`
     real(wp), intent(in) :: unit(:)     !! the speed or the position that changes, [moving]
     real(wp) :: drag(self%joints%teeth%count)
-    real(wp) :: moment
-    integer :: c, e, i
+    real(wp) :: rates(self%machine%elements%count)
+    integer :: e
 
-    drag = 0.0_wp
     associate (elements => self%machine%elements, teeth => self%joints%teeth, n => size(self%moving))
-      do e = 1, elements%count
-        moment = 0.0_wp
-        if (column == 0) moment = elements%applied_time(1, e)
-        if (column > 0 .and. column <= n) moment = elements%applied_speed(1, e) * self%element_rate(e, unit)
-        if (column > n .and. column <= 2 * n) then
-          moment = (elements%restoring_angle(1, e) + elements%applied_angle(1, e)) * self%element_rate(e, unit)
-        end if
-        drag = drag + teeth%by_moment(:, e) * moment
-      end do
-      do c = 1, elements%cross%count
-        associate (x => elements%cross)
-          moment = merge(x%applied_speed(1, c), x%restoring_angle(1, c) + x%applied_angle(1, c), column <= n)
-          if (column == 0 .or. column > 2 * n) cycle
-          drag = drag + teeth%by_moment(:, x%element(c)) * moment * self%element_rate(x%by(c), unit)
-        end associate
-      end do
       if (column > self%mechanical) then
-        e = elements%internal%element(column - self%mechanical)
-        drag = drag + teeth%by_moment(:, e) * elements%internal%applied(1, column - self%mechanical)
+        drag = teeth%drag_by_internal(elements, column - self%mechanical)
+        return
       end if
-      drag = teeth%share * drag
-      if (column == 0 .or. column > n) return
-      do i = 1, teeth%count
-        e = self%joints%element(teeth%joint(i))
-        drag(i) = drag(i) + teeth%share_slope(i) * teeth%held_load(i) * self%element_rate(e, unit)
-      end do
+      rates = [(self%element_rate(e, unit), e=1, elements%count)]
+      if (column == 0) then
+        drag = teeth%drag_by_time(elements)
+      else if (column <= n) then
+        drag = teeth%drag_by_speed(elements, rates, rates(self%joints%element(teeth%joint)))
+      else
+        drag = teeth%drag_by_angle(elements, rates)
+      end if
     end associate
   end function drag_derivative
 
@@ -391,7 +376,7 @@ contains
         if (bank%role == role_loss) then
           text = 'the teeth of ' // name // ' jam: their second wheel brakes the first one more than its inertia allows, by ' // &
                  'their low reverse efficiency'
-        else if (self%stops_both(row)) then
+        else if (has_other_ratio(machine%coordinates, machine%elements%rows, element)) then
           text = trim(role_names(bank%role)) // ' ' // name // ' contradicts the gears between its bodies: locked, it stops both'
         else
           text = trim(role_names(bank%role)) // ' ' // name // ' contradicts other joints and drives there, or does not ' // &
@@ -400,31 +385,5 @@ contains
       end associate
     end associate
   end function evaluation_obstacle
-
-  !> Whether the gears of the machine keep the speeds of the bodies of a joint in another ratio than 1, in the first lane.
-  pure logical function stops_both(self, joint)
-    class(row_formulation_t), intent(in) :: self
-    integer, intent(in) :: joint
-    real(wp), parameter :: rounding = 1.0e-10_wp
-    real(wp) :: speed(size(self%machine%coordinates%body), 2)   ! of both bodies, by those of the coordinates
-    integer :: i, k
-
-    stops_both = .false.
-    associate (rows => self%machine%elements%rows, map => self%machine%coordinates, first => self%joints%element(joint))
-      if (rows%first(first + 1) - rows%first(first) /= 2) return
-      speed = 0.0_wp
-      do i = 1, 2
-        associate (body => rows%body(rows%first(first) - 1 + i))
-          if (body == 0) return
-          do k = map%first(body), map%first(body + 1) - 1
-            speed(map%coordinate(k), i) = map%ratio(1, k)
-          end do
-        end associate
-      end do
-    end associate
-    associate (a => speed(:, 1), b => speed(:, 2))
-      stops_both = norm2(sum(a * b) * a - sum(a**2) * b) <= rounding * sum(a**2) * norm2(b) .and. any(abs(a - b) > rounding)
-    end associate
-  end function stops_both
 
 end module nocdyn_row_formulation

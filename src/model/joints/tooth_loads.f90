@@ -37,6 +37,7 @@ module nocdyn_tooth_loads
     procedure :: drag
     procedure :: add_moments
     procedure :: shift_boundaries
+    procedure :: drag_by_time, drag_by_speed, drag_by_angle, drag_by_internal
   end type tooth_loads_t
 
 contains
@@ -177,6 +178,72 @@ contains
     drag = self%share * self%applied
   end function drag
 
+  !> The derivative of the drags by the time, after that of the laws of all elements.
+  pure function drag_by_time(self, elements) result(drag)
+    class(tooth_loads_t), intent(in) :: self
+    type(elements_t), intent(in) :: elements
+    real(wp) :: drag(self%count)   !! [N m/s]
+    integer :: e
+
+    drag = 0.0_wp
+    do e = 1, elements%count
+      drag = drag + self%share * self%by_moment(:, e) * elements%applied_time(1, e)
+    end do
+  end function drag_by_time
+
+  !> The same by a speed; the shares follow it.
+  pure function drag_by_speed(self, elements, rates, own) result(drag)
+    class(tooth_loads_t), intent(in) :: self
+    type(elements_t), intent(in) :: elements
+    real(wp), intent(in) :: rates(:)   !! derivatives of u' of all elements by it
+    real(wp), intent(in) :: own(:)     !! those of the losses, [losses]
+    real(wp) :: drag(self%count)       !! [N m s/rad]
+    integer :: e
+
+    drag = self%share_slope * self%held_load * own
+    do e = 1, elements%count
+      drag = drag + self%share * self%by_moment(:, e) * (elements%applied_speed(1, e) * rates(e))
+    end do
+    associate (x => elements%cross)
+      do e = 1, x%count
+        drag = drag + self%share * self%by_moment(:, x%element(e)) * (x%applied_speed(1, e) * rates(x%by(e)))
+      end do
+    end associate
+  end function drag_by_speed
+
+  !> The same by a position.
+  pure function drag_by_angle(self, elements, rates) result(drag)
+    class(tooth_loads_t), intent(in) :: self
+    type(elements_t), intent(in) :: elements
+    real(wp), intent(in) :: rates(:)   !! derivatives of u of all elements by it
+    real(wp) :: drag(self%count)       !! [N m/rad]
+    integer :: e
+
+    drag = 0.0_wp
+    do e = 1, elements%count
+      associate (slope => elements%restoring_angle(1, e) + elements%applied_angle(1, e))
+        drag = drag + self%share * self%by_moment(:, e) * (slope * rates(e))
+      end associate
+    end do
+    associate (x => elements%cross)
+      do e = 1, x%count
+        associate (slope => x%restoring_angle(1, e) + x%applied_angle(1, e))
+          drag = drag + self%share * self%by_moment(:, x%element(e)) * (slope * rates(x%by(e)))
+        end associate
+      end do
+    end associate
+  end function drag_by_angle
+
+  !> The same by an internal state.
+  pure function drag_by_internal(self, elements, state) result(drag)
+    class(tooth_loads_t), intent(in) :: self
+    type(elements_t), intent(in) :: elements
+    integer, intent(in) :: state
+    real(wp) :: drag(self%count)   !! [N m] per unit of the state
+
+    drag = self%share * self%by_moment(:, elements%internal%element(state)) * elements%internal%applied(1, state)
+  end function drag_by_internal
+
   !> Adds what the moments of all joints do to T.
   pure subroutine add_moments(self, moment)
     class(tooth_loads_t), intent(inout) :: self
@@ -195,7 +262,9 @@ contains
 
     self%shift(:) = 0.0_wp
     do e = 1, merge(elements%count, 0, self%count > 0)
-      self%shift(:) = self%shift + width * abs(self%by_moment(:, e)) * (abs(elements%restoring(1, e)) + abs(elements%applied(1, e)))
+      associate (moment => abs(elements%restoring(1, e)) + abs(elements%applied(1, e)))
+        self%shift(:) = self%shift + width * moment * abs(self%by_moment(:, e))
+      end associate
     end do
     if (self%count > 0) self%shift(:) = max(self%shift, mixed * maxval(self%shift), tiny(width))
   end subroutine shift_boundaries
