@@ -1,8 +1,8 @@
 !> The events of clutches and freewheels in a run, with their names, and their form in summary.json.
 module nocdyn_joint_events
-  use nocdyn_bank, only: bank_of, role_names
+  use nocdyn_bank, only: bank_of, role_bearing, role_loss, role_names
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_friction_joints, only: direction_of, idle, locked
+  use nocdyn_friction_joints, only: direction_of, idle, locked, slips_backwards, slips_forwards
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   implicit none (type, external)
@@ -41,9 +41,30 @@ contains
         events(i)%slip = event%slip
         events(i)%torque = event%torque
         events(i)%impulse = event%impulse
+        associate (role => machine%banks(bank_of(machine%banks, formulation%joints%element(event%joint)))%bank%role)
+          if (role == role_bearing .or. role == role_loss) call name_body_first(events(i))
+        end associate
       end associate
     end do
   end subroutine list_joint_events
+
+  !> Turns an event round where the second body of the joint is what moves: a body in its bearings, the first wheel of teeth.
+  pure subroutine name_body_first(event)
+    type(named_event_t), intent(inout) :: event
+
+    event%slip = 0.0_wp - event%slip
+    event%from = opposite(event%from)
+    event%to = opposite(event%to)
+  end subroutine name_body_first
+
+  !> The mode with the opposite slip.
+  pure integer function opposite(mode)
+    integer, intent(in) :: mode
+
+    opposite = mode
+    if (direction_of(mode) > 0) opposite = slips_backwards
+    if (direction_of(mode) < 0) opposite = slips_forwards
+  end function opposite
 
   !> Writes them as the list joint_events.
   subroutine put_joint_events(json, events)

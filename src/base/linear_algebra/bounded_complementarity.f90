@@ -12,7 +12,7 @@ module nocdyn_bounded_complementarity
   implicit none (type, external)
   private
 
-  public :: solve_bounded_complementarity
+  public :: solve_bounded_complementarity, solve_scaled_complementarity
 
   integer, parameter, public :: is_free = 0, at_lower = -1, at_upper = 1   !! where a force is
   real(wp), parameter :: rounding = 1.0e-12_wp                             ! of a, relative to the largest of its terms
@@ -52,6 +52,32 @@ contains
       state(worst) = is_free
     end do
   end subroutine solve_bounded_complementarity
+
+  !> The same where x / scale is to have the least norm.
+  subroutine solve_scaled_complementarity(w, b, scale, bounds, x, a, state, is_solved)
+    real(wp), intent(in) :: w(:, :), b(:)    !! as in `solve_bounded_complementarity`, also what follows
+    real(wp), intent(in) :: scale(:)         !! positive, [n]
+    real(wp), intent(in) :: bounds(:, :)     !! lower and upper ones, [n, 2]
+    real(wp), intent(out) :: x(:), a(:)
+    integer, intent(out) :: state(:)
+    logical, intent(out) :: is_solved
+    real(wp) :: scaled_bounds(size(b), 2), scaled_w(size(b), size(b))
+    integer :: i, k
+
+    do k = 1, 2
+      where (abs(bounds(:, k)) < huge(1.0_wp))
+        scaled_bounds(:, k) = bounds(:, k) / scale
+      elsewhere
+        scaled_bounds(:, k) = bounds(:, k)
+      end where
+    end do
+    do k = 1, size(b)
+      scaled_w(:, k) = [(scale(i) * scale(k) * w(i, k), i=1, size(b))]
+    end do
+    call solve_bounded_complementarity(scaled_w, scale * b, scaled_bounds(:, 1), scaled_bounds(:, 2), x, a, state, is_solved)
+    x = scale * x
+    a = a / scale
+  end subroutine solve_scaled_complementarity
 
   !> Moves the free forces to where their a is zero; those that reach a bound on the way stay there.
   subroutine move_free(w, b, lower, upper, x, state, is_endless)

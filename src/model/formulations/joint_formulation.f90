@@ -255,8 +255,9 @@ contains
     call self%find_held_moments(t, y(:self%states))
     do j = 1, self%joints%locking
       if (self%joints%mode(j) == before(j)) cycle
-      if (self%joints%teeth%count > 0 .and. all([before(j), self%joints%mode(j)] /= locked)) cycle   ! another wheel drives, or
-                                                                       ! others hold the joint while it is at a bound
+      if (all([before(j), self%joints%mode(j)] /= locked)) then   ! another wheel drives, or others hold it at a bound
+        if (direction_of(before(j)) == direction_of(self%joints%mode(j)) .or. .not. self%joints%is_moved(j)) cycle
+      end if
       if (before(j) /= locked) then   ! it is not, and cannot be
         if (self%joints%is_open(self%machine%banks, j, t)) cycle
       end if

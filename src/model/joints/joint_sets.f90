@@ -5,7 +5,8 @@
 !> that of slip, which may be smaller than at rest, and the others are looked at again. A row that moves has no bounds.
 module nocdyn_joint_sets
   use nocdyn_bank, only: bank_slot_t
-  use nocdyn_bounded_complementarity, only: at_upper, is_free, solve_bounded_complementarity
+  use nocdyn_bounded_complementarity, only: at_upper, is_free, solve_bounded_complementarity, &
+    solve_scaled_complementarity
   use nocdyn_friction_joints, only: direction_of, first_wheel_drives, friction_joints_t, idle, locked, slips_backwards, &
     slips_forwards
   use nocdyn_held_rows, only: held_rows_t
@@ -43,6 +44,7 @@ module nocdyn_joint_sets
     procedure :: is_open
     procedure :: has_teeth
     procedure :: has_stopped
+    procedure :: is_moved
   end type joint_sets_t
 
 contains
@@ -172,9 +174,7 @@ contains
       call decide_resting(self, banks, t, resting, is_solved)
     end if
     do i = 1, self%locking
-      if (is_at_rest(i)) then
-        if (self%is_open(banks, i, t)) call rest_idly(self, i)
-      end if
+      if (is_at_rest(i)) call rest_idly(self, banks, i, t)
       call set_mode(self, banks, i)
     end do
     call self%change_set()
@@ -214,16 +214,26 @@ contains
     if (.not. is_solved) self%lost = findloc(is_wrong, .true., dim=1)
   end subroutine find_impact
 
-  !> Sets the mode of an open joint at rest that does not begin to slip.
-  subroutine rest_idly(self, joint)
-    class(joint_sets_t), intent(inout) :: self
+  !> Whether the accelerations of the joints, after `find_moments`, move a joint whose slip has ended.
+  pure logical function is_moved(self, joint)
+    class(joint_sets_t), intent(in) :: self
     integer, intent(in) :: joint
-    real(wp), parameter :: rounding = 1.0e-12_wp
+    real(wp), parameter :: rounding = 1.0e-10_wp
 
-    if (self%has_teeth(joint)) return
     associate (parts => self%weight(joint, :) * self%moment, rate => self%rate(joint))
-      if (abs(rate + sum(parts)) <= rounding * (abs(rate) + sum(abs(parts)))) self%mode(joint) = idle
+      is_moved = abs(rate + sum(parts)) > rounding * (abs(rate) + sum(abs(parts)))
     end associate
+  end function is_moved
+
+  !> Sets the mode of an open joint at rest that does not begin to slip.
+  subroutine rest_idly(self, banks, joint, t)
+    class(joint_sets_t), intent(inout) :: self
+    type(bank_slot_t), intent(in) :: banks(:)
+    integer, intent(in) :: joint
+    real(wp), intent(in) :: t   !! [s]
+
+    if (self%has_teeth(joint) .or. self%is_moved(joint)) return
+    if (self%is_open(banks, joint, t)) self%mode(joint) = idle
   end subroutine rest_idly
 
   !> Decides the modes of the joints at rest: whenever some slip, the others are looked at again.
@@ -233,7 +243,7 @@ contains
     real(wp), intent(in) :: t            !! [s]
     integer, intent(in) :: resting(:)    !! joints
     logical, intent(out) :: is_solved
-    real(wp), dimension(size(resting)) :: a, least, most, x
+    real(wp), dimension(size(resting)) :: a, least, most, scale, x
     real(wp) :: sliding(2, size(resting))
     integer :: i, state(size(resting))
     logical :: has_changed
@@ -241,12 +251,17 @@ contains
     do i = 1, size(resting)
       call find_ranges(self, banks, resting(i), t, least(i), most(i), sliding(:, i))
     end do
+    scale = 1.0_wp   ! redundant locks share with the least norm of `find_moments`
+    do i = 1, merge(size(resting), 0, self%motions%count > 0)
+      scale(i) = 1.0_wp / sqrt(max(self%weight(resting(i), resting(i)), tiny(scale)))
+    end do
     self%mode(resting) = locked
     self%moment(:) = 0.0_wp
     has_changed = .true.
     do while (has_changed)
       has_changed = .false.
-      call solve_bounded_complementarity(self%weight(resting, resting), self%rate(resting), least, most, x, a, state, is_solved)
+      call solve_scaled_complementarity(self%weight(resting, resting), self%rate(resting), scale, reshape([least, most], &
+                                        [size(x), 2]), x, a, state, is_solved)
       if (.not. is_solved) then   ! other rows contradict one of these
         self%lost = resting(maxloc(abs(a), dim=1))
         return
