@@ -67,7 +67,7 @@ contains
     do k = 1, 2
       where (abs(bounds(:, k)) < huge(1.0_wp))
         scaled_bounds(:, k) = bounds(:, k) / scale
-      elsewhere
+      else where
         scaled_bounds(:, k) = bounds(:, k)
       end where
     end do
