@@ -47,24 +47,10 @@ contains
     call new_asked_formulation(plan%input, plan%machine, formulation, setup%has_energy_balance)
     if (size(plan%statistics) > 0) call choose_settings(plan%input, formulation, settings, notes, error)
     setup%lanes = merge(large_block, small_block, formulation%states <= max_states)
-    if (formulation%joints%count == 0 .and. .not. may_add_joints(plan)) return
+    if (formulation%joints%count == 0) return
     setup%lanes = 1   ! whose joints may be in different sets
     if (size(plan%analyses) > 0) call refuse_joints(plan%input, 'a sweep of modes or responses', error)
   end subroutine prepare_sweep
-
-  !> Whether some variants may have losses and friction that the base machine has not.
-  pure logical function may_add_joints(plan)
-    type(sweep_plan_t), intent(in) :: plan
-    character(len=*), parameter :: keys(*) = [character(len=16) :: 'efficiency', 'table_reverse', 'bearing_friction']
-    integer :: i, k
-
-    may_add_joints = .false.
-    do i = 1, size(plan%numbers%targets)
-      do k = 1, size(keys)
-        if (index(plan%numbers%targets(i)%path, trim(keys(k))) > 0) may_add_joints = .true.
-      end do
-    end do
-  end function may_add_joints
 
   !> Computes the variants that `scheduler` hands out, by threads with a block of lanes each.
   subroutine compute_variants(plan, setup, threads, scheduler)

@@ -10,6 +10,7 @@ module nocdyn_variant_machines
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
+  use nocdyn_joint_sets, only: joint_sets_t, new_joint_sets
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_machine, only: machine_t
@@ -53,7 +54,8 @@ contains
     integer, intent(in) :: lanes
     logical, intent(in) :: with_energy_balance     !! whether the work integrals are among the states
     type(variant_machines_t), intent(out) :: self
-    real(wp), intent(in), optional :: typical(:)   !! values of the targets; absent, or if refused: those of the input
+    real(wp), intent(in), optional :: typical(:)   !! values of the targets; absent, or if they are refused or have joints, which
+                                                   !! need a block of one lane: those of the input
     type(reduced_t), pointer :: block
     class(formulation_t), allocatable :: formulation
     character(len=:), allocatable :: message
@@ -69,6 +71,9 @@ contains
     is_typical = present(typical)
     if (is_typical) call assemble_variant(self%input, targets, typical, block%machine, message, lanes)
     if (is_typical) is_typical = message == ''
+    if (is_typical .and. lanes > 1) then
+      if (has_joints(block%machine)) is_typical = .false.
+    end if
     if (.not. is_typical) then
       self%input = input
       call assemble_variant(self%input, no_targets, no_values, block%machine, message, lanes)
@@ -84,6 +89,15 @@ contains
       deallocate (block)
     end if
   end subroutine new_variant_machines
+
+  !> Whether a machine has joints that lock or move, which lanes of a block do not share.
+  logical function has_joints(machine)
+    type(machine_t), intent(in) :: machine
+    type(joint_sets_t) :: joints
+
+    joints = new_joint_sets(machine%banks, machine%switches, machine%elements%count)
+    has_joints = joints%count > 0
+  end function has_joints
 
   !> Which targets are values of &run, and what they are in the input: the block is integrated with them.
   subroutine find_run_values(self)
