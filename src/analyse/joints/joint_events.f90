@@ -26,14 +26,14 @@ contains
   subroutine list_joint_events(formulation, events)
     class(formulation_t), intent(in) :: formulation
     type(named_event_t), allocatable, intent(out) :: events(:)
-    integer :: i
+    integer :: i, role
 
     allocate (events(formulation%joints%log%count))
     do i = 1, size(events)
       associate (event => formulation%joints%log%event(i), machine => formulation%machine)
         associate (element => formulation%joints%element(event%joint))
-          events(i)%joint = trim(role_names(machine%banks(bank_of(machine%banks, element))%bank%role)) // ' ' // &
-                            machine%element_name(element)
+          role = machine%banks(bank_of(machine%banks, element))%bank%role
+          events(i)%joint = trim(role_names(role)) // ' ' // machine%element_name(element)
         end associate
         events(i)%time = event%time
         events(i)%from = event%from
@@ -41,9 +41,7 @@ contains
         events(i)%slip = event%slip
         events(i)%torque = event%torque
         events(i)%impulse = event%impulse
-        associate (role => machine%banks(bank_of(machine%banks, formulation%joints%element(event%joint)))%bank%role)
-          if (role == role_bearing .or. role == role_loss) call name_body_first(events(i))
-        end associate
+        if (role == role_bearing .or. role == role_loss) call name_body_first(events(i))
       end associate
     end do
   end subroutine list_joint_events

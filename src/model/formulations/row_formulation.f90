@@ -228,7 +228,6 @@ contains
     integer :: i
 
     associate (joints => self%joints, motions => self%joints%motions, elements => self%machine%elements)
-      self%joints%teeth%held_load(:) = joints%teeth%load
       motions%held(:) = joints%moment(joints%locking + 1:)
       do i = 1, motions%count
         associate (driver => motions%driver(i))
@@ -302,22 +301,29 @@ contains
     integer, intent(in) :: column       !! as in `hold_column`
     real(wp), intent(in) :: unit(:)     !! the speed or the position that changes, [moving]
     real(wp) :: drag(self%joints%teeth%count)
-    real(wp) :: rates(self%machine%elements%count)
+    real(wp), dimension(self%machine%elements%count) :: rates, slope
     integer :: e
 
     associate (elements => self%machine%elements, teeth => self%joints%teeth, n => size(self%moving))
-      if (column > self%mechanical) then
-        drag = teeth%drag_by_internal(elements, column - self%mechanical)
-        return
-      end if
       rates = [(self%element_rate(e, unit), e=1, elements%count)]
+      slope = 0.0_wp
       if (column == 0) then
-        drag = teeth%drag_by_time(elements)
+        slope = elements%applied_time(1, :)
       else if (column <= n) then
-        drag = teeth%drag_by_speed(elements, rates, rates(self%joints%element(teeth%joint)))
-      else
-        drag = teeth%drag_by_angle(elements, rates)
+        slope = elements%applied_speed(1, :) * rates
+      else if (column <= 2 * n) then
+        slope = (elements%restoring_angle(1, :) + elements%applied_angle(1, :)) * rates
+      else if (column > self%mechanical) then
+        slope(elements%internal%element(column - self%mechanical)) = elements%internal%applied(1, column - self%mechanical)
       end if
+      do e = 1, merge(elements%cross%count, 0, column > 0)
+        associate (x => elements%cross, by => rates(elements%cross%by(e)), moved => slope(elements%cross%element(e)))
+          if (column <= n) moved = moved + x%applied_speed(1, e) * by
+          if (column > n) moved = moved + (x%restoring_angle(1, e) + x%applied_angle(1, e)) * by
+        end associate
+      end do
+      drag = teeth%share * teeth%torques_of(slope)
+      if (column > 0 .and. column <= n) drag = drag + teeth%share_slope * teeth%load * rates(self%joints%element(teeth%joint))
     end associate
   end function drag_derivative
 

@@ -48,8 +48,8 @@ module nocdyn_held_rows
     integer, private :: rank_at_start = 0    !! of the rows that move
     ! where there are teeth with losses:
     logical, private :: has_factors = .false.      !! whether they are those of the present modes, slopes and shares
-    real(wp), allocatable, private :: with_teeth(:, :)    !! equations of all moments
-    real(wp), allocatable, private :: factors(:, :), inverse(:, :)   !! LU factors; a pseudoinverse if they are singular
+    real(wp), allocatable, private :: factors(:, :)       !! LU factors of the equations of all moments
+    logical, private :: is_singular = .false.             !! `factors` are the pseudo-inverse
     real(wp), allocatable, private :: share(:)            !! of the factors, [losses]
     integer, allocatable, private :: pivots(:)
   contains
@@ -82,7 +82,7 @@ contains
       allocate (self%sets(0), self%holding(n))
       self%system = new_semidefinite(merge(n, 0, self%motions%count > 0))
       if (self%teeth%count == 0) return
-      allocate (self%with_teeth(n, n), self%factors(n, n), self%inverse(0, 0), self%pivots(n), self%share(self%teeth%count))
+      allocate (self%factors(n, n), self%pivots(n), self%share(self%teeth%count))
     end associate
   end subroutine allocate_rows
 
@@ -208,8 +208,8 @@ contains
         self%moment(j) = -drag(self%teeth%loss_of(j))
       end if
     end do
-    if (size(self%inverse) > 0) then
-      self%moment(:) = matmul(self%inverse, self%moment)
+    if (self%is_singular) then
+      self%moment(:) = matmul(self%factors, self%moment)
     else
       call lu_solve(self%factors, self%pivots, self%moment)
     end if
@@ -218,32 +218,28 @@ contains
   !> Factors the equations of all moments: rows of W where joints are locked, x + s V x where teeth turn, x elsewhere.
   subroutine factor_with_teeth(self)
     class(held_rows_t), intent(inout) :: self
-    real(wp) :: pivots(self%count)
+    real(wp) :: equations(self%count, self%count), pivots(self%count)
     integer :: j
-    logical :: is_singular
 
     self%share(:) = self%teeth%share
+    equations = 0.0_wp
     do j = 1, self%count
-      self%factors(j, :) = 0.0_wp
       if (self%mode(j) == locked) then
-        self%factors(j, :) = self%weight(j, :)
-        if (self%weight(j, j) > 0) self%factors(j, :) = self%factors(j, :) / self%weight(j, j)
+        equations(j, :) = self%weight(j, :)
+        if (self%weight(j, j) > 0) equations(j, :) = equations(j, :) / self%weight(j, j)
       else
-        self%factors(j, j) = 1.0_wp
-        if (self%is_active(j, .true.)) then
-          associate (loss => self%teeth%loss_of(j))
-            self%factors(j, :) = self%factors(j, :) + self%share(loss) * self%teeth%by_joint(loss, :)
-          end associate
-        end if
+        equations(j, j) = 1.0_wp
+        if (.not. self%is_active(j, .true.)) cycle
+        associate (loss => self%teeth%loss_of(j))
+          equations(j, :) = equations(j, :) + self%share(loss) * self%teeth%by_joint(loss, :)
+        end associate
       end if
     end do
-    if (size(self%inverse) > 0) deallocate (self%inverse)
-    if (.not. allocated(self%inverse)) allocate (self%inverse(0, 0))
-    self%with_teeth = self%factors
-    call lu_factor(self%factors, self%pivots, is_singular)
+    self%factors(:, :) = equations
+    call lu_factor(self%factors, self%pivots, self%is_singular)
     pivots = [(abs(self%factors(j, j)), j=1, self%count)]
-    if (minval(pivots) <= null_tolerance * maxval(pivots)) is_singular = .true.
-    if (is_singular) self%inverse = pseudo_inverse(self%with_teeth, null_tolerance)
+    if (minval(pivots) <= null_tolerance * maxval(pivots)) self%is_singular = .true.
+    if (self%is_singular) self%factors(:, :) = pseudo_inverse(equations, null_tolerance)
     self%has_factors = .true.
   end subroutine factor_with_teeth
 

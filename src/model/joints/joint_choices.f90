@@ -11,6 +11,7 @@ module nocdyn_joint_choices
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pseudo_inverse
   use nocdyn_semidefinite, only: null_tolerance
+  use nocdyn_tooth_loads, only: mixed
   implicit none (type, external)
   private
 
@@ -106,7 +107,6 @@ contains
     class(joint_choices_t), intent(in) :: self
     integer :: mode(size(self%mode))
     real(wp), dimension(size(self%mode)) :: acceleration, load, smallest
-    real(wp), parameter :: mixed = 1.0e-3_wp   ! of the largest terms, in the errors of the others
     integer :: i
     logical :: holds_always(size(self%mode))
 

@@ -16,6 +16,8 @@ module nocdyn_tooth_loads
 
   public :: new_tooth_loads
 
+  real(wp), parameter, public :: mixed = 1.0e-3_wp   !! of the largest terms of equations, in the rounding errors of all of them
+
   type, public :: tooth_loads_t
     integer :: count = 0
     integer, allocatable :: joint(:)            !! of each loss, [losses] as all that follow
@@ -28,16 +30,15 @@ module nocdyn_tooth_loads
     real(wp), allocatable :: share(:)           !! share s of T that is lost while the wheels turn
     real(wp), allocatable :: share_slope(:)     !! its derivative by the speed [s/rad]
     real(wp), allocatable :: shift(:)           !! by which the boundary of T lies beyond zero [N m]
-    real(wp), allocatable :: held_load(:)       !! T [N m], for the derivatives of the accelerations
   contains
     procedure :: find_coefficients
     procedure :: weigh
+    procedure :: torques_of
     procedure :: apply
     procedure :: choose_shares
     procedure :: drag
     procedure :: add_moments
     procedure :: shift_boundaries
-    procedure :: drag_by_time, drag_by_speed, drag_by_angle, drag_by_internal
   end type tooth_loads_t
 
 contains
@@ -65,7 +66,7 @@ contains
     allocate (self%by_moment(self%count, merge(elements, 0, self%count > 0)), source=0.0_wp)
     allocate (self%by_joint(self%count, size(bank_of_joint)), source=0.0_wp)
     allocate (self%applied(self%count), source=0.0_wp)
-    allocate (self%load, self%share, self%share_slope, self%shift, self%held_load, source=self%applied)
+    allocate (self%load, self%share, self%share_slope, self%shift, source=self%applied)
   end function new_tooth_loads
 
   !> Sets G at the start.
@@ -140,16 +141,21 @@ contains
     end do
   end subroutine weigh
 
+  !> T = G M, or its derivatives by those of M.
+  pure function torques_of(self, moment) result(torque)
+    class(tooth_loads_t), intent(in) :: self
+    real(wp), intent(in) :: moment(:)   !! M of all elements [N m]
+    real(wp) :: torque(self%count)      !! [N m]
+
+    torque = matmul(self%by_moment, moment)
+  end function torques_of
+
   !> Finds T without the moments of the joints that hold and the losses, after the laws of all elements.
   pure subroutine apply(self, elements)
     class(tooth_loads_t), intent(inout) :: self
     type(elements_t), intent(in) :: elements
-    integer :: e
 
-    self%applied(:) = 0.0_wp
-    do e = 1, elements%count
-      self%applied(:) = self%applied + self%by_moment(:, e) * (elements%restoring(1, e) + elements%applied(1, e))
-    end do
+    self%applied(:) = self%torques_of(elements%restoring(1, :) + elements%applied(1, :))
   end subroutine apply
 
   !> Sets the shares that are lost at the present modes and speeds.
@@ -178,72 +184,6 @@ contains
     drag = self%share * self%applied
   end function drag
 
-  !> The derivative of the drags by the time, after that of the laws of all elements.
-  pure function drag_by_time(self, elements) result(drag)
-    class(tooth_loads_t), intent(in) :: self
-    type(elements_t), intent(in) :: elements
-    real(wp) :: drag(self%count)   !! [N m/s]
-    integer :: e
-
-    drag = 0.0_wp
-    do e = 1, elements%count
-      drag = drag + self%share * self%by_moment(:, e) * elements%applied_time(1, e)
-    end do
-  end function drag_by_time
-
-  !> The same by a speed; the shares follow it.
-  pure function drag_by_speed(self, elements, rates, own) result(drag)
-    class(tooth_loads_t), intent(in) :: self
-    type(elements_t), intent(in) :: elements
-    real(wp), intent(in) :: rates(:)   !! derivatives of u' of all elements by it
-    real(wp), intent(in) :: own(:)     !! those of the losses, [losses]
-    real(wp) :: drag(self%count)       !! [N m s/rad]
-    integer :: e
-
-    drag = self%share_slope * self%held_load * own
-    do e = 1, elements%count
-      drag = drag + self%share * self%by_moment(:, e) * (elements%applied_speed(1, e) * rates(e))
-    end do
-    associate (x => elements%cross)
-      do e = 1, x%count
-        drag = drag + self%share * self%by_moment(:, x%element(e)) * (x%applied_speed(1, e) * rates(x%by(e)))
-      end do
-    end associate
-  end function drag_by_speed
-
-  !> The same by a position.
-  pure function drag_by_angle(self, elements, rates) result(drag)
-    class(tooth_loads_t), intent(in) :: self
-    type(elements_t), intent(in) :: elements
-    real(wp), intent(in) :: rates(:)   !! derivatives of u of all elements by it
-    real(wp) :: drag(self%count)       !! [N m/rad]
-    integer :: e
-
-    drag = 0.0_wp
-    do e = 1, elements%count
-      associate (slope => elements%restoring_angle(1, e) + elements%applied_angle(1, e))
-        drag = drag + self%share * self%by_moment(:, e) * (slope * rates(e))
-      end associate
-    end do
-    associate (x => elements%cross)
-      do e = 1, x%count
-        associate (slope => x%restoring_angle(1, e) + x%applied_angle(1, e))
-          drag = drag + self%share * self%by_moment(:, x%element(e)) * (slope * rates(x%by(e)))
-        end associate
-      end do
-    end associate
-  end function drag_by_angle
-
-  !> The same by an internal state.
-  pure function drag_by_internal(self, elements, state) result(drag)
-    class(tooth_loads_t), intent(in) :: self
-    type(elements_t), intent(in) :: elements
-    integer, intent(in) :: state
-    real(wp) :: drag(self%count)   !! [N m] per unit of the state
-
-    drag = self%share * self%by_moment(:, elements%internal%element(state)) * elements%internal%applied(1, state)
-  end function drag_by_internal
-
   !> Adds what the moments of all joints do to T.
   pure subroutine add_moments(self, moment)
     class(tooth_loads_t), intent(inout) :: self
@@ -257,16 +197,10 @@ contains
     class(tooth_loads_t), intent(inout) :: self
     type(elements_t), intent(in) :: elements
     real(wp), parameter :: width = 1.0e-11_wp   ! relative to the terms of T
-    real(wp), parameter :: mixed = 1.0e-3_wp    ! of the largest width, as in `nocdyn_joint_choices`
-    integer :: e
 
-    self%shift(:) = 0.0_wp
-    do e = 1, merge(elements%count, 0, self%count > 0)
-      associate (moment => abs(elements%restoring(1, e)) + abs(elements%applied(1, e)))
-        self%shift(:) = self%shift + width * moment * abs(self%by_moment(:, e))
-      end associate
-    end do
-    if (self%count > 0) self%shift(:) = max(self%shift, mixed * maxval(self%shift), tiny(width))
+    if (self%count == 0) return
+    self%shift(:) = width * matmul(abs(self%by_moment), abs(elements%restoring(1, :)) + abs(elements%applied(1, :)))
+    self%shift(:) = max(self%shift, mixed * maxval(self%shift), tiny(width))
   end subroutine shift_boundaries
 
 end module nocdyn_tooth_loads
