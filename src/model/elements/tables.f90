@@ -5,13 +5,14 @@ module nocdyn_tables
     segment_origin, segment_size, segment_slope, segment_value
   use nocdyn_described_elements, only: boundary_width
   use nocdyn_kinds, only: wp
-  use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), operator(+), operator(-), segment_part
+  use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), operator(+), operator(-), pick, &
+    segment_part
   use nocdyn_law_functions, only: add_guard
   use nocdyn_law_tape, only: law_tape_t
   implicit none (type, external)
   private
 
-  public :: add_table, curve_value, curve_integral, guard_segment
+  public :: add_table, curve_value, curve_integral, guard_segment, picked_value, guard_picked_square
 
 contains
 
@@ -29,12 +30,59 @@ contains
   function curve_value(tape, x) result(value)
     type(law_tape_t), target, intent(inout) :: tape
     type(expression_t), intent(in) :: x
-    type(expression_t) :: d, value
+    type(expression_t) :: value
 
-    d = x - segment_part(tape, segment_origin)
-    value = segment_part(tape, segment_value) + d * (segment_part(tape, segment_slope) &
-            + d * (segment_part(tape, segment_half_curvature) + segment_part(tape, segment_cubic) * d))
+    value = cubic(x - segment_part(tape, segment_origin), segment_part(tape, segment_value), segment_part(tape, segment_slope), &
+                  segment_part(tape, segment_half_curvature), segment_part(tape, segment_cubic))
   end function curve_value
+
+  !> value + d (slope + d (half_curvature + d cubic)).
+  function cubic(d, value, slope, half_curvature, third)
+    type(expression_t), intent(in) :: d, value, slope, half_curvature, third
+    type(expression_t) :: cubic
+
+    cubic = value + d * (slope + d * (half_curvature + third * d))
+  end function cubic
+
+  !> A curve of all elements at x, whose segments are the branches of a switch. There is none before its first point.
+  function picked_value(tape, curve, switch, x) result(value)
+    type(law_tape_t), target, intent(inout) :: tape
+    type(curve_t), intent(in) :: curve
+    integer, intent(in) :: switch   !! of each element
+    type(expression_t), intent(in) :: x
+    type(expression_t) :: value
+
+    value = cubic(x - part(segment_origin), part(segment_value), part(segment_slope), part(segment_half_curvature), &
+                  part(segment_cubic))
+
+  contains
+
+    !> One of the numbers of the present segment.
+    type(expression_t) function part(which)
+      integer, intent(in) :: which   !! segment_...
+      integer :: i
+
+      part = pick(switch, [(literal(tape, curve%segment_number(i, which)), i=1, curve%points())])
+    end function part
+
+  end function picked_value
+
+  !> The ends of its segments are the boundaries of the branches, where x is 0 or more: by its square, as guards have no picks.
+  subroutine guard_picked_square(tape, curve, switch, square)
+    type(law_tape_t), target, intent(inout) :: tape
+    type(curve_t), intent(in) :: curve
+    integer, intent(in) :: switch                !! of each element
+    type(expression_t), intent(in) :: square     !! of x
+    real(wp) :: edge
+    integer :: k
+
+    do k = 1, curve%points()
+      edge = curve%segment_number(k, segment_begin)
+      if (k > 1) call add_guard(switch, k, square - literal(tape, edge**2), literal(tape, boundary_width * edge**2))
+      edge = curve%segment_number(k, segment_end)
+      if (edge < huge(edge)) call add_guard(switch, k, literal(tape, edge**2) - square, literal(tape, boundary_width * edge**2))
+    end do
+  end subroutine guard_picked_square
 
   !> Its integral from 0 to x.
   function curve_integral(tape, x) result(integral)

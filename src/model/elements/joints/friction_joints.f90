@@ -11,16 +11,13 @@
 !> (`nocdyn_joint_sets`).
 module nocdyn_friction_joints
   use nocdyn_bank, only: bank_t, quantity_t, role_bearing
-  use nocdyn_curves, only: curve_t, segment_begin, segment_cubic, segment_end, segment_half_curvature, segment_origin, &
-    segment_slope, segment_value
-  use nocdyn_described_elements, only: boundary_width
+  use nocdyn_curves, only: curve_t
   use nocdyn_element_rows, only: rows_between
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), operator(+), operator(-), pick, speed_of, time_of
-  use nocdyn_law_functions, only: add_guard
+  use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), pick, speed_of, time_of
   use nocdyn_law_tape, only: law_tape_t
-  use nocdyn_tables, only: add_table, curve_value, guard_segment
+  use nocdyn_tables, only: add_table, curve_value, guard_picked_square, guard_segment, picked_value
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -42,6 +39,8 @@ module nocdyn_friction_joints
     integer :: mode_switch = 1   !! of each element, the switch of its mode
     type(curve_t), allocatable :: over_slip   !! friction while it slips [N m] over the speed of the slip [rad/s] of all elements
   contains
+    procedure :: connect_joints
+    procedure :: add_modes
     procedure :: describe
     procedure :: range_at_rest
     procedure :: range_of_slip
@@ -86,25 +85,43 @@ contains
     type(friction_joints_t) :: bank
     integer :: e
 
-    call bank%connect(role, size(ranges%least, 1), names, rows_between(from, to))
-    bank%is_polynomial = .false.
-    bank%has_paper_law = .false.
-    bank%elastic = [integer ::]
+    call bank%connect_joints(role, size(ranges%least, 1), names, from, to)
     call bank%add_parameter('least', ranges%least, is_key=.false.)
     call bank%add_parameter('most', ranges%most, is_key=.false.)
     call bank%add_parameter('sliding least', ranges%sliding_least, is_key=.false.)
     call bank%add_parameter('sliding most', ranges%sliding_most, is_key=.false.)
     if (present(engagement)) then
       call add_table(bank, engagement)
-      bank%mode_switch = 2
     end if
-    call bank%add_switches([('locking', e=1, bank%count)], -1)
+    call bank%add_modes()
     if (present(over_slip)) then
       allocate (bank%over_slip, source=over_slip)
       call bank%add_switches([('point in the table', e=1, bank%count)], over_slip%points())
     end if
     call bank%prepare_law()
   end function new_friction_joints
+
+  !> Sets the bodies of joints whose law is no polynomial. Every constructor calls it first.
+  subroutine connect_joints(self, role, lanes, names, from, to)
+    class(friction_joints_t), intent(inout) :: self
+    integer, intent(in) :: role, lanes
+    type(string_t), intent(in) :: names(:)
+    integer, intent(in) :: from(:), to(:)   !! bodies, 0 = ground
+
+    call self%connect(role, lanes, names, rows_between(from, to))
+    self%is_polynomial = .false.
+    self%has_paper_law = .false.
+    self%elastic = [integer ::]
+  end subroutine connect_joints
+
+  !> Gives every joint the switch of its mode, after that of an engagement.
+  subroutine add_modes(self)
+    class(friction_joints_t), intent(inout) :: self
+    integer :: e
+
+    if (allocated(self%curve)) self%mode_switch = 2
+    call self%add_switches([('locking', e=1, self%count)], -1)
+  end subroutine add_modes
 
   subroutine describe(self, tape)
     class(friction_joints_t), intent(in) :: self
@@ -128,33 +145,14 @@ contains
   function friction_over_slip(self, tape) result(moment)
     class(friction_joints_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape
-    type(expression_t) :: distance, moment, slip, square
-    real(wp) :: edge
-    integer :: k, switch
+    type(expression_t) :: moment, slip
 
-    switch = self%mode_switch + 1
     slip = pick(self%mode_switch, by_direction(1.0_wp)) * speed_of(tape)
-    distance = slip - part(segment_origin)
-    moment = part(segment_value) + distance * (part(segment_slope) + distance * (part(segment_half_curvature) &
-                                                                                 + part(segment_cubic) * distance))
+    moment = picked_value(tape, self%over_slip, self%mode_switch + 1, slip)
     moment = pick(self%mode_switch, by_direction(-1.0_wp)) * moment
-    square = speed_of(tape) * speed_of(tape)   ! as guards have no picks
-    do k = 1, self%over_slip%points()
-      edge = self%over_slip%segment_number(k, segment_begin)
-      if (k > 1) call add_guard(switch, k, square - literal(tape, edge**2), literal(tape, boundary_width * edge**2))
-      edge = self%over_slip%segment_number(k, segment_end)
-      if (edge < huge(edge)) call add_guard(switch, k, literal(tape, edge**2) - square, literal(tape, boundary_width * edge**2))
-    end do
+    call guard_picked_square(tape, self%over_slip, self%mode_switch + 1, speed_of(tape) * speed_of(tape))
 
   contains
-
-    !> One of the numbers of the present segment.
-    type(expression_t) function part(which)
-      integer, intent(in) :: which   !! segment_...
-      integer :: i
-
-      part = pick(switch, [(literal(tape, self%over_slip%segment_number(i, which)), i=1, self%over_slip%points())])
-    end function part
 
     !> A number by the mode, its opposite where the joint slips backwards.
     function by_direction(number) result(choices)

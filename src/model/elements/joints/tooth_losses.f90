@@ -11,7 +11,6 @@
 module nocdyn_tooth_losses
   use nocdyn_bank, only: quantity_t, role_loss
   use nocdyn_curves, only: curve_t
-  use nocdyn_element_rows, only: rows_between
   use nocdyn_elements, only: elements_t
   use nocdyn_friction_joints, only: friction_joints_t
   use nocdyn_kinds, only: wp
@@ -53,19 +52,15 @@ contains
     integer, intent(in) :: from(:), to(:)    !! what the first wheel moves against, 0 = ground, and the first wheel
     type(teeth_t), intent(in) :: teeth
     type(tooth_losses_t) :: bank
-    integer :: e
 
-    call bank%connect(role_loss, size(teeth%forward, 1), names, rows_between(from, to))
-    bank%is_polynomial = .false.
-    bank%has_paper_law = .false.
-    bank%elastic = [integer ::]
+    call bank%connect_joints(role_loss, size(teeth%forward, 1), names, from, to)
     bank%row = teeth%row
     bank%factor = teeth%factor
     call bank%add_parameter('efficiency', teeth%forward, is_key=.false.)
     call bank%add_parameter('backward efficiency', teeth%backward, is_key=.false.)
     if (allocated(teeth%forward_over_speed)) allocate (bank%forward_over_speed, source=teeth%forward_over_speed)
     if (allocated(teeth%backward_over_speed)) allocate (bank%backward_over_speed, source=teeth%backward_over_speed)
-    call bank%add_switches([('locking', e=1, bank%count)], -1)
+    call bank%add_modes()
     call bank%prepare_law()
   end function new_tooth_losses
 
@@ -74,7 +69,6 @@ contains
     class(tooth_losses_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape
 
-    if (self%count < 0) error stop 'nocdyn_tooth_losses: a bank has elements'
     tape%applied = node_of(literal(tape, 0.0_wp))
   end subroutine describe
 
