@@ -4,15 +4,16 @@ module nocdyn_element_groups
   use nocdyn_bank, only: bank_slot_t
   use nocdyn_curves, only: curve_t, extrapolation_constant, extrapolation_linear, interpolation_cubic, interpolation_linear, &
                            new_curve
+  use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_schema_rules, only: ground
-  use nocdyn_text, only: selected, string_t
+  use nocdyn_text, only: selected, string_t, to_text
   use nocdyn_text_sort, only: argsort, sorted_position
   implicit none (type, external)
   private
 
-  public :: new_body_index, bodies_of, new_element_groups, add_banks, group_curve
+  public :: new_body_index, bodies_of, new_element_groups, add_banks, group_curve, check_from_standstill
 
   !> Finds the bodies of an input by name.
   type, public :: body_index_t
@@ -191,5 +192,20 @@ contains
     outside = merge(extrapolation_constant, extrapolation_linear, beyond == 'constant')
     curve = new_curve(group%numbers(x), group%numbers(y), inside, outside)
   end function group_curve
+
+  !> Refuses a table over a speed, in either direction, that does not begin at standstill.
+  subroutine check_from_standstill(input, index, key, speeds, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index             !! of the group
+    character(len=*), intent(in) :: key      !! of the speeds [rad/s]; they may be unset
+    character(len=*), intent(in) :: speeds   !! what they are, e.g. 'slips'
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: x(:)
+
+    allocate (x, source=input%groups(index)%numbers(key))
+    if (size(x) == 0) return
+    if (x(1) > 0) call raise(error, exit_input, input%location(index, key) // ': ' // key // ' begins with ' // to_text(x(1)) // &
+                             '; allowed: 0 [rad/s] first, then the ' // speeds // ' in either direction')
+  end subroutine check_from_standstill
 
 end module nocdyn_element_groups

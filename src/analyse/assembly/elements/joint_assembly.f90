@@ -2,7 +2,7 @@
 module nocdyn_joint_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t, role_bearing, role_clutch, role_freewheel
   use nocdyn_curves, only: curve_t, new_steps
-  use nocdyn_element_groups, only: element_groups_t, group_curve
+  use nocdyn_element_groups, only: check_from_standstill, element_groups_t, group_curve
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_friction_joints, only: joint_ranges_t, new_friction_joints
   use nocdyn_input, only: group_t, input_t
@@ -38,13 +38,8 @@ contains
     integer, intent(in) :: index
     type(group_t), intent(in) :: group   !! with this index
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: slip(:)
 
-    allocate (slip, source=group%numbers('table_slip'))
-    if (size(slip) > 0) then
-      if (slip(1) > 0) call raise(error, exit_input, input%location(index, 'table_slip') // ': table_slip begins with ' // &
-                                  to_text(slip(1)) // '; allowed: 0 [rad/s] first, then the slips in either direction')
-    end if
+    call check_from_standstill(input, index, 'table_slip', 'slips', error)
     if (allocated(error) .or. .not. group%has_value('static_capacity')) return
     if (group%number('static_capacity') < sliding_capacity(group)) then
       call raise(error, exit_input, input%location(index, 'static_capacity') // ': static_capacity = ' // &
@@ -177,11 +172,12 @@ contains
     type(joint_ranges_t) :: ranges
     integer, allocatable :: body(:)
     integer :: i
+    logical :: has_friction(size(bodies%indices))
 
-    groups = bodies%some([(bodies%input%groups(bodies%indices(i))%number('bearing_friction') > 0, i=1, size(bodies%indices))])
-    if (size(groups%indices) == 0) return
-    body = pack([(i, i=1, size(bodies%indices))], &
-                [(bodies%input%groups(bodies%indices(i))%number('bearing_friction') > 0, i=1, size(bodies%indices))])
+    has_friction = [(bodies%input%groups(bodies%indices(i))%number('bearing_friction') > 0, i=1, size(bodies%indices))]
+    if (.not. any(has_friction)) return
+    groups = bodies%some(has_friction)
+    body = pack([(i, i=1, size(bodies%indices))], has_friction)
     ranges%most = groups%values('bearing_friction')
     ranges%least = -ranges%most
     ranges%sliding_most = ranges%most

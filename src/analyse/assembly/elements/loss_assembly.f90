@@ -2,7 +2,7 @@
 module nocdyn_loss_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
   use nocdyn_curves, only: curve_t, extrapolation_constant, interpolation_linear, new_curve
-  use nocdyn_element_groups, only: element_groups_t
+  use nocdyn_element_groups, only: check_from_standstill, element_groups_t
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
@@ -31,17 +31,14 @@ contains
   subroutine check_losses(input, error)
     type(input_t), intent(in) :: input
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: speed(:)
     integer :: i
 
     do i = 1, size(input%groups)
       associate (group => input%groups(i))
         if (.not. has_losses(group)) cycle
-        speed = [group%numbers('table_speed'), 0.0_wp]
-        if (abs(speed(1)) > 0) then
-          call raise(error, exit_input, input%location(i, 'table_speed') // ': table_speed begins with ' // to_text(speed(1)) // &
-                     '; allowed: 0 [rad/s] first, then the speeds in either direction')
-        else if (group%has_value('table_reverse') .and. &
+        call check_from_standstill(input, i, 'table_speed', 'speeds', error)
+        if (allocated(error)) return
+        if (group%has_value('table_reverse') .and. &
                  size(group%numbers('table_reverse')) /= size(group%numbers('table_speed'))) then
           call raise(error, exit_input, input%location(i, 'table_reverse') // ': table_reverse has ' // &
                      to_text(size(group%numbers('table_reverse'))) // ' values; needed: ' // &

@@ -26,15 +26,15 @@ module nocdyn_schema_constraints
       'numbers of teeth, in the order of the bodies'), &
     key_rule_t('gear',       'internal',        a_flag,         1, '',            '.false.',   anything, &
       'an internal gear: both wheels turn in the same direction'), &
-    key_rule_t('gear',        'efficiency',      a_number,       1, '',            unset,       efficiencies, &
+    key_rule_t('gear',       'efficiency',      a_number,       1, '',            unset,       efficiencies, &
       'share of the power that the second wheel gets where the first one drives; 1 without losses'), &
-    key_rule_t('gear',        'reverse_efficiency', a_number,   1, '',            unset,       reverse_efficiencies, &
+    key_rule_t('gear',       'reverse_efficiency', a_number,    1, '',            unset,       reverse_efficiencies, &
       'the same where the second wheel drives; as efficiency if not given; 0 or less: self-locking'), &
-    key_rule_t('gear',        'table_speed',     a_number,       any_number, 'rad/s', unset,    not_negative, &
+    key_rule_t('gear',       'table_speed',     a_number,       any_number, 'rad/s', unset,    not_negative, &
       'speeds of the first wheel of the points of a table of efficiencies, from 0 on', fewest=2, ascends=.true.), &
-    key_rule_t('gear',        'table_efficiency', a_number,      any_number, '',   unset,       efficiencies, &
+    key_rule_t('gear',       'table_efficiency', a_number,      any_number, '',  unset,       efficiencies, &
       'efficiency at these speeds; beyond the last point as there', fewest=2), &
-    key_rule_t('gear',        'table_reverse', a_number, any_number, '', unset,     reverse_efficiencies, &
+    key_rule_t('gear',       'table_reverse',   a_number,       any_number, '',   unset,       reverse_efficiencies, &
       'reverse efficiency at these speeds', fewest=2), &
     key_rule_t('planetary',  'name',            a_name,         1, '',            required,    anything, &
       'name in results and messages'), &
@@ -46,15 +46,15 @@ module nocdyn_schema_constraints
       'the carrier; its inertia includes the mass of the planets, whose spin is neglected'), &
     key_rule_t('planetary',  'teeth',           an_integer,     2, '',            required,    from_1, &
       'numbers of teeth of sun and ring; the ring has more', ascends=.true.), &
-    key_rule_t('planetary',   'efficiency',      a_number,       1, '',            unset,       efficiencies, &
+    key_rule_t('planetary',  'efficiency',      a_number,       1, '',            unset,       efficiencies, &
       'share that the ring gets of the power of the sun, with the carrier at rest; 1 without losses'), &
-    key_rule_t('planetary',   'reverse_efficiency', a_number,   1, '',            unset,       reverse_efficiencies, &
+    key_rule_t('planetary',  'reverse_efficiency', a_number,    1, '',            unset,       reverse_efficiencies, &
       'the same where the ring drives; as efficiency if not given; 0 or less: self-locking'), &
-    key_rule_t('planetary',   'table_speed',     a_number,       any_number, 'rad/s', unset,    not_negative, &
+    key_rule_t('planetary',  'table_speed',     a_number,       any_number, 'rad/s', unset,    not_negative, &
       'speeds of the sun against the carrier of the points of a table of efficiencies, from 0 on', fewest=2, ascends=.true.), &
-    key_rule_t('planetary',   'table_efficiency', a_number,      any_number, '',   unset,       efficiencies, &
+    key_rule_t('planetary',  'table_efficiency', a_number,      any_number, '',  unset,       efficiencies, &
       'efficiency at these speeds; beyond the last point as there', fewest=2), &
-    key_rule_t('planetary',   'table_reverse', a_number, any_number, '', unset,     reverse_efficiencies, &
+    key_rule_t('planetary',  'table_reverse',   a_number,       any_number, '',   unset,       reverse_efficiencies, &
       'reverse efficiency at these speeds', fewest=2), &
     key_rule_t('differential', 'name',          a_name,         1, '',            required,    anything, &
       'name in results and messages'), &

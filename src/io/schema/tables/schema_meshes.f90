@@ -34,15 +34,15 @@ module nocdyn_schema_meshes
       'order of each in turns of the first body; if not given 1, 2, ... times its teeth', fewest=1), &
     key_rule_t('mesh',       'error_phases',    a_number,       any_number, 'rad', unset,      anything, &
       'phase of each: amplitude * sin(order * angle + phase)', fewest=1), &
-    key_rule_t('mesh',        'efficiency',      a_number,       1, '',            unset,       efficiencies, &
+    key_rule_t('mesh',       'efficiency',      a_number,       1, '',            unset,       efficiencies, &
       'share of the power that the second wheel gets where the first one drives; 1 without losses'), &
-    key_rule_t('mesh',        'reverse_efficiency', a_number,   1, '',            unset,       reverse_efficiencies, &
+    key_rule_t('mesh',       'reverse_efficiency', a_number,    1, '',            unset,       reverse_efficiencies, &
       'the same where the second wheel drives; as efficiency if not given; 0 or less: self-locking'), &
-    key_rule_t('mesh',        'table_speed',     a_number,       any_number, 'rad/s', unset,    not_negative, &
+    key_rule_t('mesh',       'table_speed',     a_number,       any_number, 'rad/s', unset,    not_negative, &
       'speeds of the first wheel of the points of a table of efficiencies, from 0 on', fewest=2, ascends=.true.), &
-    key_rule_t('mesh',        'table_efficiency', a_number,      any_number, '',   unset,       efficiencies, &
+    key_rule_t('mesh',       'table_efficiency', a_number,      any_number, '',  unset,       efficiencies, &
       'efficiency at these speeds; beyond the last point as there', fewest=2), &
-    key_rule_t('mesh',        'table_reverse', a_number, any_number, '', unset,     reverse_efficiencies, &
+    key_rule_t('mesh',       'table_reverse',   a_number,       any_number, '',   unset,       reverse_efficiencies, &
       'reverse efficiency at these speeds', fewest=2)]
 
   type(relation_rule_t), parameter, public :: mesh_relations(*) = [ &
