@@ -54,8 +54,7 @@ contains
     integer, intent(in) :: lanes
     logical, intent(in) :: with_energy_balance     !! whether the work integrals are among the states
     type(variant_machines_t), intent(out) :: self
-    real(wp), intent(in), optional :: typical(:)   !! values of the targets; absent, or if they are refused or have joints, which
-                                                   !! need a block of one lane: those of the input
+    real(wp), intent(in), optional :: typical(:)   !! values of the targets; absent, refused or with joints: those of the input
     type(reduced_t), pointer :: block
     class(formulation_t), allocatable :: formulation
     character(len=:), allocatable :: message
@@ -69,10 +68,10 @@ contains
     call find_run_values(self)
     allocate (block, self%assembled)
     is_typical = present(typical)
-    if (is_typical) call assemble_variant(self%input, targets, typical, block%machine, message, lanes)
-    if (is_typical) is_typical = message == ''
-    if (is_typical .and. lanes > 1) then
-      if (has_joints(block%machine)) is_typical = .false.
+    if (is_typical) then
+      call assemble_variant(self%input, targets, typical, block%machine, message, lanes)
+      is_typical = message == ''
+      if (is_typical .and. lanes > 1) is_typical = count_joints(block%machine) == 0
     end if
     if (.not. is_typical) then
       self%input = input
@@ -90,14 +89,14 @@ contains
     end if
   end subroutine new_variant_machines
 
-  !> Whether a machine has joints that lock or move, which lanes of a block do not share.
-  logical function has_joints(machine)
+  !> The joints of a machine that lock or move, which lanes of a block do not share.
+  integer function count_joints(machine)
     type(machine_t), intent(in) :: machine
     type(joint_sets_t) :: joints
 
     joints = new_joint_sets(machine%banks, machine%switches, machine%elements%count)
-    has_joints = joints%count > 0
-  end function has_joints
+    count_joints = joints%count
+  end function count_joints
 
   !> Which targets are values of &run, and what they are in the input: the block is integrated with them.
   subroutine find_run_values(self)
