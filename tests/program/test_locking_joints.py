@@ -283,13 +283,29 @@ def test_bad_clutches_are_refused(nocdyn, keys, words):
 @pytest.mark.parametrize(
     ("command", "change", "words"),
     [
-        ("modes", "", "nocdyn modes does not know which joints are locked"),
-        ("equilibrium", "", "nocdyn equilibrium does not know which joints are locked"),
-        ("run", "run.start=equilibrium", "start = 'equilibrium' does not know which joints are locked"),
+        ("modes", "at", "which joints, bearings and teeth are locked at a time of the run is not known here"),
+        ("matrices", "", "nocdyn matrices does not know which joints are locked; allowed: no clutches and freewheels"),
         ("run", "run.method=taylor", "method = 'taylor' cannot be used: joints that lock or move have no Taylor series"),
     ],
 )
 def test_what_does_not_know_the_joints_refuses_them(nocdyn, command, change, words):
     path = nocdyn.write("machine.nml", PAIR.replace("KEYS", "") + "&run t_end = 1 /\n")
-    outcome = nocdyn(command, path, *(["--set", change] if change else []))
+    options = ["--at", "0.5"] if change == "at" else ["--set", change] if change else []
+    outcome = nocdyn(command, path, *options)
     assert outcome.returncode == 2 and words in outcome.stderr
+
+
+@pytest.mark.parametrize("formulation", ["reduced", "paper", "multiplier"])
+def test_joints_that_share_what_they_hold_are_named(nocdyn, formulation):
+    text = BODY.format("a", 1, 10) + BODY.format("b", 1, 0) + BODY.format("c", 1, 0)
+    text += "&clutch name = 'one' bodies = 'a', 'b' capacity = 20 /\n&clutch name = 'two' bodies = 'a', 'b' capacity = 10 /\n"
+    text += "&clutch name = 'three' bodies = 'b', 'c' capacity = 10 /\n&load name = 'l' body = 'c' viscous = 1 /\n"
+    path = nocdyn.write("shared.nml", text + f"&run t_end = 3 formulation = '{formulation}' /\n")
+    outcome = nocdyn("run", path, "--out", "shared")
+    assert outcome.returncode == 0, outcome.stderr
+    assert "note: clutch 'one', clutch 'two' are redundant where they are locked together" in outcome.stdout
+    header, rows = nocdyn.table("shared")
+    last = dict(zip(header, rows[-1], strict=True))
+    assert last["torque_one [N m]"] == pytest.approx(last["torque_two [N m]"], rel=1e-9)
+    outcome = nocdyn("run", path, "--set", "clutch.two.capacity=0", "--set", "clutch.two.static_capacity=0", "--out", "one")
+    assert outcome.returncode == 0 and "redundant" not in outcome.stdout

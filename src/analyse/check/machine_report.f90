@@ -57,7 +57,7 @@ contains
   subroutine add_redundancy_notes(machine, notes)
     type(machine_t), intent(in) :: machine
     type(string_t), allocatable, intent(inout) :: notes(:)
-    integer :: found, g, r
+    integer :: found, g, i, r
 
     found = 0
     do g = 1, size(machine%groups)
@@ -68,12 +68,30 @@ contains
           call append(notes, label(machine, redundancy%row) // ' repeats what ' // &
                              joined(selected(constraints%names, redundancy%repeats), ', ', max_names) // ' already ' // &
                              trim(merge('fixes', 'fix  ', size(redundancy%repeats) == 1)) // '; its ' // &
-                             reaction_word(machine, redundancy%row) // ' not unique, the smallest-norm share is reported')
+                             reaction_word(machine, redundancy%row) // ' not unique, the smallest-norm share is reported' // &
+                             trim(merge(', and its losses are in the motion', repeat(' ', 34), &
+                                        any([(has_losses(machine, redundancy%repeats(i)), i=1, size(redundancy%repeats))]) .or. &
+                                        has_losses(machine, redundancy%row))))
         end associate
       end do
     end do
     if (found > max_notes) call append(notes, to_text(found - max_notes) // ' more constraints repeat others')
   end subroutine add_redundancy_notes
+
+  !> Whether the teeth of a row lose something.
+  pure logical function has_losses(machine, row)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: row
+    integer :: b
+
+    has_losses = .false.
+    do b = 1, size(machine%banks)
+      select type (bank => machine%banks(b)%bank)
+      class is (tooth_losses_t)
+        has_losses = has_losses .or. any(bank%row == row)
+      end select
+    end do
+  end function has_losses
 
   !> The name of the multiplier of a row, with its verb.
   function reaction_word(machine, row) result(word)

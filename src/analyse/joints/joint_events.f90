@@ -5,10 +5,11 @@ module nocdyn_joint_events
   use nocdyn_friction_joints, only: direction_of, idle, locked, slips_backwards, slips_forwards
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
+  use nocdyn_text, only: quoted
   implicit none (type, external)
   private
 
-  public :: list_joint_events, put_joint_events
+  public :: describe_shared_joints, list_joint_events, put_joint_events
 
   !> A joint that locks or begins to slip.
   type, public :: named_event_t
@@ -45,6 +46,24 @@ contains
       end associate
     end do
   end subroutine list_joint_events
+
+  !> "clutch 'a', clutch 'b'": the joints whose torques were not unique; '' if there were none.
+  subroutine describe_shared_joints(formulation, text)
+    class(formulation_t), intent(in) :: formulation
+    character(len=:), allocatable, intent(out) :: text
+    integer :: element, j
+
+    text = ''
+    associate (joints => formulation%joints, machine => formulation%machine)
+      do j = 1, joints%count
+        if (.not. joints%is_shared(j)) cycle
+        element = joints%element(j)
+        if (text /= '') text = text // ', '
+        text = text // trim(role_names(machine%banks(bank_of(machine%banks, element))%bank%role)) // ' ' // &
+               quoted(machine%element_name(element))
+      end do
+    end associate
+  end subroutine describe_shared_joints
 
   !> Turns an event round where the second body of the joint is what moves: a body in its bearings, the first wheel of teeth.
   pure subroutine name_body_first(event)

@@ -9,7 +9,7 @@ module nocdyn_transient
   use nocdyn_input, only: input_t
   use nocdyn_integration, only: integrate
   use nocdyn_integration_settings, only: integration_settings_t
-  use nocdyn_joint_events, only: list_joint_events
+  use nocdyn_joint_events, only: describe_shared_joints, list_joint_events
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_missed_states, only: note_missed_state
@@ -178,6 +178,7 @@ contains
     type(run_observer_t), intent(inout) :: observer
     type(run_summary_t), intent(inout) :: summary
     type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: shared
     real(wp), allocatable :: y(:, :)
     integer(int64) :: began, ended, rate
 
@@ -187,7 +188,12 @@ contains
     call system_clock(ended)
     if (allocated(error)) return   ! a setting was refused
     summary%has_run = .true.
-    if (formulation%joints%count > 0) call list_joint_events(formulation, summary%events)
+    if (formulation%joints%count > 0) then
+      call list_joint_events(formulation, summary%events)
+      call describe_shared_joints(formulation, shared)
+      if (shared /= '') call append(summary%notes, shared // ' are redundant where they are locked together; their torques ' // &
+                                    'are not unique, the smallest-norm share is reported')
+    end if
     summary%wall_time = real(ended - began, wp) / real(rate, wp)
     if (observer%not_finite > 0 .and. any(summary%solver_status%code(1) == [integration_done, integration_interrupted])) then
       summary%solver_status%code(1) = integration_not_finite

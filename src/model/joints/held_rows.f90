@@ -21,6 +21,7 @@ module nocdyn_held_rows
   !> A set with its W^+.
   type :: joint_set_t
     logical, allocatable :: is_locked(:)
+    logical :: is_examined = .false.   ! whether `is_shared` knows it
     real(wp), allocatable :: inverse(:, :)
   end type joint_set_t
 
@@ -39,7 +40,10 @@ module nocdyn_held_rows
     real(wp), allocatable :: mutual(:, :)    !! responses of all elements and then all drivers to their moments [1/(kg m2)],
                                              !! [2 joints, 2 joints]
     real(wp), allocatable :: weight(:, :)    !! W [1/(kg m2)], [joints, joints]
+    logical, allocatable :: is_shared(:)     !! whether it was in a set that does not determine its moment
     integer :: lost = 0                      !! a row with which the rank has changed, or that others contradict, 0: none
+    logical :: is_assumed = .false.          !! whether the modes are for a trial only
+    logical, private :: is_examined = .false.   !! whether `is_shared` knows the present modes
     logical, private :: is_known = .false.   !! whether the set is that of the present modes and slopes
     type(joint_set_t), allocatable, private :: sets(:)   !! without rows that move
     integer, private :: present = 0          !! one of them
@@ -65,6 +69,8 @@ module nocdyn_held_rows
     procedure, private :: factor_with_teeth
     procedure, private :: watch_rank
     procedure, private :: choose_set
+    procedure, private :: add_set
+    procedure, private :: examine
   end type held_rows_t
 
 contains
@@ -79,6 +85,7 @@ contains
       self%mode(self%locking + 1:) = locked
       allocate (self%rate(n), self%moment(n), self%slope(n), source=0.0_wp)
       allocate (self%weight(n, n), self%mutual(2 * n, 2 * n), source=0.0_wp)
+      allocate (self%is_shared(n), source=.false.)
       allocate (self%sets(0), self%holding(n))
       self%system = new_semidefinite(merge(n, 0, self%motions%count > 0))
       if (self%teeth%count == 0) return
@@ -122,6 +129,7 @@ contains
     class(held_rows_t), intent(inout) :: self
 
     self%is_known = .false.
+    self%is_examined = .false.
     self%has_factors = .false.
   end subroutine change_set
 
@@ -181,6 +189,7 @@ contains
         self%holding(n) = j
       end do
       call self%system%set_matrix(self%weight, self%holding, n)
+      if (self%system%is_singular) call self%examine(self%holding(:n))
       if (self%system%is_singular .or. self%rank_at_start < self%motions%count) call self%watch_rank()
       self%is_known = .true.
     end if
@@ -239,7 +248,10 @@ contains
     call lu_factor(self%factors, self%pivots, self%is_singular)
     pivots = [(abs(self%factors(j, j)), j=1, self%count)]
     if (minval(pivots) <= null_tolerance * maxval(pivots)) self%is_singular = .true.
-    if (self%is_singular) self%factors(:, :) = pseudo_inverse(equations, null_tolerance)
+    if (self%is_singular) then
+      self%factors(:, :) = pseudo_inverse(equations, null_tolerance)
+      call self%examine(pack([(j, j=1, self%count)], self%mode == locked))
+    end if
     self%has_factors = .true.
   end subroutine factor_with_teeth
 
@@ -268,15 +280,27 @@ contains
   !> Finds or makes the set of the present modes.
   subroutine choose_set(self)
     class(held_rows_t), intent(inout) :: self
-    type(joint_set_t), allocatable :: longer(:)
-    integer, allocatable :: which(:)
     integer :: i
 
     self%is_known = .true.
     do i = 1, size(self%sets)
       self%present = i
-      if (all(self%sets(i)%is_locked .eqv. self%mode == locked)) return
+      if (all(self%sets(i)%is_locked .eqv. self%mode == locked)) exit
     end do
+    if (i > size(self%sets)) call self%add_set()
+    associate (set => self%sets(self%present))
+      if (.not. set%is_examined) call self%examine(pack([(i, i=1, self%count)], set%is_locked))
+      set%is_examined = .not. self%is_assumed
+    end associate
+  end subroutine choose_set
+
+  !> Makes the set of the present modes.
+  subroutine add_set(self)
+    class(held_rows_t), intent(inout) :: self
+    type(joint_set_t), allocatable :: longer(:)
+    integer, allocatable :: which(:)
+    integer :: i
+
     allocate (longer(size(self%sets) + 1))
     longer(:size(self%sets)) = self%sets
     call move_alloc(longer, self%sets)
@@ -286,6 +310,26 @@ contains
       which = pack([(i, i=1, self%count)], set%is_locked)
       set%inverse = pseudo_inverse(self%weight(which, which), null_tolerance)
     end associate
-  end subroutine choose_set
+  end subroutine add_set
+
+  !> Takes note of the joints of a set whose moments are not unique: those in the null vectors of W.
+  subroutine examine(self, which)
+    class(held_rows_t), intent(inout) :: self
+    integer, intent(in) :: which(:)   !! joints that hold
+    real(wp), dimension(size(which), size(which)) :: inverse, w
+    real(wp) :: scale(size(which))
+    integer :: j
+
+    if (self%is_examined .or. self%is_assumed) return
+    self%is_examined = .true.
+    scale = [(sqrt(max(self%weight(which(j), which(j)), tiny(scale))), j=1, size(which))]
+    do j = 1, size(which)
+      w(:, j) = self%weight(which, which(j)) / (scale * scale(j))
+    end do
+    inverse = pseudo_inverse(w, null_tolerance)
+    do j = 1, size(which)
+      if (1 - dot_product(inverse(j, :), w(:, j)) > sqrt(null_tolerance)) self%is_shared(which(j)) = .true.
+    end do
+  end subroutine examine
 
 end module nocdyn_held_rows
