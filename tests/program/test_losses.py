@@ -1,5 +1,6 @@
 """Losses of teeth and bearings, and friction over the slip, against closed forms and other computations."""
 
+import json
 import random
 from math import exp, sin
 
@@ -346,12 +347,19 @@ def test_bad_losses_are_refused(nocdyn, group, words):
     assert "bad.nml:3: &" in outcome.stderr and words in outcome.stderr
 
 
-def test_analyses_about_a_steady_state_leave_losses_out_and_say_so(nocdyn):
+def test_vibrations_leave_losses_out_and_say_so(nocdyn):
     text = body("one", 0.2) + body("two", 3.0, 0, "bearing_friction = 1") + GEAR.format("efficiency = 0.9")
     text += "&excitation name = 'e' body = 'one' kind = 'step' amplitude = 6 time = 0 /\n" + LOAD
-    path = nocdyn.write("steady.nml", text + "&run t_end = 1 start = 'equilibrium' /\n")
-    outcome = nocdyn("equilibrium", path)
-    assert outcome.returncode == 0 and "note: the losses of gear 'g' are left out" in outcome.stdout
-    outcome = nocdyn("run", path, "--out", "out")
-    assert outcome.returncode == 0, outcome.stderr
-    assert "the balance at the start leaves out the losses of body 'two', gear 'g'" in outcome.stdout
+    text += "&response body = 'one' speed = 10, 20 /\n&excitation name = 'v' body = 'one' amplitude = 1 frequency = 9 /\n"
+    path = nocdyn.write("steady.nml", text + "&run t_end = 1 /\n")
+    for command, words in (
+        ("equilibrium", "note: the moments of the losses of g are taken as constant in vibrations"),
+        ("modes", "note: the moments of the losses of g are taken as constant in vibrations"),
+        ("response", "note: the losses of g are left out"),
+        ("campbell", "note: the losses of g are left out"),
+    ):
+        outcome = nocdyn(command, path, "--out", "out")
+        assert outcome.returncode == 0, outcome.stderr
+        assert words in outcome.stdout.replace("'", "")
+        notes = json.loads((nocdyn.folder / f"out/{command}.json").read_text())["notes"]
+        assert words.removeprefix("note: ") in [note.replace("'", "") for note in notes]

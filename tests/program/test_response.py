@@ -369,7 +369,7 @@ HELD = "&coupling name = 'g' bodies = 'ground', 'two' stiffness = 1 /\n&run"
             "/\n&limit coupling = 'shaft' stress = 1e7 /",
             "stress limits a stress, but 'shaft' has none",
         ),
-        ("&run", HELD, "'one' is held by elastic couplings: it has no steady speed but 0"),
+        ("&run", HELD, "'one' is held by couplings or joints: it has no steady speed but 0"),
     ],
 )
 def test_responses_that_cannot_be_are_refused(nocdyn, old, new, message):

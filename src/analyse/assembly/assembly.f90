@@ -1,40 +1,22 @@
-!> From an input to a machine and its formulation: bodies, banks, constraints and coordinates.
+!> From an input to a machine at its start, and to its formulation.
 module nocdyn_assembly
-  use nocdyn_complement, only: complement_names
-  use nocdyn_constraint_analysis, only: analyse_constraints
-  use nocdyn_constraint_assembly, only: assemble_constraints, constraint_groups
-  use nocdyn_coordinates, only: build_coordinates
-  use nocdyn_coupling_assembly, only: add_coupling_form, check_couplings, coupling_form
-  use nocdyn_crank_assembly, only: add_cranks, check_cranks
-  use nocdyn_element_groups, only: add_banks, bodies_of, body_index_t, element_groups_t, new_body_index, new_element_groups
-  use nocdyn_engine_checks, only: check_engines, check_orders
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
-  use nocdyn_joint_assembly, only: add_bearings, add_clutch_form, add_freewheels, check_joints, clutch_form
-  use nocdyn_joint_simplifications, only: find_left_out, refuse_joints
-  use nocdyn_loss_assembly, only: add_losses, check_losses
+  use nocdyn_joint_simplifications, only: has_joint_that_locks, refuse_joints
+  use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_massless_motion, only: massless_bodies
-  use nocdyn_mesh_assembly, only: add_mesh_form, check_meshes, mesh_form
-  use nocdyn_motion_assembly, only: add_cardans, add_drive_form, add_relations, check_motions, drive_form
-  use nocdyn_moving_start, only: fit_moving_rows
-  use nocdyn_motor_assembly, only: add_motor_form, check_motors, motor_form
+  use nocdyn_machine_parts, only: build_machine, given_speeds
   use nocdyn_multiplier, only: new_multiplier
   use nocdyn_paper, only: new_paper
   use nocdyn_reduced, only: new_reduced
-  use nocdyn_response_ranges, only: check_response_ranges
-  use nocdyn_shaft_assembly, only: add_shafts, check_shafts, new_shaft_set, shaft_set_t
-  use nocdyn_start_speeds, only: fit_start_speeds
+  use nocdyn_steady_joints, only: choose_overruns
   use nocdyn_steady_start, only: start_steadily
-  use nocdyn_text, only: append, joined, selected
-  use nocdyn_torque_assembly, only: add_engines, add_excitation_form, add_load_form, excitation_form, load_form
+  use nocdyn_text, only: append
   implicit none (type, external)
   private
 
-  public :: assemble_machine, new_asked_formulation, new_formulation
-
-  integer, parameter :: most_names = 12   ! in a message
+  public :: assemble_machine, assemble_steady_machine, new_asked_formulation, new_formulation
 
 contains
 
@@ -46,183 +28,75 @@ contains
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
     integer, intent(in), optional :: lanes   !! 1 if absent
-    type(body_index_t), target :: body_index
-    type(shaft_set_t) :: shafts
 
     if (present(lanes)) machine%lanes = lanes
-    call set_bodies(input, machine)
-    body_index = new_body_index(machine%names)
-    call assemble_constraints(input, body_index, machine%lanes, machine%constraints, error)
-    if (.not. allocated(error)) call check_groups(input, error)
-    if (allocated(error)) return
-    call add_elements(input, body_index, machine)
-    call new_shaft_set(input, body_index, shafts)
-    call add_shafts(shafts, machine)
-    call add_cranks(new_element_groups(input, 'crank', machine%lanes, body_index), machine)
-    call machine%number_elements()
-    call analyse_machine_constraints(input, body_index, machine, error)
-    if (allocated(error)) return
-    call shafts%place_nodes(machine)
-    call fit_moving_rows(input, machine, given_speeds(input, machine%nodes), error)
-    if (allocated(error)) return
-    call start_machine(input, machine, error)
+    call build_machine(input, machine, error)
+    if (.not. allocated(error)) call start_machine(input, machine, error)
   end subroutine assemble_machine
 
-  !> Refuses values that do not fit together, which the schema does not know.
-  subroutine check_groups(input, error)
-    type(input_t), intent(in) :: input
+  !> Builds the machine as it is in a steady state: with means over a turn, and with locked joints as constraint rows.
+  recursive subroutine assemble_steady_machine(input, t, machine, error)
+    type(input_t), intent(inout) :: input   !! afterwards it says which joints are open
+    real(wp), intent(in) :: t               !! the time at which clutches are engaged or not [s]
+    type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
+    logical :: is_changed
+    integer :: trials
 
-    call check_couplings(input, error)
-    if (.not. allocated(error)) call check_shafts(input, error)
-    if (.not. allocated(error)) call check_meshes(input, error)
-    if (.not. allocated(error)) call check_losses(input, error)
-    if (.not. allocated(error)) call check_joints(input, error)
-    if (.not. allocated(error)) call check_motions(input, error)
-    if (.not. allocated(error)) call check_cranks(input, error)
-    if (.not. allocated(error)) call check_motors(input, error)
-    if (.not. allocated(error)) call check_engines(input, error)
-    if (.not. allocated(error)) call check_orders(input, error)
-    if (.not. allocated(error)) call check_response_ranges(input, error)
-  end subroutine check_groups
-
-  !> Adds the banks of all elements that join or turn bodies of the input.
-  subroutine add_elements(input, body_index, machine)
-    type(input_t), target, intent(in) :: input
-    type(body_index_t), target, intent(in) :: body_index
-    type(machine_t), intent(inout) :: machine
-    integer, allocatable :: rows(:)   ! groups of the constraint rows
-
-    allocate (machine%banks(0))
-    associate (n => machine%lanes)
-      call add_banks(new_element_groups(input, 'coupling', n, body_index), coupling_form, add_coupling_form, machine%banks)
-      call add_banks(new_element_groups(input, 'mesh', n, body_index), mesh_form, add_mesh_form, machine%banks)
-      call add_banks(new_element_groups(input, 'clutch', n, body_index), clutch_form, add_clutch_form, machine%banks)
-      call add_freewheels(new_element_groups(input, 'freewheel', n, body_index), machine%banks)
-      call add_bearings(new_element_groups(input, 'body', n, body_index), machine%banks)
-      if (.not. input%takes_means) then
-        call add_cardans(new_element_groups(input, 'cardan', n, body_index), machine%banks)
-        call add_relations(new_element_groups(input, 'relation', n, body_index), machine%banks)
-        allocate (rows, source=constraint_groups(input))
-        call add_losses(new_element_groups(input, 'gear', n, body_index), rows, machine%banks)
-        call add_losses(new_element_groups(input, 'planetary', n, body_index), rows, machine%banks)
-        call add_losses(new_element_groups(input, 'mesh', n, body_index), rows, machine%banks)
+    input%takes_means = .true.
+    input%means_at = t
+    if (allocated(input%overruns)) deallocate (input%overruns)
+    allocate (input%overruns(size(input%groups)), source=.false.)
+    do trials = 0, 2 * size(input%groups_named('freewheel'))
+      call assemble_machine(input, machine, error)
+      if (.not. allocated(error) .and. machine%coordinates%freedoms == 0) then
+        call raise(error, exit_failed, input%shown_file() // ': ' // machine%simplifications(1)%text // ', so that nothing moves')
       end if
-      call add_banks(new_element_groups(input, 'drive', n, body_index), drive_form, add_drive_form, machine%banks)
-      call add_banks(new_element_groups(input, 'motor', n, body_index), motor_form, add_motor_form, machine%banks)
-      call add_banks(new_element_groups(input, 'load', n, body_index), load_form, add_load_form, machine%banks)
-      call add_banks(new_element_groups(input, 'excitation', n, body_index), excitation_form, add_excitation_form, machine%banks)
-      call add_engines(new_element_groups(input, 'engine', n, body_index), machine%banks)
-    end associate
-  end subroutine add_elements
-
-  subroutine set_bodies(input, machine)
-    type(input_t), target, intent(in) :: input
-    type(machine_t), intent(inout) :: machine
-    type(element_groups_t) :: bodies
-
-    bodies = new_element_groups(input, 'body', machine%lanes)
-    machine%bodies = size(bodies%names)
-    machine%names = bodies%names
-    machine%inertia = bodies%values('inertia')
-    machine%start_angle = bodies%values('angle')
-    machine%start_speed = bodies%values('speed')
-    allocate (machine%start_notes(0))
-  end subroutine set_bodies
+      if (allocated(error)) return
+      call choose_overruns(input, machine, is_changed)
+      if (.not. is_changed) return
+    end do
+    call raise(error, exit_failed, input%shown_file() // ': no steady state was found in which every freewheel holds or overruns')
+  end subroutine assemble_steady_machine
 
   !> Starts a machine in its steady state, if the input wants it.
   recursive subroutine start_machine(input, machine, error)
     type(input_t), intent(in) :: input
     type(machine_t), intent(inout) :: machine
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: losses
-    type(machine_t) :: single   ! of one lane
+    type(machine_t), allocatable :: steady   ! of one lane
+    type(input_t) :: view
 
     associate (run => input%groups(input%position('run')))
       if (run%text('start') /= 'equilibrium') return
-      call refuse_joints(input, "start = 'equilibrium'", error, leaves_out_bearings=.true.)
-      if (allocated(error)) return
-      call find_left_out(input, .true., losses)
-      if (machine%lanes > 1) then
-        call assemble_machine(input, single, error)
-        if (allocated(error)) return
-        machine%start_speed(:, :) = spread(single%start_speed(1, :), 1, machine%lanes)
-        machine%start_angle(:, :) = spread(single%start_angle(1, :), 1, machine%lanes)
-        allocate (machine%steady_internal, source=spread(single%steady_internal(1, :), 1, machine%lanes))
-      else
+      if (machine%lanes == 1 .and. (input%takes_means .or. .not. has_joint_that_locks(input))) then
         call start_steadily(machine, given_speeds(input, machine%nodes), run%number('t_start'), error)
         if (allocated(error)) error%message = input%location(input%position('run'), 'start') // ": start = 'equilibrium': " // &
           error%message // "; start = 'given' starts with the speeds of the bodies"
-        if (losses /= '') call append(machine%start_notes, 'the balance at the start leaves out the losses of ' // losses)
+        return
       end if
+      call refuse_joints(input, "start = 'equilibrium'", error, knows_locks=.true.)
+      if (allocated(error)) return
+      allocate (steady)
+      view = input
+      call assemble_steady_machine(view, run%number('t_start'), steady, error)
+      if (.not. allocated(error)) call start_as(steady, machine)
     end associate
   end subroutine start_machine
 
-  !> Whether the input gives the start speed of a body, [bodies].
-  function given_speeds(input, nodes) result(is_given)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: nodes   !! bodies that the input does not name
-    logical, allocatable :: is_given(:)
-    integer, allocatable :: bodies(:)
-    integer :: b
-
-    allocate (bodies, source=input%groups_named('body'))
-    allocate (is_given(size(bodies) + nodes), source=.false.)
-    do b = 1, size(bodies)
-      is_given(b) = input%groups(bodies(b))%is_given('speed')
-    end do
-  end function given_speeds
-
-  !> Analyses the constraints, chooses the coordinates and makes the start speeds consistent. A message begins with file, line and
-  !> group: those of a constraint row, or of `independent`.
-  subroutine analyse_machine_constraints(input, body_index, machine, error)
-    type(input_t), intent(in) :: input
-    type(body_index_t), intent(in) :: body_index
+  !> Starts all lanes of a machine as another one with the same bodies.
+  subroutine start_as(single, machine)
+    type(machine_t), intent(in) :: single
     type(machine_t), intent(inout) :: machine
-    type(error_t), allocatable, intent(out) :: error
-    integer, allocatable :: indices(:), wanted(:)   ! groups of the rows, bodies that are to be the coordinates
-    integer :: offending_row
+    integer :: i
 
-    associate (run => input%groups(input%position('run')))
-      allocate (wanted, source=bodies_of(run, 'independent', body_index))
-      call analyse_constraints(machine%constraints, machine%names, wanted, machine%trains, machine%groups, offending_row, error)
-      if (.not. allocated(error)) then
-        call refuse_massless_motion(input, machine, error)
-        if (allocated(error)) return
-        call build_coordinates(machine%constraints, machine%names, machine%trains, machine%groups, machine%inertia, wanted, &
-                               findloc(complement_names == run%text('complement'), .true., dim=1), machine%coordinates, error)
-      end if
-      if (.not. allocated(error)) then
-        call fit_start_speeds(machine, given_speeds(input, machine%nodes), run%text('start') == 'projected', offending_row, error)
-        if (allocated(error) .and. input%takes_means) then   ! the speeds fit the ratios at the start, perhaps
-          deallocate (error)
-          call fit_start_speeds(machine, given_speeds(input, machine%nodes), .true., offending_row, error)
-        end if
-      end if
-    end associate
-    if (.not. allocated(error)) return
-    if (offending_row > 0) then
-      allocate (indices, source=constraint_groups(input))
-      error%message = input%location(indices(offending_row)) // ': ' // error%message
-    else
-      error%message = input%location(input%position('run'), 'independent') // ': independent ' // error%message
-    end if
-  end subroutine analyse_machine_constraints
-
-  !> Refuses bodies that can move while all bodies with inertia stand still: the reduced mass matrix is singular.
-  subroutine refuse_massless_motion(input, machine, error)
-    type(input_t), intent(in) :: input
-    type(machine_t), intent(in) :: machine   !! its constraints are analysed
-    type(error_t), allocatable, intent(out) :: error
-    integer, allocatable :: bodies(:), indices(:)
-
-    allocate (bodies, source=massless_bodies(machine))
-    if (size(bodies) == 0) return
-    allocate (indices, source=input%groups_named('body'))
-    call raise(error, exit_input, input%location(indices(bodies(1)), 'inertia') // ': inertia = 0: ' // &
-               joined(selected(machine%names, bodies), ', ', most_names) // ' can turn while every body with an inertia ' // &
-               'stands still; allowed: > 0 [kg m2], or 0 where a body with an inertia is geared to it')
-  end subroutine refuse_massless_motion
+    machine%start_speed(:, :) = spread(single%start_speed(1, :), 1, machine%lanes)
+    machine%start_angle(:, :) = spread(single%start_angle(1, :), 1, machine%lanes)
+    allocate (machine%steady_internal, source=spread(single%steady_internal(1, :), 1, machine%lanes))
+    do i = 1, size(single%start_notes)
+      call append(machine%start_notes, single%start_notes(i)%text)
+    end do
+  end subroutine start_as
 
   !> The formulation that an input asks for.
   subroutine new_asked_formulation(input, machine, formulation, with_energy_balance)

@@ -4,13 +4,15 @@ module nocdyn_constraint_assembly
   use nocdyn_element_groups, only: bodies_of, body_index_t
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
+  use nocdyn_joint_assembly, only: engagement_at, sliding_capacity
   use nocdyn_kinds, only: wp
+  use nocdyn_motion_assembly, only: holds_still
   use nocdyn_text, only: string_t
   use nocdyn_text_sort, only: argsort, sorted_position
   implicit none (type, external)
   private
 
-  public :: assemble_constraints, constraint_groups
+  public :: assemble_constraints, constraint_groups, is_open_joint
 
   !> One constraint row, with the ground still in it.
   type :: joint_t
@@ -22,20 +24,47 @@ module nocdyn_constraint_assembly
 
 contains
 
-  !> Indices of the groups that are constraint rows, in the order of the file. Where means stand for ratios that depend on the
-  !> position, joints with such ratios are.
+  !> Indices of the groups that are constraint rows, in the order of the file.
   function constraint_groups(input) result(indices)
     type(input_t), intent(in) :: input
     integer, allocatable :: indices(:)
-    character(len=*), parameter :: kinds(4) = [character(len=12) :: 'gear', 'planetary', 'differential', 'constraint']
     integer :: i
 
-    character(len=*), parameter :: varying(2) = [character(len=8) :: 'cardan', 'relation']
-
-    indices = pack([(i, i=1, size(input%groups))], &
-                   [(any(kinds == input%groups(i)%kind) .or. (input%takes_means .and. any(varying == input%groups(i)%kind)), &
-                     i=1, size(input%groups))])
+    indices = pack([(i, i=1, size(input%groups))], [(is_row(input, i), i=1, size(input%groups))])
   end function constraint_groups
+
+  !> Whether a group is a constraint row. In a steady state joints are, but those that are open.
+  logical function is_row(input, index)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+
+    associate (group => input%groups(index))
+      select case (group%kind)
+      case ('gear', 'planetary', 'differential', 'constraint')
+        is_row = .true.
+      case ('cardan', 'relation')
+        is_row = input%takes_means
+      case ('clutch', 'freewheel')
+        is_row = .not. is_open_joint(input, index)
+        is_row = is_row .and. input%takes_means
+      case ('drive')
+        is_row = input%takes_means
+        if (is_row) is_row = holds_still(group)
+      case default
+        is_row = .false.
+      end select
+    end associate
+  end function is_row
+
+  !> Whether a clutch or a freewheel is open in the steady state.
+  logical function is_open_joint(input, index)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+
+    is_open_joint = .false.
+    if (allocated(input%overruns)) is_open_joint = input%overruns(index)
+    if (input%groups(index)%kind == 'clutch') is_open_joint = .not. engagement_at(input%groups(index), input%means_at) > 0
+  end function is_open_joint
 
   !> All rows in the order of the file. Two columns of the results with the same name are an error.
   subroutine assemble_constraints(input, body_index, lanes, constraints, error)
@@ -72,10 +101,14 @@ contains
       joint%bodies = [bodies_of(group, 'sides', body_index), bodies_of(group, 'case', body_index)]
       joint%coefficients = [1.0_wp, 1.0_wp, -2.0_wp]
       joint%members = [character(len=7) :: '', '', 'case']
-    case ('cardan', 'relation')
+    case ('cardan', 'relation', 'clutch', 'freewheel')
       joint%bodies = bodies_of(group, 'bodies', body_index)
-      joint%coefficients = [mean_ratio(group), -1.0_wp]
+      joint%coefficients = [-mean_ratio(group), 1.0_wp]
       joint%members = [character(len=7) :: '', '']
+    case ('drive')
+      joint%bodies = bodies_of(group, 'body', body_index)
+      joint%coefficients = [1.0_wp]
+      joint%members = [character(len=7) :: '']
     case ('constraint')
       joint%bodies = bodies_of(group, 'bodies', body_index)
       joint%coefficients = group%numbers('coefficients')
@@ -91,7 +124,7 @@ contains
     type(group_t), intent(in) :: group
 
     mean_ratio = 1.0_wp
-    if (group%kind == 'cardan') return
+    if (group%kind /= 'relation') return
     associate (x => group%numbers('table_angle'), y => group%numbers('table_driven'))
       mean_ratio = (y(size(y)) - y(1)) / (x(size(x)) - x(1))
     end associate
@@ -163,7 +196,32 @@ contains
     end do
     first(size(first)) = next
     constraints = new_constraints(bodies, names, units, first, body, coefficient, kinds, member_torques(joints, lanes))
+    do i = 1, size(indices)
+      call limit_of_lock(input%groups(indices(i)), input%means_at, constraints%least(i), constraints%most(i))
+    end do
+    constraints%may_stop = [(any(kinds(i)%text == [character(len=9) :: 'clutch', 'freewheel', 'drive']), i=1, size(kinds))]
   end subroutine form_rows
+
+  !> The torques on its second body that a locked joint holds [N m].
+  subroutine limit_of_lock(group, t, least, most)
+    type(group_t), intent(in) :: group
+    real(wp), intent(in) :: t   !! [s]
+    real(wp), intent(inout) :: least, most
+
+    select case (group%kind)
+    case ('clutch')
+      if (group%text('kind') == 'dog') return
+      most = engagement_at(group, t) * group%number('static_capacity', absent=sliding_capacity(group))
+      least = -most
+    case ('freewheel')
+      most = group%number('capacity', absent=most)
+      least = 0.0_wp
+      if (group%text('direction') == 'forward') return
+      least = -most
+      most = 0.0_wp
+    case default   ! others have no limits
+    end select
+  end subroutine limit_of_lock
 
   !> The torques of members that have columns of their own.
   type(member_torques_t) function member_torques(joints, lanes) result(members)

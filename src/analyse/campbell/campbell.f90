@@ -11,7 +11,7 @@ module nocdyn_campbell
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: sort_ascending
   use nocdyn_machine, only: machine_t
-  use nocdyn_response_notes, only: note_steady_states
+  use nocdyn_response_notes, only: note_simplifications, note_steady_states
   use nocdyn_response_settings, only: operating_distance, place_error, read_response_settings, response_settings_t
   use nocdyn_speed_modes, only: most_coordinates, new_speed_modes, speed_modes_t
   use nocdyn_text, only: string_t, to_text
@@ -58,7 +58,7 @@ contains
       call place_error(input, self%settings, failed_speed, error)
       return
     end if
-    allocate (self%notes(0))
+    call note_simplifications(machine, self%notes)
     call note_steady_states(self%settings, self%response, self%notes)
     allocate (self%distance(size(self%crossings)), self%is_too_near(size(self%crossings)))
     do i = 1, size(self%crossings)

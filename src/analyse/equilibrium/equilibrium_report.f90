@@ -12,6 +12,7 @@ module nocdyn_equilibrium_report
   use nocdyn_machine_report, only: named_coordinates
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: new_reduced
+  use nocdyn_steady_losses, only: tell_losses
   use nocdyn_table_text, only: append_table, cell, cell_digits, clear_rounding, padded, rounding
   use nocdyn_text, only: rounded_text, selected, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
@@ -61,6 +62,7 @@ contains
     allocate (self%values(size(self%labels), size(equilibria)), self%power(size(self%work_elements), size(equilibria)))
     allocate (row(size(table%labels)), watts(1, size(self%work_elements)))
     do k = 1, size(equilibria)
+      call tell_losses(table%columns%formulation%machine, equilibria(k)%losses)
       y = [equilibria(k)%y(1, :), (0.0_wp, i=1, size(self%work_elements))]
       call table%fill(t_infinity, y, row)
       call table%columns%formulation%machine%power(watts)

@@ -79,7 +79,7 @@ contains
     allocate (self%ratio(size(self%balance%motions%free)))
     call find_ratios(self%balance, reference, self%ratio)
     if (.not. any(abs(self%ratio) > 0)) then
-      call raise(error, exit_input, quoted(machine%names(reference)%text) // ' is held by elastic couplings: it has no ' // &
+      call raise(error, exit_input, quoted(machine%names(reference)%text) // ' is held by couplings or joints: it has no ' // &
                  'steady speed but 0; allowed: a body that can turn on')
       return
     end if

@@ -168,14 +168,16 @@ contains
     integer, intent(in) :: reference
     type(response_quantity_t), intent(inout) :: quantities(:)   !! [rows]
     type(coordinates_t) :: coordinates
+    character(len=:), allocatable :: name
     real(wp) :: lambda(size(quantities)), torque(0:machine%bodies)
     integer :: e, r
 
     if (size(quantities) == 0) return
     coordinates = machine%coordinates
     do r = 1, size(quantities)
-      call set_quantity(quantity_reaction, machine%constraints%names(r)%text, 'reaction_' // machine%constraints%names(r)%text, &
-                        machine%constraints%units(r)%text, quantities(r))
+      call machine%constraints%name_column(r, name)
+      call set_quantity(quantity_reaction, machine%constraints%names(r)%text, name, machine%constraints%units(r)%text, &
+                        quantities(r))
     end do
     do e = 1, machine%elements%count
       torque = 0.0_wp

@@ -5,12 +5,14 @@ module nocdyn_operating_point
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_integration_settings, only: integration_settings_t
+  use nocdyn_joint_simplifications, only: has_joint_that_locks
   use nocdyn_kinds, only: wp
   use nocdyn_literals, only: literal_ok, read_real
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: new_reduced
   use nocdyn_run_settings, only: choose_settings, find_lossy_element
   use nocdyn_solve, only: solve
+  use nocdyn_steady_losses, only: tell_losses
   use nocdyn_text, only: append, string_t, to_text
   implicit none (type, external)
   private
@@ -40,7 +42,6 @@ contains
     type(group_t) :: run
     character(len=:), allocatable :: lossy
     real(wp) :: time
-    integer :: status
 
     if (2 * machine%coordinates%freedoms > max_states) then
       call raise(error, exit_input, input%shown_file() // ': the modes of this machine are those of a dense matrix of ' // &
@@ -49,28 +50,42 @@ contains
     end if
     run = input%single('run')
     point%t = run%number('t_start')
-    allocate (point%notes(0))
+    allocate (point%notes, source=machine%simplifications)
     select case (at)
     case ('equilibrium')
       call use_equilibrium(machine, point, error)
     case ('rest')
       call use_rest(machine, point)
     case default
-      call read_real(at, time, status)
-      if (status /= literal_ok) then
-        call raise(error, exit_input, '--at ' // at // ': allowed: equilibrium, rest or a time of the run [s]')
-      else if (time < run%number('t_start') .or. time > run%number('t_end')) then
-        call raise(error, exit_input, input%shown_file() // ': --at ' // at // ' is no time of the run; allowed: ' // &
-                   to_text(run%number('t_start')) // ' to ' // to_text(run%number('t_end')) // ' s')
-      else
-        call use_time(input, machine, time, point, error)
-      end if
+      call read_time(input, run, at, time, error)
+      if (.not. allocated(error)) call use_time(input, machine, time, point, error)
     end select
     if (allocated(error)) return
     call find_lossy_element(input, machine, lossy)
     if (lossy /= '') call append(point%notes, 'relative damping without damping_frequency is no part of these modes; ' // &
                                               'nocdyn campbell has it')
   end subroutine find_operating_point
+
+  !> Reads a time of the run.
+  subroutine read_time(input, run, at, time, error)
+    type(input_t), intent(in) :: input
+    type(group_t), intent(in) :: run
+    character(len=*), intent(in) :: at
+    real(wp), intent(out) :: time   !! [s]
+    type(error_t), allocatable, intent(out) :: error
+    integer :: status
+
+    call read_real(at, time, status)
+    if (status /= literal_ok) then
+      call raise(error, exit_input, '--at ' // at // ': allowed: equilibrium, rest or a time of the run [s]')
+    else if (time < run%number('t_start') .or. time > run%number('t_end')) then
+      call raise(error, exit_input, input%shown_file() // ': --at ' // at // ' is no time of the run; allowed: ' // &
+                 to_text(run%number('t_start')) // ' to ' // to_text(run%number('t_end')) // ' s')
+    else if (has_joint_that_locks(input)) then
+      call raise(error, exit_input, input%shown_file() // ': --at ' // at // ': which joints, bearings and teeth are locked ' // &
+                 'at a time of the run is not known here; allowed: equilibrium or rest')
+    end if
+  end subroutine read_time
 
   !> Takes the steady state that is nearest to the start, a stable one if there is one.
   subroutine use_equilibrium(machine, point, error)
@@ -86,6 +101,7 @@ contains
     nearest = nearest_equilibrium(point%formulation, equilibria)
     point%t = t_infinity
     point%y = equilibria(nearest)%y
+    call tell_losses(point%formulation%machine, equilibria(nearest)%losses)
     point%text = 'the steady state'
     if (size(equilibria) == 1) return
     call append(point%notes, 'there are ' // to_text(size(equilibria)) // ' steady states, ' // &

@@ -10,7 +10,7 @@ module nocdyn_response_analysis
   use nocdyn_limit_edges, only: refine_edges
   use nocdyn_machine, only: machine_t
   use nocdyn_response_limits, only: read_limits, response_limit_t
-  use nocdyn_response_notes, only: note_rated_speeds, note_separation, note_steady_states
+  use nocdyn_response_notes, only: note_rated_speeds, note_separation, note_simplifications, note_steady_states
   use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
   use nocdyn_speed_modes, only: most_coordinates, new_speed_modes, speed_modes_t
   use nocdyn_synthesis, only: new_synthesis
@@ -43,7 +43,8 @@ contains
     real(wp) :: failed_speed
 
     call system_clock(began, rate)
-    allocate (self%notes(0), self%crossings(0))
+    allocate (self%crossings(0))
+    call note_simplifications(machine, self%notes)
     call read_response_settings(input, machine, self%settings, error)
     if (allocated(error)) return
     self%body_name = machine%names(self%settings%body)%text

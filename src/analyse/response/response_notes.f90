@@ -6,16 +6,29 @@ module nocdyn_response_notes
   use nocdyn_gap_couplings, only: gap_couplings_t
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
   use nocdyn_response_quantities, only: quantity_moment
   use nocdyn_response_settings, only: response_settings_t
+  use nocdyn_steady_losses, only: describe_losses
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
   use nocdyn_units, only: from_si, unit_rpm
   implicit none (type, external)
   private
 
-  public :: note_steady_states, note_separation, note_rated_speeds
+  public :: note_simplifications, note_steady_states, note_separation, note_rated_speeds
 
 contains
+
+  !> What the analysis leaves out of the input, and what stands for it.
+  subroutine note_simplifications(machine, notes)
+    type(machine_t), intent(in) :: machine
+    type(string_t), allocatable, intent(out) :: notes(:)
+    character(len=:), allocatable :: lossy
+
+    allocate (notes, source=machine%simplifications)
+    call describe_losses(machine, lossy)
+    if (lossy /= '') call append(notes, 'the losses of ' // lossy // ' are left out')
+  end subroutine note_simplifications
 
   !> Notes on the speeds and the steady states: what nocdyn campbell has too.
   subroutine note_steady_states(settings, response, notes)

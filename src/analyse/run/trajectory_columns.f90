@@ -113,7 +113,7 @@ contains
 
     member = 1
     do row = 1, constraints%rows()
-      name = 'reaction_' // constraints%names(row)%text
+      call constraints%name_column(row, name)
       call add_column(columns, labels, count, column_t(column_reaction, index=row), &
                       name // ' [' // constraints%units(row)%text // ']')
       do while (member <= size(constraints%members%row))

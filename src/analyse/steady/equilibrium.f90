@@ -1,8 +1,9 @@
 !> Steady states of a machine: constant speeds, mean torques, constant twists.
 module nocdyn_equilibrium
   use nocdyn_balance_search, only: search_balance
-  use nocdyn_balance_texts, only: describe_speeds, explain_no_balance, list_moving_bodies
+  use nocdyn_balance_texts, only: describe_speeds, describe_state_speeds, explain_no_balance, list_moving_bodies
   use nocdyn_block_solutions, only: block_solutions_t
+  use nocdyn_constraints, only: constraints_t
   use nocdyn_element_sets, only: element_names
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
@@ -12,7 +13,8 @@ module nocdyn_equilibrium
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: reduced_t
   use nocdyn_static_twists, only: find_twists, undetermined_elements
-  use nocdyn_text, only: append, joined, string_t
+  use nocdyn_steady_losses, only: describe_losses, new_steady_losses, steady_losses_t, tell_losses
+  use nocdyn_text, only: append, joined, quoted, rounded_text, string_t
   use nocdyn_torque_balance, only: set_up_balance, torque_balance_t
   implicit none (type, external)
   private
@@ -24,10 +26,12 @@ module nocdyn_equilibrium
   integer, parameter :: most_combinations = 64   ! of the solutions of independent parts of a machine
   integer, parameter :: most_states = 1000       ! up to which eigenvalues are computed, which takes some seconds
   integer, parameter :: most_names = 5           ! of bodies in a message
+  integer, parameter :: most_trials = 50         ! of moments of losses
 
   !> A steady state and its stability.
   type, public :: equilibrium_t
     real(wp), allocatable :: y(:, :)   !! state of the reduced formulation without work integrals, [1, states]
+    real(wp), allocatable :: losses(:) !! moments of the teeth with losses, for `tell_losses` [N m]
     character(len=14) :: stability = 'not determined'   !! stable, unstable, neutral, not determined
     real(wp) :: growth = 0.0_wp   !! largest real part of the eigenvalues without those of free rigid motions [1/s]
     integer :: free_modes = 0   !! number of rigid motions without torques, or in a range of steady speeds
@@ -43,15 +47,37 @@ contains
     type(equilibrium_t), allocatable, intent(out) :: equilibria(:)
     type(string_t), allocatable, intent(out) :: notes(:)   !! remarks for the report
     type(error_t), allocatable, intent(out) :: error       !! if no steady state was found
+    character(len=:), allocatable :: lossy
+    integer :: i
+
+    call mean_formulation(machine, formulation)
+    allocate (notes(0))
+    if (allocated(machine%simplifications)) notes = machine%simplifications
+    call find_balances(formulation, t, equilibria, notes, error)
+    if (allocated(error)) return
+    do i = 1, size(equilibria)
+      call balance_losses(formulation, t, equilibria(i), error)
+      if (allocated(error)) return
+    end do
+    call describe_losses(machine, lossy)
+    if (lossy /= '') call append(notes, 'the moments of the losses of ' // lossy // ' are taken as constant in vibrations')
+    call drop_overloaded(formulation, t, equilibria, notes, error)
+  end subroutine find_equilibria
+
+  !> Finds the states in which all torques balance, with given moments of losses.
+  subroutine find_balances(formulation, t, equilibria, notes, error)
+    class(formulation_t), allocatable, intent(inout) :: formulation
+    real(wp), intent(in) :: t   !! [s]
+    type(equilibrium_t), allocatable, intent(out) :: equilibria(:)
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    type(error_t), allocatable, intent(out) :: error
     type(torque_balance_t), target :: balance
     type(block_solutions_t), allocatable :: blocks(:)
     character(len=:), allocatable :: text
     integer :: i
 
-    call mean_formulation(machine, formulation)
     call set_up_balance(formulation, t, balance)
     call search_balance(balance, blocks)
-    allocate (notes(0))
     do i = 1, size(blocks)
       if (size(blocks(i)%values, 2) > 0) cycle
       call explain_no_balance(balance, blocks(i), text)
@@ -65,7 +91,103 @@ contains
     end do
     call combine(balance, blocks, equilibria, notes, error)
     call move_alloc(balance%formulation, formulation)
-  end subroutine find_equilibria
+  end subroutine find_balances
+
+  !> Finds the moments of the losses in a steady state, and the state with them.
+  subroutine balance_losses(formulation, t, equilibrium, error)
+    class(formulation_t), allocatable, intent(inout) :: formulation
+    real(wp), intent(in) :: t   !! [s]
+    type(equilibrium_t), intent(inout) :: equilibrium   !! without losses at first
+    type(error_t), allocatable, intent(out) :: error
+    type(equilibrium_t), allocatable :: found(:)
+    type(steady_losses_t) :: losses
+    type(string_t), allocatable :: notes(:)   ! those of the state without losses stand
+    character(len=:), allocatable :: lossy
+    logical :: is_solved
+    integer :: i
+
+    losses = new_steady_losses(formulation%machine)
+    allocate (equilibrium%losses, source=losses%moment)
+    if (losses%count == 0) return
+    call describe_losses(formulation%machine, lossy)
+    do i = 1, most_trials
+      call tell_losses(formulation%machine, equilibrium%losses)
+      call losses%improve(formulation, t, equilibrium%y, is_solved)
+      if (is_solved) return
+      call tell_losses(formulation%machine, losses%moment)
+      allocate (notes(0))
+      call find_balances(formulation, t, found, notes, error)
+      if (allocated(error)) exit
+      equilibrium%y = found(nearest_state(formulation, found, equilibrium%y))%y
+      equilibrium%losses = losses%moment
+      deallocate (notes)
+    end do
+    call raise(error, exit_failed, 'no steady state was found with the losses of ' // lossy // &
+               '; teeth that lock themselves may stand still')
+  end subroutine balance_losses
+
+  !> The steady state with the least kinetic energy relative to a state.
+  integer function nearest_state(formulation, equilibria, y) result(nearest)
+    class(formulation_t), intent(inout) :: formulation
+    type(equilibrium_t), intent(in) :: equilibria(:)
+    real(wp), intent(in) :: y(:, :)   !! [1, states]
+    real(wp) :: distance(size(equilibria)), omega(formulation%machine%bodies)
+    integer :: i
+
+    call formulation%set_state(y)
+    omega = formulation%omega(1, 1:)
+    do i = 1, size(equilibria)
+      call formulation%set_state(equilibria(i)%y)
+      distance(i) = formulation%machine%kinetic_energy(1, formulation%omega(1, 1:) - omega)
+    end do
+    nearest = minloc(distance, dim=1)
+  end function nearest_state
+
+  !> Drops states in which joints that are taken as locked would slip.
+  subroutine drop_overloaded(formulation, t, equilibria, notes, error)
+    class(formulation_t), intent(inout) :: formulation
+    real(wp), intent(in) :: t   !! [s]
+    type(equilibrium_t), allocatable, intent(inout) :: equilibria(:)
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: lambda(formulation%machine%constraints%rows())
+    character(len=:), allocatable :: text
+    logical :: holds(size(equilibria))
+    integer :: i, row
+
+    holds = .true.
+    do i = 1, size(equilibria)
+      call tell_losses(formulation%machine, equilibria(i)%losses)
+      call formulation%observe([t], equilibria(i)%y)
+      call formulation%reactions(1, lambda)
+      row = overloaded_row(formulation%machine%constraints, lambda)
+      holds(i) = row == 0
+      if (holds(i)) cycle
+      call describe_state_speeds(formulation, text)
+      associate (constraints => formulation%machine%constraints)
+        text = 'at ' // text // ' ' // constraints%kinds(row)%text // ' ' // quoted(constraints%names(row)%text) // &
+               ' does not hold: locked it would carry ' // rounded_text(lambda(row), 6) // ' N m; allowed: ' // &
+               rounded_text(constraints%least(row), 6) // ' to ' // rounded_text(constraints%most(row), 6)
+      end associate
+      call append(notes, text)
+    end do
+    equilibria = pack(equilibria, holds)
+    if (size(equilibria) == 0) call raise(error, exit_failed, 'no steady state was found: ' // text)
+  end subroutine drop_overloaded
+
+  !> The first row whose multiplier is out of its bounds by more than rounding, 0 if there is none.
+  pure integer function overloaded_row(constraints, lambda) result(row)
+    type(constraints_t), intent(in) :: constraints
+    real(wp), intent(in) :: lambda(:)
+    real(wp), parameter :: rounding = 1.0e-9_wp
+    real(wp) :: shift
+
+    shift = rounding * maxval(abs(lambda))
+    do row = 1, size(lambda)
+      if (lambda(row) < constraints%least(row) - shift .or. lambda(row) > constraints%most(row) + shift) return
+    end do
+    row = 0
+  end function overloaded_row
 
   !> The reduced formulation of a machine with mean torques, without work integrals.
   subroutine mean_formulation(machine, formulation)
@@ -88,6 +210,7 @@ contains
     integer :: i
 
     do i = 1, size(equilibria)
+      call tell_losses(formulation%machine, equilibria(i)%losses)
       call classify(formulation, t, equilibria(i))
     end do
   end subroutine find_stability

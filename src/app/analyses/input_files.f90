@@ -1,13 +1,14 @@
 !> The loop over the input files that the commands without a run have in common.
 module nocdyn_input_files
   use nocdyn_arguments, only: arguments_t
-  use nocdyn_assembly, only: assemble_machine
-  use nocdyn_console, only: print_text, report_error
+  use nocdyn_assembly, only: assemble_machine, assemble_steady_machine
+  use nocdyn_console, only: report_error
   use nocdyn_diagnostics, only: diagnostics_t
+  use nocdyn_equilibrium, only: t_infinity
   use nocdyn_errors, only: error_t, exit_done
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
-  use nocdyn_joint_simplifications, only: list_simplifications, refuse_joints
+  use nocdyn_joint_simplifications, only: refuse_joints
   use nocdyn_machine, only: machine_t
   use nocdyn_output_times, only: check_output_times
   use nocdyn_result_folders, only: out_folder, refuse_shared_folders, result_folder
@@ -64,29 +65,29 @@ contains
     end if
     do i = 1, size(readings)
       associate (reading => readings(i))
-        if (.not. allocated(reading%error) .and. arguments%command /= 'check') then
-          reading%input%takes_means = arguments%command /= 'matrices'
-          call refuse_joints(reading%input, 'nocdyn ' // arguments%command, reading%error)
-        end if
-        if (.not. allocated(reading%error)) call assemble_machine(reading%input, machine, reading%error)
-        if (.not. (allocated(reading%error) .or. arguments%is_given('--quiet'))) call note_simplifications(reading%input)
+        if (.not. allocated(reading%error)) call assemble_for(arguments%command, reading%input, machine, reading%error)
         if (.not. allocated(reading%error)) call analyse(arguments, reading%input, machine, folders(i)%text, reading%error)
         if (allocated(reading%error)) call report_error(reading%error, code)
       end associate
     end do
   end subroutine analyse_files
 
-  !> Says what an analysis about a steady state replaces or leaves out.
-  subroutine note_simplifications(input)
-    type(input_t), intent(in) :: input
-    type(string_t), allocatable :: notes(:)
-    integer :: i
+  !> Builds the machine as a command looks at it: all but `check` and `matrices` look at a steady state.
+  subroutine assemble_for(command, input, machine, error)
+    character(len=*), intent(in) :: command
+    type(input_t), intent(inout) :: input
+    type(machine_t), intent(out) :: machine
+    type(error_t), allocatable, intent(out) :: error
 
-    call list_simplifications(input, notes)
-    do i = 1, size(notes)
-      call print_text(input%shown_file() // ': note: ' // notes(i)%text)
-    end do
-  end subroutine note_simplifications
+    input%takes_means = all(command /= [character(len=8) :: 'check', 'matrices'])
+    if (command /= 'check') call refuse_joints(input, 'nocdyn ' // command, error)
+    if (allocated(error)) return
+    if (input%takes_means) then
+      call assemble_steady_machine(input, t_infinity, machine, error)
+    else
+      call assemble_machine(input, machine, error)
+    end if
+  end subroutine assemble_for
 
   !> Reads and checks a file, and finds the folder of its results.
   subroutine read_one(arguments, number, reading, folder, always_writes)

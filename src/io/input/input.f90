@@ -48,7 +48,11 @@ module nocdyn_input
     character(len=:), allocatable :: file
     type(string_t), allocatable :: overrides(:)   !! PATH=VALUE, as given
     type(group_t), allocatable :: groups(:)       !! single groups that the file does not have come last
-    logical :: takes_means = .false.              !! whether means stand for ratios that depend on the position
+    logical :: takes_means = .false.              !! whether it is looked at in a steady state: means stand for ratios that
+                                                  !! depend on the position, and joints are locked or open
+    real(wp) :: means_at = huge(1.0_wp)           !! the time at which joints are so [s]; with it
+    logical, allocatable :: overruns(:)           !! which joints are open then beside those without engagement, [groups]; not
+                                                  !! allocated: none
   contains
     procedure :: groups_named   !! indices of the groups with a name, perhaps only those of one law
     procedure :: position       !! index of the group of a kind that occurs once

@@ -162,7 +162,7 @@ contains
     call pivoted_rank(rows, ratio_tolerance, rank_of, pivots)
   end function rank_of
 
-  !> Raises the error for the first group that is locked.
+  !> Raises the error for the first group that is locked and has no row that may do so.
   subroutine raise_first_lock(constraints, body_names, trains, relations, groups, offending_row, error)
     type(constraints_t), intent(in) :: constraints
     type(string_t), intent(in) :: body_names(:)
@@ -175,7 +175,7 @@ contains
 
     do g = 1, size(groups)
       associate (elimination => groups(g)%elimination)
-        if (.not. elimination%has_relations()) cycle
+        if (.not. elimination%has_relations() .or. any(constraints%may_stop(groups(g)%rows))) cycle
         if (.not. any(locked_trains(relations, elimination))) cycle
         call raise_lock(constraints, body_names, trains, relations, &
                            [elimination%relation, elimination%core], offending_row, error)

@@ -25,10 +25,13 @@ module nocdyn_constraints
     integer, allocatable :: first(:)             !! first entry of each row, [rows + 1]
     integer, allocatable :: body(:)              !! [entries], different bodies in each row
     real(wp), allocatable :: coefficient(:, :)   !! never 0, [lanes, entries]
+    real(wp), allocatable :: least(:), most(:)   !! the multipliers that steady states may have, huge without bounds, [rows]
+    logical, allocatable :: may_stop(:)          !! whether bodies may be held still by the row, as by a closed brake
     type(member_torques_t) :: members
   contains
     procedure :: rows
     procedure :: entries
+    procedure :: name_column
     procedure :: pair_coefficients
     procedure :: subset
     procedure :: list_body_rows
@@ -61,6 +64,9 @@ contains
     else
       allocate (constraints%kinds, source=strings(spread('constraint', 1, size(names))))
     end if
+    allocate (constraints%may_stop(size(names)), source=.false.)
+    allocate (constraints%most(size(names)), source=huge(1.0_wp))
+    allocate (constraints%least, source=-constraints%most)
     if (present(members)) then
       constraints%members = members
     else
@@ -74,6 +80,20 @@ contains
 
     rows = size(self%names)
   end function rows
+
+  !> The name of the column of a row's multiplier: a torque where it is that on the second body, as of clutches.
+  pure subroutine name_column(self, row, name)
+    class(constraints_t), intent(in) :: self
+    integer, intent(in) :: row
+    character(len=:), allocatable, intent(out) :: name
+
+    select case (self%kinds(row)%text)
+    case ('gear', 'planetary', 'differential', 'constraint')
+      name = 'reaction_' // self%names(row)%text
+    case default
+      name = 'torque_' // self%names(row)%text
+    end select
+  end subroutine name_column
 
   !> Number of bodies in a row.
   pure integer function entries(self, row)

@@ -5,8 +5,7 @@
 !> that of slip, which may be smaller than at rest, and the others are looked at again. A row that moves has no bounds.
 module nocdyn_joint_sets
   use nocdyn_bank, only: bank_slot_t
-  use nocdyn_bounded_complementarity, only: at_upper, is_free, solve_bounded_complementarity, &
-    solve_scaled_complementarity
+  use nocdyn_bounded_complementarity, only: at_upper, is_free, solve_bounded_complementarity, solve_scaled_complementarity
   use nocdyn_friction_joints, only: direction_of, first_wheel_drives, friction_joints_t, idle, locked, slips_backwards, &
     slips_forwards
   use nocdyn_held_rows, only: held_rows_t
@@ -42,9 +41,7 @@ module nocdyn_joint_sets
     procedure :: indicator
     procedure :: follow
     procedure :: is_open
-    procedure :: has_teeth
-    procedure :: has_stopped
-    procedure :: is_moved
+    procedure :: has_teeth, has_stopped, is_moved
   end type joint_sets_t
 
 contains
@@ -64,7 +61,7 @@ contains
     do b = 1, size(banks)
       select type (bank => banks(b)%bank)
       class is (friction_joints_t)
-        do e = 1, bank%count
+        do e = 1, merge(bank%count, 0, bank%are_joints)
           self%element = [self%element, bank%first - 1 + e]
           self%bank = [self%bank, b]
           self%number = [self%number, e]
@@ -146,6 +143,7 @@ contains
     real(wp), intent(in) :: slip(:)        !! u' [rad/s], [joints]
     integer :: j
 
+    self%is_assumed = .true.
     self%mode(:) = merge(locked, merge(slips_forwards, slips_backwards, slip > 0), is_at_rest)
     do j = 1, self%locking
       call set_mode(self, banks, j)
@@ -165,6 +163,7 @@ contains
     integer, allocatable :: resting(:)
     integer :: i
 
+    self%is_assumed = .false.
     where (.not. is_at_rest) self%mode = merge(slips_forwards, slips_backwards, slip > 0)
     self%shift(:) = 0.0_wp
     if (self%teeth%count > 0) then

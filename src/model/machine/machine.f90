@@ -34,6 +34,7 @@ module nocdyn_machine
     type(start_impulse_t), allocatable :: start_impulse   !! if the start speeds of the input were projected
     real(wp), allocatable :: steady_internal(:, :)        !! internal states of a steady start, [lanes, internal states]
     type(string_t), allocatable :: start_notes(:)         !! how the start was found
+    type(string_t), allocatable :: simplifications(:)     !! what it leaves out of the input, and what stands for it
     type(bank_slot_t), allocatable :: banks(:)
     type(elements_t) :: elements                !! elements of all banks, after `number_elements`
     type(polynomial_laws_t) :: laws             !! polynomial parts of their laws, after `number_elements`
@@ -153,8 +154,7 @@ contains
     call self%coordinates%list_parameters(parameters)
   end subroutine list_parameters
 
-  !> Replaces periodic torques by their means, for the search of a steady state; to be evaluated at a time after all transients
-  !> of the excitations.
+  !> Replaces periodic torques by their means, for the search of a steady state.
   subroutine to_mean_torque(self)
     class(machine_t), intent(inout) :: self
     integer :: i

@@ -12,7 +12,7 @@ module nocdyn_joint_assembly
   implicit none (type, external)
   private
 
-  public :: clutch_form, add_clutch_form, add_freewheels, add_bearings, check_joints
+  public :: clutch_form, add_clutch_form, add_freewheels, add_bearings, check_joints, engagement_at, sliding_capacity
 
   integer, parameter :: engaged = 1, with_engagement = 2
   integer, parameter :: forms_of_friction = 2   ! as many follow of dog clutches, and then of friction by a table
@@ -140,6 +140,20 @@ contains
       curve = group_curve(group, 'table_time', 'table_level', 'constant')
     end if
   end function engagement_of
+
+  !> The engagement of a clutch at a time, from 0 to 1.
+  real(wp) function engagement_at(group, t) result(level)
+    type(group_t), intent(in) :: group
+    real(wp), intent(in) :: t   !! [s]
+    type(curve_t) :: curve
+    real(wp) :: values(0:3)
+
+    level = 1.0_wp
+    if (.not. (group%has_value('times') .or. group%has_value('table_time'))) return
+    curve = engagement_of(group)
+    values = curve%derivatives(curve%segment(t), t)
+    level = values(0)
+  end function engagement_at
 
   !> Adds the bank of the freewheels: forward, the driven body is pushed, never pulled back.
   subroutine add_freewheels(groups, banks)

@@ -15,7 +15,7 @@ module nocdyn_motion_assembly
   implicit none (type, external)
   private
 
-  public :: check_motions, add_cardans, add_relations, drive_form, add_drive_form
+  public :: check_motions, add_cardans, add_relations, drive_form, add_drive_form, holds_still
 
   integer, parameter :: by_formula = 1, by_table = 2
   integer, parameter :: forms_of_speed = 2   ! as many follow of angles
@@ -94,6 +94,20 @@ contains
     case default   ! a lever may be anything
     end select
   end subroutine find_table_mistake
+
+  !> Whether a drive holds its body still in the end.
+  pure logical function holds_still(group)
+    type(group_t), intent(in) :: group
+    real(wp), allocatable :: speeds(:)
+
+    allocate (speeds, source=[0.0_wp, group%numbers('table_speed')])
+    holds_still = .not. (group%has_value('speed_amplitude') .or. group%has_value('angle_amplitude'))
+    if (group%text('kind') == 'angle') then
+      holds_still = holds_still .and. .not. group%has_value('table_time')
+    else
+      holds_still = holds_still .and. .not. abs(group%number('speed') + speeds(size(speeds))) > 0
+    end if
+  end function holds_still
 
   !> Adds the bank of the relations and that of their drivers.
   subroutine add_relations(groups, banks)

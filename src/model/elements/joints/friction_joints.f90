@@ -37,6 +37,7 @@ module nocdyn_friction_joints
 
   type, extends(bank_t), public :: friction_joints_t
     integer :: mode_switch = 1   !! of each element, the switch of its mode
+    logical :: are_joints = .true.   !! whether their modes and moments follow from the machine; false: it is told the moments
     type(curve_t), allocatable :: over_slip   !! friction while it slips [N m] over the speed of the slip [rad/s] of all elements
   contains
     procedure :: connect_joints
