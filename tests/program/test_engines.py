@@ -105,6 +105,10 @@ def test_pressure_turns_the_crank(nocdyn):
             "firing_deg(2) = 721 is out of range; allowed: 0 to 720 with stroke = 4",
         ),
         (
+            FIRST.format("").replace("firing_deg = 0, 360", "firing = 0, 7").replace("stroke = 4", "stroke = 2"),
+            "firing(2) = 7 is out of range; allowed: 0 to 6.283185307179586 with stroke = 2",
+        ),
+        (
             FIRST.format("").replace("firing_deg = 0, 360", "firing_deg = 0"),
             "firing_deg has 1 value and cylinders has 2 values; needed: as many of each",
         ),
@@ -121,7 +125,7 @@ def test_pressure_turns_the_crank(nocdyn):
         ),
         (
             FIRST.format("").replace("0.5, 1 ", "0, 1 "),
-            "orders(1) = 0 is a mean, and phases(1) = 0.5235987755982988; needed: the phase 0",
+            "orders(1) = 0 is a mean, and phases_deg(1) = 30; needed: the phase 0",
         ),
         (FIRST.format("misfire = 3"), "misfire = 3; allowed: 0 to 2, the number of a cylinder"),
         (FIRST.format("cylinder_scatter = 0.1, 0, 0"), "cylinder_scatter has 3 values; needed: 1 or 2"),
@@ -131,6 +135,7 @@ def test_pressure_turns_the_crank(nocdyn):
         ),
         (FIRST.format("load_share = 1"), "load_share needs loads or table_file"),
         (FIRST.format("speeds = 10, 20"), "order 1 has 0 rows at the speed 10 rad/s; needed: one at each speed"),
+        (FIRST.format("speeds_rpm = 10, 20"), "order 1 has 0 rows at the speed 10 rpm; needed: one at each speed"),
         (FIRST.format("reciprocating_mass = 2"), "reciprocating_mass needs crank_radius"),
         (
             FIRST.format("reciprocating_mass = 2 crank_radius = 0.5 rod_length = 0.4"),
@@ -197,8 +202,14 @@ def test_a_file_of_harmonics_that_is_not_there_is_refused(nocdyn):
 @pytest.mark.parametrize(
     "rows, complaint",
     [
-        (pressure_rows(0, 300), "the crank angles from 0 to 300 deg are not those of one cycle; needed: 360 deg with stroke = 2"),
-        (pressure_rows(0, 720), "the crank angles from 0 to 720 deg are not those of one cycle; needed: 360 deg with stroke = 2"),
+        (
+            pressure_rows(0, 300),
+            "crank_angles_deg from 0 to 300 are not those of one cycle; needed: a range of 360 with stroke",
+        ),
+        (
+            pressure_rows(0, 720),
+            "crank_angles_deg from 0 to 720 are not those of one cycle; needed: a range of 360 with stroke",
+        ),
         (pressure_rows(0, 8), "pressure_file: p.csv: crank_angle_deg has 5 rows; needed: at least 8"),
         (
             "0, 1\n0, 2\n" + pressure_rows(10, 360),

@@ -180,7 +180,7 @@ def test_start_speeds_that_violate_a_joint_are_refused_with_the_nearest_that_do_
     message = refusal(nocdyn, command, PAIR.format(a=1.0, b=1.0, start=""))
     assert message == (
         "nocdyn: pair.nml:3: &gear 'g': the start speeds violate it: 0.5 * 1 rad/s ('a') + 0.5 * 1 rad/s ('b') = 1, "
-        "which must be 0; nearest speeds that fit: -0.5 ('a'), 0.5 ('b'); &run start = 'projected' takes them\n"
+        "which must be 0; nearest speeds that fit: -0.5 rad/s ('a'), 0.5 rad/s ('b'); &run start = 'projected' takes them\n"
     )
     nocdyn.write("fits.nml", PAIR.format(a=-0.5, b=0.5, start=""))
     assert nocdyn(command, "fits.nml").returncode == 0

@@ -320,7 +320,8 @@ GEAR = "&gear name = 'g' bodies = 'one', 'two' teeth = 20, 40 {} /\n"
         (GEAR.format("efficiency = 0"), "efficiency = 0 is out of range"),
         (GEAR.format("reverse_efficiency = 0.5"), "reverse_efficiency needs efficiency"),
         (GEAR.format("efficiency = 0.9 table_speed = 0, 1 table_efficiency = 1, 1"), "efficiency and table_speed are both given"),
-        (GEAR.format("table_speed = 1, 2 table_efficiency = 0.9, 1"), "table_speed begins with 1; allowed: 0 [rad/s] first"),
+        (GEAR.format("table_speed = 1, 2 table_efficiency = 0.9, 1"), "table_speed(1) = 1; allowed: 0 first, then the speeds in"),
+        (GEAR.format("table_speed_rpm = 100, 200 table_efficiency = 0.9, 1"), ": table_speed_rpm(1) = 100; allowed: 0 first"),
         (
             GEAR.format("table_speed = 0, 2 table_efficiency = 0.9, 1 table_reverse = 0.5, 0.6, 0.7"),
             "table_reverse has 3 values; needed: 2, as table_speed",
@@ -328,7 +329,7 @@ GEAR = "&gear name = 'g' bodies = 'one', 'two' teeth = 20, 40 {} /\n"
         (GEAR.replace("'one', 'two'", "'ground', 'two'").format("efficiency = 0.9"), "'ground' is the first wheel"),
         (
             "&clutch name = 'c' bodies = 'one', 'two' table_slip = 1, 2 table_capacity = 3, 4 /\n",
-            "table_slip begins with 1; allowed: 0 [rad/s] first",
+            "table_slip(1) = 1; allowed: 0 first, then the slips in either direction",
         ),
         (
             "&clutch name = 'c' bodies = 'one', 'two' capacity = 4 interpolation = 'cubic' /\n",

@@ -388,9 +388,25 @@ FORCES = "crank_angles_deg = 0, 30, 60, 90, 120, 150, 180, 210 forces = 1, 2, 3,
         ),
         (CRANK.format("offset = 0.16"), ":2: &crank 'p': offset = 0.16 m: the rod of 0.2 m does not reach the piston at all"),
         (CRANK.format("rod_mass = 1"), ":2: &crank 'p': rod_mass = 1 kg, but rod_center is missing"),
-        (CRANK.format(FORCES), "the crank angles from 0 to 210 deg are not those of one cycle; needed: 360 deg with stroke = 2"),
+        (CRANK.format(FORCES), "crank_angles_deg from 0 to 210 are not those of one cycle; needed: a range of 360 with stroke"),
+        (
+            CRANK.format(FORCES.replace("_deg", "")),
+            "from 0 to 210 are not those of one cycle; needed: a range of 6.2831",
+        ),
         (CRANK.format(FORCES + " stroke = 3"), ":2: &crank 'p': stroke = 3; allowed: 2 or 4"),
-        (RELATION.format("table_angle = 0, 1, 2 table_driven = 0, 1, 2"), ":3: &relation 'r': table_driven: a cam returns: "),
+        (
+            RELATION.format("table_angle = 0, 1, 2 table_driven = 0, 1, 2"),
+            ":3: &relation 'r': table_driven(3) = 2: a cam returns: ",
+        ),
+        (
+            RELATION.format("table_angle_deg = 0, 90, 360 table_driven_deg = 5, 10, 30"),
+            ": table_driven_deg(3) = 30: a cam returns: the last value must be the first, 5; kind = 'gear'",
+        ),
+        (
+            RELATION.format("kind = 'gear' table_angle_deg = 0, 40, 90 table_driven_deg = 0, 50, 20"),
+            ": table_driven_deg: non-circular gears turn in one direction, but the spline through the points turns back near "
+            "table_angle_deg(2) = 40; kind = 'cam' may go to and fro",
+        ),
         (
             RELATION.format("kind = 'gear' table_angle = 0, 1, 2 table_driven = 0, 5, 2"),
             "the spline through the points turns back",
@@ -403,7 +419,14 @@ FORCES = "crank_angles_deg = 0, 30, 60, 90, 120, 150, 180, 210 forces = 1, 2, 3,
             DRIVE.format("table_time = 0, 1, 1, 2 table_speed = 0, 0, 5, 5"),
             "table_time(3) = 1 must be greater than table_time(2) = 1 s: a jump needs an infinite torque; allowed: a ramp",
         ),
-        (DRIVE.format("speed = 3").replace("inertia = 1", "inertia = 1 speed = 2"), "that begins with a ramp"),
+        (
+            DRIVE.format("speed = 3").replace("inertia = 1", "inertia = 1 speed = 2"),
+            "by -1 rad/s from those of the drive, 3 rad",
+        ),
+        (
+            DRIVE.format("speed_rpm = 300").replace("inertia = 1", "inertia = 1 speed_rpm = 100"),
+            "they differ by -200 rpm from those of the drive, 300 rpm; allowed: these, or a drive that begins with a ramp",
+        ),
         (
             DRIVE.format("") + "&drive name = 'e' body = 'a' speed = 1 /\n",
             "other drives and joints already prescribe this motion",

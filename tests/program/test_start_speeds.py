@@ -1,5 +1,6 @@
 """Start speeds that are not given follow from the others through the gears; digits that are only rounded are accepted."""
 
+import re
 from math import pi
 
 import pytest
@@ -73,6 +74,15 @@ def test_digits_that_contradict_the_gears_are_refused(nocdyn, a, b):
     message = refusal(nocdyn, bodies(a=a, b=b) + GEAR)
     assert ":3: &gear 'g': the start speeds violate it: 1 * 10" in message
     assert "which must be 0; nearest speeds that fit: " in message and message.endswith("&run start = 'projected' takes them\n")
+
+
+def test_speeds_in_rpm_that_contradict_the_gears_are_refused_in_rpm(nocdyn):
+    text = (bodies(a=100.0, b=40.0) + GEAR).replace("speed =", "speed_rpm =")
+    message = refusal(nocdyn, text)
+    assert ": 1 * 100 rpm ('a') + -3 * 40 rpm ('b') = -20, which must be 0; nearest speeds that fit: " in message
+    nearest = [float(number) for number in re.findall(r"([0-9.]+) rpm \('.'\)(?:,|; &run)", message)]
+    assert refusal(nocdyn, text.replace("_rpm = 40", " = 40")).count(" rad/s (") == 4
+    assert start(nocdyn, (bodies(a=nearest[0], b=nearest[1]) + GEAR).replace("speed =", "speed_rpm ="))[1] == []
 
 
 def test_two_speeds_of_a_differential_give_the_third(nocdyn):

@@ -24,6 +24,7 @@ module nocdyn_machine_parts
   use nocdyn_start_speeds, only: fit_start_speeds
   use nocdyn_text, only: joined, selected
   use nocdyn_torque_assembly, only: add_engines, add_excitation_form, add_load_form, excitation_form, load_form
+  use nocdyn_written_values, only: shared_unit
   implicit none (type, external)
   private
 
@@ -144,10 +145,11 @@ contains
                                findloc(complement_names == run%text('complement'), .true., dim=1), machine%coordinates, error)
       end if
       if (.not. allocated(error)) then
-        call fit_start_speeds(machine, given_speeds(input, machine%nodes), run%text('start') == 'projected', offending_row, error)
+        call fit_start_speeds(machine, given_speeds(input, machine%nodes), run%text('start') == 'projected', &
+                              shared_unit(input, 'body', 'speed'), offending_row, error)
         if (allocated(error) .and. input%takes_means) then   ! the speeds fit the ratios at the start, perhaps
           deallocate (error)
-          call fit_start_speeds(machine, given_speeds(input, machine%nodes), .true., offending_row, error)
+          call fit_start_speeds(machine, given_speeds(input, machine%nodes), .true., 0, offending_row, error)
         end if
       end if
     end associate

@@ -10,7 +10,8 @@ module nocdyn_moving_start
   use nocdyn_lapack, only: pivoted_rank, pseudo_inverse
   use nocdyn_machine, only: machine_t
   use nocdyn_row_motions, only: new_row_motions, row_motions_t
-  use nocdyn_text, only: append, rounded_text, to_text
+  use nocdyn_text, only: append, rounded_text
+  use nocdyn_written_values, only: speed_text, unit_of
   implicit none (type, external)
   private
 
@@ -116,10 +117,9 @@ contains
     logical, intent(in) :: is_given(:)
     type(moving_start_t), intent(inout) :: start
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: demand
     real(wp), allocatable :: change(:), equations(:, :), missing(:)
     integer, allocatable :: given(:)
-    integer :: b, i
+    integer :: b
 
     given = pack([(b, b=1, size(is_given))], is_given)
     allocate (equations(size(start%demand) + size(given), size(start%speed)), missing(size(start%demand) + size(given)))
@@ -136,26 +136,33 @@ contains
       return
     end if
     start%speed = start%speed - change
-    i = maxloc(residuals(start), dim=1)
-    call describe_demand(start, i, demand)
-    call raise(error, exit_input, input%location(group_of(input, machine, start, i)) // ': the start speeds violate it: ' // &
-               'they differ by ' // rounded_text(dot_product(start%a(i, :), start%speed) - start%demand(i), 6) // demand // &
-               "; &run start = 'projected' takes the nearest speeds that fit")
+    call refuse_speeds(input, group_of(input, machine, start, maxloc(residuals(start), dim=1)), start, error)
   end subroutine follow_rows
 
-  !> What a row demands, for messages.
-  subroutine describe_demand(start, row, text)
+  !> The message on the row that the start speeds violate most; speeds of a drive are in the unit in which it is written.
+  subroutine refuse_speeds(input, group, start, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: group   !! of the row
     type(moving_start_t), intent(in) :: start
-    integer, intent(in) :: row
-    character(len=:), allocatable, intent(out) :: text
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: text
+    real(wp) :: difference
+    integer :: row, unit
 
+    row = maxloc(residuals(start), dim=1)
+    difference = dot_product(start%a(row, :), start%speed) - start%demand(row)
     if (start%motions%driver(row) == 0) then
-      text = ' rad/s from those of the drive, ' // to_text(start%demand(row)) // ' rad/s; allowed: these, or a drive ' // &
-             'that begins with a ramp'
+      unit = max(unit_of(input%groups(group), 'speed'), unit_of(input%groups(group), 'table_speed'), &
+                 unit_of(input%groups(group), 'speed_amplitude'))
+      text = speed_text(difference, unit, 6) // ' from those of the drive, ' // speed_text(start%demand(row), unit, 15) // &
+             '; allowed: these, or a drive that begins with a ramp'
     else
-      text = ' rad/s (m/s of a slider) at this position, where the ratio is ' // rounded_text(start%motions%g(1, row), 12)
+      text = rounded_text(difference, 6) // ' rad/s (m/s of a slider) at this position, where the ratio is ' // &
+             rounded_text(start%motions%g(1, row), 12)
     end if
-  end subroutine describe_demand
+    call raise(error, exit_input, input%location(group) // ': the start speeds violate it: they differ by ' // text // &
+               "; &run start = 'projected' takes the nearest speeds that fit")
+  end subroutine refuse_speeds
 
   !> The nearest speeds, weighted by the inertias.
   subroutine project_start(machine, start)

@@ -9,6 +9,8 @@ module nocdyn_start_speeds
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_text, only: quoted, rounded_text, to_text
+  use nocdyn_units, only: from_si
+  use nocdyn_written_values, only: speed_text
   implicit none (type, external)
   private
 
@@ -25,10 +27,11 @@ contains
 
   !> Completes and checks the start speeds of a machine. If they may be projected, projects those of the groups with violated
   !> rows; speeds that are not given count as 0 then.
-  subroutine fit_start_speeds(machine, is_given, may_project, offending_row, error)
+  subroutine fit_start_speeds(machine, is_given, may_project, unit, offending_row, error)
     type(machine_t), intent(inout) :: machine
     logical, intent(in) :: is_given(:)      !! whether the start speed of a body is given, [bodies]
     logical, intent(in) :: may_project      !! whether violations are repaired; they are errors otherwise
+    integer, intent(in) :: unit             !! of speeds in messages: index of `units`, 0: rad/s
     integer, intent(out) :: offending_row   !! first violated row, 0 if there is no error
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: nearest(machine%bodies)
@@ -53,7 +56,7 @@ contains
       call project_start(nearest, machine)
     else
       offending_row = violated(1)
-      call describe_violation(machine, violated, nearest, message)
+      call describe_violation(machine, violated, nearest, unit, message)
       call raise(error, exit_input, message)
     end if
   end subroutine fit_start_speeds
@@ -124,10 +127,11 @@ contains
   end subroutine project_start
 
   !> "the start speeds violate this gear: 2 * 1 rad/s ('pinion') + ... = 2, which must be 0; nearest speeds that ...".
-  subroutine describe_violation(machine, violated, nearest, text)
+  subroutine describe_violation(machine, violated, nearest, unit, text)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: violated(:)   !! rows
     real(wp), intent(in) :: nearest(:)   !! [bodies] [rad/s]
+    integer, intent(in) :: unit          !! as in `fit_start_speeds`
     character(len=:), allocatable, intent(out) :: text
     character(len=:), allocatable :: row
     real(wp) :: residual, scale
@@ -135,24 +139,25 @@ contains
     integer :: b, i
 
     call machine%constraints%residual(1, violated(1), machine%start_speed(1, :), residual, scale)
-    call describe_row(machine, violated(1), row)
-    text = 'the start speeds violate it: ' // row // ' = ' // rounded_text(residual, 6) // &
+    call describe_row(machine, violated(1), unit, row)
+    text = 'the start speeds violate it: ' // row // ' = ' // rounded_text(from_si(residual, unit), 6) // &
            ', which must be 0'
     if (size(violated) > 1) text = text // ' (and ' // to_text(size(violated) - 1) // ' more)'
     text = text // '; nearest speeds that fit:'
     others = pack([(b, b=1, machine%bodies)], abs(nearest - machine%start_speed(1, :)) > speed_tolerance * abs(nearest))
     do i = 1, min(size(others), most_bodies)
       if (i > 1) text = text // ','
-      text = text // ' ' // rounded_text(nearest(others(i)), digits) // ' (' // quoted(machine%names(others(i))%text) // ')'
+      text = text // ' ' // speed_text(nearest(others(i)), unit, digits) // ' (' // quoted(machine%names(others(i))%text) // ')'
     end do
     if (size(others) > most_bodies) text = text // ' and ' // to_text(size(others) - most_bodies) // ' more'
     text = text // '; &run start = ' // quoted('projected') // ' takes them'
   end subroutine describe_violation
 
   !> The left-hand side of a row with the start speeds in it, e.g. "2 * 1 rad/s ('pinion') + 3 * 0 rad/s ('machine')".
-  subroutine describe_row(machine, row, text)
+  subroutine describe_row(machine, row, unit, text)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: row
+    integer, intent(in) :: unit   !! as in `fit_start_speeds`
     character(len=:), allocatable, intent(out) :: text
     integer :: entry, last
 
@@ -162,7 +167,7 @@ contains
       do entry = rows%first(row), last
         if (entry > rows%first(row)) text = text // ' + '
         text = text // to_text(rows%coefficient(1, entry)) // ' * ' // &
-               to_text(machine%start_speed(1, rows%body(entry))) // ' rad/s (' // &
+               speed_text(machine%start_speed(1, rows%body(entry)), unit, digits) // ' (' // &
                quoted(machine%names(rows%body(entry))%text) // ')'
       end do
       if (last < rows%first(row + 1) - 1) text = text // ' + ' // to_text(rows%first(row + 1) - 1 - last) // ' more terms'

@@ -7,12 +7,13 @@ module nocdyn_engine_checks
   use nocdyn_kinds, only: wp
   use nocdyn_shared_loads, only: find_shared_load
   use nocdyn_text, only: counted, quoted, to_text
+  use nocdyn_written_values, only: written_element, written_key, written_number
   implicit none (type, external)
   private
 
   public :: check_engines, check_orders, check_stroke, check_crank_angles
 
-  real(wp), parameter :: pi = acos(-1.0_wp), degree = pi / 180.0_wp
+  real(wp), parameter :: pi = acos(-1.0_wp)
   real(wp), parameter :: rounding = 1.0e-9_wp   ! relative, of angles and orders
   integer, parameter :: most_cylinders = 100
 
@@ -99,8 +100,8 @@ contains
     allocate (firing, source=group%numbers('firing'))
     do i = 1, size(firing)
       if (firing(i) <= cycle_of(group) * (1.0_wp + rounding)) cycle
-      text = 'firing_deg(' // to_text(i) // ') = ' // to_text(firing(i) / degree) // ' is out of range; allowed: 0 to ' // &
-             to_text(nint(cycle_of(group) / degree)) // ' with stroke = ' // to_text(group%whole_number('stroke'))
+      text = written_element(group, 'firing', i) // ' is out of range; allowed: 0 to ' // &
+             written_number(group, 'firing', cycle_of(group)) // ' with stroke = ' // to_text(group%whole_number('stroke'))
       return
     end do
     key = 'orders'
@@ -153,9 +154,9 @@ contains
       step = maxval(angle(2:) - angle(:n - 1))
       associate (span => angle(n) - angle(1))
         if (span <= cycle * (1.0_wp + rounding) .and. span + step >= cycle * (1.0_wp - rounding)) return
-        text = 'the crank angles from ' // to_text(angle(1) / degree) // ' to ' // to_text(angle(n) / degree) // &
-               ' deg are not those of one cycle; needed: ' // to_text(nint(cycle / degree)) // &
-               ' deg with stroke = ' // to_text(group%whole_number('stroke'))
+        text = written_key(group, key) // ' from ' // written_number(group, key, angle(1)) // ' to ' // &
+               written_number(group, key, angle(n)) // ' are not those of one cycle; needed: a range of ' // &
+               written_number(group, key, cycle) // ' with stroke = ' // to_text(group%whole_number('stroke'))
       end associate
     end associate
   end subroutine check_crank_angles

@@ -4,6 +4,7 @@ module nocdyn_harmonic_tables
   use nocdyn_kinds, only: wp
   use nocdyn_order_excitations, only: order_torque_t
   use nocdyn_text, only: counted, to_text
+  use nocdyn_written_values, only: written_element, written_number, written_unit
   implicit none (type, external)
   private
 
@@ -31,14 +32,15 @@ contains
     allocate (phase, source=group%numbers('phases'))
     do i = 1, size(order)
       if (order(i) > 0 .or. i > size(phase)) cycle
-      if (abs(phase(i)) > 0) text = 'orders(' // to_text(i) // ') = 0 is a mean, and phases(' // to_text(i) // &
-                                    ') = ' // to_text(phase(i)) // '; needed: the phase 0'
+      if (abs(phase(i)) > 0) text = 'orders(' // to_text(i) // ') = 0 is a mean, and ' // &
+                                    written_element(group, 'phases', i) // '; needed: the phase 0'
     end do
-    if (text == '') call find_gap(order, speed, load, text)
+    if (text == '') call find_gap(group, order, speed, load, text)
   end subroutine find_table_obstacle
 
   !> Which order does not have one row at each speed and load, '' if all have.
-  pure subroutine find_gap(order, speed, load, text)
+  pure subroutine find_gap(group, order, speed, load, text)
+    type(group_t), intent(in) :: group
     real(wp), intent(in) :: order(:), speed(:), load(:)   !! of the rows
     character(len=:), allocatable, intent(out) :: text
     real(wp), allocatable :: loads(:), orders(:), speeds(:)
@@ -60,7 +62,8 @@ contains
           n = count(is_same(order, orders(i)) .and. is_same(speed, speeds(j)) .and. is_same(load, loads(k)))
           if (n == 1) cycle
           text = 'order ' // to_text(orders(i)) // ' has ' // to_text(n) // ' rows'
-          if (size(speeds) > 1) text = text // ' at the speed ' // to_text(speeds(j)) // ' rad/s'
+          if (size(speeds) > 1) text = text // ' at the speed ' // written_number(group, 'speeds', speeds(j)) // &
+            ' ' // written_unit(group, 'speeds')
           if (size(loads) > 1) text = text // ' at the load ' // to_text(loads(k))
           text = text // '; needed: one'
           if (size(speeds) > 1 .and. size(loads) > 1) then

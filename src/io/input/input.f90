@@ -13,6 +13,7 @@ module nocdyn_input
     logical :: is_given = .false.   !! by the file or by an override, not by default
     integer :: line = 0             !! of the key in the file
     integer :: override = 0         !! index of the override that sets it, 0: none
+    integer :: unit = 0             !! in which numbers are written: index of `units`, 0: that of the schema
     real(wp), allocatable :: numbers(:)
     integer, allocatable :: whole_numbers(:)
     logical, allocatable :: flags(:)

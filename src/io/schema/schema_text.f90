@@ -14,6 +14,8 @@ module nocdyn_schema_text
   public :: allowed_text, number_text, type_text, only_if_text, listed_keys, group_names, key_names, similar_keys, key_suggestion
   public :: suggestion
 
+  integer, parameter :: kept_digits = 14   ! of a number that is converted
+
 contains
 
   !> "> 0 [kg m2]", "'rk45', 'rosenbrock'", ".true., .false." ...; never empty.
@@ -69,18 +71,28 @@ contains
   end function range_text
 
   !> A number of SI in a unit; all its digits, but for those that the conversion rounds.
-  function number_text(value, unit) result(text)
+  pure function number_text(value, unit) result(text)
     real(wp), intent(in) :: value   !! in the SI unit
     integer, intent(in) :: unit     !! index of `units`, 0: SI
-    character(len=:), allocatable :: text
-    integer, parameter :: kept = 14
+    character(len=number_length(value, unit)) :: text
 
     if (unit == 0) then
       text = to_text(value)
     else
-      text = rounded_text(from_si(value, unit), kept)
+      text = rounded_text(from_si(value, unit), kept_digits)
     end if
   end function number_text
+
+  pure integer function number_length(value, unit) result(length)
+    real(wp), intent(in) :: value
+    integer, intent(in) :: unit
+
+    if (unit == 0) then
+      length = len(to_text(value))
+    else
+      length = len(rounded_text(from_si(value, unit), kept_digits))
+    end if
+  end function number_length
 
   !> "number", "2 bodies", "list of bodies" ...
   pure function type_text(rule) result(text)

@@ -8,8 +8,9 @@ module nocdyn_element_groups
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_schema_rules, only: ground
-  use nocdyn_text, only: selected, string_t, to_text
+  use nocdyn_text, only: selected, string_t
   use nocdyn_text_sort, only: argsort, sorted_position
+  use nocdyn_written_values, only: written_element
   implicit none (type, external)
   private
 
@@ -204,8 +205,9 @@ contains
 
     allocate (x, source=input%groups(index)%numbers(key))
     if (size(x) == 0) return
-    if (x(1) > 0) call raise(error, exit_input, input%location(index, key) // ': ' // key // ' begins with ' // to_text(x(1)) // &
-                             '; allowed: 0 [rad/s] first, then the ' // speeds // ' in either direction')
+    if (x(1) > 0) call raise(error, exit_input, input%location(index, key) // ': ' // &
+                             written_element(input%groups(index), key, 1) // '; allowed: 0 first, then the ' // speeds // &
+                             ' in either direction')
   end subroutine check_from_standstill
 
 end module nocdyn_element_groups

@@ -12,6 +12,7 @@ module nocdyn_motion_assembly
   use nocdyn_relation_rows, only: new_relation_rows
   use nocdyn_splines, only: new_spline, spline_t
   use nocdyn_text, only: to_text
+  use nocdyn_written_values, only: written_element, written_key, written_number
   implicit none (type, external)
   private
 
@@ -34,7 +35,7 @@ contains
     do i = 1, size(relations)
       call find_table_mistake(input%groups(relations(i)), text)
       if (text == '') cycle
-      call raise(error, exit_input, input%location(relations(i), 'table_driven') // ': table_driven: ' // text)
+      call raise(error, exit_input, input%location(relations(i), 'table_driven') // ': ' // text)
       return
     end do
     allocate (drives, source=input%groups_named('drive'))
@@ -80,15 +81,17 @@ contains
     way = y(size(y)) - y(1)
     select case (group%text('kind'))
     case ('cam')
-      if (abs(way) > 1.0e-12_wp * maxval(abs(y))) text = 'a cam returns: the last value must be the first, ' // to_text(y(1)) // &
+      if (abs(way) > 1.0e-12_wp * maxval(abs(y))) text = written_element(group, 'table_driven', size(y)) // &
+        ': a cam returns: the last value must be the first, ' // written_number(group, 'table_driven', y(1)) // &
         "; kind = 'gear' advances from turn to turn, kind = 'lever' does not repeat"
     case ('gear')
       spline = new_spline(x, y, .true.)
       do i = 0, looks * (size(x) - 1) - 1
         slope = spline%derivatives(x(1 + i / looks) + modulo(i, looks) * (x(2 + i / looks) - x(1 + i / looks)) / looks)
         if (slope(1) * way > 0) cycle
-        text = 'non-circular gears turn in one direction, but the spline through the points turns back near ' // &
-               'table_angle = ' // to_text(x(1 + i / looks)) // " rad; kind = 'cam' may go to and fro"
+        text = written_key(group, 'table_driven') // ': non-circular gears turn in one direction, but the spline through ' // &
+               'the points turns back near ' // written_element(group, 'table_angle', 1 + i / looks) // &
+               "; kind = 'cam' may go to and fro"
         return
       end do
     case default   ! a lever may be anything

@@ -105,6 +105,7 @@ contains
       else
         is_set(i) = .true.
         group%values(lists(i))%numbers = values(c, :)
+        group%values(lists(i))%unit = unit
         call convert_column(file // ': ' // names(c)%text, key_rules(keys(i)), unit, group%values(lists(i))%numbers, messages)
       end if
     end do

@@ -35,6 +35,7 @@ contains
       value%is_given = given > 0
       value%line = key%line
       value%override = key%override
+      value%unit = key%unit
       if (key%is_malformed .or. (given == 0 .and. (key%may_be_missing .or. key%is_excluded))) return
       if (given == 0 .and. rule%default == unset .and. .not. key%is_required) return
 
