@@ -6,13 +6,11 @@
 !> the least change, weighted by the inertias; E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, section IV.4.
 !> Extensions say how elements move with the states, and how the states answer to the moments of elements.
 module nocdyn_row_formulation
-  use nocdyn_bank, only: bank_of, role_loss, role_names
   use nocdyn_formulation, only: formulation_t
   use nocdyn_friction_joints, only: locked
-  use nocdyn_geared_pairs, only: has_other_ratio
   use nocdyn_kinds, only: wp
+  use nocdyn_row_obstacles, only: describe_obstacle
   use nocdyn_system, only: evaluation_fatal
-  use nocdyn_text, only: quoted
   implicit none (type, external)
   private
 
@@ -370,26 +368,8 @@ contains
   function evaluation_obstacle(self) result(text)
     class(row_formulation_t), intent(in) :: self
     character(len=:), allocatable :: text
-    character(len=:), allocatable :: name
-    integer :: row
 
-    text = ''
-    row = self%joints%nearly_lost()
-    if (row == 0) return
-    associate (machine => self%machine, element => self%joints%element(row))
-      associate (bank => machine%banks(bank_of(machine%banks, element))%bank)
-        name = quoted(bank%names(element - bank%first + 1)%text)
-        if (bank%role == role_loss) then
-          text = 'the teeth of ' // name // ' jam: their second wheel brakes the first one more than its inertia allows, by ' // &
-                 'their low reverse efficiency'
-        else if (has_other_ratio(machine%coordinates, machine%elements%rows, element)) then
-          text = trim(role_names(bank%role)) // ' ' // name // ' contradicts the gears between its bodies: locked, it stops both'
-        else
-          text = trim(role_names(bank%role)) // ' ' // name // ' contradicts other joints and drives there, or does not ' // &
-                 'differ from them: a dead centre, or a loop that locks'
-        end if
-      end associate
-    end associate
+    call describe_obstacle(self%joints, self%machine%banks, self%machine%elements%rows, self%machine%coordinates, text)
   end function evaluation_obstacle
 
 end module nocdyn_row_formulation

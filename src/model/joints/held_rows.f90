@@ -63,6 +63,7 @@ module nocdyn_held_rows
     procedure :: change_set
     procedure :: find_moments
     procedure :: nearly_lost
+    procedure :: partners
     procedure :: is_active
     procedure, private :: find_moving_moments
     procedure, private :: find_moments_with_teeth
@@ -265,6 +266,27 @@ contains
     if (self%system%weakest > 0) nearly_lost = self%holding(self%system%weakest)
     if (nearly_lost <= self%locking) nearly_lost = 0
   end function nearly_lost
+
+  !> The other rows that hold of which a row is a combination, or nearly so: those that it may contradict.
+  function partners(self, row) result(rows)
+    class(held_rows_t), intent(in) :: self
+    integer, intent(in) :: row
+    integer, allocatable :: rows(:)
+    real(wp), parameter :: small = 1.0e-6_wp   ! a share of the combination
+    integer :: j
+    real(wp), allocatable :: share(:)
+    real(wp) :: scale(self%count)
+
+    scale = 0.0_wp
+    do j = 1, self%count
+      if (self%weight(j, j) > 0) scale(j) = 1.0_wp / sqrt(self%weight(j, j))
+    end do
+    rows = pack([(j, j=1, self%count)], [(self%mode(j) == locked .and. j /= row, j=1, self%count)])
+    associate (w => self%weight(rows, rows) * spread(scale(rows), 1, size(rows)) * spread(scale(rows), 2, size(rows)))
+      share = matmul(pseudo_inverse(w, null_tolerance), self%weight(rows, row) * scale(rows) * scale(row))
+    end associate
+    rows = pack(rows, abs(share) > small)
+  end function partners
 
   !> Looks whether the rank of the rows that move is still that of the start. Locks may be combinations of them.
   subroutine watch_rank(self)

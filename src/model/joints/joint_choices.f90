@@ -37,6 +37,7 @@ module nocdyn_joint_choices
     procedure, private :: better_friction
     procedure, private :: holds_always
     procedure, private :: try_all
+    procedure, private :: is_against_rows
   end type joint_choices_t
 
   real(wp), parameter :: rounding = 1.0e-12_wp      ! of a torque, relative to its terms
@@ -217,7 +218,31 @@ contains
       if (all(better == self%mode)) return
       number = number + 1
     end do
-    self%doubtful = max(1, findloc(self%has_teeth, .true., dim=1))
+    self%doubtful = findloc(self%is_against_rows(), .true., dim=1)
+    if (self%doubtful == 0) self%doubtful = max(1, findloc(self%has_teeth, .true., dim=1))
   end subroutine try_all
+
+  !> Joints at rest that rows without bounds, such as drives, move in the direction in which they hold without a bound.
+  function is_against_rows(self)
+    class(joint_choices_t), intent(in) :: self
+    logical :: is_against_rows(size(self%mode))
+    integer, allocatable :: rows(:)
+    integer :: i
+    real(wp) :: acceleration, left   ! what is left of the response to its own moment
+    real(wp), allocatable :: share(:)
+
+    is_against_rows = .false.
+    rows = pack([(i, i=1, size(self%mode))], self%holds_always())
+    associate (inverse => pseudo_inverse(self%w(rows, rows), null_tolerance))
+      do i = 1, size(self%mode)
+        if (self%has_teeth(i) .or. .not. self%is_at_rest(i) .or. any(rows == i)) cycle
+        share = matmul(inverse, self%w(rows, i))
+        left = self%w(i, i) - dot_product(self%w(i, rows), share)
+        acceleration = self%rate(i) - dot_product(share, self%rate(rows))
+        if (left > inconsistent * self%w(i, i) .or. abs(acceleration) <= inconsistent * abs(self%rate(i))) cycle
+        is_against_rows(i) = merge(self%least(i) <= -huge(1.0_wp), self%most(i) >= huge(1.0_wp), acceleration > 0)
+      end do
+    end associate
+  end function is_against_rows
 
 end module nocdyn_joint_choices
