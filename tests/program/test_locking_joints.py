@@ -171,6 +171,33 @@ def test_a_freewheel_that_starts_the_wrong_way_strikes(nocdyn):
     assert nocdyn.summary("out")["energy_account"]["work_in_J"]["freewheel f"] == pytest.approx(-12, rel=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("keys", "engages"),
+    [
+        ("", True),
+        ("times = 0, 2 levels = 0, 1", False),
+        ("times = 0, 1.9 levels = 0, 1", True),
+        ("times = -1, 1 levels = 1, 0", False),
+        ("times = -1, 1.1 levels = 1, 0", True),
+        ("table_time = 0, 1 table_level = 1, 0", False),
+        ("table_time = 0, 1.5 table_level = 1, 0", True),
+        ("table_time = 2, 3 table_level = 0, 1", False),
+        ("table_time = 1.9, 3 table_level = 0, 1", True),
+        ("table_time = 3, 4 table_level = 0.5, 1", True),
+        ("kind = 'dog' times = 3 levels = 1", False),
+    ],
+)
+def test_a_clutch_that_never_engages_in_the_run_is_noted(nocdyn, keys, engages):
+    capacity = "" if "dog" in keys else "capacity = 1"
+    text = BODY.format("a", 1, 1) + f"&clutch name = 'c' bodies = 'a', 'ground' {capacity} {keys} /\n"
+    text = nocdyn.write("machine.nml", text + "&run t_start = 1 t_end = 2 /\n")
+    note = "clutch 'c' does not engage in the run: its engagement is 0 from t = 1 to 2 s"
+    outcome = nocdyn("run", text, "--out", "out")
+    assert nocdyn.summary("out")["machine"]["notes"] == ([] if engages else [note])
+    assert (f": note: {note}\n" in outcome.stdout) is not engages
+    assert (f"\n  note: {note}\n" in nocdyn("check", text).stdout) is not engages
+
+
 # Random trains against time stepping with impulses: v_1 = v_0 + J^-1 (h T + B p), each |p| at most h times its capacity.
 STEP, END = 2e-5, 0.5
 

@@ -363,6 +363,23 @@ def test_sweeps_over_moving_joints_are_their_runs(nocdyn):
     assert [float(cell) for cell in last[4:7]] == [column(table, name)[-1] for name in ("torque_j", "position_q", "omega_e")]
 
 
+@pytest.mark.parametrize(
+    ("keys", "is_noted"),
+    [
+        ("", True),
+        ("kind = 'angle'", True),
+        ("speed = 0", False),
+        ("speed_rpm = 0", False),
+        ("table_time = 0, 1 table_speed = 0, 0", False),
+        ("kind = 'angle' angle_amplitude = 1 frequency = 1", False),
+    ],
+)
+def test_a_drive_without_a_motion_is_noted(nocdyn, keys, is_noted):
+    run(nocdyn, FREE.format("a", 1) + f"&drive name = 'd' body = 'a' {keys} /\n&run t_end = 1 /\n")
+    note = "drive 'd' has neither a speed, a table nor an amplitude: it holds its body still, as speed = 0 does"
+    assert nocdyn.summary("out")["machine"]["notes"] == ([note] if is_noted else [])
+
+
 def test_check_counts_joints_and_freedoms(nocdyn):
     outcome = nocdyn("check", nocdyn.write("machine.nml", PAIR + "&run t_end = 1 /\n"))
     assert "0 excitations, 1 cardan\n  1 degree of freedom\n" in outcome.stdout

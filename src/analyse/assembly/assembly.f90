@@ -3,6 +3,7 @@ module nocdyn_assembly
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
+  use nocdyn_joint_notes, only: note_idle_joints
   use nocdyn_joint_simplifications, only: has_joint_that_locks, refuse_joints
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -32,6 +33,7 @@ contains
     if (present(lanes)) machine%lanes = lanes
     call build_machine(input, machine, error)
     if (.not. allocated(error)) call start_machine(input, machine, error)
+    if (.not. allocated(error)) call note_idle_joints(input, machine%start_notes)
   end subroutine assemble_machine
 
   !> Builds the machine as it is in a steady state: with means over a turn, and with locked joints as constraint rows.

@@ -19,8 +19,8 @@ module nocdyn_machine_report
 
 contains
 
-  !> Notes on redundant constraints, on the start (speeds projected onto the constraints or rounded, a steady state), and on
-  !> bodies that nothing moves.
+  !> Notes on redundant constraints, on the start (speeds projected onto the constraints or rounded, a steady state), on bodies
+  !> that nothing moves, and on joints that do nothing.
   function machine_notes(machine) result(notes)
     type(machine_t), intent(in) :: machine
     type(string_t), allocatable :: notes(:)

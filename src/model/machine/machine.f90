@@ -33,7 +33,7 @@ module nocdyn_machine
     real(wp), allocatable :: start_speed(:, :)            !! [rad/s], [lanes, bodies], obeys the constraints
     type(start_impulse_t), allocatable :: start_impulse   !! if the start speeds of the input were projected
     real(wp), allocatable :: steady_internal(:, :)        !! internal states of a steady start, [lanes, internal states]
-    type(string_t), allocatable :: start_notes(:)         !! how the start was found
+    type(string_t), allocatable :: start_notes(:)         !! how the start was found; joints that do nothing
     type(string_t), allocatable :: simplifications(:)     !! what it leaves out of the input, and what stands for it
     type(bank_slot_t), allocatable :: banks(:)
     type(elements_t) :: elements                !! elements of all banks, after `number_elements`
