@@ -336,3 +336,19 @@ def test_joints_that_share_what_they_hold_are_named(nocdyn, formulation):
     assert last["torque_one [N m]"] == pytest.approx(last["torque_two [N m]"], rel=1e-9)
     outcome = nocdyn("run", path, "--set", "clutch.two.capacity=0", "--set", "clutch.two.static_capacity=0", "--out", "one")
     assert outcome.returncode == 0 and "redundant" not in outcome.stdout
+
+
+@pytest.mark.parametrize(
+    ("word", "hint"),
+    [
+        ("brake", "did you mean 'clutch' with 'ground' as one of its bodies?"),
+        ("dog_clutch", "did you mean 'clutch' with kind = 'dog'?"),
+        ("cam", "did you mean 'relation' with kind = 'cam'?"),
+        ("clutsh", "did you mean 'clutch'?"),
+    ],
+)
+def test_words_of_the_field_lead_to_their_groups(nocdyn, word, hint):
+    text = BODY.format("one", 1, 0) + f"&{word} name = 'c' bodies = 'one', 'ground' /\n&run t_end = 1 /\n"
+    outcome = nocdyn("check", nocdyn.write("bad.nml", text))
+    assert outcome.returncode == 2
+    assert f"bad.nml:2: &{word}: there is no such group; {hint}" in outcome.stderr

@@ -5,7 +5,7 @@ module nocdyn_key_path
   use nocdyn_namelist, only: assignment_t
   use nocdyn_namelist_values, only: read_subscript
   use nocdyn_schema, only: group_rule_index, group_rules, is_single
-  use nocdyn_schema_text, only: group_names, key_suggestion, suggestion
+  use nocdyn_schema_text, only: group_suggestion, key_suggestion
   use nocdyn_schema_units, only: find_key
   use nocdyn_text, only: lower_case, quoted, shortened
   implicit none (type, external)
@@ -63,7 +63,7 @@ contains
     path%group_rule = group_rule_index(group)
     message = ''
     if (path%group_rule == 0) then
-      message = 'there is no group ' // quoted(shortened(group)) // suggestion(group, group_names())
+      message = 'there is no group ' // quoted(shortened(group)) // group_suggestion(group)
     else if (open <= len(text)) then
       call read_subscript(text(open + 1:max(open, len(text) - 1)), subscript)
       path%number = subscript%first

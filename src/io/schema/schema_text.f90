@@ -1,7 +1,8 @@
 !> Rows of the schema as texts for messages and help.
 module nocdyn_schema_text
   use nocdyn_kinds, only: wp
-  use nocdyn_schema, only: aliases, first_key, group_rules, has_word, key_rule_index, key_rules, last_key, words_in, words_of
+  use nocdyn_schema, only: aliases, first_key, group_aliases, group_rules, has_word, key_rule_index, key_rules, last_key, &
+    words_in, words_of
   use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_word, allowed_t, an_integer, &
     any_number, body_or_ground, key_rule_t, type_nouns
   use nocdyn_schema_units, only: name_in_unit, other_unit, unit_name
@@ -12,7 +13,7 @@ module nocdyn_schema_text
   private
 
   public :: allowed_text, number_text, type_text, only_if_text, listed_keys, group_names, key_names, similar_keys, key_suggestion
-  public :: suggestion
+  public :: group_suggestion, suggestion
 
   integer, parameter :: kept_digits = 14   ! of a number that is converted
 
@@ -209,6 +210,22 @@ contains
       text = suggestion(word, key_names(group_rule))
     end if
   end function key_suggestion
+
+  !> "; did you mean 'gear'?", or the group for which a word stands in the field.
+  pure function group_suggestion(word) result(text)
+    character(len=*), intent(in) :: word   !! in lower case
+    character(len=:), allocatable :: text
+    integer :: i
+
+    do i = 1, size(group_aliases)
+      if (.not. has_word(group_aliases(i)%words, word)) cycle
+      text = "; did you mean '" // trim(group_aliases(i)%group) // "'"
+      if (group_aliases(i)%addition /= '') text = text // ' with ' // trim(group_aliases(i)%addition)
+      text = text // '?'
+      return
+    end do
+    text = suggestion(word, group_names())
+  end function group_suggestion
 
   !> "; did you mean 'stiffness'?", or all candidates if none is similar and they are few.
   pure function suggestion(word, candidates) result(text)

@@ -11,7 +11,7 @@ module nocdyn_input_reader
   use nocdyn_schema, only: first_key, group_rule_index, group_rules, is_single, key_rules, last_key
   use nocdyn_schema_relations, only: relations_of, relations_t
   use nocdyn_schema_rules, only: at_least_once, exactly_once, occurrence_texts, required
-  use nocdyn_schema_text, only: group_names, suggestion
+  use nocdyn_schema_text, only: group_names, group_suggestion, suggestion
   use nocdyn_near_words, only: nearest_word
   use nocdyn_text, only: quoted, shortened, string_t, to_text
   use nocdyn_text_file, only: largest_input, read_text_file
@@ -119,7 +119,7 @@ contains
     character(len=:), allocatable :: hint
 
     hint = ''
-    if (diagnostics%count < most_shown) hint = suggestion(group%kind, group_names())
+    if (diagnostics%count < most_shown) hint = group_suggestion(group%kind)
     call diagnostics%add(group%line, g, 'there is no such group' // hint)
   end subroutine refuse_group
 

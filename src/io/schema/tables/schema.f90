@@ -13,8 +13,8 @@ module nocdyn_schema
   use nocdyn_schema_response, only: response_examples, response_groups, response_keys, response_relations
   use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_text, a_word, alias_t, &
     allowed_t, an_integer, any_number, any_times, anything, at_least_once, at_most_once, at_most_one, body_or_ground, &
-    exactly_once, example_t, from_2, group_rule_t, in_machine, in_simulation, in_torques, key_rule_t, kind_rule_t, less_than, &
-    not_negative, positive, relation_rule_t, required, unset
+    exactly_once, example_t, from_2, group_alias_t, group_rule_t, in_machine, in_simulation, in_torques, key_rule_t, &
+    kind_rule_t, less_than, not_negative, positive, relation_rule_t, required, unset
   use nocdyn_schema_shafts, only: shaft_examples, shaft_groups, shaft_keys, shaft_relations
   use nocdyn_schema_sweep, only: sweep_aliases, sweep_examples, sweep_groups, sweep_keys, sweep_kinds, sweep_relations
   use nocdyn_schema_torques, only: excitation_keys, load_keys, motor_keys, torque_examples, torque_kinds, torque_relations
@@ -112,6 +112,20 @@ module nocdyn_schema
     response_relations, sweep_relations]
 
   type(alias_t), parameter, public :: aliases(*) = sweep_aliases
+
+  !> Words that readers of other programs may try.
+  type(group_alias_t), parameter, public :: group_aliases(*) = [ &
+    group_alias_t('brake retarder',                           'clutch', "'ground' as one of its bodies"), &
+    group_alias_t('dog dog_clutch synchronizer',              'clutch', "kind = 'dog'"), &
+    group_alias_t('backstop holdback',                        'freewheel', "'ground' as one of its bodies"), &
+    group_alias_t('overrunning_clutch one_way_clutch sprag',  'freewheel'), &
+    group_alias_t('joint universal_joint hooke_joint',        'cardan'), &
+    group_alias_t('cam',                                      'relation', "kind = 'cam'"), &
+    group_alias_t('lever linkage',                            'relation', "kind = 'lever'"), &
+    group_alias_t('piston slider_crank',                      'crank'), &
+    group_alias_t('motion prescribed_motion hold',            'drive'), &
+    group_alias_t('worm bevel spur pinion',                   'gear'), &
+    group_alias_t('spring damper torsion_spring',             'coupling')]
 
   type(example_t), parameter, public :: examples(*) = [ &
     example_t('case',       "title = 'Paper, case 2: harmonic torque on the motor'"), &

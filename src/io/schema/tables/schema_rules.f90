@@ -110,6 +110,13 @@ module nocdyn_schema_rules
     character(len=48) :: words, keys
   end type alias_t
 
+  !> Words of the field for a group, separated by blanks.
+  type, public :: group_alias_t
+    character(len=48) :: words
+    character(len=12) :: group
+    character(len=40) :: addition = ''   !! what the group needs then
+  end type group_alias_t
+
   !> An example of a group.
   type, public :: example_t
     character(len=12) :: group
