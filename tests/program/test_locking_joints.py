@@ -352,3 +352,13 @@ def test_words_of_the_field_lead_to_their_groups(nocdyn, word, hint):
     outcome = nocdyn("check", nocdyn.write("bad.nml", text))
     assert outcome.returncode == 2
     assert f"bad.nml:2: &{word}: there is no such group; {hint}" in outcome.stderr
+
+
+def test_the_printed_energies_have_no_rounding(nocdyn):
+    text = BODY.format("a", 1, 10) + BODY.format("b", 1, 0) + "&load name = 'l' body = 'b' viscous = 1 /\n"
+    text += "&coupling name = 'k' bodies = 'a', 'b' stiffness = 1000 damping = 1 /\n&run t_end = 40 /\n"
+    outcome = nocdyn("run", nocdyn.write("machine.nml", text), "--out", "out")
+    assert outcome.returncode == 0, outcome.stderr
+    assert "kinetic energy" in outcome.stdout and "stored in k" not in outcome.stdout
+    account = nocdyn.summary("out")["energy_account"]
+    assert 0 < account["stored_J"]["k"][1] < 1e-12

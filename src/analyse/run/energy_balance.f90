@@ -96,7 +96,8 @@ contains
   subroutine list_entries(self, names, energies)
     type(energy_balance_t), intent(in) :: self
     type(string_t), allocatable, intent(out) :: names(:)
-    real(wp), allocatable, intent(out) :: energies(:)   !! into the machine, negative if out of it [J]
+    real(wp), allocatable, intent(out) :: energies(:)   !! into the machine, negative if out of it; 0 for rounding [J]
+    real(wp), parameter :: unseen = 1.0e-12_wp   ! share of all energies
     integer :: i
 
     allocate (energies, source=[self%work, self%stored_start - self%stored_end, self%kinetic_start - self%kinetic_end])
@@ -106,6 +107,7 @@ contains
       names(size(self%work) + i)%text = 'stored in ' // self%elastic_elements(i)%text
     end do
     names(size(names))%text = 'kinetic energy'
+    where (abs(energies) <= unseen * sum(abs(energies))) energies = 0.0_wp
   end subroutine list_entries
 
   !> The entries of one side, the largest first.
