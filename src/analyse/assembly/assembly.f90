@@ -33,7 +33,7 @@ contains
     if (present(lanes)) machine%lanes = lanes
     call build_machine(input, machine, error)
     if (.not. allocated(error)) call start_machine(input, machine, error)
-    if (.not. allocated(error)) call note_idle_joints(input, machine%start_notes)
+    if (.not. (allocated(error) .or. input%takes_means)) call note_idle_joints(input, machine%start_notes)
   end subroutine assemble_machine
 
   !> Builds the machine as it is in a steady state: with means over a turn, and with locked joints as constraint rows.

@@ -45,11 +45,10 @@ contains
       case ('cardan', 'relation')
         is_row = input%takes_means
       case ('clutch', 'freewheel')
-        is_row = .not. is_open_joint(input, index)
-        is_row = is_row .and. input%takes_means
-      case ('drive')
         is_row = input%takes_means
-        if (is_row) is_row = holds_still(group)
+        if (is_row) is_row = .not. is_open_joint(input, index)
+      case ('drive')
+        is_row = input%takes_means .and. holds_still(group)
       case default
         is_row = .false.
       end select

@@ -77,7 +77,7 @@ contains
           else
             call add_to(locked, group)
           end if
-        else if (group%kind == 'drive' .and. holds_still(group)) then
+        else if (holds_still(group)) then
           call add_to(locked, group)
         else if (has_mean(group)) then
           call add_to(means, group)

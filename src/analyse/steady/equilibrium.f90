@@ -3,7 +3,6 @@ module nocdyn_equilibrium
   use nocdyn_balance_search, only: search_balance
   use nocdyn_balance_texts, only: describe_speeds, describe_state_speeds, explain_no_balance, list_moving_bodies
   use nocdyn_block_solutions, only: block_solutions_t
-  use nocdyn_constraints, only: constraints_t
   use nocdyn_element_sets, only: element_names
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
@@ -11,10 +10,11 @@ module nocdyn_equilibrium
   use nocdyn_lapack_eigen, only: eigenvectors
   use nocdyn_linearisation, only: linearisation_t, linearise
   use nocdyn_machine, only: machine_t
+  use nocdyn_overloads, only: describe_overload
   use nocdyn_reduced, only: reduced_t
   use nocdyn_static_twists, only: find_twists, undetermined_elements
   use nocdyn_steady_losses, only: describe_losses, new_steady_losses, steady_losses_t, tell_losses
-  use nocdyn_text, only: append, joined, quoted, rounded_text, string_t
+  use nocdyn_text, only: append, joined, string_t
   use nocdyn_torque_balance, only: set_up_balance, torque_balance_t
   implicit none (type, external)
   private
@@ -48,20 +48,16 @@ contains
     type(string_t), allocatable, intent(out) :: notes(:)   !! remarks for the report
     type(error_t), allocatable, intent(out) :: error       !! if no steady state was found
     character(len=:), allocatable :: lossy
-    integer :: i
 
     call mean_formulation(machine, formulation)
     allocate (notes(0))
     if (allocated(machine%simplifications)) notes = machine%simplifications
     call find_balances(formulation, t, equilibria, notes, error)
     if (allocated(error)) return
-    do i = 1, size(equilibria)
-      call balance_losses(formulation, t, equilibria(i), error)
-      if (allocated(error)) return
-    end do
     call describe_losses(machine, lossy)
     if (lossy /= '') call append(notes, 'the moments of the losses of ' // lossy // ' are taken as constant in vibrations')
-    call drop_overloaded(formulation, t, equilibria, notes, error)
+    call add_losses(formulation, t, equilibria, notes, error)
+    if (.not. allocated(error)) call drop_overloaded(formulation, t, equilibria, notes, error)
   end subroutine find_equilibria
 
   !> Finds the states in which all torques balance, with given moments of losses.
@@ -93,23 +89,47 @@ contains
     call move_alloc(balance%formulation, formulation)
   end subroutine find_balances
 
+  !> Adds the losses of teeth to steady states without them. States in which they do not let the machine turn are dropped.
+  subroutine add_losses(formulation, t, equilibria, notes, error)
+    class(formulation_t), allocatable, intent(inout) :: formulation
+    real(wp), intent(in) :: t   !! [s]
+    type(equilibrium_t), allocatable, intent(inout) :: equilibria(:)
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: lossy, speeds
+    logical :: turns(size(equilibria))
+    integer :: i
+
+    do i = 1, size(equilibria)
+      call balance_losses(formulation, t, equilibria(i), turns(i))
+      if (turns(i)) cycle
+      call formulation%set_state(equilibria(i)%y)
+      call describe_state_speeds(formulation, speeds)
+      call append(notes, 'of the steady state without losses at ' // speeds // ' there is none with them')
+    end do
+    equilibria = pack(equilibria, turns)
+    if (size(equilibria) > 0) return
+    call describe_losses(formulation%machine, lossy)
+    call raise(error, exit_failed, 'no steady state was found with the losses of ' // lossy // &
+               '; teeth that lock themselves may stand still')
+  end subroutine add_losses
+
   !> Finds the moments of the losses in a steady state, and the state with them.
-  subroutine balance_losses(formulation, t, equilibrium, error)
+  subroutine balance_losses(formulation, t, equilibrium, is_solved)
     class(formulation_t), allocatable, intent(inout) :: formulation
     real(wp), intent(in) :: t   !! [s]
     type(equilibrium_t), intent(inout) :: equilibrium   !! without losses at first
-    type(error_t), allocatable, intent(out) :: error
+    logical, intent(out) :: is_solved
     type(equilibrium_t), allocatable :: found(:)
+    type(error_t), allocatable :: error
     type(steady_losses_t) :: losses
     type(string_t), allocatable :: notes(:)   ! those of the state without losses stand
-    character(len=:), allocatable :: lossy
-    logical :: is_solved
     integer :: i
 
+    is_solved = .true.
     losses = new_steady_losses(formulation%machine)
     allocate (equilibrium%losses, source=losses%moment)
     if (losses%count == 0) return
-    call describe_losses(formulation%machine, lossy)
     do i = 1, most_trials
       call tell_losses(formulation%machine, equilibrium%losses)
       call losses%improve(formulation, t, equilibrium%y, is_solved)
@@ -122,15 +142,14 @@ contains
       equilibrium%losses = losses%moment
       deallocate (notes)
     end do
-    call raise(error, exit_failed, 'no steady state was found with the losses of ' // lossy // &
-               '; teeth that lock themselves may stand still')
+    is_solved = .false.
   end subroutine balance_losses
 
   !> The steady state with the least kinetic energy relative to a state.
   integer function nearest_state(formulation, equilibria, y) result(nearest)
     class(formulation_t), intent(inout) :: formulation
     type(equilibrium_t), intent(in) :: equilibria(:)
-    real(wp), intent(in) :: y(:, :)   !! [1, states]
+    real(wp), contiguous, intent(in) :: y(:, :)   !! [1, states]
     real(wp) :: distance(size(equilibria)), omega(formulation%machine%bodies)
     integer :: i
 
@@ -150,44 +169,19 @@ contains
     type(equilibrium_t), allocatable, intent(inout) :: equilibria(:)
     type(string_t), allocatable, intent(inout) :: notes(:)
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: lambda(formulation%machine%constraints%rows())
     character(len=:), allocatable :: text
     logical :: holds(size(equilibria))
-    integer :: i, row
+    integer :: i
 
-    holds = .true.
     do i = 1, size(equilibria)
       call tell_losses(formulation%machine, equilibria(i)%losses)
-      call formulation%observe([t], equilibria(i)%y)
-      call formulation%reactions(1, lambda)
-      row = overloaded_row(formulation%machine%constraints, lambda)
-      holds(i) = row == 0
-      if (holds(i)) cycle
-      call describe_state_speeds(formulation, text)
-      associate (constraints => formulation%machine%constraints)
-        text = 'at ' // text // ' ' // constraints%kinds(row)%text // ' ' // quoted(constraints%names(row)%text) // &
-               ' does not hold: locked it would carry ' // rounded_text(lambda(row), 6) // ' N m; allowed: ' // &
-               rounded_text(constraints%least(row), 6) // ' to ' // rounded_text(constraints%most(row), 6)
-      end associate
-      call append(notes, text)
+      call describe_overload(formulation, t, equilibria(i)%y, text)
+      holds(i) = text == ''
+      if (.not. holds(i)) call append(notes, text)
     end do
     equilibria = pack(equilibria, holds)
     if (size(equilibria) == 0) call raise(error, exit_failed, 'no steady state was found: ' // text)
   end subroutine drop_overloaded
-
-  !> The first row whose multiplier is out of its bounds by more than rounding, 0 if there is none.
-  pure integer function overloaded_row(constraints, lambda) result(row)
-    type(constraints_t), intent(in) :: constraints
-    real(wp), intent(in) :: lambda(:)
-    real(wp), parameter :: rounding = 1.0e-9_wp
-    real(wp) :: shift
-
-    shift = rounding * maxval(abs(lambda))
-    do row = 1, size(lambda)
-      if (lambda(row) < constraints%least(row) - shift .or. lambda(row) > constraints%most(row) + shift) return
-    end do
-    row = 0
-  end function overloaded_row
 
   !> The reduced formulation of a machine with mean torques, without work integrals.
   subroutine mean_formulation(machine, formulation)

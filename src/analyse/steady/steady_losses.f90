@@ -62,7 +62,7 @@ contains
     class(steady_losses_t), intent(inout) :: self
     class(formulation_t), intent(inout) :: formulation
     real(wp), intent(in) :: t         !! [s]
-    real(wp), intent(in) :: y(:, :)   !! [1, states]
+    real(wp), contiguous, intent(in) :: y(:, :)   !! [1, states]
     logical, intent(out) :: is_solved   !! whether they follow from this state
     real(wp), parameter :: rounding = 1.0e-15_wp, tolerance = 1.0e-10_wp   ! shares of the torques
     real(wp) :: difference, following(self%count), torque(self%count)

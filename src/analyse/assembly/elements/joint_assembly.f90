@@ -145,13 +145,16 @@ contains
   real(wp) function engagement_at(group, t) result(level)
     type(group_t), intent(in) :: group
     real(wp), intent(in) :: t   !! [s]
+    real(wp), allocatable :: times(:)
     type(curve_t) :: curve
-    real(wp) :: values(0:3)
+    real(wp) :: at, values(0:3)
 
     level = 1.0_wp
-    if (.not. (group%has_value('times') .or. group%has_value('table_time'))) return
+    allocate (times, source=[group%numbers('times'), group%numbers('table_time')])
+    if (size(times) == 0) return
     curve = engagement_of(group)
-    values = curve%derivatives(curve%segment(t), t)
+    at = min(t, times(size(times)))   ! later it does not change; the square of a late time may be too large
+    values = curve%derivatives(curve%segment(at), at)
     level = values(0)
   end function engagement_at
 

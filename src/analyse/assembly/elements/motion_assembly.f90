@@ -98,11 +98,13 @@ contains
     end select
   end subroutine find_table_mistake
 
-  !> Whether a drive holds its body still in the end.
+  !> Whether a group is a drive that holds its body still in the end.
   pure logical function holds_still(group)
     type(group_t), intent(in) :: group
     real(wp), allocatable :: speeds(:)
 
+    holds_still = .false.
+    if (group%kind /= 'drive') return
     allocate (speeds, source=[0.0_wp, group%numbers('table_speed')])
     holds_still = .not. (group%has_value('speed_amplitude') .or. group%has_value('angle_amplitude'))
     if (group%text('kind') == 'angle') then
