@@ -205,3 +205,15 @@ def test_random_trains_run_into_their_steady_states(nocdyn, seed):
     row = last_row(nocdyn, text)
     assert any(same_state(state, row, 1e-5) for state in found)
     assert all(abs(state["power_residual_W"]) < 1e-10 * state["power_put_in_W"] for state in found)
+
+
+def test_a_run_starts_steadily_beside_a_freewheel_that_overruns(nocdyn):
+    text = GEARBOX + "&freewheel name = 'back' bodies = 'ring', 'ground' direction = 'backward' /\n"
+    text += "&freewheel name = 'idle' bodies = 'sun', 'ground' direction = 'backward' /\n" + GEAR.format("g", "out", "load")
+    text += "&run t_end = 1 start = 'equilibrium' /\n&output interval = 0.5 /\n"
+    values = steady_states(nocdyn, text)["steady_states"][0]["values"]
+    assert values["omega_ring [rad/s]"] == 0 and values["torque_back [N m]"] < 0
+    row = last_row(nocdyn, text)
+    assert row["omega_sun [rad/s]"] == pytest.approx(values["omega_sun [rad/s]"], rel=1e-9)
+    notes = json.loads((nocdyn.folder / "run/summary.json").read_text())["machine"]["notes"]
+    assert "in this state there are open: freewheel 'idle'" in notes

@@ -42,6 +42,7 @@ contains
     real(wp), intent(in) :: t               !! the time at which clutches are engaged or not [s]
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
+    type(machine_t), allocatable :: trial
     logical :: is_changed
     integer :: trials
 
@@ -50,15 +51,24 @@ contains
     if (allocated(input%overruns)) deallocate (input%overruns)
     allocate (input%overruns(size(input%groups)), source=.false.)
     do trials = 0, 2 * size(input%groups_named('freewheel'))
-      call assemble_machine(input, machine, error)
-      if (.not. allocated(error) .and. machine%coordinates%freedoms == 0) then
-        call raise(error, exit_failed, input%shown_file() // ': ' // machine%simplifications(1)%text // ', so that nothing moves')
-      end if
+      allocate (trial)
+      call build_machine(input, trial, error)
       if (allocated(error)) return
-      call choose_overruns(input, machine, is_changed)
-      if (.not. is_changed) return
+      if (trial%coordinates%freedoms == 0) then
+        call raise(error, exit_failed, input%shown_file() // ': ' // trial%simplifications(1)%text // ', so that nothing moves')
+        return
+      end if
+      call choose_overruns(input, trial, is_changed)
+      if (.not. is_changed) exit
+      deallocate (trial)
     end do
-    call raise(error, exit_failed, input%shown_file() // ': no steady state was found in which every freewheel holds or overruns')
+    if (is_changed) then
+      call raise(error, exit_failed, input%shown_file() // ': no steady state was found in which each freewheel ' // &
+                 'holds or overruns')
+    else
+      machine = trial
+      call start_machine(input, machine, error)
+    end if
   end subroutine assemble_steady_machine
 
   !> Starts a machine in its steady state, if the input wants it.

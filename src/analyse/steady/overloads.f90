@@ -19,7 +19,7 @@ contains
     real(wp), contiguous, intent(in) :: y(:, :)   !! [1, states]
     character(len=:), allocatable, intent(out) :: text
     real(wp) :: lambda(formulation%machine%constraints%rows())
-    character(len=:), allocatable :: speeds
+    character(len=:), allocatable :: allowed, speeds
     integer :: row
 
     text = ''
@@ -29,9 +29,11 @@ contains
     if (row == 0) return
     call describe_state_speeds(formulation, speeds)
     associate (constraints => formulation%machine%constraints)
+      allowed = rounded_text(constraints%least(row), 6) // ' to ' // rounded_text(constraints%most(row), 6)
+      if (constraints%least(row) <= -huge(lambda)) allowed = 'at most ' // rounded_text(constraints%most(row), 6)
+      if (constraints%most(row) >= huge(lambda)) allowed = 'at least ' // rounded_text(constraints%least(row), 6)
       text = 'at ' // speeds // ' ' // constraints%kinds(row)%text // ' ' // quoted(constraints%names(row)%text) // &
-             ' does not hold: locked it would carry ' // rounded_text(lambda(row), 6) // ' N m; allowed: ' // &
-             rounded_text(constraints%least(row), 6) // ' to ' // rounded_text(constraints%most(row), 6)
+             ' does not hold: locked it would carry ' // rounded_text(lambda(row), 6) // ' N m; allowed: ' // allowed
     end associate
   end subroutine describe_overload
 
