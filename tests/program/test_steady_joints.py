@@ -32,8 +32,8 @@ def steady_states(nocdyn, text):
 def last_row(nocdyn, text):
     outcome = nocdyn("run", nocdyn.write("machine.nml", text), "--out", "run", "--quiet")
     assert outcome.returncode == 0, outcome.stderr
-    with open(nocdyn.folder / "run/trajectory.csv") as file:
-        return {key: float(value) for key, value in list(csv.DictReader(file))[-1].items()}
+    header, rows = nocdyn.table("run")
+    return dict(zip(header, rows[-1], strict=True))
 
 
 def same_state(state, row, tolerance):
@@ -149,13 +149,13 @@ def test_a_run_starts_in_the_steady_state_with_its_losses_and_locks(nocdyn):
     text += "&body name = 'shaft' inertia = 0.2  bearing_friction = 2 /\n"
     text += "&clutch name = 'c' bodies = 'worm', 'shaft' capacity = 500 times = 0, 3 levels = 1, 0 /\n"
     row = last_row(nocdyn, text + "&run t_end = 2 start = 'equilibrium' /\n&output interval = 0.5 /\n")
-    with open(nocdyn.folder / "run/trajectory.csv") as file:
-        for other in csv.DictReader(file):
-            for key, value in other.items():
-                if key.startswith(("omega", "twist", "torque", "loss")):
-                    assert float(value) == pytest.approx(row[key], rel=1e-9, abs=1e-9)
+    header, rows = nocdyn.table("run")
+    for other in rows:
+        for key, value in zip(header, other, strict=True):
+            if key.startswith(("omega", "twist", "torque", "loss")):
+                assert value == pytest.approx(row[key], rel=1e-9, abs=1e-9)
     assert row["loss_w [N m]"] < -1
-    notes = json.loads((nocdyn.folder / "run/summary.json").read_text())["machine"]["notes"]
+    notes = nocdyn.summary("run")["machine"]["notes"]
     assert "in this state there are locked: clutch 'c'" in notes
 
 
@@ -215,5 +215,11 @@ def test_a_run_starts_steadily_beside_a_freewheel_that_overruns(nocdyn):
     assert values["omega_ring [rad/s]"] == 0 and values["torque_back [N m]"] < 0
     row = last_row(nocdyn, text)
     assert row["omega_sun [rad/s]"] == pytest.approx(values["omega_sun [rad/s]"], rel=1e-9)
-    notes = json.loads((nocdyn.folder / "run/summary.json").read_text())["machine"]["notes"]
+    notes = nocdyn.summary("run")["machine"]["notes"]
     assert "in this state there are open: freewheel 'idle'" in notes
+
+
+def test_the_column_of_a_lock_is_no_reaction(nocdyn):
+    text = GEARBOX + "&clutch name = 'set_ring' bodies = 'ring', 'ground' kind = 'dog' /\n" + GEAR.format("g", "out", "load")
+    values = steady_states(nocdyn, text + END)["steady_states"][0]["values"]
+    assert values["torque_set_ring [N m]"] == pytest.approx(values["reaction_set_ring [N m]"], rel=1e-12)

@@ -249,7 +249,7 @@ contains
     integer, intent(in) :: indices(:)
     type(constraints_t), intent(in) :: constraints
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: name
+    character(len=:), allocatable :: column, name
     integer, allocatable :: order(:)
     integer :: m, other
 
@@ -259,6 +259,8 @@ contains
       name = constraints%names(constraints%members%row(m))%text // '_' // constraints%members%names(m)%text
       other = sorted_position(name, constraints%names, order)
       if (other == 0) cycle
+      call constraints%name_column(other, column)
+      if (column /= 'reaction_' // name) cycle   ! it is that of a lock, a torque
       call raise(error, exit_input, input%location(indices(constraints%members%row(m))) // ': its column reaction_' // name // &
                  ' would have the name of that of ' // input%label(indices(other)) // '; allowed: another name')
       return
