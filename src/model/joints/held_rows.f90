@@ -72,6 +72,7 @@ module nocdyn_held_rows
     procedure, private :: choose_set
     procedure, private :: add_set
     procedure, private :: examine
+    procedure, private :: unit_weights
   end type held_rows_t
 
 contains
@@ -274,19 +275,32 @@ contains
     integer, allocatable :: rows(:)
     real(wp), parameter :: small = 1.0e-6_wp   ! a share of the combination
     integer :: j
-    real(wp), allocatable :: share(:)
-    real(wp) :: scale(self%count)
+    real(wp), allocatable :: share(:), w(:, :)
 
-    scale = 0.0_wp
-    do j = 1, self%count
-      if (self%weight(j, j) > 0) scale(j) = 1.0_wp / sqrt(self%weight(j, j))
-    end do
     rows = pack([(j, j=1, self%count)], [(self%mode(j) == locked .and. j /= row, j=1, self%count)])
-    associate (w => self%weight(rows, rows) * spread(scale(rows), 1, size(rows)) * spread(scale(rows), 2, size(rows)))
-      share = matmul(pseudo_inverse(w, null_tolerance), self%weight(rows, row) * scale(rows) * scale(row))
+    allocate (w, source=self%unit_weights([rows, row]))
+    associate (n => size(rows))
+      share = matmul(pseudo_inverse(w(:n, :n), null_tolerance), w(:n, n + 1))
     end associate
     rows = pack(rows, abs(share) > small)
   end function partners
+
+  !> W of some rows, scaled to a unit diagonal, or to zero where the diagonal is.
+  pure function unit_weights(self, rows) result(w)
+    class(held_rows_t), intent(in) :: self
+    integer, intent(in) :: rows(:)
+    real(wp), dimension(size(rows), size(rows)) :: w
+    real(wp) :: scale(size(rows))
+    integer :: j
+
+    scale = 0.0_wp
+    do j = 1, size(rows)
+      if (self%weight(rows(j), rows(j)) > 0) scale(j) = 1.0_wp / sqrt(self%weight(rows(j), rows(j)))
+    end do
+    do j = 1, size(rows)
+      w(:, j) = self%weight(rows, rows(j)) * (scale * scale(j))
+    end do
+  end function unit_weights
 
   !> Looks whether the rank of the rows that move is still that of the start. Locks may be combinations of them.
   subroutine watch_rank(self)
@@ -312,7 +326,7 @@ contains
     if (i > size(self%sets)) call self%add_set()
     associate (set => self%sets(self%present))
       if (.not. set%is_examined) call self%examine(pack([(i, i=1, self%count)], set%is_locked))
-      set%is_examined = .not. self%is_assumed
+      set%is_examined = set%is_examined .or. .not. self%is_assumed
     end associate
   end subroutine choose_set
 
@@ -339,15 +353,11 @@ contains
     class(held_rows_t), intent(inout) :: self
     integer, intent(in) :: which(:)   !! joints that hold
     real(wp), dimension(size(which), size(which)) :: inverse, w
-    real(wp) :: scale(size(which))
     integer :: j
 
     if (self%is_examined .or. self%is_assumed) return
     self%is_examined = .true.
-    scale = [(sqrt(max(self%weight(which(j), which(j)), tiny(scale))), j=1, size(which))]
-    do j = 1, size(which)
-      w(:, j) = self%weight(which, which(j)) / (scale * scale(j))
-    end do
+    w = self%unit_weights(which)
     inverse = pseudo_inverse(w, null_tolerance)
     do j = 1, size(which)
       if (1 - dot_product(inverse(j, :), w(:, j)) > sqrt(null_tolerance)) self%is_shared(which(j)) = .true.
