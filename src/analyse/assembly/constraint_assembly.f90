@@ -4,7 +4,7 @@ module nocdyn_constraint_assembly
   use nocdyn_element_groups, only: bodies_of, body_index_t
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
-  use nocdyn_joint_assembly, only: engagement_at, sliding_capacity
+  use nocdyn_joint_assembly, only: engagement_at, find_rest_range
   use nocdyn_kinds, only: wp
   use nocdyn_motion_assembly, only: holds_still
   use nocdyn_text, only: string_t
@@ -205,21 +205,13 @@ contains
   subroutine limit_of_lock(group, t, least, most)
     type(group_t), intent(in) :: group
     real(wp), intent(in) :: t   !! [s]
-    real(wp), intent(inout) :: least, most
+    real(wp), intent(inout) :: least, most   !! unchanged for other rows, which have no limits
 
-    select case (group%kind)
-    case ('clutch')
-      if (group%text('kind') == 'dog') return
-      most = engagement_at(group, t) * group%number('static_capacity', absent=sliding_capacity(group))
-      least = -most
-    case ('freewheel')
-      most = group%number('capacity', absent=most)
-      least = 0.0_wp
-      if (group%text('direction') == 'forward') return
-      least = -most
-      most = 0.0_wp
-    case default   ! others have no limits
-    end select
+    if (all(group%kind /= [character(len=9) :: 'clutch', 'freewheel'])) return
+    call find_rest_range(group, least, most)
+    if (group%kind /= 'clutch' .or. most >= huge(most)) return
+    most = engagement_at(group, t) * most
+    least = -most
   end subroutine limit_of_lock
 
   !> The torques of members that have columns of their own.

@@ -1,6 +1,7 @@
 !> Notes on joints and drives that do nothing in a run, perhaps by mistake.
 module nocdyn_joint_notes
   use nocdyn_input, only: group_t, input_t
+  use nocdyn_joint_assembly, only: engagement_at
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: append, quoted, string_t, to_text
   implicit none (type, external)
@@ -35,30 +36,16 @@ contains
   end subroutine note_idle_joints
 
   !> Whether the engagement of a clutch is above 0 for some time of a run.
-  pure logical function engages(group, t_start, t_end)
+  logical function engages(group, t_start, t_end)
     type(group_t), intent(in) :: group   !! &clutch
     real(wp), intent(in) :: t_start, t_end   !! [s]
-    real(wp), allocatable :: level(:), time(:)
+    real(wp), allocatable :: looked_at(:), times(:)
     integer :: i
-    logical :: is_table
 
-    engages = .true.
-    is_table = group%has_value('table_time')
-    if (.not. (is_table .or. group%has_value('times'))) return
-    if (is_table) then   ! with the first level before the first time
-      time = [-huge(t_start), group%numbers('table_time'), huge(t_start)]
-      level = group%numbers('table_level')
-      level = [level(1), level, level(size(level))]
-    else
-      time = [-huge(t_start), group%numbers('times'), huge(t_start)]
-      level = [0.0_wp, group%numbers('levels')]
-    end if
-    do i = 1, size(time) - 1
-      if (time(i) >= t_end .or. time(i + 1) <= t_start) cycle
-      if (level(i) > 0) return
-      if (is_table .and. level(min(i + 1, size(level))) > 0) return
-    end do
-    engages = .false.
+    allocate (times, source=[group%numbers('times'), group%numbers('table_time')])
+    looked_at = [t_start, pack(times, times > t_start .and. times < t_end)]
+    if (group%has_value('table_time')) looked_at = [looked_at, t_end]   ! a table rises to it
+    engages = any([(engagement_at(group, looked_at(i)) > 0, i=1, size(looked_at))])
   end function engages
 
   !> Whether a drive has keys of a motion.

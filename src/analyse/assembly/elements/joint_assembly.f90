@@ -12,7 +12,7 @@ module nocdyn_joint_assembly
   implicit none (type, external)
   private
 
-  public :: clutch_form, add_clutch_form, add_freewheels, add_bearings, check_joints, engagement_at, sliding_capacity
+  public :: clutch_form, add_clutch_form, add_freewheels, add_bearings, check_joints, engagement_at, find_rest_range
 
   integer, parameter :: engaged = 1, with_engagement = 2
   integer, parameter :: forms_of_friction = 2   ! as many follow of dog clutches, and then of friction by a table
@@ -104,18 +104,50 @@ contains
     integer, intent(in) :: form
     integer :: i
 
-    allocate (ranges%most(groups%lanes, size(groups%indices)), source=huge(1.0_wp))
+    ranges = rest_ranges(groups)
     allocate (ranges%sliding_most, source=0.0_wp * ranges%most)
     if (form <= forms_of_friction .or. form > 2 * forms_of_friction) then
       do i = 1, size(groups%indices)
         ranges%sliding_most(:, i) = sliding_capacity(groups%input%groups(groups%indices(i)))
       end do
-      ranges%most = groups%values('static_capacity', absent=-1.0_wp)
-      where (ranges%most < 0) ranges%most = ranges%sliding_most
     end if
     ranges%sliding_least = -ranges%sliding_most
-    ranges%least = -ranges%most
   end function clutch_ranges
+
+  !> The ranges at rest of joints of one kind; those of slip are not allocated.
+  type(joint_ranges_t) function rest_ranges(groups) result(ranges)
+    type(element_groups_t), intent(in) :: groups
+    real(wp) :: least, most
+    integer :: i
+
+    allocate (ranges%least(groups%lanes, size(groups%indices)), ranges%most(groups%lanes, size(groups%indices)))
+    do i = 1, size(groups%indices)
+      call find_rest_range(groups%input%groups(groups%indices(i)), least, most)
+      ranges%least(:, i) = least
+      ranges%most(:, i) = most
+    end do
+  end function rest_ranges
+
+  !> The torques on its second body that a fully engaged clutch or a freewheel holds [N m]. Forward, the second body of a freewheel
+  !> is pushed, never pulled back.
+  pure subroutine find_rest_range(group, least, most)
+    type(group_t), intent(in) :: group
+    real(wp), intent(out) :: least, most   !! huge without a bound
+
+    most = huge(most)
+    if (group%kind == 'freewheel') then
+      most = group%number('capacity', absent=most)
+    else if (group%text('kind') /= 'dog') then
+      most = group%number('static_capacity', absent=sliding_capacity(group))
+    end if
+    least = -most
+    if (group%kind /= 'freewheel') return
+    if (group%text('direction') == 'forward') then
+      least = 0.0_wp
+    else
+      most = 0.0_wp
+    end if
+  end subroutine find_rest_range
 
   !> The friction of a clutch that begins to slip [N m].
   pure real(wp) function sliding_capacity(group)
@@ -158,25 +190,16 @@ contains
     level = values(0)
   end function engagement_at
 
-  !> Adds the bank of the freewheels: forward, the driven body is pushed, never pulled back.
+  !> Adds the bank of the freewheels.
   subroutine add_freewheels(groups, banks)
     type(element_groups_t), intent(in) :: groups
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(joint_ranges_t) :: ranges
-    integer :: i
 
     if (size(groups%indices) == 0) return
-    ranges%most = groups%values('capacity', absent=huge(1.0_wp))
-    ranges%least = 0.0_wp * groups%values('capacity')
+    ranges = rest_ranges(groups)
     ranges%sliding_most = merge(0.0_wp, ranges%most, ranges%most >= huge(1.0_wp))
-    ranges%sliding_least = ranges%least
-    do i = 1, size(groups%indices)
-      if (groups%input%groups(groups%indices(i))%text('direction') == 'forward') cycle
-      ranges%least(:, i) = -ranges%most(:, i)
-      ranges%sliding_least(:, i) = -ranges%sliding_most(:, i)
-      ranges%most(:, i) = 0.0_wp
-      ranges%sliding_most(:, i) = 0.0_wp
-    end do
+    ranges%sliding_least = merge(0.0_wp, ranges%least, ranges%least <= -huge(1.0_wp))
     call append_bank(banks, new_friction_joints(role_freewheel, groups%names, groups%bodies('bodies', 1), &
                                                 groups%bodies('bodies', 2), ranges))
   end subroutine add_freewheels
