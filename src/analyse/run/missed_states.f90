@@ -1,7 +1,7 @@
 !> A hint after a run: the machine ends in a slow steady state, as a motor does that cannot start its load, and could run faster.
 module nocdyn_missed_states
   use nocdyn_balance_texts, only: describe_state_speeds
-  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability
+  use nocdyn_equilibrium, only: distances, equilibrium_t, find_equilibria, find_stability
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
@@ -29,7 +29,7 @@ contains
     type(error_t), allocatable :: error
     real(wp), allocatable :: distance(:), energy(:)
     character(len=:), allocatable :: here, there
-    integer :: fastest, i, nearest
+    integer :: fastest, nearest
 
     if (machine%bodies > most_bodies) return
     call find_equilibria(machine, t_end, formulation, equilibria, remarks, error)
@@ -38,12 +38,8 @@ contains
     call find_stability(formulation, t_end, equilibria)
     equilibria = pack(equilibria, equilibria%stability == 'stable')
     if (size(equilibria) < 2) return
-    allocate (distance(size(equilibria)), energy(size(equilibria)))
-    do i = 1, size(equilibria)
-      call formulation%set_state(equilibria(i)%y)
-      distance(i) = machine%kinetic_energy(1, formulation%omega(1, 1:) - omega)
-      energy(i) = machine%kinetic_energy(1, formulation%omega(1, 1:))
-    end do
+    allocate (distance, source=distances(formulation, equilibria, omega))
+    allocate (energy, source=distances(formulation, equilibria, 0.0_wp * omega))
     nearest = minloc(distance, dim=1)
     fastest = maxloc(energy, dim=1)
     if (nearest == fastest .or. distance(nearest) > near * distance(fastest)) return

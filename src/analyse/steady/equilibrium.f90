@@ -19,7 +19,7 @@ module nocdyn_equilibrium
   implicit none (type, external)
   private
 
-  public :: find_equilibria, find_stability, mean_formulation, nearest_equilibrium
+  public :: distances, find_equilibria, find_stability, mean_formulation, nearest_equilibrium
 
   real(wp), parameter, public :: t_infinity = 1.0e30_wp   !! a time after all transients of the excitations [s]
 
@@ -124,6 +124,7 @@ contains
     type(error_t), allocatable :: error
     type(steady_losses_t) :: losses
     type(string_t), allocatable :: notes(:)   ! those of the state without losses stand
+    real(wp) :: omega(formulation%machine%bodies)
     integer :: i
 
     is_solved = .true.
@@ -138,29 +139,31 @@ contains
       allocate (notes(0))
       call find_balances(formulation, t, found, notes, error)
       if (allocated(error)) exit
-      equilibrium%y = found(nearest_state(formulation, found, equilibrium%y))%y
+      call formulation%set_state(equilibrium%y)
+      omega = formulation%omega(1, 1:)
+      equilibrium%y = found(minloc(distances(formulation, found, omega), dim=1))%y
       equilibrium%losses = losses%moment
       deallocate (notes)
     end do
     is_solved = .false.
   end subroutine balance_losses
 
-  !> The steady state with the least kinetic energy relative to a state.
-  integer function nearest_state(formulation, equilibria, y) result(nearest)
+  !> The kinetic energies of steady states relative to given speeds [J], [equilibria].
+  function distances(formulation, equilibria, omega, counts)
     class(formulation_t), intent(inout) :: formulation
     type(equilibrium_t), intent(in) :: equilibria(:)
-    real(wp), contiguous, intent(in) :: y(:, :)   !! [1, states]
-    real(wp) :: distance(size(equilibria)), omega(formulation%machine%bodies)
+    real(wp), intent(in) :: omega(:)             !! [rad/s], [bodies]
+    logical, intent(in), optional :: counts(:)   !! bodies whose speeds count, [bodies]; absent: all
+    real(wp) :: distances(size(equilibria)), difference(size(omega))
     integer :: i
 
-    call formulation%set_state(y)
-    omega = formulation%omega(1, 1:)
     do i = 1, size(equilibria)
       call formulation%set_state(equilibria(i)%y)
-      distance(i) = formulation%machine%kinetic_energy(1, formulation%omega(1, 1:) - omega)
+      difference = formulation%omega(1, 1:) - omega
+      if (present(counts)) difference = merge(difference, 0.0_wp, counts)
+      distances(i) = formulation%machine%kinetic_energy(1, difference)
     end do
-    nearest = minloc(distance, dim=1)
-  end function nearest_state
+  end function distances
 
   !> Drops states in which joints that are taken as locked would slip.
   subroutine drop_overloaded(formulation, t, equilibria, notes, error)
@@ -360,25 +363,18 @@ contains
     class(formulation_t), intent(inout) :: formulation
     type(equilibrium_t), intent(in) :: equilibria(:)
     logical, intent(in), optional :: counts(:)   !! bodies whose start speeds count, [bodies]; absent: all
-    real(wp) :: distances(size(equilibria)), start(formulation%machine%bodies)
-    logical :: is_start(formulation%machine%bodies)
-    logical :: is_candidate(size(equilibria))
-    integer :: i
+    real(wp) :: distance(size(equilibria)), start(formulation%machine%bodies)
+    logical :: is_candidate(size(equilibria)), is_start(formulation%machine%bodies)
 
     call formulation%set_state(formulation%start())
     start = formulation%omega(1, 1:)
     is_start = .true.
     if (present(counts)) is_start = counts
-    do i = 1, size(equilibria)
-      call formulation%set_state(equilibria(i)%y)
-      associate (machine => formulation%machine, omega => formulation%omega(1, 1:))
-        distances(i) = machine%kinetic_energy(1, merge(omega - start, 0.0_wp, is_start))
-        if (.not. any(is_start)) distances(i) = -machine%kinetic_energy(1, omega)
-      end associate
-    end do
+    distance = distances(formulation, equilibria, start, is_start)
+    if (.not. any(is_start)) distance = -distances(formulation, equilibria, 0.0_wp * start)
     is_candidate = equilibria%stability == 'stable'
     if (.not. any(is_candidate)) is_candidate = equilibria%stability /= 'unstable'
-    nearest = minloc(distances, dim=1, mask=is_candidate .or. .not. any(is_candidate))
+    nearest = minloc(distance, dim=1, mask=is_candidate .or. .not. any(is_candidate))
   end function nearest_equilibrium
 
 end module nocdyn_equilibrium

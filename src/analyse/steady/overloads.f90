@@ -23,6 +23,9 @@ contains
     integer :: row
 
     text = ''
+    associate (constraints => formulation%machine%constraints)
+      if (all(constraints%least <= -huge(lambda) .and. constraints%most >= huge(lambda))) return
+    end associate
     call formulation%observe([t], y)
     call formulation%reactions(1, lambda)
     row = overloaded_row(formulation%machine%constraints, lambda)

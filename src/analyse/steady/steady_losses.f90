@@ -144,7 +144,7 @@ contains
     end do
   end subroutine tell_losses
 
-  !> "'worm' and 'stage'": the teeth with losses; '' if there are none.
+  !> "'worm', 'stage'": the teeth with losses; '' if there are none.
   subroutine describe_losses(machine, text)
     type(machine_t), intent(in) :: machine
     character(len=:), allocatable, intent(out) :: text
