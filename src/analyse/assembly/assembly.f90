@@ -30,8 +30,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer, intent(in), optional :: lanes   !! 1 if absent
 
-    if (present(lanes)) machine%lanes = lanes
-    call build_machine(input, machine, error)
+    call build_machine(input, machine, error, lanes)
     if (.not. allocated(error)) call start_machine(input, machine, error)
     if (.not. (allocated(error) .or. input%takes_means)) call note_idle_joints(input, machine%start_notes)
   end subroutine assemble_machine
@@ -42,7 +41,6 @@ contains
     real(wp), intent(in) :: t               !! the time at which clutches are engaged or not [s]
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
-    type(machine_t), allocatable :: trial
     logical :: is_changed
     integer :: trials
 
@@ -51,22 +49,19 @@ contains
     if (allocated(input%overruns)) deallocate (input%overruns)
     allocate (input%overruns(size(input%groups)), source=.false.)
     do trials = 0, 2 * size(input%groups_named('freewheel'))
-      allocate (trial)
-      call build_machine(input, trial, error)
+      call build_machine(input, machine, error)
       if (allocated(error)) return
-      if (trial%coordinates%freedoms == 0) then
-        call raise(error, exit_failed, input%shown_file() // ': ' // trial%simplifications(1)%text // ', so that nothing moves')
+      if (machine%coordinates%freedoms == 0) then
+        call raise(error, exit_failed, input%shown_file() // ': ' // machine%simplifications(1)%text // ', so that nothing moves')
         return
       end if
-      call choose_overruns(input, trial, is_changed)
+      call choose_overruns(input, machine, is_changed)
       if (.not. is_changed) exit
-      deallocate (trial)
     end do
     if (is_changed) then
       call raise(error, exit_failed, input%shown_file() // ': no steady state was found in which each freewheel ' // &
                  'holds or overruns')
     else
-      machine = trial
       call start_machine(input, machine, error)
     end if
   end subroutine assemble_steady_machine

@@ -35,13 +35,15 @@ module nocdyn_machine_parts
 contains
 
   !> Builds the machine of a checked input, at the start that the input gives. Errors are those of `assemble_machine`.
-  subroutine build_machine(input, machine, error)
+  subroutine build_machine(input, machine, error, lanes)
     type(input_t), target, intent(in) :: input
-    type(machine_t), intent(inout) :: machine   !! with its number of lanes
+    type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
+    integer, intent(in), optional :: lanes   !! 1 if absent
     type(body_index_t), target :: body_index
     type(shaft_set_t) :: shafts
 
+    if (present(lanes)) machine%lanes = lanes
     call set_bodies(input, machine)
     body_index = new_body_index(machine%names)
     call assemble_constraints(input, body_index, machine%lanes, machine%constraints, error)

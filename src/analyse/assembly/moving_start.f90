@@ -119,7 +119,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: change(:), equations(:, :), missing(:)
     integer, allocatable :: given(:)
-    integer :: b
+    integer :: b, row
 
     given = pack([(b, b=1, size(is_given))], is_given)
     allocate (equations(size(start%demand) + size(given), size(start%speed)), missing(size(start%demand) + size(given)))
@@ -136,20 +136,20 @@ contains
       return
     end if
     start%speed = start%speed - change
-    call refuse_speeds(input, group_of(input, machine, start, maxloc(residuals(start), dim=1)), start, error)
+    row = maxloc(residuals(start), dim=1)
+    call refuse_speeds(input, group_of(input, machine, start, row), row, start, error)
   end subroutine follow_rows
 
   !> The message on the row that the start speeds violate most; speeds of a drive are in the unit in which it is written.
-  subroutine refuse_speeds(input, group, start, error)
+  subroutine refuse_speeds(input, group, row, start, error)
     type(input_t), intent(in) :: input
-    integer, intent(in) :: group   !! of the row
+    integer, intent(in) :: group, row   !! group of the row
     type(moving_start_t), intent(in) :: start
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: text
     real(wp) :: difference
-    integer :: row, unit
+    integer :: unit
 
-    row = maxloc(residuals(start), dim=1)
     difference = dot_product(start%a(row, :), start%speed) - start%demand(row)
     if (start%motions%driver(row) == 0) then
       unit = max(unit_of(input%groups(group), 'speed'), unit_of(input%groups(group), 'table_speed'), &
