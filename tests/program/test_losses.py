@@ -364,3 +364,15 @@ def test_vibrations_leave_losses_out_and_say_so(nocdyn):
         assert words in outcome.stdout.replace("'", "")
         notes = json.loads((nocdyn.folder / f"out/{command}.json").read_text())["notes"]
         assert words.removeprefix("note: ") in [note.replace("'", "") for note in notes]
+
+
+def test_the_note_on_redundant_gears_says_that_their_losses_count(nocdyn):
+    gears = "".join(f"&gear name = '{name}' bodies = 'one', 'two' teeth = 20, 30 {{}} /\n" for name in ("first", "second"))
+    for losses, words in (
+        ("efficiency = 0.9", "share is reported, and its losses are in the motion\n"),
+        ("", "share is reported\n"),
+    ):
+        text = body("one", 1) + body("two", 1) + gears.format(losses, "") + "&run t_end = 1 /\n"
+        outcome = nocdyn("check", nocdyn.write("pair.nml", text))
+        assert outcome.returncode == 0, outcome.stderr
+        assert words in outcome.stdout
