@@ -128,8 +128,8 @@ contains
     end do
   end function rest_ranges
 
-  !> The torques on its second body that a fully engaged clutch or a freewheel holds [N m]. Forward, the second body of a freewheel
-  !> is pushed, never pulled back.
+  !> The torques on its second body that a fully engaged clutch or a freewheel holds [N m]. Forward, a freewheel pushes this body
+  !> and never pulls it back.
   pure subroutine find_rest_range(group, least, most)
     type(group_t), intent(in) :: group
     real(wp), intent(out) :: least, most   !! huge without a bound
