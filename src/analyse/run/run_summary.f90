@@ -2,6 +2,7 @@
 module nocdyn_run_summary
   use nocdyn_energy_balance, only: energy_balance_t, put_energy_balance
   use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_fatigue_report, only: put_fatigue
   use nocdyn_finite, only: is_finite
   use nocdyn_input, only: input_t
   use nocdyn_joint_events, only: named_event_t, put_joint_events
@@ -9,6 +10,7 @@ module nocdyn_run_summary
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: constraint_count, machine_notes, named_coordinates
+  use nocdyn_run_fatigue, only: run_fatigue_t
   use nocdyn_run_limits, only: put_run_limits, run_limit_t
   use nocdyn_solver_status, only: max_switch_times, solver_status_t
   use nocdyn_run_settings, only: put_settings
@@ -58,6 +60,7 @@ module nocdyn_run_summary
     type(solver_status_t) :: solver_status
     type(energy_balance_t), allocatable :: energy_balance  !! from the start to the last row; not allocated if there are no rows
     type(run_limit_t), allocatable :: limits(:)     !! by &limit; not allocated before the first row
+    type(run_fatigue_t) :: fatigue                  !! by &fatigue; no items before the first row
     real(wp) :: wall_time = 0.0_wp                  !! of integration and writing of the trajectory [s]
     type(named_event_t), allocatable :: events(:)   !! of joints; not allocated if there are no joints
   end type run_summary_t
@@ -182,6 +185,7 @@ contains
     call put_machine(json, summary)
     call put_settings(json, input%single('run'))
     if (allocated(summary%limits)) call put_run_limits(json, summary%limits)
+    if (allocated(summary%fatigue%items)) call put_fatigue(json, summary%fatigue)
     call put_counts(json, summary)
     call put_method(json, summary)
     if (allocated(summary%energy_balance)) call put_energy_balance(json, summary%energy_balance)

@@ -2,6 +2,7 @@
 module nocdyn_run_table
   use nocdyn_column_names, only: quantity_of
   use nocdyn_energy_balance, only: append_energy_balance
+  use nocdyn_fatigue_report, only: fatigue_text
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_run_limits, only: run_limits_text
@@ -36,6 +37,7 @@ contains
     call append_columns(report, summary, left)
     call report%append(text)
     if (allocated(summary%limits)) call report%append(run_limits_text(summary%limits))
+    if (allocated(summary%fatigue%items)) call report%append(fatigue_text(summary%fatigue))
     text = report%text()
   end function summary_table
 

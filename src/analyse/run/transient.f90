@@ -15,6 +15,7 @@ module nocdyn_transient
   use nocdyn_missed_states, only: note_missed_state
   use nocdyn_output_times, only: check_output_times, output_note, output_times
   use nocdyn_output_units, only: output_units
+  use nocdyn_run_fatigue, only: new_run_fatigue, run_fatigue_t
   use nocdyn_run_limits, only: check_run_limits
   use nocdyn_run_settings, only: check_size, choose_settings
   use nocdyn_run_summary, only: check_energy_balance, check_extremes, describe_machine, extremes_t, run_summary_t, &
@@ -74,6 +75,7 @@ module nocdyn_transient
     real(wp), allocatable :: row(:)          !! [columns]
     integer, allocatable :: chosen(:)        !! columns that are written
     real(wp), allocatable :: written(:)      !! their values in the row
+    type(run_fatigue_t) :: fatigue           !! of signals, which are tracked after the columns
     type(vibration_t) :: vibration           !! its energy in the rows
     real(wp) :: last_time = 0.0_wp           !! of the rows [s]
     real(wp), allocatable :: last_state(:)   !! at that time, [states + quadratures]
@@ -83,7 +85,7 @@ module nocdyn_transient
     logical :: has_ranges = .false.          !! whether the columns were evaluated between the rows
     class(run_output_t), pointer :: output => null()
   contains
-    procedure :: on_output, wants_stop, tracked_values, on_extremes, on_shift
+    procedure :: on_output, wants_stop, tracked_values, on_extremes, on_turn, least_range, on_shift
   end type run_observer_t
 
 contains
@@ -164,7 +166,9 @@ contains
     end if
     allocate (observer%row(size(observer%table%labels)))
     allocate (observer%last_state(formulation%states + formulation%quadratures), source=0.0_wp)
-    observer%tracked = size(observer%row)
+    call new_run_fatigue(input, formulation%machine, observer%table%labels, observer%fatigue)
+    observer%turning = size(observer%fatigue%counters)
+    observer%tracked = size(observer%row) + observer%turning
     call start_extremes(observer%extremes, size(observer%row), observer%tracked_from)
     call choose_columns(input, observer%table%labels, observer%chosen, error)
     if (.not. allocated(error)) allocate (observer%written(size(observer%chosen)))
@@ -211,6 +215,8 @@ contains
     type(run_summary_t), intent(inout) :: summary
 
     summary%extremes = observer%extremes
+    call observer%fatigue%finish()
+    summary%fatigue = observer%fatigue
     call check_run_limits(input, summary%labels, summary%extremes%lowest, summary%extremes%highest, summary%limits)
     if (.not. allocated(error)) call check_extremes(summary%extremes, summary%labels, error)
     call check_energy_balance(summary%extremes, observer%vibration%largest, summary%notes)
@@ -260,12 +266,34 @@ contains
     integer, intent(in) :: lane
     real(wp), intent(in) :: t                  !! [s]
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
-    real(wp), contiguous, intent(inout) :: values(:)   !! [columns]
+    real(wp), contiguous, intent(inout) :: values(:)   !! [columns + signals]
 
     if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
-    call self%table%fill(t, y, values)
+    associate (columns => size(self%row))
+      call self%table%fill(t, y, values(:columns))
+      call self%fatigue%evaluate(self%table%columns%formulation%machine, values(:columns), values(columns + 1:))
+    end associate
     self%has_ranges = .true.
   end subroutine tracked_values
+
+  !> The next value of a signal.
+  subroutine on_turn(self, lane, function, value)
+    class(run_observer_t), intent(inout) :: self
+    integer, intent(in) :: lane, function
+    real(wp), intent(in) :: value
+
+    if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
+    call self%fatigue%counters(function - size(self%row))%add(value)
+  end subroutine on_turn
+
+  !> The ranges of a signal that do not count.
+  real(wp) function least_range(self, lane, function)
+    class(run_observer_t), intent(in) :: self
+    integer, intent(in) :: lane, function
+
+    if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
+    least_range = self%fatigue%counters(function - size(self%row))%hysteresis()
+  end function least_range
 
   subroutine on_shift(self, lane, shift)
     class(run_observer_t), intent(inout) :: self

@@ -1,8 +1,9 @@
-!> The files that a run leaves: trajectory.csv or trajectory.nc, summary.json and input.nml.
+!> The files that a run leaves: trajectory.csv or trajectory.nc, summary.json, input.nml, and cycles.csv with &fatigue.
 module nocdyn_run_files
   use nocdyn_console, only: new_status_line, status_line_t
   use nocdyn_disk_room, only: check_room
   use nocdyn_errors, only: error_t
+  use nocdyn_fatigue_report, only: put_cycles_csv
   use nocdyn_input, only: input_t
   use nocdyn_input_text, only: input_text
   use nocdyn_kinds, only: wp
@@ -24,7 +25,7 @@ module nocdyn_run_files
   !> Names of the rows: of a run that is done, of one that is not; as CSV, as NetCDF.
   character(len=22), parameter :: trajectory_names(2, 2) = reshape([character(len=22) :: 'trajectory.csv', &
     'trajectory.partial.csv', 'trajectory.nc', 'trajectory.partial.nc'], [2, 2])
-  character(len=*), parameter, public :: summary_file = 'summary.json', input_file = 'input.nml'
+  character(len=*), parameter, public :: summary_file = 'summary.json', input_file = 'input.nml', cycles_file = 'cycles.csv'
 
   !> Writes the rows and shows the progress while the run is integrated.
   type, extends(run_output_t) :: trajectory_writer_t
@@ -95,43 +96,50 @@ contains
     call writer%line%clear()
   end subroutine run_to_files
 
-  !> Gives the three files their names once all are written: if the disk is full, the results of an earlier run stay.
+  !> Gives the files their names once all are written: if the disk is full, the results of an earlier run stay.
   subroutine write_results(input, summary, writer, error)
     type(input_t), intent(in) :: input
     type(run_summary_t), intent(in) :: summary
     type(trajectory_writer_t), intent(inout) :: writer
     type(error_t), allocatable, intent(out) :: error
-    type(output_file_t) :: input_copy, report
+    type(output_file_t) :: cycles, input_copy, report
 
     call input_copy%open(writer%folder, input_file)
     call input_copy%put(input_text(input))
+    if (size(summary%fatigue%items) > 0) then
+      call cycles%open(writer%folder, cycles_file)
+      call put_cycles_csv(summary%fatigue, cycles)
+    end if
     call report%open(writer%folder, summary_file)
     call report%put(summary_json(input, summary))
     call writer%file%complete(trim(trajectory_names(1, writer%form)), error)
     if (.not. allocated(error)) call input_copy%complete(input_file, error)
+    if (.not. allocated(error) .and. size(summary%fatigue%items) > 0) call cycles%complete(cycles_file, error)
     if (.not. allocated(error)) call report%complete(summary_file, error)
-    if (.not. allocated(error)) call name_files(writer, summary%status == 'done', input_copy, report, error)
+    if (.not. allocated(error)) call name_files(writer, summary, input_copy, cycles, report, error)
     if (.not. allocated(error)) return
     call writer%file%discard()
     call input_copy%discard()
+    call cycles%discard()
     call report%discard()
   end subroutine write_results
 
   !> Removes the trajectories of an earlier run under other names. summary.json goes first and comes last: without it there are no
   !> results, if a file in between cannot take its name.
-  subroutine name_files(writer, is_done, input_copy, report, error)
+  subroutine name_files(writer, summary, input_copy, cycles, report, error)
     type(trajectory_writer_t), intent(inout) :: writer
-    logical, intent(in) :: is_done   !! whether the run has reached its end
-    type(output_file_t), intent(inout) :: input_copy, report
+    type(run_summary_t), intent(in) :: summary
+    type(output_file_t), intent(inout) :: input_copy, cycles, report
     type(error_t), allocatable, intent(out) :: error
-
     character(len=:), allocatable :: name
 
-    name = trim(trajectory_names(merge(1, 2, is_done), writer%form))
+    name = trim(trajectory_names(merge(1, 2, summary%status == 'done'), writer%form))
     call remove_file(writer%folder // '/' // summary_file)
     call remove_trajectories(writer%folder, name)
+    call remove_file(writer%folder // '/' // cycles_file)
     call writer%file%finish(name, error)
     if (.not. allocated(error)) call input_copy%finish(input_file, error)
+    if (.not. allocated(error) .and. size(summary%fatigue%items) > 0) call cycles%finish(cycles_file, error)
     if (.not. allocated(error)) call report%finish(summary_file, error)
   end subroutine name_files
 

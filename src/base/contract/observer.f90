@@ -17,6 +17,7 @@ module nocdyn_observer
   type, public :: observer_t
     integer, allocatable :: directions(:)   !! event_... of each event function; not allocated: there are none
     integer :: tracked = 0                  !! number of tracked functions
+    integer :: turning = 0                  !! number of the last ones of them whose turning points `on_turn` receives
     real(wp) :: tracked_from = -huge(1.0_wp)   !! time from which their extremes are taken [s]
     logical :: wants_steps = .false.        !! whether `on_steps` is called
     logical :: takes_shifts = .false.       !! whether `on_shift` is overridden; a system shifts no states without
@@ -29,6 +30,7 @@ module nocdyn_observer
     procedure :: on_event
     procedure :: tracked_values
     procedure :: on_extremes
+    procedure :: on_turn, least_range
     procedure :: on_steps
     procedure :: on_shift
   end type observer_t
@@ -112,6 +114,25 @@ contains
 
     error stop 'nocdyn_observer: an observer with tracked functions overrides on_extremes'
   end subroutine on_extremes
+
+  !> The next value of a tracked function, from `tracked_from` on: those at the start, at the ends of the steps, before and after
+  !> a jump, and all extremes between them, but not those of ranges below `least_range`.
+  subroutine on_turn(self, lane, function, value)
+    class(observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    integer, intent(in) :: function   !! number among the tracked ones
+    real(wp), intent(in) :: value
+
+    error stop 'nocdyn_observer: an observer of turning points overrides on_turn'
+  end subroutine on_turn
+
+  !> The range of a tracked function that does not count, 0 by default.
+  real(wp) function least_range(self, lane, function)
+    class(observer_t), intent(in) :: self
+    integer, intent(in) :: lane, function
+
+    least_range = 0.0_wp
+  end function least_range
 
   !> The last steps of the lanes, after their output times and events: y + sum over p of c(:, :, p) (scale theta)^p.
   subroutine on_steps(self, steps, y, y_new, c)

@@ -8,7 +8,7 @@ module nocdyn_chebyshev
   implicit none (type, external)
   private
 
-  public :: new_interpolation, raise_to_maximum, find_last_exit, time_at
+  public :: new_interpolation, raise_to_maximum, find_last_exit, list_extremes, time_at
 
   integer, parameter, public :: max_degree = 39
   integer, parameter :: max_halvings = 52           !! of [-1, 1], until no number is left inside a part
@@ -151,6 +151,49 @@ contains
       call add_part(parts, middle + 0.5_wp * half, 0.5_wp * half)
     end do
   end subroutine find_last_exit
+
+  !> The values of the extremes between the ends, ascending with their positions. Parts are left out in which the polynomial
+  !> changes by less than a range: their extremes do not count.
+  pure subroutine list_extremes(rule, values, least, extremes, count)
+    type(interpolation_t), intent(in) :: rule
+    real(wp), intent(in) :: values(0:rule%degree)   !! at the nodes
+    real(wp), intent(in) :: least                   !! that range
+    real(wp), intent(out) :: extremes(max_degree)
+    integer, intent(out) :: count
+    real(wp), dimension(0:max_degree) :: whole, part_values, c, slopes, bends
+    real(wp) :: middle, half, x
+    type(parts_t) :: parts
+    logical, dimension(2) :: has_none, has_one   ! of maxima, of minima
+    integer :: i, part, sign
+
+    count = 0
+    call find_series(rule, values, whole)
+    call add_part(parts, 0.0_wp, 1.0_wp)
+    do part = 1, max_parts
+      if (parts%count == 0 .or. count == max_degree) exit
+      call take_part(rule, values, whole, parts, middle, half, part_values, c)
+      if (.not. 2 * sum(abs(c(1:rule%degree))) > least) cycle
+      call differentiate(rule%degree, c, slopes)
+      call differentiate(rule%degree, slopes, bends)
+      do i = 1, 2
+        sign = 3 - 2 * i
+        call count_maxima(rule%degree, sign * slopes(:rule%degree), sign * bends(:rule%degree), has_none(i), has_one(i))
+      end do
+      if (all(has_none)) cycle
+      x = 0.0_wp
+      i = findloc(has_one .and. .not. has_none, .true., dim=1)
+      sign = 3 - 2 * i
+      if (i > 0) call find_turn(rule, sign * part_values(:rule%degree), sign * slopes(:rule%degree), &
+                                sign * bends(:rule%degree), x)
+      if (i > 0 .or. half <= least_half) then
+        count = count + 1
+        extremes(count) = value(rule%degree, c, x)
+      else
+        call add_part(parts, middle + 0.5_wp * half, 0.5_wp * half)
+        call add_part(parts, middle - 0.5_wp * half, 0.5_wp * half)
+      end if
+    end do
+  end subroutine list_extremes
 
   pure subroutine add_part(parts, middle, half)
     type(parts_t), intent(inout) :: parts

@@ -4,7 +4,7 @@
 !> output has coefficients: a linear function of the state is represented exactly. The extremes of the polynomial are found to
 !> machine precision wherever it can exceed those so far.
 module nocdyn_extremes
-  use nocdyn_chebyshev, only: interpolation_t, max_degree, new_interpolation, raise_to_maximum, time_at
+  use nocdyn_chebyshev, only: interpolation_t, list_extremes, max_degree, new_interpolation, raise_to_maximum, time_at
   use nocdyn_dense_output, only: dense_output_t, sample
   use nocdyn_kinds, only: wp
   use nocdyn_observer, only: observer_t, ranges_t
@@ -87,7 +87,20 @@ contains
     if (.not. extremes%have_begun(lane)) return
     extremes%y(:) = attempt%y(lane, :attempt%components)
     call observer%tracked_values(lane, attempt%t(lane), extremes%y, extremes%last(:, lane))
+    call tell_values(observer, lane, extremes%last(:, lane))
   end subroutine restart_extremes
+
+  !> Tells the present values of the functions whose turning points are wanted.
+  subroutine tell_values(observer, lane, values)
+    class(observer_t), intent(inout) :: observer
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: values(:)   !! [functions]
+    integer :: function
+
+    do function = observer%tracked - observer%turning + 1, observer%tracked
+      call observer%on_turn(lane, function, values(function))
+    end do
+  end subroutine tell_values
 
   !> Widens the ranges of a lane by its last step, from `tracked_from` up to t_end. If the step ends at a crossing, the last node
   !> is just before it: a function may jump there, which would spoil the polynomial.
@@ -115,7 +128,27 @@ contains
     end do
     extremes%last(:, dense%lane) = extremes%values(:, last)
     call widen_ranges(extremes%rules(dense%degree), extremes%values(:, :last), extremes%ranges(dense%lane), t_start, t_end)
+    call tell_turns(observer, dense%lane, extremes%rules(dense%degree), extremes%values(:, :last))
   end subroutine update_extremes
+
+  !> Tells the extremes inside of a step and the values at its end.
+  subroutine tell_turns(observer, lane, rule, values_of)
+    class(observer_t), intent(inout) :: observer
+    integer, intent(in) :: lane
+    type(interpolation_t), intent(in) :: rule
+    real(wp), contiguous, intent(in) :: values_of(:, :)   !! [functions, nodes]
+    real(wp) :: turns(max_degree), values(0:max_degree)
+    integer :: function, i, turn_count
+
+    do function = observer%tracked - observer%turning + 1, observer%tracked
+      values(:rule%degree) = values_of(function, :)
+      call list_extremes(rule, values, observer%least_range(lane, function), turns, turn_count)
+      do i = 1, turn_count
+        call observer%on_turn(lane, function, turns(i))
+      end do
+      call observer%on_turn(lane, function, values(rule%degree))
+    end do
+  end subroutine tell_turns
 
   !> Sets the ranges of a lane to the values at a time in its last step.
   subroutine begin(extremes, observer, dense, t)
@@ -127,6 +160,7 @@ contains
     call sample(dense, (t - dense%t) / dense%h, extremes%y)
     call observer%tracked_values(dense%lane, t, extremes%y, extremes%last(:, dense%lane))
     call start_ranges(extremes%ranges(dense%lane), extremes%last(:, dense%lane), t)
+    call tell_values(observer, dense%lane, extremes%last(:, dense%lane))
     extremes%have_begun(dense%lane) = .true.
   end subroutine begin
 

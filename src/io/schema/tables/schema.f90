@@ -10,6 +10,7 @@ module nocdyn_schema
   use nocdyn_schema_joints, only: joint_examples, joint_groups, joint_keys, joint_kinds, joint_relations
   use nocdyn_schema_motions, only: motion_examples, motion_groups, motion_keys, motion_kinds, motion_relations
   use nocdyn_schema_meshes, only: mesh_examples, mesh_groups, mesh_keys, mesh_relations
+  use nocdyn_schema_fatigue, only: fatigue_examples, fatigue_groups, fatigue_keys, fatigue_relations
   use nocdyn_schema_response, only: response_examples, response_groups, response_keys, response_relations
   use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_text, a_word, alias_t, &
     allowed_t, an_integer, any_number, any_times, anything, at_least_once, at_most_once, at_most_one, body_or_ground, &
@@ -48,7 +49,7 @@ module nocdyn_schema
     engine_groups, &
     group_rule_t('run',        in_simulation, exactly_once,  '',         'What is computed, and how.'), &
     group_rule_t('output',     in_simulation, at_most_once,  '',         'What is written, in which form, and where.'), &
-    response_groups, sweep_groups]
+    response_groups, fatigue_groups, sweep_groups]
 
   type(key_rule_t), parameter :: frame_keys(*) = [ &
     key_rule_t('case',       'title',           a_text,         1, '',            "''",        anything, &
@@ -102,14 +103,14 @@ module nocdyn_schema
 
   type(key_rule_t), parameter, public :: key_rules(*) = &
     [frame_keys, coupling_keys, shaft_keys, mesh_keys, constraint_keys, joint_keys, motion_keys, motor_keys, load_keys, &
-     excitation_keys, engine_keys, response_keys, sweep_keys]
+     excitation_keys, engine_keys, response_keys, fatigue_keys, sweep_keys]
 
   type(relation_rule_t), parameter, public :: relation_rules(*) = [ &
     relation_rule_t('run', less_than, 't_start', 't_end'), &
     relation_rule_t('output', at_most_one, 'interval', 'points'), &
     coupling_relations, shaft_relations, mesh_relations, constraint_relations, joint_relations, motion_relations, &
     torque_relations, engine_relations, &
-    response_relations, sweep_relations]
+    response_relations, fatigue_relations, sweep_relations]
 
   type(alias_t), parameter, public :: aliases(*) = sweep_aliases
 
@@ -136,7 +137,7 @@ module nocdyn_schema
     example_t('output',     'interval = 0.01'), &
     coupling_examples, shaft_examples, mesh_examples, constraint_examples, joint_examples, motion_examples, torque_examples, &
     engine_examples, &
-    response_examples, sweep_examples]
+    response_examples, fatigue_examples, sweep_examples]
 
   ! One value for each row of `group_rules`. The rows of `key_rules` of a group are consecutive.
   integer :: rule   ! index of the lists below

@@ -27,7 +27,7 @@ module nocdyn_shafts
   contains
     procedure :: quantities
     procedure :: observe
-    procedure :: positions, section_moduli
+    procedure :: positions, section_moduli, moment_at
   end type shafts_t
 
   ! the order of `quantities`
@@ -91,7 +91,7 @@ contains
     integer, intent(in) :: quantity   !! twist ... stress
     integer, intent(in) :: lane
     real(wp), intent(out) :: values(:)   !! [elements of the bank]
-    real(wp) :: found, moment
+    real(wp) :: found
     integer :: p, s
 
     values = 0.0_wp
@@ -103,16 +103,26 @@ contains
         end if
         do p = 1, size(shaft%moments, 1)
           if (quantity == moment_1 .and. p > 1 .or. quantity == moment_2 .and. p < size(shaft%moments, 1)) cycle
-          moment = 0.0_wp - sum(shaft%moments(p, :) * (elements%restoring(lane, offset + shaft%first:offset + shaft%last) &
-                                                       + elements%applied(lane, offset + shaft%first:offset + shaft%last)))
-          found = moment
-          if (quantity == stress) found = moment / self%parameters(self%number_of('shaft_modulus')) &
+          found = self%moment_at(elements, s, p, lane)
+          if (quantity == stress) found = found / self%parameters(self%number_of('shaft_modulus')) &
                                                    %value(lane, shaft%first_point + p - 1)
           if (abs(found) > abs(value)) value = found
         end do
       end associate
     end do
   end subroutine observe
+
+  !> The moment at a point of a shaft, elastic and of its damping [N m], after `evaluate`.
+  pure real(wp) function moment_at(self, elements, shaft, point, lane) result(moment)
+    class(shafts_t), intent(in) :: self
+    type(elements_t), intent(in) :: elements
+    integer, intent(in) :: shaft, point, lane
+
+    associate (one => self%shafts(shaft), offset => self%first - 1)
+      moment = 0.0_wp - sum(one%moments(point, :) * (elements%restoring(lane, offset + one%first:offset + one%last) &
+                                                     + elements%applied(lane, offset + one%first:offset + one%last)))
+    end associate
+  end function moment_at
 
   !> Distances of the points of a shaft from its first end [m], [points].
   pure function positions(self, shaft, lane)

@@ -1,0 +1,191 @@
+!> The groups &fatigue of an input: what they may ask for, and their S-N curves.
+module nocdyn_fatigue_groups
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_near_words, only: nearest_word
+  use nocdyn_sn_curves, only: mean_strength, new_sn_curve, sn_curve_t
+  use nocdyn_text, only: quoted, string_t, to_text
+  implicit none (type, external)
+  private
+
+  public :: check_fatigue, element_kind, quantity_of, read_curve
+
+  character(len=*), parameter :: kinds(*) = [character(len=8) :: 'coupling', 'shaft', 'mesh', 'gear']
+  character(len=*), parameter, public :: quantities(*) = [character(len=6) :: 'stress', 'moment', 'force']
+  character(len=*), parameter, public :: quantity_units(*) = [character(len=3) :: 'Pa', 'N m', 'N']   !! of `quantities`
+
+contains
+
+  !> The kind of the element of a group: 'coupling', 'shaft', 'mesh' or 'gear'.
+  pure function element_kind(group) result(kind)
+    type(group_t), intent(in) :: group
+    character(len=8) :: kind
+    integer :: i
+
+    do i = 1, size(kinds)
+      kind = kinds(i)
+      if (group%has_value(trim(kind))) return
+    end do
+  end function element_kind
+
+  !> The quantity of the S-N curve of a group: index of `quantities`.
+  pure integer function quantity_of(group) result(quantity)
+    type(group_t), intent(in) :: group
+
+    do quantity = 1, size(quantities) - 1
+      if (group%has_value('reference_' // trim(quantities(quantity)))) return
+      if (group%has_value('table_' // trim(quantities(quantity)))) return
+    end do
+  end function quantity_of
+
+  !> Refuses elements that do not exist or have no such quantity, and values that do not fit together.
+  subroutine check_fatigue(input, error)
+    type(input_t), intent(in) :: input
+    type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: groups(:)
+    integer :: i
+
+    allocate (groups, source=input%groups_named('fatigue'))
+    do i = 1, size(groups)
+      call check_element(input, groups(i), error)
+      if (.not. allocated(error)) call check_curve(input, groups(i), error)
+      if (.not. allocated(error)) call check_mean(input, groups(i), error)
+      if (allocated(error)) return
+    end do
+  end subroutine check_fatigue
+
+  !> The element must exist and have the quantity.
+  subroutine check_element(input, index, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    type(error_t), allocatable, intent(out) :: error
+    type(string_t), allocatable :: names(:)
+    integer, allocatable :: candidates(:)
+    character(len=8) :: kind
+    integer :: i, near
+
+    kind = element_kind(input%groups(index))
+    associate (group => input%groups(index))
+      allocate (candidates, source=input%groups_named(trim(kind)))
+      allocate (names(size(candidates)))
+      do i = 1, size(candidates)
+        names(i)%text = input%groups(candidates(i))%name
+        if (names(i)%text /= group%text(trim(kind))) cycle
+        call check_quantity(input, index, input%groups(candidates(i)), error)
+        return
+      end do
+      near = nearest_word(group%text(trim(kind)), names)
+      if (near > 0) then
+        call raise(error, exit_input, input%location(index, trim(kind)) // ': there is no ' // trim(kind) // ' ' // &
+                   quoted(group%text(trim(kind))) // '; did you mean ' // quoted(names(near)%text) // '?')
+      else
+        call raise(error, exit_input, input%location(index, trim(kind)) // ': there is no ' // trim(kind) // ' ' // &
+                   quoted(group%text(trim(kind))))
+      end if
+    end associate
+  end subroutine check_element
+
+  !> A coupling has a stress if its section is given, a gear a force if its radii are.
+  subroutine check_quantity(input, index, element, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    type(group_t), intent(in) :: element
+    type(error_t), allocatable, intent(out) :: error
+
+    if (element%kind == 'coupling' .and. quantity_of(input%groups(index)) == 1) then
+      if (element%has_value('section_modulus') .or. element%has_value('diameter')) return
+      call raise(error, exit_input, input%location(index, 'coupling') // ': a stress needs a section, but coupling ' // &
+                 quoted(element%name) // ' has none; required: section_modulus [m3] or diameter [m] of &coupling, or ' // &
+                 'a moment in place of the stress')
+    else if (element%kind == 'gear') then
+      if (element%has_value('radii')) return
+      call raise(error, exit_input, input%location(index, 'gear') // ': a tooth force needs radii, but gear ' // &
+                 quoted(element%name) // ' has none; required: radii [m] of &gear')
+    end if
+  end subroutine check_quantity
+
+  !> The lists of a table have the same length, and its half ranges descend.
+  subroutine check_curve(input, index, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: cycles(:), half_range(:)
+    character(len=18) :: key
+    integer :: i
+
+    associate (group => input%groups(index))
+      if (group%has_value('slope')) return
+      key = 'table_' // quantities(quantity_of(group))
+      allocate (cycles, source=group%numbers('table_cycles'))
+      allocate (half_range, source=group%numbers(trim(key)))
+      if (size(half_range) /= size(cycles)) then
+        call raise(error, exit_input, input%location(index, trim(key)) // ': ' // trim(key) // ' has ' // &
+                   to_text(size(half_range)) // ' values, table_cycles has ' // to_text(size(cycles)) // '; needed: as many')
+        return
+      end if
+      do i = 2, size(cycles)
+        if (half_range(i) < half_range(i - 1)) cycle
+        call raise(error, exit_input, input%location(index, trim(key)) // ': ' // trim(key) // '(' // to_text(i) // ') = ' // &
+                   to_text(half_range(i)) // ' is not less than the value before, ' // to_text(half_range(i - 1)) // &
+                   '; needed: half ranges that descend')
+        return
+      end do
+    end associate
+  end subroutine check_curve
+
+  !> The influence of the mean needs the strength, in stresses.
+  subroutine check_mean(input, index, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    type(error_t), allocatable, intent(out) :: error
+    character(len=15) :: key
+
+    associate (group => input%groups(index))
+      select case (group%text('mean_stress'))
+      case ('goodman')
+        key = 'ultimate_stress'
+      case ('soderberg')
+        key = 'yield_stress'
+      case default
+        key = ''
+        if (group%has_value('ultimate_stress')) key = 'ultimate_stress'
+        if (group%has_value('yield_stress')) key = 'yield_stress'
+        if (key /= '') call raise(error, exit_input, input%location(index, trim(key)) // ': ' // trim(key) // &
+                                  " has no effect with mean_stress = 'none'; allowed: goodman with ultimate_stress, " // &
+                                  'soderberg with yield_stress')
+        return
+      end select
+      if (quantity_of(group) /= 1) then
+        call raise(error, exit_input, input%location(index, 'mean_stress') // ': mean_stress = ' // &
+                   quoted(group%text('mean_stress')) // ' needs an S-N curve of stresses, reference_stress or table_stress')
+      else if (.not. group%has_value(trim(key))) then
+        call raise(error, exit_input, input%location(index, 'mean_stress') // ': mean_stress = ' // &
+                   quoted(group%text('mean_stress')) // ' needs ' // trim(key) // ' [Pa]')
+      end if
+    end associate
+  end subroutine check_mean
+
+  !> The S-N curve of a checked group.
+  type(sn_curve_t) function read_curve(group) result(curve)
+    type(group_t), intent(in) :: group
+    real(wp), allocatable :: cycles(:), half_range(:)
+    character(len=6) :: name
+
+    name = quantities(quantity_of(group))
+    if (group%has_value('slope')) then
+      curve = new_sn_curve([group%number('reference_cycles')], [group%number('reference_' // trim(name))], &
+                           group%number('slope'), group%number('second_slope', absent=group%number('slope')))
+    else
+      allocate (cycles, source=group%numbers('table_cycles'))
+      allocate (half_range, source=group%numbers('table_' // trim(name)))
+      curve = new_sn_curve(cycles, half_range)
+    end if
+    curve%endurance = group%number('endurance_limit')
+    curve%notch_factor = group%number('notch_factor')
+    if (group%text('mean_stress') == 'none') return
+    curve%mean_kind = mean_strength
+    curve%strength = group%number('ultimate_stress', absent=group%number('yield_stress', absent=1.0_wp))
+  end function read_curve
+
+end module nocdyn_fatigue_groups

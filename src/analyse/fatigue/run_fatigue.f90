@@ -1,0 +1,195 @@
+!> The fatigue of a run, by &fatigue: counts the cycles of moments, stresses and forces while the machine is integrated.
+module nocdyn_run_fatigue
+  use nocdyn_cycle_classes, only: cycle_classes_t
+  use nocdyn_damage_counters, only: damage_counter_t
+  use nocdyn_fatigue_groups, only: element_kind, quantities, quantity_of, quantity_units, read_curve
+  use nocdyn_input, only: input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_shafts, only: shafts_t
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  public :: new_run_fatigue
+
+  integer, parameter :: stress = 1   ! of `quantities`
+
+  !> One group &fatigue. A shaft has a signal for each of its points, else there is one.
+  type, public :: fatigue_item_t
+    character(len=:), allocatable :: name, element, unit
+    real(wp) :: repeats = 1.0_wp
+    integer :: first = 1, last = 0          !! signals
+    integer, private :: column = 0          !! in the table of the run; 0: a shaft
+    integer, private :: bank = 0, shaft = 0 !! of a shaft
+    logical, private :: is_stress = .false.
+  end type fatigue_item_t
+
+  type, public :: run_fatigue_t
+    type(fatigue_item_t), allocatable :: items(:)
+    type(damage_counter_t), allocatable :: counters(:)   !! of the signals
+    real(wp), allocatable :: position(:)                 !! of a point along its shaft [m], [signals]
+  contains
+    procedure :: evaluate, finish, worst
+  end type run_fatigue_t
+
+contains
+
+  !> Finds the signals of all groups &fatigue.
+  subroutine new_run_fatigue(input, machine, labels, fatigue)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    type(string_t), intent(in) :: labels(:)   !! columns of the table of the run, in SI
+    type(run_fatigue_t), intent(out) :: fatigue
+    integer, allocatable :: groups(:)
+    integer :: i, signals
+
+    allocate (groups, source=input%groups_named('fatigue'))
+    allocate (fatigue%items(size(groups)))
+    signals = 0
+    do i = 1, size(groups)
+      associate (group => input%groups(groups(i)), item => fatigue%items(i))
+        item%name = group%name
+        item%element = group%text(trim(element_kind(group)))
+        item%unit = trim(quantity_units(quantity_of(group)))
+        item%repeats = group%number('repeats')
+        item%is_stress = quantity_of(group) == stress
+        item%first = signals + 1
+        item%last = item%first
+        if (element_kind(group) == 'shaft') then
+          call find_shaft(machine, item)
+        else
+          call find_column(labels, trim(element_kind(group)), trim(quantities(quantity_of(group))), item)
+        end if
+        signals = item%last
+      end associate
+    end do
+    allocate (fatigue%counters(signals))
+    allocate (fatigue%position(signals), source=0.0_wp)
+    do i = 1, size(groups)
+      call prepare_signals(input, groups(i), machine, fatigue, i)
+    end do
+  end subroutine new_run_fatigue
+
+  !> The column of a moment, a stress or a force: of a damped coupling that of the whole moment.
+  pure subroutine find_column(labels, kind, quantity, item)
+    type(string_t), intent(in) :: labels(:)
+    character(len=*), intent(in) :: kind, quantity
+    type(fatigue_item_t), intent(inout) :: item
+    integer :: i
+
+    do i = 1, size(labels)
+      select case (quantity)
+      case ('stress')
+        if (labels(i)%text == 'stress_' // item%element // ' [Pa]') item%column = i
+      case ('moment')
+        if (labels(i)%text == 'moment_' // item%element // ' [N m]' .and. item%column == 0) item%column = i
+        if (labels(i)%text == 'shaft_' // item%element // ' [N m]') item%column = i
+      case default
+        if (kind == 'gear' .and. labels(i)%text == 'reaction_' // item%element // ' [N]') item%column = i
+        if (kind == 'mesh' .and. labels(i)%text == 'force_' // item%element // ' [N]') item%column = i
+      end select
+    end do
+    if (item%column == 0) error stop 'nocdyn_run_fatigue: a checked group has a column'
+  end subroutine find_column
+
+  !> The points of a shaft.
+  pure subroutine find_shaft(machine, item)
+    type(machine_t), intent(in) :: machine
+    type(fatigue_item_t), intent(inout) :: item
+    integer :: b, s
+
+    do b = 1, size(machine%banks)
+      select type (bank => machine%banks(b)%bank)
+      type is (shafts_t)
+        do s = 1, size(bank%shafts)
+          if (bank%names(bank%shafts(s)%first)%text /= item%element) cycle
+          item%bank = b
+          item%shaft = s
+          item%last = item%first + bank%shafts(s)%last_point - bank%shafts(s)%first_point
+        end do
+      class default
+        cycle
+      end select
+    end do
+    if (item%bank == 0) error stop 'nocdyn_run_fatigue: a checked group has a shaft'
+  end subroutine find_shaft
+
+  subroutine prepare_signals(input, group, machine, fatigue, i)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: group, i   !! indices of the group and of its item
+    type(machine_t), intent(in) :: machine
+    type(run_fatigue_t), intent(inout) :: fatigue
+    integer :: k
+
+    associate (item => fatigue%items(i))
+      do k = item%first, item%last
+        fatigue%counters(k)%curve = read_curve(input%groups(group))
+        allocate (fatigue%counters(k)%classes)
+        call fatigue%counters(k)%start()
+      end do
+      if (item%bank == 0) return
+      select type (bank => machine%banks(item%bank)%bank)
+      type is (shafts_t)
+        fatigue%position(item%first:item%last) = bank%positions(item%shaft, 1)
+      class default
+        error stop 'nocdyn_run_fatigue: the bank of a shaft is one of shafts'
+      end select
+    end associate
+  end subroutine prepare_signals
+
+  !> The signals at a time, after the machine and its table have been evaluated there.
+  subroutine evaluate(self, machine, row, signals)
+    class(run_fatigue_t), intent(in) :: self
+    type(machine_t), intent(in) :: machine
+    real(wp), intent(in) :: row(:)           !! [columns]
+    real(wp), intent(inout) :: signals(:)    !! in the units of the items
+    integer :: i, p
+
+    do i = 1, size(self%items)
+      associate (item => self%items(i))
+        if (item%column > 0) then
+          signals(item%first) = row(item%column)
+          cycle
+        end if
+        select type (bank => machine%banks(item%bank)%bank)
+        type is (shafts_t)
+          do p = 1, item%last - item%first + 1
+            signals(item%first + p - 1) = bank%moment_at(machine%elements, item%shaft, p, 1)
+          end do
+          if (item%is_stress) signals(item%first:item%last) = signals(item%first:item%last) &
+                                                              / bank%section_moduli(item%shaft, 1)
+        class default
+          error stop 'nocdyn_run_fatigue: the bank of a shaft is one of shafts'
+        end select
+      end associate
+    end do
+  end subroutine evaluate
+
+  !> Counts what is left at the end of the run.
+  subroutine finish(self)
+    class(run_fatigue_t), intent(inout) :: self
+    integer :: k
+
+    do k = 1, size(self%counters)
+      call self%counters(k)%finish()
+    end do
+  end subroutine finish
+
+  !> The signal of an item with the largest damage; without any damage, with the largest range.
+  pure integer function worst(self, i)
+    class(run_fatigue_t), intent(in) :: self
+    integer, intent(in) :: i   !! item
+
+    associate (item => self%items(i))
+      associate (counters => self%counters(item%first:item%last))
+        if (any(counters%damage > 0)) then
+          worst = item%first - 1 + maxloc(counters%damage, dim=1)
+        else
+          worst = item%first - 1 + maxloc(counters%largest_range, dim=1)
+        end if
+      end associate
+    end associate
+  end function worst
+
+end module nocdyn_run_fatigue

@@ -1,0 +1,225 @@
+"""Fatigue in runs: cycles against another program, closed forms of oscillations, sections of shafts, what is refused."""
+
+import csv
+import json
+import math
+import os
+import random
+import subprocess
+
+import numpy as np
+import pytest
+import rainflow
+
+SIGNALS = 20
+RELEASED = (
+    "&body name='a' inertia=2 angle=0.01 /\n"
+    "&coupling name='c' bodies='a', 'ground' stiffness=5000 section_modulus=1e-5 /\n"
+    "&run t_end={t_end} rtol=1e-10 atol=1e-12 /\n&output points=11 /\n"
+)
+MOMENT = 5000 * 0.01
+STRESS = MOMENT / 1e-5
+PERIOD = 2 * math.pi / math.sqrt(5000 / 2)
+CURVE = "reference_stress=5e6 reference_cycles=1e6 slope=4"
+ROUNDING = 1e-8  # of integrations at rtol = 1e-10
+STARTED = (
+    "&body name='motor' inertia=2 /\n&body name='fan' inertia=20 /\n"
+    "&coupling name='c' bodies='motor', 'fan' stiffness=2e4 damping=5 diameter=0.05 /\n"
+    "&motor name='drive' body='motor' kind='induction' breakdown_torque=800 breakdown_slip=0.15 synchronous_speed=157 /\n"
+    "&load name='air' body='fan' quadratic=0.01 /\n"
+    "&excitation name='mains' body='motor' amplitude=500 frequency_hz=50 /\n"
+    "&run t_end=2 rtol=1e-9 atol=1e-12 /\n&output points=100001 /\n"
+)
+
+
+def fatigue_of(nocdyn, text, *words):
+    nocdyn.write("machine.nml", text)
+    done = nocdyn("run", "machine.nml", *words)
+    assert (done.returncode, done.stderr) == (0, "")
+    return json.loads((nocdyn.folder / "results/machine/summary.json").read_text())["fatigue"]
+
+
+def turning_points(count, seed):
+    draw = random.Random(seed)
+    return [(-1) ** i * draw.random() * 10 ** draw.uniform(-2, 1) for i in range(count)]
+
+
+@pytest.mark.parametrize("seed", range(SIGNALS))
+def test_cycles_are_those_of_another_program(seed):
+    points = turning_points(200 + 50 * seed, seed)
+    text = f"{len(points)}\n" + "\n".join(map(repr, points))
+    done = subprocess.run([os.environ["NOCDYN_RAINFLOW"]], input=text, capture_output=True, text=True, check=True)
+    found = sorted(tuple(map(float, line.split())) for line in done.stdout.splitlines())
+    expected = sorted((r, m, c) for r, m, c, _, _ in rainflow.extract_cycles(points))
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13)
+
+
+def test_a_free_oscillation_has_a_cycle_for_each_period(nocdyn):
+    text = RELEASED.format(t_end=100.5 * PERIOD) + f"&fatigue name='life' coupling='c' {CURVE} repeats=7 /\n"
+    (life,) = fatigue_of(nocdyn, text)
+    damage = 100.5 * (STRESS / 5e6) ** 4 / 1e6
+    assert life["cycles"] == 100.5
+    assert life["largest_range"] == pytest.approx(2 * STRESS, rel=ROUNDING)
+    assert life["damage"] == pytest.approx(damage, rel=5 * ROUNDING)
+    assert life["damage_of_repeats"] == pytest.approx(7 * damage, rel=5 * ROUNDING)
+    assert life["repeats_to_failure"] == pytest.approx(1 / damage, rel=5 * ROUNDING)
+    assert abs(life["mean_of_largest_range"]) < 1e-6 * STRESS
+    with (nocdyn.folder / "results/machine/cycles.csv").open() as file:
+        header, *rows = csv.reader(file)
+    assert header == ["fatigue", "unit", "range", "mean", "cycles", "damage"]
+    assert sum(float(row[4]) for row in rows) == 100.5
+    assert sum(float(row[5]) for row in rows) == pytest.approx(damage, rel=5 * ROUNDING)
+
+
+def test_moments_and_tables_give_the_same_life_as_stresses(nocdyn):
+    text = RELEASED.format(t_end=10 * PERIOD) + (
+        f"&fatigue name='stress' coupling='c' {CURVE} /\n"
+        "&fatigue name='moment' coupling='c' reference_moment=50 reference_cycles=1e6 slope=4 /\n"
+        "&fatigue name='table' coupling='c' table_moment=500, 50 table_cycles=1e2, 1e6 /\n"
+    )
+    lives = fatigue_of(nocdyn, text)
+    assert [life["unit"] for life in lives] == ["Pa", "N m", "N m"]
+    damages = [life["damage"] for life in lives]
+    assert damages == pytest.approx([damages[0]] * 3, rel=1e-12)
+
+
+def test_the_damage_is_that_of_the_sampled_stress_with_goodman_and_notch(nocdyn):
+    (life,) = fatigue_of(
+        nocdyn,
+        STARTED + f"&fatigue name='life' coupling='c' {CURVE} notch_factor=1.5 mean_stress='goodman' ultimate_stress=3e8 /\n",
+    )
+    header, rows = nocdyn.table("results/machine")
+    stress = [float(row[header.index("stress_c [Pa]")]) for row in rows]
+    least = 1e-5 * max(map(abs, stress))
+    cycles = [(r, m, c) for r, m, c, _, _ in rainflow.extract_cycles(stress) if r > least]
+    damage = sum(c * (1.5 * r / 2 / (1 - abs(m) / 3e8) / 5e6) ** 4 / 1e6 for r, m, c in cycles)
+    assert life["cycles"] == sum(c for _, _, c in cycles)
+    assert life["damage"] == pytest.approx(damage, rel=1e-5)
+
+
+def test_the_thin_part_of_a_shaft_takes_the_damage(nocdyn):
+    (life,) = fatigue_of(
+        nocdyn,
+        "&body name='a' inertia=2 speed=5 /\n&body name='b' inertia=3 /\n"
+        "&shaft name='s' bodies='a', 'b' lengths=0.5, 0.2, 0.6 diameters=0.06, 0.03, 0.08 shear_modulus=8e10 density=7850 /\n"
+        f"&fatigue name='life' shaft='s' {CURVE} /\n&run t_end=0.5 /\n",
+    )
+    assert 0.5 <= life["position"] <= 0.7
+    columns = json.loads((nocdyn.folder / "results/machine/summary.json").read_text())["columns"]["stress_s [Pa]"]
+    assert life["largest_range"] == pytest.approx(columns["max"] - columns["min"], rel=1e-3)
+
+
+def test_forces_of_gears_and_meshes_are_counted(nocdyn):
+    gears = (
+        "&body name='a' inertia=1 /\n&body name='p' inertia=0.1 /\n&body name='w' inertia=0.3 /\n&body name='x' inertia=0.2 /\n"
+        "&coupling name='c' bodies='a', 'p' stiffness=1e4 /\n&gear name='g' bodies='p', 'w' radii=0.1, 0.2 /\n"
+        "&mesh name='m' bodies='w', 'x' radii=0.2, 0.1 stiffness=1e8 /\n"
+        "&excitation name='e' body='a' amplitude=100 frequency=40 /\n&run t_end=1 /\n"
+        "&fatigue name='gear' gear='g' reference_force=100 reference_cycles=1e6 slope=6 /\n"
+        "&fatigue name='mesh' mesh='m' reference_force=100 reference_cycles=1e6 slope=6 /\n"
+    )
+    lives = fatigue_of(nocdyn, gears)
+    columns = json.loads((nocdyn.folder / "results/machine/summary.json").read_text())["columns"]
+    for life, column in zip(lives, ("reaction_g [N]", "force_m [N]"), strict=True):
+        assert life["unit"] == "N"
+        assert life["largest_range"] == pytest.approx(columns[column]["max"] - columns[column]["min"], rel=1e-6)
+        assert life["damage"] > 0
+
+
+def test_what_is_counted_begins_with_extremes_from(nocdyn):
+    text = RELEASED.format(t_end=100.5 * PERIOD) + f"&fatigue name='life' coupling='c' {CURVE} /\n"
+    (life,) = fatigue_of(nocdyn, text, "--set", f"output.extremes_from={50 * PERIOD}")
+    assert life["cycles"] == pytest.approx(50.5, abs=0.5)
+
+
+def test_a_jump_of_the_moment_is_a_turning_point(nocdyn):
+    """The moment of a step of excitation on a body without inertia jumps: the gear carries it at once."""
+    (life,) = fatigue_of(
+        nocdyn,
+        "&body name='a' inertia=1 /\n&body name='b' inertia=1 /\n&gear name='g' bodies='a', 'b' radii=1, 1 /\n"
+        "&excitation name='on' body='a' kind='step' amplitude=10 time=0.3 /\n"
+        "&excitation name='off' body='a' kind='step' amplitude=-20 time=0.6 /\n&run t_end=1 /\n"
+        "&fatigue name='life' gear='g' reference_force=1 reference_cycles=1 slope=1 /\n",
+    )
+    assert life["cycles"] == 1.0
+    assert life["largest_range"] == pytest.approx(10.0)
+    assert life["damage"] == pytest.approx(0.5 * (5.0 + 10.0) / 2)
+
+
+def test_without_the_group_there_is_no_file(nocdyn):
+    text = RELEASED.format(t_end=PERIOD)
+    fatigue_of(nocdyn, text + f"&fatigue name='life' coupling='c' {CURVE} /\n")
+    assert "cycles.csv" in nocdyn.files("results/machine")
+    nocdyn.write("machine.nml", text)
+    assert nocdyn("run", "machine.nml").returncode == 0
+    assert "cycles.csv" not in nocdyn.files("results/machine")
+
+
+def test_the_printed_line_says_cycles_damage_and_life(nocdyn):
+    nocdyn.write("m.nml", RELEASED.format(t_end=100 * PERIOD) + f"&fatigue name='life' coupling='c' {CURVE} repeats=500 /\n")
+    text = nocdyn("run", "m.nml").stdout
+    assert (
+        "fatigue 'life': 100 cycles, range up to 10000000 Pa; damage 0.0001, the life is 10000 such runs; "
+        "500 of them: damage 0.05"
+    ) in text
+
+
+BARE = RELEASED.replace(" section_modulus=1e-5", "").format(t_end=1)
+
+
+@pytest.mark.parametrize(
+    ("group", "message"),
+    [
+        (
+            f"coupling='c' {CURVE}",
+            ":5: &fatigue 'f': a stress needs a section, but coupling 'c' has none; required: section_modulus [m3] or "
+            "diameter [m] of &coupling, or a moment in place of the stress",
+        ),
+        (f"coupling='d' {CURVE}", ":5: &fatigue 'f': there is no coupling 'd'; did you mean 'c'?"),
+        (f"shaft='shaft_1' {CURVE}", ":5: &fatigue 'f': there is no shaft 'shaft_1'"),
+        ("coupling='c' reference_moment=1 slope=3", "reference_cycles"),
+        ("coupling='c' reference_cycles=1 slope=3", "reference_stress"),
+        ("coupling='c' reference_force=1 reference_cycles=1 slope=3", "reference_force"),
+        ("coupling='c' slope=0 reference_moment=1 reference_cycles=1", "slope = 0"),
+        ("coupling='c'", "slope"),
+        (
+            "coupling='c' table_moment=10, 5, 1 table_cycles=10, 100",
+            ":5: &fatigue 'f': table_moment has 3 values, table_cycles has 2; needed: as many",
+        ),
+        (
+            "coupling='c' table_moment=10, 11 table_cycles=10, 100",
+            ":5: &fatigue 'f': table_moment(2) = 11 is not less than the value before, 10; needed: half ranges that descend",
+        ),
+        (
+            "coupling='c' reference_moment=1 reference_cycles=1 slope=3 mean_stress='goodman'",
+            ":5: &fatigue 'f': mean_stress = 'goodman' needs an S-N curve of stresses, reference_stress or table_stress",
+        ),
+        (
+            "coupling='c' reference_moment=1 reference_cycles=1 slope=3 yield_stress=1e8",
+            ":5: &fatigue 'f': yield_stress has no effect with mean_stress = 'none'; allowed: goodman with "
+            "ultimate_stress, soderberg with yield_stress",
+        ),
+    ],
+)
+def test_groups_that_do_not_fit_are_refused(nocdyn, group, message):
+    nocdyn.write("bad.nml", BARE + f"&fatigue name='f' {group} /\n")
+    for command in ("run", "check"):
+        done = nocdyn(command, "bad.nml")
+        assert done.returncode == 2
+        assert message in done.stderr
+        assert done.stderr.count("\n") <= 2
+
+
+def test_a_mean_needs_its_strength_and_a_force_its_radii(nocdyn):
+    nocdyn.write("mean.nml", RELEASED.format(t_end=1) + f"&fatigue name='f' coupling='c' {CURVE} mean_stress='soderberg' /\n")
+    done = nocdyn("run", "mean.nml")
+    assert done.returncode == 2
+    assert "mean.nml:5: &fatigue 'f': mean_stress = 'soderberg' needs yield_stress [Pa]" in done.stderr
+    nocdyn.write(
+        "teeth.nml",
+        "&body name='a' inertia=1 /\n&body name='b' inertia=1 /\n&gear name='g' bodies='a', 'b' teeth=20, 30 /\n&run t_end=1 /\n"
+        "&fatigue name='f' gear='g' reference_force=1 reference_cycles=1 slope=3 /\n",
+    )
+    done = nocdyn("run", "teeth.nml")
+    assert done.returncode == 2
+    assert "teeth.nml:5: &fatigue 'f': a tooth force needs radii, but gear 'g' has none; required: radii [m]" in done.stderr
