@@ -10,7 +10,7 @@ module nocdyn_cycle_classes
 
   type, public :: cycle_classes_t
     real(wp), private :: range_width = 0.0_wp, mean_width = 0.0_wp   !! 0: there is no cycle yet
-    real(wp), private :: sums(4, classes, -classes / 2:classes / 2 - 1) = 0.0_wp   !! sums of class_..., over the cycles of a class
+    real(wp), private :: sums(4, classes, -classes / 2:classes / 2 - 1) = 0.0_wp   !! of class_..., over the cycles of a class
   contains
     procedure :: add, list
   end type cycle_classes_t
