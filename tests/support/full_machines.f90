@@ -6,6 +6,7 @@ module nocdyn_test_full_machines
                            new_curve
   use nocdyn_dc_motors, only: new_dc_motors
   use nocdyn_element_rows, only: element_rows_t, new_element_rows
+  use nocdyn_flux_motors, only: circuit_keys, new_flux_motors
   use nocdyn_gap_couplings, only: gap_couplings_t, new_gap_couplings
   use nocdyn_governed_banks, only: governor_t
   use nocdyn_kinds, only: wp
@@ -181,8 +182,23 @@ contains
       call append_bank(machine%banks, &
                        new_dc_motors(numbered_names('drive', 1), [bodies], 24.0_wp * one, 2.0_wp * one, 1.5_wp * one, &
                                      0.5_wp * one, governor))
+      call append_bank(machine%banks, new_flux_motors(numbered_names('fluxes', 1), [bodies], circuits(variants), &
+                                                      4.0_wp + 0.0_wp * one, sign(1.0_wp, -one)))
     end associate
   end subroutine add_motors
+
+  !> The circuit of one induction motor, with inductances that are given partly as reactances, [lanes, 1, keys].
+  function circuits(variants)
+    integer, intent(in) :: variants(:)
+    real(wp) :: circuits(size(variants), 1, size(circuit_keys))
+    real(wp), parameter :: typical(size(circuit_keys)) = [30.0_wp, 12.0_wp, 0.4_wp, 0.5_wp, 0.05_wp, 0.0_wp, 0.8_wp, &
+                                                          0.0_wp, 0.6_wp, 0.0_wp]
+    integer :: k
+
+    do k = 1, size(circuit_keys)
+      circuits(:, :, k) = lane_values(typical(k), variants, 1)
+    end do
+  end function circuits
 
   subroutine add_loads(bodies, variants, machine)
     integer, intent(in) :: bodies, variants(:)

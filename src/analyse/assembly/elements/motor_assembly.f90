@@ -4,6 +4,7 @@ module nocdyn_motor_assembly
   use nocdyn_dc_motors, only: new_dc_motors
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_flux_motors, only: circuit_keys, new_flux_motors
   use nocdyn_governed_banks, only: governor_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
@@ -15,11 +16,11 @@ module nocdyn_motor_assembly
   public :: motor_form, add_motor_form, check_motors
 
   ! forms; a motor with a governor has the next one
-  integer, parameter :: quadratic = 1, induction = 3, table = 5, inductive = 7
+  integer, parameter :: quadratic = 1, induction = 3, table = 5, inductive = 7, fluxes = 9
 
 contains
 
-  !> Refuses induction motors whose breakdown torque and synchronous speed have different signs.
+  !> Refuses motors whose values do not fit together.
   subroutine check_motors(input, error)
     type(input_t), intent(in) :: input
     type(error_t), allocatable, intent(out) :: error
@@ -28,17 +29,46 @@ contains
 
     allocate (indices, source=input%groups_named('motor'))
     do i = 1, size(indices)
-      associate (group => input%groups(indices(i)))
-        if (group%text('kind') /= 'induction') cycle
-        associate (torque => group%number('breakdown_torque'), speed => group%number('synchronous_speed'))
-          if ((torque > 0 .and. speed > 0) .or. (torque < 0 .and. speed < 0)) cycle
-          call raise(error, exit_input, input%location(indices(i), 'breakdown_torque') // ': breakdown_torque = ' // &
-                     to_text(torque) // ' must have the sign of synchronous_speed = ' // to_text(speed))
-          return
-        end associate
-      end associate
+      select case (input%groups(indices(i))%text('kind'))
+      case ('induction')
+        call check_induction(input, indices(i), error)
+      case ('induction_dq')
+        call check_flux_motor(input, indices(i), error)
+      case default
+      end select
+      if (allocated(error)) return
     end do
   end subroutine check_motors
+
+  !> Refuses a breakdown torque and a synchronous speed of different signs.
+  subroutine check_induction(input, index, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    type(error_t), allocatable, intent(out) :: error
+
+    associate (torque => input%groups(index)%number('breakdown_torque'), speed => input%groups(index)%number('synchronous_speed'))
+      if ((torque > 0 .and. speed > 0) .or. (torque < 0 .and. speed < 0)) return
+      call raise(error, exit_input, input%location(index, 'breakdown_torque') // ': breakdown_torque = ' // to_text(torque) // &
+                 ' must have the sign of synchronous_speed = ' // to_text(speed))
+    end associate
+  end subroutine check_induction
+
+  !> Refuses an odd number of poles, and a voltage that is not positive.
+  subroutine check_flux_motor(input, index, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    type(error_t), allocatable, intent(out) :: error
+
+    associate (group => input%groups(index))
+      if (modulo(group%whole_number('poles'), 2) == 1) then
+        call raise(error, exit_input, input%location(index, 'poles') // ': poles = ' // to_text(group%whole_number('poles')) // &
+                   '; allowed: an even number, twice the pole pairs')
+      else if (.not. group%number('voltage') > 0) then
+        call raise(error, exit_input, input%location(index, 'voltage') // ': voltage = ' // to_text(group%number('voltage')) // &
+                   '; allowed: > 0 [V]')
+      end if
+    end associate
+  end subroutine check_flux_motor
 
   !> Form of the law of a group &motor. A motor with constant torque is quadratic, and so is a dc motor without inductance.
   pure integer function motor_form(group)
@@ -47,6 +77,8 @@ contains
     select case (group%text('kind'))
     case ('induction')
       motor_form = induction
+    case ('induction_dq')
+      motor_form = fluxes
     case ('table')
       motor_form = table
     case ('dc')
@@ -88,11 +120,34 @@ contains
                                                    governor, drag))
     case (table, table + 1)
       call append_bank(banks, new_table_motors(groups%names, body, groups%curves('table_speed', 'table_torque'), governor, drag))
+    case (fluxes)
+      call add_flux_motors(groups, body, banks)
     case default
       call append_bank(banks, new_dc_motors(groups%names, body, groups%values('voltage'), groups%values('resistance'), &
                                             groups%values('flux_constant'), groups%values('inductance'), governor))
     end select
   end subroutine add_motor_form
+
+  !> Adds a bank of induction motors with electrical transients.
+  subroutine add_flux_motors(groups, body, banks)
+    type(element_groups_t), intent(in) :: groups
+    integer, intent(in) :: body(:)
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    real(wp), dimension(groups%lanes, size(body)) :: direction, poles
+    real(wp) :: values(groups%lanes, size(body), size(circuit_keys))
+    integer :: i, k
+
+    do k = 1, size(circuit_keys)
+      values(:, :, k) = groups%values(trim(circuit_keys(k)))
+    end do
+    do i = 1, size(body)
+      associate (group => groups%input%groups(groups%indices(i)))
+        poles(:, i) = group%whole_number('poles')
+        direction(:, i) = merge(-1.0_wp, 1.0_wp, group%flag('reversed'))
+      end associate
+    end do
+    call append_bank(banks, new_flux_motors(groups%names, body, values, poles, direction))
+  end subroutine add_flux_motors
 
   !> Torques at standstill [N m]: `a` of quadratic motors, `torque` of constant ones, k voltage / resistance of dc motors.
   function standstill_torques(groups) result(torques)

@@ -142,6 +142,7 @@ contains
       if ((group%keys(one)%override > 0) .eqv. (group%keys(other)%override > 0)) then   ! no override decides between them
         call group%report([one, other], group%written_names([one, other], ' and ') // &
                           ' are both given; allowed: one of them', diagnostics)
+        group%keys([relation%first, relation%second])%may_be_missing = .true.   ! which are needed is not known
       end if
       if (group%keys(other)%override > 0 .and. group%keys(one)%override == 0) one = 0
     end if

@@ -120,7 +120,7 @@ module nocdyn_schema_rules
   !> An example of a group.
   type, public :: example_t
     character(len=12) :: group
-    character(len=192) :: text   !! keys and values, with | where a line ends
+    character(len=256) :: text   !! keys and values, with | where a line ends
     logical :: is_in_template = .true.   !! part of the example machine of help and template
   end type example_t
 

@@ -1,18 +1,20 @@
 !> Rows of the schema: the keys of &motor, &load and &excitation and the relations between them.
 module nocdyn_schema_torques
-  use nocdyn_schema_rules, only: a_body, a_file, a_name, a_number, a_selector, a_text, a_word, an_integer, any_number, &
+  use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_name, a_number, a_selector, a_text, a_word, an_integer, any_number, &
     anything, at_most_one, columns, equal_lengths, exactly_one, example_t, extrapolations, from_0_to_1, from_1, &
-    interpolations, key_rule_t, kind_rule_t, not_negative, not_zero, positive, relation_rule_t, required, requires, unset
+    from_2, interpolations, key_rule_t, kind_rule_t, not_negative, not_zero, positive, relation_rule_t, required, requires, unset
   implicit none (type, external)
   private
 
   character(len=*), parameter :: linear = "'linear'"
+  character(len=*), parameter :: governed = 'quadratic constant table induction dc'   ! kinds that may have a governor
 
   type(kind_rule_t), parameter, public :: torque_kinds(*) = [ &
     kind_rule_t('motor',      'quadratic', 'a - b omega - c omega^2'), &
     kind_rule_t('motor',      'constant',  'the same torque at every speed'), &
     kind_rule_t('motor',      'table',     'torque over speed from a table'), &
     kind_rule_t('motor',      'induction', '2 T_k / (s/s_k + s_k/s), slip s = 1 - omega/synchronous_speed (Kloss)'), &
+    kind_rule_t('motor',      'induction_dq', 'induction machine with electrical transients, by its equivalent circuit'), &
     kind_rule_t('motor',      'dc',        'flux_constant i; inductance di/dt = voltage - resistance i - flux_constant omega'), &
     kind_rule_t('excitation', 'harmonic',  'amplitude sin(frequency t + phase)'), &
     kind_rule_t('excitation', 'orders',    'the sum of amplitude_k sin(order_k phi + phase_k), phi the angle of the body'), &
@@ -54,7 +56,29 @@ module nocdyn_schema_torques
     key_rule_t('motor',      'synchronous_speed', a_number,     1, 'rad/s',       required,    not_zero, &
       'speed without slip', 'induction'), &
     key_rule_t('motor',      'voltage',         a_number,       1, 'V',           required,    anything, &
-      'voltage of the supply', 'dc'), &
+      'voltage of the supply; of three-phase mains, positive, between two lines, rms', 'induction_dq dc'), &
+    key_rule_t('motor',      'frequency',       a_number,       1, 'rad/s',       required,    positive, &
+      'angular frequency of the mains', 'induction_dq'), &
+    key_rule_t('motor',      'poles',           an_integer,     1, '',            required,    from_2, &
+      'number of poles, even; the synchronous speed is 2 frequency / poles', 'induction_dq'), &
+    key_rule_t('motor',      'reversed',        a_flag,         1, '',            '.false.',   anything, &
+      'whether the field turns backwards, as with two lines exchanged', 'induction_dq'), &
+    key_rule_t('motor',      'stator_resistance', a_number,     1, 'Ohm',         required,    not_negative, &
+      'of a phase of the star; of a delta winding a third, as of all values below', 'induction_dq'), &
+    key_rule_t('motor',      'rotor_resistance', a_number,      1, 'Ohm',         required,    positive, &
+      'of a phase of the rotor, referred to the stator', 'induction_dq'), &
+    key_rule_t('motor',      'stator_leakage',  a_number,       1, 'H',           required,    not_negative, &
+      'leakage inductance of a phase of the stator', 'induction_dq'), &
+    key_rule_t('motor',      'rotor_leakage',   a_number,       1, 'H',           required,    positive, &
+      'leakage inductance of a phase of the rotor, referred to the stator', 'induction_dq'), &
+    key_rule_t('motor',      'mutual_inductance', a_number,     1, 'H',           required,    positive, &
+      'magnetising inductance', 'induction_dq'), &
+    key_rule_t('motor',      'stator_reactance', a_number,      1, 'Ohm',         required,    not_negative, &
+      'leakage reactance of a phase of the stator at the frequency', 'induction_dq'), &
+    key_rule_t('motor',      'rotor_reactance', a_number,       1, 'Ohm',         required,    positive, &
+      'leakage reactance of a phase of the rotor at the frequency, referred to the stator', 'induction_dq'), &
+    key_rule_t('motor',      'mutual_reactance', a_number,      1, 'Ohm',         required,    positive, &
+      'magnetising reactance at the frequency', 'induction_dq'), &
     key_rule_t('motor',      'resistance',      a_number,       1, 'Ohm',         required,    positive, &
       'resistance of the armature', 'dc'), &
     key_rule_t('motor',      'flux_constant',   a_number,       1, 'V s/rad',     required,    not_zero, &
@@ -62,13 +86,13 @@ module nocdyn_schema_torques
     key_rule_t('motor',      'inductance',      a_number,       1, 'H',           '0',         not_negative, &
       'inductance of the armature; 0: the current has no delay', 'dc'), &
     key_rule_t('motor',      'governor_speed',  a_number,       1, 'rad/s',       unset,       anything, &
-      'speed that a PI governor keeps by a throttle from 0 to 1 on the torque (dc: on the voltage)'), &
+      'speed that a PI governor keeps by a throttle from 0 to 1 on the torque (dc: on the voltage)', governed), &
     key_rule_t('motor',      'governor_gain',   a_number,       1, 's/rad',       unset,       not_zero, &
-      'throttle = z + governor_gain (governor_speed - omega); gain < 0 if the motor turns backwards'), &
+      'throttle = z + governor_gain (governor_speed - omega); gain < 0 if the motor turns backwards', governed), &
     key_rule_t('motor',      'governor_time',   a_number,       1, 's',           unset,       positive, &
-      'integral time: z'' = (throttle - z) / governor_time'), &
+      'integral time: z'' = (throttle - z) / governor_time', governed), &
     key_rule_t('motor',      'governor_start',  a_number,       1, '',            '1',         from_0_to_1, &
-      'throttle at t_start')]
+      'throttle at t_start', governed)]
 
   type(key_rule_t), parameter, public :: load_keys(*) = [ &
     key_rule_t('load',       'name',            a_name,         1, '',            required,    anything, &
@@ -143,6 +167,8 @@ module nocdyn_schema_torques
     relation_rule_t('excitation', at_most_one, 'share_of_load', 'speeds'), &
     relation_rule_t('excitation', requires, 'load', 'share_of_load'), &
     relation_rule_t('excitation', exactly_one, 'table_time table_torque', 'table_file'), &
+    relation_rule_t('motor', exactly_one, 'stator_leakage rotor_leakage mutual_inductance', &
+                    'stator_reactance rotor_reactance mutual_reactance'), &
     relation_rule_t('motor', requires, 'governor_speed', 'governor_gain'), &
     relation_rule_t('motor', requires, 'governor_speed', 'governor_time'), &
     relation_rule_t('motor', requires, 'governor_gain governor_time governor_start', 'governor_speed'), &
@@ -158,6 +184,10 @@ module nocdyn_schema_torques
     example_t('motor',      "name = 'drive'    body = 'motor'    a = 200.0  b = 10.0  c = 1.0"), &
     example_t('motor',      "name = 'mains'    body = 'motor'    kind = 'induction'|" // &
                             'breakdown_torque = 100.0  breakdown_slip = 0.2  synchronous_speed = 157.08', .false.), &
+    example_t('motor',      "name = 'pump'     body = 'motor'    kind = 'induction_dq'|" // &
+                            'voltage = 400  frequency_hz = 50  poles = 4|' // &
+                            'stator_resistance = 0.4  rotor_resistance = 0.3|' // &
+                            'stator_reactance = 0.9  rotor_reactance = 0.9  mutual_reactance = 25', .false.), &
     example_t('motor',      "name = 'diesel'   body = 'motor'    kind = 'table'|" // &
                             'table_speed = 60, 120, 180  table_torque = 250, 310, 270|' // &
                             'governor_speed = 150.0  governor_gain = 0.1  governor_time = 2.0', .false.), &

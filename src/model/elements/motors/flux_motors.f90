@@ -1,0 +1,190 @@
+!> Induction motors with the electrical transients of stator and rotor: the two-axis model, whose states are flux linkages.
+!>
+!> In the frame that turns with the mains (angular frequency w, voltage along d) and with w_r = pole pairs times speed
+!>
+!>     lambda_ds' = V - R_s i_ds + w lambda_qs            lambda_dr' = -R_r i_dr + (w - w_r) lambda_qr
+!>     lambda_qs' =   - R_s i_qs - w lambda_ds            lambda_qr' = -R_r i_qr - (w - w_r) lambda_dr
+!>
+!> and the torque is 3/2 pole pairs (lambda_ds i_qs - lambda_qs i_ds). A steady state is constant in this frame. Currents follow
+!> from fluxes by the inverse of the inductances. (P. C. Krause, Analysis of Electric Machinery, 1986, chapter 4.)
+module nocdyn_flux_motors
+  use nocdyn_bank, only: bank_t, quantity_t, role_motor
+  use nocdyn_elements, only: elements_t
+  use nocdyn_induction_circuits, only: induction_circuit_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_law_expressions, only: expression_t, node_of, operator(*), operator(+), operator(-), operator(/), speed_of, state_of
+  use nocdyn_law_tape, only: law_tape_t
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  public :: new_flux_motors
+
+  !> Keys of a motor. Each inductance is given as such or as a reactance at the frequency; the other one is 0.
+  character(len=*), parameter, public :: circuit_keys(*) = [character(len=17) :: &
+    'voltage', 'frequency', 'stator_resistance', 'rotor_resistance', 'stator_leakage', 'rotor_leakage', 'mutual_inductance', &
+    'stator_reactance', 'rotor_reactance', 'mutual_reactance']
+
+  real(wp), parameter :: amplitude = sqrt(2.0_wp / 3.0_wp)   ! of a phase of the star, per rms voltage between lines
+
+  !> The internal states of a motor are the flux linkages d and q of its stator, then those of its rotor [V s].
+  type, extends(bank_t), public :: flux_motors_t
+  contains
+    procedure :: describe
+    procedure :: circuit
+    procedure :: steady_internal
+    procedure :: knees
+    procedure :: quantities
+    procedure :: observe
+  end type flux_motors_t
+
+contains
+
+  !> A bank of motors, each on one body.
+  function new_flux_motors(names, body, values, poles, direction) result(bank)
+    type(string_t), intent(in) :: names(:)
+    integer, intent(in) :: body(:)
+    real(wp), intent(in) :: values(:, :, :)    !! in SI, shape [lanes, motors, keys], keys as in `circuit_keys`
+    real(wp), intent(in) :: poles(:, :)        !! number of poles, shape [lanes, motors]
+    real(wp), intent(in) :: direction(:, :)    !! 1 or -1: of the field, the same shape
+    type(flux_motors_t) :: bank
+    integer :: k
+
+    bank%is_polynomial = .false.
+    bank%has_paper_law = .false.
+    bank%states = 4
+    allocate (bank%internal_names, source=[character(len=24) :: 'stator flux d', 'stator flux q', 'rotor flux d', 'rotor flux q'])
+    call bank%connect(role_motor, size(poles, 1), names, body)
+    do k = 1, size(circuit_keys)
+      call bank%add_parameter(circuit_keys(k), values(:, :, k))
+    end do
+    call bank%add_parameter('pole pairs', 0.5_wp * poles, is_key=.false.)
+    call bank%add_parameter('direction', direction, is_key=.false.)
+    call bank%prepare_law()
+  end function new_flux_motors
+
+  subroutine describe(self, tape)
+    class(flux_motors_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: determinant, ds, dr, frequency, mutual, pole_pairs, qs, qr, rotor, rotor_rate, slip_frequency, stator, &
+                          stator_rate
+
+    ds = state_of(tape, 1)
+    qs = state_of(tape, 2)
+    dr = state_of(tape, 3)
+    qr = state_of(tape, 4)
+    frequency = self%parameter(tape, 'frequency')
+    mutual = inductance('mutual_inductance', 'mutual_reactance')
+    stator = mutual + inductance('stator_leakage', 'stator_reactance')
+    rotor = mutual + inductance('rotor_leakage', 'rotor_reactance')
+    determinant = stator * rotor - mutual * mutual
+    stator_rate = self%parameter(tape, 'stator_resistance') / determinant   ! of the stator flux, times an inductance [1/s]
+    rotor_rate = self%parameter(tape, 'rotor_resistance') / determinant
+    pole_pairs = self%parameter(tape, 'direction') * self%parameter(tape, 'pole pairs')
+    slip_frequency = frequency - pole_pairs * speed_of(tape)
+    tape%applied = node_of(1.5_wp * pole_pairs * (mutual / determinant) * (qs * dr - ds * qr))
+    tape%rate(1) = node_of(amplitude * self%parameter(tape, 'voltage') - stator_rate * rotor * ds + stator_rate * mutual * dr &
+                           + frequency * qs)
+    tape%rate(2) = node_of(stator_rate * mutual * qr - stator_rate * rotor * qs - frequency * ds)
+    tape%rate(3) = node_of(rotor_rate * mutual * ds - rotor_rate * stator * dr + slip_frequency * qr)
+    tape%rate(4) = node_of(rotor_rate * mutual * qs - rotor_rate * stator * qr - slip_frequency * dr)
+
+  contains
+
+    !> One inductance, from the key that is given.
+    type(expression_t) function inductance(key, reactance)
+      character(len=*), intent(in) :: key, reactance
+
+      inductance = self%parameter(tape, key) + self%parameter(tape, reactance) / frequency
+    end function inductance
+
+  end subroutine describe
+
+  !> The circuit of one motor in one lane.
+  pure type(induction_circuit_t) function circuit(self, lane, element)
+    class(flux_motors_t), intent(in) :: self
+    integer, intent(in) :: lane
+    integer, intent(in) :: element   !! numbered within the bank
+
+    circuit%voltage = amplitude * value('voltage')
+    circuit%frequency = value('frequency')
+    circuit%pole_pairs = value('pole pairs')
+    circuit%stator_resistance = value('stator_resistance')
+    circuit%rotor_resistance = value('rotor_resistance')
+    circuit%mutual = value('mutual_inductance') + value('mutual_reactance') / circuit%frequency
+    circuit%stator = circuit%mutual + value('stator_leakage') + value('stator_reactance') / circuit%frequency
+    circuit%rotor = circuit%mutual + value('rotor_leakage') + value('rotor_reactance') / circuit%frequency
+
+  contains
+
+    pure real(wp) function value(name)
+      character(len=*), intent(in) :: name   !! of a parameter
+
+      value = self%parameters(self%number_of(name))%value(lane, element)
+    end function value
+
+  end function circuit
+
+  !> The fluxes of the steady state with the slip at a speed.
+  subroutine steady_internal(self, speed, internal)
+    class(flux_motors_t), intent(in) :: self
+    real(wp), intent(in) :: speed(:)         !! u' [rad/s], [motors]
+    real(wp), intent(inout) :: internal(:)   !! [states * motors]
+    type(induction_circuit_t) :: circuit
+    complex(wp) :: flux(2)
+    integer :: e
+
+    associate (direction => self%parameters(self%number_of('direction'))%value)
+      do e = 1, self%count
+        circuit = self%circuit(1, e)
+        flux = circuit%steady_flux(circuit%slip(direction(1, e) * speed(e)))
+        internal(4 * e - 3:4 * e) = [real(flux(1), wp), aimag(flux(1)), real(flux(2), wp), aimag(flux(2))]
+      end do
+    end associate
+  end subroutine steady_internal
+
+  !> The synchronous speed, and those of the largest steady torque as a motor and as a generator.
+  function knees(self, element) result(speeds)
+    class(flux_motors_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), allocatable :: speeds(:)
+    type(induction_circuit_t) :: circuit
+
+    circuit = self%circuit(1, element)
+    associate (synchronous => self%parameters(self%number_of('direction'))%value(1, element) * circuit%frequency &
+               / circuit%pole_pairs)
+      speeds = synchronous * (1.0_wp + circuit%breakdown_slip() * [-1.0_wp, 0.0_wp, 1.0_wp])
+    end associate
+  end function knees
+
+  !> Torque, and the current of the stator.
+  function quantities(self) result(columns)
+    class(flux_motors_t), intent(in) :: self
+    type(quantity_t), allocatable :: columns(:)
+    integer :: e
+
+    allocate (columns(2))
+    columns(1) = quantity_t('torque', 'N m', [(e, e=1, self%count)])
+    columns(2) = quantity_t('current', 'A', columns(1)%elements)
+  end function quantities
+
+  pure subroutine observe(self, elements, quantity, lane, values)
+    class(flux_motors_t), intent(in) :: self
+    type(elements_t), intent(in) :: elements
+    integer, intent(in) :: quantity   !! index in `quantities`
+    integer, intent(in) :: lane
+    real(wp), intent(out) :: values(:)   !! [elements of the bank]; the current is that of a line, rms
+    real(wp) :: z(4)
+    type(induction_circuit_t) :: circuit
+    integer :: e
+
+    values = elements%applied(lane, self%first:self%last())
+    if (quantity == 1) return
+    do e = 1, size(values)
+      z = elements%internal%value(lane, self%first_internal + 4 * (e - 1):self%first_internal + 4 * e - 1)
+      circuit = self%circuit(lane, e)
+      values(e) = sqrt(0.5_wp) * abs(circuit%stator_current(cmplx(z(1:3:2), z(2:4:2), wp)))
+    end do
+  end subroutine observe
+
+end module nocdyn_flux_motors

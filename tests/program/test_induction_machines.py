@@ -1,0 +1,182 @@
+"""Induction machines with electrical transients: run-up, steady states and supply, against other computations."""
+
+import csv
+
+import numpy as np
+import pytest
+
+ROTOR = {"3 hp": 0.089, "500 hp": 11.06}
+CIRCUIT = {
+    "3 hp": "voltage = 220 stator_resistance = 0.435 rotor_resistance = 0.816 "
+    "stator_reactance = 0.754 rotor_reactance = 0.754 mutual_reactance = 26.13",
+    "500 hp": "voltage = 2300 stator_resistance = 0.262 rotor_resistance = 0.187 "
+    "stator_reactance = 1.206 rotor_reactance = 1.206 mutual_reactance = 54.02",
+}
+
+# Time [s], speed [rad/s], torque [N m], current [A]: printed by motor_references.py, Krause's equations in the stationary frame
+# with the method DOP853 of SciPy and rtol 1e-13.
+RUN_UP = {
+    "3 hp": [
+        (0.05, 30.48704218605, 42.78839477517, 62.54622425921),
+        (0.1, 57.52961606013, 79.04920328981, 49.16260940829),
+        (0.2, 123.2394760615, 57.56365122311, 40.35110245582),
+        (0.3, 171.508555455, 25.16469587605, 14.90996173167),
+        (0.5, 188.096783437, 0.6906951327254, 4.742229149502),
+    ],
+    "500 hp": [
+        (0.05, 5.583051034396, 607.2068007175, 528.1051212145),
+        (0.1, 8.345839653235, 2090.529209757, 533.2954568086),
+        (0.2, 12.3503832161, 3913.980697941, 491.1034427583),
+        (0.3, 17.43187454889, 12.87088535036, 551.823952432),
+        (0.5, 33.98266852153, 878.9117323683, 543.6159131986),
+        (1.0, 90.68951755155, 1589.142614038, 538.4841034468),
+        (1.449, 191.7353829799, 31.17206534879, 81.75918407095),
+        (2.0, 188.4950523812, 0.6456266626967, 24.04182340982),
+    ],
+}
+LARGEST = {"3 hp": (188.5, 132.06, 74.2), "500 hp": (191.7, 5066.4, 570.0)}  # speed, torque, current
+PRECISE = "method = 'rk853' rtol = 1e-12 atol = 1e-13"
+
+
+def machine(name, keys="", run=PRECISE, rest=""):
+    return f"""&body name = 'rotor' inertia = {ROTOR[name]} /
+&motor name = 'mains' body = 'rotor' kind = 'induction_dq' frequency_hz = 60 poles = 4 {CIRCUIT[name]} {keys} /
+{rest}
+&run t_end = 2.0 {run} /
+&output interval = 0.001 /
+"""
+
+
+def run(nocdyn, text, *settings, command="run"):
+    (nocdyn.folder / "machine.nml").write_text(text)
+    words = [word for s in settings for word in ("--set", s)]
+    files = {"run": ("--out", "out"), "sweep": ("--out", "swept", "--csv")}.get(command, ())
+    outcome = nocdyn(command, "machine.nml", *files, *words)
+    assert outcome.returncode == 0, outcome.stderr
+    return outcome
+
+
+def columns(nocdyn):
+    header, rows = nocdyn.table("out")
+    return {name.split(" ")[0]: np.array(values) for name, values in zip(header, zip(*rows))}
+
+
+@pytest.mark.parametrize("name", RUN_UP)
+def test_machines_run_up_as_in_another_frame_and_program(nocdyn, name):
+    run(nocdyn, machine(name))
+    table = columns(nocdyn)
+    for time, *expected in RUN_UP[name]:
+        at = round(time / 0.001)
+        found = [table[key][at] for key in ("omega_rotor", "torque_mains", "current_mains")]
+        assert np.abs((np.array(found) - expected) / LARGEST[name]).max() < 1e-8
+    assert np.abs(table["energy_residual"]).max() < 1e-6
+
+
+@pytest.mark.parametrize("method", ["auto", "rk45", "rodas5p"])
+@pytest.mark.parametrize("formulation", ["reduced", "paper", "multiplier"])
+def test_every_formulation_and_kind_of_method_computes_the_same_run_up(nocdyn, method, formulation):
+    if formulation == "reduced" and method == "auto":
+        method = "taylor"
+    settings = f"method = '{method}' formulation = '{formulation}' rtol = 1e-8 atol = 1e-8"
+    run(nocdyn, machine("3 hp", run=settings), "run.t_end=0.3")
+    table = columns(nocdyn)
+    for time, *expected in RUN_UP["3 hp"][:4]:
+        found = [table[key][round(time / 0.001)] for key in ("omega_rotor", "torque_mains", "current_mains")]
+        assert np.abs((np.array(found) - expected) / LARGEST["3 hp"]).max() < 1e-5
+
+
+# The largest torque and speed, and their times, by motor_references.py; the speed of the small machine does not pass 1800 rpm.
+PEAKS = {"3 hp": (132.0600443189, 0.01048970467), "500 hp": (5066.511163821, 0.04567919959)}
+OVERSHOOT = (1830.94412980, 1.449453556)
+
+
+@pytest.mark.parametrize("name", PEAKS)
+def test_peaks_of_the_torque_are_the_known_ones(nocdyn, name):
+    run(nocdyn, machine(name))
+    torque = nocdyn.summary("out")["columns"]["torque_mains [N m]"]
+    assert torque["max"] == pytest.approx(PEAKS[name][0], rel=1e-9)
+    assert torque["time_of_max"] == pytest.approx(PEAKS[name][1], rel=1e-6)
+
+
+def test_a_large_machine_overshoots_the_synchronous_speed(nocdyn):
+    run(nocdyn, machine("500 hp"))
+    speed = nocdyn.summary("out")["columns"]["omega_rotor [rad/s]"]
+    assert speed["max"] * 30 / np.pi == pytest.approx(OVERSHOOT[0], rel=1e-9)
+    assert speed["time_of_max"] == pytest.approx(OVERSHOOT[1], rel=1e-6)
+
+
+def test_a_small_machine_reaches_95_percent_of_its_speed_in_the_known_time(nocdyn):
+    run(nocdyn, machine("3 hp"), "run.t_end=0.33395391300129")
+    assert columns(nocdyn)["omega_rotor"][-1] == pytest.approx(0.95 * 60 * np.pi, rel=1e-9)
+
+
+def test_a_reversed_field_gives_the_mirror_image(nocdyn):
+    run(nocdyn, machine("3 hp"), "run.t_end=0.2")
+    forwards = columns(nocdyn)
+    run(nocdyn, machine("3 hp", "reversed = .true."), "run.t_end=0.2")
+    backwards = columns(nocdyn)
+    assert np.abs(forwards["torque_mains"] + backwards["torque_mains"]).max() == 0
+    assert np.abs(forwards["omega_rotor"] + backwards["omega_rotor"]).max() == 0
+    assert np.abs(forwards["current_mains"] - backwards["current_mains"]).max() == 0
+
+
+def test_a_start_in_the_steady_state_stays_there(nocdyn):
+    load = "&load name = 'fan' body = 'rotor' quadratic = 4e-4 /"
+    run(nocdyn, machine("3 hp", run=PRECISE + " start = 'equilibrium'", rest=load))
+    table = columns(nocdyn)
+    for key in ("omega_rotor", "torque_mains", "current_mains"):
+        assert np.ptp(table[key]) < 1e-9 * table[key][0]
+    assert table["torque_mains"][0] == pytest.approx(4e-4 * table["omega_rotor"][0] ** 2, rel=1e-9)
+
+
+def test_steady_states_are_on_both_sides_of_the_breakdown_torque(nocdyn):
+    load = "&load name = 'press' body = 'rotor' table_speed = 0, 300 table_torque = 57, 57 /"
+    text = run(nocdyn, machine("3 hp", rest=load), command="equilibrium").stdout
+    assert "steady state 1 of 2, unstable" in text and "steady state 2 of 2, stable" in text
+
+
+def test_a_sweep_computes_what_single_runs_compute(nocdyn):
+    variants = """
+&sweep design = 'grid' /
+&vary target = 'motor.mains.rotor_resistance' low = 0.5 high = 1.2 count = 3 /
+&vary target = 'motor.mains.frequency_hz' low = 50 high = 60 count = 2 /
+&vary target = 'motor.mains.poles' low = 2 high = 4 count = 2 /
+&record quantity = 'torque_mains' statistic = 'max' /
+&record quantity = 'current_mains' statistic = 'final' /
+"""
+    text = machine("3 hp", run="rtol = 1e-8") + variants
+    run(nocdyn, text, "run.t_end=0.2", command="sweep")
+    with open(nocdyn.folder / "swept/sweep.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 12
+    for row in rows:
+        values = {key: float(value) for key, value in row.items() if "mains" in key}
+        targets = ("rotor_resistance", "frequency_hz", "poles")
+        settings = [f"{key.split(' ')[0]}={values[key]:g}" for key in values if any(f"mains.{name}" in key for name in targets)]
+        run(nocdyn, machine("3 hp", run="rtol = 1e-8"), *settings, "run.t_end=0.2")
+        single = nocdyn.summary("out")["columns"]
+        assert len(settings) == 3
+        assert values["torque_mains_max [N m]"] == pytest.approx(single["torque_mains [N m]"]["max"], rel=1e-6)
+        assert values["current_mains_final [A]"] == pytest.approx(single["current_mains [A]"]["last"], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "keys, complaint",
+    [
+        ("poles = 3", "poles = 3; allowed: an even number, twice the pole pairs"),
+        ("voltage = -220", "voltage = -220; allowed: > 0 [V]"),
+        ("governor_speed = 100", "governor_speed belongs to kind = 'quadratic', 'constant', 'table', 'induction' or 'dc'"),
+        ("frequency = -377", "frequency = -377 is out of range; allowed: > 0 [rad/s]"),
+        ("stator_leakage = 0.002", "stator_leakage and stator_reactance are both given; allowed: one of them\n"),
+    ],
+)
+def test_values_that_do_not_fit_are_refused(nocdyn, keys, complaint):
+    text = machine("3 hp")
+    name = keys.split(" ")[0]
+    for given in ("poles = 4", "voltage = 220", "frequency_hz = 60"):
+        if given.startswith(name):
+            text = text.replace(given, "")
+    (nocdyn.folder / "machine.nml").write_text(text.replace("kind = 'induction_dq'", f"kind = 'induction_dq' {keys}"))
+    outcome = nocdyn("check", "machine.nml")
+    assert outcome.returncode == 2
+    assert f"machine.nml:2: &motor 'mains': {complaint}" in outcome.stderr
