@@ -20,10 +20,22 @@ MACHINES = {
 TIMES = {"3 hp": [0.05, 0.1, 0.2, 0.3, 0.5], "500 hp": [0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 1.449, 2.0]}
 
 
-class Machine:
-    """A machine without load on a supply that never changes."""
+ARC = 1e-3  # time constant of the currents in opening contacts [s]
 
-    def __init__(self, name):
+# Load [N m s2] times the square of the speed, end [s], and from when on which share of the voltage is applied, and what it gains
+# in a second; a negative share: disconnected.
+SUPPLIES = {
+    "star and delta": ("3 hp", 4e-4, 1.0, [(0, 0.57735, 0), (0.6, -1, 0), (0.63, 1, 0)]),
+    "soft start": ("3 hp", 4e-4, 1.0, [(0, -1, 0), (0.05, 0, 2), (0.45, 0.8, 0), (0.6, 0.8, 1), (0.8, 1, 0)]),
+    "reconnection": ("500 hp", 0.055, 3.1, [(0, 1, 0), (2.8, -1, 0), (2.926, 1, 0)]),
+}
+
+
+class Machine:
+    """A machine with a load that grows with the square of the speed, on a supply that may change."""
+
+    def __init__(self, name, load=0.0):
+        self.load, self.share, self.is_off = load, lambda t: 1.0, False
         self.voltage, self.r_s, self.x_ls, self.x_m, self.x_lr, self.r_r, self.inertia = MACHINES[name]
         self.x_aq = 1 / (1 / self.x_m + 1 / self.x_ls + 1 / self.x_lr)
 
@@ -37,12 +49,31 @@ class Machine:
     def rates(self, t, y):
         psi_s, psi_r, speed = y[0] + 1j * y[1], y[2] + 1j * y[3], y[4]
         i_s, i_r = self.currents(psi_s, psi_r)
-        rate_s = BASE * (np.sqrt(2 / 3) * self.voltage * np.exp(1j * BASE * t) - self.r_s * i_s)
+        rate_s = BASE * (self.share(t) * np.sqrt(2 / 3) * self.voltage * np.exp(1j * BASE * t) - self.r_s * i_s)
         rate_r = 2j * speed * psi_r - BASE * self.r_r * i_r
-        return [rate_s.real, rate_s.imag, rate_r.real, rate_r.imag, self.torque(psi_s, psi_r) / self.inertia]
+        if self.is_off:
+            part = self.x_m / (self.x_m + self.x_lr)  # of the rotor flux that the open stator sees
+            difference = psi_s - part * psi_r
+            rate_s = part * rate_r + (2j * speed - 1 / ARC) * difference
+        acceleration = (self.torque(psi_s, psi_r) - self.load * speed * abs(speed)) / self.inertia
+        return [rate_s.real, rate_s.imag, rate_r.real, rate_r.imag, acceleration]
 
     def run(self, t_end):
-        return solve_ivp(self.rates, (0, t_end), np.zeros(5), "DOP853", rtol=1e-13, atol=1e-12, dense_output=True)
+        return self.integrate((0, t_end), np.zeros(5))
+
+    def integrate(self, ends, y):
+        return solve_ivp(self.rates, ends, y, "DOP853", rtol=1e-13, atol=1e-12, dense_output=True)
+
+    def run_stages(self, t_end, stages):
+        """The solution on each stage, from its begin."""
+        y, runs = np.zeros(5), []
+        for (begin, share, slope), end in zip(stages, [*(stage[0] for stage in stages[1:]), t_end]):
+            self.is_off = share < 0
+            self.share = lambda t, begin=begin, share=share, slope=slope: share + slope * (t - begin)
+            run = self.integrate((begin, end), y)
+            y = run.y[:, -1]
+            runs.append((begin, run.sol))
+        return runs
 
 
 def torques(machine, states):
@@ -74,6 +105,25 @@ def main():
         print("    ],")
     for name in MACHINES:
         print(f"{name}: largest torque {largest(Machine(name), torques, 0.1)}, speed {largest(Machine(name), speeds, 2.0)}")
+    for name, (machine_name, load, t_end, stages) in SUPPLIES.items():
+        machine = Machine(machine_name, load)
+        runs = machine.run_stages(t_end, stages)
+        print(f'    "{name}": [')
+        for time in np.linspace(0, t_end, 11)[1:]:
+            states = [solution for begin, solution in runs if begin <= time][-1](time)
+            current = abs(machine.currents(states[0] + 1j * states[1], states[2] + 1j * states[3])[0]) / np.sqrt(2)
+            print(f"        ({time:g}, {states[4]:.13g}, {torques(machine, states):.13g}, {current:.13g}),")
+        print("    ],")
+        fine = np.linspace(runs[-1][0], t_end, 200001)
+        values = torques(machine, runs[-1][1](fine))
+        print(f"{name}: torque on the last stage from {min(values):.10g} at {fine[np.argmin(values)]:.6g} to {max(values):.10g}")
+        if name == "reconnection":
+            begin, solution = runs[-1]
+            flux = solution(begin)
+            flux = (flux[2] + 1j * flux[3]) * np.exp(-1j * BASE * begin)
+            before = runs[0][1](stages[1][0])
+            before = (before[2] + 1j * before[3]) * np.exp(-1j * BASE * stages[1][0])
+            print("rotor flux of that before the opening:", abs(flux / before), "turned by", np.angle(flux / before, deg=True))
     run = Machine("3 hp").run(0.5).sol
     print("3 hp: 95 % of the synchronous speed at", brentq(lambda t: run(t)[4] - 0.95 * BASE / 2, 0.2, 0.5))
 

@@ -160,6 +160,98 @@ def test_a_sweep_computes_what_single_runs_compute(nocdyn):
         assert values["current_mains_final [A]"] == pytest.approx(single["current_mains [A]"]["last"], rel=1e-6)
 
 
+# Load [N m s2], end [s], keys; then the rows that motor_references.py prints, as above.
+SUPPLIES = {
+    "star and delta": ("3 hp", 4e-4, 1.0, "supply_times = 0, 0.6, 0.63 supply_factors = 0.57735, 0, 1"),
+    "soft start": ("3 hp", 4e-4, 1.0, "supply_times = 0.05, 0.6 supply_factors = 0.8, 1 supply_ramps = 0.4, 0.2"),
+    "reconnection": ("500 hp", 0.055, 3.1, "supply_times = 0, 2.8, 2.926 supply_factors = 1, 0, 1"),
+}
+SUPPLIED = {
+    "star and delta": [
+        (0.1, 19.9552436867, 17.91214939834, 36.05984071158),
+        (0.2, 39.10794066828, 24.75338108515, 33.21241368974),
+        (0.3, 59.91198533696, 18.68947892992, 34.45659564886),
+        (0.4, 80.416299744, 20.3720747158, 31.2032079796),
+        (0.5, 99.82278212581, 20.46244152337, 28.14134879669),
+        (0.6, 117.1504022134, 19.72596847651, 24.82952678778),
+        (0.7, 140.216176584, 48.86246940935, 32.25689756931),
+        (0.8, 171.019732585, 25.18292365988, 14.82167321064),
+        (0.9, 178.3939397279, 15.12919545078, 9.395262657815),
+        (1, 179.6237488811, 13.2806683895, 8.501082719807),
+    ],
+    "soft start": [
+        (0.1, 0.09294266669714, 0.5304159379555, 6.406037442506),
+        (0.2, 2.618053843045, 4.770627914878, 19.47730431465),
+        (0.3, 12.35580725144, 13.55381250529, 32.07809576044),
+        (0.4, 34.7205704027, 27.83171870221, 43.11814828706),
+        (0.5, 73.3551194332, 39.06092068813, 44.30410001666),
+        (0.6, 113.2886215852, 38.24286342905, 35.6156202657),
+        (0.7, 148.9271116776, 36.86229779952, 25.83721938863),
+        (0.8, 171.691849002, 24.10582352758, 14.38519479352),
+        (0.9, 178.5054771482, 14.96373421013, 9.313604129687),
+        (1, 179.6411543294, 13.25414815054, 8.488560850381),
+    ],
+    "reconnection": [
+        (0.31, 18.98173698031, 477.2518639039, 570.0162934247),
+        (0.62, 43.77921025983, 1105.976624118, 543.7043189247),
+        (0.93, 72.65151657938, 1358.848262827, 541.6861697323),
+        (1.24, 104.3899638386, 1824.435864004, 535.1011058837),
+        (1.55, 145.9669133815, 3133.665541882, 503.0375506775),
+        (1.86, 185.5124646558, 1986.727042528, 104.9979398304),
+        (2.17, 185.8238260914, 1900.018158356, 99.97582186607),
+        (2.48, 185.8253043468, 1899.213708698, 99.93923210524),
+        (2.79, 185.8253095687, 1899.207550552, 99.93894201955),
+        (3.1, 181.3190752982, 3939.359670905, 293.416595341),
+    ],
+}
+
+
+def supplied(name, run=PRECISE):
+    size, load, _, keys = SUPPLIES[name]
+    return machine(size, keys, run, rest=f"&load name = 'fan' body = 'rotor' quadratic = {load} /")
+
+
+@pytest.mark.parametrize("name", SUPPLIES)
+@pytest.mark.parametrize("method, precision", [(PRECISE, 1e-8), ("method = 'rodas5p' rtol = 1e-9 atol = 1e-9", 1e-6)])
+def test_motors_on_a_changing_supply_move_as_in_another_program(nocdyn, name, method, precision):
+    size, _, t_end, _ = SUPPLIES[name]
+    run(nocdyn, supplied(name, method), f"run.t_end={t_end}", f"output.interval={t_end / 10}")
+    table = columns(nocdyn)
+    for row, (_, *expected) in enumerate(SUPPLIED[name], start=1):
+        found = [table[key][row] for key in ("omega_rotor", "torque_mains", "current_mains")]
+        assert np.abs((np.array(found) - expected) / LARGEST[size]).max() < precision
+
+
+def test_a_reconnection_in_phase_opposition_gives_ten_times_the_rated_torque(nocdyn):
+    run(nocdyn, supplied("reconnection"), "run.t_end=3.1")
+    torque = nocdyn.summary("out")["columns"]["torque_mains [N m]"]
+    assert torque["min"] == pytest.approx(-18837.66295, rel=1e-6)
+    assert torque["time_of_min"] == pytest.approx(2.93186, abs=1e-5)
+
+
+def test_a_disconnected_motor_keeps_its_rotor_flux_but_no_current(nocdyn):
+    run(nocdyn, supplied("reconnection"), "run.t_end=2.92", "output.interval=0.01")
+    table = columns(nocdyn)
+    assert table["current_mains"][281] < 0.03 and table["current_mains"][291] < 1e-6
+    assert np.abs(table["torque_mains"][284:]).max() < 1e-6
+
+
+def test_a_start_in_the_steady_state_takes_the_share_of_the_supply_at_its_time(nocdyn):
+    text = supplied("soft start", PRECISE + " t_start = 0.5 start = 'equilibrium'").replace("t_end = 2.0", "t_end = 0.6")
+    run(nocdyn, text)
+    table = columns(nocdyn)
+    assert np.ptp(table["omega_rotor"]) < 1e-9 * table["omega_rotor"][0]
+    run(nocdyn, text, "run.t_start=0.25", "run.t_end=0.251")
+    on_the_ramp = columns(nocdyn)
+    constant = machine(
+        "3 hp", run=PRECISE + " start = 'equilibrium'", rest="&load name = 'fan' body = 'rotor' quadratic = 4e-4 /"
+    )
+    run(nocdyn, constant, "motor.mains.voltage=88", "run.t_end=0.001")
+    table = columns(nocdyn)
+    for key in ("omega_rotor", "torque_mains", "current_mains"):
+        assert on_the_ramp[key][0] == pytest.approx(table[key][0], rel=1e-9)
+
+
 @pytest.mark.parametrize(
     "keys, complaint",
     [
@@ -167,6 +259,20 @@ def test_a_sweep_computes_what_single_runs_compute(nocdyn):
         ("voltage = -220", "voltage = -220; allowed: > 0 [V]"),
         ("governor_speed = 100", "governor_speed belongs to kind = 'quadratic', 'constant', 'table', 'induction' or 'dc'"),
         ("frequency = -377", "frequency = -377 is out of range; allowed: > 0 [rad/s]"),
+        (
+            "supply_times = 1, 2 supply_factors = 0, 1",
+            "supply_factors(1) = 0; allowed: > 0, as the motor is disconnected before supply_times(1) = 1",
+        ),
+        (
+            "supply_times = 1, 2 supply_factors = 0.5, 1 supply_ramps = 3, 0",
+            "supply_ramps(1) = 3 from supply_times(1) = 1 ends after supply_times(2) = 2; allowed: ramps that end before",
+        ),
+        ("supply_times = 1, 2", "supply_times needs supply_factors"),
+        ("supply_ramps = 1, 2", "supply_ramps needs supply_times"),
+        (
+            "supply_times = 1, 2 supply_factors = 1",
+            "supply_factors has 1 value and supply_times has 2 values; needed: as many of each",
+        ),
         ("stator_leakage = 0.002", "stator_leakage and stator_reactance are both given; allowed: one of them\n"),
     ],
 )

@@ -18,6 +18,7 @@ module nocdyn_test_full_machines
   use nocdyn_order_excitations, only: new_order_excitations, order_torque_t
   use nocdyn_polynomial_couplings, only: new_polynomial_couplings, polynomial_couplings_t
   use nocdyn_saturated_couplings, only: new_saturated_couplings
+  use nocdyn_schedules, only: schedule_t
   use nocdyn_table_couplings, only: new_table_couplings
   use nocdyn_table_excitations, only: new_table_excitations
   use nocdyn_test_machines, only: finish, numbered_names
@@ -184,8 +185,26 @@ contains
                                      0.5_wp * one, governor))
       call append_bank(machine%banks, new_flux_motors(numbered_names('fluxes', 1), [bodies], circuits(variants), &
                                                       4.0_wp + 0.0_wp * one, sign(1.0_wp, -one)))
+      call append_bank(machine%banks, new_flux_motors(numbered_names('supplied', 1), [1], circuits(variants), &
+                                                      2.0_wp + 0.0_wp * one, sign(1.0_wp, one), supply(variants)))
     end associate
   end subroutine add_motors
+
+  !> Half of the voltage within a ramp, then disconnected, then all of it.
+  function supply(variants) result(schedule)
+    integer, intent(in) :: variants(:)
+    type(schedule_t) :: schedule(size(variants), 1)
+    integer :: l
+
+    do l = 1, size(variants)
+      associate (factor => 1.0_wp + 0.03_wp * variants(l))
+        call schedule(l, 1)%append(0.05_wp, 0.0_wp, 0.0_wp, .true.)
+        call schedule(l, 1)%append(0.05_wp * factor, 0.1_wp * factor, factor, .false.)
+        call schedule(l, 1)%append(0.4_wp * factor, 0.0_wp, 0.0_wp, .true.)
+        call schedule(l, 1)%append(0.5_wp * factor, factor, 0.0_wp, .false.)
+      end associate
+    end do
+  end function supply
 
   !> The circuit of one induction motor, with inductances that are given partly as reactances, [lanes, 1, keys].
   function circuits(variants)

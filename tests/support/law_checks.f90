@@ -42,7 +42,7 @@ contains
     error = max(error, misfit(slopes%rate, elements%internal%rate_speed))
     slopes = difference_laws(bank, elements, by_time, step)
     error = max(error, misfit(slopes%applied, elements%applied_time), maxval(abs(slopes%restoring)))
-    error = max(error, maxval([0.0_wp, abs(slopes%rate)]))
+    error = max(error, misfit(slopes%rate, elements%internal%rate_time))
     do s = 1, bank%states
       slopes = difference_laws(bank, elements, by_state + s, step)
       error = max(error, misfit(slopes%applied, elements%internal%applied(:, s:s)), maxval(abs(slopes%restoring)))

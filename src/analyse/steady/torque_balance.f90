@@ -233,7 +233,7 @@ contains
 
     if (self%internal == 0) return
     call set_elements(self, z)
-    call self%formulation%machine%settle_internal()
+    call self%formulation%machine%settle_internal(self%t(1))
     z(size(self%motions%free) + 1:) = self%formulation%machine%elements%internal%value(1, :)
   end subroutine settle
 
@@ -247,7 +247,7 @@ contains
       machine%elements%angle(1, :) = self%start_twist
       machine%elements%speed(1, :) = 0.0_wp
       machine%elements%speed(1, self%inelastic) = speed
-      call machine%settle_internal()
+      call machine%settle_internal(self%t(1))
       call machine%choose_branches(self%t)
       call machine%evaluate_elements(self%t)
       moments = machine%elements%restoring(1, self%inelastic) + machine%elements%applied(1, self%inelastic)

@@ -215,9 +215,10 @@ contains
     internal = 0.0_wp
   end subroutine start_internal
 
-  !> The internal states of one lane that do not change while the speeds stay.
-  subroutine steady_internal(self, speed, internal)
+  !> The internal states of one lane that do not change while the speeds stay, and what follows the time stays as it is.
+  subroutine steady_internal(self, t, speed, internal)
     class(bank_t), intent(in) :: self
+    real(wp), intent(in) :: t                 !! [s]
     real(wp), intent(in) :: speed(:)          !! u' [rad/s], [elements]
     real(wp), intent(inout) :: internal(:)    !! [states * elements], the states of the first element first
 

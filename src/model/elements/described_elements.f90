@@ -8,7 +8,7 @@
 !> law reads beside its own. The law gives a moment for both. The phases of a bank follow one another as its elements do.
 !>
 !> An element may have *internal states*, for instance the integral of a governor or an armature current. Their rates depend
-!> on the speed of the element and on its internal states only. All elements have the same number of them.
+!> on the speed of the element, on its internal states and on the time only. All elements have the same number of them.
 !>
 !> A law with kinks or jumps has *branches*: on each branch it is one smooth formula that may be evaluated anywhere. A branch
 !> selects constants of the formulas (`pick`), or a segment of a curve; guards, which tell where a branch holds, contain no picks.

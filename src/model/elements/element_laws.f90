@@ -200,6 +200,9 @@ contains
       if (self%time > 0) then
         call turn(self, strip, [self%time], 1)
         call unload(law, work, tape%applied, 1, strip, 1, 1, to%applied_time(1, first))
+        do i = 1, self%states
+          call unload(law, work, tape%rate(i), 1, strip, self%states, i, to%internal%rate_time(1, first_internal))
+        end do
       end if
     end associate
   end subroutine differentiate_by_motion
@@ -247,6 +250,7 @@ contains
 
     internal%applied(:, first:last) = 0.0_wp
     internal%rate_speed(:, first:last) = 0.0_wp
+    internal%rate_time(:, first:last) = 0.0_wp
     internal%rate_internal(:, :, first:last) = 0.0_wp
   end subroutine clear_internal
 

@@ -14,11 +14,12 @@ module nocdyn_elements
     integer, allocatable :: element(:)             !! element of each state, numbered in the machine, [states]
     integer, allocatable :: first(:)               !! the first state of that element, [states]
     integer, allocatable :: members(:)             !! number of states of that element, [states]
-    real(wp), allocatable :: value(:, :)           !! [lanes, states] as `rate`, `applied` and `rate_speed`
+    real(wp), allocatable :: value(:, :)           !! [lanes, states] as `rate` to `rate_time`
     real(wp), allocatable :: rate(:, :)            !! by `evaluate_internal` of the banks
     ! by `differentiate`:
     real(wp), allocatable :: applied(:, :)         !! derivative of the element's `applied` moment by the state
     real(wp), allocatable :: rate_speed(:, :)      !! derivative of the rate by the element's speed
+    real(wp), allocatable :: rate_time(:, :)       !! derivative of the rate by t
     real(wp), allocatable :: rate_internal(:, :, :)   !! derivatives of the rate by the element's states, [lanes, members, states]
   end type internal_states_t
 
@@ -159,7 +160,7 @@ contains
       next = next + members(e)
     end do
     allocate (self%value(lanes, self%count), source=0.0_wp)
-    allocate (self%rate, self%applied, self%rate_speed, source=self%value)
+    allocate (self%rate, self%applied, self%rate_speed, self%rate_time, source=self%value)
     allocate (self%rate_internal(lanes, maxval([0, members]), self%count), source=0.0_wp)
   end function new_internal_states
 

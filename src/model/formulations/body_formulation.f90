@@ -207,6 +207,7 @@ contains
       call multiply(self%mobility(:, :, l), self%by_time, dfdt(l, :n))
       call differentiate_powers(self, l, dfdy(l, :, :), dfdt(l, :))
       call differentiate_internal(self, l, dfdy(l, :, :))
+      dfdt(l, self%mechanical + 1:self%states) = self%machine%elements%internal%rate_time(l, :)
     end do
     if (self%joints%count > 0) call self%hold_columns(components, dfdy(1, :, :), dfdt(1, :))
   end subroutine fill_of_bodies

@@ -257,7 +257,8 @@ contains
         call self%element_jacobian%fill(elements, dfdy)
       end if
       call self%accelerations%multiply(elements%applied_time, dfdt)
-      dfdt(:, f + 1:self%states) = 0.0_wp
+      dfdt(:, f + 1:2 * f) = 0.0_wp
+      dfdt(:, 2 * f + 1:self%states) = elements%internal%rate_time
       do k = 1, self%quadratures
         e = machine%with_work(k)
         dfdt(:, self%states + k) = elements%applied_time(:, e) * elements%speed(:, e)

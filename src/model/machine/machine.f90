@@ -195,8 +195,7 @@ contains
     if (allocated(self%steady_internal)) allocate (internal, source=self%steady_internal)
     if (allocated(internal)) return
     allocate (internal(self%lanes, self%elements%internal%count), source=0.0_wp)
-    omega(:, 0) = 0.0_wp
-    omega(:, 1:) = self%start_speed
+    omega = reshape([spread(0.0_wp, 1, self%lanes), self%start_speed], shape(omega))
     do i = 1, size(self%internal_banks)
       associate (bank => self%banks(self%internal_banks(i))%bank)
         call bank%rows%combine(self%lanes, self%bodies, omega, speed(:, :bank%count))
@@ -246,14 +245,15 @@ contains
   end subroutine choose_branches
 
   !> Replaces the internal states in the first lane of `elements` by those that do not change at the speeds there.
-  subroutine settle_internal(self)
+  subroutine settle_internal(self, t)
     class(machine_t), intent(inout) :: self
+    real(wp), intent(in) :: t   !! [s]
     integer :: i
 
     do i = 1, size(self%internal_banks)
-      associate (bank => self%banks(self%internal_banks(i))%bank, elements => self%elements)
-        call bank%steady_internal(elements%speed(1, bank%first:bank%last()), elements%internal%value(1, &
-                                  bank%first_internal:bank%first_internal + bank%states * bank%count - 1))
+      associate (bank => self%banks(self%internal_banks(i))%bank, speed => self%elements%speed, z => self%elements%internal%value)
+        call bank%steady_internal(t, speed(1, bank%first:bank%last()), &
+                                  z(1, bank%first_internal:bank%first_internal + bank%states * bank%count - 1))
       end associate
     end do
   end subroutine settle_internal

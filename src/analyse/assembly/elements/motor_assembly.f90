@@ -4,8 +4,8 @@ module nocdyn_motor_assembly
   use nocdyn_dc_motors, only: new_dc_motors
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_flux_motors, only: circuit_keys, new_flux_motors
   use nocdyn_governed_banks, only: governor_t
+  use nocdyn_induction_assembly, only: add_flux_motors, check_flux_motor
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_motors, only: new_induction_motors, new_motors, new_table_motors
@@ -15,7 +15,7 @@ module nocdyn_motor_assembly
 
   public :: motor_form, add_motor_form, check_motors
 
-  ! forms; a motor with a governor has the next one
+  ! forms; a motor with a governor has the next one, and so has one of `fluxes` with a supply over the time
   integer, parameter :: quadratic = 1, induction = 3, table = 5, inductive = 7, fluxes = 9
 
 contains
@@ -53,23 +53,6 @@ contains
     end associate
   end subroutine check_induction
 
-  !> Refuses an odd number of poles, and a voltage that is not positive.
-  subroutine check_flux_motor(input, index, error)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
-
-    associate (group => input%groups(index))
-      if (modulo(group%whole_number('poles'), 2) == 1) then
-        call raise(error, exit_input, input%location(index, 'poles') // ': poles = ' // to_text(group%whole_number('poles')) // &
-                   '; allowed: an even number, twice the pole pairs')
-      else if (.not. group%number('voltage') > 0) then
-        call raise(error, exit_input, input%location(index, 'voltage') // ': voltage = ' // to_text(group%number('voltage')) // &
-                   '; allowed: > 0 [V]')
-      end if
-    end associate
-  end subroutine check_flux_motor
-
   !> Form of the law of a group &motor. A motor with constant torque is quadratic, and so is a dc motor without inductance.
   pure integer function motor_form(group)
     type(group_t), intent(in) :: group
@@ -86,7 +69,7 @@ contains
     case default
       motor_form = quadratic
     end select
-    if (group%has_value('governor_speed')) motor_form = motor_form + 1
+    if (group%has_value('governor_speed') .or. group%has_value('supply_times')) motor_form = motor_form + 1
   end function motor_form
 
   !> Adds the bank of the motors of one form.
@@ -99,7 +82,7 @@ contains
     integer :: body(size(groups%indices))
 
     body = groups%bodies('body', 1)
-    if (modulo(form, 2) == 0) then
+    if (modulo(form, 2) == 0 .and. form < fluxes) then
       allocate (governor)
       allocate (governor%set_speed, source=groups%values('governor_speed'))
       allocate (governor%gain, source=groups%values('governor_gain'))
@@ -120,34 +103,13 @@ contains
                                                    governor, drag))
     case (table, table + 1)
       call append_bank(banks, new_table_motors(groups%names, body, groups%curves('table_speed', 'table_torque'), governor, drag))
-    case (fluxes)
+    case (fluxes, fluxes + 1)
       call add_flux_motors(groups, body, banks)
     case default
       call append_bank(banks, new_dc_motors(groups%names, body, groups%values('voltage'), groups%values('resistance'), &
                                             groups%values('flux_constant'), groups%values('inductance'), governor))
     end select
   end subroutine add_motor_form
-
-  !> Adds a bank of induction motors with electrical transients.
-  subroutine add_flux_motors(groups, body, banks)
-    type(element_groups_t), intent(in) :: groups
-    integer, intent(in) :: body(:)
-    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    real(wp), dimension(groups%lanes, size(body)) :: direction, poles
-    real(wp) :: values(groups%lanes, size(body), size(circuit_keys))
-    integer :: i, k
-
-    do k = 1, size(circuit_keys)
-      values(:, :, k) = groups%values(trim(circuit_keys(k)))
-    end do
-    do i = 1, size(body)
-      associate (group => groups%input%groups(groups%indices(i)))
-        poles(:, i) = group%whole_number('poles')
-        direction(:, i) = merge(-1.0_wp, 1.0_wp, group%flag('reversed'))
-      end associate
-    end do
-    call append_bank(banks, new_flux_motors(groups%names, body, values, poles, direction))
-  end subroutine add_flux_motors
 
   !> Torques at standstill [N m]: `a` of quadratic motors, `torque` of constant ones, k voltage / resistance of dc motors.
   function standstill_torques(groups) result(torques)

@@ -57,14 +57,15 @@ contains
                            / self%parameter(tape, 'inductance'))
   end subroutine describe
 
-  subroutine steady_internal(self, speed, internal)
+  subroutine steady_internal(self, t, speed, internal)
     class(dc_motors_t), intent(in) :: self
+    real(wp), intent(in) :: t                !! [s]
     real(wp), intent(in) :: speed(:)         !! u' [rad/s], [motors]
     real(wp), intent(inout) :: internal(:)   !! [states * motors]
     real(wp) :: throttle
     integer :: e
 
-    call self%governed_bank_t%steady_internal(speed, internal)
+    call self%governed_bank_t%steady_internal(t, speed, internal)
     throttle = 1.0_wp
     associate (voltage => self%parameters(self%number_of('voltage'))%value, &
                resistance => self%parameters(self%number_of('resistance'))%value, &

@@ -7,6 +7,9 @@
 !>
 !> and the torque is 3/2 pole pairs (lambda_ds i_qs - lambda_qs i_ds). A steady state is constant in this frame. Currents follow
 !> from fluxes by the inverse of the inductances. (P. C. Krause, Analysis of Electric Machinery, 1986, chapter 4.)
+!>
+!> V may follow the time. While the motor is disconnected, no current flows in its stator, whose flux is (L_m / L_r) lambda_r, as
+!> the rotor alone makes it: lambda_s follows that by its rate, and what differs at the opening decays with `arc_time`.
 module nocdyn_flux_motors
   use nocdyn_bank, only: bank_t, quantity_t, role_motor
   use nocdyn_elements, only: elements_t
@@ -14,6 +17,7 @@ module nocdyn_flux_motors
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, node_of, operator(*), operator(+), operator(-), operator(/), speed_of, state_of
   use nocdyn_law_tape, only: law_tape_t
+  use nocdyn_schedules, only: add_schedule, guard_schedule, schedule_t, scheduled_flag, scheduled_value, value_at
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -25,10 +29,13 @@ module nocdyn_flux_motors
     'voltage', 'frequency', 'stator_resistance', 'rotor_resistance', 'stator_leakage', 'rotor_leakage', 'mutual_inductance', &
     'stator_reactance', 'rotor_reactance', 'mutual_reactance']
 
+  character(len=*), parameter :: supply = 'supply'   ! the scheduled share of the voltage; its flag: the motor is disconnected
+  real(wp), parameter, public :: arc_time = 1.0e-3_wp   !! time constant of the currents in opening contacts [s]
   real(wp), parameter :: amplitude = sqrt(2.0_wp / 3.0_wp)   ! of a phase of the star, per rms voltage between lines
 
   !> The internal states of a motor are the flux linkages d and q of its stator, then those of its rotor [V s].
   type, extends(bank_t), public :: flux_motors_t
+    logical, private :: has_schedule = .false.   !! whether the supply follows the time
   contains
     procedure :: describe
     procedure :: circuit
@@ -41,12 +48,13 @@ module nocdyn_flux_motors
 contains
 
   !> A bank of motors, each on one body.
-  function new_flux_motors(names, body, values, poles, direction) result(bank)
+  function new_flux_motors(names, body, values, poles, direction, schedule) result(bank)
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: body(:)
     real(wp), intent(in) :: values(:, :, :)    !! in SI, shape [lanes, motors, keys], keys as in `circuit_keys`
     real(wp), intent(in) :: poles(:, :)        !! number of poles, shape [lanes, motors]
     real(wp), intent(in) :: direction(:, :)    !! 1 or -1: of the field, the same shape
+    type(schedule_t), intent(in), optional :: schedule(:, :)   !! of the supply, the same shape; its flag: disconnected
     type(flux_motors_t) :: bank
     integer :: k
 
@@ -60,14 +68,16 @@ contains
     end do
     call bank%add_parameter('pole pairs', 0.5_wp * poles, is_key=.false.)
     call bank%add_parameter('direction', direction, is_key=.false.)
+    bank%has_schedule = present(schedule)
+    if (present(schedule)) call add_schedule(bank, supply, schedule, 'change of the supply')
     call bank%prepare_law()
   end function new_flux_motors
 
   subroutine describe(self, tape)
     class(flux_motors_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape
-    type(expression_t) :: determinant, ds, dr, frequency, mutual, pole_pairs, qs, qr, rotor, rotor_rate, slip_frequency, stator, &
-                          stator_rate
+    type(expression_t) :: circuit(3), determinant, drive, ds, dr, frequency, mutual, own, pole_pairs, qs, qr, rotor, rotor_rate, &
+                          slip_frequency, stator, turn
 
     ds = state_of(tape, 1)
     qs = state_of(tape, 2)
@@ -78,14 +88,17 @@ contains
     stator = mutual + inductance('stator_leakage', 'stator_reactance')
     rotor = mutual + inductance('rotor_leakage', 'rotor_reactance')
     determinant = stator * rotor - mutual * mutual
-    stator_rate = self%parameter(tape, 'stator_resistance') / determinant   ! of the stator flux, times an inductance [1/s]
-    rotor_rate = self%parameter(tape, 'rotor_resistance') / determinant
+    rotor_rate = self%parameter(tape, 'rotor_resistance') / determinant   ! of the flux, times an inductance [1/(H s)]
     pole_pairs = self%parameter(tape, 'direction') * self%parameter(tape, 'pole pairs')
     slip_frequency = frequency - pole_pairs * speed_of(tape)
+    circuit = stator_circuit(self, tape, [stator, rotor, mutual, determinant])
+    own = circuit(1)
+    drive = circuit(2)
+    turn = frequency
+    if (self%has_schedule) turn = frequency - scheduled_flag(self, tape, supply, 1) * pole_pairs * speed_of(tape)
     tape%applied = node_of(1.5_wp * pole_pairs * (mutual / determinant) * (qs * dr - ds * qr))
-    tape%rate(1) = node_of(amplitude * self%parameter(tape, 'voltage') - stator_rate * rotor * ds + stator_rate * mutual * dr &
-                           + frequency * qs)
-    tape%rate(2) = node_of(stator_rate * mutual * qr - stator_rate * rotor * qs - frequency * ds)
+    tape%rate(1) = node_of(circuit(3) - own * ds + drive * dr + turn * qs)
+    tape%rate(2) = node_of(drive * qr - own * qs - turn * ds)
     tape%rate(3) = node_of(rotor_rate * mutual * ds - rotor_rate * stator * dr + slip_frequency * qr)
     tape%rate(4) = node_of(rotor_rate * mutual * qs - rotor_rate * stator * qr - slip_frequency * dr)
 
@@ -99,6 +112,31 @@ contains
     end function inductance
 
   end subroutine describe
+
+  !> What the stator flux follows: its own rate and that by the rotor flux [1/s], and the voltage [V].
+  function stator_circuit(self, tape, inductances) result(circuit)
+    class(flux_motors_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t), intent(in) :: inductances(4)   !! of stator, rotor, both [H]; the determinant [H2]
+    type(expression_t) :: circuit(3)
+    type(expression_t) :: is_off, resistance, voltage
+
+    resistance = self%parameter(tape, 'stator_resistance')
+    voltage = amplitude * self%parameter(tape, 'voltage')
+    associate (stator => inductances(1), rotor => inductances(2), mutual => inductances(3), determinant => inductances(4))
+      circuit = [(resistance / determinant) * rotor, (resistance / determinant) * mutual, voltage]
+      if (.not. self%has_schedule) return
+      is_off = scheduled_flag(self, tape, supply, 1)
+      resistance = (1.0_wp - is_off) * resistance + (is_off * determinant) / (arc_time * rotor)
+      circuit(1) = (resistance * rotor) / determinant
+      circuit(2) = (resistance * mutual) / determinant
+      resistance = (is_off * mutual) / rotor * self%parameter(tape, 'rotor_resistance')   ! times rotor current: rate of the flux
+      circuit(1) = circuit(1) - (resistance * mutual) / determinant
+      circuit(2) = circuit(2) - (resistance * stator) / determinant
+      circuit(3) = scheduled_value(self, tape, supply, 1) * voltage
+      call guard_schedule(self, tape, supply, 1)
+    end associate
+  end function stator_circuit
 
   !> The circuit of one motor in one lane.
   pure type(induction_circuit_t) function circuit(self, lane, element)
@@ -126,8 +164,9 @@ contains
   end function circuit
 
   !> The fluxes of the steady state with the slip at a speed.
-  subroutine steady_internal(self, speed, internal)
+  subroutine steady_internal(self, t, speed, internal)
     class(flux_motors_t), intent(in) :: self
+    real(wp), intent(in) :: t                !! [s]
     real(wp), intent(in) :: speed(:)         !! u' [rad/s], [motors]
     real(wp), intent(inout) :: internal(:)   !! [states * motors]
     type(induction_circuit_t) :: circuit
@@ -137,6 +176,7 @@ contains
     associate (direction => self%parameters(self%number_of('direction'))%value)
       do e = 1, self%count
         circuit = self%circuit(1, e)
+        if (self%has_schedule) circuit%voltage = circuit%voltage * value_at(self, supply, e, t)
         flux = circuit%steady_flux(circuit%slip(direction(1, e) * speed(e)))
         internal(4 * e - 3:4 * e) = [real(flux(1), wp), aimag(flux(1)), real(flux(2), wp), aimag(flux(2))]
       end do

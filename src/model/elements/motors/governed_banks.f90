@@ -109,8 +109,9 @@ contains
   end subroutine hold_speed
 
   !> The integral of a governor at rest is its throttle; at the set speed, where any is steady, the open one.
-  subroutine steady_internal(self, speed, internal)
+  subroutine steady_internal(self, t, speed, internal)
     class(governed_bank_t), intent(in) :: self
+    real(wp), intent(in) :: t                !! [s]
     real(wp), intent(in) :: speed(:)         !! u' [rad/s], [motors]
     real(wp), intent(inout) :: internal(:)   !! [states * motors]
     integer :: e

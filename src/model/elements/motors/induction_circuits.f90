@@ -46,7 +46,7 @@ contains
   !> The flux linkages of stator and rotor that do not change at a slip [V s].
   pure function steady_flux(self, slip) result(flux)
     class(induction_circuit_t), intent(in) :: self
-    real(wp), intent(in) :: slip
+    real(wp), intent(in) :: slip   !! 1 at standstill, negative as a generator
     complex(wp) :: flux(2)
     complex(wp) :: current   ! of the stator
     complex(wp) :: rotor     ! impedance of the rotor
@@ -79,7 +79,7 @@ contains
   !> The torque of the steady state at a slip [N m].
   pure real(wp) function steady_torque(self, slip)
     class(induction_circuit_t), intent(in) :: self
-    real(wp), intent(in) :: slip
+    real(wp), intent(in) :: slip   !! 1 at standstill, negative as a generator
 
     steady_torque = self%torque(self%steady_flux(slip))
   end function steady_torque

@@ -79,6 +79,12 @@ module nocdyn_schema_torques
       'leakage reactance of a phase of the rotor at the frequency, referred to the stator', 'induction_dq'), &
     key_rule_t('motor',      'mutual_reactance', a_number,      1, 'Ohm',         required,    positive, &
       'magnetising reactance at the frequency', 'induction_dq'), &
+    key_rule_t('motor',      'supply_times',    a_number,       any_number, 's',  unset,       anything, &
+      'times at which the supply changes; before the first one the motor is disconnected', 'induction_dq', 1, ascends=.true.), &
+    key_rule_t('motor',      'supply_factors',  a_number,       any_number, '',   unset,       not_negative, &
+      'share of the voltage from each of these times on, 0: disconnected; without times it is 1', 'induction_dq', 1), &
+    key_rule_t('motor',      'supply_ramps',    a_number,       any_number, 's',  '0',         not_negative, &
+      'time in which the share changes evenly, from each of these times', 'induction_dq', 1), &
     key_rule_t('motor',      'resistance',      a_number,       1, 'Ohm',         required,    positive, &
       'resistance of the armature', 'dc'), &
     key_rule_t('motor',      'flux_constant',   a_number,       1, 'V s/rad',     required,    not_zero, &
@@ -169,12 +175,15 @@ module nocdyn_schema_torques
     relation_rule_t('excitation', exactly_one, 'table_time table_torque', 'table_file'), &
     relation_rule_t('motor', exactly_one, 'stator_leakage rotor_leakage mutual_inductance', &
                     'stator_reactance rotor_reactance mutual_reactance'), &
+    relation_rule_t('motor', requires, 'supply_times', 'supply_factors'), &
+    relation_rule_t('motor', requires, 'supply_factors supply_ramps', 'supply_times'), &
     relation_rule_t('motor', requires, 'governor_speed', 'governor_gain'), &
     relation_rule_t('motor', requires, 'governor_speed', 'governor_time'), &
     relation_rule_t('motor', requires, 'governor_gain governor_time governor_start', 'governor_speed'), &
     relation_rule_t('load', requires, 'constant_speed', 'constant'), &
     relation_rule_t('load', requires, 'interpolation extrapolation', 'table_speed table_file'), &
     relation_rule_t('motor', equal_lengths, 'table_speed table_torque', 'table_file'), &
+    relation_rule_t('motor', equal_lengths, 'supply_times supply_factors supply_ramps', ''), &
     relation_rule_t('load', equal_lengths, 'table_speed table_torque', 'table_file'), &
     relation_rule_t('excitation', equal_lengths, 'table_time table_torque', 'table_file'), &
     relation_rule_t('excitation', columns, 'orders amplitudes phases', 'table_file speeds'), &
