@@ -1,6 +1,7 @@
 """Induction machines with electrical transients: run-up, steady states and supply, against other computations."""
 
 import csv
+import re
 
 import numpy as np
 import pytest
@@ -286,3 +287,102 @@ def test_values_that_do_not_fit_are_refused(nocdyn, keys, complaint):
     outcome = nocdyn("check", "machine.nml")
     assert outcome.returncode == 2
     assert f"machine.nml:2: &motor 'mains': {complaint}" in outcome.stderr
+
+
+RATED = """&body name = 'rotor' inertia = 20 /
+&motor name = 'mains' body = 'rotor' kind = 'induction_dq' voltage = 6600 frequency_hz = 50 poles = 4
+  rated_power = 630e3 rated_speed_rpm = 1489.5 efficiency = 0.959 power_factor = 0.83 breakdown_ratio = 2.55 {keys} /
+&load name = 'fan' body = 'rotor' quadratic = 0.16601154 /
+&run t_end = 2.0 rtol = 1e-9 /
+&output interval = 0.01 /
+"""
+
+
+def test_a_circuit_from_rated_values_is_noted(nocdyn):
+    run(nocdyn, RATED.format(keys="starting_torque = 1.22 starting_current = 5"))
+    notes = nocdyn.summary("out")["machine"]["notes"]
+    assert notes == [
+        "motor 'mains' has from its rated values, with 40 % of the losses outside of the rotor in the stator winding and equal "
+        "leakages: stator_resistance = 0.643653, rotor_resistance = 0.414587, stator_reactance = rotor_reactance = 5.97825, "
+        "mutual_reactance = 129.174 Ohm; its starting torque is 0.189 of the rated one, its starting current 4.69",
+        "motor 'mains': starting_torque = 1.22, but 0.189 with the circuit, which knows no skin effect in the bars",
+    ]
+    text = run(nocdyn, RATED.format(keys=""), command="check").stdout
+    assert text.count("note: ") == 1 and f"  note: {notes[0]}\n" in text
+
+
+def test_the_circuit_of_a_note_gives_the_motion_of_the_rated_values(nocdyn):
+    run(nocdyn, RATED.format(keys=""))
+    table = columns(nocdyn)
+    rated = RATED[RATED.index("  rated_power") : RATED.index("{keys}")]
+    circuit = (
+        "stator_resistance = 0.643653 rotor_resistance = 0.414587 "
+        "stator_reactance = 5.97825 rotor_reactance = 5.97825 mutual_reactance = 129.174 "
+    )
+    run(nocdyn, RATED.replace(rated, circuit).format(keys=""))
+    same = columns(nocdyn)
+    for key in ("omega_rotor", "torque_mains", "current_mains"):
+        assert np.abs(table[key] - same[key]).max() < 1e-4 * np.abs(table[key]).max()
+
+
+def test_a_motor_turns_with_its_rated_speed_at_its_rated_torque(nocdyn):
+    text = run(nocdyn, RATED.format(keys=""), command="equilibrium").stdout
+    speed = next(float(line.split()[-1]) for line in text.splitlines() if "omega_rotor" in line)
+    assert speed * 30 / np.pi == pytest.approx(1489.5, rel=1e-6)
+
+
+def test_a_sweep_over_rated_values_finds_a_circuit_for_each(nocdyn):
+    text = (
+        RATED.format(keys="")
+        + """
+&sweep design = 'grid' /
+&vary target = 'motor.mains.breakdown_ratio' low = 2.0 high = 3.0 count = 3 /
+&record quantity = 'torque_mains' statistic = 'max' /
+"""
+    )
+    run(nocdyn, text, command="sweep")
+    with open(nocdyn.folder / "swept/sweep.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    for ratio, row in zip((2.0, 2.5, 3.0), rows, strict=True):
+        run(nocdyn, RATED.format(keys=""), f"motor.mains.breakdown_ratio={ratio}")
+        largest = nocdyn.summary("out")["columns"]["torque_mains [N m]"]["max"]
+        assert float(row["torque_mains_max [N m]"]) == pytest.approx(largest, rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    "setting, complaint",
+    [
+        ("efficiency=0.995", "efficiency = 0.995; allowed: < 0.993, as the slip takes 0.007 of the power of the air gap"),
+        ("breakdown_ratio=80", "breakdown_ratio = 80; allowed: <= 26.6673 with these losses, slip and power factor"),
+        ("breakdown_ratio=1.05", "breakdown_ratio = 1.05; allowed: >= 1.0763 with these losses, slip and power factor"),
+        ("breakdown_ratio=1", "breakdown_ratio = 1 is out of range; allowed: > 1"),
+        ("power_factor=1", "power_factor = 1 leaves no reactive power to magnetise the motor; allowed: smaller values"),
+        ("power_factor=1.1", "power_factor = 1.1 is out of range; allowed: > 0 to 1"),
+        (
+            "rated_speed_rpm=1500",
+            "rated_speed_rpm = 1500; allowed: below 1500 and above 750 [rpm], the synchronous speed with poles = 4 and half "
+            "of it",
+        ),
+    ],
+)
+def test_rated_values_without_a_circuit_are_refused(nocdyn, setting, complaint):
+    name, value = setting.split("=")
+    text = re.sub(rf"{name} = [0-9.]+", f"{name} = {value}", RATED.format(keys=""))
+    (nocdyn.folder / "machine.nml").write_text(text)
+    outcome = nocdyn("check", "machine.nml")
+    assert outcome.returncode == 2
+    assert outcome.stderr == f"nocdyn: machine.nml:3: &motor 'mains': {complaint}\n"
+
+
+def test_poles_that_do_not_fit_the_rated_speed_are_refused(nocdyn):
+    (nocdyn.folder / "machine.nml").write_text(RATED.format(keys="").replace("poles = 4", "poles = 6"))
+    outcome = nocdyn("check", "machine.nml")
+    assert outcome.returncode == 2
+    assert "rated_speed_rpm = 1489.5; allowed: below 1000 and above 500 [rpm]" in outcome.stderr
+
+
+def test_a_circuit_and_rated_values_exclude_each_other(nocdyn):
+    (nocdyn.folder / "machine.nml").write_text(RATED.format(keys="rotor_resistance = 0.4"))
+    outcome = nocdyn("check", "machine.nml")
+    assert outcome.returncode == 2
+    assert "rotor_resistance and rated_power are both given; allowed: one of them" in outcome.stderr

@@ -184,9 +184,9 @@ contains
                        new_dc_motors(numbered_names('drive', 1), [bodies], 24.0_wp * one, 2.0_wp * one, 1.5_wp * one, &
                                      0.5_wp * one, governor))
       call append_bank(machine%banks, new_flux_motors(numbered_names('fluxes', 1), [bodies], circuits(variants), &
-                                                      4.0_wp + 0.0_wp * one, sign(1.0_wp, -one)))
+                                                      4.0_wp + 0.0_wp * one, sign(1.0_wp, -one), .true.))
       call append_bank(machine%banks, new_flux_motors(numbered_names('supplied', 1), [1], circuits(variants), &
-                                                      2.0_wp + 0.0_wp * one, sign(1.0_wp, one), supply(variants)))
+                                                      2.0_wp + 0.0_wp * one, sign(1.0_wp, one), .true., supply(variants)))
     end associate
   end subroutine add_motors
 

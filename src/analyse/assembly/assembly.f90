@@ -2,6 +2,7 @@
 module nocdyn_assembly
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
+  use nocdyn_induction_assembly, only: note_rated_motors
   use nocdyn_input, only: input_t
   use nocdyn_joint_notes, only: note_idle_joints
   use nocdyn_joint_simplifications, only: has_joint_that_locks, refuse_joints
@@ -32,7 +33,9 @@ contains
 
     call build_machine(input, machine, error, lanes)
     if (.not. allocated(error)) call start_machine(input, machine, error)
-    if (.not. (allocated(error) .or. input%takes_means)) call note_idle_joints(input, machine%start_notes)
+    if (allocated(error) .or. input%takes_means) return
+    call note_idle_joints(input, machine%start_notes)
+    call note_rated_motors(input, machine%start_notes)
   end subroutine assemble_machine
 
   !> Builds the machine as it is in a steady state: with means over a turn, and with locked joints as constraint rows.

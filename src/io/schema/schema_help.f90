@@ -16,7 +16,7 @@ module nocdyn_schema_help
   integer, parameter :: longest_group = maxval(len_trim(group_rules%name))
   integer, parameter :: column = 38       !! width of type and allowed values
   integer, parameter :: longest = 54      !! type and allowed values that leave room for the default in the same line
-  integer, parameter :: line_width = 96   !! of sentences
+  integer, parameter :: line_width = 94   !! of sentences
   character(len=*), parameter :: comment = '! '
 
 contains

@@ -4,19 +4,25 @@ module nocdyn_induction_assembly
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_flux_motors, only: circuit_keys, new_flux_motors
+  use nocdyn_induction_circuits, only: induction_circuit_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
+  use nocdyn_rated_circuits, only: fit_circuit, rating_fits, rating_impossible, rating_t, rating_too_efficient, &
+                                   rating_too_strong, rating_too_weak
   use nocdyn_schedules, only: schedule_t
-  use nocdyn_text, only: to_text
-  use nocdyn_written_values, only: written_element
+  use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
+  use nocdyn_written_values, only: written_element, written_key, written_number, written_unit
   implicit none (type, external)
   private
 
-  public :: add_flux_motors, check_flux_motor
+  public :: add_flux_motors, check_flux_motor, note_rated_motors
+
+  real(wp), parameter :: resolution = 1.0e4_wp     ! of limits in messages
+  real(wp), parameter :: tolerated = 0.2_wp        ! relative difference between what is given and what the circuit has
 
 contains
 
-  !> Adds a bank of induction motors, all or none of which have a supply over the time.
+  !> Adds a bank of induction motors, all or none of which have a supply over the time, and a circuit from rated values.
   subroutine add_flux_motors(groups, body, banks)
     type(element_groups_t), intent(in) :: groups
     integer, intent(in) :: body(:)
@@ -25,7 +31,9 @@ contains
     real(wp) :: values(groups%lanes, size(body), size(circuit_keys))
     integer :: i, k
     type(schedule_t), allocatable :: schedule(:, :)
+    logical :: are_keys
 
+    are_keys = .not. groups%input%groups(groups%indices(1))%has_value('rated_power')
     do k = 1, size(circuit_keys)
       values(:, :, k) = groups%values(trim(circuit_keys(k)))
     end do
@@ -33,11 +41,86 @@ contains
       associate (group => groups%input%groups(groups%indices(i)))
         poles(:, i) = group%whole_number('poles')
         direction(:, i) = merge(-1.0_wp, 1.0_wp, group%flag('reversed'))
+        if (.not. are_keys) values(:, i, :) = spread(fitted_values(group), 1, groups%lanes)
       end associate
     end do
     if (groups%input%groups(groups%indices(1))%has_value('supply_times')) call find_schedules(groups, schedule)
-    call append_bank(banks, new_flux_motors(groups%names, body, values, poles, direction, schedule))
+    call append_bank(banks, new_flux_motors(groups%names, body, values, poles, direction, are_keys, schedule))
   end subroutine add_flux_motors
+
+  !> The values of the circuit that follows from the rated values, in the order of `circuit_keys`.
+  function fitted_values(group) result(values)
+    type(group_t), intent(in) :: group
+    real(wp) :: values(size(circuit_keys))
+    type(induction_circuit_t) :: circuit
+    integer :: status
+    real(wp) :: limit
+
+    call fit_circuit(rating_of(group), circuit, status, limit)
+    if (status /= rating_fits) error stop 'nocdyn_induction_assembly: rated values were not checked'
+    values = [group%number('voltage'), circuit%frequency, circuit%stator_resistance, circuit%rotor_resistance, &
+              circuit%stator - circuit%mutual, circuit%rotor - circuit%mutual, circuit%mutual, 0.0_wp, 0.0_wp, 0.0_wp]
+  end function fitted_values
+
+  pure type(rating_t) function rating_of(group) result(rating)
+    type(group_t), intent(in) :: group
+
+    rating%power = group%number('rated_power')
+    rating%speed = group%number('rated_speed')
+    rating%efficiency = group%number('efficiency')
+    rating%power_factor = group%number('power_factor')
+    rating%breakdown_ratio = group%number('breakdown_ratio')
+    rating%voltage = group%number('voltage')
+    rating%frequency = group%number('frequency')
+    rating%pole_pairs = 0.5_wp * group%whole_number('poles')
+  end function rating_of
+
+  !> Notes the circuits that follow from rated values, with what they are found from, and starting values that they do not have.
+  subroutine note_rated_motors(input, notes)
+    type(input_t), intent(in) :: input
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    type(induction_circuit_t) :: circuit
+    type(rating_t) :: rating
+    integer, allocatable :: indices(:)
+    integer :: i, status
+    real(wp) :: current, limit, torque
+
+    allocate (indices, source=input%groups_named('motor', 'induction_dq'))
+    do i = 1, size(indices)
+      associate (group => input%groups(indices(i)))
+        if (.not. group%has_value('rated_power')) cycle
+        rating = rating_of(group)
+        call fit_circuit(rating, circuit, status, limit)
+        torque = circuit%steady_torque(1.0_wp) * rating%speed / rating%power
+        current = sqrt(0.5_wp) * abs(circuit%stator_current(circuit%steady_flux(1.0_wp))) / rating%current()
+        call append(notes, 'motor ' // quoted(group%name) // ' has from its rated values, with ' // &
+                    to_text(nint(100 * rating%stator_share)) // ' % of the losses outside of the rotor in the stator ' // &
+                    'winding and equal leakages: stator_resistance = ' // rounded_text(circuit%stator_resistance, 6) // &
+                    ', rotor_resistance = ' // rounded_text(circuit%rotor_resistance, 6) // &
+                    ', stator_reactance = rotor_reactance = ' // &
+                    rounded_text(circuit%frequency * (circuit%stator - circuit%mutual), 6) // ', mutual_reactance = ' // &
+                    rounded_text(circuit%frequency * circuit%mutual, 6) // ' Ohm; its starting torque is ' // &
+                    rounded_text(torque, 3) // ' of the rated one, its starting current ' // rounded_text(current, 3))
+        call compare_start(group, 'starting_torque', torque, notes)
+        call compare_start(group, 'starting_current', current, notes)
+      end associate
+    end do
+  end subroutine note_rated_motors
+
+  !> Notes a given starting value that the circuit does not have: for the skin effect in the bars it would need more cages.
+  subroutine compare_start(group, key, found, notes)
+    type(group_t), intent(in) :: group
+    character(len=*), intent(in) :: key
+    real(wp), intent(in) :: found
+    type(string_t), allocatable, intent(inout) :: notes(:)
+
+    if (.not. group%has_value(key)) return
+    associate (given => group%number(key))
+      if (abs(found - given) <= tolerated * given) return
+      call append(notes, 'motor ' // quoted(group%name) // ': ' // key // ' = ' // to_text(given) // ', but ' // &
+                  rounded_text(found, 3) // ' with the circuit, which knows no skin effect in the bars')
+    end associate
+  end subroutine compare_start
 
   !> The shares of the voltage over the time, the same in every lane.
   subroutine find_schedules(groups, schedule)
@@ -87,11 +170,54 @@ contains
       else if (.not. group%number('voltage') > 0) then
         call raise(error, exit_input, input%location(index, 'voltage') // ': voltage = ' // to_text(group%number('voltage')) // &
                    '; allowed: > 0 [V]')
-      else if (group%has_value('supply_times')) then
-        call check_supply(input, index, error)
+      else
+        if (group%has_value('supply_times')) call check_supply(input, index, error)
+        if (group%has_value('rated_power') .and. .not. allocated(error)) call check_rating(input, index, error)
       end if
     end associate
   end subroutine check_flux_motor
+
+  !> Refuses rated values that no circuit has.
+  subroutine check_rating(input, index, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    type(error_t), allocatable, intent(out) :: error
+    type(induction_circuit_t) :: circuit
+    integer :: status
+    real(wp) :: limit
+
+    associate (group => input%groups(index), rating => rating_of(input%groups(index)))
+      if (.not. (rating%slip() > 0 .and. rating%slip() < 0.5_wp)) then
+        associate (synchronous => rating%frequency / rating%pole_pairs)
+          call raise(error, exit_input, input%location(index, 'rated_speed') // ': ' // written_key(group, 'rated_speed') // &
+                     ' = ' // written_number(group, 'rated_speed', rating%speed) // '; allowed: below ' // &
+                     written_number(group, 'rated_speed', synchronous) // ' and above ' // &
+                     written_number(group, 'rated_speed', 0.5_wp * synchronous) // ' [' // written_unit(group, 'rated_speed') // &
+                     '], the synchronous speed with poles = ' // to_text(group%whole_number('poles')) // ' and half of it')
+        end associate
+        return
+      end if
+      call fit_circuit(rating, circuit, status, limit)
+      select case (status)
+      case (rating_too_efficient)
+        call raise(error, exit_input, input%location(index, 'efficiency') // ': efficiency = ' // to_text(rating%efficiency) // &
+                   '; allowed: < ' // rounded_text(limit, 6) // ', as the slip takes ' // rounded_text(rating%slip(), 4) // &
+                   ' of the power of the air gap')
+      case (rating_too_strong)
+        call raise(error, exit_input, input%location(index, 'breakdown_ratio') // ': breakdown_ratio = ' // &
+                   to_text(rating%breakdown_ratio) // '; allowed: <= ' // &
+                   to_text(floor(limit * resolution) / resolution) // ' with these losses, slip and power factor')
+      case (rating_too_weak)
+        call raise(error, exit_input, input%location(index, 'breakdown_ratio') // ': breakdown_ratio = ' // &
+                   to_text(rating%breakdown_ratio) // '; allowed: >= ' // &
+                   to_text(ceiling(limit * resolution) / resolution) // ' with these losses, slip and power factor')
+      case (rating_impossible)
+        call raise(error, exit_input, input%location(index, 'power_factor') // ': power_factor = ' // &
+                   to_text(rating%power_factor) // ' leaves no reactive power to magnetise the motor; allowed: smaller values')
+      case default
+      end select
+    end associate
+  end subroutine check_rating
 
   !> Refuses a first factor of 0, and ramps that end after the next change.
   subroutine check_supply(input, index, error)

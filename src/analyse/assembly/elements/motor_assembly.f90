@@ -15,8 +15,8 @@ module nocdyn_motor_assembly
 
   public :: motor_form, add_motor_form, check_motors
 
-  ! forms; a motor with a governor has the next one, and so has one of `fluxes` with a supply over the time
-  integer, parameter :: quadratic = 1, induction = 3, table = 5, inductive = 7, fluxes = 9
+  ! forms; a motor with a governor has the next one, and so has one of `fluxes` or `rated` with a supply over the time
+  integer, parameter :: quadratic = 1, induction = 3, table = 5, inductive = 7, fluxes = 9, rated = 11
 
 contains
 
@@ -61,7 +61,7 @@ contains
     case ('induction')
       motor_form = induction
     case ('induction_dq')
-      motor_form = fluxes
+      motor_form = merge(rated, fluxes, group%has_value('rated_power'))
     case ('table')
       motor_form = table
     case ('dc')
@@ -103,7 +103,7 @@ contains
                                                    governor, drag))
     case (table, table + 1)
       call append_bank(banks, new_table_motors(groups%names, body, groups%curves('table_speed', 'table_torque'), governor, drag))
-    case (fluxes, fluxes + 1)
+    case (fluxes:)
       call add_flux_motors(groups, body, banks)
     case default
       call append_bank(banks, new_dc_motors(groups%names, body, groups%values('voltage'), groups%values('resistance'), &

@@ -100,7 +100,7 @@ module nocdyn_schema_rules
   type, public :: relation_rule_t
     character(len=12) :: group
     integer :: form                          !! `exactly_one` ... `less_than`
-    character(len=80) :: first, second       !! keys, separated by blanks
+    character(len=144) :: first, second      !! keys, separated by blanks
     character(len=18) :: equal_if_one = ''   !! `less_than`: the numbers may be equal if this key is 1
   end type relation_rule_t
 
@@ -130,6 +130,7 @@ module nocdyn_schema_rules
   type(allowed_t), parameter, public :: efficiencies = allowed_t(low=0.0_wp, high=1.0_wp, excludes_low=.true.)
   type(allowed_t), parameter, public :: reverse_efficiencies = allowed_t(low=-10.0_wp, high=1.0_wp)
   type(allowed_t), parameter, public :: not_zero = allowed_t(excludes_zero=.true.)
+  type(allowed_t), parameter, public :: above_1 = allowed_t(low=1.0_wp, excludes_low=.true.)
   type(allowed_t), parameter, public :: from_1 = allowed_t(low=1.0_wp)
   type(allowed_t), parameter, public :: from_2 = allowed_t(low=2.0_wp)
   type(allowed_t), parameter, public :: from_0_to_1 = allowed_t(low=0.0_wp, high=1.0_wp)

@@ -48,12 +48,13 @@ module nocdyn_flux_motors
 contains
 
   !> A bank of motors, each on one body.
-  function new_flux_motors(names, body, values, poles, direction, schedule) result(bank)
+  function new_flux_motors(names, body, values, poles, direction, are_keys, schedule) result(bank)
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: body(:)
     real(wp), intent(in) :: values(:, :, :)    !! in SI, shape [lanes, motors, keys], keys as in `circuit_keys`
     real(wp), intent(in) :: poles(:, :)        !! number of poles, shape [lanes, motors]
     real(wp), intent(in) :: direction(:, :)    !! 1 or -1: of the field, the same shape
+    logical, intent(in) :: are_keys            !! whether these are the values of the keys, not values that follow from others
     type(schedule_t), intent(in), optional :: schedule(:, :)   !! of the supply, the same shape; its flag: disconnected
     type(flux_motors_t) :: bank
     integer :: k
@@ -64,7 +65,7 @@ contains
     allocate (bank%internal_names, source=[character(len=24) :: 'stator flux d', 'stator flux q', 'rotor flux d', 'rotor flux q'])
     call bank%connect(role_motor, size(poles, 1), names, body)
     do k = 1, size(circuit_keys)
-      call bank%add_parameter(circuit_keys(k), values(:, :, k))
+      call bank%add_parameter(circuit_keys(k), values(:, :, k), is_key=are_keys)
     end do
     call bank%add_parameter('pole pairs', 0.5_wp * poles, is_key=.false.)
     call bank%add_parameter('direction', direction, is_key=.false.)

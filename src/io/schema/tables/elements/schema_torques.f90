@@ -1,8 +1,10 @@
 !> Rows of the schema: the keys of &motor, &load and &excitation and the relations between them.
 module nocdyn_schema_torques
-  use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_name, a_number, a_selector, a_text, a_word, an_integer, any_number, &
-    anything, at_most_one, columns, equal_lengths, exactly_one, example_t, extrapolations, from_0_to_1, from_1, &
-    from_2, interpolations, key_rule_t, kind_rule_t, not_negative, not_zero, positive, relation_rule_t, required, requires, unset
+  use nocdyn_schema_rules, only: &
+    a_body, a_file, a_flag, a_name, a_number, a_selector, a_text, a_word, above_1, an_integer, any_number, anything, &
+    at_most_one, columns, efficiencies, equal_lengths, exactly_one, example_t, extrapolations, from_0_to_1, from_1, &
+    from_2, interpolations, key_rule_t, kind_rule_t, not_negative, not_zero, positive, relation_rule_t, required, &
+    requires, unset
   implicit none (type, external)
   private
 
@@ -79,6 +81,20 @@ module nocdyn_schema_torques
       'leakage reactance of a phase of the rotor at the frequency, referred to the stator', 'induction_dq'), &
     key_rule_t('motor',      'mutual_reactance', a_number,      1, 'Ohm',         required,    positive, &
       'magnetising reactance at the frequency', 'induction_dq'), &
+    key_rule_t('motor',      'rated_power',     a_number,       1, 'W',           required,    positive, &
+      'power at the shaft on the name plate, from which the circuit follows with the values below', 'induction_dq'), &
+    key_rule_t('motor',      'rated_speed',     a_number,       1, 'rad/s',       required,    positive, &
+      'speed on the name plate, below the synchronous speed', 'induction_dq'), &
+    key_rule_t('motor',      'efficiency',      a_number,       1, '',            required,    efficiencies, &
+      'efficiency on the name plate, 0 to 1', 'induction_dq'), &
+    key_rule_t('motor',      'power_factor',    a_number,       1, '',            required,    efficiencies, &
+      'cos phi on the name plate', 'induction_dq'), &
+    key_rule_t('motor',      'breakdown_ratio', a_number,       1, '',            required,    above_1, &
+      'breakdown torque over the rated torque, of the data sheet', 'induction_dq'), &
+    key_rule_t('motor',      'starting_torque', a_number,       1, '',            unset,       positive, &
+      'starting torque over the rated torque, to compare with that of the circuit', 'induction_dq'), &
+    key_rule_t('motor',      'starting_current', a_number,      1, '',            unset,       positive, &
+      'starting current over the rated current, to compare with that of the circuit', 'induction_dq'), &
     key_rule_t('motor',      'supply_times',    a_number,       any_number, 's',  unset,       anything, &
       'times at which the supply changes; before the first one the motor is disconnected', 'induction_dq', 1, ascends=.true.), &
     key_rule_t('motor',      'supply_factors',  a_number,       any_number, '',   unset,       not_negative, &
@@ -173,6 +189,10 @@ module nocdyn_schema_torques
     relation_rule_t('excitation', at_most_one, 'share_of_load', 'speeds'), &
     relation_rule_t('excitation', requires, 'load', 'share_of_load'), &
     relation_rule_t('excitation', exactly_one, 'table_time table_torque', 'table_file'), &
+    relation_rule_t('motor', exactly_one, 'stator_resistance rotor_resistance stator_leakage rotor_leakage ' // &
+                    'mutual_inductance stator_reactance rotor_reactance mutual_reactance', &
+                    'rated_power rated_speed efficiency power_factor breakdown_ratio'), &
+    relation_rule_t('motor', requires, 'starting_torque starting_current', 'rated_power'), &
     relation_rule_t('motor', exactly_one, 'stator_leakage rotor_leakage mutual_inductance', &
                     'stator_reactance rotor_reactance mutual_reactance'), &
     relation_rule_t('motor', requires, 'supply_times', 'supply_factors'), &
