@@ -181,7 +181,7 @@ contains
     associate (banks => balance%formulation%machine%banks, number => balance%inelastic(element))
       do i = 1, size(banks)
         if (number > banks(i)%bank%last()) cycle
-        knees = banks(i)%bank%knees(number - banks(i)%bank%first + 1)
+        knees = banks(i)%bank%knees(number - banks(i)%bank%first + 1, balance%t(1))
         return
       end do
     end associate

@@ -226,10 +226,11 @@ contains
   end subroutine steady_internal
 
   !> Speeds at which the applied moment of an element in the first lane has an extreme, changes its sign, bends or jumps [rad/s]:
-  !> where the search of steady states looks closely. By default there are none.
-  function knees(self, element) result(speeds)
+  !> where the search of steady states at a time looks closely. By default there are none.
+  function knees(self, element, t) result(speeds)
     class(bank_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: t        !! [s]
     real(wp), allocatable :: speeds(:)
 
     allocate (speeds(0))

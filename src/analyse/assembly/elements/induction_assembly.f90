@@ -15,7 +15,7 @@ module nocdyn_induction_assembly
   implicit none (type, external)
   private
 
-  public :: add_flux_motors, check_flux_motor, note_rated_motors
+  public :: add_flux_motors, check_flux_motor, check_poles, note_rated_motors
 
   real(wp), parameter :: resolution = 1.0e4_wp     ! of limits in messages
   real(wp), parameter :: tolerated = 0.2_wp        ! relative difference between what is given and what the circuit has
@@ -164,10 +164,9 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     associate (group => input%groups(index))
-      if (modulo(group%whole_number('poles'), 2) == 1) then
-        call raise(error, exit_input, input%location(index, 'poles') // ': poles = ' // to_text(group%whole_number('poles')) // &
-                   '; allowed: an even number, twice the pole pairs')
-      else if (.not. group%number('voltage') > 0) then
+      call check_poles(input, index, error)
+      if (allocated(error)) return
+      if (.not. group%number('voltage') > 0) then
         call raise(error, exit_input, input%location(index, 'voltage') // ': voltage = ' // to_text(group%number('voltage')) // &
                    '; allowed: > 0 [V]')
       else
@@ -176,6 +175,18 @@ contains
       end if
     end associate
   end subroutine check_flux_motor
+
+  !> Refuses an odd number of poles.
+  subroutine check_poles(input, index, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    type(error_t), allocatable, intent(out) :: error
+
+    associate (poles => input%groups(index)%whole_number('poles'))
+      if (modulo(poles, 2) == 1) call raise(error, exit_input, input%location(index, 'poles') // ': poles = ' // &
+                                            to_text(poles) // '; allowed: an even number, twice the pole pairs')
+    end associate
+  end subroutine check_poles
 
   !> Refuses rated values that no circuit has.
   subroutine check_rating(input, index, error)

@@ -5,18 +5,21 @@ module nocdyn_motor_assembly
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_governed_banks, only: governor_t
-  use nocdyn_induction_assembly, only: add_flux_motors, check_flux_motor
+  use nocdyn_induction_assembly, only: add_flux_motors, check_flux_motor, check_poles
   use nocdyn_input, only: group_t, input_t
+  use nocdyn_inverter_motors, only: new_inverter_motors, torque_harmonics_t
   use nocdyn_kinds, only: wp
   use nocdyn_motors, only: new_induction_motors, new_motors, new_table_motors
+  use nocdyn_schedules, only: join_points
   use nocdyn_text, only: to_text
   implicit none (type, external)
   private
 
   public :: motor_form, add_motor_form, check_motors
 
-  ! forms; a motor with a governor has the next one, and so has one of `fluxes` or `rated` with a supply over the time
-  integer, parameter :: quadratic = 1, induction = 3, table = 5, inductive = 7, fluxes = 9, rated = 11
+  ! forms; a motor with a governor has the next one, and so has one of `fluxes` or `rated` with a supply over the time; one whose
+  ! set speed follows the time has the one after that
+  integer, parameter :: quadratic = 1, induction = 4, table = 7, inductive = 10, fluxes = 13, rated = 16, inverter = 19
 
 contains
 
@@ -34,6 +37,8 @@ contains
         call check_induction(input, indices(i), error)
       case ('induction_dq')
         call check_flux_motor(input, indices(i), error)
+      case ('inverter')
+        call check_inverter(input, indices(i), error)
       case default
       end select
       if (allocated(error)) return
@@ -53,6 +58,22 @@ contains
     end associate
   end subroutine check_induction
 
+  !> Refuses a gain that turns a motor away from its set speed, and an odd number of poles.
+  subroutine check_inverter(input, index, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    type(error_t), allocatable, intent(out) :: error
+
+    associate (group => input%groups(index))
+      if (.not. group%number('governor_gain') > 0) then
+        call raise(error, exit_input, input%location(index, 'governor_gain') // ': governor_gain = ' // &
+                   to_text(group%number('governor_gain')) // "; allowed with kind = 'inverter': > 0 [s/rad]")
+      else if (group%has_value('poles')) then
+        call check_poles(input, index, error)
+      end if
+    end associate
+  end subroutine check_inverter
+
   !> Form of the law of a group &motor. A motor with constant torque is quadratic, and so is a dc motor without inductance.
   pure integer function motor_form(group)
     type(group_t), intent(in) :: group
@@ -62,6 +83,8 @@ contains
       motor_form = induction
     case ('induction_dq')
       motor_form = merge(rated, fluxes, group%has_value('rated_power'))
+    case ('inverter')
+      motor_form = inverter
     case ('table')
       motor_form = table
     case ('dc')
@@ -70,6 +93,7 @@ contains
       motor_form = quadratic
     end select
     if (group%has_value('governor_speed') .or. group%has_value('supply_times')) motor_form = motor_form + 1
+    if (group%has_value('set_times')) motor_form = motor_form + 2
   end function motor_form
 
   !> Adds the bank of the motors of one form.
@@ -82,34 +106,83 @@ contains
     integer :: body(size(groups%indices))
 
     body = groups%bodies('body', 1)
-    if (modulo(form, 2) == 0 .and. form < fluxes) then
+    if (modulo(form, 3) /= quadratic .and. (form < fluxes .or. form > inverter)) then
       allocate (governor)
-      allocate (governor%set_speed, source=groups%values('governor_speed'))
-      allocate (governor%gain, source=groups%values('governor_gain'))
-      allocate (governor%time, source=groups%values('governor_time'))
-      allocate (governor%start, source=groups%values('governor_start'))
+      call set_governor(groups, governor)
       allocate (drag, source=drags(groups))
     end if
     select case (form)
     case (quadratic)
       call append_bank(banks, new_motors(groups%names, body, standstill_torques(groups), groups%values('b') + drags(groups), &
                                          groups%values('c')))
-    case (quadratic + 1)
+    case (quadratic + 1, quadratic + 2)
       call append_bank(banks, new_motors(groups%names, body, standstill_torques(groups), groups%values('b'), groups%values('c'), &
                                          governor, drag))
-    case (induction, induction + 1)
+    case (induction:induction + 2)
       call append_bank(banks, new_induction_motors(groups%names, body, groups%values('breakdown_torque'), &
                                                    groups%values('breakdown_slip'), groups%values('synchronous_speed'), &
                                                    governor, drag))
-    case (table, table + 1)
+    case (table:table + 2)
       call append_bank(banks, new_table_motors(groups%names, body, groups%curves('table_speed', 'table_torque'), governor, drag))
-    case (fluxes:)
+    case (fluxes:inverter - 1)
       call add_flux_motors(groups, body, banks)
+    case (inverter:)
+      call append_bank(banks, new_inverter_motors(groups%names, body, groups%values('torque_limit'), governor, &
+                                                  torque_harmonics(groups)))
     case default
       call append_bank(banks, new_dc_motors(groups%names, body, groups%values('voltage'), groups%values('resistance'), &
                                             groups%values('flux_constant'), groups%values('inductance'), governor))
     end select
   end subroutine add_motor_form
+
+  !> The governors of motors, all or none of whose set speeds follow the time.
+  subroutine set_governor(groups, governor)
+    type(element_groups_t), intent(in) :: groups
+    type(governor_t), intent(out) :: governor
+    integer :: i, lane
+    real(wp) :: t_start
+
+    allocate (governor%set_speed, source=groups%values('governor_speed'))
+    allocate (governor%gain, source=groups%values('governor_gain'))
+    allocate (governor%time, source=groups%values('governor_time'))
+    allocate (governor%start, source=groups%values('governor_start'))
+    if (groups%input%groups(groups%indices(1))%text('kind') == 'inverter') governor%least = -1.0_wp
+    if (.not. groups%input%groups(groups%indices(1))%has_value('set_times')) return
+    t_start = groups%input%groups(groups%input%position('run'))%number('t_start')
+    allocate (governor%course(groups%lanes, size(groups%indices)))
+    do i = 1, size(groups%indices)
+      associate (group => groups%input%groups(groups%indices(i)))
+        do lane = 1, groups%lanes
+          call join_points(group%numbers('set_times'), group%numbers('set_speeds'), governor%course(lane, i))
+          governor%set_speed(lane, i) = governor%course(lane, i)%at(t_start)
+        end do
+      end associate
+    end do
+  end subroutine set_governor
+
+  !> The harmonics of the torque of motors on inverters.
+  function torque_harmonics(groups) result(harmonics)
+    type(element_groups_t), intent(in) :: groups
+    type(torque_harmonics_t) :: harmonics
+    integer :: i, k, most
+
+    most = maxval([0, (size(groups%input%groups(groups%indices(i))%numbers('harmonics')), i=1, size(groups%indices))])
+    allocate (harmonics%order(groups%lanes, size(groups%indices), most), source=0.0_wp)
+    allocate (harmonics%share, harmonics%torque, harmonics%phase, source=harmonics%order)
+    do i = 1, size(groups%indices)
+      associate (group => groups%input%groups(groups%indices(i)))
+        associate (order => group%numbers('harmonics'), share => group%numbers('harmonic_shares'), &
+                   torque => group%numbers('harmonic_torques'), phase => group%numbers('harmonic_phases'))
+          do k = 1, size(order)
+            harmonics%order(:, i, k) = 0.5_wp * group%whole_number('poles') * order(k)
+            harmonics%phase(:, i, k) = phase(k)
+            if (size(share) > 0) harmonics%share(:, i, k) = share(k)
+            if (size(torque) > 0) harmonics%torque(:, i, k) = torque(k)
+          end do
+        end associate
+      end associate
+    end do
+  end function torque_harmonics
 
   !> Torques at standstill [N m]: `a` of quadratic motors, `torque` of constant ones, k voltage / resistance of dc motors.
   function standstill_torques(groups) result(torques)

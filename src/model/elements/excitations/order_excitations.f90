@@ -335,9 +335,10 @@ contains
   end subroutine find_segment
 
   !> The mean bends at the points.
-  function knees(self, element) result(speeds)
+  function knees(self, element, t) result(speeds)
     class(order_excitations_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: t        !! [s]
     real(wp), allocatable :: speeds(:)
 
     allocate (speeds(0))

@@ -78,14 +78,15 @@ contains
   end subroutine steady_internal
 
   !> The speed without torque, and that of the governor.
-  function knees(self, element) result(speeds)
+  function knees(self, element, t) result(speeds)
     class(dc_motors_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: t        !! [s]
     real(wp), allocatable :: speeds(:)
 
     associate (voltage => self%parameters(self%number_of('voltage'))%value, &
                flux_constant => self%parameters(self%number_of('flux_constant'))%value)
-      speeds = [self%governed_bank_t%knees(element), voltage(1, element) / flux_constant(1, element)]
+      speeds = [self%governed_bank_t%knees(element, t), voltage(1, element) / flux_constant(1, element)]
     end associate
   end function knees
 

@@ -185,9 +185,10 @@ contains
   end subroutine steady_internal
 
   !> The synchronous speed, and those of the largest steady torque as a motor and as a generator.
-  function knees(self, element) result(speeds)
+  function knees(self, element, t) result(speeds)
     class(flux_motors_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: t        !! [s]
     real(wp), allocatable :: speeds(:)
     type(induction_circuit_t) :: circuit
 

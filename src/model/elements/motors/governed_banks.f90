@@ -1,4 +1,5 @@
 !> Banks of motors that a PI governor may throttle: y = clip(z + gain (set_speed - omega)) between 0 and 1, z' = (y - z) / time.
+!> That of an inverter is between -1 and 1. The set speed may follow the time.
 !>
 !> Between the limits z' = gain (set_speed - omega) / time, the integral of a PI controller. At a limit z tends to the limit.
 !> Stopping the integration there (clamping) would make the state slide along the limit when the governor leaves it.
@@ -12,20 +13,25 @@ module nocdyn_governed_banks
     pick, speed_of, state_of
   use nocdyn_law_functions, only: add_guard
   use nocdyn_law_tape, only: law_tape_t
+  use nocdyn_schedules, only: add_schedule, guard_schedule, schedule_t, scheduled_value, value_at
   implicit none (type, external)
   private
 
   !> The governors of the motors of a bank, shape [lanes, motors].
   type, public :: governor_t
-    real(wp), allocatable :: set_speed(:, :)   !! [rad/s]
+    real(wp), allocatable :: set_speed(:, :)   !! at the start [rad/s]
     real(wp), allocatable :: gain(:, :)        !! [s/rad], not zero
     real(wp), allocatable :: time(:, :)        !! integral time [s], positive
-    real(wp), allocatable :: start(:, :)       !! throttle y at the start, 0 to 1
+    real(wp), allocatable :: start(:, :)       !! throttle y at the start, `least` to 1
+    real(wp) :: least = 0.0_wp                 !! lower limit of the throttle
+    type(schedule_t), allocatable :: course(:, :)   !! of the set speed, where it follows the time
   end type governor_t
 
   !> The integral z of a governor is the last internal state of its motor. The switches of the governors are the last ones.
   type, extends(bank_t), public :: governed_bank_t
     logical :: has_governor = .false.
+    logical, private :: has_course = .false.   !! whether the set speeds follow the time; their switch is the last but one
+    real(wp), private :: least = 0.0_wp        !! lower limit of the throttle
     logical, private :: is_held = .false.   !! whether the throttles stay open at every speed, after `hold_speed`
   contains
     procedure :: add_governor
@@ -38,6 +44,7 @@ module nocdyn_governed_banks
     procedure :: observe
   end type governed_bank_t
 
+  character(len=*), parameter :: course = 'set speed'   ! the schedule
   integer, parameter :: governing = 1, closed = 2, open = 3   ! the branches
 
 contains
@@ -55,6 +62,9 @@ contains
     call self%add_parameter('governor_gain', governor%gain, is_key=.false.)
     call self%add_parameter('governor_time', governor%time)
     call self%add_parameter('governor_start', governor%start, is_key=.false.)
+    self%least = governor%least
+    self%has_course = allocated(governor%course)
+    if (self%has_course) call add_schedule(self, course, governor%course, 'point of the set speed')
     call self%add_switches([('limit of the governor', e=1, self%count)], open)
   end subroutine add_governor
 
@@ -63,7 +73,7 @@ contains
     class(governed_bank_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape
     type(expression_t) :: y
-    type(expression_t) :: free, none, one, shift, z
+    type(expression_t) :: free, least, none, one, set_speed, shift, z
     integer :: switch
 
     switch = size(self%switch_element) / self%count
@@ -71,12 +81,16 @@ contains
     one = literal(tape, 1.0_wp)
     shift = literal(tape, boundary_width)
     z = state_of(tape, self%states)
-    free = z + self%parameter(tape, 'governor_gain') * (self%parameter(tape, 'governor_speed') - speed_of(tape))
-    y = pick(switch, [none, none, one]) + pick(switch, [one, none, none]) * free
+    least = literal(tape, self%least)
+    set_speed = self%parameter(tape, 'governor_speed')
+    if (self%has_course) set_speed = scheduled_value(self, tape, course, switch - 1)
+    if (self%has_course) call guard_schedule(self, tape, course, switch - 1)
+    free = z + self%parameter(tape, 'governor_gain') * (set_speed - speed_of(tape))
+    y = pick(switch, [none, least, one]) + pick(switch, [one, none, none]) * free
     tape%rate(self%states) = node_of((y - z) / self%parameter(tape, 'governor_time'))
-    call add_guard(switch, governing, free, shift)
+    call add_guard(switch, governing, free - self%least, shift)   ! continuous in the time, though it has picks of the course
     call add_guard(switch, governing, 1.0_wp - free, shift)
-    call add_guard(switch, closed, -free, shift)
+    call add_guard(switch, closed, self%least - free, shift)
     call add_guard(switch, open, free - 1.0_wp, shift)
   end function throttle
 
@@ -117,30 +131,42 @@ contains
     integer :: e
 
     if (.not. self%has_governor) return
-    associate (set_speed => self%parameters(self%number_of('governor_speed'))%value, &
-               gain => self%parameters(self%number_of('governor_gain'))%value)
+    associate (gain => self%parameters(self%number_of('governor_gain'))%value)
       do e = 1, self%count
-        if (self%is_held) then   ! beyond the limit, where the throttle does not depend on the speed
-          internal(self%states * e) = 2.0_wp + abs(gain(1, e) * (set_speed(1, e) - speed(e)))
-        else
-          internal(self%states * e) = merge(1.0_wp, 0.0_wp, gain(1, e) * (set_speed(1, e) - speed(e)) >= 0.0_wp)
-        end if
+        associate (demand => gain(1, e) * (set_speed_at(self, e, t) - speed(e)))
+          if (self%is_held) then   ! beyond the limit, where the throttle does not depend on the speed
+            internal(self%states * e) = 2.0_wp + abs(demand)
+          else
+            internal(self%states * e) = merge(1.0_wp, self%least, demand >= 0.0_wp)
+          end if
+        end associate
       end do
     end associate
   end subroutine steady_internal
 
+  !> The set speed of a governor in the first lane [rad/s].
+  pure real(wp) function set_speed_at(self, element, t)
+    class(governed_bank_t), intent(in) :: self
+    integer, intent(in) :: element
+    real(wp), intent(in) :: t   ! [s]
+
+    if (self%has_course) then
+      set_speed_at = value_at(self, course, element, t)
+    else
+      set_speed_at = self%parameters(self%number_of('governor_speed'))%value(1, element)
+    end if
+  end function set_speed_at
+
   !> The points of a table, and the speed that a governor keeps.
-  function knees(self, element) result(speeds)
+  function knees(self, element, t) result(speeds)
     class(governed_bank_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: t        !! [s]
     real(wp), allocatable :: speeds(:)
 
     allocate (speeds(0))
     if (allocated(self%curve)) speeds = self%curve(1, element)%knots()
-    if (.not. self%has_governor) return
-    associate (set_speed => self%parameters(self%number_of('governor_speed'))%value)
-      speeds = [speeds, set_speed(1, element)]
-    end associate
+    if (self%has_governor) speeds = [speeds, set_speed_at(self, element, t)]
   end function knees
 
   !> Torque, armature current where that is a state, and throttle where there is a governor.

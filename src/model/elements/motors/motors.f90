@@ -166,14 +166,15 @@ contains
   end function induction_torque
 
   !> The vertex, and the speeds without torque, where a, b and c are of sizes that belong together.
-  function quadratic_knees(self, element) result(speeds)
+  function quadratic_knees(self, element, t) result(speeds)
     class(motors_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: t        !! [s]
     real(wp), allocatable :: speeds(:)
     real(wp), parameter :: together = 1.0e-20_wp   ! ratio of coefficients below which one is no part of the law
     real(wp) :: a, b, c, discriminant
 
-    speeds = self%governed_bank_t%knees(element)
+    speeds = self%governed_bank_t%knees(element, t)
     a = self%parameters(self%number_of('a'))%value(1, element)
     b = self%parameters(self%number_of('b'))%value(1, element)
     c = self%parameters(self%number_of('c'))%value(1, element)
@@ -186,14 +187,15 @@ contains
   end function quadratic_knees
 
   !> The synchronous speed, and those of the largest torque as a motor and as a generator.
-  function induction_knees(self, element) result(speeds)
+  function induction_knees(self, element, t) result(speeds)
     class(induction_motors_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: t        !! [s]
     real(wp), allocatable :: speeds(:)
 
     associate (synchronous => self%parameters(self%number_of('synchronous_speed'))%value(1, element), &
                slip => self%parameters(self%number_of('breakdown_slip'))%value(1, element))
-      speeds = [self%governed_bank_t%knees(element), synchronous * (1.0_wp + slip * [-1.0_wp, 0.0_wp, 1.0_wp])]
+      speeds = [self%governed_bank_t%knees(element, t), synchronous * (1.0_wp + slip * [-1.0_wp, 0.0_wp, 1.0_wp])]
     end associate
   end function induction_knees
 

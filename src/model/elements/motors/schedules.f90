@@ -24,6 +24,7 @@ module nocdyn_schedules
     logical, allocatable :: flag(:)     !! what else holds on a stretch
   contains
     procedure :: append
+    procedure :: at
   end type schedule_t
 
 contains
@@ -44,6 +45,19 @@ contains
     self%slope = [self%slope, slope]
     self%flag = [self%flag, flag]
   end subroutine append
+
+  !> The number at a time.
+  pure real(wp) function at(self, t)
+    class(schedule_t), intent(in) :: self
+    real(wp), intent(in) :: t   !! [s]
+    integer :: s
+
+    do s = size(self%begin), 2, -1
+      if (time_reached(t) >= self%begin(s)) exit
+    end do
+    s = max(s, 1)
+    at = self%value(s) + self%slope(s) * (t - self%begin(s))
+  end function at
 
   !> The schedule through points, with the first value before them and the last one after them.
   subroutine join_points(time, value, schedule)

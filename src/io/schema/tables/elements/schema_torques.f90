@@ -9,7 +9,7 @@ module nocdyn_schema_torques
   private
 
   character(len=*), parameter :: linear = "'linear'"
-  character(len=*), parameter :: governed = 'quadratic constant table induction dc'   ! kinds that may have a governor
+  character(len=*), parameter :: governed = 'quadratic constant table induction dc inverter'   ! kinds with a governor
 
   type(kind_rule_t), parameter, public :: torque_kinds(*) = [ &
     kind_rule_t('motor',      'quadratic', 'a - b omega - c omega^2'), &
@@ -18,6 +18,7 @@ module nocdyn_schema_torques
     kind_rule_t('motor',      'induction', '2 T_k / (s/s_k + s_k/s), slip s = 1 - omega/synchronous_speed (Kloss)'), &
     kind_rule_t('motor',      'induction_dq', 'induction machine with electrical transients, by its equivalent circuit'), &
     kind_rule_t('motor',      'dc',        'flux_constant i; inductance di/dt = voltage - resistance i - flux_constant omega'), &
+    kind_rule_t('motor',      'inverter',  'speed control: torque_limit times the throttle of a governor, -1 to 1'), &
     kind_rule_t('excitation', 'harmonic',  'amplitude sin(frequency t + phase)'), &
     kind_rule_t('excitation', 'orders',    'the sum of amplitude_k sin(order_k phi + phase_k), phi the angle of the body'), &
     kind_rule_t('excitation', 'table',     'torque over time from a table; constant before and after it'), &
@@ -61,8 +62,9 @@ module nocdyn_schema_torques
       'voltage of the supply; of three-phase mains, positive, between two lines, rms', 'induction_dq dc'), &
     key_rule_t('motor',      'frequency',       a_number,       1, 'rad/s',       required,    positive, &
       'angular frequency of the mains', 'induction_dq'), &
-    key_rule_t('motor',      'poles',           an_integer,     1, '',            required,    from_2, &
-      'number of poles, even; the synchronous speed is 2 frequency / poles', 'induction_dq'), &
+    key_rule_t('motor',      'poles',           an_integer,     1, '',            unset,       from_2, &
+      'number of poles, even; the synchronous speed is 2 frequency / poles', 'induction_dq inverter', &
+      required_if='induction_dq'), &
     key_rule_t('motor',      'reversed',        a_flag,         1, '',            '.false.',   anything, &
       'whether the field turns backwards, as with two lines exchanged', 'induction_dq'), &
     key_rule_t('motor',      'stator_resistance', a_number,     1, 'Ohm',         required,    not_negative, &
@@ -107,14 +109,29 @@ module nocdyn_schema_torques
       'torque per current, which is voltage per speed', 'dc'), &
     key_rule_t('motor',      'inductance',      a_number,       1, 'H',           '0',         not_negative, &
       'inductance of the armature; 0: the current has no delay', 'dc'), &
+    key_rule_t('motor',      'torque_limit',    a_number,       1, 'N m',         required,    positive, &
+      'largest torque that the control gives, in both directions', 'inverter'), &
+    key_rule_t('motor',      'harmonics',       a_number,       any_number, '',   unset,       positive, &
+      'multiples of the electrical frequency, poles / 2 times the speed, with which the torque pulsates', 'inverter', 1), &
+    key_rule_t('motor',      'harmonic_shares', a_number,       any_number, '',   unset,       anything, &
+      'amplitude of each as a share of the present control torque', 'inverter', 1), &
+    key_rule_t('motor',      'harmonic_torques', a_number,      any_number, 'N m', unset,      anything, &
+      'amplitude of each', 'inverter', 1), &
+    key_rule_t('motor',      'harmonic_phases', a_number,       any_number, 'rad', '0',        anything, &
+      'phase of each where the angle of the body is 0', 'inverter', 1), &
     key_rule_t('motor',      'governor_speed',  a_number,       1, 'rad/s',       unset,       anything, &
       'speed that a PI governor keeps by a throttle from 0 to 1 on the torque (dc: on the voltage)', governed), &
     key_rule_t('motor',      'governor_gain',   a_number,       1, 's/rad',       unset,       not_zero, &
-      'throttle = z + governor_gain (governor_speed - omega); gain < 0 if the motor turns backwards', governed), &
+      'throttle = z + governor_gain (governor_speed - omega); gain < 0 if the motor turns backwards', governed, &
+      required_if='inverter'), &
     key_rule_t('motor',      'governor_time',   a_number,       1, 's',           unset,       positive, &
-      'integral time: z'' = (throttle - z) / governor_time', governed), &
+      'integral time: z'' = (throttle - z) / governor_time', governed, required_if='inverter'), &
     key_rule_t('motor',      'governor_start',  a_number,       1, '',            '1',         from_0_to_1, &
-      'throttle at t_start', governed)]
+      'throttle at t_start; that of an inverter is 0', 'quadratic constant table induction dc'), &
+    key_rule_t('motor',      'set_times',       a_number,       any_number, 's',  unset,       anything, &
+      'times of points between which the set speed changes evenly, instead of governor_speed', governed, 1, ascends=.true.), &
+    key_rule_t('motor',      'set_speeds',      a_number,       any_number, 'rad/s', unset,    anything, &
+      'set speed at these times; constant before and after them', governed, 1)]
 
   type(key_rule_t), parameter, public :: load_keys(*) = [ &
     key_rule_t('load',       'name',            a_name,         1, '',            required,    anything, &
@@ -197,12 +214,21 @@ module nocdyn_schema_torques
                     'stator_reactance rotor_reactance mutual_reactance'), &
     relation_rule_t('motor', requires, 'supply_times', 'supply_factors'), &
     relation_rule_t('motor', requires, 'supply_factors supply_ramps', 'supply_times'), &
-    relation_rule_t('motor', requires, 'governor_speed', 'governor_gain'), &
-    relation_rule_t('motor', requires, 'governor_speed', 'governor_time'), &
-    relation_rule_t('motor', requires, 'governor_gain governor_time governor_start', 'governor_speed'), &
+    relation_rule_t('motor', requires, 'harmonics', 'poles'), &
+    relation_rule_t('motor', requires, 'harmonics', 'harmonic_shares harmonic_torques'), &
+    relation_rule_t('motor', requires, 'harmonic_shares harmonic_torques harmonic_phases', 'harmonics'), &
+    relation_rule_t('motor', at_most_one, 'harmonic_shares', 'harmonic_torques'), &
+    relation_rule_t('motor', at_most_one, 'governor_speed', 'set_times set_speeds'), &
+    relation_rule_t('motor', requires, 'governor_speed set_times', 'governor_gain'), &
+    relation_rule_t('motor', requires, 'governor_speed set_times', 'governor_time'), &
+    relation_rule_t('motor', requires, 'governor_gain governor_time governor_start', 'governor_speed set_times'), &
+    relation_rule_t('motor', requires, 'set_times', 'set_speeds'), &
+    relation_rule_t('motor', requires, 'set_speeds', 'set_times'), &
     relation_rule_t('load', requires, 'constant_speed', 'constant'), &
     relation_rule_t('load', requires, 'interpolation extrapolation', 'table_speed table_file'), &
     relation_rule_t('motor', equal_lengths, 'table_speed table_torque', 'table_file'), &
+    relation_rule_t('motor', equal_lengths, 'set_times set_speeds', ''), &
+    relation_rule_t('motor', equal_lengths, 'harmonics harmonic_shares harmonic_torques harmonic_phases', ''), &
     relation_rule_t('motor', equal_lengths, 'supply_times supply_factors supply_ramps', ''), &
     relation_rule_t('load', equal_lengths, 'table_speed table_torque', 'table_file'), &
     relation_rule_t('excitation', equal_lengths, 'table_time table_torque', 'table_file'), &
@@ -220,6 +246,9 @@ module nocdyn_schema_torques
     example_t('motor',      "name = 'diesel'   body = 'motor'    kind = 'table'|" // &
                             'table_speed = 60, 120, 180  table_torque = 250, 310, 270|' // &
                             'governor_speed = 150.0  governor_gain = 0.1  governor_time = 2.0', .false.), &
+    example_t('motor',      "name = 'drive'    body = 'motor'    kind = 'inverter'  torque_limit = 600.0|" // &
+                            'set_times = 0, 10  set_speeds_rpm = 0, 1500  governor_gain = 0.1  governor_time = 0.5|' // &
+                            'poles = 4  harmonics = 6, 12  harmonic_shares = 0.02, 0.01', .false.), &
     example_t('load',       "name = 'work'     body = 'machine'  viscous = 100.0"), &
     example_t('load',       "name = 'fan'      body = 'machine'  quadratic = 0.01  constant = 2.0", .false.), &
     example_t('excitation', "name = 'shaker'   body = 'motor'    amplitude = 20.0  frequency = 5.0"), &
