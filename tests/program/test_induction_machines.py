@@ -258,7 +258,10 @@ def test_a_start_in_the_steady_state_takes_the_share_of_the_supply_at_its_time(n
     [
         ("poles = 3", "poles = 3; allowed: an even number, twice the pole pairs"),
         ("voltage = -220", "voltage = -220; allowed: > 0 [V]"),
-        ("governor_speed = 100", "governor_speed belongs to kind = 'quadratic', 'constant', 'table', 'induction' or 'dc'"),
+        (
+            "governor_speed = 100",
+            "governor_speed belongs to kind = 'quadratic', 'constant', 'table', 'induction', 'dc' or 'inverter'",
+        ),
         ("frequency = -377", "frequency = -377 is out of range; allowed: > 0 [rad/s]"),
         (
             "supply_times = 1, 2 supply_factors = 0, 1",
@@ -268,7 +271,7 @@ def test_a_start_in_the_steady_state_takes_the_share_of_the_supply_at_its_time(n
             "supply_times = 1, 2 supply_factors = 0.5, 1 supply_ramps = 3, 0",
             "supply_ramps(1) = 3 from supply_times(1) = 1 ends after supply_times(2) = 2; allowed: ramps that end before",
         ),
-        ("supply_times = 1, 2", "supply_times needs supply_factors"),
+        ("supply_times = 1, 2", "supply_factors is missing; needed: 2 values, one for each of supply_times\n"),
         ("supply_ramps = 1, 2", "supply_ramps needs supply_times"),
         (
             "supply_times = 1, 2 supply_factors = 1",

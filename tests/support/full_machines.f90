@@ -9,6 +9,7 @@ module nocdyn_test_full_machines
   use nocdyn_flux_motors, only: circuit_keys, new_flux_motors
   use nocdyn_gap_couplings, only: gap_couplings_t, new_gap_couplings
   use nocdyn_governed_banks, only: governor_t
+  use nocdyn_inverter_motors, only: new_inverter_motors, torque_harmonics_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_mesh_phases, only: new_mesh_phases
@@ -18,7 +19,7 @@ module nocdyn_test_full_machines
   use nocdyn_order_excitations, only: new_order_excitations, order_torque_t
   use nocdyn_polynomial_couplings, only: new_polynomial_couplings, polynomial_couplings_t
   use nocdyn_saturated_couplings, only: new_saturated_couplings
-  use nocdyn_schedules, only: schedule_t
+  use nocdyn_schedules, only: join_points, schedule_t
   use nocdyn_table_couplings, only: new_table_couplings
   use nocdyn_table_excitations, only: new_table_excitations
   use nocdyn_test_machines, only: finish, numbered_names
@@ -183,12 +184,43 @@ contains
       call append_bank(machine%banks, &
                        new_dc_motors(numbered_names('drive', 1), [bodies], 24.0_wp * one, 2.0_wp * one, 1.5_wp * one, &
                                      0.5_wp * one, governor))
+      governor%least = -1.0_wp
+      call set_courses(variants, governor)
+      call append_bank(machine%banks, &
+                       new_inverter_motors(numbered_names('inverter', 1), [bodies], 20.0_wp * one, governor, ripple(variants)))
       call append_bank(machine%banks, new_flux_motors(numbered_names('fluxes', 1), [bodies], circuits(variants), &
                                                       4.0_wp + 0.0_wp * one, sign(1.0_wp, -one), .true.))
       call append_bank(machine%banks, new_flux_motors(numbered_names('supplied', 1), [1], circuits(variants), &
                                                       2.0_wp + 0.0_wp * one, sign(1.0_wp, one), .true., supply(variants)))
     end associate
   end subroutine add_motors
+
+  !> Set speeds that rise from 0.05 s on.
+  subroutine set_courses(variants, governor)
+    integer, intent(in) :: variants(:)
+    type(governor_t), intent(inout) :: governor
+    integer :: l
+
+    allocate (governor%course(size(variants), 1))   ! gfortran 12: `source` copies the pointers to allocatable components
+    do l = 1, size(variants)
+      call join_points([0.05_wp, 0.5_wp, 2.0_wp], [0.5_wp, 1.0_wp + 0.03_wp * variants(l), -1.0_wp], governor%course(l, 1))
+    end do
+  end subroutine set_courses
+
+  !> Two harmonics of a motor.
+  function ripple(variants) result(harmonics)
+    integer, intent(in) :: variants(:)
+    type(torque_harmonics_t) :: harmonics
+
+    associate (one => reshape(lane_values(1.0_wp, variants, 2), [size(variants), 1, 2]))
+      harmonics%order = 0.0_wp * one
+      harmonics%order(:, 1, 1) = 2.0_wp
+      harmonics%order(:, 1, 2) = 6.0_wp
+      harmonics%share = 0.1_wp * one
+      harmonics%torque = 0.5_wp * one
+      harmonics%phase = 0.3_wp * one
+    end associate
+  end function ripple
 
   !> Half of the voltage within a ramp, then disconnected, then all of it.
   function supply(variants) result(schedule)

@@ -87,7 +87,7 @@ contains
         call append(known, trim(key_rules(key)%name))
       end if
     end do
-    if (size(known) > 0) call buffer%append_line(prefix // '    ' // listed(known, ' and ') // ' as above')
+    if (size(known) > 0) call append_wrapped(buffer, listed(known, ' and ') // ' as above', prefix // '    ')
   end subroutine append_kind
 
   subroutine append_key(buffer, rule, prefix)

@@ -1,7 +1,7 @@
 !> Motors on inverters, whose speed is controlled: torque_limit y with the throttle y of a governor, from -1 to 1, and harmonics.
 !>
-!> The harmonics of the air gap's torque have whole multiples of the electrical frequency, which is the number of pole pairs times the
-!> speed: (1 + sum of share_k sin(n_k p u + phase_k)) times the control torque, plus a sum of torque_k sin(n_k p u + phase_k).
+!> The harmonics of the air gap's torque have multiples of the electrical frequency, the number of pole pairs times the speed:
+!> (1 + sum of share_k sin(n_k p u + phase_k)) times the control torque, plus a sum of torque_k sin(n_k p u + phase_k).
 module nocdyn_inverter_motors
   use nocdyn_bank, only: harmonic_t, role_motor, sine_harmonic
   use nocdyn_governed_banks, only: governed_bank_t, governor_t

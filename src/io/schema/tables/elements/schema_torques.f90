@@ -112,7 +112,7 @@ module nocdyn_schema_torques
     key_rule_t('motor',      'torque_limit',    a_number,       1, 'N m',         required,    positive, &
       'largest torque that the control gives, in both directions', 'inverter'), &
     key_rule_t('motor',      'harmonics',       a_number,       any_number, '',   unset,       positive, &
-      'multiples of the electrical frequency, poles / 2 times the speed, with which the torque pulsates', 'inverter', 1), &
+      'multiples of the electrical frequency, poles / 2 times the speed, in the torque', 'inverter', 1), &
     key_rule_t('motor',      'harmonic_shares', a_number,       any_number, '',   unset,       anything, &
       'amplitude of each as a share of the present control torque', 'inverter', 1), &
     key_rule_t('motor',      'harmonic_torques', a_number,      any_number, 'N m', unset,      anything, &
@@ -212,17 +212,14 @@ module nocdyn_schema_torques
     relation_rule_t('motor', requires, 'starting_torque starting_current', 'rated_power'), &
     relation_rule_t('motor', exactly_one, 'stator_leakage rotor_leakage mutual_inductance', &
                     'stator_reactance rotor_reactance mutual_reactance'), &
-    relation_rule_t('motor', requires, 'supply_times', 'supply_factors'), &
     relation_rule_t('motor', requires, 'supply_factors supply_ramps', 'supply_times'), &
     relation_rule_t('motor', requires, 'harmonics', 'poles'), &
-    relation_rule_t('motor', requires, 'harmonics', 'harmonic_shares harmonic_torques'), &
     relation_rule_t('motor', requires, 'harmonic_shares harmonic_torques harmonic_phases', 'harmonics'), &
-    relation_rule_t('motor', at_most_one, 'harmonic_shares', 'harmonic_torques'), &
+    relation_rule_t('motor', exactly_one, 'harmonic_shares', 'harmonic_torques'), &
     relation_rule_t('motor', at_most_one, 'governor_speed', 'set_times set_speeds'), &
     relation_rule_t('motor', requires, 'governor_speed set_times', 'governor_gain'), &
     relation_rule_t('motor', requires, 'governor_speed set_times', 'governor_time'), &
     relation_rule_t('motor', requires, 'governor_gain governor_time governor_start', 'governor_speed set_times'), &
-    relation_rule_t('motor', requires, 'set_times', 'set_speeds'), &
     relation_rule_t('motor', requires, 'set_speeds', 'set_times'), &
     relation_rule_t('load', requires, 'constant_speed', 'constant'), &
     relation_rule_t('load', requires, 'interpolation extrapolation', 'table_speed table_file'), &
@@ -246,7 +243,7 @@ module nocdyn_schema_torques
     example_t('motor',      "name = 'diesel'   body = 'motor'    kind = 'table'|" // &
                             'table_speed = 60, 120, 180  table_torque = 250, 310, 270|' // &
                             'governor_speed = 150.0  governor_gain = 0.1  governor_time = 2.0', .false.), &
-    example_t('motor',      "name = 'drive'    body = 'motor'    kind = 'inverter'  torque_limit = 600.0|" // &
+    example_t('motor',      "name = 'control'  body = 'motor'    kind = 'inverter'  torque_limit = 600.0|" // &
                             'set_times = 0, 10  set_speeds_rpm = 0, 1500  governor_gain = 0.1  governor_time = 0.5|' // &
                             'poles = 4  harmonics = 6, 12  harmonic_shares = 0.02, 0.01', .false.), &
     example_t('load',       "name = 'work'     body = 'machine'  viscous = 100.0"), &
