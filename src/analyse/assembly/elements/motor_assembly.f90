@@ -11,6 +11,7 @@ module nocdyn_motor_assembly
   use nocdyn_kinds, only: wp
   use nocdyn_motors, only: new_induction_motors, new_motors, new_table_motors
   use nocdyn_schedules, only: join_points
+  use nocdyn_synchronous_motors, only: new_synchronous_motors, slip_curves_t
   use nocdyn_text, only: to_text
   implicit none (type, external)
   private
@@ -19,7 +20,8 @@ module nocdyn_motor_assembly
 
   ! forms; a motor with a governor has the next one, and so has one of `fluxes` or `rated` with a supply over the time; one whose
   ! set speed follows the time has the one after that
-  integer, parameter :: quadratic = 1, induction = 4, table = 7, inductive = 10, fluxes = 13, rated = 16, inverter = 19
+  integer, parameter :: quadratic = 1, induction = 4, table = 7, inductive = 10, fluxes = 13, rated = 16, inverter = 19, &
+                        synchronous = 22
 
 contains
 
@@ -39,6 +41,8 @@ contains
         call check_flux_motor(input, indices(i), error)
       case ('inverter')
         call check_inverter(input, indices(i), error)
+      case ('synchronous')
+        call check_synchronous(input, indices(i), error)
       case default
       end select
       if (allocated(error)) return
@@ -74,6 +78,24 @@ contains
     end associate
   end subroutine check_inverter
 
+  !> Refuses an odd number of poles, and curves over the slip of which one is missing.
+  subroutine check_synchronous(input, index, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    type(error_t), allocatable, intent(out) :: error
+    logical :: by_axes, by_parts
+
+    call check_poles(input, index, error)
+    if (allocated(error)) return
+    associate (group => input%groups(index))
+      by_axes = group%has_value('d_torques') .and. group%has_value('q_torques')
+      by_parts = group%has_value('mean_torques') .and. group%has_value('pulsations')
+      if (by_axes .neqv. by_parts) return
+      call raise(error, exit_input, input%location(index, 'slips') // ': allowed over the slips: d_torques and q_torques, or ' // &
+                 'mean_torques and pulsations')
+    end associate
+  end subroutine check_synchronous
+
   !> Form of the law of a group &motor. A motor with constant torque is quadratic, and so is a dc motor without inductance.
   pure integer function motor_form(group)
     type(group_t), intent(in) :: group
@@ -85,6 +107,8 @@ contains
       motor_form = merge(rated, fluxes, group%has_value('rated_power'))
     case ('inverter')
       motor_form = inverter
+    case ('synchronous')
+      motor_form = synchronous
     case ('table')
       motor_form = table
     case ('dc')
@@ -106,7 +130,7 @@ contains
     integer :: body(size(groups%indices))
 
     body = groups%bodies('body', 1)
-    if (modulo(form, 3) /= quadratic .and. (form < fluxes .or. form > inverter)) then
+    if (modulo(form, 3) /= quadratic .and. (form < fluxes .or. form > inverter .and. form < synchronous)) then
       allocate (governor)
       call set_governor(groups, governor)
       allocate (drag, source=drags(groups))
@@ -126,7 +150,9 @@ contains
       call append_bank(banks, new_table_motors(groups%names, body, groups%curves('table_speed', 'table_torque'), governor, drag))
     case (fluxes:inverter - 1)
       call add_flux_motors(groups, body, banks)
-    case (inverter:)
+    case (synchronous)
+      call add_synchronous_motors(groups, body, banks)
+    case (inverter:inverter + 2)
       call append_bank(banks, new_inverter_motors(groups%names, body, groups%values('torque_limit'), governor, &
                                                   torque_harmonics(groups)))
     case default
@@ -159,6 +185,35 @@ contains
       end associate
     end do
   end subroutine set_governor
+
+  !> Adds a bank of synchronous motors.
+  subroutine add_synchronous_motors(groups, body, banks)
+    type(element_groups_t), intent(in) :: groups
+    integer, intent(in) :: body(:)
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    type(slip_curves_t) :: curves(groups%lanes, size(body))
+    real(wp), dimension(groups%lanes, size(body)) :: direction, poles
+    integer :: i, lane
+
+    do i = 1, size(body)
+      associate (group => groups%input%groups(groups%indices(i)))
+        poles(:, i) = group%whole_number('poles')
+        direction(:, i) = merge(-1.0_wp, 1.0_wp, group%flag('reversed'))
+        do lane = 1, groups%lanes
+          curves(lane, i)%slip = group%numbers('slips')
+          if (group%has_value('mean_torques')) then
+            curves(lane, i)%mean = group%numbers('mean_torques')
+            curves(lane, i)%pulsation = group%numbers('pulsations')
+          else
+            curves(lane, i)%mean = 0.5_wp * (group%numbers('d_torques') + group%numbers('q_torques'))
+            curves(lane, i)%pulsation = 0.5_wp * (group%numbers('d_torques') - group%numbers('q_torques'))
+          end if
+        end do
+      end associate
+    end do
+    call append_bank(banks, new_synchronous_motors(groups%names, body, curves, groups%values('frequency'), poles, direction, &
+                                                   groups%values('phase')))
+  end subroutine add_synchronous_motors
 
   !> The harmonics of the torque of motors on inverters.
   function torque_harmonics(groups) result(harmonics)

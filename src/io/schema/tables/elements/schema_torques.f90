@@ -19,6 +19,7 @@ module nocdyn_schema_torques
     kind_rule_t('motor',      'induction_dq', 'induction machine with electrical transients, by its equivalent circuit'), &
     kind_rule_t('motor',      'dc',        'flux_constant i; inductance di/dt = voltage - resistance i - flux_constant omega'), &
     kind_rule_t('motor',      'inverter',  'speed control: torque_limit times the throttle of a governor, -1 to 1'), &
+    kind_rule_t('motor',      'synchronous', 'start by the cage: a mean torque and a pulsation at twice the slip frequency'), &
     kind_rule_t('excitation', 'harmonic',  'amplitude sin(frequency t + phase)'), &
     kind_rule_t('excitation', 'orders',    'the sum of amplitude_k sin(order_k phi + phase_k), phi the angle of the body'), &
     kind_rule_t('excitation', 'table',     'torque over time from a table; constant before and after it'), &
@@ -47,7 +48,7 @@ module nocdyn_schema_torques
     key_rule_t('motor',      'table_torque',    a_number,       any_number, 'N m', unset,      anything, &
       'torque at these speeds', 'table', fewest=2), &
     key_rule_t('motor',      'table_file',      a_file,         1, '',            unset,       anything, &
-      'file with the table: two columns, speed [rad/s] and torque [N m]', 'table'), &
+      'two columns, speed [rad/s] and torque [N m]; synchronous: slip, d_torque, q_torque, ...', 'table synchronous'), &
     key_rule_t('motor',      'interpolation',   a_word,         1, '',            linear,      interpolations, &
       'between the points: straight lines, or the monotone cubic of Fritsch and Butland', 'table'), &
     key_rule_t('motor',      'extrapolation',   a_word,         1, '',            linear,      extrapolations, &
@@ -61,12 +62,12 @@ module nocdyn_schema_torques
     key_rule_t('motor',      'voltage',         a_number,       1, 'V',           required,    anything, &
       'voltage of the supply; of three-phase mains, positive, between two lines, rms', 'induction_dq dc'), &
     key_rule_t('motor',      'frequency',       a_number,       1, 'rad/s',       required,    positive, &
-      'angular frequency of the mains', 'induction_dq'), &
+      'angular frequency of the mains', 'induction_dq synchronous'), &
     key_rule_t('motor',      'poles',           an_integer,     1, '',            unset,       from_2, &
-      'number of poles, even; the synchronous speed is 2 frequency / poles', 'induction_dq inverter', &
+      'number of poles, even; the synchronous speed is 2 frequency / poles', 'induction_dq inverter synchronous', &
       required_if='induction_dq'), &
     key_rule_t('motor',      'reversed',        a_flag,         1, '',            '.false.',   anything, &
-      'whether the field turns backwards, as with two lines exchanged', 'induction_dq'), &
+      'whether the field turns backwards, as with two lines exchanged', 'induction_dq synchronous'), &
     key_rule_t('motor',      'stator_resistance', a_number,     1, 'Ohm',         required,    not_negative, &
       'of a phase of the star; of a delta winding a third, as of all values below', 'induction_dq'), &
     key_rule_t('motor',      'rotor_resistance', a_number,      1, 'Ohm',         required,    positive, &
@@ -119,6 +120,19 @@ module nocdyn_schema_torques
       'amplitude of each', 'inverter', 1), &
     key_rule_t('motor',      'harmonic_phases', a_number,       any_number, 'rad', '0',        anything, &
       'phase of each where the angle of the body is 0', 'inverter', 1), &
+    key_rule_t('motor',      'slips',           a_number,       any_number, '',   unset,       not_negative, &
+      'slips of the points of a table, ascending: 0 at the synchronous speed, 1 at standstill', 'synchronous', 2, &
+      ascends=.true.), &
+    key_rule_t('motor',      'd_torques',       a_number,       any_number, 'N m', unset,      anything, &
+      'torque at these slips with the circuits of the d axis on both axes', 'synchronous', 2), &
+    key_rule_t('motor',      'q_torques',       a_number,       any_number, 'N m', unset,      anything, &
+      'the same of the q axis; the mean is (d + q) / 2, the pulsation (d - q) / 2', 'synchronous', 2), &
+    key_rule_t('motor',      'mean_torques',    a_number,       any_number, 'N m', unset,      anything, &
+      'mean torque at these slips', 'synchronous', 2), &
+    key_rule_t('motor',      'pulsations',      a_number,       any_number, 'N m', unset,      anything, &
+      'amplitude of the pulsation at these slips', 'synchronous', 2), &
+    key_rule_t('motor',      'phase',           a_number,       1, 'rad',         '0',         anything, &
+      'pulsation sin(2 (frequency t - poles / 2 phi) + phase), phi the angle of the body', 'synchronous'), &
     key_rule_t('motor',      'governor_speed',  a_number,       1, 'rad/s',       unset,       anything, &
       'speed that a PI governor keeps by a throttle from 0 to 1 on the torque (dc: on the voltage)', governed), &
     key_rule_t('motor',      'governor_gain',   a_number,       1, 's/rad',       unset,       not_zero, &
@@ -213,6 +227,10 @@ module nocdyn_schema_torques
     relation_rule_t('motor', exactly_one, 'stator_leakage rotor_leakage mutual_inductance', &
                     'stator_reactance rotor_reactance mutual_reactance'), &
     relation_rule_t('motor', requires, 'supply_factors supply_ramps', 'supply_times'), &
+    relation_rule_t('motor', exactly_one, 'slips d_torques q_torques mean_torques pulsations', 'table_file'), &
+    relation_rule_t('motor', at_most_one, 'd_torques q_torques', 'mean_torques pulsations'), &
+    relation_rule_t('motor', requires, 'd_torques q_torques mean_torques pulsations', 'slips'), &
+    relation_rule_t('motor', requires, 'frequency', 'poles'), &
     relation_rule_t('motor', requires, 'harmonics', 'poles'), &
     relation_rule_t('motor', requires, 'harmonic_shares harmonic_torques harmonic_phases', 'harmonics'), &
     relation_rule_t('motor', exactly_one, 'harmonic_shares', 'harmonic_torques'), &
@@ -224,6 +242,7 @@ module nocdyn_schema_torques
     relation_rule_t('load', requires, 'constant_speed', 'constant'), &
     relation_rule_t('load', requires, 'interpolation extrapolation', 'table_speed table_file'), &
     relation_rule_t('motor', equal_lengths, 'table_speed table_torque', 'table_file'), &
+    relation_rule_t('motor', columns, 'slips', 'table_file d_torques q_torques mean_torques pulsations'), &
     relation_rule_t('motor', equal_lengths, 'set_times set_speeds', ''), &
     relation_rule_t('motor', equal_lengths, 'harmonics harmonic_shares harmonic_torques harmonic_phases', ''), &
     relation_rule_t('motor', equal_lengths, 'supply_times supply_factors supply_ramps', ''), &
@@ -246,6 +265,8 @@ module nocdyn_schema_torques
     example_t('motor',      "name = 'control'  body = 'motor'    kind = 'inverter'  torque_limit = 600.0|" // &
                             'set_times = 0, 10  set_speeds_rpm = 0, 1500  governor_gain = 0.1  governor_time = 0.5|' // &
                             'poles = 4  harmonics = 6, 12  harmonic_shares = 0.02, 0.01', .false.), &
+    example_t('motor',      "name = 'start'    body = 'motor'    kind = 'synchronous'  frequency_hz = 50  poles = 4|" // &
+                            'slips = 0, 0.05, 0.5, 1  d_torques = 0, 900, 700, 600  q_torques = 0, 700, 400, 300', .false.), &
     example_t('load',       "name = 'work'     body = 'machine'  viscous = 100.0"), &
     example_t('load',       "name = 'fan'      body = 'machine'  quadratic = 0.01  constant = 2.0", .false.), &
     example_t('excitation', "name = 'shaker'   body = 'motor'    amplitude = 20.0  frequency = 5.0"), &

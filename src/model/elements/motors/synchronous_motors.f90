@@ -1,0 +1,208 @@
+!> Synchronous motors that start asynchronously, by their cages: a mean torque and a pulsation over the slip.
+!>
+!> With the slip s = 1 - p u' / w and the angle w t - p u between the field and the rotor, p pole pairs, the torque is
+!> mean(s) + pulsation(s) sin(2 (w t - p u) + phase), at twice the slip frequency. If T_d and T_q are the torques that the motor
+!> would have with the circuits of one axis on both, mean = (T_d + T_q) / 2, and the part of the pulsation by the resistances is
+!> (T_d - T_q) / 2; that by the difference of the reactances comes on top of it, so that a curve of the pulsation is better where
+!> there is one. (C. Concordia, Synchronous Machines, 1951, on starting; R_s is neglected.)
+!> Both are linear between the points of a table; below its least slip with the slope there, above its largest constant.
+module nocdyn_synchronous_motors
+  use nocdyn_bank, only: bank_t, harmonic_t, role_motor, sine_harmonic
+  use nocdyn_described_elements, only: boundary_width
+  use nocdyn_kinds, only: wp
+  use nocdyn_law_expressions, only: angle_of, expression_t, literal, node_of, operator(*), operator(+), operator(-), operator(/), &
+    pick, speed_of, time_of
+  use nocdyn_law_functions, only: add_guard, sin
+  use nocdyn_law_tape, only: law_tape_t
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  public :: new_synchronous_motors
+
+  !> The torques of one motor over the slip.
+  type, public :: slip_curves_t
+    real(wp), allocatable :: slip(:)        !! ascending, at least 2, [points]
+    real(wp), allocatable :: mean(:)        !! [N m], [points]
+    real(wp), allocatable :: pulsation(:)   !! [N m], [points]
+  end type slip_curves_t
+
+  type, extends(bank_t), public :: synchronous_motors_t
+    integer, private :: segments = 1            !! between, below and above the points
+    logical, private :: is_mean = .false.       !! whether the pulsation is left out
+  contains
+    procedure :: describe
+    procedure :: to_mean_torque
+    procedure :: list_harmonics
+    procedure :: knees
+  end type synchronous_motors_t
+
+contains
+
+  !> A bank of motors, each on one body.
+  function new_synchronous_motors(names, body, curves, frequency, poles, direction, phase) result(bank)
+    type(string_t), intent(in) :: names(:)
+    integer, intent(in) :: body(:)
+    type(slip_curves_t), intent(in) :: curves(:, :)   !! their size does not depend on the lane, [lanes, motors]
+    real(wp), intent(in) :: frequency(:, :)           !! of the mains [rad/s], positive, shape [lanes, motors] as all that follow
+    real(wp), intent(in) :: poles(:, :)
+    real(wp), intent(in) :: direction(:, :)           !! 1 or -1: of the field
+    real(wp), intent(in) :: phase(:, :)               !! [rad]
+    type(synchronous_motors_t) :: bank
+    integer :: e
+
+    bank%is_polynomial = .false.
+    bank%has_paper_law = .false.
+    call bank%connect(role_motor, size(frequency, 1), names, body)
+    call bank%add_parameter('frequency', frequency)
+    call bank%add_parameter('pole pairs', 0.5_wp * poles, is_key=.false.)
+    call bank%add_parameter('direction', direction, is_key=.false.)
+    call bank%add_parameter('phase', phase)
+    bank%segments = 1 + maxval([1, (size(curves(1, e)%slip), e=1, bank%count)])
+    call add_pieces(bank, curves)
+    call bank%add_switches([character(len=24) :: ('point in the table', e=1, bank%count)], bank%segments)
+    call bank%prepare_law()
+  end function new_synchronous_motors
+
+  !> Adds the slip at the begin of each segment, sorted by segments, and the values and slopes of both torques.
+  subroutine add_pieces(bank, curves)
+    type(synchronous_motors_t), intent(inout) :: bank
+    type(slip_curves_t), intent(in) :: curves(:, :)   ! [lanes, motors]
+    real(wp), dimension(bank%lanes, bank%count, bank%segments) :: begin, mean, mean_slope, pulsation, pulsation_slope
+    integer :: e, lane, s
+
+    do e = 1, bank%count
+      do lane = 1, bank%lanes
+        associate (one => curves(lane, e))
+          call divide(one%slip, one%mean, begin(lane, e, :), mean(lane, e, :), mean_slope(lane, e, :))
+          call divide(one%slip, one%pulsation, begin(lane, e, :), pulsation(lane, e, :), pulsation_slope(lane, e, :))
+        end associate
+      end do
+    end do
+    associate (n => bank%count * bank%segments, owner => [((e, e=1, bank%count), s=1, bank%segments)])
+      call bank%add_parameter('slip', reshape(begin, [bank%lanes, n]), is_key=.false., element=owner)
+      call bank%add_parameter('mean', reshape(mean, [bank%lanes, n]), is_key=.false., element=owner)
+      call bank%add_parameter('mean slope', reshape(mean_slope, [bank%lanes, n]), is_key=.false., element=owner)
+      call bank%add_parameter('pulsation', reshape(pulsation, [bank%lanes, n]), is_key=.false., element=owner)
+      call bank%add_parameter('pulsation slope', reshape(pulsation_slope, [bank%lanes, n]), is_key=.false., element=owner)
+    end associate
+  end subroutine add_pieces
+
+  !> Begins, values and slopes of the segments. Those that a table lacks begin behind all slips.
+  pure subroutine divide(slip, torque, begin, value, slope)
+    real(wp), intent(in) :: slip(:), torque(:)   ! [points]
+    real(wp), intent(out) :: begin(:), value(:), slope(:)   ! [segments]
+    integer :: n
+
+    n = size(slip)
+    begin = huge(begin)
+    value = torque(n)
+    slope = 0.0_wp
+    begin(:n + 1) = [slip(1), slip]
+    value(:n + 1) = [torque(1), torque]
+    slope(2:n) = (torque(2:) - torque(:n - 1)) / (slip(2:) - slip(:n - 1))
+    slope(1) = slope(2)
+  end subroutine divide
+
+  subroutine describe(self, tape)
+    class(synchronous_motors_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: edge, frequency, pole_pairs, slip, torque, width
+    integer :: s
+
+    frequency = self%parameter(tape, 'frequency')
+    pole_pairs = self%parameter(tape, 'direction') * self%parameter(tape, 'pole pairs')
+    slip = 1.0_wp - (pole_pairs / frequency) * speed_of(tape)
+    torque = on_segment(self, tape, 'mean', slip)
+    if (.not. self%is_mean) then
+      torque = torque + on_segment(self, tape, 'pulsation', slip) &
+               * sin(2.0_wp * (frequency * time_of(tape) - pole_pairs * angle_of(tape)) + self%parameter(tape, 'phase'))
+    end if
+    tape%applied = node_of(self%parameter(tape, 'direction') * torque)
+    width = literal(tape, boundary_width)
+    do s = 2, self%segments
+      edge = self%parameter(tape, 'slip', columns_of(self, s))
+      call add_guard(1, s - 1, edge - slip, width)
+      call add_guard(1, s, slip - edge, width)
+    end do
+  end subroutine describe
+
+  !> Columns of the parameters of a segment.
+  pure function columns_of(self, segment) result(columns)
+    class(synchronous_motors_t), intent(in) :: self
+    integer, intent(in) :: segment
+    integer :: columns(self%count)
+    integer :: e
+
+    columns = [(e, e=1, self%count)] + (segment - 1) * self%count
+  end function columns_of
+
+  !> One of the torques at a slip.
+  function on_segment(self, tape, name, slip) result(torque)
+    class(synchronous_motors_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    character(len=*), intent(in) :: name
+    type(expression_t), intent(in) :: slip
+    type(expression_t) :: torque
+    integer :: s
+
+    torque = pick(1, [(self%parameter(tape, name, columns_of(self, s)), s=1, self%segments)]) &
+             + pick(1, [(self%parameter(tape, name // ' slope', columns_of(self, s)), s=1, self%segments)]) &
+             * (slip - pick(1, [(self%parameter(tape, 'slip', columns_of(self, s)), s=1, self%segments)]))
+  end function on_segment
+
+  !> Leaves the pulsation out.
+  subroutine to_mean_torque(self)
+    class(synchronous_motors_t), intent(inout) :: self
+
+    self%is_mean = .true.
+    call self%prepare_law()
+  end subroutine to_mean_torque
+
+  !> The pulsation at the slip of the speed.
+  subroutine list_harmonics(self, element, speed, list)
+    class(synchronous_motors_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: speed    !! u' [rad/s]
+    type(harmonic_t), allocatable, intent(out) :: list(:)
+    real(wp) :: pulsation, slip
+    integer :: s
+
+    associate (frequency => parameter_of('frequency', 1), order => parameter_of('direction', 1) * parameter_of('pole pairs', 1))
+      slip = 1.0_wp - order * speed / frequency
+      do s = self%segments, 2, -1
+        if (slip >= parameter_of('slip', s)) exit
+      end do
+      pulsation = parameter_of('pulsation', s) + parameter_of('pulsation slope', s) * (slip - parameter_of('slip', s))
+      list = [sine_harmonic(parameter_of('direction', 1) * pulsation, 2.0_wp * frequency, -2.0_wp * order, &
+                            parameter_of('phase', 1), self%rows%last_body(element))]
+    end associate
+
+  contains
+
+    !> A parameter of the element in the first lane.
+    pure real(wp) function parameter_of(name, segment)
+      character(len=*), intent(in) :: name
+      integer, intent(in) :: segment   !! 1 for parameters that are the same on all segments
+
+      parameter_of = self%parameters(self%number_of(name))%value(1, element + (segment - 1) * self%count)
+    end function parameter_of
+
+  end subroutine list_harmonics
+
+  !> The synchronous speed, and those of the points of the table.
+  function knees(self, element, t) result(speeds)
+    class(synchronous_motors_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: t        !! [s]
+    real(wp), allocatable :: speeds(:)
+
+    associate (slip => self%parameters(self%number_of('slip'))%value(1, element + self%count::self%count), &
+               synchronous => self%parameters(self%number_of('frequency'))%value(1, element) &
+               * self%parameters(self%number_of('direction'))%value(1, element) &
+               / self%parameters(self%number_of('pole pairs'))%value(1, element))
+      speeds = synchronous * [1.0_wp, 1.0_wp - pack(slip, slip < huge(slip))]
+    end associate
+  end function knees
+
+end module nocdyn_synchronous_motors
