@@ -20,6 +20,7 @@ module nocdyn_test_full_machines
   use nocdyn_polynomial_couplings, only: new_polynomial_couplings, polynomial_couplings_t
   use nocdyn_saturated_couplings, only: new_saturated_couplings
   use nocdyn_schedules, only: join_points, schedule_t
+  use nocdyn_synchronous_motors, only: new_synchronous_motors, slip_curves_t
   use nocdyn_table_couplings, only: new_table_couplings
   use nocdyn_table_excitations, only: new_table_excitations
   use nocdyn_test_machines, only: finish, numbered_names
@@ -184,6 +185,20 @@ contains
       call append_bank(machine%banks, &
                        new_dc_motors(numbered_names('drive', 1), [bodies], 24.0_wp * one, 2.0_wp * one, 1.5_wp * one, &
                                      0.5_wp * one, governor))
+    end associate
+    call add_three_phase_motors(bodies, variants, governor, machine)
+  end subroutine add_motors
+
+  !> Motors on mains and inverters.
+  subroutine add_three_phase_motors(bodies, variants, governor, machine)
+    integer, intent(in) :: bodies, variants(:)
+    type(governor_t), intent(inout) :: governor
+    type(machine_t), intent(inout) :: machine
+
+    associate (one => lane_values(1.0_wp, variants, 1))
+      call append_bank(machine%banks, &
+                       new_synchronous_motors(numbered_names('starting', 1), [1], slip_curves(variants), 4.0_wp * one, &
+                                              4.0_wp + 0.0_wp * one, sign(1.0_wp, one), 0.3_wp * one))
       governor%least = -1.0_wp
       call set_courses(variants, governor)
       call append_bank(machine%banks, &
@@ -193,7 +208,20 @@ contains
       call append_bank(machine%banks, new_flux_motors(numbered_names('supplied', 1), [1], circuits(variants), &
                                                       2.0_wp + 0.0_wp * one, sign(1.0_wp, one), .true., supply(variants)))
     end associate
-  end subroutine add_motors
+  end subroutine add_three_phase_motors
+
+  !> A mean torque and a pulsation.
+  function slip_curves(variants) result(curves)
+    integer, intent(in) :: variants(:)
+    type(slip_curves_t) :: curves(size(variants), 1)
+    integer :: l
+
+    do l = 1, size(variants)
+      curves(l, 1)%slip = [0.0_wp, 0.3_wp, 1.0_wp]
+      curves(l, 1)%mean = [0.0_wp, 20.0_wp, 12.0_wp + variants(l)]
+      curves(l, 1)%pulsation = [0.0_wp, 5.0_wp + variants(l), 9.0_wp]
+    end do
+  end function slip_curves
 
   !> Set speeds that rise from 0.05 s on.
   subroutine set_courses(variants, governor)

@@ -91,8 +91,8 @@ contains
       by_axes = group%has_value('d_torques') .and. group%has_value('q_torques')
       by_parts = group%has_value('mean_torques') .and. group%has_value('pulsations')
       if (by_axes .neqv. by_parts) return
-      call raise(error, exit_input, input%location(index, 'slips') // ': allowed over the slips: d_torques and q_torques, or ' // &
-                 'mean_torques and pulsations')
+      call raise(error, exit_input, input%location(index, 'slips') // ': allowed over the slips: d_torques and q_torques, ' // &
+                 'or mean_torques and pulsations')
     end associate
   end subroutine check_synchronous
 

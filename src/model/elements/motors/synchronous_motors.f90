@@ -10,8 +10,8 @@ module nocdyn_synchronous_motors
   use nocdyn_bank, only: bank_t, harmonic_t, role_motor, sine_harmonic
   use nocdyn_described_elements, only: boundary_width
   use nocdyn_kinds, only: wp
-  use nocdyn_law_expressions, only: angle_of, expression_t, literal, node_of, operator(*), operator(+), operator(-), operator(/), &
-    pick, speed_of, time_of
+  use nocdyn_law_expressions, only: angle_of, expression_t, literal, node_of, operator(*), operator(+), operator(-), &
+    operator(/), pick, speed_of, time_of
   use nocdyn_law_functions, only: add_guard, sin
   use nocdyn_law_tape, only: law_tape_t
   use nocdyn_text, only: string_t
@@ -45,7 +45,7 @@ contains
     integer, intent(in) :: body(:)
     type(slip_curves_t), intent(in) :: curves(:, :)   !! their size does not depend on the lane, [lanes, motors]
     real(wp), intent(in) :: frequency(:, :)           !! of the mains [rad/s], positive, shape [lanes, motors] as all that follow
-    real(wp), intent(in) :: poles(:, :)
+    real(wp), intent(in) :: poles(:, :)               !! even
     real(wp), intent(in) :: direction(:, :)           !! 1 or -1: of the field
     real(wp), intent(in) :: phase(:, :)               !! [rad]
     type(synchronous_motors_t) :: bank

@@ -19,7 +19,7 @@ module nocdyn_schema_torques
     kind_rule_t('motor',      'induction_dq', 'induction machine with electrical transients, by its equivalent circuit'), &
     kind_rule_t('motor',      'dc',        'flux_constant i; inductance di/dt = voltage - resistance i - flux_constant omega'), &
     kind_rule_t('motor',      'inverter',  'speed control: torque_limit times the throttle of a governor, -1 to 1'), &
-    kind_rule_t('motor',      'synchronous', 'start by the cage: a mean torque and a pulsation at twice the slip frequency'), &
+    kind_rule_t('motor',      'synchronous', 'start by the cage: mean torque, and pulsation at twice the slip frequency'), &
     kind_rule_t('excitation', 'harmonic',  'amplitude sin(frequency t + phase)'), &
     kind_rule_t('excitation', 'orders',    'the sum of amplitude_k sin(order_k phi + phase_k), phi the angle of the body'), &
     kind_rule_t('excitation', 'table',     'torque over time from a table; constant before and after it'), &
