@@ -82,13 +82,13 @@ def test_energy_of_every_kind_of_element_adds_up(nocdyn, formulation, method):
 
 def test_check_counts_elements_of_one_role_together(nocdyn):
     outcome = nocdyn("check", EVERY_KIND)
-    assert "0 gears, 6 couplings, 5 motors, 2 loads, 11 excitations" in outcome.stdout
+    assert "0 gears, 6 couplings, 9 motors, 2 loads, 11 excitations" in outcome.stdout
 
 
 def test_matrices_name_the_laws_that_are_not_those_of_the_paper(nocdyn):
     text = nocdyn("matrices", EVERY_KIND).stdout
     assert "Other laws than those of the paper: coupling 'shaft', 'splines', 'clutch', 'rubber', 'teeth'\n" in text
-    assert "Other laws than those of the paper: motor 'constant', 'induction', 'table', 'dc'\n" in text
+    assert "Other laws than those of the paper: motor 'constant', 'induction', 'table', 'dc', 'fluxes', 'mains', 'inverter', 'synchronous'\n" in text
 
 
 @pytest.mark.parametrize(
