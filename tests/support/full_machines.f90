@@ -231,7 +231,7 @@ contains
 
     allocate (governor%course(size(variants), 1))   ! gfortran 12: `source` copies the pointers to allocatable components
     do l = 1, size(variants)
-      call join_points([0.05_wp, 0.5_wp, 2.0_wp], [0.5_wp, 1.0_wp + 0.03_wp * variants(l), -1.0_wp], governor%course(l, 1))
+      call join_points([0.05_wp, 0.5_wp, 4.0_wp], [0.5_wp, 1.0_wp + 0.03_wp * variants(l), -1.0_wp], governor%course(l, 1))
     end do
   end subroutine set_courses
 
@@ -250,7 +250,7 @@ contains
     end associate
   end function ripple
 
-  !> Half of the voltage within a ramp, then disconnected, then all of it.
+  !> A part of the voltage within a ramp, then disconnected, then another ramp.
   function supply(variants) result(schedule)
     integer, intent(in) :: variants(:)
     type(schedule_t) :: schedule(size(variants), 1)
@@ -261,7 +261,8 @@ contains
         call schedule(l, 1)%append(0.05_wp, 0.0_wp, 0.0_wp, .true.)
         call schedule(l, 1)%append(0.05_wp * factor, 0.1_wp * factor, factor, .false.)
         call schedule(l, 1)%append(0.4_wp * factor, 0.0_wp, 0.0_wp, .true.)
-        call schedule(l, 1)%append(0.5_wp * factor, factor, 0.0_wp, .false.)
+        call schedule(l, 1)%append(0.5_wp * factor, factor, 0.2_wp * factor, .false.)
+        call schedule(l, 1)%append(4.0_wp, 1.7_wp * factor, 0.0_wp, .false.)
       end associate
     end do
   end function supply
