@@ -12,7 +12,7 @@ module nocdyn_schedules
   implicit none (type, external)
   private
 
-  public :: join_points, add_schedule, scheduled_value, scheduled_flag, guard_schedule, stretch_at, value_at
+  public :: join_points, add_schedule, scheduled_value, scheduled_flag, guard_schedule, value_at
 
   real(wp), parameter :: never = 1.0e60_wp   ! begin of a stretch that a schedule lacks [s]
 
