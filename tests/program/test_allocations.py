@@ -60,13 +60,14 @@ def test_nothing_is_allocated_when_auto_switches(nocdyn, counter):
     assert abs(many - few) <= DOUBLINGS
 
 
+@pytest.mark.parametrize("kinds", ["every_kind.nml", "electrical_kinds.nml"])
 @pytest.mark.parametrize("method", ["auto", "rk45", "rodas5p"])
 @pytest.mark.parametrize("formulation", ["reduced", "paper", "multiplier"])
-def test_nothing_is_allocated_by_elements_of_every_kind(nocdyn, counter, formulation, method):
+def test_nothing_is_allocated_by_elements_of_every_kind(nocdyn, counter, kinds, formulation, method):
     common = [f"run.formulation={formulation}", f"run.method={method}", "run.rtol=1e-6", "run.atol=1e-6"]
     common += ["output.extremes_from=4.0"]  # the summary lists those in the transient of the start
-    few = allocations(nocdyn, counter, DATA / "every_kind.nml", *common, "run.t_end=10")
+    few = allocations(nocdyn, counter, DATA / kinds, *common, "run.t_end=10")
     steps = nocdyn.summary("out")["counts"]["accepted_steps"]
-    many = allocations(nocdyn, counter, DATA / "every_kind.nml", *common, "run.t_end=20")
+    many = allocations(nocdyn, counter, DATA / kinds, *common, "run.t_end=20")
     assert nocdyn.summary("out")["counts"]["accepted_steps"] > steps + 100
     assert abs(many - few) <= NUMBERS

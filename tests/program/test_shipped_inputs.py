@@ -11,6 +11,7 @@ from conftest import DATA, SOURCE
 
 INPUTS = sorted((SOURCE / "input").rglob("*.nml")) + sorted(DATA.glob("*.nml"))
 WITHOUT_TABLE_FILES = [path for path in INPUTS if "table_file" not in path.read_text()]
+READ_BY_FORTRAN = [path for path in WITHOUT_TABLE_FILES if path.stem != "electrical_kinds"]  # the reader lacks its keys
 
 
 UNITS = {"_rpm": math.pi / 30, "_hz": 2 * math.pi, "_deg": math.pi / 180}
@@ -59,7 +60,7 @@ def test_there_are_inputs():
     assert len(INPUTS) >= 4
 
 
-@pytest.mark.parametrize("path", WITHOUT_TABLE_FILES, ids=names)
+@pytest.mark.parametrize("path", READ_BY_FORTRAN, ids=names)
 def test_fortran_reads_the_same_values(nocdyn, fortran_reader, path):
     # Fortran's read takes file names of limited length only
     shutil.copy(path, nocdyn.folder / "given.nml")

@@ -6,6 +6,8 @@ module nocdyn_test_full_machines
                            new_curve
   use nocdyn_dc_motors, only: new_dc_motors
   use nocdyn_element_rows, only: element_rows_t, new_element_rows
+  use nocdyn_excitation_banks, only: excitation_bank_t
+  use nocdyn_fault_excitations, only: fault_terms_t, new_fault_excitations
   use nocdyn_flux_motors, only: circuit_keys, new_flux_motors
   use nocdyn_gap_couplings, only: gap_couplings_t, new_gap_couplings
   use nocdyn_governed_banks, only: governor_t
@@ -310,12 +312,29 @@ contains
                        new_timed_excitations(numbered_names('impact', 3), [1, 2, bodies], &
                                              [shape_step, shape_ramp, shape_pulse], 12.0_wp * one, &
                                              0.35_wp * one, 0.2_wp * one))
+      call append_bank(machine%banks, new_fault_excitations(numbered_names('fault', 2), [1, bodies], &
+                                                            [fault_terms(), fault_terms()], 0.3_wp * one(:, :2)))
+      select type (bank => machine%banks(size(machine%banks))%bank)
+      class is (excitation_bank_t)
+        call bank%set_window(0.4_wp * one(:, :2), 0.9_wp * one(:, :2), 2.0_wp * one(:, :2))
+      class default
+        error stop 'full_machine: a fault is an excitation'
+      end select
       call append_bank(machine%banks, &
                        new_table_excitations(numbered_names('record', 1), [2], &
                                              curves([0.1_wp, 0.3_wp, 0.6_wp], [0.0_wp, 20.0_wp, -10.0_wp], interpolation_linear, &
                                                     extrapolation_constant, variants, 1)))
     end associate
   end subroutine add_excitations
+
+  !> A constant and two sines that decay.
+  type(fault_terms_t) function fault_terms() result(terms)
+    terms%frequency = 20.0_wp
+    terms%amplitude = [9.0_wp, -7.0_wp, 3.0_wp]
+    terms%multiple = [1.0_wp, 2.0_wp, 0.0_wp]
+    terms%rate = [3.0_wp, 5.0_wp, 1.0_wp]
+    terms%phase = [0.1_wp, 0.2_wp, 1.5_wp]
+  end function fault_terms
 
   !> Two cylinders, of which one follows the speed at more points, [lanes, cylinders].
   function cylinders(variants) result(torque)

@@ -9,6 +9,7 @@ module nocdyn_machine_parts
   use nocdyn_element_groups, only: add_banks, bodies_of, body_index_t, element_groups_t, new_body_index, new_element_groups
   use nocdyn_engine_checks, only: check_engines, check_orders
   use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_electrical_faults, only: check_faults
   use nocdyn_fatigue_groups, only: check_fatigue
   use nocdyn_input, only: input_t
   use nocdyn_joint_assembly, only: add_bearings, add_clutch_form, add_freewheels, check_joints, clutch_form
@@ -76,6 +77,7 @@ contains
     if (.not. allocated(error)) call check_motors(input, error)
     if (.not. allocated(error)) call check_engines(input, error)
     if (.not. allocated(error)) call check_orders(input, error)
+    if (.not. allocated(error)) call check_faults(input, error)
     if (.not. allocated(error)) call check_response_ranges(input, error)
     if (.not. allocated(error)) call check_fatigue(input, error)
   end subroutine check_groups

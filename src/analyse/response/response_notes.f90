@@ -2,6 +2,7 @@
 module nocdyn_response_notes
   use nocdyn_bank, only: bank_of
   use nocdyn_element_sets, only: element_names
+  use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_forced_response, only: forced_response_t
   use nocdyn_gap_couplings, only: gap_couplings_t
   use nocdyn_input, only: input_t
@@ -28,7 +29,27 @@ contains
     allocate (notes, source=machine%simplifications)
     call describe_losses(machine, lossy)
     if (lossy /= '') call append(notes, 'the losses of ' // lossy // ' are left out')
+    call note_ended_excitations(machine, notes)
   end subroutine note_simplifications
+
+  !> Excitations that are over in a steady state.
+  subroutine note_ended_excitations(machine, notes)
+    type(machine_t), intent(in) :: machine
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    integer :: e, i
+
+    do i = 1, size(machine%banks)
+      select type (bank => machine%banks(i)%bank)
+      class is (excitation_bank_t)
+        do e = 1, bank%count
+          if (bank%has_ended(e)) call append(notes, 'excitation ' // quoted(bank%names(e)%text) // &
+                                             ' ends or decays, and has no part in the response')
+        end do
+      class default
+        cycle
+      end select
+    end do
+  end subroutine note_ended_excitations
 
   !> Notes on the speeds and the steady states: what nocdyn campbell has too.
   subroutine note_steady_states(settings, response, notes)

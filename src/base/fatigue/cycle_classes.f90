@@ -9,7 +9,7 @@ module nocdyn_cycle_classes
   integer, parameter, public :: class_range = 1, class_mean = 2, class_count = 3, class_damage = 4   !! see `list`
 
   type, public :: cycle_classes_t
-    real(wp), private :: range_width = 0.0_wp, mean_width = 0.0_wp   !! 0: there is no cycle yet
+    real(wp), private :: range_width = 0.0_wp, mean_width = 0.0_wp   !! 0 before the first cycle
     real(wp), private :: sums(4, classes, -classes / 2:classes / 2 - 1) = 0.0_wp   !! of class_..., over the cycles of a class
   contains
     procedure :: add, list

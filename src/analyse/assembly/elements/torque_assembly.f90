@@ -2,8 +2,11 @@
 module nocdyn_torque_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
   use nocdyn_cylinder_torques, only: cylinder_torques
+  use nocdyn_electrical_faults, only: fault_terms
   use nocdyn_element_groups, only: element_groups_t
+  use nocdyn_excitation_banks, only: excitation_bank_t, never
   use nocdyn_excitations, only: new_excitations
+  use nocdyn_fault_excitations, only: new_fault_excitations
   use nocdyn_harmonic_tables, only: table_torque
   use nocdyn_input, only: group_t
   use nocdyn_kinds, only: wp
@@ -21,8 +24,8 @@ module nocdyn_torque_assembly
   public :: load_form, add_load_form, excitation_form, add_excitation_form, add_engines, in_lanes
 
   integer, parameter :: viscous = 1, nonlinear = 2, table = 3     ! forms of loads
-  ! forms of excitations, and `table`
-  integer, parameter :: harmonic = 1, waves = 2, timed = 4, orders = 5, shares = 6
+  ! forms of excitations, and `table`; one with a start, an end or a decay has the form after its own
+  integer, parameter :: harmonic = 1, waves = 11, timed = 5, orders = 7, shares = 9, faults = 13
 
 contains
 
@@ -72,20 +75,31 @@ contains
       if (group%has_value('share_of_load')) excitation_form = shares
     case ('table')
       excitation_form = table
+    case ('fault')
+      excitation_form = faults
     case default
       excitation_form = timed
     end select
+    if (has_window(group)) excitation_form = excitation_form + 1
   end function excitation_form
 
-  !> Adds the bank of the excitations of one form.
+  !> Whether an excitation starts, ends or decays.
+  pure logical function has_window(group)
+    type(group_t), intent(in) :: group
+
+    has_window = group%has_value('start') .or. group%has_value('end') .or. group%has_value('decay')
+  end function has_window
+
+  !> Adds the bank of the excitations of one form, or its banks.
   subroutine add_excitation_form(groups, form, banks)
     type(element_groups_t), intent(in) :: groups
     integer, intent(in) :: form
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    integer :: body(size(groups%indices)), i, shape(size(groups%indices))
+    integer :: before, body(size(groups%indices)), i, shape(size(groups%indices))
 
+    before = size(banks)
     body = groups%bodies('body', 1)
-    select case (form)
+    select case (form - 1 + modulo(form, 2))   ! without its window
     case (harmonic)
       call append_bank(banks, new_excitations(groups%names, body, groups%values('amplitude'), groups%values('frequency'), &
                                               groups%values('phase')))
@@ -98,6 +112,9 @@ contains
     case (table)
       call append_bank(banks, new_table_excitations(groups%names, body, &
                                                     groups%curves('table_time', 'table_torque', extrapolation='constant')))
+    case (faults)
+      call append_bank(banks, new_fault_excitations(groups%names, body, [(fault_terms(groups%input%groups(groups%indices(i))), &
+                                                    i=1, size(body))], groups%values('time')))
     case default
       shape = shape_pulse
       do i = 1, size(body)
@@ -107,7 +124,38 @@ contains
       call append_bank(banks, new_timed_excitations(groups%names, body, shape, groups%values('amplitude'), &
                                                     groups%values('time'), groups%values('duration', absent=1.0_wp)))
     end select
+    if (modulo(form, 2) == 0) call add_windows(groups, banks(before + 1:))
   end subroutine add_excitation_form
+
+  !> Gives excitations their windows. Several banks have one excitation each.
+  subroutine add_windows(groups, banks)
+    type(element_groups_t), intent(in) :: groups
+    type(bank_slot_t), intent(inout) :: banks(:)
+    real(wp), dimension(groups%lanes, size(groups%indices)) :: begin, end, rate
+    real(wp) :: t_start
+    integer :: i, last
+
+    t_start = groups%input%groups(groups%input%position('run'))%number('t_start')
+    begin = groups%values('start', absent=t_start)
+    end = groups%values('end', absent=never)
+    rate = 0.0_wp
+    do i = 1, size(groups%indices)
+      associate (group => groups%input%groups(groups%indices(i)))
+        if (group%has_value('decay')) rate(:, i) = 1 / group%number('decay')
+      end associate
+    end do
+    last = 0
+    do i = 1, size(banks)
+      select type (bank => banks(i)%bank)
+      class is (excitation_bank_t)
+        call bank%set_window(begin(:, last + 1:last + bank%count), end(:, last + 1:last + bank%count), &
+                             rate(:, last + 1:last + bank%count))
+        last = last + bank%count
+      class default
+        error stop 'nocdyn_torque_assembly: an excitation has no window'
+      end select
+    end do
+  end subroutine add_windows
 
   !> Adds a bank of waves: every order is a term, and so is amplitude sin(2 (frequency t - pole_pairs phi) + phase).
   subroutine add_waves(groups, body, banks)

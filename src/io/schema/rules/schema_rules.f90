@@ -81,7 +81,7 @@ module nocdyn_schema_rules
   !> One key of a group.
   type, public :: key_rule_t
     character(len=12) :: group
-    character(len=18) :: name
+    character(len=22) :: name
     integer :: value_type          !! `a_text` ... `a_folder`
     integer :: count               !! how many values, or `any_number`
     character(len=12) :: unit

@@ -10,7 +10,7 @@ module nocdyn_schema_fatigue
 
   type(group_rule_t), parameter, public :: fatigue_groups(*) = [ &
     group_rule_t('fatigue', in_torsional, any_times, 'fatigue', &
-                 'Cycles and damage of a coupling, a shaft, a mesh or a gear in a run, by rainflow and Miner.')]
+                 'Rainflow cycles and damage of a coupling, shaft, mesh or gear in a run.')]
 
   type(key_rule_t), parameter, public :: fatigue_keys(*) = [ &
     key_rule_t('fatigue',    'name',            a_name,         1, '',            required,    anything, &
@@ -48,7 +48,7 @@ module nocdyn_schema_fatigue
     key_rule_t('fatigue',    'notch_factor',    a_number,       1, '',            '1',         from_1, &
       'fatigue notch factor on the half range'), &
     key_rule_t('fatigue',    'mean_stress',     a_word,         1, '',            "'none'",    mean_stresses, &
-      'half range / (1 - |mean| / strength), by ultimate_stress (goodman) or yield_stress (soderberg)'), &
+      'half range / (1 - mean / strength): ultimate_stress of goodman, yield_stress of soderberg'), &
     key_rule_t('fatigue',    'ultimate_stress', a_number,       1, 'Pa',          unset,       positive, &
       'shear stress that breaks the part at once, for goodman'), &
     key_rule_t('fatigue',    'yield_stress',    a_number,       1, 'Pa',          unset,       positive, &

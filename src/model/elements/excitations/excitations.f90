@@ -1,8 +1,9 @@
 !> Harmonic excitations, eq. (17): M_0 sin(omega_p t + phase).
 module nocdyn_excitations
-  use nocdyn_bank, only: bank_t, harmonic_t, role_excitation, sine_harmonic
+  use nocdyn_bank, only: harmonic_t, role_excitation, sine_harmonic
+  use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_kinds, only: wp
-  use nocdyn_law_expressions, only: node_of, operator(*), operator(+), time_of
+  use nocdyn_law_expressions, only: expression_t, operator(*), operator(+), time_of
   use nocdyn_law_functions, only: sin
   use nocdyn_law_tape, only: law_tape_t
   use nocdyn_text, only: string_t
@@ -11,9 +12,9 @@ module nocdyn_excitations
 
   public :: new_excitations
 
-  type, extends(bank_t), public :: excitations_t
+  type, extends(excitation_bank_t), public :: excitations_t
   contains
-    procedure :: describe
+    procedure :: torque
     procedure :: to_mean_torque
     procedure :: list_harmonics
   end type excitations_t
@@ -35,13 +36,14 @@ contains
     call bank%prepare_law()
   end function new_excitations
 
-  subroutine describe(self, tape)
+  function torque(self, tape)
     class(excitations_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: torque
 
-    tape%applied = node_of(self%parameter(tape, 'amplitude') &
-                           * sin(self%parameter(tape, 'frequency') * time_of(tape) + self%parameter(tape, 'phase')))
-  end subroutine describe
+    torque = self%parameter(tape, 'amplitude') &
+             * sin(self%parameter(tape, 'frequency') * time_of(tape) + self%parameter(tape, 'phase'))
+  end function torque
 
   !> The mean of a sine is zero; with the frequency 0 it is a constant.
   subroutine to_mean_torque(self)
@@ -60,6 +62,10 @@ contains
     type(harmonic_t), allocatable, intent(out) :: list(:)
     real(wp), dimension(self%lanes, self%count) :: amplitude, frequency, phase
 
+    if (self%has_ended(element)) then
+      allocate (list(0))
+      return
+    end if
     amplitude = self%values_of('amplitude')
     frequency = self%values_of('frequency')
     phase = self%values_of('phase')

@@ -6,7 +6,7 @@ module nocdyn_load_shares
   use nocdyn_bank, only: harmonic_t
   use nocdyn_curves, only: curve_t
   use nocdyn_kinds, only: wp
-  use nocdyn_law_expressions, only: node_of, operator(*), operator(-), speed_of
+  use nocdyn_law_expressions, only: expression_t, operator(*), operator(-), speed_of
   use nocdyn_law_tape, only: law_tape_t
   use nocdyn_loads, only: resistance
   use nocdyn_tables, only: add_table
@@ -20,7 +20,7 @@ module nocdyn_load_shares
   type, extends(wave_excitations_t), public :: load_shares_t
     logical :: has_quadratic = .false.
   contains
-    procedure :: describe
+    procedure :: torque
     procedure :: list_harmonics
   end type load_shares_t
 
@@ -56,13 +56,14 @@ contains
     call bank%prepare_law()
   end function new_load_shares
 
-  subroutine describe(self, tape)
+  function torque(self, tape)
     class(load_shares_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: torque
 
-    tape%applied = node_of((self%parameter(tape, 'viscous') * speed_of(tape) - resistance(self, self%has_quadratic, tape)) &
-                           * self%sum_of_waves(tape))
-  end subroutine describe
+    torque = (self%parameter(tape, 'viscous') * speed_of(tape) - resistance(self, self%has_quadratic, tape)) &
+             * self%sum_of_waves(tape)
+  end function torque
 
   !> One harmonic of each term.
   subroutine list_harmonics(self, element, speed, list)

@@ -3,10 +3,11 @@
 !> The torque is M + sum of S sin(order u) + C cos(order u), plus a sum of the same form times u'^2 for reciprocating masses.
 !> M, S and C are known at some speeds, linear between them, and constant below the lowest and above the highest one.
 module nocdyn_order_excitations
-  use nocdyn_bank, only: bank_t, harmonic_t, role_excitation
+  use nocdyn_bank, only: harmonic_t, role_excitation
   use nocdyn_described_elements, only: boundary_width
+  use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_kinds, only: wp
-  use nocdyn_law_expressions, only: angle_of, expression_t, node_of, operator(*), operator(+), operator(-), pick, speed_of
+  use nocdyn_law_expressions, only: angle_of, expression_t, operator(*), operator(+), operator(-), pick, speed_of
   use nocdyn_law_functions, only: add_guard, cos, harmonics, sin
   use nocdyn_law_tape, only: law_tape_t
   use nocdyn_order_terms, only: new_order_terms, order_terms_t
@@ -26,11 +27,11 @@ module nocdyn_order_excitations
     real(wp), allocatable :: square_sine(:), square_cosine(:)   !! [N m s2/rad2], [square orders]
   end type order_torque_t
 
-  type, extends(bank_t), public :: order_excitations_t
+  type, extends(excitation_bank_t), public :: order_excitations_t
     integer :: segments = 1                 !! between, below and above the points; 1 if nothing but squares depends on the speed
     type(order_terms_t) :: sorted, sorted_squares   !! harmonics, and those times u'^2
   contains
-    procedure :: describe
+    procedure :: torque => order_torque
     procedure :: to_mean_torque
     procedure :: list_harmonics
     procedure :: knees
@@ -179,7 +180,7 @@ contains
     end do
   end function edges
 
-  subroutine describe(self, tape)
+  function order_torque(self, tape) result(torque)
     class(order_excitations_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape
     type(expression_t) :: begin, edge(max(1, self%segments - 1)), speed, torque
@@ -199,8 +200,7 @@ contains
     if (size(self%sorted_squares%single) + size(self%sorted_squares%multiples) > 0) then
       torque = torque + speed * speed * harmonic_sum(self, tape, self%sorted_squares, 'square ', '')
     end if
-    tape%applied = node_of(torque)
-  end subroutine describe
+  end function order_torque
 
   !> The sum of some terms: the torque, its slope over the speed, or the part that is multiplied by u'^2, which has no mean.
   function harmonic_sum(self, tape, terms, prefix, suffix) result(sum)
@@ -276,6 +276,10 @@ contains
     real(wp) :: distance   ! to the last point of the table below this speed
     integer :: below, body, cosine, i, n, shift, sine
 
+    if (self%has_ended(element)) then
+      allocate (list(0))
+      return
+    end if
     body = self%rows%last_body(element)
     sine = self%number_of('sine')
     cosine = self%number_of('cosine')

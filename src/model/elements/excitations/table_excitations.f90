@@ -1,8 +1,9 @@
 !> Excitations with a table over the time.
 module nocdyn_table_excitations
-  use nocdyn_bank, only: bank_t, role_excitation
+  use nocdyn_bank, only: role_excitation
   use nocdyn_curves, only: curve_t
-  use nocdyn_law_expressions, only: node_of, time_of
+  use nocdyn_excitation_banks, only: excitation_bank_t
+  use nocdyn_law_expressions, only: expression_t, time_of
   use nocdyn_law_tape, only: law_tape_t
   use nocdyn_tables, only: add_table, curve_value, guard_segment
   use nocdyn_text, only: string_t
@@ -11,9 +12,9 @@ module nocdyn_table_excitations
 
   public :: new_table_excitations
 
-  type, extends(bank_t), public :: table_excitations_t
+  type, extends(excitation_bank_t), public :: table_excitations_t
   contains
-    procedure :: describe
+    procedure :: torque
   end type table_excitations_t
 
 contains
@@ -32,13 +33,14 @@ contains
     call bank%prepare_law()
   end function new_table_excitations
 
-  subroutine describe(self, tape)
+  function torque(self, tape)
     class(table_excitations_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: torque
 
     if (.not. allocated(self%curve)) error stop 'nocdyn_table_excitations: there are no tables'
-    tape%applied = node_of(curve_value(tape, time_of(tape)))
+    torque = curve_value(tape, time_of(tape))
     call guard_segment(tape, time_of(tape), is_time=.true.)
-  end subroutine describe
+  end function torque
 
 end module nocdyn_table_excitations

@@ -1,8 +1,9 @@
 !> Excitations that change during a limited time: steps, ramps and half-sine pulses.
 module nocdyn_timed_excitations
-  use nocdyn_bank, only: bank_t, role_excitation
+  use nocdyn_bank, only: role_excitation
+  use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_kinds, only: wp
-  use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), operator(+), operator(-), operator(/), &
+  use nocdyn_law_expressions, only: expression_t, literal, operator(*), operator(+), operator(-), operator(/), &
     pick, time_of
   use nocdyn_law_functions, only: add_guard, sin
   use nocdyn_law_tape, only: law_tape_t
@@ -16,9 +17,9 @@ module nocdyn_timed_excitations
   integer, parameter, public :: shape_ramp = 2    !! linear from 0 to the amplitude, then constant
   integer, parameter, public :: shape_pulse = 3   !! half a sine wave with the amplitude, then 0
 
-  type, extends(bank_t), public :: timed_excitations_t
+  type, extends(excitation_bank_t), public :: timed_excitations_t
   contains
-    procedure :: describe
+    procedure :: torque
   end type timed_excitations_t
 
   character(len=*), parameter :: switch_names(3) = &   ! by shape
@@ -51,9 +52,10 @@ contains
 
   !> Torques as parts of the amplitude: x while a ramp rises, sin(pi x) during a pulse, with x from 0 to 1; a step ends as it
   !> begins.
-  subroutine describe(self, tape)
+  function torque(self, tape)
     class(timed_excitations_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: torque
     type(expression_t) :: begin, duration, is_pulse, is_ramp, is_step, none, part, x
 
     begin = self%parameter(tape, 'time')
@@ -65,9 +67,9 @@ contains
     x = (time_of(tape) - begin) / duration
     part = pick(1, [none, is_ramp, none]) * x + pick(1, [none, is_pulse, none]) * sin(pi * x) &
            + pick(1, [none, none, is_step + is_ramp])
-    tape%applied = node_of(self%parameter(tape, 'amplitude') * part)
+    torque = self%parameter(tape, 'amplitude') * part
     call add_guard(1, before, begin - time_of(tape), none)   ! time does not go back across a boundary
     call add_guard(1, during, begin + (1.0_wp - is_step) * duration - time_of(tape), none)
-  end subroutine describe
+  end function torque
 
 end module nocdyn_timed_excitations

@@ -3,9 +3,10 @@
 !> Engine orders have f = 0; those of one excitation that are whole multiples of one order follow from one sine and one cosine. A
 !> synchronous motor with p pole pairs pulsates during its start at twice the slip frequency: f = 2 omega_mains, order = -2 p.
 module nocdyn_wave_excitations
-  use nocdyn_bank, only: bank_t, harmonic_t, role_excitation, sine_harmonic
+  use nocdyn_bank, only: harmonic_t, role_excitation, sine_harmonic
+  use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_kinds, only: wp
-  use nocdyn_law_expressions, only: angle_of, expression_t, node_of, operator(*), operator(+), time_of
+  use nocdyn_law_expressions, only: angle_of, expression_t, operator(*), operator(+), time_of
   use nocdyn_law_functions, only: cos, harmonics, sin
   use nocdyn_law_tape, only: law_tape_t
   use nocdyn_order_terms, only: new_order_terms, order_terms_t
@@ -15,11 +16,11 @@ module nocdyn_wave_excitations
 
   public :: new_wave_excitations
 
-  type, extends(bank_t), public :: wave_excitations_t
+  type, extends(excitation_bank_t), public :: wave_excitations_t
     type(order_terms_t) :: sorted
   contains
     procedure :: sum_of_waves
-    procedure :: describe
+    procedure :: torque => sum_of_waves
     procedure :: to_mean_torque
     procedure :: list_harmonics
   end type wave_excitations_t
@@ -47,13 +48,6 @@ contains
     call bank%add_parameter('base', spread(bank%sorted%base, 1, bank%lanes), is_key=.false.)
     call bank%prepare_law()
   end function new_wave_excitations
-
-  subroutine describe(self, tape)
-    class(wave_excitations_t), intent(in) :: self
-    type(law_tape_t), target, intent(inout) :: tape
-
-    tape%applied = node_of(self%sum_of_waves(tape))
-  end subroutine describe
 
   !> The sum of all terms.
   function sum_of_waves(self, tape) result(torque)
@@ -122,6 +116,10 @@ contains
     integer :: i, k
     integer, allocatable :: terms(:)
 
+    if (self%has_ended(element)) then
+      allocate (list(0))
+      return
+    end if
     associate (amplitude => self%parameters(self%number_of('amplitude')), phase => self%parameters(self%number_of('phase')), &
                frequency => self%parameters(self%number_of('frequency')), order => self%parameters(self%number_of('order')))
       terms = pack([(k, k=1, size(amplitude%element))], amplitude%element == element)

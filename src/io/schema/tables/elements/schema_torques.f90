@@ -1,13 +1,14 @@
 !> Rows of the schema: the keys of &motor, &load and &excitation and the relations between them.
 module nocdyn_schema_torques
   use nocdyn_schema_rules, only: &
-    a_body, a_file, a_flag, a_name, a_number, a_selector, a_text, a_word, above_1, an_integer, any_number, anything, &
+    a_body, a_file, a_flag, a_name, a_number, a_selector, a_text, a_word, above_1, allowed_t, an_integer, any_number, anything, &
     at_most_one, columns, efficiencies, equal_lengths, exactly_one, example_t, extrapolations, from_0_to_1, from_1, &
-    from_2, interpolations, key_rule_t, kind_rule_t, not_negative, not_zero, positive, relation_rule_t, required, &
+    from_2, interpolations, key_rule_t, kind_rule_t, less_than, not_negative, not_zero, positive, relation_rule_t, required, &
     requires, unset
   implicit none (type, external)
   private
 
+  type(allowed_t), parameter :: faults = allowed_t(words='three_phase two_phase resynchronisation')
   character(len=*), parameter :: linear = "'linear'"
   character(len=*), parameter :: governed = 'quadratic constant table induction dc inverter'   ! kinds with a governor
 
@@ -26,7 +27,8 @@ module nocdyn_schema_torques
     kind_rule_t('excitation', 'step',      '0 before time, amplitude from then on'), &
     kind_rule_t('excitation', 'ramp',      'linear rise from 0 at time to amplitude within duration, then constant'), &
     kind_rule_t('excitation', 'pulse',     'half a sine of height amplitude from time to time + duration'), &
-    kind_rule_t('excitation', 'startup',   'amplitude sin(2 (frequency t - pole_pairs phi) + phase), synchronous motor')]
+    kind_rule_t('excitation', 'startup',   'amplitude sin(2 (frequency t - pole_pairs phi) + phase), synchronous motor'), &
+    kind_rule_t('excitation', 'fault',     'decaying sines from time on: short circuits, faulty synchronisation')]
 
   type(key_rule_t), parameter, public :: motor_keys(*) = [ &
     key_rule_t('motor',      'name',            a_name,         1, '',            required,    anything, &
@@ -181,7 +183,7 @@ module nocdyn_schema_torques
     key_rule_t('excitation', 'amplitude',       a_number,       1, 'N m',         required,    anything, &
       'largest torque', 'harmonic step ramp pulse startup'), &
     key_rule_t('excitation', 'frequency',       a_number,       1, 'rad/s',       required,    not_negative, &
-      'angular frequency; that of the mains for a start-up', 'harmonic startup'), &
+      'angular frequency; that of the mains for a start-up and a fault', 'harmonic startup fault'), &
     key_rule_t('excitation', 'phase',           a_number,       1, 'rad',         '0',         anything, &
       'phase at t = 0', 'harmonic startup'), &
     key_rule_t('excitation', 'orders',          a_number,       any_number, '',   unset,       positive, &
@@ -205,11 +207,41 @@ module nocdyn_schema_torques
     key_rule_t('excitation', 'interpolation',   a_word,         1, '',            linear,      interpolations, &
       'between the points: straight lines, or the monotone cubic of Fritsch and Butland', 'table'), &
     key_rule_t('excitation', 'time',            a_number,       1, 's',           required,    anything, &
-      'start of the step, ramp or pulse', 'step ramp pulse'), &
+      'start of the step, ramp, pulse or fault', 'step ramp pulse fault'), &
     key_rule_t('excitation', 'duration',        a_number,       1, 's',           required,    positive, &
       'duration of the rise or of the pulse', 'ramp pulse'), &
     key_rule_t('excitation', 'pole_pairs',      an_integer,     1, '',            required,    from_1, &
-      'pole pairs of the motor', 'startup')]
+      'pole pairs of the motor', 'startup'), &
+    key_rule_t('excitation', 'fault',           a_word,         1, '',            unset,       faults, &
+      'at the terminals of a machine at rated voltage; resynchronisation closes with a phase angle', 'fault'), &
+    key_rule_t('excitation', 'rated_torque',    a_number,       1, 'N m',         unset,       not_zero, &
+      'rated apparent power / synchronous speed; > 0: brakes a body that turns forwards first', 'fault'), &
+    key_rule_t('excitation', 'subtransient_reactance', a_number, 1, '',       unset,       positive, &
+      'x'''' per unit, with that of the network up to the fault', 'fault'), &
+    key_rule_t('excitation', 'transient_reactance', a_number,   1, '',            unset,       positive, &
+      'x'' per unit; if not given the torque decays to 0 with subtransient_time', 'fault'), &
+    key_rule_t('excitation', 'subtransient_time', a_number,     1, 's',           unset,       positive, &
+      'time constant T'''' of the rotor''s flux; no decay if not given', 'fault'), &
+    key_rule_t('excitation', 'transient_time',  a_number,       1, 's',           unset,       positive, &
+      'time constant T'' beside transient_reactance; no decay if not given', 'fault'), &
+    key_rule_t('excitation', 'armature_time',   a_number,       1, 's',           unset,       positive, &
+      'time constant T_a of the stator''s flux; no decay if not given', 'fault'), &
+    key_rule_t('excitation', 'angle',           a_number,       1, 'rad',         '2.0943951024', anything, &
+      'phase angle of a resynchronisation; 120 degrees give the largest torque', 'fault'), &
+    key_rule_t('excitation', 'term_amplitudes', a_number,       any_number, 'N m', unset,      anything, &
+      'amplitudes of given decaying sines, in place of fault', 'fault', 1), &
+    key_rule_t('excitation', 'term_multiples',  a_number,       any_number, '',   unset,       not_negative, &
+      'their frequencies as multiples of frequency', 'fault', 1), &
+    key_rule_t('excitation', 'term_times',      a_number,       any_number, 's',  unset,       positive, &
+      'their time constants; no decay if not given', 'fault', 1), &
+    key_rule_t('excitation', 'term_phases',     a_number,       any_number, 'rad', unset,      anything, &
+      'their phases at the time of the fault; 0 if not given', 'fault', 1), &
+    key_rule_t('excitation', 'start',           a_number,       1, 's',           unset,       anything, &
+      'the torque is 0 before; t_start if not given'), &
+    key_rule_t('excitation', 'end',             a_number,       1, 's',           unset,       anything, &
+      'the torque is 0 from then on'), &
+    key_rule_t('excitation', 'decay',           a_number,       1, 's',           unset,       positive, &
+      'time constant: the torque is multiplied by exp(-(t - start) / decay)')]
 
   type(relation_rule_t), parameter, public :: torque_relations(*) = [ &
     relation_rule_t('motor', exactly_one, 'table_speed table_torque', 'table_file'), &
@@ -249,7 +281,17 @@ module nocdyn_schema_torques
     relation_rule_t('load', equal_lengths, 'table_speed table_torque', 'table_file'), &
     relation_rule_t('excitation', equal_lengths, 'table_time table_torque', 'table_file'), &
     relation_rule_t('excitation', columns, 'orders amplitudes phases', 'table_file speeds'), &
-    relation_rule_t('excitation', equal_lengths, 'orders share_of_load', '')]
+    relation_rule_t('excitation', equal_lengths, 'orders share_of_load', ''), &
+    relation_rule_t('excitation', exactly_one, 'fault', 'term_amplitudes'), &
+    relation_rule_t('excitation', requires, 'fault', 'rated_torque'), &
+    relation_rule_t('excitation', requires, 'fault', 'subtransient_reactance'), &
+    relation_rule_t('excitation', requires, 'rated_torque subtransient_reactance transient_reactance', 'fault'), &
+    relation_rule_t('excitation', requires, 'subtransient_time armature_time', 'fault'), &
+    relation_rule_t('excitation', requires, 'transient_time', 'transient_reactance'), &
+    relation_rule_t('excitation', requires, 'term_amplitudes', 'term_multiples'), &
+    relation_rule_t('excitation', requires, 'term_multiples term_times term_phases', 'term_amplitudes'), &
+    relation_rule_t('excitation', equal_lengths, 'term_amplitudes term_multiples', ''), &
+    relation_rule_t('excitation', less_than, 'start', 'end')]
 
   type(example_t), parameter, public :: torque_examples(*) = [ &
     example_t('motor',      "name = 'drive'    body = 'motor'    a = 200.0  b = 10.0  c = 1.0"), &

@@ -1,0 +1,120 @@
+!> Excitations by faults of an electrical machine: sums of decaying sines from the time of the fault on.
+!>
+!> With x = t - time, the torque is the sum of A exp(-rate x) sin(n f x + phase), f the angular frequency of the mains.
+module nocdyn_fault_excitations
+  use nocdyn_bank, only: role_excitation
+  use nocdyn_excitation_banks, only: excitation_bank_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_law_expressions, only: expression_t, literal, operator(*), operator(+), operator(-), pick, time_of
+  use nocdyn_law_functions, only: add_guard, exp, sin
+  use nocdyn_law_tape, only: law_tape_t
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  public :: new_fault_excitations
+
+  !> The terms of one fault.
+  type, public :: fault_terms_t
+    real(wp) :: frequency = 0.0_wp          !! f [rad/s]
+    real(wp), allocatable :: amplitude(:)   !! A [N m], [terms]
+    real(wp), allocatable :: multiple(:)    !! n, [terms]
+    real(wp), allocatable :: rate(:)        !! [1/s], [terms]
+    real(wp), allocatable :: phase(:)       !! [rad], [terms]
+  end type fault_terms_t
+
+  type, extends(excitation_bank_t), public :: fault_excitations_t
+    integer, private :: most_terms = 0   !! of the excitation with the most
+  contains
+    procedure :: torque
+    procedure :: has_ended => fault_has_ended
+    procedure :: to_mean_torque
+  end type fault_excitations_t
+
+contains
+
+  !> A bank of excitations, each on one body.
+  function new_fault_excitations(names, body, terms, time) result(bank)
+    type(string_t), intent(in) :: names(:)
+    integer, intent(in) :: body(:)
+    type(fault_terms_t), intent(in) :: terms(:)   !! the same in every lane, [excitations]
+    real(wp), intent(in) :: time(:, :)            !! of the faults [s], shape [lanes, excitations]
+    type(fault_excitations_t) :: bank
+    integer :: e
+
+    bank%is_polynomial = .false.
+    bank%has_paper_law = .false.
+    call bank%connect(role_excitation, size(time, 1), names, body)
+    bank%most_terms = maxval([(size(terms(e)%amplitude), e=1, size(body))])
+    call bank%add_parameter('time', time)
+    call bank%add_parameter('mains', spread(terms%frequency, 1, bank%lanes), is_key=.false.)
+    call add_numbers(bank, terms)
+    call bank%add_switches([character(len=24) :: ('fault', e=1, size(body))], 2)
+    call bank%prepare_law()
+  end function new_fault_excitations
+
+  !> Adds the numbers of the terms, sorted by terms. Those that an excitation lacks are 0.
+  subroutine add_numbers(bank, terms)
+    type(fault_excitations_t), intent(inout) :: bank
+    type(fault_terms_t), intent(in) :: terms(:)
+    real(wp), dimension(size(terms), bank%most_terms) :: amplitude, multiple, phase, rate
+    integer, allocatable :: owner(:)
+    integer :: e, k
+
+    amplitude = 0.0_wp
+    multiple = 0.0_wp
+    phase = 0.0_wp
+    rate = 0.0_wp
+    do e = 1, size(terms)
+      associate (n => size(terms(e)%amplitude))
+        amplitude(e, :n) = terms(e)%amplitude
+        multiple(e, :n) = terms(e)%multiple
+        phase(e, :n) = terms(e)%phase
+        rate(e, :n) = terms(e)%rate
+      end associate
+    end do
+    allocate (owner, source=[((e, e=1, size(terms)), k=1, bank%most_terms)])
+    call bank%add_parameter('amplitude', spread(reshape(amplitude, [size(owner)]), 1, bank%lanes), is_key=.false., element=owner)
+    call bank%add_parameter('multiple', spread(reshape(multiple, [size(owner)]), 1, bank%lanes), is_key=.false., element=owner)
+    call bank%add_parameter('phase', spread(reshape(phase, [size(owner)]), 1, bank%lanes), is_key=.false., element=owner)
+    call bank%add_parameter('rate', spread(reshape(rate, [size(owner)]), 1, bank%lanes), is_key=.false., element=owner)
+  end subroutine add_numbers
+
+  !> A fault has no part in a steady state.
+  pure logical function fault_has_ended(self, element)
+    class(fault_excitations_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+
+    fault_has_ended = element <= self%count
+  end function fault_has_ended
+
+  subroutine to_mean_torque(self)
+    class(fault_excitations_t), intent(inout) :: self
+
+    self%parameters(self%number_of('amplitude'))%value = 0.0_wp
+    call self%prepare_law()
+  end subroutine to_mean_torque
+
+  function torque(self, tape)
+    class(fault_excitations_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: torque
+    type(expression_t) :: has_begun, time, wave, x
+    integer :: e, k
+
+    time = self%parameter(tape, 'time')
+    has_begun = pick(1, [literal(tape, 0.0_wp), literal(tape, 1.0_wp)])
+    x = has_begun * (time_of(tape) - time)
+    torque = literal(tape, 0.0_wp)
+    do k = 1, self%most_terms
+      associate (columns => [(e + (k - 1) * self%count, e=1, self%count)])
+        wave = self%parameter(tape, 'amplitude', columns) * exp(-(self%parameter(tape, 'rate', columns) * x)) &
+               * sin(self%parameter(tape, 'multiple', columns) * self%parameter(tape, 'mains') * x &
+                     + self%parameter(tape, 'phase', columns))
+      end associate
+      torque = torque + has_begun * wave
+    end do
+    call add_guard(1, 1, time - time_of(tape), literal(tape, 0.0_wp))   ! time does not go back
+  end function torque
+
+end module nocdyn_fault_excitations
