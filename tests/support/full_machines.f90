@@ -300,7 +300,10 @@ contains
   subroutine add_excitations(bodies, variants, machine)
     integer, intent(in) :: bodies, variants(:)
     type(machine_t), intent(inout) :: machine
+    type(fault_terms_t) :: faults(2)
 
+    call set_fault(faults(1))
+    call set_fault(faults(2))
     call append_bank(machine%banks, new_order_excitations(numbered_names('cylinder', 2), [1, bodies], cylinders(variants)))
     call add_shares(bodies, variants, machine)
     associate (one => lane_values(1.0_wp, variants, 3))
@@ -313,7 +316,7 @@ contains
                                              [shape_step, shape_ramp, shape_pulse], 12.0_wp * one, &
                                              0.35_wp * one, 0.2_wp * one))
       call append_bank(machine%banks, new_fault_excitations(numbered_names('fault', 2), [1, bodies], &
-                                                            [fault_terms(), fault_terms()], 0.3_wp * one(:, :2)))
+                                                            faults, 0.3_wp * one(:, :2)))
       select type (bank => machine%banks(size(machine%banks))%bank)
       class is (excitation_bank_t)
         call bank%set_window(0.4_wp * one(:, :2), 0.9_wp * one(:, :2), 2.0_wp * one(:, :2))
@@ -328,13 +331,15 @@ contains
   end subroutine add_excitations
 
   !> A constant and two sines that decay.
-  type(fault_terms_t) function fault_terms() result(terms)
+  subroutine set_fault(terms)
+    type(fault_terms_t), intent(out) :: terms
+
     terms%frequency = 20.0_wp
     terms%amplitude = [9.0_wp, -7.0_wp, 3.0_wp]
     terms%multiple = [1.0_wp, 2.0_wp, 0.0_wp]
     terms%rate = [3.0_wp, 5.0_wp, 1.0_wp]
     terms%phase = [0.1_wp, 0.2_wp, 1.5_wp]
-  end function fault_terms
+  end subroutine set_fault
 
   !> Two cylinders, of which one follows the speed at more points, [lanes, cylinders].
   function cylinders(variants) result(torque)

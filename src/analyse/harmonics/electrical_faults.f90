@@ -20,7 +20,7 @@ module nocdyn_electrical_faults
   implicit none (type, external)
   private
 
-  public :: check_faults, fault_terms
+  public :: check_faults, find_fault_terms
 
   real(wp), parameter :: quarter = 0.5_wp * acos(-1.0_wp)   ! turn
 
@@ -80,8 +80,9 @@ contains
   end subroutine check_fault
 
   !> The terms of a checked group. The torque of a fault brakes a rotor that turns forwards; that of given terms is as they are.
-  type(fault_terms_t) function fault_terms(group) result(terms)
+  subroutine find_fault_terms(group, terms)
     type(group_t), intent(in) :: group
+    type(fault_terms_t), intent(out) :: terms
     real(wp) :: angle, transient, rotor_rate
     integer :: n
 
@@ -130,7 +131,7 @@ contains
       terms%phase = [terms%phase, phase]
     end subroutine add
 
-  end function fault_terms
+  end subroutine find_fault_terms
 
   !> The given terms.
   subroutine copy_terms(group, terms)

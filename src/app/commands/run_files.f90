@@ -120,7 +120,7 @@ contains
     if (.not. allocated(error)) return
     call writer%file%discard()
     call input_copy%discard()
-    call cycles%discard()
+    if (size(summary%fatigue%items) > 0) call cycles%discard()
     call report%discard()
   end subroutine write_results
 

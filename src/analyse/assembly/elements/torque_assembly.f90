@@ -2,11 +2,11 @@
 module nocdyn_torque_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
   use nocdyn_cylinder_torques, only: cylinder_torques
-  use nocdyn_electrical_faults, only: fault_terms
+  use nocdyn_electrical_faults, only: find_fault_terms
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_excitation_banks, only: excitation_bank_t, never
   use nocdyn_excitations, only: new_excitations
-  use nocdyn_fault_excitations, only: new_fault_excitations
+  use nocdyn_fault_excitations, only: fault_terms_t, new_fault_excitations
   use nocdyn_harmonic_tables, only: table_torque
   use nocdyn_input, only: group_t
   use nocdyn_kinds, only: wp
@@ -95,6 +95,7 @@ contains
     type(element_groups_t), intent(in) :: groups
     integer, intent(in) :: form
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    type(fault_terms_t) :: terms(size(groups%indices))
     integer :: before, body(size(groups%indices)), i, shape(size(groups%indices))
 
     before = size(banks)
@@ -113,8 +114,10 @@ contains
       call append_bank(banks, new_table_excitations(groups%names, body, &
                                                     groups%curves('table_time', 'table_torque', extrapolation='constant')))
     case (faults)
-      call append_bank(banks, new_fault_excitations(groups%names, body, [(fault_terms(groups%input%groups(groups%indices(i))), &
-                                                    i=1, size(body))], groups%values('time')))
+      do i = 1, size(body)
+        call find_fault_terms(groups%input%groups(groups%indices(i)), terms(i))
+      end do
+      call append_bank(banks, new_fault_excitations(groups%names, body, terms, groups%values('time')))
     case default
       shape = shape_pulse
       do i = 1, size(body)

@@ -47,7 +47,7 @@ contains
     call self%add_parameter('window begin', begin, is_key=.false.)
     call self%add_parameter('window end', end, is_key=.false.)
     call self%add_parameter('decay rate', rate, is_key=.false.)
-    call self%add_switches([character(len=24) :: ('start or end', e=1, self%count)], after)
+    call self%add_switches([('start or end', e=1, self%count)], after)
     call self%prepare_law()
   end subroutine set_window
 

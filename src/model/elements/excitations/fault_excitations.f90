@@ -47,9 +47,9 @@ contains
     call bank%connect(role_excitation, size(time, 1), names, body)
     bank%most_terms = maxval([(size(terms(e)%amplitude), e=1, size(body))])
     call bank%add_parameter('time', time)
-    call bank%add_parameter('mains', spread(terms%frequency, 1, bank%lanes), is_key=.false.)
+    call bank%add_parameter('mains', spread([(terms(e)%frequency, e=1, size(body))], 1, bank%lanes), is_key=.false.)
     call add_numbers(bank, terms)
-    call bank%add_switches([character(len=24) :: ('fault', e=1, size(body))], 2)
+    call bank%add_switches([('fault', e=1, size(body))], 2)
     call bank%prepare_law()
   end function new_fault_excitations
 
@@ -100,18 +100,17 @@ contains
     type(law_tape_t), target, intent(inout) :: tape
     type(expression_t) :: torque
     type(expression_t) :: has_begun, time, wave, x
-    integer :: e, k
+    integer :: columns(self%count), e, k
 
     time = self%parameter(tape, 'time')
     has_begun = pick(1, [literal(tape, 0.0_wp), literal(tape, 1.0_wp)])
     x = has_begun * (time_of(tape) - time)
     torque = literal(tape, 0.0_wp)
     do k = 1, self%most_terms
-      associate (columns => [(e + (k - 1) * self%count, e=1, self%count)])
-        wave = self%parameter(tape, 'amplitude', columns) * exp(-(self%parameter(tape, 'rate', columns) * x)) &
-               * sin(self%parameter(tape, 'multiple', columns) * self%parameter(tape, 'mains') * x &
-                     + self%parameter(tape, 'phase', columns))
-      end associate
+      columns = [(e + (k - 1) * self%count, e=1, self%count)]
+      wave = self%parameter(tape, 'amplitude', columns) * exp(-(self%parameter(tape, 'rate', columns) * x)) &
+             * sin(self%parameter(tape, 'multiple', columns) * self%parameter(tape, 'mains') * x &
+                   + self%parameter(tape, 'phase', columns))
       torque = torque + has_begun * wave
     end do
     call add_guard(1, 1, time - time_of(tape), literal(tape, 0.0_wp))   ! time does not go back

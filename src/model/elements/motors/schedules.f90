@@ -102,7 +102,7 @@ contains
     call add(name // ' time', begin)
     call add(name // ' slope', slope)
     call add(name // ' flag', flag)
-    call bank%add_switches([character(len=24) :: (boundary, e=1, bank%count)], stretches)
+    call bank%add_switches(spread(boundary, 1, bank%count), stretches)
 
   contains
 

@@ -60,7 +60,7 @@ contains
     call bank%add_parameter('phase', phase)
     bank%segments = 1 + maxval([1, (size(curves(1, e)%slip), e=1, bank%count)])
     call add_pieces(bank, curves)
-    call bank%add_switches([character(len=24) :: ('point in the table', e=1, bank%count)], bank%segments)
+    call bank%add_switches([('point in the table', e=1, bank%count)], bank%segments)
     call bank%prepare_law()
   end function new_synchronous_motors
 
