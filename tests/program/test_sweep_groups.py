@@ -45,7 +45,10 @@ def test_a_new_input_is_an_ordinary_machine_and_explains_sweeps(nocdyn):
 @pytest.mark.parametrize(
     ("group", "parts"),
     [
-        ("sweep", ["  design = 'latin': ", "    samples                whole number, 1 to 2e+09               required", "'list'"]),
+        (
+            "sweep",
+            ["  design = 'latin': ", "    samples                whole number, 1 to 2e+09               required", "'list'"],
+        ),
         ("vary", ["    low                    number, any value                      required by 'uniform'", "'lognormal'"]),
         ("record", ["  statistic = 'settling_time': ", "quantity, mode and response need statistic."]),
     ],

@@ -334,8 +334,8 @@ contains
   subroutine set_fault(terms)
     type(fault_terms_t), intent(out) :: terms
 
-    terms%frequency = 20.0_wp
-    terms%amplitude = [9.0_wp, -7.0_wp, 3.0_wp]
+    terms%frequency = 5.0_wp
+    terms%amplitude = [3.0_wp, -2.0_wp, 1.0_wp]
     terms%multiple = [1.0_wp, 2.0_wp, 0.0_wp]
     terms%rate = [3.0_wp, 5.0_wp, 1.0_wp]
     terms%phase = [0.1_wp, 0.2_wp, 1.5_wp]

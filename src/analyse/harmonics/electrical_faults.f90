@@ -9,8 +9,8 @@
 !>   closing with a phase angle d    D / x'' (sin d (1 - e^(-t/T_a) cos x) + (1 - cos d) e^(-t/T_a) sin x)
 !>
 !> D is the decay of the rotor's flux, e^(-t/T''). With a transient reactance x', D / x'' is (1/x'' - 1/x') e^(-t/T'') +
-!> 1/x' e^(-t/T'), the decay of the current of a short circuit. (C. Concordia, Synchronous Machines, 1951; E. W. Kimbark, Power
-!> System Stability, vol. 3, 1956, on short-circuit torques.) Resistances add small mean torques that are left out.
+!> 1/x' e^(-t/T'), the decay of the current of a short circuit. Resistances add small mean torques that are left out. The page on
+!> the theory derives the torques.
 module nocdyn_electrical_faults
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_fault_excitations, only: fault_terms_t

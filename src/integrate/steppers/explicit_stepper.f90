@@ -114,12 +114,15 @@ contains
     type(step_attempt_t), intent(inout) :: attempt
     logical, intent(in) :: wanted(:)
     real(wp), contiguous, intent(inout) :: coefficients(:, :, :)
-    integer :: stage
+    integer :: lane, stage
 
     if (self%stages%all > self%stages%step) then
       attempt%active(:) = wanted
       do stage = self%stages%step + 1, self%stages%all
         call stage_state(self%stages, attempt, stage, self%y_stage)
+        do lane = 1, attempt%lanes   ! steps of other kinds, or refused, have stages of no meaning, perhaps huge
+          if (.not. wanted(lane)) self%y_stage(lane, :) = attempt%y(lane, :)
+        end do
         self%t_stage(:) = attempt%t + self%c(stage) * attempt%h
         call evaluate_finite(attempt, system, self%t_stage, self%y_stage, self%stages%k(1, 1, self%stages%k_index(stage)))
       end do
