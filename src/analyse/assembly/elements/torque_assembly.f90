@@ -24,8 +24,8 @@ module nocdyn_torque_assembly
   public :: load_form, add_load_form, excitation_form, add_excitation_form, add_engines, in_lanes
 
   integer, parameter :: viscous = 1, nonlinear = 2, table = 3     ! forms of loads
-  ! forms of excitations, and `table`; one with a start, an end or a decay has the form after its own
-  integer, parameter :: harmonic = 1, waves = 11, timed = 5, orders = 7, shares = 9, faults = 13
+  ! Forms of excitations, in the order of their columns; one with a start, an end or a decay has the form after its own.
+  integer, parameter :: harmonic = 1, waves = 3, tables = 5, timed = 7, orders = 9, shares = 11, faults = 13
 
 contains
 
@@ -74,7 +74,7 @@ contains
       if (group%has_value('speeds')) excitation_form = orders
       if (group%has_value('share_of_load')) excitation_form = shares
     case ('table')
-      excitation_form = table
+      excitation_form = tables
     case ('fault')
       excitation_form = faults
     case default
@@ -110,7 +110,7 @@ contains
       call append_bank(banks, new_order_excitations(groups%names, body, in_lanes(torques(groups), groups%lanes)))
     case (shares)
       call add_shares(groups, body, banks)
-    case (table)
+    case (tables)
       call append_bank(banks, new_table_excitations(groups%names, body, &
                                                     groups%curves('table_time', 'table_torque', extrapolation='constant')))
     case (faults)
