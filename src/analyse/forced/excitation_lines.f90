@@ -50,6 +50,7 @@ contains
       associate (bank => machine%banks(b)%bank)
         if (bank%role == role_load) cycle
         do e = 1, bank%count
+          if (bank%has_ended(e)) cycle
           speed = 0.0_wp
           do k = bank%rows%first(e), bank%rows%first(e + 1) - 1
             if (bank%rows%body(k) > 0) speed = speed + bank%rows%coefficient(k) * state%omega(bank%rows%body(k))

@@ -2,7 +2,6 @@
 module nocdyn_response_notes
   use nocdyn_bank, only: bank_of
   use nocdyn_element_sets, only: element_names
-  use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_forced_response, only: forced_response_t
   use nocdyn_gap_couplings, only: gap_couplings_t
   use nocdyn_input, only: input_t
@@ -39,15 +38,12 @@ contains
     integer :: e, i
 
     do i = 1, size(machine%banks)
-      select type (bank => machine%banks(i)%bank)
-      class is (excitation_bank_t)
+      associate (bank => machine%banks(i)%bank)
         do e = 1, bank%count
           if (bank%has_ended(e)) call append(notes, 'excitation ' // quoted(bank%names(e)%text) // &
                                              ' ends or decays, and has no part in the response')
         end do
-      class default
-        cycle
-      end select
+      end associate
     end do
   end subroutine note_ended_excitations
 

@@ -69,6 +69,7 @@ module nocdyn_bank
   contains
     procedure :: to_mean_torque
     procedure :: list_harmonics
+    procedure :: has_ended
     procedure :: hold_speed
     procedure :: start_internal
     procedure :: steady_internal
@@ -179,7 +180,7 @@ contains
   end subroutine to_mean_torque
 
   !> The harmonics of the torque, or of a twist in series, of an element in the first lane, which turns with a constant speed;
-  !> `to_mean_torque` removes them. By default there are none.
+  !> `to_mean_torque` removes them. By default there are none. Those of an element that `has_ended` do not count.
   subroutine list_harmonics(self, element, speed, list)
     class(bank_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
@@ -188,6 +189,14 @@ contains
 
     allocate (list(0))
   end subroutine list_harmonics
+
+  !> Whether an element of the first lane has no part in a steady state, because its torque ends or decays; by default none has.
+  pure logical function has_ended(self, element)
+    class(bank_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+
+    has_ended = .false.
+  end function has_ended
 
   !> amplitude sin(frequency t + order phi + phase).
   pure type(harmonic_t) function sine_harmonic(amplitude, frequency, order, phase, body) result(harmonic)

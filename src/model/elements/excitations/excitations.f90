@@ -62,10 +62,6 @@ contains
     type(harmonic_t), allocatable, intent(out) :: list(:)
     real(wp), dimension(self%lanes, self%count) :: amplitude, frequency, phase
 
-    if (self%has_ended(element)) then
-      allocate (list(0))
-      return
-    end if
     amplitude = self%values_of('amplitude')
     frequency = self%values_of('frequency')
     phase = self%values_of('phase')

@@ -85,7 +85,7 @@ contains
     class(fault_excitations_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
 
-    fault_has_ended = element <= self%count
+    fault_has_ended = .true.
   end function fault_has_ended
 
   subroutine to_mean_torque(self)

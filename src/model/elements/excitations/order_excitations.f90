@@ -276,10 +276,6 @@ contains
     real(wp) :: distance   ! to the last point of the table below this speed
     integer :: below, body, cosine, i, n, shift, sine
 
-    if (self%has_ended(element)) then
-      allocate (list(0))
-      return
-    end if
     body = self%rows%last_body(element)
     sine = self%number_of('sine')
     cosine = self%number_of('cosine')

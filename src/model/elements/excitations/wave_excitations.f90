@@ -116,10 +116,6 @@ contains
     integer :: i, k
     integer, allocatable :: terms(:)
 
-    if (self%has_ended(element)) then
-      allocate (list(0))
-      return
-    end if
     associate (amplitude => self%parameters(self%number_of('amplitude')), phase => self%parameters(self%number_of('phase')), &
                frequency => self%parameters(self%number_of('frequency')), order => self%parameters(self%number_of('order')))
       terms = pack([(k, k=1, size(amplitude%element))], amplitude%element == element)
