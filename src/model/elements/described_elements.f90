@@ -62,6 +62,7 @@ module nocdyn_described_elements
     procedure :: describe
     procedure :: set_size
     procedure :: add_parameter
+    procedure :: add_parts, part_columns
     procedure :: values_of
     procedure :: add_term
     procedure :: number_of
@@ -122,6 +123,27 @@ contains
     if (present(element)) longer(n + 1)%element(:) = element
     call move_alloc(longer, self%parameters)
   end subroutine add_parameter
+
+  !> Adds an array of parameters in parts, such as the terms of a sum, sorted by them; they are not the values of a key.
+  subroutine add_parts(self, name, value)
+    class(described_elements_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    real(wp), intent(in) :: value(:, :, :)   !! [lanes, elements, parts]
+    integer :: e, k
+
+    call self%add_parameter(name, reshape(value, [size(value, 1), size(value, 2) * size(value, 3)]), is_key=.false., &
+                            element=[((e, e=1, size(value, 2)), k=1, size(value, 3))])
+  end subroutine add_parts
+
+  !> The columns of a part of all elements, see `add_parts`.
+  pure function part_columns(self, part) result(columns)
+    class(described_elements_t), intent(in) :: self
+    integer, intent(in) :: part
+    integer :: columns(self%count)
+    integer :: e
+
+    columns = [(e + (part - 1) * self%count, e=1, self%count)]
+  end function part_columns
 
   !> Number of a parameter; 0 if there is none.
   pure integer function number_of(self, name)

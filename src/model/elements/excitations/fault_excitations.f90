@@ -53,31 +53,29 @@ contains
     call bank%prepare_law()
   end function new_fault_excitations
 
-  !> Adds the numbers of the terms, sorted by terms. Those that an excitation lacks are 0.
+  !> Adds the numbers of the terms. Those that an excitation lacks are 0.
   subroutine add_numbers(bank, terms)
     type(fault_excitations_t), intent(inout) :: bank
     type(fault_terms_t), intent(in) :: terms(:)
-    real(wp), dimension(size(terms), bank%most_terms) :: amplitude, multiple, phase, rate
-    integer, allocatable :: owner(:)
+    real(wp), dimension(bank%lanes, bank%count, bank%most_terms) :: amplitude, multiple, phase, rate
     integer :: e, k
 
     amplitude = 0.0_wp
     multiple = 0.0_wp
     phase = 0.0_wp
     rate = 0.0_wp
-    do e = 1, size(terms)
-      associate (n => size(terms(e)%amplitude))
-        amplitude(e, :n) = terms(e)%amplitude
-        multiple(e, :n) = terms(e)%multiple
-        phase(e, :n) = terms(e)%phase
-        rate(e, :n) = terms(e)%rate
-      end associate
+    do e = 1, bank%count
+      do k = 1, size(terms(e)%amplitude)
+        amplitude(:, e, k) = terms(e)%amplitude(k)
+        multiple(:, e, k) = terms(e)%multiple(k)
+        phase(:, e, k) = terms(e)%phase(k)
+        rate(:, e, k) = terms(e)%rate(k)
+      end do
     end do
-    allocate (owner, source=[((e, e=1, size(terms)), k=1, bank%most_terms)])
-    call bank%add_parameter('amplitude', spread(reshape(amplitude, [size(owner)]), 1, bank%lanes), is_key=.false., element=owner)
-    call bank%add_parameter('multiple', spread(reshape(multiple, [size(owner)]), 1, bank%lanes), is_key=.false., element=owner)
-    call bank%add_parameter('phase', spread(reshape(phase, [size(owner)]), 1, bank%lanes), is_key=.false., element=owner)
-    call bank%add_parameter('rate', spread(reshape(rate, [size(owner)]), 1, bank%lanes), is_key=.false., element=owner)
+    call bank%add_parts('amplitude', amplitude)
+    call bank%add_parts('multiple', multiple)
+    call bank%add_parts('phase', phase)
+    call bank%add_parts('rate', rate)
   end subroutine add_numbers
 
   !> A fault has no part in a steady state.
@@ -100,14 +98,14 @@ contains
     type(law_tape_t), target, intent(inout) :: tape
     type(expression_t) :: torque
     type(expression_t) :: has_begun, time, wave, x
-    integer :: columns(self%count), e, k
+    integer :: columns(self%count), k
 
     time = self%parameter(tape, 'time')
     has_begun = pick(1, [literal(tape, 0.0_wp), literal(tape, 1.0_wp)])
     x = has_begun * (time_of(tape) - time)
     torque = literal(tape, 0.0_wp)
     do k = 1, self%most_terms
-      columns = [(e + (k - 1) * self%count, e=1, self%count)]
+      columns = self%part_columns(k)
       wave = self%parameter(tape, 'amplitude', columns) * exp(-(self%parameter(tape, 'rate', columns) * x)) &
              * sin(self%parameter(tape, 'multiple', columns) * self%parameter(tape, 'mains') * x &
                    + self%parameter(tape, 'phase', columns))

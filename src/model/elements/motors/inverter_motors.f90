@@ -41,7 +41,6 @@ contains
     type(governor_t), intent(in) :: governor     !! of all motors, down to -1
     type(torque_harmonics_t), intent(in) :: harmonics
     type(inverter_motors_t) :: bank
-    integer :: e, k
 
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
@@ -49,12 +48,10 @@ contains
     call bank%connect(role_motor, size(torque_limit, 1), names, body)
     call bank%add_parameter('torque_limit', torque_limit)
     bank%harmonics = size(harmonics%order, 3)
-    associate (owner => [((e, e=1, bank%count), k=1, bank%harmonics)], n => bank%count * bank%harmonics)
-      call bank%add_parameter('order', reshape(harmonics%order, [bank%lanes, n]), is_key=.false., element=owner)
-      call bank%add_parameter('share', reshape(harmonics%share, [bank%lanes, n]), is_key=.false., element=owner)
-      call bank%add_parameter('torque', reshape(harmonics%torque, [bank%lanes, n]), is_key=.false., element=owner)
-      call bank%add_parameter('phase', reshape(harmonics%phase, [bank%lanes, n]), is_key=.false., element=owner)
-    end associate
+    call bank%add_parts('order', harmonics%order)
+    call bank%add_parts('share', harmonics%share)
+    call bank%add_parts('torque', harmonics%torque)
+    call bank%add_parts('phase', harmonics%phase)
     call bank%add_governor(governor)
     call bank%prepare_law()
   end function new_inverter_motors
@@ -63,12 +60,12 @@ contains
     class(inverter_motors_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape
     type(expression_t) :: control, torque, wave
-    integer :: columns(self%count), e, k
+    integer :: columns(self%count), k
 
     control = self%parameter(tape, 'torque_limit') * self%throttle(tape)
     torque = control
     do k = 1, self%harmonics
-      columns = [(e + (k - 1) * self%count, e=1, self%count)]
+      columns = self%part_columns(k)
       wave = sin(self%parameter(tape, 'order', columns) * angle_of(tape) + self%parameter(tape, 'phase', columns))
       torque = torque + (self%parameter(tape, 'torque', columns) + self%parameter(tape, 'share', columns) * control) * wave
     end do

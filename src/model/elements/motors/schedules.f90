@@ -79,8 +79,7 @@ contains
     character(len=*), intent(in) :: name       !! of the scheduled number, at most 16 characters
     type(schedule_t), intent(in) :: schedule(:, :)   !! [lanes, elements]
     character(len=*), intent(in) :: boundary   !! name of the end of a stretch
-    integer :: e, lane, n, s, stretches
-    integer, allocatable :: owner(:)
+    integer :: e, lane, n, stretches
     real(wp), allocatable, dimension(:, :, :) :: begin, flag, slope, value
 
     stretches = maxval([0, (size(schedule(1, e)%begin), e=1, bank%count)])
@@ -97,23 +96,11 @@ contains
         end associate
       end do
     end do
-    owner = [((e, e=1, bank%count), s=1, stretches)]
-    call add(name, value)
-    call add(name // ' time', begin)
-    call add(name // ' slope', slope)
-    call add(name // ' flag', flag)
+    call bank%add_parts(name, value)
+    call bank%add_parts(name // ' time', begin)
+    call bank%add_parts(name // ' slope', slope)
+    call bank%add_parts(name // ' flag', flag)
     call bank%add_switches(spread(boundary, 1, bank%count), stretches)
-
-  contains
-
-    subroutine add(parameter, numbers)
-      character(len=*), intent(in) :: parameter
-      real(wp), intent(in) :: numbers(:, :, :)
-
-      call bank%add_parameter(parameter, reshape(numbers, [size(numbers, 1), size(numbers, 2) * size(numbers, 3)]), &
-                              is_key=.false., element=owner)
-    end subroutine add
-
   end subroutine add_schedule
 
   !> Number of stretches of the schedules of a bank.
@@ -131,10 +118,9 @@ contains
     character(len=*), intent(in) :: name   !! of a parameter
     integer, intent(in) :: switch
     type(expression_t) :: number
-    integer :: e, s
+    integer :: s
 
-    number = pick(switch, [(bank%parameter(tape, name, [(e + (s - 1) * bank%count, e=1, bank%count)]), &
-                            s=1, stretches_of(bank, name))])
+    number = pick(switch, [(bank%parameter(tape, name, bank%part_columns(s)), s=1, stretches_of(bank, name))])
   end function picked
 
   !> The scheduled number.
@@ -166,10 +152,10 @@ contains
     type(law_tape_t), target, intent(inout) :: tape
     character(len=*), intent(in) :: name
     integer, intent(in) :: switch   !! of the schedule, numbered within an element
-    integer :: e, s
+    integer :: s
 
     do s = 1, stretches_of(bank, name) - 1
-      call add_guard(switch, s, bank%parameter(tape, name // ' time', [(e + s * bank%count, e=1, bank%count)]) - time_of(tape), &
+      call add_guard(switch, s, bank%parameter(tape, name // ' time', bank%part_columns(s + 1)) - time_of(tape), &
                      literal(tape, 0.0_wp))
     end do
   end subroutine guard_schedule

@@ -69,7 +69,7 @@ contains
     type(synchronous_motors_t), intent(inout) :: bank
     type(slip_curves_t), intent(in) :: curves(:, :)   ! [lanes, motors]
     real(wp), dimension(bank%lanes, bank%count, bank%segments) :: begin, mean, mean_slope, pulsation, pulsation_slope
-    integer :: e, lane, s
+    integer :: e, lane
 
     do e = 1, bank%count
       do lane = 1, bank%lanes
@@ -79,13 +79,11 @@ contains
         end associate
       end do
     end do
-    associate (n => bank%count * bank%segments, owner => [((e, e=1, bank%count), s=1, bank%segments)])
-      call bank%add_parameter('slip', reshape(begin, [bank%lanes, n]), is_key=.false., element=owner)
-      call bank%add_parameter('mean', reshape(mean, [bank%lanes, n]), is_key=.false., element=owner)
-      call bank%add_parameter('mean slope', reshape(mean_slope, [bank%lanes, n]), is_key=.false., element=owner)
-      call bank%add_parameter('pulsation', reshape(pulsation, [bank%lanes, n]), is_key=.false., element=owner)
-      call bank%add_parameter('pulsation slope', reshape(pulsation_slope, [bank%lanes, n]), is_key=.false., element=owner)
-    end associate
+    call bank%add_parts('slip', begin)
+    call bank%add_parts('mean', mean)
+    call bank%add_parts('mean slope', mean_slope)
+    call bank%add_parts('pulsation', pulsation)
+    call bank%add_parts('pulsation slope', pulsation_slope)
   end subroutine add_pieces
 
   !> Begins, values and slopes of the segments. Those that a table lacks begin behind all slips.
@@ -121,21 +119,11 @@ contains
     tape%applied = node_of(self%parameter(tape, 'direction') * torque)
     width = literal(tape, boundary_width)
     do s = 2, self%segments
-      edge = self%parameter(tape, 'slip', columns_of(self, s))
+      edge = self%parameter(tape, 'slip', self%part_columns(s))
       call add_guard(1, s - 1, edge - slip, width)
       call add_guard(1, s, slip - edge, width)
     end do
   end subroutine describe
-
-  !> Columns of the parameters of a segment.
-  pure function columns_of(self, segment) result(columns)
-    class(synchronous_motors_t), intent(in) :: self
-    integer, intent(in) :: segment
-    integer :: columns(self%count)
-    integer :: e
-
-    columns = [(e, e=1, self%count)] + (segment - 1) * self%count
-  end function columns_of
 
   !> One of the torques at a slip.
   function on_segment(self, tape, name, slip) result(torque)
@@ -146,9 +134,9 @@ contains
     type(expression_t) :: torque
     integer :: s
 
-    torque = pick(1, [(self%parameter(tape, name, columns_of(self, s)), s=1, self%segments)]) &
-             + pick(1, [(self%parameter(tape, name // ' slope', columns_of(self, s)), s=1, self%segments)]) &
-             * (slip - pick(1, [(self%parameter(tape, 'slip', columns_of(self, s)), s=1, self%segments)]))
+    torque = pick(1, [(self%parameter(tape, name, self%part_columns(s)), s=1, self%segments)]) &
+             + pick(1, [(self%parameter(tape, name // ' slope', self%part_columns(s)), s=1, self%segments)]) &
+             * (slip - pick(1, [(self%parameter(tape, 'slip', self%part_columns(s)), s=1, self%segments)]))
   end function on_segment
 
   !> Leaves the pulsation out.
