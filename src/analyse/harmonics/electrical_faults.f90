@@ -83,55 +83,55 @@ contains
   subroutine find_fault_terms(group, terms)
     type(group_t), intent(in) :: group
     type(fault_terms_t), intent(out) :: terms
-    real(wp) :: angle, transient, rotor_rate
-    integer :: n
+    real(wp), allocatable, dimension(:) :: rate, share   ! of the parts of the rotor's decay D: D = sum of share e^(-rate t)
+    integer :: i
 
-    allocate (terms%amplitude(0), terms%multiple(0), terms%rate(0), terms%phase(0))
     terms%frequency = group%number('frequency')
     if (group%has_value('term_amplitudes')) then
       call copy_terms(group, terms)
       return
     end if
-    angle = group%number('angle')
-    transient = 0.0_wp
-    if (group%has_value('transient_reactance')) transient = 1 / group%number('transient_reactance')
-    rotor_rate = rate_of(group, 'subtransient_time')
-    call add_decay(1 / group%number('subtransient_reactance') - transient, rotor_rate)
-    if (transient > 0) call add_decay(transient, rate_of(group, 'transient_time'))
-    n = size(terms%amplitude)
-    terms%amplitude(:n) = -group%number('rated_torque') * terms%amplitude
-
-  contains
-
-    !> Adds the terms that one part of the rotor's decay has.
-    subroutine add_decay(share, rate)
-      real(wp), intent(in) :: share, rate
-      real(wp) :: stator_rate
-
-      stator_rate = rate + rate_of(group, 'armature_time')
-      select case (group%text('fault'))
-      case ('three_phase')
-        call add(share, 1.0_wp, stator_rate, 0.0_wp)
-      case ('two_phase')
-        call add(share, 1.0_wp, stator_rate, 0.0_wp)
-        call add(-0.5_wp * share, 2.0_wp, rate, 0.0_wp)
-      case default
-        call add(share * sin(angle), 0.0_wp, rate, quarter)
-        call add(-share * sin(angle), 1.0_wp, stator_rate, quarter)
-        call add(share * (1 - cos(angle)), 1.0_wp, stator_rate, 0.0_wp)
-      end select
-    end subroutine add_decay
-
-    subroutine add(amplitude, multiple, rate, phase)
-      real(wp), intent(in) :: amplitude, multiple, rate, phase
-
-      terms%amplitude = [terms%amplitude, amplitude]
-      terms%multiple = [terms%multiple, multiple]
-      terms%rate = [terms%rate, rate]
-      terms%phase = [terms%phase, phase]
-    end subroutine add
-
+    share = [1 / group%number('subtransient_reactance')]
+    rate = [rate_of(group, 'subtransient_time')]
+    if (group%has_value('transient_reactance')) then
+      associate (transient => 1 / group%number('transient_reactance'))
+        share = [share - transient, transient]
+        rate = [rate, rate_of(group, 'transient_time')]
+      end associate
+    end if
+    call find_shape(group, terms)
+    terms%amplitude = -group%number('rated_torque') * [(share(i) * terms%amplitude, i=1, size(share))]
+    terms%rate = [(rate(i) + terms%rate, i=1, size(rate))]
+    terms%multiple = [(terms%multiple, i=1, size(share))]
+    terms%phase = [(terms%phase, i=1, size(share))]
   end subroutine find_fault_terms
+
+  !> The terms of a fault beside D. Their rates are those of the stator's flux where it takes part.
+  subroutine find_shape(group, terms)
+    type(group_t), intent(in) :: group
+    type(fault_terms_t), intent(inout) :: terms
+    real(wp) :: angle, stator
+
+    stator = rate_of(group, 'armature_time')
+    select case (group%text('fault'))
+    case ('three_phase')
+      terms%amplitude = [1.0_wp]
+      terms%multiple = [1.0_wp]
+      terms%rate = [stator]
+      terms%phase = [0.0_wp]
+    case ('two_phase')
+      terms%amplitude = [1.0_wp, -0.5_wp]
+      terms%multiple = [1.0_wp, 2.0_wp]
+      terms%rate = [stator, 0.0_wp]
+      terms%phase = [0.0_wp, 0.0_wp]
+    case default
+      angle = group%number('angle')
+      terms%amplitude = [sin(angle), -sin(angle), 1 - cos(angle)]
+      terms%multiple = [0.0_wp, 1.0_wp, 1.0_wp]
+      terms%rate = [0.0_wp, stator, stator]
+      terms%phase = [quarter, quarter, 0.0_wp]
+    end select
+  end subroutine find_shape
 
   !> The given terms.
   subroutine copy_terms(group, terms)
