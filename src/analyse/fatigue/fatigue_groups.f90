@@ -12,8 +12,9 @@ module nocdyn_fatigue_groups
   public :: check_fatigue, element_kind, quantity_of, read_curve
 
   character(len=*), parameter :: kinds(*) = [character(len=8) :: 'coupling', 'shaft', 'mesh', 'gear']
-  character(len=*), parameter, public :: quantities(*) = [character(len=6) :: 'stress', 'moment', 'force']
-  character(len=*), parameter, public :: quantity_units(*) = [character(len=3) :: 'Pa', 'N m', 'N']   !! of `quantities`
+  integer, parameter, public :: quantity_stress = 1, quantity_moment = 2   !! other ones: forces
+  character(len=*), parameter :: quantities(*) = [character(len=6) :: 'stress', 'moment', 'force']
+  character(len=*), parameter, public :: quantity_units(*) = [character(len=3) :: 'Pa', 'N m', 'N']
 
 contains
 
@@ -29,11 +30,11 @@ contains
     end do
   end function element_kind
 
-  !> The quantity of the S-N curve of a group: index of `quantities`.
+  !> The quantity of the S-N curve of a group: quantity_...
   pure integer function quantity_of(group) result(quantity)
     type(group_t), intent(in) :: group
 
-    do quantity = 1, size(quantities) - 1
+    do quantity = quantity_stress, quantity_moment
       if (group%has_value('reference_' // trim(quantities(quantity)))) return
       if (group%has_value('table_' // trim(quantities(quantity)))) return
     end do
@@ -93,7 +94,7 @@ contains
     type(group_t), intent(in) :: element
     type(error_t), allocatable, intent(out) :: error
 
-    if (element%kind == 'coupling' .and. quantity_of(input%groups(index)) == 1) then
+    if (element%kind == 'coupling' .and. quantity_of(input%groups(index)) == quantity_stress) then
       if (element%has_value('section_modulus') .or. element%has_value('diameter')) return
       call raise(error, exit_input, input%location(index, 'coupling') // ': a stress needs a section, but coupling ' // &
                  quoted(element%name) // ' has none; required: section_modulus [m3] or diameter [m] of &coupling, or ' // &
@@ -156,7 +157,7 @@ contains
                                   'soderberg with yield_stress')
         return
       end select
-      if (quantity_of(group) /= 1) then
+      if (quantity_of(group) /= quantity_stress) then
         call raise(error, exit_input, input%location(index, 'mean_stress') // ': mean_stress = ' // &
                    quoted(group%text('mean_stress')) // ' needs an S-N curve of stresses, reference_stress or table_stress')
       else if (.not. group%has_value(trim(key))) then

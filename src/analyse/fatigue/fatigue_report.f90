@@ -19,17 +19,18 @@ contains
   subroutine put_fatigue(json, fatigue)
     type(json_t), intent(inout) :: json
     type(run_fatigue_t), intent(in) :: fatigue
-    integer :: i
+    integer :: i, k
 
     if (size(fatigue%items) == 0) return
     call json%open_list('fatigue')
     do i = 1, size(fatigue%items)
-      associate (item => fatigue%items(i), counter => fatigue%counters(fatigue%worst(i)))
+      k = fatigue%worst(i)
+      associate (item => fatigue%items(i), counter => fatigue%counters(k))
         call json%open()
         call json%put('name', item%name)
         call json%put('element', item%element)
         call json%put('unit', item%unit)
-        if (item%last > item%first) call json%put('position', fatigue%position(fatigue%worst(i)))
+        if (item%last > item%first) call json%put('position', fatigue%position(k))
         call json%put('cycles', counter%cycles)
         call json%put('largest_range', counter%largest_range)
         call json%put('mean_of_largest_range', counter%mean_of_largest)
@@ -48,14 +49,15 @@ contains
   function fatigue_text(fatigue) result(text)
     type(run_fatigue_t), intent(in) :: fatigue
     character(len=:), allocatable :: text
-    integer :: i
+    integer :: i, k
 
     text = ''
     do i = 1, size(fatigue%items)
-      associate (item => fatigue%items(i), counter => fatigue%counters(fatigue%worst(i)))
+      k = fatigue%worst(i)
+      associate (item => fatigue%items(i), counter => fatigue%counters(k))
         text = text // 'fatigue ' // quoted(item%name) // ': ' // rounded_text(counter%cycles, digits) // &
                ' cycles, range up to ' // rounded_text(counter%largest_range, digits) // ' ' // item%unit
-        if (item%last > item%first) text = text // ' at ' // rounded_text(fatigue%position(fatigue%worst(i)), digits) // ' m'
+        if (item%last > item%first) text = text // ' at ' // rounded_text(fatigue%position(k), digits) // ' m'
         if (counter%damage > 0) then
           text = text // '; damage ' // rounded_text(counter%damage, digits) // ', the life is ' // &
                  rounded_text(1 / counter%damage, digits) // ' such runs'

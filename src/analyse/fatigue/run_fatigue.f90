@@ -1,10 +1,10 @@
 !> The fatigue of a run, by &fatigue: counts the cycles of moments, stresses and forces while the machine is integrated.
 module nocdyn_run_fatigue
-  use nocdyn_cycle_classes, only: cycle_classes_t
   use nocdyn_damage_counters, only: damage_counter_t
-  use nocdyn_fatigue_groups, only: element_kind, quantities, quantity_of, quantity_units, read_curve
+  use nocdyn_fatigue_groups, only: element_kind, quantity_moment, quantity_of, quantity_stress, quantity_units, read_curve
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
+  use nocdyn_labelled_columns, only: column_of, whole_moment_column
   use nocdyn_machine, only: machine_t
   use nocdyn_shafts, only: shafts_t
   use nocdyn_text, only: string_t
@@ -12,8 +12,6 @@ module nocdyn_run_fatigue
   private
 
   public :: new_run_fatigue
-
-  integer, parameter :: stress = 1   ! of `quantities`
 
   !> One group &fatigue. A shaft has a signal for each of its points, else there is one.
   type, public :: fatigue_item_t
@@ -53,13 +51,13 @@ contains
         item%element = group%text(trim(element_kind(group)))
         item%unit = trim(quantity_units(quantity_of(group)))
         item%repeats = group%number('repeats')
-        item%is_stress = quantity_of(group) == stress
+        item%is_stress = quantity_of(group) == quantity_stress
         item%first = signals + 1
         item%last = item%first
         if (element_kind(group) == 'shaft') then
           call find_shaft(machine, item)
         else
-          call find_column(labels, trim(element_kind(group)), trim(quantities(quantity_of(group))), item)
+          call find_column(labels, trim(element_kind(group)), quantity_of(group), item)
         end if
         signals = item%last
       end associate
@@ -71,25 +69,21 @@ contains
     end do
   end subroutine new_run_fatigue
 
-  !> The column of a moment, a stress or a force: of a damped coupling that of the whole moment.
+  !> The column of a moment, a stress or a force.
   pure subroutine find_column(labels, kind, quantity, item)
     type(string_t), intent(in) :: labels(:)
-    character(len=*), intent(in) :: kind, quantity
+    character(len=*), intent(in) :: kind
+    integer, intent(in) :: quantity   !! quantity_...
     type(fatigue_item_t), intent(inout) :: item
-    integer :: i
 
-    do i = 1, size(labels)
-      select case (quantity)
-      case ('stress')
-        if (labels(i)%text == 'stress_' // item%element // ' [Pa]') item%column = i
-      case ('moment')
-        if (labels(i)%text == 'moment_' // item%element // ' [N m]' .and. item%column == 0) item%column = i
-        if (labels(i)%text == 'shaft_' // item%element // ' [N m]') item%column = i
-      case default
-        if (kind == 'gear' .and. labels(i)%text == 'reaction_' // item%element // ' [N]') item%column = i
-        if (kind == 'mesh' .and. labels(i)%text == 'force_' // item%element // ' [N]') item%column = i
-      end select
-    end do
+    select case (quantity)
+    case (quantity_stress)
+      item%column = column_of(labels, 'stress_' // item%element // ' [Pa]')
+    case (quantity_moment)
+      item%column = whole_moment_column(labels, item%element)
+    case default
+      item%column = column_of(labels, trim(merge('reaction', 'force   ', kind == 'gear')) // '_' // item%element // ' [N]')
+    end select
     if (item%column == 0) error stop 'nocdyn_run_fatigue: a checked group has a column'
   end subroutine find_column
 

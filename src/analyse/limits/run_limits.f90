@@ -5,6 +5,7 @@ module nocdyn_run_limits
   use nocdyn_input, only: group_t, input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
+  use nocdyn_labelled_columns, only: column_of, whole_moment_column
   use nocdyn_text, only: rounded_text, string_t
   implicit none (type, external)
   private
@@ -43,8 +44,7 @@ contains
           column = column_of(labels, 'moment_' // limits(n)%name // '_max [N m]')
         else
           limits(n)%name = group%text('coupling')
-          column = column_of(labels, 'shaft_' // limits(n)%name // ' [N m]')   ! with damping
-          if (column == 0) column = column_of(labels, 'moment_' // limits(n)%name // ' [N m]')
+          column = whole_moment_column(labels, limits(n)%name)
         end if
         limits(n)%limit = group%number('moment', absent=0.0_wp)
         if (group%has_value('mesh')) limits(n)%limit = group%number('force')
@@ -62,15 +62,6 @@ contains
 
     has_peak = group%has_value('moment') .or. group%has_value('force')
   end function has_peak
-
-  pure integer function column_of(labels, label) result(column)
-    type(string_t), intent(in) :: labels(:)
-    character(len=*), intent(in) :: label
-
-    do column = size(labels), 1, -1
-      if (labels(column)%text == label) return
-    end do
-  end function column_of
 
   !> Writes whether a limit is exceeded, and all ratios; nothing without limits.
   subroutine put_run_limits(json, limits)

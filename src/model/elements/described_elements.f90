@@ -29,6 +29,7 @@ module nocdyn_described_elements
 
   public :: time_reached
 
+  real(wp), parameter, public :: never = 1.0e60_wp   !! later than all times, of what does not begin or end [s]
   real(wp), parameter, public :: boundary_width = 1.0e-10_wp   !! shift of branch boundaries, relative to the scale of a law
 
   !> A coefficient of the polynomial part of a law: a multiple of a parameter.

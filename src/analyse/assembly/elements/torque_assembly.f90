@@ -2,9 +2,10 @@
 module nocdyn_torque_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
   use nocdyn_cylinder_torques, only: cylinder_torques
+  use nocdyn_described_elements, only: never
   use nocdyn_electrical_faults, only: find_fault_terms
   use nocdyn_element_groups, only: element_groups_t
-  use nocdyn_excitation_banks, only: excitation_bank_t, never
+  use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_excitations, only: new_excitations
   use nocdyn_fault_excitations, only: fault_terms_t, new_fault_excitations
   use nocdyn_harmonic_tables, only: table_torque

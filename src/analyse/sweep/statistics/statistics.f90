@@ -1,6 +1,7 @@
 !> Statistics of columns of trajectory.csv: their kinds, and the labels of the results of a sweep.
 module nocdyn_statistics
   use nocdyn_kinds, only: wp
+  use nocdyn_labelled_columns, only: column_of
   use nocdyn_text, only: string_t, to_text
   use nocdyn_units, only: units
   implicit none (type, external)
@@ -98,16 +99,6 @@ contains
       end associate
     end do
   end subroutine find_columns
-
-  !> The column with a label, 0 if there is none.
-  pure integer function column_of(labels, label)
-    type(string_t), intent(in) :: labels(:)
-    character(len=*), intent(in) :: label
-
-    do column_of = size(labels), 1, -1
-      if (labels(column_of)%text == label) return
-    end do
-  end function column_of
 
   !> Whether the column is a torque. In a machine without such a column the torque is 0.
   pure logical function is_torque(statistic)

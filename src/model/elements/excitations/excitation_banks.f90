@@ -3,14 +3,13 @@
 !> The torque is 0 before `begin` and after `end`, and law exp(-rate (t - begin)) between them.
 module nocdyn_excitation_banks
   use nocdyn_bank, only: bank_t
+  use nocdyn_described_elements, only: never
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), operator(-), pick, time_of
   use nocdyn_law_functions, only: add_guard, exp
   use nocdyn_law_tape, only: law_tape_t
   implicit none (type, external)
   private
-
-  real(wp), parameter, public :: never = 1.0e60_wp   !! end of excitations that do not end [s]
 
   !> An extension gives the torque without the window.
   type, abstract, extends(bank_t), public :: excitation_bank_t

@@ -4,7 +4,7 @@
 !> many stretches as the longest one of its bank; those that it lacks begin after all times.
 module nocdyn_schedules
   use nocdyn_bank, only: bank_t
-  use nocdyn_described_elements, only: time_reached
+  use nocdyn_described_elements, only: never, time_reached
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, literal, operator(*), operator(+), operator(-), pick, time_of
   use nocdyn_law_functions, only: add_guard
@@ -13,8 +13,6 @@ module nocdyn_schedules
   private
 
   public :: join_points, add_schedule, scheduled_value, scheduled_flag, guard_schedule, value_at
-
-  real(wp), parameter :: never = 1.0e60_wp   ! begin of a stretch that a schedule lacks [s]
 
   !> One schedule. The first stretch is that before the first point.
   type, public :: schedule_t
