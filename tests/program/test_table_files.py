@@ -50,3 +50,16 @@ def test_a_missing_file_has_exit_code_3(nocdyn):
     outcome = nocdyn("check", path)
     assert outcome.returncode == 3
     assert outcome.stderr.endswith("/in/tables/load.csv: cannot be read: there is no such file\n")
+
+
+def test_notes_of_the_author_must_be_there_and_are_not_named_beside_the_results(nocdyn):
+    case = "&case author = 'A. Smith' notes_file = 'notes.md' /\n"
+    nocdyn.write("a.nml", case + "&body name = 'a' inertia = 1.0 /\n&run t_end = 1.0 /\n")
+    outcome = nocdyn("check", "a.nml")
+    assert outcome.returncode == 3
+    assert outcome.stderr == "nocdyn: a.nml:1: &case: notes_file: notes.md: cannot be read: there is no such file\n"
+    nocdyn.write("notes.md", "# Notes\n")
+    assert nocdyn("run", "a.nml").returncode == 0
+    copy = f90nml.read(nocdyn.folder / "results/a/input.nml")["case"]
+    assert copy["author"] == "A. Smith"
+    assert "notes_file" not in copy

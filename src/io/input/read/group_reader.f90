@@ -1,6 +1,7 @@
 !> One group of the input, from the texts of the file and the overrides to checked values.
 module nocdyn_group_reader
   use nocdyn_diagnostics, only: diagnostics_t, most_shown, no_line
+  use nocdyn_errors, only: error_t
   use nocdyn_group_checks, only: check_group
   use nocdyn_input, only: group_t, value_t
   use nocdyn_input_overrides, only: override_t
@@ -9,13 +10,13 @@ module nocdyn_group_reader
   use nocdyn_raw_group, only: new_raw_group, raw_group_t
   use nocdyn_schema, only: first_key, group_rules, has_word, is_single, key_rules
   use nocdyn_schema_relations, only: relations_t
-  use nocdyn_schema_rules, only: a_name, columns, equal_lengths
+  use nocdyn_schema_rules, only: a_file, a_name, columns, equal_lengths
   use nocdyn_schema_text, only: key_suggestion, similar_keys
   use nocdyn_schema_units, only: find_key, name_in_unit
   use nocdyn_table_columns, only: read_table_columns
   use nocdyn_table_file, only: read_table_file
   use nocdyn_text, only: lower_case, shortened, string_t
-  use nocdyn_text_file, only: path_in
+  use nocdyn_text_file, only: largest_input, path_in, read_text_file
   use nocdyn_value_conversion, only: convert_key
   implicit none (type, external)
   private
@@ -60,6 +61,7 @@ contains
         end if
       end associate
     end do
+    call check_text_files(folder, raw, group, diagnostics)
     call check_group(raw, relations, group, diagnostics)
   end subroutine read_group
 
@@ -209,5 +211,27 @@ contains
       call diagnostics%add(source%line, raw%index, raw%keys(file)%name() // ': ' // messages(i)%text, source%override, code)
     end do
   end subroutine read_table
+
+  !> Refuses files of text that cannot be read. Others than nocdyn take their contents; the group keeps no path, which would be of
+  !> no use beside the results.
+  subroutine check_text_files(folder, raw, group, diagnostics)
+    character(len=*), intent(in) :: folder
+    type(raw_group_t), intent(in) :: raw
+    type(group_t), intent(inout) :: group   !! with its tables read
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: text
+    integer :: i
+
+    do i = 1, size(group%values)
+      if (key_rules(raw%keys(i)%rule)%value_type /= a_file .or. .not. allocated(group%values(i)%texts)) cycle
+      associate (value => group%values(i))
+        call read_text_file(path_in(folder, value%texts(1)%text), text, error, largest_input)
+        if (allocated(error)) call diagnostics%add(value%line, raw%index, raw%keys(i)%name() // ': ' // error%message, &
+                                                   value%override, error%code)
+        deallocate (value%texts)
+      end associate
+    end do
+  end subroutine check_text_files
 
 end module nocdyn_group_reader

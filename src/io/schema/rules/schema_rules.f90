@@ -35,7 +35,7 @@ module nocdyn_schema_rules
   integer, parameter, public :: a_body = 3, body_or_ground = 4   !! name of a &body
   integer, parameter, public :: a_word = 5, a_number = 6, an_integer = 7, a_flag = 8
   integer, parameter, public :: a_selector = 9   !! a word of `kind_rules`, the kind of the group; at most one key of a group
-  integer, parameter, public :: a_file = 10      !! path of a table file, relative to the folder of the input
+  integer, parameter, public :: a_file = 10      !! path of a table or text file, relative to the folder of the input
   integer, parameter, public :: a_folder = 11    !! path of a folder
   character(len=12), parameter, public :: type_nouns(11) = [character(len=12) :: &   !! of `a_text` ... `a_folder`
     'text', 'name', 'body', 'body', 'word', 'number', 'whole number', 'logical', 'word', 'file', 'folder']

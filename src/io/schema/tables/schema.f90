@@ -54,6 +54,14 @@ module nocdyn_schema
   type(key_rule_t), parameter :: frame_keys(*) = [ &
     key_rule_t('case',       'title',           a_text,         1, '',            "''",        anything, &
       'title of summaries and figures, one line'), &
+    key_rule_t('case',       'author',          a_text,         1, '',            "''",        anything, &
+      'who made the calculation, for the report'), &
+    key_rule_t('case',       'customer',        a_text,         1, '',            "''",        anything, &
+      'for whom it is made, for the report'), &
+    key_rule_t('case',       'revision',        a_text,         1, '',            "''",        anything, &
+      'of the calculation, for the report'), &
+    key_rule_t('case',       'notes_file',      a_file,         1, '',            unset,       anything, &
+      'file with the author''s own text of the report, in Markdown'), &
     key_rule_t('body',       'name',            a_name,         1, '',            required,    anything, &
       'name in couplings, gears, torques and results'), &
     key_rule_t('body',       'inertia',         a_number,       1, 'kg m2',       required,    not_negative, &
