@@ -99,6 +99,7 @@ COMMANDS = ["run", "check", "equilibrium", "modes", "matrices", "sweep", "merge"
 OPTIONS = {
     "--out": "a",
     "--set": "a=1",
+    "--case": "a",
     "--at": "rest",
     "--holzer": None,
     "--threads": "1",

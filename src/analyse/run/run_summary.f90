@@ -182,6 +182,7 @@ contains
     type(json_t) :: json
 
     call json%open_report(input%file, input%title(), summary%status, summary%message)
+    if (allocated(input%load_case)) call json%put('load_case', input%load_case%name)
     call put_machine(json, summary)
     call put_settings(json, input%single('run'))
     if (allocated(summary%limits)) call put_run_limits(json, summary%limits)
@@ -303,11 +304,11 @@ contains
     character(len=*), intent(in) :: folder
     character(len=:), allocatable :: text
 
-    text = input%shown_file() // ': done at t = ' // to_text(summary%solver_status%t(1)) // ' s, ' // &
+    text = input%shown_case() // ': done at t = ' // to_text(summary%solver_status%t(1)) // ' s, ' // &
            counted(summary%solver_status%accepted(1), 'step', 'steps') // ' (' // &
            to_text(summary%solver_status%rejected(1)) // ' rejected), '
     if (summary%solver_status%crossings(1) > 0) then
-      text = text // to_text(summary%solver_status%crossings(1)) // ' kinks or jumps crossed, '
+      text = text // counted(summary%solver_status%crossings(1), 'kink or jump', 'kinks or jumps') // ' crossed, '
     end if
     text = text // to_text(summary%extremes%rows) // ' rows, ' // rounded_text(1000.0_wp * summary%wall_time, 3) // &
            ' ms; results in ' // shortened(folder, longest_path)
@@ -322,7 +323,7 @@ contains
     text = ''
     associate (solver_status => summary%solver_status)
       if (solver_status%switches(1) == 0) return
-      text = input%shown_file() // ': stiff: implicit steps from t = ' // rounded_text(solver_status%switch_times(1, 1), &
+      text = input%shown_case() // ': stiff: implicit steps from t = ' // rounded_text(solver_status%switch_times(1, 1), &
                                                                                cell_digits) // ' s'
       if (solver_status%switches(1) > 1) text = text // ' (' // to_text(solver_status%switches(1)) // ' switches in all)'
       text = text // ', ' // to_text(solver_status%implicit_steps(1)) // ' of ' // &

@@ -14,7 +14,7 @@ module nocdyn_run_table
   implicit none (type, external)
   private
 
-  public :: summary_table
+  public :: columns_to_show, summary_table
 
   integer, parameter :: most_lines = 25   ! of columns and of the energy balance
   integer, parameter :: sorts = 5         ! of columns, see `sort_of`

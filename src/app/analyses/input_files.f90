@@ -2,6 +2,7 @@
 module nocdyn_input_files
   use nocdyn_arguments, only: arguments_t
   use nocdyn_assembly, only: assemble_machine, assemble_steady_machine
+  use nocdyn_case_choice, only: choose_case
   use nocdyn_console, only: report_error
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_equilibrium, only: t_infinity
@@ -22,6 +23,7 @@ module nocdyn_input_files
   !> An input file that has been read.
   type :: reading_t
     type(input_t) :: input
+    type(input_t), allocatable :: load_cases(:)   !! of `check`
     type(error_t), allocatable :: error
   end type reading_t
 
@@ -67,6 +69,7 @@ contains
       associate (reading => readings(i))
         if (.not. allocated(reading%error)) call assemble_for(arguments%command, reading%input, machine, reading%error)
         if (.not. allocated(reading%error)) call analyse(arguments, reading%input, machine, folders(i)%text, reading%error)
+        if (.not. allocated(reading%error)) call check_load_cases(arguments%command, reading)
         if (allocated(reading%error)) call report_error(reading%error, code)
       end associate
     end do
@@ -89,6 +92,23 @@ contains
     end if
   end subroutine assemble_for
 
+  !> Builds the machines of the load cases for `check`.
+  subroutine check_load_cases(command, reading)
+    character(len=*), intent(in) :: command
+    type(reading_t), intent(inout) :: reading   !! gets the first error
+    type(machine_t) :: machine
+    integer :: c
+
+    if (command /= 'check') return
+    do c = 1, size(reading%load_cases)
+      call assemble_for(command, reading%load_cases(c), machine, reading%error)
+      if (.not. allocated(reading%error)) call check_output_times(reading%load_cases(c), reading%error)
+      if (.not. allocated(reading%error)) cycle
+      reading%error%message = reading%load_cases(c)%shown_case() // ': ' // reading%error%message
+      return
+    end do
+  end subroutine check_load_cases
+
   !> Reads and checks a file, and finds the folder of its results.
   subroutine read_one(arguments, number, reading, folder, always_writes)
     type(arguments_t), intent(in) :: arguments
@@ -97,13 +117,22 @@ contains
     character(len=:), allocatable, intent(out) :: folder
     logical, intent(in), optional :: always_writes   !! as in `analyse_files`
     type(diagnostics_t) :: diagnostics
+    integer :: chosen
 
     folder = out_folder(arguments, arguments%operands(number)%text)
-    call read_input(arguments%operands(number)%text, arguments%overrides, reading%input, reading%error, diagnostics)
+    call read_input(arguments%operands(number)%text, arguments%overrides, reading%input, reading%error, &
+                    diagnostics, reading%load_cases)
     if (allocated(reading%error)) call add_plan_diagnostics(reading%input, diagnostics, reading%error)
-    if (.not. allocated(reading%error)) call check_output_times(reading%input, reading%error)
-    if (allocated(reading%error) .or. .not. present(always_writes)) return
-    if (always_writes) folder = result_folder(arguments, reading%input)
+    if (.not. allocated(reading%error)) call choose_case(arguments, reading%input, chosen, reading%error)
+    if (allocated(reading%error)) return
+    if (present(always_writes)) then
+      if (always_writes) folder = result_folder(arguments, reading%input)
+    end if
+    if (chosen > 0) then
+      if (folder /= '') folder = folder // '/' // reading%load_cases(chosen)%load_case%name
+      reading%input = reading%load_cases(chosen)
+    end if
+    call check_output_times(reading%input, reading%error)
   end subroutine read_one
 
 end module nocdyn_input_files

@@ -17,6 +17,7 @@ module nocdyn_arguments
   type(option_t), parameter, public :: options(*) = [ &
     option_t('--out', value='DIR'), &
     option_t('--set', value='PATH=VALUE', may_repeat=.true.), &
+    option_t('--case', value='NAME'), &
     option_t('--at', value='equilibrium|rest|TIME'), &
     option_t('--holzer', may_repeat=.true.), &
     option_t('--threads', value='NUMBER'), &

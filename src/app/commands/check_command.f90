@@ -18,7 +18,7 @@ module nocdyn_check_command
   use nocdyn_run_settings, only: check_method, find_lossy_element
   use nocdyn_sweep_plan, only: has_sweep, make_plan, sweep_plan_t
   use nocdyn_table_text, only: append_table
-  use nocdyn_text, only: selected, string_t
+  use nocdyn_text, only: quoted, selected, string_t
   use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_units, only: from_si, unit_hz, unit_rpm
   implicit none (type, external)
@@ -59,6 +59,7 @@ contains
     sizes = response
     if (note /= '') sizes = sizes // new_line('a') // '  note: nocdyn run refuses it: ' // note
     if (output_note(input) /= '') sizes = new_line('a') // '  note: ' // output_note(input)
+    if (.not. allocated(input%load_case)) sizes = sizes // load_cases_line(input)
     if (has_sweep(input)) then
       call make_plan(input, plan, error)
       if (allocated(error)) return
@@ -75,6 +76,19 @@ contains
     end if
     call print_text(machine_report(input%shown_file(), machine) // speed_table(input, machine) // sizes)
   end subroutine check
+
+  !> The names of the load cases, on a line of their own; nothing if there are none.
+  function load_cases_line(input) result(text)
+    type(input_t), intent(in) :: input
+    character(len=:), allocatable :: text
+    integer :: c
+
+    text = ''
+    do c = 1, size(input%load_cases)
+      text = text // ', ' // quoted(input%load_cases(c)%name)
+    end do
+    if (text /= '') text = new_line('a') // '  load cases: ' // text(3:)
+  end function load_cases_line
 
   !> The start speeds and the other speeds and frequencies of an input, also in rpm and Hz, on lines of their own; zeros are left
   !> out.

@@ -38,25 +38,29 @@ contains
   subroutine list_analyses(commands)
     type(command_t), allocatable, intent(inout) :: commands(:)
 
-    call add_command(commands, 'run', 'FILE...', '--out --set --quiet', 'integrate machines and write their results', &
+    call add_command(commands, 'run', 'FILE...', '--out --set --case --quiet', 'integrate machines and write their results', &
       'Integrates every input file and writes trajectory.csv (or trajectory.nc), summary.json and input.nml.' // nl // nl // &
       '  --out DIR          write to DIR, with several files to DIR/<name of the file>;' // nl // &
       '                     default: &output directory, else results/<name of the file>' // nl // &
       '  --set PATH=VALUE   override a key: run.rtol=1e-9, load.work.viscous=80, gear.reducer.radii=2,3' // nl // &
+      '  --case NAME        run only this &load_case; default: all of them, each to DIR/NAME' // nl // &
       '  --quiet            print nothing but errors' // nl // nl // &
       'A file with errors does not stop the others; the exit code is the highest of all files. After Ctrl-C or a' // nl // &
       'failed computation, the rows up to there are in trajectory.partial.csv.', run_command)
-    call add_command(commands, 'check', 'FILE...', '--set', 'read and analyse, integrate nothing', &
+    call add_command(commands, 'check', 'FILE...', '--set --case', 'read and analyse, integrate nothing', &
       'Reads the files and analyses the machines. Prints every error with its line, or the degrees of freedom,' // nl // &
-      'independent coordinates, ratios between geared bodies, redundant gears, and the sweep if there is one.', check_command)
-    call add_command(commands, 'equilibrium', 'FILE...', '--out --set', &
+      'independent coordinates, ratios between geared bodies, redundant gears, and the load cases and the sweep if' // nl // &
+      'there are some.' // nl // nl // &
+      '  --case NAME        look at the machine of this &load_case', check_command)
+    call add_command(commands, 'equilibrium', 'FILE...', '--out --set --case', &
       'steady states: speeds, torques, twists, powers, stability', &
       'Finds the steady states of the machines: constant speeds at which the mean torques balance, and the' // nl // &
       'twists of the couplings that transmit them. If there are several steady states, all are printed with' // nl // &
       'their stability. Excitations enter with their mean.' // nl // nl // &
-      '  --out DIR          write equilibrium.json to DIR, with several files to DIR/<name of the file>' // nl // nl // &
+      '  --out DIR          write equilibrium.json to DIR, with several files to DIR/<name of the file>' // nl // &
+      '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR' // nl // nl // &
       'Exit code 1: there is no steady state.', equilibrium_command)
-    call add_command(commands, 'modes', 'FILE...', '--out --set --at --holzer', &
+    call add_command(commands, 'modes', 'FILE...', '--out --set --case --at --holzer', &
       'natural frequencies, damping, shapes and energies of the modes', &
       'Linearises the machines and prints natural frequencies, damping ratios, time constants and the' // nl // &
       'distribution of the energy of each mode.' // nl // nl // &
@@ -64,16 +68,18 @@ contains
       '  --at rest          at the start angles, with zero speeds and mean torques' // nl // &
       '  --at TIME          at a time of the run [s], which is integrated up to there' // nl // &
       '  --holzer           print the table of Holzer of each undamped mode; with --out, write holzer.csv' // nl // &
-      '  --out DIR          write modes.csv and modes.json to DIR, with several files to DIR/<name of the file>', modes_command)
+      '  --out DIR          write modes.csv and modes.json to DIR, with several files to DIR/<name of the file>' // nl // &
+      '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR', modes_command)
     call list_torsional_analyses(commands)
-    call add_command(commands, 'matrices', 'FILE', '--set', 'print the matrices of the method for a machine', &
-      'Prints every matrix and vector of the method for the machine at its start, with its equation number.', matrices_command)
+    call add_command(commands, 'matrices', 'FILE', '--set --case', 'print the matrices of the method for a machine', &
+      'Prints every matrix and vector of the method for the machine at its start, with its equation number.' // nl // nl // &
+      '  --case NAME        look at the machine of this &load_case', matrices_command)
   end subroutine list_analyses
 
   subroutine list_torsional_analyses(commands)
     type(command_t), allocatable, intent(inout) :: commands(:)
 
-    call add_command(commands, 'response', 'FILE...', '--out --set --quiet', &
+    call add_command(commands, 'response', 'FILE...', '--out --set --case --quiet', &
       'forced response by orders over a range of speeds, critical speeds, limits', &
       'Computes by &response what the orders of the excitations do at every speed: the steady state at the speed,' // nl // &
       'which the motors hold, and the oscillations about it, of each order and of all together. Prints the' // nl // &
@@ -82,9 +88,10 @@ contains
       '  --out DIR          write to DIR, with several files to DIR/<name of the file>;' // nl // &
       '                     default: &output directory, else results/<name of the file>' // nl // &
       '  --set PATH=VALUE   override a key: response.count=501' // nl // &
+      '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR' // nl // &
       '  --quiet            print nothing but errors' // nl // nl // &
       'A limit that is exceeded is no error: response.json says limits_exceeded.', response_command)
-    call add_command(commands, 'campbell', 'FILE...', '--out --set --quiet', &
+    call add_command(commands, 'campbell', 'FILE...', '--out --set --case --quiet', &
       'natural frequencies over a range of speeds, and where the orders meet them', &
       'Follows the natural frequencies of the machine, linearised about its steady states, over the speeds of' // nl // &
       '&response, and finds the speeds at which its orders, or those of the excitations, meet them. Writes' // nl // &
@@ -92,6 +99,7 @@ contains
       '  --out DIR          write to DIR, with several files to DIR/<name of the file>;' // nl // &
       '                     default: &output directory, else results/<name of the file>' // nl // &
       '  --set PATH=VALUE   override a key: response.count=501' // nl // &
+      '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR' // nl // &
       '  --quiet            print nothing but errors', campbell_command)
   end subroutine list_torsional_analyses
 

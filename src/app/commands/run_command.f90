@@ -1,27 +1,33 @@
-!> nocdyn run: integrates machines and writes their results. Files with errors do not stop the others.
+!> nocdyn run: integrates machines, or their load cases, and writes the results. Files with errors do not stop the others.
 module nocdyn_run_command
   use nocdyn_arguments, only: arguments_t
+  use nocdyn_case_choice, only: choose_case
+  use nocdyn_cases_files, only: remove_cases_files, write_cases_files
   use nocdyn_companion_command, only: become_companion
   use nocdyn_console, only: print_text, report_error
   use nocdyn_errors, only: error_t, exit_done, exit_failed, exit_input, raise
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
+  use nocdyn_load_case_peaks, only: case_run_t
+  use nocdyn_load_case_report, only: load_cases_text
   use nocdyn_posix, only: is_interrupted, catch_interrupts
   use nocdyn_result_folders, only: refuse_shared_folders, refuse_sweep_folder, result_folder
   use nocdyn_run_files, only: partial_file, run_to_files, wants_netcdf
+  use nocdyn_run_limits, only: run_limits_text
   use nocdyn_run_summary, only: method_line, run_summary_t, summary_line
   use nocdyn_run_table, only: summary_table
-  use nocdyn_text, only: shown_path, string_t, to_text
+  use nocdyn_text, only: append, counted, shown_path, string_t, to_text
   use nocdyn_trajectory_file, only: trajectory_file_t
   implicit none (type, external)
   private
 
   public :: run_command, run_inputs
 
-  !> An input that was read, or why it is refused.
+  !> What is to be run of a file, or why it is refused.
   type :: reading_t
-    type(input_t) :: input
-    character(len=:), allocatable :: folder   !! of the results
+    type(input_t), allocatable :: inputs(:)    !! the machine itself, or its load cases
+    type(string_t), allocatable :: folders(:)  !! of their results
+    character(len=:), allocatable :: folder    !! of the file
     type(error_t), allocatable :: error
   end type reading_t
 
@@ -41,12 +47,11 @@ contains
     integer, intent(out) :: code
     class(trajectory_file_t), intent(in), optional :: netcdf   !! not open
     type(reading_t), allocatable :: readings(:)
-    type(string_t), allocatable :: folders(:)
     type(error_t), allocatable :: error
     integer :: i
 
     code = exit_done
-    allocate (readings(size(arguments%operands)), folders(size(arguments%operands)))
+    allocate (readings(size(arguments%operands)))
     do i = 1, size(readings)
       call read_one(arguments, i, present(netcdf), readings(i))
     end do
@@ -57,10 +62,9 @@ contains
       end if
     end if
     do i = 1, size(readings)
-      folders(i)%text = readings(i)%folder
       if (allocated(readings(i)%error)) call report_error(readings(i)%error, code)
     end do
-    call refuse_shared_folders(arguments%operands, folders, error)
+    call refuse_folders(arguments, readings, error)
     if (allocated(error)) then
       call report_error(error, code)
     else
@@ -68,19 +72,43 @@ contains
     end if
   end subroutine run_inputs
 
+  !> Refuses folders of results that two files or load cases would share.
+  subroutine refuse_folders(arguments, readings, error)
+    type(arguments_t), intent(in) :: arguments
+    type(reading_t), intent(in) :: readings(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(string_t), allocatable :: files(:), folders(:)
+    integer :: i, k
+
+    allocate (files(0), folders(0))
+    do i = 1, size(readings)
+      do k = 1, size(readings(i)%inputs)
+        call append(files, arguments%operands(i)%text)
+        call append(folders, readings(i)%folders(k)%text)
+      end do
+    end do
+    call refuse_shared_folders(files, folders, error)
+  end subroutine refuse_folders
+
   subroutine run_all(arguments, readings, code, netcdf)
     type(arguments_t), intent(in) :: arguments
     type(reading_t), intent(in) :: readings(:)
     integer, intent(inout) :: code
     class(trajectory_file_t), intent(in), optional :: netcdf   !! as in `run_inputs`
+    type(run_summary_t) :: summary
     type(error_t), allocatable :: error
     integer :: i, left
 
     call catch_interrupts()
-    left = count([(readings(i)%folder /= '', i=1, size(readings))])
+    left = count([(size(readings(i)%inputs) > 0, i=1, size(readings))])
     do i = 1, size(readings)
-      if (readings(i)%folder == '') cycle
-      call run_file(arguments, readings(i)%input, readings(i)%folder, code, netcdf)
+      if (size(readings(i)%inputs) == 0) cycle
+      call remove_cases_files(readings(i)%folder)
+      if (allocated(readings(i)%inputs(1)%load_case)) then
+        call run_load_cases(arguments, readings(i), code, netcdf)
+      else
+        call run_input(arguments, readings(i)%inputs(1), readings(i)%folder, code, summary, netcdf)
+      end if
       left = left - 1
       if (is_interrupted()) exit
     end do
@@ -89,67 +117,134 @@ contains
     call report_error(error, code)
   end subroutine run_all
 
+  !> Runs the load cases of a file, then writes and prints what they say together. Cases that fail do not stop the others.
+  subroutine run_load_cases(arguments, reading, code, netcdf)
+    type(arguments_t), intent(in) :: arguments
+    type(reading_t), intent(in) :: reading
+    integer, intent(inout) :: code
+    class(trajectory_file_t), intent(in), optional :: netcdf   !! as in `run_inputs`
+    type(case_run_t), allocatable :: runs(:)
+    type(error_t), allocatable :: error
+    integer :: c
+
+    allocate (runs(size(reading%inputs)))
+    do c = 1, size(runs)
+      runs(c)%load_case = reading%inputs(c)%load_case
+      call run_input(arguments, reading%inputs(c), reading%folders(c)%text, code, runs(c)%summary, netcdf)
+      if (.not. is_interrupted()) cycle
+      if (c == size(runs)) return
+      call raise(error, exit_failed, reading%inputs(c)%shown_file() // ': load cases not run after the interruption: ' // &
+                 to_text(size(runs) - c))
+      call report_error(error, code)
+      return
+    end do
+    call write_cases_files(reading%inputs(1), runs, reading%folder, error)
+    if (allocated(error)) then
+      call report_error(error, code)
+    else if (.not. arguments%is_given('--quiet')) then
+      call print_text(load_cases_text(runs) // reading%inputs(1)%shown_file() // ': ' // &
+                      counted(size(runs), 'load case', 'load cases') // '; cases.json and cases.csv are in ' // &
+                      shown_path(reading%folder))
+    end if
+  end subroutine run_load_cases
+
   subroutine read_one(arguments, number, has_netcdf, reading)
     type(arguments_t), intent(in) :: arguments
     integer, intent(in) :: number        !! of the file
     logical, intent(in) :: has_netcdf    !! whether this program can write NetCDF
     type(reading_t), intent(inout) :: reading
-    character(len=:), allocatable :: folder
-    integer :: bytes
+    type(input_t) :: machine
+    type(input_t), allocatable :: load_cases(:)
+    integer :: bytes, chosen
 
-    reading%folder = ''
+    allocate (reading%inputs(0), reading%folders(0))
     associate (file => arguments%operands(number)%text)
-      call read_input(file, arguments%overrides, reading%input, reading%error)
+      call read_input(file, arguments%overrides, machine, reading%error, load_cases=load_cases)
+      if (.not. allocated(reading%error)) call choose_case(arguments, machine, chosen, reading%error)
+      if (.not. allocated(reading%error)) then
+        reading%folder = result_folder(arguments, machine)
+        call refuse_sweep_folder(machine%file, reading%folder, reading%error)
+      end if
       if (allocated(reading%error)) return
-      folder = result_folder(arguments, reading%input)
-      call refuse_sweep_folder(reading%input%file, folder, reading%error)
-      if (allocated(reading%error)) return
-      reading%folder = folder
-      if (has_netcdf .or. .not. wants_netcdf(reading%input)) return
-      inquire (file=file, size=bytes)
-      if (bytes > 0) return
-      reading%folder = ''
-      call raise(reading%error, exit_input, reading%input%shown_file() // &
-                 ": format = 'netcdf' needs an input that can be read twice, not a pipe")
+      if (.not. has_netcdf .and. wants_netcdf(machine)) then
+        inquire (file=file, size=bytes)
+        if (bytes <= 0) then
+          call raise(reading%error, exit_input, machine%shown_file() // &
+                     ": format = 'netcdf' needs an input that can be read twice, not a pipe")
+          return
+        end if
+      end if
     end associate
+    call take_inputs(machine, load_cases, chosen, reading)
   end subroutine read_one
+
+  !> Takes what is to be run, each with the folder of its results.
+  subroutine take_inputs(machine, load_cases, chosen, reading)
+    type(input_t), intent(in) :: machine, load_cases(:)
+    integer, intent(in) :: chosen   !! the only load case that is wanted, 0: all
+    type(reading_t), intent(inout) :: reading
+    integer :: c, k
+
+    deallocate (reading%inputs)
+    allocate (reading%inputs(merge(1, size(load_cases), chosen > 0 .or. size(load_cases) == 0)))
+    if (size(load_cases) == 0) reading%inputs(1) = machine
+    if (size(load_cases) == 0) call append(reading%folders, reading%folder)
+    k = 0
+    do c = 1, size(load_cases)
+      if (chosen > 0 .and. c /= chosen) cycle
+      k = k + 1
+      reading%inputs(k) = load_cases(c)
+      call append(reading%folders, reading%folder // '/' // load_cases(c)%load_case%name)
+    end do
+  end subroutine take_inputs
 
   !> Whether an input is to be run, but not by a program that cannot write NetCDF.
   logical function needs_companion(reading)
     type(reading_t), intent(in) :: reading
 
-    needs_companion = reading%folder /= ''
-    if (needs_companion) needs_companion = wants_netcdf(reading%input)
+    integer :: i
+
+    needs_companion = any([(wants_netcdf(reading%inputs(i)), i=1, size(reading%inputs))])
   end function needs_companion
 
-  subroutine run_file(arguments, input, folder, code, netcdf)
+  !> Runs the machine itself or one of its load cases.
+  subroutine run_input(arguments, input, folder, code, summary, netcdf)
     type(arguments_t), intent(in) :: arguments
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: folder
     integer, intent(inout) :: code
+    type(run_summary_t), intent(out) :: summary
     class(trajectory_file_t), intent(in), optional :: netcdf   !! as in `run_inputs`
-    type(run_summary_t) :: summary
     type(error_t), allocatable :: error
     character(len=:), allocatable :: reached
     integer :: i
 
-    call run_to_files(input, folder, input%shown_file(), arguments%is_given('--quiet'), summary, error, netcdf)
+    call run_to_files(input, folder, input%shown_case(), arguments%is_given('--quiet'), summary, error, netcdf)
     if (allocated(error)) then
       reached = 'there'
       if (summary%extremes%rows > 0) reached = 't = ' // to_text(summary%extremes%last(1)) // ' s'
       if (error%code == exit_failed .and. summary%has_run) then
-        error%message = input%shown_file() // ': ' // error%message // '; the rows up to ' // reached // ' are in ' // &
+        error%message = input%shown_case() // ': ' // error%message // '; the rows up to ' // reached // ' are in ' // &
                         shown_path(folder // '/' // partial_file(input))
       end if
       call report_error(error, code)
     else if (.not. arguments%is_given('--quiet')) then
       do i = 1, size(summary%notes)
-        call print_text(input%shown_file() // ': note: ' // summary%notes(i)%text)
+        call print_text(input%shown_case() // ': note: ' // summary%notes(i)%text)
       end do
-      if (size(arguments%operands) == 1) call print_text(summary_table(input, summary))
+      if (shows_table(arguments, input)) call print_text(summary_table(input, summary))
+      if (.not. shows_table(arguments, input)) call print_text(run_limits_text(summary%limits))
       if (len(method_line(input, summary)) > 0) call print_text(method_line(input, summary))
       call print_text(summary_line(input, summary, folder))
     end if
-  end subroutine run_file
+  end subroutine run_input
+
+  !> Whether the table of a run is printed: of the only run of a call.
+  logical function shows_table(arguments, input)
+    type(arguments_t), intent(in) :: arguments
+    type(input_t), intent(in) :: input
+
+    shows_table = size(arguments%operands) == 1 .and. (arguments%is_given('--case') .or. .not. allocated(input%load_case))
+  end function shows_table
 
 end module nocdyn_run_command

@@ -1,53 +1,31 @@
 !> A checked input: the groups in the order of the file, every key of the schema with its value or default.
 module nocdyn_input
   use nocdyn_diagnostics, only: diagnostics_t, most_shown, no_line
+  use nocdyn_input_group, only: group_t, value_t
   use nocdyn_kinds, only: wp
-  use nocdyn_schema, only: first_key, group_rules, key_rules
+  use nocdyn_schema, only: group_rules
   use nocdyn_text, only: counted, quoted, shortened, shown_path, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
 
-  !> The value of one key. One of the four arrays is allocated, that of the type of the key; none if the key has no value.
-  type, public :: value_t
-    logical :: is_given = .false.   !! by the file or by an override, not by default
-    integer :: line = 0             !! of the key in the file
-    integer :: override = 0         !! index of the override that sets it, 0: none
-    integer :: unit = 0             !! in which numbers are written: index of `units`, 0: that of the schema
-    real(wp), allocatable :: numbers(:)
-    integer, allocatable :: whole_numbers(:)
-    logical, allocatable :: flags(:)
-    type(string_t), allocatable :: texts(:)
-  contains
-    procedure :: count => count_of
-    procedure :: has_any, number_at
-  end type value_t
+  public :: group_t, value_t
 
-  !> One group of the file. To ask for a key that the schema does not have, or for another type, is an error of the program.
-  type, public :: group_t
-    character(len=:), allocatable :: kind   !! 'body', 'gear' ...
-    character(len=:), allocatable :: name   !! of the element, '' where the kind has no names
-    integer :: rule = 0                     !! its row of `group_rules`
-    integer :: ordinal = 0                  !! its number among the groups of its kind, 0: not in the file
-    integer :: line = 0                     !! where it begins, 0: not in the file
-    type(value_t), allocatable :: values(:) !! one for each key, in the order of the schema
-  contains
-    procedure :: number          !! the single value of a key
-    procedure :: whole_number
-    procedure :: flag
-    procedure :: text
-    procedure :: numbers         !! all values, empty if unset
-    procedure :: whole_numbers
-    procedure :: texts
-    procedure :: is_given        !! set by the user
-    procedure :: has_value       !! set by the user or by default
-    procedure :: key_position    !! index in `values`
-  end type group_t
+  !> A load case of a file.
+  type, public :: load_case_t
+    character(len=:), allocatable :: name, title
+    real(wp) :: repeats = 1.0_wp                  !! how often it occurs in the life of the machine
+    integer :: line = 0                           !! of its group
+    type(string_t), allocatable :: overrides(:)   !! PATH=VALUE, which it sets
+    logical, allocatable :: lacks(:)              !! whether it leaves out a group, of the groups of the file
+  end type load_case_t
 
-  !> A whole input file with the overrides of the command line.
+  !> A whole input file with the overrides of the command line: the machine itself, or one of its load cases.
   type, public :: input_t
     character(len=:), allocatable :: file
-    type(string_t), allocatable :: overrides(:)   !! PATH=VALUE, as given
+    type(string_t), allocatable :: overrides(:)   !! PATH=VALUE, as given; those of a load case come first
+    type(load_case_t), allocatable :: load_case       !! that of this input; not allocated: the machine itself
+    type(load_case_t), allocatable :: load_cases(:)   !! those of the file; of the machine itself
     type(group_t), allocatable :: groups(:)       !! single groups that the file does not have come last
     logical :: takes_means = .false.              !! whether it is looked at in a steady state: means stand for ratios that
                                                   !! depend on the position, and joints are locked or open
@@ -60,6 +38,7 @@ module nocdyn_input
     procedure :: single         !! that group
     procedure :: title
     procedure :: shown_file     !! the path for messages
+    procedure :: shown_case     !! the same with the load case
     procedure :: label          !! "&gear 'reducer'"
     procedure, private :: location_of_group, location_of_key
     generic :: location => location_of_group, location_of_key   !! where they come from, to begin a message with
@@ -68,160 +47,6 @@ module nocdyn_input
   end type input_t
 
 contains
-
-  !> Whether a key has a value, perhaps an empty list.
-  pure logical function has_any(self)
-    class(value_t), intent(in) :: self
-
-    has_any = allocated(self%numbers) .or. allocated(self%whole_numbers) .or. allocated(self%flags) .or. allocated(self%texts)
-  end function has_any
-
-  !> How many values a key has.
-  pure integer function count_of(self)
-    class(value_t), intent(in) :: self
-
-    count_of = 0
-    if (allocated(self%numbers)) count_of = size(self%numbers)
-    if (allocated(self%whole_numbers)) count_of = size(self%whole_numbers)
-    if (allocated(self%flags)) count_of = size(self%flags)
-    if (allocated(self%texts)) count_of = size(self%texts)
-  end function count_of
-
-  !> One value of a key of numbers or whole numbers.
-  pure real(wp) function number_at(self, position)
-    class(value_t), intent(in) :: self
-    integer, intent(in) :: position   !! in the list
-
-    if (allocated(self%whole_numbers)) then
-      number_at = real(self%whole_numbers(position), wp)
-    else
-      number_at = self%numbers(position)
-    end if
-  end function number_at
-
-  !> The single value of a key.
-  pure real(wp) function number(self, key, absent)
-    class(group_t), intent(in) :: self
-    character(len=*), intent(in) :: key
-    real(wp), optional, intent(in) :: absent   !! result if the key has no value
-    integer :: k
-
-    k = self%key_position(key)
-    if (allocated(self%values(k)%numbers)) then
-      number = self%values(k)%numbers(1)
-    else if (present(absent)) then
-      number = absent
-    else
-      error stop 'nocdyn_input: number() of a key without a number'
-    end if
-  end function number
-
-  !> The single value of a key of whole numbers, which must have one.
-  pure integer function whole_number(self, key)
-    class(group_t), intent(in) :: self
-    character(len=*), intent(in) :: key
-    integer :: k
-
-    k = self%key_position(key)
-    if (.not. allocated(self%values(k)%whole_numbers)) error stop 'nocdyn_input: whole_number() of a key without one'
-    whole_number = self%values(k)%whole_numbers(1)
-  end function whole_number
-
-  !> The single value of a logical key, which must have one.
-  pure logical function flag(self, key)
-    class(group_t), intent(in) :: self
-    character(len=*), intent(in) :: key
-    integer :: k
-
-    k = self%key_position(key)
-    if (.not. allocated(self%values(k)%flags)) error stop 'nocdyn_input: flag() of a key without a logical value'
-    flag = self%values(k)%flags(1)
-  end function flag
-
-  !> The single value of a key of texts, which must have one.
-  pure function text(self, key)
-    class(group_t), intent(in) :: self
-    character(len=*), intent(in) :: key
-    character(len=text_length(self, key)) :: text
-
-    text = self%values(self%key_position(key))%texts(1)%text
-  end function text
-
-  pure integer function text_length(self, key)
-    class(group_t), intent(in) :: self
-    character(len=*), intent(in) :: key
-    integer :: k
-
-    k = self%key_position(key)
-    if (.not. allocated(self%values(k)%texts)) error stop 'nocdyn_input: text() of a key without a text'
-    text_length = len(self%values(k)%texts(1)%text)
-  end function text_length
-
-  !> All values of a key, none if it has no value.
-  pure function numbers(self, key)
-    class(group_t), intent(in) :: self
-    character(len=*), intent(in) :: key
-    real(wp), allocatable :: numbers(:)
-
-    allocate (numbers(0))
-    associate (value => self%values(self%key_position(key)))
-      if (allocated(value%numbers)) numbers = value%numbers
-    end associate
-  end function numbers
-
-  !> All values of a key, none if it has no value.
-  pure function whole_numbers(self, key)
-    class(group_t), intent(in) :: self
-    character(len=*), intent(in) :: key
-    integer, allocatable :: whole_numbers(:)
-
-    allocate (whole_numbers(0))
-    associate (value => self%values(self%key_position(key)))
-      if (allocated(value%whole_numbers)) whole_numbers = value%whole_numbers
-    end associate
-  end function whole_numbers
-
-  !> All values of a key, none if it has no value.
-  pure function texts(self, key)
-    class(group_t), intent(in) :: self
-    character(len=*), intent(in) :: key
-    type(string_t), allocatable :: texts(:)
-
-    allocate (texts(0))
-    associate (value => self%values(self%key_position(key)))
-      if (allocated(value%texts)) texts = value%texts
-    end associate
-  end function texts
-
-  !> Whether the user sets the key.
-  pure logical function is_given(self, key)
-    class(group_t), intent(in) :: self
-    character(len=*), intent(in) :: key
-
-    is_given = self%values(self%key_position(key))%is_given
-  end function is_given
-
-  !> Whether the key has a value, set by the user or by default.
-  pure logical function has_value(self, key)
-    class(group_t), intent(in) :: self
-    character(len=*), intent(in) :: key
-
-    has_value = self%values(self%key_position(key))%has_any()
-  end function has_value
-
-  !> Index of a key in `values`.
-  pure integer function key_position(self, key)
-    class(group_t), intent(in) :: self
-    character(len=*), intent(in) :: key
-    integer :: first
-
-    first = first_key(self%rule) - 1
-    do key_position = 1, size(self%values)
-      if (key_rules(first + key_position)%name(1:1) /= key(1:1)) cycle   ! faster than a comparison of the names
-      if (key_rules(first + key_position)%name == key) return
-    end do
-    error stop 'nocdyn_input: the schema has no such key'
-  end function key_position
 
   !> Indices of the groups of one kind.
   pure function groups_named(self, kind, law) result(indices)
@@ -326,12 +151,19 @@ contains
     integer, intent(in) :: line, override
     character(len=:), allocatable, intent(out) :: source
 
-    if (override > 0) then
-      source = '--set ' // shortened(input%overrides(override)%text)
-    else
+    if (override == 0) then
       source = shown_path(input%file)
       if (line > 0 .and. line < no_line) source = source // ':' // to_text(line)
+      return
     end if
+    if (allocated(input%load_case)) then
+      if (override <= size(input%load_case%overrides)) then
+        source = shown_path(input%file) // ':' // to_text(input%load_case%line) // ': &load_case ' // &
+                 quoted(shortened(input%load_case%name)) // ': set ' // quoted(shortened(input%overrides(override)%text))
+        return
+      end if
+    end if
+    source = '--set ' // shortened(input%overrides(override)%text)
   end subroutine make_source
 
   !> Adds a diagnostic on a key of a group, with the line of the key if it is given.
@@ -378,6 +210,15 @@ contains
 
     text = shown_path(self%file)
   end function shown_file
+
+  !> "machine.nml", or "machine.nml: load case 'start'".
+  pure function shown_case(self) result(text)
+    class(input_t), intent(in) :: self
+    character(len=:), allocatable :: text
+
+    text = self%shown_file()
+    if (allocated(self%load_case)) text = text // ': load case ' // quoted(shortened(self%load_case%name))
+  end function shown_case
 
   !> "&gear 'reducer'", for messages.
   pure function label(self, index) result(text)

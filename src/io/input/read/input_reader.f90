@@ -5,6 +5,7 @@ module nocdyn_input_reader
   use nocdyn_group_reader, only: read_group
   use nocdyn_input, only: group_t, input_t
   use nocdyn_input_overrides, only: override_t, read_overrides
+  use nocdyn_load_cases, only: find_load_cases, is_run_of_case, keep_groups
   use nocdyn_name_checks, only: check_duplicate_names, check_references, collect_names
   use nocdyn_namelist, only: namelist_group_t, namelist_t
   use nocdyn_namelist_scanner, only: scan_namelist
@@ -13,7 +14,7 @@ module nocdyn_input_reader
   use nocdyn_schema_rules, only: at_least_once, exactly_once, occurrence_texts, required
   use nocdyn_schema_text, only: group_names, group_suggestion, suggestion
   use nocdyn_near_words, only: nearest_word
-  use nocdyn_text, only: quoted, shortened, string_t, to_text
+  use nocdyn_text, only: append, quoted, shortened, string_t, to_text
   use nocdyn_text_file, only: largest_input, read_text_file
   implicit none (type, external)
   private
@@ -23,33 +24,111 @@ module nocdyn_input_reader
 contains
 
   !> Reads and checks a file. The message of the error has one line for each diagnostic, in the order of the file.
-  subroutine read_input(file, overrides, input, error, diagnostics)
+  subroutine read_input(file, overrides, input, error, diagnostics, load_cases)
     character(len=*), intent(in) :: file
     type(string_t), intent(in) :: overrides(:)   !! PATH=VALUE
     type(input_t), intent(out) :: input
     type(error_t), allocatable, intent(out) :: error            !! the file or an override is wrong
     type(diagnostics_t), intent(out), optional :: diagnostics   !! those of the error
+    type(input_t), allocatable, intent(out), optional :: load_cases(:)   !! as of `read_input_text`
     character(len=:), allocatable :: text
 
     call read_text_file(file, text, error, largest_input)
     if (allocated(error)) return
-    call read_input_text(text, file, overrides, input, error, diagnostics)
+    call read_input_text(text, file, overrides, input, error, diagnostics, load_cases)
   end subroutine read_input
 
-  !> Reads and checks the text of a file.
-  subroutine read_input_text(text, file, overrides, input, error, all_diagnostics)
+  !> Reads and checks the text of a file: the machine itself and, if they are asked for, its load cases.
+  subroutine read_input_text(text, file, overrides, input, error, all_diagnostics, load_cases)
     character(len=*), intent(in) :: text
     character(len=*), intent(in) :: file         !! its name in messages
     type(string_t), intent(in) :: overrides(:)   !! PATH=VALUE
     type(input_t), intent(out) :: input
     type(error_t), allocatable, intent(out) :: error                !! the text or an override is wrong
-    type(diagnostics_t), intent(out), optional :: all_diagnostics   !! those of the error
-    type(namelist_t) :: namelist
+    type(diagnostics_t), intent(out), optional :: all_diagnostics   !! those of the error, but for those of load cases
+    type(input_t), allocatable, intent(out), optional :: load_cases(:)
     type(diagnostics_t) :: diagnostics
-    type(override_t), allocatable :: parsed(:)
+    logical, allocatable :: lacks(:)
+    integer :: c
 
     input%file = file
     input%overrides = overrides
+    call read_all_groups(text, input, diagnostics, error)
+    if (allocated(error)) return
+    if (diagnostics%count == 0) call find_load_cases(input, lacks, diagnostics)
+    if (diagnostics%count > 0) then
+      call raise(error, diagnostics%worst_code(), input%diagnostics_text(diagnostics))
+    else if (size(input%load_cases) > 0) then
+      call keep_groups(input, lacks)
+    end if
+    if (present(all_diagnostics)) all_diagnostics = diagnostics
+    if (allocated(error) .or. .not. present(load_cases)) return
+    allocate (load_cases(size(input%load_cases)))
+    do c = 1, size(load_cases)
+      call read_load_case(text, input, c, overrides, load_cases(c), error)
+    end do
+  end subroutine read_input_text
+
+  !> Reads one load case of a file.
+  subroutine read_load_case(text, machine, c, overrides, input, error)
+    character(len=*), intent(in) :: text   !! of the file
+    type(input_t), intent(in) :: machine
+    integer, intent(in) :: c   !! of `machine%load_cases`
+    type(string_t), intent(in) :: overrides(:)   !! PATH=VALUE of the command line
+    type(input_t), intent(out) :: input
+    type(error_t), allocatable, intent(inout) :: error   !! gets the mistakes of this case too
+    type(error_t), allocatable :: own
+    type(diagnostics_t) :: diagnostics
+    integer :: i
+
+    input%file = machine%file
+    input%load_case = machine%load_cases(c)
+    allocate (input%overrides(0))
+    do i = 1, size(input%load_case%overrides)
+      call append(input%overrides, input%load_case%overrides(i)%text)
+    end do
+    do i = 1, size(overrides)
+      call append(input%overrides, overrides(i)%text)
+    end do
+    call read_all_groups(text, input, diagnostics, own)
+    call refuse_lacking(input, diagnostics)
+    if (diagnostics%count > 0) call raise(own, diagnostics%worst_code(), input%diagnostics_text(diagnostics))
+    if (allocated(own) .and. allocated(error)) then
+      error%message = error%message // new_line('a') // own%message
+    else if (allocated(own)) then
+      call move_alloc(own, error)
+    else
+      call keep_groups(input, input%load_case%lacks)
+    end if
+  end subroutine read_load_case
+
+  !> Refuses values that a load case sets of elements which it leaves out.
+  subroutine refuse_lacking(input, diagnostics)
+    type(input_t), intent(in) :: input   !! with all groups of the file
+    type(diagnostics_t), intent(inout) :: diagnostics
+    integer :: g, i
+
+    if (diagnostics%count > 0) return
+    do g = 1, size(input%load_case%lacks)
+      if (.not. input%load_case%lacks(g) .or. input%groups(g)%name == '') cycle
+      do i = 1, size(input%groups(g)%values)
+        associate (override => input%groups(g)%values(i)%override)
+          if (override == 0 .or. override > size(input%load_case%overrides)) cycle
+          call diagnostics%add(no_line, 0, 'the load case leaves out ' // input%label(g), override)
+        end associate
+      end do
+    end do
+  end subroutine refuse_lacking
+
+  !> Reads and checks all groups of a file.
+  subroutine read_all_groups(text, input, diagnostics, error)
+    character(len=*), intent(in) :: text
+    type(input_t), intent(inout) :: input   !! with its file and overrides
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(error_t), allocatable, intent(out) :: error   !! there are no groups
+    type(namelist_t) :: namelist
+    type(override_t), allocatable :: parsed(:)
+
     if (index(text, achar(0)) > 0) then
       call raise(error, exit_input, input%shown_file() // ': not a text file')
       return
@@ -60,15 +139,13 @@ contains
       return
     end if
 
-    call read_overrides(overrides, parsed, diagnostics)
+    call read_overrides(input%overrides, parsed, diagnostics)
     call read_groups(namelist, parsed, input, diagnostics)
     call check_occurrences(input%groups, diagnostics)
     call refuse_unused(input%groups, parsed, diagnostics)
     call check_duplicate_names(input%groups, diagnostics)
     call check_references(input%groups, bodies_are_known(input%groups), diagnostics)
-    if (diagnostics%count > 0) call raise(error, diagnostics%worst_code(), input%diagnostics_text(diagnostics))
-    if (present(all_diagnostics)) all_diagnostics = diagnostics
-  end subroutine read_input_text
+  end subroutine read_all_groups
 
   !> Reads all groups of the file, then the single groups that it does not have.
   subroutine read_groups(namelist, overrides, input, diagnostics)
@@ -157,6 +234,10 @@ contains
         rule = nearest_word(groups(g)%kind, names)
         if (rule > 0) is_misspelt(rule) = .true.
       else if (first(rule) == 0) then
+        first(rule) = g
+      else if (is_run_of_case(groups(g))) then
+        cycle
+      else if (is_run_of_case(groups(first(rule)))) then
         first(rule) = g
       else if (is_single(rule)) then
         call diagnostics%add(groups(g)%line, g, 'given twice, first on line ' // to_text(groups(first(rule))%line) &

@@ -48,6 +48,8 @@ module nocdyn_schema
                  'A torque on a body, by a law of time or of its angle.'), &
     engine_groups, &
     group_rule_t('run',        in_simulation, exactly_once,  '',         'What is computed, and how.'), &
+    group_rule_t('load_case',  in_simulation, any_times,     'load_case', &
+                 'A start, a fault or a load: nocdyn run does one load case after the other.'), &
     group_rule_t('output',     in_simulation, at_most_once,  '',         'What is written, in which form, and where.'), &
     response_groups, fatigue_groups, sweep_groups]
 
@@ -92,6 +94,20 @@ module nocdyn_schema
       'given speeds; projected: after an impact if they violate gears; equilibrium: steady'), &
     key_rule_t('run',        'max_steps',       an_integer,     1, '',            '1000000',   steps, &
       'the run fails after this many steps'), &
+    key_rule_t('run',        'load_case',       a_text,         1, '',            unset,       anything, &
+      'load case whose run it is; if not given, that of all cases without a &run of their own'), &
+    key_rule_t('load_case',  'name',            a_name,         1, '',            required,    anything, &
+      'name in results and messages, and of the folder of its results'), &
+    key_rule_t('load_case',  'title',           a_text,         1, '',            "''",        anything, &
+      'title in tables and reports, one line'), &
+    key_rule_t('load_case',  'repeats',         a_number,       1, '',            '1',         positive, &
+      'how often it occurs in the life of the machine, for the damage'), &
+    key_rule_t('load_case',  'set',             a_text,         any_number, '',   unset,       anything, &
+      "values that differ from the file, PATH=VALUE as of --set, e.g. 'load.work.viscous=80'", fewest=1), &
+    key_rule_t('load_case',  'with',            a_text,         any_number, '',   unset,       anything, &
+      'names of elements that only the cases have which name them here', fewest=1), &
+    key_rule_t('load_case',  'without',         a_text,         any_number, '',   unset,       anything, &
+      'names of elements that it leaves out', fewest=1), &
     key_rule_t('output',     'interval',        a_number,       1, 's',           unset,       positive, &
       'time from row to row'), &
     key_rule_t('output',     'points',          an_integer,     1, '',            '1001',      from_2, &
@@ -143,6 +159,7 @@ module nocdyn_schema
     example_t('body',       "name = 'machine'  inertia = 5.0"), &
     example_t('run',        "t_end = 10.0  method = 'rk45'  rtol = 1.0e-9  atol = 1.0e-9"), &
     example_t('output',     'interval = 0.01'), &
+    example_t('load_case',  "name = 'half_load'  repeats = 5000  set = 'load.work.viscous=50'", .false.), &
     coupling_examples, shaft_examples, mesh_examples, constraint_examples, joint_examples, motion_examples, torque_examples, &
     engine_examples, &
     response_examples, fatigue_examples, sweep_examples]

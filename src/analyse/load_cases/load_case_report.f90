@@ -1,0 +1,182 @@
+!> The table over load cases: as printed, for cases.json and for cases.csv.
+module nocdyn_load_case_report
+  use nocdyn_csv, only: write_header, write_numbers
+  use nocdyn_input, only: input_t
+  use nocdyn_json, only: json_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_load_case_peaks, only: case_run_t, find_peaks, life_t, peak_t, sum_damage
+  use nocdyn_output_file, only: output_file_t
+  use nocdyn_output_units, only: unit_of
+  use nocdyn_run_table, only: columns_to_show
+  use nocdyn_table_text, only: cell, padded, text_width
+  use nocdyn_text, only: counted, quoted, rounded_text, string_t, strings
+  use nocdyn_text_buffer, only: text_buffer_t
+  implicit none (type, external)
+  private
+
+  public :: load_cases_json, load_cases_text, put_load_cases_csv
+
+  integer, parameter :: most_lines = 25   ! printed
+  integer, parameter :: digits = 4        ! of printed damages
+
+contains
+
+  !> The text of cases.json.
+  function load_cases_json(input, runs) result(text)
+    type(input_t), intent(in) :: input   !! of one of the cases
+    type(case_run_t), intent(in) :: runs(:)
+    character(len=:), allocatable :: text
+    type(json_t) :: json
+    integer :: c
+
+    call json%open_report(input%file, input%title())
+    call json%open_list('load_cases')
+    do c = 1, size(runs)
+      associate (load_case => runs(c)%load_case, summary => runs(c)%summary)
+        call json%open()
+        call json%put('name', load_case%name)
+        call json%put('title', load_case%title)
+        call json%put('repeats', load_case%repeats)
+        call json%put('folder', load_case%name)
+        call json%put('status', trim(summary%status))
+        if (allocated(summary%message)) call json%put('message', summary%message)
+        call json%close()
+      end associate
+    end do
+    call json%close_list()
+    call put_peaks(json, runs)
+    call put_lives(json, runs)
+    call json%close()
+    text = json%text()
+  end function load_cases_json
+
+  subroutine put_peaks(json, runs)
+    type(json_t), intent(inout) :: json
+    type(case_run_t), intent(in) :: runs(:)
+    type(peak_t), allocatable :: peaks(:)
+    integer :: i
+
+    call find_peaks(runs, peaks)
+    call json%open_list('peaks')
+    do i = 1, size(peaks)
+      call json%open()
+      call json%put('column', name_of(peaks(i)%label))
+      call json%put('unit', unit_of(peaks(i)%label))
+      call json%put('largest', peaks(i)%largest)
+      call json%put('time', peaks(i)%time)
+      call json%put('load_case', runs(peaks(i)%load_case)%load_case%name)
+      call json%close()
+    end do
+    call json%close_list()
+  end subroutine put_peaks
+
+  !> A column without its unit.
+  pure function name_of(label) result(name)
+    character(len=*), intent(in) :: label
+    character(len=:), allocatable :: name
+
+    name = label(:index(label // ' [', ' [') - 1)
+  end function name_of
+
+  subroutine put_lives(json, runs)
+    type(json_t), intent(inout) :: json
+    type(case_run_t), intent(in) :: runs(:)
+    type(life_t), allocatable :: lives(:)
+    integer :: c, i
+
+    call sum_damage(runs, lives)
+    if (size(lives) == 0) return
+    call json%open_list('fatigue')
+    do i = 1, size(lives)
+      call json%open()
+      call json%put('name', lives(i)%name)
+      call json%put('element', lives(i)%element)
+      call json%put('unit', lives(i)%unit)
+      if (lives(i)%is_shaft) call json%put('position', lives(i)%position)
+      call json%put('damage', lives(i)%damage)
+      if (lives(i)%damage > 0) call json%put('repeats_to_failure', 1 / lives(i)%damage)
+      call json%put('mean_exceeds_strength', lives(i)%exceeds_strength)
+      call json%open('damage_of_load_cases')
+      do c = 1, size(runs)
+        call json%put(runs(c)%load_case%name, lives(i)%of_case(c))
+      end do
+      call json%close()
+      call json%close()
+    end do
+    call json%close_list()
+  end subroutine put_lives
+
+  !> Writes cases.csv: the extremes of every column that is written in every load case.
+  subroutine put_load_cases_csv(runs, file)
+    type(case_run_t), intent(in) :: runs(:)
+    type(output_file_t), intent(inout) :: file
+    integer :: c, i
+
+    call write_header(file, strings([character(len=15) :: 'load_case', 'column', 'min', 'time_of_min [s]', 'max', &
+                                     'time_of_max [s]']))
+    do c = 1, size(runs)
+      if (.not. runs(c)%summary%extremes%have_begun) cycle
+      do i = 2, size(runs(c)%summary%chosen)
+        associate (extremes => runs(c)%summary%extremes, column => runs(c)%summary%chosen(i))
+          call file%put(runs(c)%load_case%name // ',' // runs(c)%summary%labels(column)%text)
+          call write_numbers(file, [extremes%lowest(column), extremes%lowest_time(column), extremes%highest(column), &
+                                    extremes%highest_time(column)], ',')
+          call file%put(new_line('a'))
+        end associate
+      end do
+    end do
+  end subroutine put_load_cases_csv
+
+  !> The printed table: the largest magnitudes of the columns that one looks for, with their times and cases; the damage.
+  function load_cases_text(runs) result(text)
+    type(case_run_t), intent(in) :: runs(:)
+    character(len=:), allocatable :: text
+    type(text_buffer_t) :: report
+    type(peak_t), allocatable :: peaks(:)
+    type(string_t), allocatable :: labels(:)
+    integer, allocatable :: shown(:)
+    integer :: i, width
+
+    call find_peaks(runs, peaks)
+    allocate (labels(size(peaks)))
+    do i = 1, size(peaks)
+      labels(i)%text = peaks(i)%label
+    end do
+    allocate (shown, source=columns_to_show(labels, [(i, i=1, size(peaks))], abs(peaks%largest), most_lines))
+    width = maxval([text_width('largest of all load cases'), (text_width(labels(shown(i))%text), i=1, size(shown))])
+    call report%append_line(padded('largest of all load cases', width) // cell('value') // cell('at t [s]') // '  load case')
+    do i = 1, size(shown)
+      associate (peak => peaks(shown(i)))
+        call report%append_line(padded(peak%label, width) // cell(peak%largest) // cell(peak%time) // '  ' // &
+                                runs(peak%load_case)%load_case%name)
+      end associate
+    end do
+    if (size(shown) < size(peaks)) call report%append_line('(' // counted(size(peaks) - size(shown), 'more column', &
+                                                           'more columns') // ' in cases.json)')
+    call append_lives(report, runs)
+    text = report%text()
+  end function load_cases_text
+
+  subroutine append_lives(report, runs)
+    type(text_buffer_t), intent(inout) :: report
+    type(case_run_t), intent(in) :: runs(:)
+    type(life_t), allocatable :: lives(:)
+    character(len=:), allocatable :: line, parts
+    integer :: c, i
+
+    call sum_damage(runs, lives)
+    do i = 1, size(lives)
+      line = 'fatigue ' // quoted(lives(i)%name) // ': damage of all load cases ' // rounded_text(lives(i)%damage, digits)
+      if (lives(i)%is_shaft) line = line // ' at ' // rounded_text(lives(i)%position, digits) // ' m'
+      parts = ''
+      do c = 1, size(runs)
+        if (lives(i)%of_case(c) > 0) parts = parts // ', ' // runs(c)%load_case%name // ' ' // &
+                                             rounded_text(lives(i)%of_case(c), digits)
+      end do
+      if (parts /= '') line = line // ' (' // parts(3:) // ')'
+      if (lives(i)%exceeds_strength) line = line // '; the mean of a cycle exceeds the strength'
+      call report%append_line(line)
+    end do
+  end subroutine append_lives
+
+end module nocdyn_load_case_report

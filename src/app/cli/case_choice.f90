@@ -1,0 +1,35 @@
+!> Which inputs of a file a command computes: the machine itself, its load cases, or the load case of --case.
+module nocdyn_case_choice
+  use nocdyn_arguments, only: arguments_t
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_input, only: input_t
+  use nocdyn_schema_text, only: suggestion
+  use nocdyn_text, only: append, quoted, shortened, string_t
+  implicit none (type, external)
+  private
+
+  public :: choose_case
+
+contains
+
+  !> Finds the load case of --case; 0 without that option.
+  subroutine choose_case(arguments, machine, chosen, error)
+    type(arguments_t), intent(in) :: arguments
+    type(input_t), intent(in) :: machine   !! with the load cases of its file
+    integer, intent(out) :: chosen         !! of its load cases
+    type(error_t), allocatable, intent(out) :: error   !! there is none of this name
+    type(string_t), allocatable :: names(:)
+    integer :: c
+
+    chosen = 0
+    if (.not. arguments%is_given('--case')) return
+    allocate (names(0))
+    do c = 1, size(machine%load_cases)
+      call append(names, machine%load_cases(c)%name)
+      if (names(c)%text == arguments%value('--case')) chosen = c
+    end do
+    if (chosen == 0) call raise(error, exit_input, machine%shown_file() // ': --case: there is no &load_case ' // &
+                                quoted(shortened(arguments%value('--case'))) // suggestion(arguments%value('--case'), names))
+  end subroutine choose_case
+
+end module nocdyn_case_choice

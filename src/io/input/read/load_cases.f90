@@ -1,0 +1,213 @@
+!> Load cases: which groups of a file belong to each of them, and which to the machine itself.
+!>
+!> Elements that a load case names by `with` belong only to the cases that name them; those that it names by `without` are not in
+!> it. The run of a case is the &run that names it, else the &run without a case.
+module nocdyn_load_cases
+  use nocdyn_diagnostics, only: diagnostics_t
+  use nocdyn_input, only: group_t, input_t, load_case_t, value_t
+  use nocdyn_schema, only: group_rules
+  use nocdyn_schema_text, only: suggestion
+  use nocdyn_text, only: append, quoted, shortened, string_t, to_text
+  implicit none (type, external)
+  private
+
+  public :: find_load_cases, is_run_of_case, keep_groups
+
+  !> What a file says of its load cases.
+  type :: members_t
+    integer, allocatable :: groups(:)     !! those that are load cases
+    logical, allocatable :: has(:, :)     !! whether a case names a group by `with`, [cases, groups]
+    logical, allocatable :: lacks(:, :)   !! and by `without`
+    integer, allocatable :: runs(:)       !! its own &run, 0: none, [cases]
+    integer :: common_run = 0             !! the &run without a case, 0: none
+  end type members_t
+
+contains
+
+  !> Whether a group is a &run that names a load case.
+  logical function is_run_of_case(group)
+    type(group_t), intent(in) :: group
+
+    is_run_of_case = group%kind == 'run' .and. group%rule > 0
+    if (is_run_of_case) is_run_of_case = group%has_value('load_case')
+  end function is_run_of_case
+
+  !> Finds the load cases of an input, and the groups that are not of the machine itself.
+  subroutine find_load_cases(input, machine_lacks, diagnostics)
+    type(input_t), intent(inout) :: input   !! all groups of the file; gets its load cases
+    logical, allocatable, intent(out) :: machine_lacks(:)   !! [groups]
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(members_t) :: members
+    integer :: c
+
+    members%groups = input%groups_named('load_case')
+    allocate (machine_lacks(size(input%groups)), source=.false.)
+    if (allocated(input%load_cases)) deallocate (input%load_cases)
+    allocate (input%load_cases(size(members%groups)))
+    call find_runs(input, members, diagnostics)
+    if (size(members%groups) == 0) return
+    allocate (members%has(size(members%groups), size(input%groups)), source=.false.)
+    allocate (members%lacks, source=members%has)
+    do c = 1, size(members%groups)
+      call check_folder(input, members%groups(c), diagnostics)
+      call find_members(input, members%groups(c), 'with', members%has(c, :), diagnostics)
+      call find_members(input, members%groups(c), 'without', members%lacks(c, :), diagnostics)
+    end do
+    do c = 1, size(members%groups)
+      call describe_case(input%groups(members%groups(c)), input%load_cases(c))
+      allocate (input%load_cases(c)%lacks(size(input%groups)))
+      input%load_cases(c)%lacks(:) = members%lacks(c, :) .or. (any(members%has, dim=1) .and. .not. members%has(c, :))
+      call leave_frame(input, members, merge(members%runs(c), members%common_run, members%runs(c) > 0), &
+                       input%load_cases(c)%lacks)
+    end do
+    machine_lacks(:) = any(members%has, dim=1)
+    call leave_frame(input, members, members%common_run, machine_lacks)
+  end subroutine find_load_cases
+
+  subroutine describe_case(group, load_case)
+    type(group_t), intent(in) :: group
+    type(load_case_t), intent(inout) :: load_case
+
+    load_case%name = group%name
+    load_case%title = group%text('title')
+    load_case%repeats = group%number('repeats')
+    load_case%line = group%line
+    allocate (load_case%overrides, source=group%texts('set'))
+  end subroutine describe_case
+
+  !> Leaves out the groups &load_case, and every &run but one.
+  subroutine leave_frame(input, members, run, lacks)
+    type(input_t), intent(in) :: input
+    type(members_t), intent(in) :: members
+    integer, intent(in) :: run   !! index of the group that stays; 0: the first one
+    logical, intent(inout) :: lacks(:)   !! [groups]
+    integer, allocatable :: runs(:)
+
+    allocate (runs, source=input%groups_named('run'))
+    lacks(members%groups) = .true.
+    lacks(runs) = .true.
+    lacks(merge(run, runs(1), run > 0)) = .false.
+  end subroutine leave_frame
+
+  !> The position of a name, 0 if it is not there.
+  pure integer function position_of(name, names)
+    character(len=*), intent(in) :: name
+    type(string_t), intent(in) :: names(:)
+
+    do position_of = size(names), 1, -1
+      if (names(position_of)%text == name) return
+    end do
+  end function position_of
+
+  !> Finds the &run of every case.
+  subroutine find_runs(input, members, diagnostics)
+    type(input_t), intent(in) :: input
+    type(members_t), intent(inout) :: members
+    type(diagnostics_t), intent(inout) :: diagnostics
+    integer, allocatable :: runs(:)
+    type(string_t), allocatable :: names(:)
+    integer :: c, i
+
+    allocate (runs, source=input%groups_named('run'))
+    allocate (members%runs(size(members%groups)), source=0)
+    allocate (names(size(members%groups)))
+    do c = 1, size(names)
+      names(c)%text = input%groups(members%groups(c))%name
+    end do
+    do i = 1, size(runs)
+      if (.not. is_run_of_case(input%groups(runs(i)))) then
+        members%common_run = runs(i)
+        cycle
+      end if
+      c = position_of(input%groups(runs(i))%text('load_case'), names)
+      if (c == 0) then
+        call input%report(runs(i), 'load_case', 'load_case: there is no &load_case ' // &
+                          quoted(shortened(input%groups(runs(i))%text('load_case'))) // &
+                          suggestion(input%groups(runs(i))%text('load_case'), names), diagnostics)
+      else if (members%runs(c) > 0) then
+        call input%report(runs(i), 'load_case', 'load_case: the &run of ' // quoted(names(c)%text) // ' is on line ' // &
+                          to_text(input%groups(members%runs(c))%line), diagnostics)
+      else
+        members%runs(c) = runs(i)
+      end if
+    end do
+    if (members%common_run > 0) return
+    do c = 1, size(names)
+      if (members%runs(c) == 0) call input%report(members%groups(c), 'name', 'there is no &run for it; needed: one with ' // &
+        'load_case = ' // quoted(shortened(names(c)%text)) // ', or one without load_case, for all', diagnostics)
+    end do
+  end subroutine find_runs
+
+  !> The name of a load case is that of a folder.
+  subroutine check_folder(input, group, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: group   !! the &load_case
+    type(diagnostics_t), intent(inout) :: diagnostics
+
+    associate (name => input%groups(group)%name)
+      if (index(name, '/') == 0 .and. index(name, '.') /= 1) return
+      call input%report(group, 'name', 'name = ' // quoted(shortened(name)) // &
+                        ' is no name of a folder; allowed: a name without / and without a dot at its beginning', diagnostics)
+    end associate
+  end subroutine check_folder
+
+  !> Marks the elements that a load case names.
+  subroutine find_members(input, group, key, is_named, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: group           !! the &load_case
+    character(len=*), intent(in) :: key    !! with, without
+    logical, intent(inout) :: is_named(:)  !! [groups]
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(string_t), allocatable :: elements(:), names(:)
+    integer :: found, g, i
+
+    allocate (names, source=input%groups(group)%texts(key))
+    if (size(names) == 0) return
+    allocate (elements(0))
+    do g = 1, size(input%groups)
+      if (is_element(input%groups(g))) call append(elements, input%groups(g)%name)
+    end do
+    do i = 1, size(names)
+      found = 0
+      do g = 1, size(input%groups)
+        if (input%groups(g)%name /= names(i)%text .or. .not. is_element(input%groups(g))) cycle
+        if (found > 0) call input%report(group, key, key // ': ' // quoted(shortened(names(i)%text)) // ' is the name of ' // &
+          input%location(found) // ' and of ' // input%location(g) // '; needed: a name that one element has', diagnostics)
+        found = g
+        is_named(g) = .true.
+      end do
+      if (found == 0) call input%report(group, key, key // ': there is no element ' // quoted(shortened(names(i)%text)) // &
+                                        suggestion(names(i)%text, elements), diagnostics)
+    end do
+  end subroutine find_members
+
+  !> Whether a group is one that load cases can have or lack: one with a name, no body, no load case.
+  logical function is_element(group)
+    type(group_t), intent(in) :: group
+
+    is_element = group%rule > 0 .and. group%name /= ''
+    if (is_element) is_element = all(group_rules(group%rule)%name_space /= [character(len=9) :: 'body', 'load_case'])
+  end function is_element
+
+  !> Leaves the groups of a load case or of the machine itself. Its &run is that of an input without load cases then.
+  subroutine keep_groups(input, lacks)
+    type(input_t), intent(inout) :: input
+    logical, intent(in) :: lacks(:)   !! whether a group is left out, of the first groups of the input
+    type(group_t), allocatable :: kept(:)
+    integer :: g, k, run
+
+    allocate (kept(size(input%groups) - count(lacks)))
+    k = 0
+    do g = 1, size(input%groups)
+      if (g <= size(lacks)) then
+        if (lacks(g)) cycle
+      end if
+      k = k + 1
+      kept(k) = input%groups(g)
+    end do
+    call move_alloc(kept, input%groups)
+    run = input%position('run')
+    input%groups(run)%values(input%groups(run)%key_position('load_case')) = value_t()
+  end subroutine keep_groups
+
+end module nocdyn_load_cases

@@ -1,0 +1,279 @@
+"""Load cases: several starts, faults and loads on one machine in one file."""
+
+import csv
+import json
+import signal
+
+import f90nml
+import pytest
+from conftest import ENDLESS, wait_for
+
+MACHINE = """&case title = 'Pump' /
+&body name = 'motor' inertia = 2.0 speed = 90.0 /
+&body name = 'pump' inertia = 5.0 speed = 90.0 /
+&coupling name = 'shaft' bodies = 'motor', 'pump' stiffness = 1.0e4 damping = 5.0 /
+&motor name = 'drive' body = 'motor' a = 500.0 b = 2.0 c = 0.0 /
+&load name = 'work' body = 'pump' quadratic = 0.03 /
+"""
+FAULT = "&excitation name = 'fault' body = 'motor' amplitude = 400.0 frequency = 30.0 /\n"
+RUN = "&run t_end = 0.5 method = 'rk853' /\n&output points = 51 /\n"
+LIFE = "&fatigue name = 'life' coupling = 'shaft' reference_moment = 300.0 reference_cycles = 1.0e5 slope = 5.0 repeats = 3 /\n"
+CASES = """&load_case name = 'start' title = 'From rest' repeats = 100 set = 'body.motor.speed=0', 'body.pump.speed = 0' /
+&load_case name = 'fault' repeats = 7 with = 'fault' /
+&load_case name = 'idle' without = 'work' /
+"""
+
+
+def rows(nocdyn, folder):
+    return (nocdyn.folder / folder / "trajectory.csv").read_bytes()
+
+
+def cases(nocdyn, folder="out"):
+    return json.loads((nocdyn.folder / folder / "cases.json").read_text())
+
+
+def complaint(nocdyn, text, *words):
+    nocdyn.write("m.nml", text)
+    outcome = nocdyn("run", "m.nml", "--out", "out", *words)
+    assert outcome.returncode == 2
+    assert not (nocdyn.folder / "out").exists()
+    return outcome.stderr
+
+
+def test_each_load_case_is_the_machine_with_its_values_written_in_the_file(nocdyn):
+    nocdyn.write("m.nml", MACHINE + FAULT + RUN + LIFE + CASES)
+    outcome = nocdyn("run", "m.nml", "--out", "out")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    alone = {
+        "start": MACHINE.replace("speed = 90.0", "") + RUN + LIFE,
+        "fault": MACHINE + FAULT + RUN + LIFE,
+        "idle": MACHINE.replace("&load name = 'work' body = 'pump' quadratic = 0.03 /", "") + RUN + LIFE,
+    }
+    for name, text in alone.items():
+        nocdyn.write(f"{name}.nml", text)
+        assert nocdyn("run", f"{name}.nml", "--out", f"alone/{name}").returncode == 0
+        assert rows(nocdyn, f"out/{name}") == rows(nocdyn, f"alone/{name}")
+        assert nocdyn.summary(f"out/{name}")["load_case"] == name
+        assert "load_case" not in nocdyn.summary(f"alone/{name}")
+    assert len({rows(nocdyn, f"out/{name}") for name in alone}) == 3
+
+
+def test_the_copy_of_the_input_of_a_case_gives_its_results_again(nocdyn):
+    nocdyn.write("m.nml", MACHINE + FAULT + RUN + CASES)
+    assert nocdyn("run", "m.nml", "--out", "out").returncode == 0
+    copy = f90nml.read(nocdyn.folder / "out/fault/input.nml")
+    assert "load_case" not in copy and "load_case" not in copy["run"]
+    assert nocdyn("run", "out/fault/input.nml", "--out", "again").returncode == 0
+    assert rows(nocdyn, "again") == rows(nocdyn, "out/fault")
+
+
+def test_peaks_are_the_largest_values_of_all_cases(nocdyn):
+    nocdyn.write("m.nml", MACHINE + FAULT + RUN + CASES)
+    outcome = nocdyn("run", "m.nml", "--out", "out")
+    result = cases(nocdyn)
+    assert [(case["name"], case["title"], case["repeats"], case["status"]) for case in result["load_cases"]] == [
+        ("start", "From rest", 100, "done"),
+        ("fault", "", 7, "done"),
+        ("idle", "", 1, "done"),
+    ]
+    summaries = {case["name"]: nocdyn.summary(f"out/{case['folder']}")["columns"] for case in result["load_cases"]}
+    found = set()
+    for peak in result["peaks"]:
+        label = f"{peak['column']} [{peak['unit']}]"
+        found.add(label)
+        values = [column[label][key] for column in summaries.values() if label in column for key in ("min", "max")]
+        assert abs(peak["largest"]) == max(map(abs, values))
+        column = summaries[peak["load_case"]][label]
+        assert (peak["largest"], peak["time"]) in [(column[end], column[f"time_of_{end}"]) for end in ("min", "max")]
+    assert found == {label for columns in summaries.values() for label in columns}
+    assert "torque_fault [N m]" in found
+    lines = outcome.stdout.splitlines()
+    assert lines[0].startswith("m.nml: load case 'start': done at t = 0.5 s, ")
+    peak = next(peak for peak in result["peaks"] if peak["column"] == "shaft_shaft")
+    line = next(line for line in lines if line.startswith("shaft_shaft [N m]"))
+    assert line.split()[-1] == peak["load_case"] and float(line.split()[3]) == pytest.approx(peak["largest"], rel=1e-6)
+    with open(nocdyn.folder / "out/cases.csv", newline="") as file:
+        table = list(csv.DictReader(file))
+    for row in table:
+        column = summaries[row["load_case"]][row["column"]]
+        assert [float(row[f"time_of_{end} [s]"]) for end in ("min", "max")] == [column["time_of_min"], column["time_of_max"]]
+        assert [float(row[end]) for end in ("min", "max")] == [column["min"], column["max"]]
+    assert len(table) == sum(map(len, summaries.values()))
+
+
+def test_the_damage_of_cases_adds_up_with_their_repeats(nocdyn):
+    nocdyn.write("m.nml", MACHINE + FAULT + RUN + LIFE + CASES)
+    outcome = nocdyn("run", "m.nml", "--out", "out")
+    [life] = cases(nocdyn)["fatigue"]
+    damage = {name: nocdyn.summary(f"out/{name}")["fatigue"][0]["damage"] for name in ("start", "fault", "idle")}
+    expected = {"start": 100 * 3 * damage["start"], "fault": 7 * 3 * damage["fault"], "idle": 3 * damage["idle"]}
+    assert expected["start"] > 0 and expected["fault"] > 0
+    assert life["damage_of_load_cases"] == pytest.approx(expected, rel=1e-14)
+    assert life["damage"] == pytest.approx(sum(expected.values()), rel=1e-14)
+    assert life["repeats_to_failure"] == pytest.approx(1 / life["damage"], rel=1e-14)
+    assert f"fatigue 'life': damage of all load cases {life['damage']:.4g} (" in outcome.stdout
+
+
+SHAFT = """&body name = 'a' inertia = 1.0 /
+&body name = 'b' inertia = 2.0 /
+&shaft name = 's' bodies = 'a', 'b' lengths = 2*0.5 diameters = 0.05, 0.06 shear_modulus = 8.0e10 density = 7850.0 nodes = 4 /
+&excitation name = 'left' body = 'a' amplitude = 900.0 frequency = 50.0 /
+&excitation name = 'right' body = 'b' amplitude = 900.0 frequency = 400.0 /
+&fatigue name = 'life' shaft = 's' reference_stress = 1.0e7 reference_cycles = 1.0e5 slope = 5.0 /
+&run t_end = 0.2 /
+&load_case name = 'slow' without = 'right' repeats = 50 /
+&load_case name = 'fast' without = 'left' repeats = 2 /
+"""
+
+
+def test_the_damage_of_a_shaft_adds_up_point_by_point(nocdyn):
+    """The worst point of a case is not that of another one: the sum is less than that of the worst ones."""
+    nocdyn.write("m.nml", SHAFT)
+    outcome = nocdyn("run", "m.nml", "--out", "out")
+    assert outcome.returncode == 0, outcome.stderr
+    [life] = cases(nocdyn)["fatigue"]
+    single = {name: nocdyn.summary(f"out/{name}")["fatigue"][0] for name in ("slow", "fast")}
+    parts = life["damage_of_load_cases"]
+    assert life["damage"] == pytest.approx(sum(parts.values()), rel=1e-14)
+    assert 0 < parts["slow"] <= 50 * single["slow"]["damage"] and 0 < parts["fast"] <= 2 * single["fast"]["damage"]
+    assert single["slow"]["position"] != single["fast"]["position"]
+    assert life["damage"] < 50 * single["slow"]["damage"] + 2 * single["fast"]["damage"]
+    assert life["damage"] > max(50 * single["slow"]["damage"], 2 * single["fast"]["damage"])
+
+
+def test_a_case_may_have_a_run_of_its_own(nocdyn):
+    runs = "&run load_case = 'start' t_end = 2.0 method = 'rodas4' /\n&run t_end = 0.5 method = 'rk45' /\n"
+    nocdyn.write("m.nml", MACHINE + FAULT + runs + CASES)
+    assert nocdyn("run", "m.nml", "--out", "out").returncode == 0
+    settings = {name: nocdyn.summary(f"out/{name}")["settings"] for name in ("start", "fault")}
+    assert (settings["start"]["t_end"], settings["start"]["method"]) == (2.0, "rodas4")
+    assert (settings["fault"]["t_end"], settings["fault"]["method"]) == (0.5, "rk45")
+
+
+def test_the_command_line_overrides_what_a_case_sets(nocdyn):
+    nocdyn.write("m.nml", MACHINE + FAULT + RUN + CASES)
+    words = ("--set", "body.motor.speed=20", "--set", "excitation.fault.amplitude=1", "--set", "run.t_end=0.1")
+    outcome = nocdyn("run", "m.nml", "--out", "out", *words)
+    assert outcome.returncode == 0, outcome.stderr
+    start = f90nml.read(nocdyn.folder / "out/start/input.nml")
+    assert [body["speed"] for body in start["body"]] == [20, 0]
+    assert start["run"]["t_end"] == 0.1
+    assert f90nml.read(nocdyn.folder / "out/fault/input.nml")["excitation"]["amplitude"] == 1
+
+
+def test_one_case_alone(nocdyn):
+    nocdyn.write("m.nml", MACHINE + FAULT + RUN + CASES)
+    outcome = nocdyn("run", "m.nml", "--out", "out", "--case", "fault")
+    assert outcome.returncode == 0
+    assert "smallest" in outcome.stdout  # the table of a single run
+    assert nocdyn.files("out") == ["cases.csv", "cases.json", "fault"]
+    assert [case["name"] for case in cases(nocdyn)["load_cases"]] == ["fault"]
+
+
+def test_other_commands_see_the_machine_itself_or_one_of_its_cases(nocdyn):
+    nocdyn.write("m.nml", MACHINE + FAULT + RUN + CASES)
+    outcome = nocdyn("check", "m.nml")
+    assert "1 load, 0 excitations" in outcome.stdout
+    assert "\n  load cases: 'start', 'fault', 'idle'\n" in outcome.stdout
+    assert "1 load, 1 excitation\n" in nocdyn("check", "m.nml", "--case", "fault").stdout
+    assert nocdyn("equilibrium", "m.nml", "--case", "idle", "--out", "steady").returncode == 0
+    steady = json.loads((nocdyn.folder / "steady/idle/equilibrium.json").read_text())
+    assert steady["steady_states"][0]["values"]["omega_motor [rad/s]"] == pytest.approx(250.0)  # where the motor gives nothing
+    outcome = nocdyn("check", "m.nml", "--case", "faul")
+    assert outcome.returncode == 2
+    assert outcome.stderr == "nocdyn: m.nml: --case: there is no &load_case 'faul'; did you mean 'fault'?\n"
+
+
+def test_a_sweep_varies_the_machine_itself(nocdyn):
+    sweep = "&sweep design = 'grid' /\n&vary target = 'load.work.quadratic' low = 0.01 high = 0.03 count = 3 /\n"
+    sweep += "&record quantity = 'moment_shaft' statistic = 'max' /\n"
+    nocdyn.write("m.nml", MACHINE + FAULT + RUN + CASES + sweep)
+    nocdyn.write("plain.nml", MACHINE + RUN + sweep)
+    for name in ("m", "plain"):
+        outcome = nocdyn("sweep", f"{name}.nml", "--out", name, "--csv")
+        assert outcome.returncode == 0, outcome.stderr
+    tables = [(nocdyn.folder / name / "sweep.csv").read_text() for name in ("m", "plain")]
+    assert tables[0] == tables[1]
+
+
+def test_a_case_that_fails_does_not_stop_the_others(nocdyn):
+    text = MACHINE + FAULT + RUN + CASES.replace("'body.motor.speed=0'", "'run.max_steps=2'")
+    nocdyn.write("m.nml", text)
+    outcome = nocdyn("run", "m.nml", "--out", "out")
+    assert outcome.returncode == 1
+    assert outcome.stderr.startswith("nocdyn: m.nml: load case 'start': ")
+    assert "out/start/trajectory.partial.csv" in outcome.stderr
+    assert [case["status"] for case in cases(nocdyn)["load_cases"]] == ["failed", "done", "done"]
+
+
+def test_after_an_interruption_there_is_no_table_over_the_cases(nocdyn):
+    nocdyn.write("m.nml", MACHINE + FAULT + RUN + CASES)
+    assert nocdyn("run", "m.nml", "--out", "out").returncode == 0
+    process = nocdyn.start("run", "m.nml", "--out", "out", *ENDLESS)
+    wait_for(lambda: list((nocdyn.folder / "out/start").glob(".trajectory.csv.*")))
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 1
+    assert "m.nml: load cases not run after the interruption: 2" in errors
+    assert "cases.json" not in nocdyn.files("out") and "cases.csv" not in nocdyn.files("out")
+
+
+@pytest.mark.parametrize(
+    "case, message",
+    [
+        ("name = 'a' /\n&load_case name = 'a'", "m.nml:11: &load_case 'a': the name 'a' is taken by &load_case on line 10"),
+        ("name = 'a/b'", "m.nml:10: &load_case 'a/b': name = 'a/b' is no name of a folder; allowed: a name without / and "),
+        ("name = '..'", "m.nml:10: &load_case '..': name = '..' is no name of a folder; allowed: "),
+        ("name = 'a' with = 'faul'", "m.nml:10: &load_case 'a': with: there is no element 'faul'; did you mean 'fault'?"),
+        ("name = 'a' without = 'pump'", "m.nml:10: &load_case 'a': without: there is no element 'pump'"),
+        ("name = 'a' repeats = 0", "m.nml:10: &load_case 'a': repeats = 0 is out of range; allowed: > 0"),
+        (
+            "name = 'a' set = 'load.work.quadratik=1'",
+            "m.nml:10: &load_case 'a': set 'load.work.quadratik=1': quadratik is not a key of &load; did you mean 'quadratic'?",
+        ),
+        (
+            "name = 'a' set = 'load.werk.quadratic=1'",
+            "m.nml:10: &load_case 'a': set 'load.werk.quadratic=1': there is no &load 'werk'; did you mean 'work'?",
+        ),
+        (
+            "name = 'a' set = 'body.motor.inertia=-1'",
+            "m.nml:10: &load_case 'a': set 'body.motor.inertia=-1': inertia = -1 is out of range; allowed: >= 0",
+        ),
+        ("name = 'a' set = 'run.t_end'", "m.nml:10: &load_case 'a': set 'run.t_end': there is no = in it; write PATH=VALUE"),
+        (
+            "name = 'b' with = 'fault' /\n&load_case name = 'a' set = 'excitation.fault.amplitude=1'",
+            "m.nml:11: &load_case 'a': set 'excitation.fault.amplitude=1': the load case leaves out &excitation 'fault'",
+        ),
+        ("name = 'a' /\n&run load_case = 'b' t_end = 1", "m.nml:11: &run: load_case: there is no &load_case 'b'"),
+        (
+            "name = 'a' /\n&run load_case = 'a' t_end = 1 /\n&run load_case = 'a' t_end = 2",
+            "m.nml:12: &run: load_case: the &run of 'a' is on line 11",
+        ),
+        ("name = 'a' /\n&run t_end = 2", "m.nml:11: &run: given twice, first on line 8; allowed: once"),
+    ],
+)
+def test_a_wrong_load_case_is_refused(nocdyn, case, message):
+    text = MACHINE + FAULT + RUN + f"&load_case {case} /\n"
+    assert complaint(nocdyn, text).startswith(f"nocdyn: {message}")
+
+
+def test_a_name_that_two_elements_have_is_refused(nocdyn):
+    text = MACHINE.replace("'shaft'", "'work'") + RUN + "&load_case name = 'a' without = 'work' /\n"
+    assert complaint(nocdyn, text) == (
+        "nocdyn: m.nml:9: &load_case 'a': without: 'work' is the name of m.nml:4: &coupling 'work' and of m.nml:6: &load 'work'; "
+        "needed: a name that one element has\n"
+    )
+
+
+def test_a_case_without_a_run_is_refused(nocdyn):
+    text = MACHINE + "&run load_case = 'a' t_end = 1 /\n&load_case name = 'a' /\n&load_case name = 'b' /\n"
+    assert complaint(nocdyn, text) == (
+        "nocdyn: m.nml:9: &load_case 'b': there is no &run for it; needed: one with load_case = 'b', or one without load_case, "
+        "for all\n"
+    )
+
+
+def test_mistakes_of_several_cases_are_told_together(nocdyn):
+    cases = "&load_case name = 'a' set = 'run.rtol=2' /\n&load_case name = 'b' set = 'run.atol=0' /\n"
+    lines = complaint(nocdyn, MACHINE + RUN + cases).splitlines()
+    assert [line.split(": ")[1:3] for line in lines] == [["m.nml:9", "&load_case 'a'"], ["m.nml:10", "&load_case 'b'"]]
