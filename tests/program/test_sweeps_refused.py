@@ -24,10 +24,13 @@ def refusal(nocdyn, **groups):
     [
         ({"sweep": ""}, "m.nml: there is no &sweep; 'nocdyn help input sweep' shows one"),
         ({"vary": ""}, "m.nml:5: &sweep: design = 'random' has nothing to vary; needed: a &vary"),
-        ({"record": ""}, "m.nml:5: &sweep: no number of the variants is kept; needed: a &record with quantity, mode or response"),
+        (
+            {"record": ""},
+            "m.nml:5: &sweep: no number of the variants is kept; needed: a &record with quantity, fatigue, mode or response",
+        ),
         (
             {"record": "&record /"},
-            "m.nml:7: &record: there is nothing to record; needed: quantity, mode, response or trajectories",
+            "m.nml:7: &record: there is nothing to record; needed: quantity, fatigue, mode, response or trajectories",
         ),
         (
             {"vary": "&vary target = 'load.drag.viscus' low = 0 high = 1 /\n"},

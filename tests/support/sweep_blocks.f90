@@ -13,7 +13,7 @@ module nocdyn_test_sweep_blocks
   use nocdyn_recorder, only: recorder, recorder_t
   use nocdyn_reduced, only: new_reduced, reduced_t
   use nocdyn_statistics, only: new_statistic, statistic_final, statistic_max, statistic_max_abs, statistic_mean, statistic_min, &
-    statistic_names, statistic_rms, statistic_settling_time, statistic_t, statistic_time_of_max
+    statistic_rms, statistic_settling_time, statistic_t, statistic_time_of_max
   use nocdyn_statistics_observer, only: new_statistics_observer, statistics_observer_t
   use nocdyn_system, only: system_t
   use nocdyn_text, only: string_t
@@ -57,7 +57,7 @@ contains
     call source%list_parameters(ensemble%source)
     call block%list_parameters(ensemble%block)
     if (.not. ensemble%block%has_same_structure(ensemble%source)) return
-    observer = new_statistics_observer(block, statistics, 0.0_wp, t_end)
+    observer = new_statistics_observer(block, statistics, 0.0_wp, t_end, may_bend=.true.)
     ensemble%observer => observer
     allocate (ensemble%y, source=source%start())
     allocate (ensemble%values(size(statistics), variants%lanes), source=0.0_wp)
@@ -104,10 +104,10 @@ contains
     integer :: column, kind, next
 
     call list_columns(machine, columns, labels)
-    allocate (statistics(2 * (size(labels) - 1) * size(statistic_names)))
+    allocate (statistics(2 * (size(labels) - 1) * statistic_settling_time))
     next = 0
     do column = 2, size(labels)
-      do kind = 1, size(statistic_names)
+      do kind = 1, statistic_settling_time
         statistics(next + 1) = new_statistic(labels, column, kind, 0.0_wp, band=band)
         statistics(next + 2) = new_statistic(labels, column, kind, 0.0_wp, from, band)
         next = next + 2
@@ -152,7 +152,7 @@ contains
     integer :: lane
 
     call new_formulation('reduced', machine, formulation)
-    observer = new_statistics_observer(formulation, statistics, 0.0_wp, t_end)
+    observer = new_statistics_observer(formulation, statistics, 0.0_wp, t_end, may_bend=.true.)
     y = formulation%start()
     do lane = 1, machine%lanes
       start = y(lane, :)

@@ -3,9 +3,12 @@ module nocdyn_recorded_columns
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
+  use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: reduced_t
+  use nocdyn_shafts, only: shafts_t
   use nocdyn_trajectory_columns, only: column_angle, column_elastic, column_element, column_kinetic, column_member, &
-    column_reaction, column_residual, column_speed, column_t, column_time, column_work_in, column_work_out
+    column_point_moment, column_point_stress, column_reaction, column_residual, column_speed, column_t, column_time, &
+    column_work_in, column_work_out
   implicit none (type, external)
   private
 
@@ -152,15 +155,14 @@ contains
           case (column_speed)
             row(first:last) = self%formulation%omega(lane, i:j)
           case (column_element)
-            if (segment%has_new_values) then
-              call machine%banks(segment%bank)%bank%observe(machine%elements, segment%quantity, lane, &
-                                                            self%values(:machine%banks(segment%bank)%bank%count))
-            end if
+            if (segment%has_new_values) call observe_bank(machine, segment, lane, self%values)
             row(first:last) = self%values(i:j)
           case (column_reaction)
             row(first:last) = self%lambda(i:j)
           case (column_member)
             row(first:last) = members%factor(lane, i:j) * self%lambda(members%row(i:j))
+          case (column_point_moment, column_point_stress)
+            call fill_points(machine, segment, lane, row(first:last))
           case (column_kinetic:column_residual)
             row(first) = self%energies(segment%kind)
           case default
@@ -170,6 +172,39 @@ contains
       end do
     end associate
   end subroutine fill_row
+
+  !> The values of one quantity of a bank.
+  subroutine observe_bank(machine, segment, lane, values)
+    type(machine_t), intent(in) :: machine
+    type(segment_t), intent(in) :: segment
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(inout) :: values(:)   !! [elements of the bank at least]
+
+    associate (bank => machine%banks(segment%bank)%bank)
+      call bank%observe(machine%elements, segment%quantity, lane, values(:bank%count))
+    end associate
+  end subroutine observe_bank
+
+  !> The moments or stresses at points of a shaft.
+  subroutine fill_points(machine, segment, lane, values)
+    type(machine_t), intent(in) :: machine
+    type(segment_t), intent(in) :: segment
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(inout) :: values(:)   !! [N m] or [Pa]
+    integer :: p
+
+    select type (bank => machine%banks(segment%bank)%bank)
+    type is (shafts_t)
+      do p = 1, size(values)
+        associate (point => segment%index + p - 1)
+          values(p) = bank%moment_at(machine%elements, segment%quantity, point, lane)
+          if (segment%kind == column_point_stress) values(p) = values(p) / bank%section_modulus(segment%quantity, point, lane)
+        end associate
+      end do
+    class default
+      error stop 'nocdyn_recorded_columns: the points are of a shaft'
+    end select
+  end subroutine fill_points
 
   !> Energies and works of one lane, one number for each kind of column.
   subroutine find_energies(self, lane, y)

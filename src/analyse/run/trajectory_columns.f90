@@ -4,11 +4,12 @@ module nocdyn_trajectory_columns
   use nocdyn_constraints, only: constraints_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_shafts, only: shafts_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
-  public :: list_columns, column_count, table_bytes
+  public :: list_columns, list_points, column_count, table_bytes
 
   integer, parameter, public :: column_time = 1
   integer, parameter, public :: column_angle = 2        !! of a body
@@ -16,11 +17,13 @@ module nocdyn_trajectory_columns
   integer, parameter, public :: column_element = 4      !! a quantity of an element of a bank
   integer, parameter, public :: column_reaction = 5     !! multiplier of a constraint row
   integer, parameter, public :: column_member = 6       !! torque of a row on one of its members
-  integer, parameter, public :: column_kinetic = 7      !! this and the following: energies and works of the machine
-  integer, parameter, public :: column_elastic = 8
-  integer, parameter, public :: column_work_in = 9
-  integer, parameter, public :: column_work_out = 10
-  integer, parameter, public :: column_residual = 11
+  integer, parameter, public :: column_point_moment = 7 !! at a point of a shaft, see `list_points`
+  integer, parameter, public :: column_point_stress = 8
+  integer, parameter, public :: column_kinetic = 9      !! this and the following: energies and works of the machine
+  integer, parameter, public :: column_elastic = 10
+  integer, parameter, public :: column_work_in = 11
+  integer, parameter, public :: column_work_out = 12
+  integer, parameter, public :: column_residual = 13
 
   character(len=*), parameter, public :: energy_labels(column_kinetic:column_residual) = &
     [character(len=19) :: 'kinetic_energy [J]', 'elastic_energy [J]', 'work_in [J]', 'work_out [J]', 'energy_residual [J]']
@@ -28,8 +31,8 @@ module nocdyn_trajectory_columns
   type, public :: column_t
     integer :: kind = column_time   !! column_...
     integer :: bank = 0             !! of an element
-    integer :: quantity = 0         !! of the bank: index in `quantities`
-    integer :: index = 0            !! of the body, of the element within its bank, of the row or of the member
+    integer :: quantity = 0         !! of the bank: index in `quantities`; of a point: the shaft
+    integer :: index = 0            !! of the body, of the element within its bank, of the row or of the member; the point
   end type column_t
 
 contains
@@ -74,6 +77,32 @@ contains
       call add_column(columns, labels, count, column_t(kind), trim(energy_labels(kind)))
     end do
   end subroutine list_columns
+
+  !> The columns of all points of a shaft, which the table does not have; none if there is no such shaft.
+  subroutine list_points(machine, shaft, kind, columns)
+    type(machine_t), intent(in) :: machine
+    character(len=*), intent(in) :: shaft   !! its name
+    integer, intent(in) :: kind             !! column_point_...
+    type(column_t), allocatable, intent(out) :: columns(:)
+    integer :: b, p, s
+
+    do b = 1, size(machine%banks)
+      select type (bank => machine%banks(b)%bank)
+      type is (shafts_t)
+        do s = 1, size(bank%shafts)
+          if (bank%names(bank%shafts(s)%first)%text /= shaft) cycle
+          allocate (columns(bank%shafts(s)%last_point - bank%shafts(s)%first_point + 1))
+          do p = 1, size(columns)
+            columns(p) = column_t(kind, b, s, p)
+          end do
+          return
+        end do
+      class default
+        cycle
+      end select
+    end do
+    allocate (columns(0))
+  end subroutine list_points
 
   !> Whether a body moves along a line: pistons and rods of cranks, but not the angles of rods.
   logical function is_straight(machine, body)

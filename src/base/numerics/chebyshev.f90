@@ -69,7 +69,7 @@ contains
     real(wp), dimension(0:max_degree) :: whole, part_values, c, slopes, bends
     real(wp) :: middle, half, rounding, sizes, x
     type(parts_t) :: parts
-    logical :: has_none, has_one
+    logical, dimension(2) :: has_none, has_one   ! of maxima, of minima
     integer :: bottom, part, top
 
     call find_range(rule%degree, values, top, bottom)
@@ -87,12 +87,12 @@ contains
       if (.not. c(0) - abs(c(0)) + sizes - rounding > highest) cycle
       call differentiate(rule%degree, c, slopes)
       call differentiate(rule%degree, slopes, bends)
-      call count_maxima(rule%degree, slopes, bends, has_none, has_one)
-      if (has_none) cycle
+      call count_turns(rule%degree, slopes, bends, has_none, has_one)
+      if (has_none(1)) cycle
       x = 0.0_wp
-      if (has_one) call find_turn(rule, part_values, slopes, bends, x)
+      if (has_one(1)) call find_turn(rule, part_values, slopes, bends, x)
       call raise(middle + half * x, value(rule%degree, c, x), highest, position, found)
-      if (has_one .or. half <= least_half) cycle
+      if (has_one(1) .or. half <= least_half) cycle
       call add_part(parts, middle + 0.5_wp * half, 0.5_wp * half)
       call add_part(parts, middle - 0.5_wp * half, 0.5_wp * half)
     end do
@@ -164,7 +164,7 @@ contains
     real(wp) :: middle, half, x
     type(parts_t) :: parts
     logical, dimension(2) :: has_none, has_one   ! of maxima, of minima
-    integer :: i, part, sign
+    integer :: part
 
     count = 0
     call find_series(rule, values, whole)
@@ -175,17 +175,16 @@ contains
       if (.not. 2 * sum(abs(c(1:rule%degree))) > least) cycle
       call differentiate(rule%degree, c, slopes)
       call differentiate(rule%degree, slopes, bends)
-      do i = 1, 2
-        sign = 3 - 2 * i
-        call count_maxima(rule%degree, sign * slopes(:rule%degree), sign * bends(:rule%degree), has_none(i), has_one(i))
-      end do
+      call count_turns(rule%degree, slopes, bends, has_none, has_one)
       if (all(has_none)) cycle
       x = 0.0_wp
-      i = findloc(has_one .and. .not. has_none, .true., dim=1)
-      sign = 3 - 2 * i
-      if (i > 0) call find_turn(rule, sign * part_values(:rule%degree), sign * slopes(:rule%degree), &
-                                sign * bends(:rule%degree), x)
-      if (i > 0 .or. half <= least_half) then
+      if (has_one(2)) then   ! of the negative polynomial that is a maximum
+        part_values(:rule%degree) = -part_values(:rule%degree)
+        slopes(:rule%degree) = -slopes(:rule%degree)
+        bends(:rule%degree) = -bends(:rule%degree)
+      end if
+      if (any(has_one)) call find_turn(rule, part_values, slopes, bends, x)
+      if (any(has_one) .or. half <= least_half) then
         count = count + 1
         extremes(count) = value(rule%degree, c, x)
       else
@@ -244,11 +243,11 @@ contains
     end do
   end subroutine find_series
 
-  !> Whether bounds show that there is no maximum between the ends, or one.
-  pure subroutine count_maxima(n, slopes, bends, has_none, has_one)
+  !> Whether bounds show that there is no maximum, or minimum, between the ends, or one.
+  pure subroutine count_turns(n, slopes, bends, has_none, has_one)
     integer, intent(in) :: n
-    real(wp), intent(in) :: slopes(0:n), bends(0:n)   !! coefficients of the derivatives
-    logical, intent(out) :: has_none, has_one
+    real(wp), intent(in) :: slopes(0:n), bends(0:n)       !! coefficients of the derivatives
+    logical, intent(out) :: has_none(2), has_one(2)       !! of maxima, of minima
     real(wp) :: end_slopes(2), change, difference
     integer :: k
 
@@ -262,10 +261,11 @@ contains
       end_slopes(2) = slopes(k) + end_slopes(2)
     end do
     if (modulo(n, 2) == 1) end_slopes(1) = -end_slopes(1)
-    has_one = -bends(0) > difference
-    has_none = abs(slopes(0)) >= change .or. bends(0) >= difference
-    if (has_one) has_none = has_none .or. end_slopes(1) <= 0 .or. end_slopes(2) >= 0
-  end subroutine count_maxima
+    has_one = [-bends(0), bends(0)] > difference
+    has_none = abs(slopes(0)) >= change .or. [bends(0), -bends(0)] >= difference
+    if (has_one(1)) has_none(1) = has_none(1) .or. end_slopes(1) <= 0 .or. end_slopes(2) >= 0
+    if (has_one(2)) has_none(2) = has_none(2) .or. end_slopes(1) >= 0 .or. end_slopes(2) <= 0
+  end subroutine count_turns
 
   !> The single root of the slope of a concave polynomial, by Newton's method, with bisection as safeguard. It starts from a
   !> parabola through the largest value and those next to it.

@@ -3,6 +3,7 @@ module nocdyn_sweep_block
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use nocdyn_ensemble, only: ensemble_t, initial_states, initial_states_t
   use nocdyn_errors, only: error_t
+  use nocdyn_fatigue_groups, only: read_curve
   use nocdyn_finite, only: is_finite
   use nocdyn_formulation, only: formulation_t
   use nocdyn_integration, only: integrate_with
@@ -86,16 +87,16 @@ contains
     call new_variant_machines(plan%input, plan%numbers%targets, lanes, with_energy_balance, block%machines, values)
     block%message = ''
     if (size(plan%statistics) == 0) return
-    call prepare_integration(plan%input, block%machines%formulation, plan%statistics, block%settings, block%times, &
-                             block%stepper, block%observer%statistics_observer_t, block%message)
+    call prepare_integration(plan%input, block%machines%formulation, plan, block%settings, block%times, block%stepper, &
+                             block%observer%statistics_observer_t, block%message)
   end subroutine new_sweep_block
 
   !> Settings, stepper and observer of the variants that a formulation is integrated for. Statistics that begin outside of the
   !> times are refused, and columns that the machine does not have.
-  subroutine prepare_integration(input, formulation, statistics, settings, times, stepper, observer, message)
-    type(input_t), intent(in) :: input
+  subroutine prepare_integration(input, formulation, plan, settings, times, stepper, observer, message)
+    type(input_t), intent(in) :: input                           !! of the variants
     class(formulation_t), target, intent(inout) :: formulation   !! stays where it is, as the observer does
-    type(statistic_t), intent(in) :: statistics(:)               !! of the plan
+    type(sweep_plan_t), intent(in) :: plan
     type(integration_settings_t), intent(out) :: settings
     real(wp), intent(out) :: times(2)                            !! start and end [s]
     class(stepper_t), allocatable, intent(out) :: stepper
@@ -104,6 +105,7 @@ contains
     type(string_t), allocatable :: notes(:)
     type(statistic_t), allocatable :: restricted(:)
     type(error_t), allocatable :: error
+    integer :: i
 
     associate (run => input%groups(input%position('run')))
       times = [run%number('t_start'), run%number('t_end')]
@@ -114,8 +116,11 @@ contains
     if (allocated(error)) then
       call move_alloc(error%message, message)
     else
-      call restrict_statistics(statistics, times(1), times(2), restricted, message)
-      observer = new_statistics_observer(formulation, restricted, times(1), times(2))
+      call restrict_statistics(plan%statistics, times(1), times(2), restricted, message)
+      do i = 1, size(restricted)
+        if (restricted(i)%fatigue > 0) restricted(i)%curve = read_curve(input%groups(restricted(i)%fatigue))
+      end do
+      observer = new_statistics_observer(formulation, restricted, times(1), times(2), plan%varies_key('cubic_stiffness'))
       if (message == '' .and. observer%missing /= '') then
         message = observer%missing // ' is recorded, but this machine has no such column'
       end if
@@ -281,8 +286,8 @@ contains
     call self%plan%numbers%target_values(chunk%parameters(:, index), values)
     call self%machines%own_formulation(values, formulation, message)
     observer%scheduler => self%scheduler
-    if (message == '') call prepare_integration(self%machines%input, formulation, self%plan%statistics, settings, times, &
-                                                stepper, observer%statistics_observer_t, message)
+    if (message == '') call prepare_integration(self%machines%input, formulation, self%plan, settings, times, stepper, &
+                                                observer%statistics_observer_t, message)
     if (message /= '') then
       call refuse(chunk, index, message)
       return

@@ -3,7 +3,8 @@
 !> A variant is what a single run of its input would be, however it gets into a lane. If all its values are direct
 !> (`direct_parameters_t`), they are written into a lane that holds another variant. Else its machine is assembled. If that has
 !> the structure of the block, its parameters are copied into the lane. If not, the variant needs a block of its own: a friction
-!> that is 0 in the block and not in the variant is an example, and other values of &run are another.
+!> that is 0 in the block and not in the variant is an example; other values of &run or &fatigue
+!> are another.
 module nocdyn_variant_machines
   use nocdyn_assembly, only: assemble_machine, new_asked_formulation
   use nocdyn_direct_parameters, only: direct_parameters_t, new_direct_parameters
@@ -15,6 +16,7 @@ module nocdyn_variant_machines
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: reduced_t
+  use nocdyn_schema, only: has_word
   use nocdyn_serial_work, only: check_values
   use nocdyn_targets, only: target_t
   implicit none (type, external)
@@ -33,7 +35,7 @@ module nocdyn_variant_machines
     type(reduced_t), pointer, private :: block => null()       !! the same if it is reduced: variants share it
     type(target_t), allocatable, private :: targets(:)
     logical, private :: has_energy_balance = .false.           !! whether the work integrals are among the states
-    logical, allocatable, private :: is_of_run(:)              !! whether a target is a value of &run, [targets]
+    logical, allocatable, private :: is_of_run(:)              !! whether a target is of &run or &fatigue, [targets]
     real(wp), allocatable, private :: base(:)                  !! values of those for the block, [targets]
     type(lane_parameters_t), private :: parameters             !! of the block
     type(direct_parameters_t), private :: direct
@@ -98,7 +100,7 @@ contains
     count_joints = joints%count
   end function count_joints
 
-  !> Which targets are values of &run, and what they are in the input: the block is integrated with them.
+  !> Which targets are values of &run or &fatigue, and what they are in the input: the block is integrated with them.
   subroutine find_run_values(self)
     type(variant_machines_t), intent(inout) :: self
     integer :: i
@@ -107,7 +109,7 @@ contains
     allocate (self%base(size(self%targets)), source=0.0_wp)
     do i = 1, size(self%targets)
       associate (target => self%targets(i))
-        self%is_of_run(i) = self%input%groups(target%group)%kind == 'run'
+        self%is_of_run(i) = has_word('run fatigue', self%input%groups(target%group)%kind)
         if (.not. self%is_of_run(i)) cycle
         self%base(i) = self%input%groups(target%group)%values(target%key)%number_at(target%position)
       end associate

@@ -7,7 +7,8 @@ module nocdyn_recorded_quantities
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_output_units, only: match_column, output_units
   use nocdyn_recorded_analyses, only: analysis_reader_t
-  use nocdyn_statistics, only: new_statistic, statistic_names, statistic_t
+  use nocdyn_recorded_fatigue, only: list_fatigue_statistics
+  use nocdyn_statistics, only: is_of_fatigue, new_statistic, statistic_names, statistic_t
   use nocdyn_text, only: quoted, string_t, to_text
   implicit none (type, external)
   private
@@ -41,11 +42,13 @@ contains
         associate (group => input%groups(records(i)))
           if (group%has_value('quantity')) then
             call add_statistics(input, records(i), labels, span, size(analyses), statistics, diagnostics)
+          else if (group%has_value('fatigue')) then
+            call add_fatigue(input, records(i), span, size(analyses), statistics, diagnostics)
           else if (group%has_value('mode') .or. group%has_value('response')) then
             call reader%add_results(input, records(i), size(statistics), analyses, diagnostics)
           else if (.not. group%has_value('trajectories')) then
-            call diagnostics%add(group%line, records(i), 'there is nothing to record; needed: quantity, mode, response or ' // &
-                                 'trajectories')
+            call diagnostics%add(group%line, records(i), 'there is nothing to record; needed: quantity, fatigue, mode, ' // &
+                                 'response or trajectories')
           end if
           if (group%has_value('trajectories')) call check_trajectories(input, records(i), variants, diagnostics)
         end associate
@@ -110,21 +113,32 @@ contains
       if (group%has_value('band')) band = group%number('band')
       do i = 1, size(words)
         k = findloc(statistic_names == words(i)%text, .true., dim=1)
-        if (k == 0) then
+        if (k == 0 .or. is_of_fatigue(k)) then
           call input%report(record, 'statistic', 'statistic = ' // quoted(words(i)%text) // ' does not belong to quantity; ' // &
-                            'needed: mode or response', diagnostics)
+                            'needed: ' // trim(merge('fatigue         ', 'mode or response', k > 0)), diagnostics)
           cycle
         end if
         statistic = new_statistic(labels, column, k, span%t_start, from, band, unit)
-        if (any([(statistics(k)%label == statistic%label, k=1, size(statistics))])) then
-          call input%report(record, 'statistic', quoted(statistic%label) // ' is recorded already; allowed: once', diagnostics)
-        else
-          statistic%result = others + size(statistics) + 1
-          call append_statistic(statistics, statistic)
-        end if
+        call append_statistic(input, record, others, statistic, statistics, diagnostics)
       end do
     end associate
   end subroutine add_statistics
+
+  subroutine add_fatigue(input, record, span, others, statistics, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record   !! index of the &record
+    type(time_span_t), intent(in) :: span
+    integer, intent(in) :: others   !! as in `add_statistics`
+    type(statistic_t), allocatable, intent(inout) :: statistics(:)
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(statistic_t), allocatable :: list(:)
+    integer :: i
+
+    call list_fatigue_statistics(input, record, span%t_start, list, diagnostics)
+    do i = 1, size(list)
+      call append_statistic(input, record, others, list(i), statistics, diagnostics)
+    end do
+  end subroutine add_fatigue
 
   !> The column of the quantity of a &record, with or without its unit; 0 if there is none. The unit may be one of the field;
   !> without one it is that of trajectory.csv.
@@ -170,14 +184,24 @@ contains
                                                        ' is out of range; allowed: ' // allowed, diagnostics)
   end subroutine check_from
 
-  subroutine append_statistic(statistics, statistic)
-    type(statistic_t), allocatable, intent(inout) :: statistics(:)
+  !> Appends a statistic that is not recorded yet.
+  subroutine append_statistic(input, record, others, statistic, statistics, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record, others   !! as in `add_statistics`
     type(statistic_t), intent(in) :: statistic
+    type(statistic_t), allocatable, intent(inout) :: statistics(:)
+    type(diagnostics_t), intent(inout) :: diagnostics
     type(statistic_t), allocatable :: longer(:)
+    integer :: k
 
+    if (any([(statistics(k)%label == statistic%label, k=1, size(statistics))])) then
+      call input%report(record, 'statistic', quoted(statistic%label) // ' is recorded already; allowed: once', diagnostics)
+      return
+    end if
     allocate (longer(size(statistics) + 1))
     longer(:size(statistics)) = statistics
     longer(size(longer)) = statistic
+    longer(size(longer))%result = others + size(longer)
     call move_alloc(longer, statistics)
   end subroutine append_statistic
 

@@ -11,7 +11,7 @@ module nocdyn_sweep_plan
   use nocdyn_machine, only: machine_t
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_output_times, only: check_output_times, row_count
-  use nocdyn_schema, only: has_word
+  use nocdyn_schema, only: first_key, has_word, key_rules
   use nocdyn_statistics, only: statistic_t
   use nocdyn_sweep_design, only: find_varied, read_design
   use nocdyn_sweep_header, only: quantity_t, sweep_header_t
@@ -41,7 +41,7 @@ module nocdyn_sweep_plan
     integer :: columns = 0                            !! of each trajectory
     character(len=:), allocatable :: list_checksum    !! of the file of a list, '' if there is none
   contains
-    procedure :: values, results, summary, file_bytes
+    procedure :: values, results, varies_key, summary, file_bytes
   end type sweep_plan_t
 
 contains
@@ -74,7 +74,7 @@ contains
                                     plan%analyses, diagnostics)
       allocate (plan%trajectories, source=wanted_trajectories(input))
       if (plan%results() == 0 .and. diagnostics%count == 0) call input%report(sweeps(1), 'design', &
-        'no number of the variants is kept; needed: a &record with quantity, mode or response', diagnostics)
+        'no number of the variants is kept; needed: a &record with quantity, fatigue, mode or response', diagnostics)
       if (size(plan%trajectories) > 0) call check_output_times(input, failure)
       if (.not. allocated(failure)) call count_columns(input, plan%machine, plan%columns, failure)
     end if
@@ -122,6 +122,20 @@ contains
 
     results = size(self%statistics) + size(self%analyses)
   end function results
+
+  !> Whether the design varies a key of some elements.
+  pure logical function varies_key(self, key)
+    class(sweep_plan_t), intent(in) :: self
+    character(len=*), intent(in) :: key
+    integer :: i
+
+    varies_key = .false.
+    do i = 1, size(self%numbers%targets)
+      associate (target => self%numbers%targets(i))
+        if (key_rules(first_key(self%input%groups(target%group)%rule) + target%key - 1)%name == key) varies_key = .true.
+      end associate
+    end do
+  end function varies_key
 
   !> E.g. 'random, 100000 variants that differ in 2 numbers, 7 results'.
   function summary(self) result(text)

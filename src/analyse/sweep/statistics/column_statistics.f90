@@ -4,11 +4,12 @@
 !> the column is that of the function between the smallest and the largest x.
 module nocdyn_column_statistics
   use nocdyn_chebyshev, only: interpolation_t, max_degree, new_interpolation, raise_to_maximum, time_at
+  use nocdyn_damage_sums, only: damage_sum_t
   use nocdyn_kinds, only: wp
   use nocdyn_quadrature, only: gauss_legendre_rule
   use nocdyn_settling_time, only: settling_history_t
-  use nocdyn_statistics, only: statistic_final, statistic_max, statistic_max_abs, statistic_mean, statistic_min, statistic_rms, &
-    statistic_settling_time, statistic_t, statistic_time_of_max
+  use nocdyn_statistics, only: is_of_fatigue, statistic_damage, statistic_final, statistic_max, statistic_max_abs, &
+    statistic_mean, statistic_min, statistic_rms, statistic_settling_time, statistic_t, statistic_time_of_max
   implicit none (type, external)
   private
 
@@ -34,6 +35,7 @@ module nocdyn_column_statistics
 
   type, abstract, public :: column_statistics_t
     type(accumulator_t), allocatable :: accumulators(:)       !! in the order of the columns
+    type(damage_sum_t), allocatable :: damages(:)             !! the same
     type(interpolation_t) :: rule                             !! of the solution inside the steps
     real(wp), allocatable :: gauss(:), weights(:)             !! nodes, -1 to 1: exact for that and for its square
     real(wp), allocatable :: linear(:, :), cubic(:, :)        !! of the functions of x, [whole strips of lanes, columns]
@@ -41,9 +43,10 @@ module nocdyn_column_statistics
     real(wp) :: t_start = 0.0_wp, t_end = 0.0_wp              !! of every variant [s]
     type(statistic_t), allocatable, private :: statistics(:)
     integer, allocatable, private :: column(:)                !! [statistics]
-    integer, allocatable, private :: acc(:)                   !! number of the accumulator, 0 for values at the end; [statistics]
+    integer, allocatable, private :: acc(:)                   !! number of the accumulator, or of the damage; 0 for values at the
+                                                              !! end; [statistics]
   contains
-    procedure :: set_statistics, prepare, start_accumulators, value
+    procedure :: set_statistics, prepare, start_accumulators, finish_damages, value, severity
   end type column_statistics_t
 
 contains
@@ -81,6 +84,7 @@ contains
         call allocate_accumulator(self%accumulators(i), padded)
       end do
     end associate
+    call add_damages(self, size(wanted), lanes)
   end subroutine set_statistics
 
   !> One accumulator for each column and `from`.
@@ -94,7 +98,7 @@ contains
     do c = 1, columns
       do i = 1, size(self%statistics)
         associate (statistic => self%statistics(i))
-          if (self%column(i) /= c .or. statistic%kind == statistic_final) cycle
+          if (self%column(i) /= c .or. statistic%kind == statistic_final .or. is_of_fatigue(statistic%kind)) cycle
           do k = 1, size(self%accumulators)
             if (self%accumulators(k)%column == c .and. abs(self%accumulators(k)%from - statistic%from) <= 0) exit
           end do
@@ -107,6 +111,35 @@ contains
       end do
     end do
   end subroutine add_accumulators
+
+  !> One damage for each column and &fatigue.
+  subroutine add_damages(self, columns, lanes)
+    class(column_statistics_t), intent(inout) :: self
+    integer, intent(in) :: columns, lanes
+    type(damage_sum_t), allocatable :: longer(:)
+    integer :: c, i, k
+
+    allocate (self%damages(0))
+    do c = 1, columns
+      do i = 1, size(self%statistics)
+        associate (statistic => self%statistics(i))
+          if (self%column(i) /= c .or. .not. is_of_fatigue(statistic%kind)) cycle
+          do k = 1, size(self%damages)
+            if (self%damages(k)%column == c .and. self%damages(k)%fatigue == statistic%fatigue) exit
+          end do
+          self%acc(i) = k
+          if (k <= size(self%damages)) cycle
+          allocate (longer(k))
+          longer(:k - 1) = self%damages
+          longer(k)%column = c
+          longer(k)%fatigue = statistic%fatigue
+          longer(k)%from = statistic%from
+          call longer(k)%allocate_lanes(lanes, statistic%curve)
+          call move_alloc(longer, self%damages)
+        end associate
+      end do
+    end do
+  end subroutine add_damages
 
   pure subroutine add_need(acc, kind)
     type(accumulator_t), intent(inout) :: acc
@@ -165,7 +198,21 @@ contains
         call acc%history(lane)%clear()
       end associate
     end do
+    do i = 1, size(self%damages)
+      call self%damages(i)%start(lane)
+    end do
   end subroutine start_accumulators
+
+  !> Counts what is left of the cycles of a lane after its last step.
+  pure subroutine finish_damages(self, lane)
+    class(column_statistics_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    integer :: i
+
+    do i = 1, size(self%damages)
+      call self%damages(i)%finish(lane)
+    end do
+  end subroutine finish_damages
 
   !> Starts the range of a lane with a value at a time [s].
   pure subroutine start_range(acc, lane, x, t)
@@ -217,6 +264,11 @@ contains
       if (statistic%kind == statistic_final) then
         value = column_at(linear, cubic, x_end)
         return
+      else if (is_of_fatigue(statistic%kind)) then
+        associate (counter => self%damages(self%acc(number))%counters(lane))
+          value = merge(counter%damage, counter%cycles, statistic%kind == statistic_damage)
+        end associate
+        return
       end if
       associate (acc => self%accumulators(self%acc(number)), duration => self%t_end - statistic%from)
         select case (statistic%kind)
@@ -241,6 +293,18 @@ contains
       end associate
     end associate
   end function value
+
+  !> By what the worst of several statistics of a &fatigue is found: the damage, and the largest range.
+  pure function severity(self, number, lane)
+    class(column_statistics_t), intent(in) :: self
+    integer, intent(in) :: number   !! of a statistic of a &fatigue
+    integer, intent(in) :: lane
+    real(wp) :: severity(2)
+
+    associate (counter => self%damages(self%acc(number))%counters(lane))
+      severity = [counter%damage, counter%largest_range]
+    end associate
+  end function severity
 
   !> The column at x.
   pure real(wp) function column_at(linear, cubic, x)

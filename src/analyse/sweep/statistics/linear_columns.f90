@@ -2,7 +2,8 @@
 !> of a coupling that is an odd cubic polynomial of x; for all lanes of a block.
 !>
 !> x = offset + sum of factor * y(component). An angle, a speed or a twist is x. An elastic moment is (linear + cubic x^2) x,
-!> where x is the twist minus that at rest.
+!> where x is the twist minus that at rest. The moment of a linear coupling with damping is x = k (u - rest) + d u', its stress
+!> that by the section modulus.
 module nocdyn_linear_columns
   use nocdyn_bank, only: quantity_t
   use nocdyn_column_statistics, only: width
@@ -15,7 +16,7 @@ module nocdyn_linear_columns
   implicit none (type, external)
   private
 
-  public :: is_linear, has_law, new_linear_columns, strip_of, lane_in_strip
+  public :: is_linear, is_proportional, has_law, new_linear_columns, strip_of, lane_in_strip
 
   type, public :: linear_columns_t
     integer :: count = 0
@@ -27,7 +28,10 @@ module nocdyn_linear_columns
     real(wp), allocatable, private :: coefficient(:)   !! the factor is this multiple of that ratio, [entries]
     logical, allocatable, private :: is_speed(:)    !! [columns]
     integer, allocatable, private :: element(:)     !! whose twist or moment the column is, 0 if it is none; [columns]
-    logical, allocatable, private :: has_law(:)     !! whether it is a moment; [columns]
+    logical, allocatable, private :: has_law(:)     !! whether it is an elastic moment; [columns]
+    integer, allocatable, private :: bank(:)        !! of a whole moment or a stress, 0 of other columns; [columns]
+    logical, allocatable, private :: is_stress(:)   !! [columns]
+    logical, allocatable, private :: is_rate(:)     !! whether a speed is multiplied, [entries]
     integer, allocatable, private :: body(:)        !! whose angle or speed the column is; [columns]
   contains
     procedure :: copy_lane, find_laws, argument
@@ -47,6 +51,27 @@ contains
                        is_quantity(block%machine, column, 'twist'), has_law(block%machine, column)])
     end select
   end function is_linear
+
+  !> Whether a column is the moment, elastic or whole, or the stress of a coupling without cubic stiffness and friction in all
+  !> lanes: a linear function of the state.
+  logical function is_proportional(block, column)
+    class(formulation_t), intent(in) :: block
+    type(column_t), intent(in) :: column
+    integer :: element
+
+    is_proportional = .false.
+    if (column%kind /= column_element) return
+    associate (machine => block%machine, bank => block%machine%banks(column%bank)%bank)
+      select type (block)
+      class is (reduced_t)
+        is_proportional = bank%has_paper_law .and. bank%has_polynomial_potential .and. (is_quantity(machine, column, 'moment') &
+                          .or. is_quantity(machine, column, 'shaft') .or. is_quantity(machine, column, 'stress'))
+      end select
+      if (.not. is_proportional) return
+      element = bank%first - 1 + column%index
+      is_proportional = all(abs(machine%laws%cubic(:, element)) <= 0)
+    end associate
+  end function is_proportional
 
   !> Whether a column is the elastic moment of a coupling with the law of eq. (3).
   logical function has_law(machine, column)
@@ -80,10 +105,10 @@ contains
     self%count = size(columns)
     strips = strip_of(block%lanes)
     allocate (self%first(self%count + 1), source=1)
-    allocate (self%component(0), self%ratio(0), self%coefficient(0))
+    allocate (self%component(0), self%ratio(0), self%coefficient(0), self%is_rate(0))
     allocate (self%is_speed, source=columns%kind == column_speed)
-    allocate (self%has_law(self%count), source=.false.)
-    allocate (self%element(self%count), self%body(self%count), source=0)
+    allocate (self%has_law(self%count), self%is_stress(self%count), source=.false.)
+    allocate (self%element(self%count), self%body(self%count), self%bank(self%count), source=0)
     do i = 1, self%count
       call set_column(self, i, block%machine, columns(i))
       call add_entries(self, i, block%machine)
@@ -101,6 +126,9 @@ contains
     if (column%kind /= column_element) return
     self%element(number) = machine%banks(column%bank)%bank%first - 1 + column%index
     self%has_law(number) = has_law(machine, column)
+    if (self%has_law(number) .or. is_quantity(machine, column, 'twist')) return
+    self%bank(number) = column%bank
+    self%is_stress(number) = is_quantity(machine, column, 'stress')
   end subroutine set_column
 
   subroutine add_entries(self, number, machine)
@@ -110,11 +138,12 @@ contains
     integer :: k
 
     if (self%element(number) == 0) then
-      call add_body(self, number, machine%coordinates, self%body(number), 1.0_wp)
+      call add_body(self, machine%coordinates, self%body(number), 1.0_wp, self%is_speed(number))
     else
       associate (rows => machine%elements%rows, e => self%element(number))
         do k = rows%first(e + 1) - 1, rows%first(e), -1
-          call add_body(self, number, machine%coordinates, rows%body(k), rows%coefficient(k))
+          call add_body(self, machine%coordinates, rows%body(k), rows%coefficient(k), .false.)
+          if (self%bank(number) > 0) call add_body(self, machine%coordinates, rows%body(k), rows%coefficient(k), .true.)
         end do
       end associate
     end if
@@ -122,23 +151,25 @@ contains
       self%ratio = [self%ratio, 0]
       self%coefficient = [self%coefficient, 0.0_wp]
       self%component = [self%component, self%component(size(self%component))]
+      self%is_rate = [self%is_rate, .false.]
     end if
     self%first(number + 1) = size(self%ratio) + 1
   end subroutine add_entries
 
-  subroutine add_body(self, number, coordinates, body, coefficient)
+  subroutine add_body(self, coordinates, body, coefficient, is_rate)
     type(linear_columns_t), intent(inout) :: self
-    integer, intent(in) :: number
     type(coordinates_t), intent(in) :: coordinates
     integer, intent(in) :: body              !! 0 = ground, which has no coordinates
     real(wp), intent(in) :: coefficient
+    logical, intent(in) :: is_rate           !! whether it multiplies the speed, not the angle
     integer :: k
 
     if (body == 0) return
     do k = coordinates%first(body), coordinates%first(body + 1) - 1
       self%ratio = [self%ratio, k]
       self%coefficient = [self%coefficient, coefficient]
-      self%component = [self%component, coordinates%coordinate(k) + merge(0, coordinates%freedoms, self%is_speed(number))]
+      self%component = [self%component, coordinates%coordinate(k) + merge(0, coordinates%freedoms, is_rate)]
+      self%is_rate = [self%is_rate, is_rate]
     end do
   end subroutine add_body
 
@@ -164,11 +195,39 @@ contains
             cycle
           end if
           offset = block%twist_at_zero(lane, self%element(i))
-          if (self%has_law(i)) offset = offset - machine%laws%rest(lane, self%element(i))
+          if (self%has_law(i) .or. self%bank(i) > 0) offset = offset - machine%laws%rest(lane, self%element(i))
         end associate
+        if (self%bank(i) > 0) call scale_column(self, i, machine, lane)
       end do
     end associate
   end subroutine copy_lane
+
+  !> Makes a whole moment or a stress of a twist and its rate.
+  pure subroutine scale_column(self, i, machine, lane)
+    class(linear_columns_t), intent(inout) :: self
+    integer, intent(in) :: i   !! column
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: lane
+    real(wp) :: stiffness, damping
+    integer :: k
+
+    stiffness = machine%laws%linear(lane, self%element(i))
+    damping = -machine%laws%by_speed(lane, self%element(i))
+    if (self%is_stress(i)) then
+      associate (bank => machine%banks(self%bank(i))%bank)
+        associate (modulus => bank%parameters(bank%number_of('section_modulus'))%value(lane, self%element(i) - bank%first + 1))
+          stiffness = stiffness / modulus
+          damping = damping / modulus
+        end associate
+      end associate
+    end if
+    associate (at => lane_in_strip(lane), strip => strip_of(lane))
+      self%offset(at, i, strip) = stiffness * self%offset(at, i, strip)
+      do k = self%first(i), self%first(i + 1) - 1
+        self%factor(at, k, strip) = merge(damping, stiffness, self%is_rate(k)) * self%factor(at, k, strip)
+      end do
+    end associate
+  end subroutine scale_column
 
   !> Sets the coefficients of the moments of a lane; those of other columns remain.
   pure subroutine find_laws(self, machine, lane, linear, cubic)

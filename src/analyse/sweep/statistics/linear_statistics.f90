@@ -5,6 +5,7 @@
 module nocdyn_linear_statistics
   use nocdyn_chebyshev, only: max_degree
   use nocdyn_column_statistics, only: accumulator_t, column_statistics_t, start_range, widen_range, width
+  use nocdyn_damage_sums, only: damage_sum_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_linear_columns, only: linear_columns_t, new_linear_columns, strip_of
@@ -46,13 +47,14 @@ contains
     integer, intent(inout) :: first, last
     integer :: i
 
-    if (size(self%accumulators) == 0) return
+    if (size(self%accumulators) + size(self%damages) == 0) return
     first = huge(first)
     last = 0
-    do i = 1, size(self%accumulators)
-      associate (columns => self%columns, column => self%accumulators(i)%column)
-        first = min(first, minval(columns%component(columns%first(column):columns%first(column + 1) - 1)))
-        last = max(last, maxval(columns%component(columns%first(column):columns%first(column + 1) - 1)))
+    do i = 1, self%columns%count
+      if (.not. (any(self%accumulators%column == i) .or. any(self%damages%column == i))) cycle
+      associate (columns => self%columns)
+        first = min(first, minval(columns%component(columns%first(i):columns%first(i + 1) - 1)))
+        last = max(last, maxval(columns%component(columns%first(i):columns%first(i + 1) - 1)))
       end associate
     end do
   end subroutine read_components
@@ -71,6 +73,12 @@ contains
     do i = 1, size(self%accumulators)
       associate (acc => self%accumulators(i))
         if (acc%from <= self%t_start) call start_range(acc, lane, self%columns%argument(acc%column, lane, y), self%t_start)
+      end associate
+    end do
+    do i = 1, size(self%damages)
+      associate (sum => self%damages(i))
+        if (sum%from <= self%t_start) call sum%add_value(lane, self%linear(lane, sum%column) * &
+                                                             self%columns%argument(sum%column, lane, y))
       end associate
     end do
   end subroutine start_lane
@@ -95,7 +103,7 @@ contains
     real(wp), contiguous, intent(in) :: c(:, :, :)             !! coefficients of the steps, [lanes, padded components, degree]
     integer :: column, i, number
 
-    if (size(self%accumulators) == 0) return
+    if (size(self%accumulators) + size(self%damages) == 0) return
     if (.not. allocated(self%chord_gap)) call allocate_work(self, size(c, 2), size(c, 3))
     do number = 1, strip_of(size(c, 1))
       call load_strip(self, number, steps, y, y_new, c)
@@ -106,6 +114,14 @@ contains
           column = acc%column
           if (acc%has_range()) call widen_strip(self, acc, steps, size(c, 3))
           if (acc%has_sums) call integrate_strip(self, acc, steps, size(c, 3))
+        end associate
+      end do
+      column = 0
+      do i = 1, size(self%damages)
+        associate (sum => self%damages(i))
+          if (sum%column /= column) call expand_strip(self, sum%column, number, y, y_new, c)
+          column = sum%column
+          call count_strip(self, sum, steps, size(c, 3))
         end associate
       end do
     end do
@@ -295,6 +311,36 @@ contains
       end = strip%scale(i) * steps%theta_end(lane)
     end associate
   end subroutine find_part
+
+  !> Counts the cycles of a column, a multiple of x, in the steps of the strip. Where x is monotonic, only its ends count.
+  subroutine count_strip(self, sum, steps, degree)
+    class(linear_statistics_t), intent(in) :: self
+    type(damage_sum_t), intent(inout) :: sum
+    type(step_block_t), intent(in) :: steps
+    integer, intent(in) :: degree
+    real(wp) :: turns(width), unused(width)   ! 1 where x may turn, else -1
+    real(wp) :: begin, end, t_start, values(max_degree + 1)
+    integer :: i
+
+    turns = 1.0_wp
+    unused = 1.0_wp
+    call exclude_monotonic(degree, self%chord_gap, self%strip%scale, self%strip%c, turns, unused)
+    do i = 1, self%strip%lanes
+      associate (lane => self%strip%before + i, linear => self%linear(self%strip%before + i, sum%column))
+        if (.not. steps%taken(lane) .or. self%strip%t_end(i) <= sum%from) cycle
+        if (turns(i) > 0 .or. .not. sum%counters(lane)%has_begun) then
+          call find_part(self%strip, i, sum%from, steps, begin, end, t_start)
+          call values_at(self%strip, i, degree, self%rule%nodes, begin, end, values)
+          values(degree + 1) = self%strip%x_end(i)
+          values(:degree + 1) = linear * values(:degree + 1)
+          call sum%add_polynomial(self%rule, lane, values)
+        else
+          call sum%add_value(lane, linear * self%strip%x_start(i))
+          call sum%add_value(lane, linear * self%strip%x_end(i))
+        end if
+      end associate
+    end do
+  end subroutine count_strip
 
   !> Adds the integrals of a column and of its square over the parts of the steps after `from`.
   subroutine integrate_strip(self, acc, steps, degree)

@@ -5,6 +5,7 @@
 !> for a linear function of the state and for its square.
 module nocdyn_sampled_statistics
   use nocdyn_column_statistics, only: accumulator_t, column_statistics_t, start_range, widen_range
+  use nocdyn_damage_sums, only: damage_sum_t
   use nocdyn_extremes, only: before_jump
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
@@ -53,6 +54,10 @@ contains
         if (.not. any(abs(self%from - acc%from) <= 0)) self%from = [self%from, acc%from]
       end associate
     end do
+    do i = 1, size(self%damages)
+      self%interpolates = .true.
+      if (.not. any(abs(self%from - self%damages(i)%from) <= 0)) self%from = [self%from, self%damages(i)%from]
+    end do
     associate (lanes => formulation%lanes)
       allocate (self%active(lanes), source=.false.)
       allocate (self%start(lanes), self%sampled_start(lanes), self%t(lanes), self%theta(lanes), &
@@ -67,10 +72,15 @@ contains
     integer, intent(in) :: lane
     real(wp), intent(in) :: t                  !! [s]
     real(wp), contiguous, intent(in) :: y(:)   !! the start, [states + quadratures]
+    integer :: i
 
     call observe_lane(self, lane, t, y)
     call self%recorded%start_lane(lane)
     call self%start_accumulators(lane)
+    call self%recorded%fill_row(lane, self%t, self%y, self%row)
+    do i = 1, size(self%damages)
+      if (self%damages(i)%from <= self%t_start) call self%damages(i)%add_value(lane, self%row(self%damages(i)%column))
+    end do
   end subroutine start_lane
 
   !> Brings one lane to a time and state; the others stay where they are.
@@ -105,7 +115,7 @@ contains
     real(wp), contiguous, intent(in) :: c(:, :, :)   !! coefficients of the steps, [lanes, padded components, degree]
     integer :: i, k, lane
 
-    if (size(self%accumulators) == 0) return
+    if (size(self%accumulators) + size(self%damages) == 0) return
     if (.not. allocated(self%nodes)) call set_nodes(self, size(c, 3))
     self%sampled_start(:) = huge(0.0_wp)
     do i = 1, size(self%from)
@@ -117,6 +127,12 @@ contains
         if (abs(self%accumulators(k)%from - self%from(i)) > 0) cycle
         do lane = 1, size(self%active)
           if (self%active(lane)) call add_part(self, self%accumulators(k), lane, steps%t_new(lane))
+        end do
+      end do
+      do k = 1, size(self%damages)
+        if (abs(self%damages(k)%from - self%from(i)) > 0) cycle
+        do lane = 1, size(self%active)
+          if (self%active(lane)) call count_part(self, self%damages(k), lane)
         end do
       end do
     end do
@@ -186,6 +202,15 @@ contains
     end do
     call self%recorded%observe(self%t, self%y)
   end subroutine observe_parts
+
+  !> Counts the cycles of a column in the part of a lane's step.
+  subroutine count_part(self, sum, lane)
+    class(sampled_statistics_t), intent(in) :: self
+    type(damage_sum_t), intent(inout) :: sum
+    integer, intent(in) :: lane
+
+    call sum%add_polynomial(self%rule, lane, self%values(:self%rule%degree + 1, sum%column, lane))
+  end subroutine count_part
 
   !> Adds the part of a lane's step to an accumulator.
   subroutine add_part(self, acc, lane, t_end)

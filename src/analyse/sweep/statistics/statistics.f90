@@ -2,12 +2,13 @@
 module nocdyn_statistics
   use nocdyn_kinds, only: wp
   use nocdyn_labelled_columns, only: column_of
+  use nocdyn_sn_curves, only: sn_curve_t
   use nocdyn_text, only: string_t, to_text
   use nocdyn_units, only: units
   implicit none (type, external)
   private
 
-  public :: new_statistic, find_columns, is_torque, value_of_zero_column
+  public :: new_statistic, new_fatigue_statistic, find_columns, is_of_fatigue, is_torque, value_of_zero_column
 
   integer, parameter, public :: statistic_final = 1           !! at the end
   integer, parameter, public :: statistic_max = 2             !! in continuous time, as all statistics
@@ -18,12 +19,16 @@ module nocdyn_statistics
   integer, parameter, public :: statistic_time_of_max = 7     !! when the largest value is first reached
   integer, parameter, public :: statistic_settling_time = 8   !! until the last exit from the band, counted from `from`
 
-  character(len=*), parameter, public :: statistic_names(8) = [character(len=13) :: 'final', 'max', 'min', 'max_abs', 'mean', &
-    'rms', 'time_of_max', 'settling_time']
+  integer, parameter, public :: statistic_damage = 9          !! of a &fatigue, by its cycles
+  integer, parameter, public :: statistic_cycles = 10         !! their number
+
+  character(len=*), parameter, public :: statistic_names(10) = [character(len=13) :: 'final', 'max', 'min', 'max_abs', 'mean', &
+    'rms', 'time_of_max', 'settling_time', 'damage', 'cycles']
   real(wp), parameter :: default_band = 0.02_wp
 
-  character(len=*), parameter :: descriptions(8) = [character(len=30) :: 'at the end', 'largest value', 'smallest value', &
-    'largest absolute value', 'mean over time', 'root mean square over time', 'time of the largest value', 'settling time']
+  character(len=*), parameter :: descriptions(10) = [character(len=30) :: 'at the end', 'largest value', 'smallest value', &
+    'largest absolute value', 'mean over time', 'root mean square over time', 'time of the largest value', 'settling time', &
+    'damage by Miner''s rule', 'number of cycles']
 
   !> A result of each variant: a statistic of a column x from the time `from` on. The settling time ends when
   !> |x - x_end| <= band |x(from) - x_end| from then on. Variants of another structure have other columns, in another order.
@@ -34,6 +39,10 @@ module nocdyn_statistics
     integer :: kind = statistic_final                !! statistic_...
     real(wp) :: from = 0.0_wp                        !! [s]
     real(wp) :: band = default_band                  !! for settling_time only
+    integer :: fatigue = 0                           !! index of the &fatigue in the input, 0: none
+    type(sn_curve_t) :: curve                        !! of that
+    character(len=:), allocatable :: shaft           !! its shaft, all of whose points count; not allocated: `quantity` counts
+    logical :: is_stress = .false.                   !! whether that is its stress, not its moment
     character(len=:), allocatable :: label           !! e.g. 'moment_shaft_max_abs_from_2'
     character(len=:), allocatable :: unit            !! e.g. 'N m'
     integer :: in_unit = 0                           !! the same: index of `units`, 0: that of SI
@@ -80,6 +89,30 @@ contains
     end if
   end function new_statistic
 
+  !> The damage or the number of cycles of a &fatigue. The curve is that of a variant.
+  type(statistic_t) function new_fatigue_statistic(name, fatigue, quantity, kind, from) result(self)
+    character(len=*), intent(in) :: name       !! of the &fatigue
+    integer, intent(in) :: fatigue             !! its index in the input
+    character(len=*), intent(in) :: quantity   !! label of the column, '' for a shaft
+    integer, intent(in) :: kind                !! statistic_damage or statistic_cycles
+    real(wp), intent(in) :: from               !! [s]
+
+    self%fatigue = fatigue
+    self%quantity = quantity
+    self%kind = kind
+    self%from = from
+    self%label = name // '_' // trim(statistic_names(kind))
+    self%unit = ''
+    self%long_name = name // ', ' // trim(descriptions(kind))
+  end function new_fatigue_statistic
+
+  !> Whether a kind of statistics is one of fatigue.
+  elemental logical function is_of_fatigue(kind)
+    integer, intent(in) :: kind   !! statistic_...
+
+    is_of_fatigue = kind == statistic_damage .or. kind == statistic_cycles
+  end function is_of_fatigue
+
   !> Finds the columns of statistics in the trajectory table of a machine. A coupling without damping has no column for the moment
   !> in the shaft: that is its elastic moment.
   subroutine find_columns(labels, statistics)
@@ -89,6 +122,7 @@ contains
 
     do i = 1, size(statistics)
       associate (statistic => statistics(i))
+        if (allocated(statistic%shaft)) cycle
         if (statistic%column >= 1 .and. statistic%column <= size(labels)) then
           if (labels(statistic%column)%text == statistic%quantity) cycle
         end if

@@ -4,15 +4,16 @@ module nocdyn_statistics_observer
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
-  use nocdyn_linear_columns, only: has_law, is_linear
+  use nocdyn_linear_columns, only: has_law, is_linear, is_proportional
   use nocdyn_linear_statistics, only: linear_statistics_t, new_linear_statistics
   use nocdyn_reduced, only: reduced_t
   use nocdyn_sampled_statistics, only: new_sampled_statistics, sampled_statistics_t
-  use nocdyn_statistics, only: find_columns, is_torque, statistic_settling_time, statistic_t, statistic_time_of_max, &
-    value_of_zero_column
+  use nocdyn_statistics, only: find_columns, is_of_fatigue, is_torque, statistic_settling_time, statistic_t, &
+    statistic_time_of_max, value_of_zero_column
   use nocdyn_observer, only: observer_t, step_block_t
   use nocdyn_text, only: string_t
-  use nocdyn_trajectory_columns, only: column_t, column_work_in, energy_labels, list_columns
+  use nocdyn_trajectory_columns, only: column_point_moment, column_point_stress, column_t, column_work_in, energy_labels, &
+    list_columns, list_points
   implicit none (type, external)
   private
 
@@ -22,7 +23,7 @@ module nocdyn_statistics_observer
   !> must stay where it is.
   !>
   !> A statistic is computed by `linear` if its column allows it, else by `sampled`. A torque that the machine of the block does
-  !> not have is 0 at all times.
+  !> not have is 0 at all times. A statistic of a whole shaft has a part for each of its points, of which the worst one counts.
   type, extends(observer_t), public :: statistics_observer_t
     character(len=:), allocatable :: missing                  !! the first quantity without a column that is no torque, or ''
     class(formulation_t), pointer, private :: block => null()
@@ -30,7 +31,8 @@ module nocdyn_statistics_observer
     type(lane_parameters_t), private :: parameters            !! of the block; none if its lanes cannot change them
     type(linear_statistics_t), private :: linear
     type(sampled_statistics_t), private :: sampled
-    integer, allocatable, private :: linear_index(:)          !! of each statistic in `linear`, or 0; [statistics]
+    integer, allocatable, private :: first_part(:)            !! of each statistic, [statistics + 1]
+    integer, allocatable, private :: linear_index(:)          !! of each part in `linear`, or 0; [parts]
     integer, allocatable, private :: sampled_index(:)         !! in `sampled`, or 0
     real(wp), allocatable, private :: default_value(:)        !! where a statistic has no column, [statistics]
     logical, private :: uses_sampled = .false.                !! whether `sampled` has statistics
@@ -50,10 +52,11 @@ contains
   end function needs_work_integrals
 
   !> An observer of a block, which stays where it is. Only the reduced formulation may change the parameters of its lanes.
-  type(statistics_observer_t) function new_statistics_observer(block, statistics, t_start, t_end) result(self)
+  type(statistics_observer_t) function new_statistics_observer(block, statistics, t_start, t_end, may_bend) result(self)
     class(formulation_t), target, intent(inout) :: block   !! with work integrals if `needs_work_integrals`
     type(statistic_t), intent(in) :: statistics(:)         !! each with t_start <= from < t_end
     real(wp), intent(in) :: t_start, t_end                 !! of every variant [s]
+    logical, intent(in) :: may_bend                        !! whether variants differ in cubic stiffnesses
     type(statistic_t), allocatable :: found(:)
     type(column_t), allocatable :: columns(:)
     type(string_t), allocatable :: labels(:)
@@ -65,14 +68,14 @@ contains
     self%wants_steps = .true.
     self%takes_shifts = .true.
     call list_columns(block%machine, columns, labels)
-    allocate (found, source=statistics)
+    call list_parts(self, statistics, columns, found)
     call find_columns(labels, found)
     self%missing = ''
     do i = size(found), 1, -1
       if (found(i)%column == 0 .and. .not. is_torque(found(i))) self%missing = found(i)%quantity
     end do
-    allocate (self%default_value, source=value_of_zero_column(found))
-    call distribute(self, found, columns)
+    allocate (self%default_value, source=value_of_zero_column(statistics))
+    call distribute(self, found, columns, may_bend)
     if (allocated(self%sampled%recorded%formulation)) self%sampled%recorded%formulation%joints%leader => block%joints%mode
     allocate (self%is_complete(block%lanes), source=.false.)
     select type (block)
@@ -81,22 +84,59 @@ contains
     end select
   end function new_statistics_observer
 
-  !> Chooses how each statistic is computed. The time of the largest moment is not that of the largest twist in a coupling that
-  !> softens.
-  subroutine distribute(self, statistics, columns)
+  !> The parts of all statistics. The points of shafts become columns after those of the table.
+  subroutine list_parts(self, statistics, columns, parts)
     type(statistics_observer_t), intent(inout) :: self
     type(statistic_t), intent(in) :: statistics(:)
-    type(column_t), intent(in) :: columns(:)   !! of the trajectory table
+    type(column_t), allocatable, intent(inout) :: columns(:)
+    type(statistic_t), allocatable, intent(out) :: parts(:)
+    type(column_t), allocatable :: points(:)
+    integer, allocatable :: column(:), owner(:)
+    integer :: i, k
+
+    allocate (owner(0), column(0))
+    allocate (self%first_part(size(statistics) + 1), source=1)
+    do i = 1, size(statistics)
+      if (allocated(statistics(i)%shaft)) then
+        call list_points(self%block%machine, statistics(i)%shaft, &
+                         merge(column_point_stress, column_point_moment, statistics(i)%is_stress), points)
+        owner = [owner, (i, k=1, size(points))]
+        column = [column, (size(columns) + k, k=1, size(points))]
+        columns = [columns, points]
+      else
+        owner = [owner, i]
+        column = [column, statistics(i)%column]
+      end if
+      self%first_part(i + 1) = size(owner) + 1
+    end do
+    allocate (parts(size(owner)))
+    do i = 1, size(parts)
+      parts(i) = statistics(owner(i))
+      parts(i)%column = column(i)
+    end do
+  end subroutine list_parts
+
+  !> Chooses how each statistic is computed. The time of the largest moment is not that of the largest twist in a coupling that
+  !> softens.
+  subroutine distribute(self, statistics, columns, may_bend)
+    type(statistics_observer_t), intent(inout) :: self
+    type(statistic_t), intent(in) :: statistics(:)
+    type(column_t), intent(in) :: columns(:)   !! of the trajectory table, and points of shafts
+    logical, intent(in) :: may_bend            !! as in `new_statistics_observer`
     logical, dimension(size(statistics)) :: is_of_linear, is_of_sampled
+    logical :: is_multiple
     integer :: i
 
     is_of_linear = .false.
     do i = 1, size(statistics)
       if (statistics(i)%column == 0 .or. statistics(i)%kind == statistic_settling_time) cycle
       associate (column => columns(statistics(i)%column))
-        is_of_linear(i) = is_linear(self%block, column)
-        if (statistics(i)%kind /= statistic_time_of_max) cycle
-        if (has_law(self%block%machine, column)) is_of_linear(i) = .false.
+        is_multiple = is_proportional(self%block, column) .and. .not. may_bend
+        is_of_linear(i) = is_linear(self%block, column) .or. is_multiple
+        if (has_law(self%block%machine, column)) then
+          if (statistics(i)%kind == statistic_time_of_max) is_of_linear(i) = .false.
+          if (is_of_fatigue(statistics(i)%kind)) is_of_linear(i) = is_multiple
+        end if
       end associate
     end do
     is_of_sampled = statistics%column > 0 .and. .not. is_of_linear
@@ -131,21 +171,43 @@ contains
     call self%sampled%start_lane(lane, self%t_start, y)
   end subroutine start_lane
 
-  !> The statistics of the last variant in a lane; NaN if it has not reached its end.
+  !> The statistics of the last variant in a lane; NaN if it has not reached its end. After the last step, once.
   subroutine results(self, lane, values)
-    class(statistics_observer_t), intent(in) :: self
+    class(statistics_observer_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(out) :: values(:)   !! [statistics]
-    integer :: i
+    integer :: i, part
 
     values(:) = ieee_value(1.0_wp, ieee_quiet_nan)
     if (.not. self%is_complete(lane)) return
+    call self%linear%finish_damages(lane)
+    if (self%uses_sampled) call self%sampled%finish_damages(lane)
     do i = 1, size(values)
+      part = worst_part(self, i, lane)
       values(i) = self%default_value(i)
-      if (self%linear_index(i) > 0) values(i) = self%linear%value(self%linear_index(i), lane)
-      if (self%sampled_index(i) > 0) values(i) = self%sampled%value(self%sampled_index(i), lane)
+      if (self%linear_index(part) > 0) values(i) = self%linear%value(self%linear_index(part), lane)
+      if (self%sampled_index(part) > 0) values(i) = self%sampled%value(self%sampled_index(part), lane)
     end do
   end subroutine results
+
+  !> The part of a statistic that counts: that with the largest damage; without any damage, with the largest range.
+  pure integer function worst_part(self, statistic, lane) result(worst)
+    class(statistics_observer_t), intent(in) :: self
+    integer, intent(in) :: statistic, lane
+    real(wp) :: largest(2), severity(2)
+    integer :: part
+
+    worst = self%first_part(statistic)
+    if (self%first_part(statistic + 1) == worst + 1) return
+    largest = -1.0_wp
+    do part = worst, self%first_part(statistic + 1) - 1
+      severity = self%sampled%severity(self%sampled_index(part), lane)
+      if (severity(1) > largest(1) .or. .not. severity(1) > 0 .and. .not. largest(1) > 0 .and. severity(2) > largest(2)) then
+        worst = part
+        largest = severity
+      end if
+    end do
+  end function worst_part
 
   !> Takes the end of a lane.
   subroutine on_output(self, lane, t, y)

@@ -10,7 +10,7 @@ module nocdyn_group_reader
   use nocdyn_raw_group, only: new_raw_group, raw_group_t
   use nocdyn_schema, only: first_key, group_rules, has_word, is_single, key_rules
   use nocdyn_schema_relations, only: relations_t
-  use nocdyn_schema_rules, only: a_file, a_name, columns, equal_lengths
+  use nocdyn_schema_rules, only: a_document, a_name, columns, equal_lengths
   use nocdyn_schema_text, only: key_suggestion, similar_keys
   use nocdyn_schema_units, only: find_key, name_in_unit
   use nocdyn_table_columns, only: read_table_columns
@@ -61,7 +61,7 @@ contains
         end if
       end associate
     end do
-    call check_text_files(folder, raw, group, diagnostics)
+    call check_documents(folder, raw, group, diagnostics)
     call check_group(raw, relations, group, diagnostics)
   end subroutine read_group
 
@@ -212,9 +212,8 @@ contains
     end do
   end subroutine read_table
 
-  !> Refuses files of text that cannot be read. Others than nocdyn take their contents; the group keeps no path, which would be of
-  !> no use beside the results.
-  subroutine check_text_files(folder, raw, group, diagnostics)
+  !> Refuses files for other programs that cannot be read. The group keeps no path, which would be of no use beside the results.
+  subroutine check_documents(folder, raw, group, diagnostics)
     character(len=*), intent(in) :: folder
     type(raw_group_t), intent(in) :: raw
     type(group_t), intent(inout) :: group   !! with its tables read
@@ -224,7 +223,7 @@ contains
     integer :: i
 
     do i = 1, size(group%values)
-      if (key_rules(raw%keys(i)%rule)%value_type /= a_file .or. .not. allocated(group%values(i)%texts)) cycle
+      if (key_rules(raw%keys(i)%rule)%value_type /= a_document .or. .not. allocated(group%values(i)%texts)) cycle
       associate (value => group%values(i))
         call read_text_file(path_in(folder, value%texts(1)%text), text, error, largest_input)
         if (allocated(error)) call diagnostics%add(value%line, raw%index, raw%keys(i)%name() // ': ' // error%message, &
@@ -232,6 +231,6 @@ contains
         deallocate (value%texts)
       end associate
     end do
-  end subroutine check_text_files
+  end subroutine check_documents
 
 end module nocdyn_group_reader

@@ -35,10 +35,11 @@ module nocdyn_schema_rules
   integer, parameter, public :: a_body = 3, body_or_ground = 4   !! name of a &body
   integer, parameter, public :: a_word = 5, a_number = 6, an_integer = 7, a_flag = 8
   integer, parameter, public :: a_selector = 9   !! a word of `kind_rules`, the kind of the group; at most one key of a group
-  integer, parameter, public :: a_file = 10      !! path of a table or text file, relative to the folder of the input
+  integer, parameter, public :: a_file = 10      !! path of a table file, relative to the folder of the input
   integer, parameter, public :: a_folder = 11    !! path of a folder
-  character(len=12), parameter, public :: type_nouns(11) = [character(len=12) :: &   !! of `a_text` ... `a_folder`
-    'text', 'name', 'body', 'body', 'word', 'number', 'whole number', 'logical', 'word', 'file', 'folder']
+  integer, parameter, public :: a_document = 12  !! path of a file that other programs read, relative to the folder of the input
+  character(len=12), parameter, public :: type_nouns(12) = [character(len=12) :: &   !! of `a_text` ... `a_document`
+    'text', 'name', 'body', 'body', 'word', 'number', 'whole number', 'logical', 'word', 'file', 'folder', 'file']
 
   ! Relations between two sets of keys, `first` and `second`.
   integer, parameter, public :: exactly_one = 1    !! keys of one set are given; those of the other lose their defaults
@@ -82,7 +83,7 @@ module nocdyn_schema_rules
   type, public :: key_rule_t
     character(len=12) :: group
     character(len=22) :: name
-    integer :: value_type          !! `a_text` ... `a_folder`
+    integer :: value_type          !! `a_text` ... `a_document`
     integer :: count               !! how many values, or `any_number`
     character(len=12) :: unit
     character(len=12) :: default   !! of each value, as written in a file, or `required`, or `unset`

@@ -12,7 +12,7 @@ module nocdyn_schema
   use nocdyn_schema_meshes, only: mesh_examples, mesh_groups, mesh_keys, mesh_relations
   use nocdyn_schema_fatigue, only: fatigue_examples, fatigue_groups, fatigue_keys, fatigue_relations
   use nocdyn_schema_response, only: response_examples, response_groups, response_keys, response_relations
-  use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_text, a_word, alias_t, &
+  use nocdyn_schema_rules, only: a_body, a_document, a_flag, a_folder, a_name, a_number, a_selector, a_text, a_word, alias_t, &
     allowed_t, an_integer, any_number, any_times, anything, at_least_once, at_most_once, at_most_one, body_or_ground, &
     exactly_once, example_t, from_2, group_alias_t, group_rule_t, in_machine, in_simulation, in_torques, key_rule_t, &
     kind_rule_t, less_than, not_negative, positive, relation_rule_t, required, unset
@@ -62,7 +62,7 @@ module nocdyn_schema
       'for whom it is made, for the report'), &
     key_rule_t('case',       'revision',        a_text,         1, '',            "''",        anything, &
       'of the calculation, for the report'), &
-    key_rule_t('case',       'notes_file',      a_file,         1, '',            unset,       anything, &
+    key_rule_t('case',       'notes_file',      a_document,     1, '',            unset,       anything, &
       'file with the author''s own text of the report, in Markdown'), &
     key_rule_t('body',       'name',            a_name,         1, '',            required,    anything, &
       'name in couplings, gears, torques and results'), &
@@ -217,7 +217,7 @@ contains
 
   !> Whether values of a type are written in quotes.
   pure logical function holds_texts(value_type)
-    integer, intent(in) :: value_type   !! a_text ... a_folder
+    integer, intent(in) :: value_type   !! a_text ... a_document
 
     holds_texts = all(value_type /= [a_number, an_integer, a_flag])
   end function holds_texts

@@ -33,6 +33,8 @@ module nocdyn_schema_sweep
     kind_rule_t('record', 'rms',     'square root of the mean of the square'), &
     kind_rule_t('record', 'time_of_max', 'when the largest value occurs'), &
     kind_rule_t('record', 'settling_time', 'time after from until |x - x_end| stays <= band |x_from - x_end|'), &
+    kind_rule_t('record', 'damage',        'of fatigue: by Miner''s rule, of one motion'), &
+    kind_rule_t('record', 'cycles',        'of fatigue: number of cycles, where the damage is largest'), &
     kind_rule_t('record', 'frequency',     'of mode: with damping, about the steady state'), &
     kind_rule_t('record', 'damping_ratio', 'of mode'), &
     kind_rule_t('record', 'peak',          'of response: largest amplitude of the order, or half range of all orders'), &
@@ -71,6 +73,8 @@ module nocdyn_schema_sweep
       'standard deviation of the natural logarithm', 'lognormal'), &
     key_rule_t('record',     'quantity',        a_text,         1, '',            unset,       anything, &
       'column of trajectory.csv, with or without its unit'), &
+    key_rule_t('record',     'fatigue',         a_text,         1, '',            unset,       anything, &
+      'name of a &fatigue, whose cycles are counted from extremes_from on'), &
     key_rule_t('record',     'mode',            an_integer,     1, '',            unset,       from_1, &
       'number of an oscillation, as nocdyn modes counts them'), &
     key_rule_t('record',     'response',        a_text,         1, '',            unset,       anything, &
@@ -87,10 +91,11 @@ module nocdyn_schema_sweep
       'tolerance band of the settling time; 0.02 if not given', 'settling_time')]
 
   type(relation_rule_t), parameter, public :: sweep_relations(*) = [ &
-    relation_rule_t('record', at_most_one, 'quantity', 'mode response'), &
+    relation_rule_t('record', at_most_one, 'quantity', 'fatigue mode response'), &
+    relation_rule_t('record', at_most_one, 'fatigue', 'mode response'), &
     relation_rule_t('record', at_most_one, 'mode', 'response'), &
-    relation_rule_t('record', requires, 'quantity mode response', 'statistic'), &
-    relation_rule_t('record', requires, 'statistic', 'quantity mode response'), &
+    relation_rule_t('record', requires, 'quantity fatigue mode response', 'statistic'), &
+    relation_rule_t('record', requires, 'statistic', 'quantity fatigue mode response'), &
     relation_rule_t('record', requires, 'from', 'quantity'), &
     relation_rule_t('record', requires, 'order', 'response'), &
     relation_rule_t('vary', less_than, 'low', 'high', 'count')]
@@ -116,6 +121,7 @@ module nocdyn_schema_sweep
     example_t('vary',   "target = 'coupling.*.stiffness' scale = 'relative' low = 0.9 high = 1.1", .false.), &
     example_t('record', "quantity = 'omega_motor'     statistic = 'final'", .false.), &
     example_t('record', "quantity = 'moment_coupling' statistic = 'max_abs', 'time_of_max' from = 2.0", .false.), &
+    example_t('record', "fatigue = 'life' statistic = 'damage', 'cycles'", .false.), &
     example_t('record', "mode = 2 statistic = 'frequency', 'damping_ratio'", .false.), &
     example_t('record', "response = 'coupling' order = 6 statistic = 'peak', 'peak_speed'", .false.), &
     example_t('record', 'trajectories = 1, 17, 90', .false.)]

@@ -27,7 +27,7 @@ module nocdyn_shafts
   contains
     procedure :: quantities
     procedure :: observe
-    procedure :: positions, section_moduli, moment_at
+    procedure :: positions, section_moduli, section_modulus, moment_at
   end type shafts_t
 
   ! the order of `quantities`
@@ -134,6 +134,15 @@ contains
       positions = self%parameters(self%number_of('position'))%value(lane, one%first_point:one%last_point)
     end associate
   end function positions
+
+  !> The section modulus against torsion at a point of a shaft [m3].
+  pure real(wp) function section_modulus(self, shaft, point, lane)
+    class(shafts_t), intent(in) :: self
+    integer, intent(in) :: shaft, point, lane
+
+    section_modulus = self%parameters(self%number_of('shaft_modulus')) &
+                      %value(lane, self%shafts(shaft)%first_point + point - 1)
+  end function section_modulus
 
   !> Section moduli against torsion at the points of a shaft [m3], [points].
   pure function section_moduli(self, shaft, lane)
