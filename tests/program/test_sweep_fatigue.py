@@ -107,7 +107,7 @@ def test_the_count_begins_at_extremes_from(nocdyn):
 
 
 def test_a_closed_form(nocdyn):
-    """An undamped oscillator has one cycle of the amplitude A in each period: damage = cycles (A / reference)^5 / cycles of it."""
+    """An undamped oscillator has one cycle of the amplitude A in each period: damage = cycles (A / reference)^5 / its cycles."""
     machine = "&body name = 'disc' inertia = 1.0 angle = 0.01 /\n"
     machine += "&coupling name = 'c' bodies = 'disc', 'ground' stiffness = 1.0e4 /\n"
     machine += "&run t_end = 6.2831853071795864 rtol = 1e-11 atol = 1e-13 /\n&output points = 2 /\n"
