@@ -5,7 +5,8 @@ module nocdyn_fatigue_groups
   use nocdyn_kinds, only: wp
   use nocdyn_near_words, only: nearest_word
   use nocdyn_sn_curves, only: mean_strength, new_sn_curve, sn_curve_t
-  use nocdyn_text, only: quoted, string_t, to_text
+  use nocdyn_text, only: quoted, rounded_text, string_t, to_text
+  use nocdyn_units, only: from_si, unit_rpm
   implicit none (type, external)
   private
 
@@ -52,6 +53,7 @@ contains
       call check_element(input, groups(i), error)
       if (.not. allocated(error)) call check_curve(input, groups(i), error)
       if (.not. allocated(error)) call check_mean(input, groups(i), error)
+      if (.not. allocated(error)) call check_profile(input, groups(i), error)
       if (allocated(error)) return
     end do
   end subroutine check_fatigue
@@ -166,6 +168,41 @@ contains
       end if
     end associate
   end subroutine check_mean
+
+  !> A profile has speeds of &response.
+  subroutine check_profile(input, index, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: responses(:)
+    real(wp), allocatable :: range(:), speeds(:)
+    integer :: i
+
+    allocate (speeds, source=input%groups(index)%numbers('profile_speeds'))
+    if (size(speeds) == 0) return
+    allocate (responses, source=input%groups_named('response'))
+    if (size(responses) == 0) then
+      call raise(error, exit_input, input%location(index, 'profile_speeds') // ': profile_speeds are those of the body of ' // &
+                 '&response; required: a group &response')
+      return
+    end if
+    allocate (range, source=input%groups(responses(1))%numbers('speed'))
+    do i = 1, size(speeds)
+      if (minval(range) <= speeds(i) .and. speeds(i) <= maxval(range)) cycle
+      call raise(error, exit_input, input%location(index, 'profile_speeds') // ': profile_speeds(' // to_text(i) // ') = ' // &
+                 both_units(speeds(i)) // ' is outside of the speeds of &response; allowed: from ' // both_units(range(1)) // &
+                 ' to ' // both_units(range(2)))
+      return
+    end do
+  end subroutine check_profile
+
+  !> "104.72 rad/s (1000 rpm)".
+  function both_units(speed) result(text)
+    real(wp), intent(in) :: speed   !! [rad/s]
+    character(len=:), allocatable :: text
+
+    text = rounded_text(speed, 6) // ' rad/s (' // rounded_text(from_si(speed, unit_rpm), 6) // ' rpm)'
+  end function both_units
 
   !> The S-N curve of a checked group.
   type(sn_curve_t) function read_curve(group) result(curve)

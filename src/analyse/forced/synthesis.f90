@@ -25,7 +25,7 @@ module nocdyn_synthesis
   type, public :: synthesis_t
     type(periodic_t), allocatable, private :: parts(:)
   contains
-    procedure :: extremes
+    procedure :: extremes, find_period
   end type synthesis_t
 
 contains
@@ -104,6 +104,23 @@ contains
       highest = highest + high
     end do
   end subroutine extremes
+
+  !> The period of the sum at given frequencies in the same ratios; without a common one, the longest of its parts.
+  pure subroutine find_period(self, frequency, is_common, period)
+    class(synthesis_t), intent(in) :: self
+    real(wp), intent(in) :: frequency(:)   !! [rad/s], [lines]
+    logical, intent(out) :: is_common
+    real(wp), intent(out) :: period        !! [s]
+    integer :: p
+
+    is_common = size(self%parts) == 1
+    period = 0.0_wp
+    do p = 1, size(self%parts)
+      associate (part => self%parts(p))
+        period = max(period, 2.0_wp * pi * part%multiple(1) / frequency(part%line(1)))
+      end associate
+    end do
+  end subroutine find_period
 
   pure subroutine periodic_extremes(part, amplitude, low, high)
     type(periodic_t), intent(in) :: part

@@ -9,6 +9,7 @@ module nocdyn_response_analysis
   use nocdyn_kinds, only: wp
   use nocdyn_limit_edges, only: refine_edges
   use nocdyn_machine, only: machine_t
+  use nocdyn_response_fatigue, only: find_response_fatigue, response_fatigue_t
   use nocdyn_response_limits, only: read_limits, response_limit_t
   use nocdyn_response_notes, only: note_rated_speeds, note_separation, note_simplifications, note_steady_states
   use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
@@ -18,7 +19,7 @@ module nocdyn_response_analysis
   implicit none (type, external)
   private
 
-  public :: analyse_response, list_orders
+  public :: analyse_response, add_fatigue, list_orders
 
   type, public :: response_analysis_t
     type(response_settings_t) :: settings
@@ -27,6 +28,7 @@ module nocdyn_response_analysis
     type(speed_modes_t) :: modes                     !! at the speeds of the grid
     type(crossing_t), allocatable :: crossings(:)
     type(response_limit_t), allocatable :: limits(:)
+    type(response_fatigue_t), allocatable :: fatigue(:)   !! after `add_fatigue`
     type(string_t), allocatable :: notes(:)
     real(wp) :: wall_time = 0.0_wp                   !! of the computation, without reading and writing files [s]
   end type response_analysis_t
@@ -68,6 +70,21 @@ contains
     call system_clock(ended)
     self%wall_time = real(ended - began, wp) / real(rate, wp)
   end subroutine analyse_response
+
+  !> Adds the damage by &fatigue to a response.
+  subroutine add_fatigue(input, self, error)
+    type(input_t), intent(in) :: input
+    type(response_analysis_t), intent(inout) :: self
+    type(error_t), allocatable, intent(out) :: error
+    integer(int64) :: began, ended, rate
+    real(wp) :: failed_speed
+
+    call system_clock(began, rate)
+    call find_response_fatigue(input, self%response, self%fatigue, error, failed_speed)
+    if (allocated(error)) call place_error(input, self%settings, failed_speed, error)
+    call system_clock(ended)
+    self%wall_time = self%wall_time + real(ended - began, wp) / real(rate, wp)
+  end subroutine add_fatigue
 
   !> Groups the lines by their frequencies.
   subroutine prepare_synthesis(response)

@@ -9,7 +9,6 @@ module nocdyn_response_files
   use nocdyn_output_units, only: turn_labels
   use nocdyn_response_analysis, only: response_analysis_t
   use nocdyn_response_limits, only: no_limit, response_limit_t
-  use nocdyn_response_points, only: response_point_t
   use nocdyn_response_quantities, only: quantity_moment, response_quantity_t
   use nocdyn_response_summary, only: critical_t, response_summary_t, worst_ratio
   use nocdyn_text, only: string_t
@@ -38,7 +37,7 @@ contains
     call turn_labels(labels, wanted, unit)
     call write_header(file, labels)
     do i = 1, size(analysis%response%points)
-      call fill_row(analysis, analysis%response%points(i), row)
+      call fill_row(analysis, i, row)
       call write_row(file, from_si(row, unit))
     end do
   end subroutine put_response_csv
@@ -72,6 +71,9 @@ contains
             call list%add('peak_limit_' // one%label // ' [' // one%unit // ']')
           end if
         end associate
+      end do
+      do k = 1, size(analysis%fatigue)
+        call list%add('damage_per_hour_' // analysis%fatigue(k)%name // ' [1/h]')
       end do
     end associate
     call list%take(labels)
@@ -122,15 +124,18 @@ contains
   end function has_peak
 
   !> The row of one speed.
-  subroutine fill_row(analysis, point, row)
+  subroutine fill_row(analysis, i, row)
     type(response_analysis_t), intent(in) :: analysis
-    type(response_point_t), intent(in) :: point
+    integer, intent(in) :: i             !! point of the response
     real(wp), intent(out) :: row(:)
     integer :: k, n, q
 
-    row(:3) = [point%state%speed, point%state%factor, point%state%torque]
-    n = 3
-    associate (quantities => analysis%response%quantities, limits => analysis%limits, speed => point%state%speed)
+    n = 0
+    associate (quantities => analysis%response%quantities, limits => analysis%limits, point => analysis%response%points(i), &
+               speed => analysis%response%points(i)%state%speed)
+      call put(speed)
+      call put(point%state%factor)
+      call put(point%state%torque)
       do q = 1, size(quantities)
         row(n + 1:n + 3) = [point%mean(q), point%half_range(q), point%peak(q)]
         n = n + 3
@@ -148,6 +153,9 @@ contains
         if (has_peak(limits, limits(k)%quantity)) then
           call put(minval(limits%peak_limit(), mask=limits%quantity == limits(k)%quantity))
         end if
+      end do
+      do k = 1, size(analysis%fatigue)
+        call put(analysis%fatigue(k)%rate(i))
       end do
     end associate
 
@@ -260,6 +268,7 @@ contains
     call json%close_list()
     call put_largest(json, analysis, summary)
     call put_barred(json, input, analysis, summary)
+    call put_fatigue(json, analysis)
     call json%close()
     text = json%text()
   end function response_json
@@ -356,5 +365,35 @@ contains
     end do
     call json%close_list()
   end subroutine put_barred
+
+  !> The damage per hour and that of profiles, of all groups &fatigue; nothing without them.
+  subroutine put_fatigue(json, analysis)
+    type(json_t), intent(inout) :: json
+    type(response_analysis_t), intent(in) :: analysis
+    integer :: i
+
+    if (size(analysis%fatigue) == 0) return
+    call json%open_list('fatigue')
+    do i = 1, size(analysis%fatigue)
+      associate (item => analysis%fatigue(i))
+        call json%open()
+        call json%put('name', item%name)
+        call json%put('element', item%element)
+        call json%put('quantity', item%quantity)
+        call json%put('largest_damage_per_hour', item%rate(item%largest))
+        call json%put('speed_rad_s', analysis%response%points(item%largest)%state%speed)
+        call json%put('mean_exceeds_strength', item%exceeds_strength)
+        if (size(item%hours) > 0) then
+          call json%put('profile_speeds_rad_s', item%speeds)
+          call json%put('profile_hours', item%hours)
+          call json%put('profile_damage_per_hour', item%profile_rate)
+          call json%put('damage_of_profile', item%damage())
+          if (item%damage() > 0) call json%put('hours_to_failure', sum(item%hours) / item%damage())
+        end if
+        call json%close()
+      end associate
+    end do
+    call json%close_list()
+  end subroutine put_fatigue
 
 end module nocdyn_response_files

@@ -5,7 +5,7 @@ module nocdyn_response_report
   use nocdyn_response_points, only: response_point_t
   use nocdyn_response_summary, only: critical_t, response_summary_t
   use nocdyn_table_text, only: cell, padded, text_width
-  use nocdyn_text, only: counted, rounded_text, to_text
+  use nocdyn_text, only: counted, quoted, rounded_text, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_units, only: from_si, unit_rpm
   implicit none (type, external)
@@ -39,6 +39,7 @@ contains
     call put_criticals(analysis, summary, report)
     call put_largest(analysis, summary, report)
     call put_barred(analysis, summary, report)
+    call put_fatigue(analysis, report)
     text = report%text()
   end function response_text
 
@@ -247,5 +248,32 @@ contains
     end do
     if (size(analysis%limits) > 0 .and. .not. summary%limits_exceeded) call report%append_line('  all limits are kept')
   end subroutine put_barred
+
+  !> The damage by &fatigue.
+  subroutine put_fatigue(analysis, report)
+    type(response_analysis_t), intent(in) :: analysis
+    type(text_buffer_t), intent(inout) :: report
+    character(len=:), allocatable :: line
+    integer :: i
+
+    do i = 1, size(analysis%fatigue)
+      associate (item => analysis%fatigue(i), points => analysis%response%points)
+        line = '  fatigue ' // quoted(item%name) // ': '
+        if (item%rate(item%largest) > 0) then
+          line = line // 'damage per hour up to ' // rounded_text(item%rate(item%largest), 4) // ' at ' // &
+                 rpm(points(item%largest)%state%speed) // ' rpm'
+        else
+          line = line // 'no damage at any speed'
+        end if
+        if (size(item%hours) > 0) then
+          line = line // '; damage of the profile of ' // rounded_text(sum(item%hours), 6) // ' h: ' // &
+                 rounded_text(item%damage(), 4)
+          if (item%damage() > 0) line = line // ', the life is ' // rounded_text(sum(item%hours) / item%damage(), 4) // ' h'
+        end if
+        if (item%exceeds_strength) line = line // '; the mean exceeds the strength'
+        call report%append_line(line)
+      end associate
+    end do
+  end subroutine put_fatigue
 
 end module nocdyn_response_report

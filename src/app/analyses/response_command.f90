@@ -8,7 +8,7 @@ module nocdyn_response_command
   use nocdyn_machine, only: machine_t
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: output_units
-  use nocdyn_response_analysis, only: analyse_response, response_analysis_t
+  use nocdyn_response_analysis, only: add_fatigue, analyse_response, response_analysis_t
   use nocdyn_response_files, only: put_orders_csv, put_response_csv, response_json
   use nocdyn_response_report, only: response_text
   use nocdyn_response_summary, only: response_summary_t, summarise_response
@@ -40,6 +40,7 @@ contains
     type(response_summary_t) :: summary
 
     call analyse_response(input, machine, analysis, error)
+    if (.not. allocated(error)) call add_fatigue(input, analysis, error)
     if (allocated(error)) return
     summary = summarise_response(analysis)
     call write_files(input, analysis, summary, folder, error)

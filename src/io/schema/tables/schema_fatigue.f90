@@ -1,7 +1,7 @@
 !> Rows of the schema: the group &fatigue with its keys.
 module nocdyn_schema_fatigue
   use nocdyn_schema_rules, only: a_name, a_number, a_text, a_word, allowed_t, any_number, any_times, anything, at_most_one, &
-    equal_lengths, exactly_one, example_t, from_1, group_rule_t, in_torsional, key_rule_t, not_negative, positive, &
+    equal_lengths, exactly_one, example_t, from_1, group_rule_t, in_torsional, key_rule_t, not_negative, not_zero, positive, &
     relation_rule_t, required, requires, unset
   implicit none (type, external)
   private
@@ -10,7 +10,7 @@ module nocdyn_schema_fatigue
 
   type(group_rule_t), parameter, public :: fatigue_groups(*) = [ &
     group_rule_t('fatigue', in_torsional, any_times, 'fatigue', &
-                 'Rainflow cycles and damage of a coupling, shaft, mesh or gear in a run.')]
+                 'Rainflow cycles and damage of a coupling, shaft, mesh or gear, in runs and responses.')]
 
   type(key_rule_t), parameter, public :: fatigue_keys(*) = [ &
     key_rule_t('fatigue',    'name',            a_name,         1, '',            required,    anything, &
@@ -54,7 +54,11 @@ module nocdyn_schema_fatigue
     key_rule_t('fatigue',    'yield_stress',    a_number,       1, 'Pa',          unset,       positive, &
       'shear stress at which it yields, for soderberg'), &
     key_rule_t('fatigue',    'repeats',         a_number,       1, '',            '1',         positive, &
-      'how often the motion of the run occurs in the life of the machine')]
+      'how often the motion of the run occurs in the life of the machine'), &
+    key_rule_t('fatigue',    'profile_speeds',  a_number,       any_number, 'rad/s', unset,    not_zero, &
+      'speeds of the body of &response, for the damage that its oscillations do', fewest=1), &
+    key_rule_t('fatigue',    'profile_hours',   a_number,       any_number, 'h',  unset,       positive, &
+      'how long the machine runs at each of these speeds', fewest=1)]
 
   type(relation_rule_t), parameter, public :: fatigue_relations(*) = [ &
     relation_rule_t('fatigue', exactly_one, 'coupling shaft', 'mesh gear'), &
@@ -73,7 +77,8 @@ module nocdyn_schema_fatigue
     relation_rule_t('fatigue', at_most_one, 'table_moment', 'table_force'), &
     relation_rule_t('fatigue', requires, 'reference_stress table_stress reference_moment table_moment', 'coupling shaft'), &
     relation_rule_t('fatigue', requires, 'reference_force table_force', 'mesh gear'), &
-    relation_rule_t('fatigue', at_most_one, 'ultimate_stress', 'yield_stress')]
+    relation_rule_t('fatigue', at_most_one, 'ultimate_stress', 'yield_stress'), &
+    relation_rule_t('fatigue', equal_lengths, 'profile_speeds profile_hours', '')]
 
   type(example_t), parameter, public :: fatigue_examples(*) = [ &
     example_t('fatigue', "name = 'life'  coupling = 'coupling'|" // &
