@@ -26,7 +26,7 @@ module nocdyn_response_fatigue
   !> The damage by one group &fatigue.
   type, public :: response_fatigue_t
     character(len=:), allocatable :: name, element
-    character(len=:), allocatable :: quantity          !! label and unit of what is counted; of a shaft's moment that at its first end
+    character(len=:), allocatable :: quantity          !! label and unit; a shaft's moment is that of its first end
     real(wp), allocatable :: rate(:)                   !! damage per hour [1/h], [points]
     logical :: exceeds_strength = .false.              !! whether a mean leaves no strength at some speed
     integer :: largest = 1                             !! point with the largest rate
