@@ -190,19 +190,13 @@ contains
     do i = 1, size(speeds)
       if (minval(range) <= speeds(i) .and. speeds(i) <= maxval(range)) cycle
       call raise(error, exit_input, input%location(index, 'profile_speeds') // ': profile_speeds(' // to_text(i) // ') = ' // &
-                 both_units(speeds(i)) // ' is outside of the speeds of &response; allowed: from ' // both_units(range(1)) // &
-                 ' to ' // both_units(range(2)))
+                 rounded_text(speeds(i), 6) // ' rad/s (' // rounded_text(from_si(speeds(i), unit_rpm), 6) // ' rpm) is ' // &
+                 'outside of the speeds of &response; allowed: from ' // rounded_text(range(1), 6) // ' rad/s (' // &
+                 rounded_text(from_si(range(1), unit_rpm), 6) // ' rpm) to ' // rounded_text(range(2), 6) // ' rad/s (' // &
+                 rounded_text(from_si(range(2), unit_rpm), 6) // ' rpm)')
       return
     end do
   end subroutine check_profile
-
-  !> "104.72 rad/s (1000 rpm)".
-  function both_units(speed) result(text)
-    real(wp), intent(in) :: speed   !! [rad/s]
-    character(len=:), allocatable :: text
-
-    text = rounded_text(speed, 6) // ' rad/s (' // rounded_text(from_si(speed, unit_rpm), 6) // ' rpm)'
-  end function both_units
 
   !> The S-N curve of a checked group.
   type(sn_curve_t) function read_curve(group) result(curve)

@@ -34,11 +34,14 @@ program read_namelists
 contains
 
   subroutine read_case()
-    character(len=80) :: title
+    character(len=80) :: author, customer, revision, title
     integer :: status
-    namelist /case/ title
+    namelist /case/ title, author, customer, revision
 
     title = ''
+    author = ''
+    customer = ''
+    revision = ''
     rewind (unit)
     read (unit, nml=case, iostat=status)
     if (status > 0) error stop 'case'

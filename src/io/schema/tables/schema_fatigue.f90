@@ -10,7 +10,7 @@ module nocdyn_schema_fatigue
 
   type(group_rule_t), parameter, public :: fatigue_groups(*) = [ &
     group_rule_t('fatigue', in_torsional, any_times, 'fatigue', &
-                 'Rainflow cycles and damage of a coupling, shaft, mesh or gear, in runs and responses.')]
+                 'Cycles and damage of a coupling, shaft, mesh or gear, in runs and responses.')]
 
   type(key_rule_t), parameter, public :: fatigue_keys(*) = [ &
     key_rule_t('fatigue',    'name',            a_name,         1, '',            required,    anything, &
