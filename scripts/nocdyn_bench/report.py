@@ -19,7 +19,7 @@ from .whole_process import Workload, largest_error
 from .work_precision import WorkPrecision
 
 COLUMNS = {"states": "error", "moment": "moment"}  # kinds of errors, as heads of tables name them
-PEERS = ("heyoka", "numbalsoda", "numba", "scipy", "numpy", "opentorsion")
+PEERS = ("heyoka", "numbalsoda", "numba", "scipy", "numpy", "opentorsion", "rainflow")
 VERDICTS = {
     "W1": targets.case2_verdicts,
     "W2": targets.throughput_verdicts,

@@ -10,6 +10,7 @@ from . import whole_process
 from .chains import Scaling
 from .costs import Case, Costs, Sweeping, chunk_costs, hand_out_costs, step_costs
 from .example_sweeps import example_sweeps, with_springs
+from .fatigue import fatigue_costs
 from .nocdyn_sweep import sweepers
 from .peers import heyoka, heyoka_sweep, numbalsoda, numbalsoda_sweep, scipy, scipy_sweep
 from .problems import Case2, Chain
@@ -292,6 +293,11 @@ def opentorsion(bench: Bench) -> Torsional:
     return Torsional("opentorsion", "openTorsion: modes and forced responses", bench.nocdyn, bench.scratch)
 
 
+def fatigue(bench: Bench) -> Costs:
+    programs, scratch = bench.programs.folder, bench.scratch
+    return Costs("fatigue", "Fatigue", lambda rounds: fatigue_costs(bench.nocdyn, programs, scratch, rounds))
+
+
 WORKLOADS: dict[str, Callable[[Bench], Workload]] = {
     "start_up": start_up,
     "case2": case2,
@@ -306,6 +312,7 @@ WORKLOADS: dict[str, Callable[[Bench], Workload]] = {
     "W6_sweep": w6_sweep,
     "example_sweeps": examples,
     "opentorsion": opentorsion,
+    "fatigue": fatigue,
     "step_costs": steps,
     "chunk_costs": chunks,
     "hand_out": hand_out,
