@@ -42,6 +42,7 @@ contains
     type(peak_t), allocatable, intent(out) :: peaks(:)
     type(string_t), allocatable :: labels(:)
     integer :: c, i, k
+    logical :: is_known
 
     call list_columns(runs, labels)
     allocate (peaks(size(labels)))
@@ -51,8 +52,9 @@ contains
     do c = 1, size(runs)
       associate (summary => runs(c)%summary)
         if (.not. summary%extremes%have_begun) cycle
+        i = 0
         do k = 2, size(summary%chosen)
-          i = position_of(labels, summary%labels(summary%chosen(k))%text)
+          call find_next(labels, summary%labels(summary%chosen(k))%text, i, is_known)
           associate (column => summary%chosen(k), extremes => summary%extremes)
             call raise_peak(peaks(i), c, extremes%lowest(column), extremes%lowest_time(column))
             call raise_peak(peaks(i), c, extremes%highest(column), extremes%highest_time(column))
@@ -77,26 +79,65 @@ contains
   subroutine list_columns(runs, labels)
     type(case_run_t), intent(in) :: runs(:)
     type(string_t), allocatable, intent(out) :: labels(:)
+    type(string_t), allocatable :: longer(:)
+    integer, allocatable :: new(:)
     integer :: c, k
 
     allocate (labels(0))
     do c = 1, size(runs)
       if (.not. runs(c)%summary%extremes%have_begun) cycle
-      do k = 2, size(runs(c)%summary%chosen)
-        associate (label => runs(c)%summary%labels(runs(c)%summary%chosen(k))%text)
-          if (position_of(labels, label) == 0) call append(labels, label)
-        end associate
+      call find_new(runs(c)%summary, labels, new)
+      allocate (longer(size(labels) + size(new)))
+      longer(:size(labels)) = labels
+      do k = 1, size(new)
+        longer(size(labels) + k)%text = runs(c)%summary%labels(new(k))%text
       end do
+      call move_alloc(longer, labels)
     end do
   end subroutine list_columns
 
-  !> The position of a label, 0 if it is not there.
-  pure integer function position_of(labels, label)
+  !> The columns of a run that are not yet known.
+  subroutine find_new(summary, labels, new)
+    type(run_summary_t), intent(in) :: summary
+    type(string_t), intent(in) :: labels(:)
+    integer, allocatable, intent(out) :: new(:)   !! columns
+    logical :: is_new(size(summary%chosen))
+    integer :: k, last
+
+    last = 0
+    is_new(1) = .false.   ! the time
+    do k = 2, size(summary%chosen)
+      call find_next(labels, summary%labels(summary%chosen(k))%text, last, is_known=is_new(k))
+      is_new(k) = .not. is_new(k)
+    end do
+    new = pack(summary%chosen, is_new)
+  end subroutine find_new
+
+  !> Looks for a label from the one after the last found on: runs have most of their columns in the same order.
+  pure subroutine find_next(labels, label, last, is_known)
     type(string_t), intent(in) :: labels(:)
     character(len=*), intent(in) :: label
+    integer, intent(inout) :: last   !! position of the label if it is there
+    logical, intent(out) :: is_known
+    integer :: i, position
 
-    do position_of = size(labels), 1, -1
-      if (labels(position_of)%text == label) return
+    do i = 1, size(labels)
+      position = 1 + modulo(last + i - 1, size(labels))
+      is_known = labels(position)%text == label
+      if (.not. is_known) cycle
+      last = position
+      return
+    end do
+    is_known = .false.
+  end subroutine find_next
+
+  !> The position of a name, 0 if it is not there.
+  pure integer function position_of(names, name)
+    type(string_t), intent(in) :: names(:)
+    character(len=*), intent(in) :: name
+
+    do position_of = size(names), 1, -1
+      if (names(position_of)%text == name) return
     end do
   end function position_of
 
