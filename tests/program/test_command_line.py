@@ -35,7 +35,7 @@ def one_line(text):
         (
             ["sweep", CASE_1, "--resum"],
             "'--resum' is not an option of nocdyn sweep; did you mean '--resume'? "
-            "allowed: '--out', '--set', '--threads', '--shard', '--resume', '--csv', '--quiet', '--help'\n",
+            "allowed: '--out', '--set', '--case', '--threads', '--shard', '--resume', '--csv', '--quiet', '--help'\n",
         ),
         (["new", "a.nml", "--force"], "'--force' is not an option of nocdyn new; allowed: '--help'\n"),
         (["run", CASE_1, "--out"], "--out needs a value: --out DIR\n"),

@@ -277,3 +277,28 @@ def test_mistakes_of_several_cases_are_told_together(nocdyn):
     cases = "&load_case name = 'a' set = 'run.rtol=2' /\n&load_case name = 'b' set = 'run.atol=0' /\n"
     lines = complaint(nocdyn, MACHINE + RUN + cases).splitlines()
     assert [line.split(": ")[1:3] for line in lines] == [["m.nml:9", "&load_case 'a'"], ["m.nml:10", "&load_case 'b'"]]
+
+
+def test_a_sweep_varies_the_machine_of_a_case(nocdyn):
+    sweep = "&sweep design = 'grid' /\n&vary target = 'coupling.shaft.stiffness' low = 1e4 high = 2e4 count = 3 /\n"
+    sweep += "&record quantity = 'moment_shaft' statistic = 'max_abs' /\n&record trajectories = 2 /\n"
+    cases = "&load_case name = 'short' with = 'fault' set = 'load.work.quadratic=0.02' /\n&load_case name = 'other' /\n"
+    nocdyn.write("m.nml", MACHINE + FAULT + RUN + cases + sweep)
+    peaks = {}
+    for case, folder in (("", "alone"), ("short", "out/short"), ("other", "out/other")):
+        words = ["--out", "out", "--case", case] if case else ["--out", "alone"]
+        outcome = nocdyn("sweep", "m.nml", "--csv", *words)
+        assert (outcome.returncode, outcome.stderr) == (0, "")
+        lines = (nocdyn.folder / folder / "sweep.csv").read_text().splitlines()
+        peaks[case] = [line.split(",")[2] for line in lines[1:]]
+    assert peaks["other"] == peaks[""]
+    assert all(float(peak) > 1.1 * float(plain) for peak, plain in zip(peaks["short"], peaks[""]))
+    run = nocdyn("run", "out/short/input.nml", "--out", "again", "--set", "coupling.shaft.stiffness=1.5e4")
+    assert run.returncode == 0
+    column = nocdyn.summary("again")["columns"]["moment_shaft [N m]"]
+    assert max(abs(column["min"]), abs(column["max"])) == pytest.approx(float(peaks["short"][1]), rel=1e-4)
+    again = nocdyn("sweep", "m.nml", "--csv", "--out", "out", "--case", "short", "--resume")
+    assert "are done already; results in out/short" in again.stdout
+    refused = nocdyn("sweep", "m.nml", "--case", "shirt")
+    assert refused.returncode == 2
+    assert refused.stderr == "nocdyn: m.nml: --case: there is no &load_case 'shirt'; did you mean 'short'?\n"

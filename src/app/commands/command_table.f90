@@ -106,12 +106,13 @@ contains
   subroutine list_sweeps(commands)
     type(command_t), allocatable, intent(inout) :: commands(:)
 
-    call add_command(commands, 'sweep', 'FILE', '--out --set --threads --shard --resume --csv --quiet', &
+    call add_command(commands, 'sweep', 'FILE', '--out --set --case --threads --shard --resume --csv --quiet', &
       'run many variants of a machine', &
       'Runs all variants of a machine that &sweep and &vary of the file describe, and writes the quantities of' // nl // &
       '&record to sweep.nc, with summary.json and input.nml. A variant that fails is recorded with the reason.' // nl // nl // &
       '  --out DIR          write to DIR; default: &output directory, else results/<name of the file>' // nl // &
       '  --set PATH=VALUE   override a key: sweep.samples=1000, vary(2).high=20, run.rtol=1e-9' // nl // &
+      '  --case NAME        vary the machine of this &load_case, and write to its folder in DIR' // nl // &
       '  --threads NUMBER   default: OMP_NUM_THREADS, else the number of cores that the process may use' // nl // &
       "  --shard K/N        compute part K of N only, for 'nocdyn merge'" // nl // &
       '  --resume           continue an interrupted sweep' // nl // &

@@ -2,6 +2,7 @@
 module nocdyn_sweep_job
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_arguments, only: arguments_t
+  use nocdyn_case_choice, only: choose_case
   use nocdyn_console, only: report_error, new_status_line, print_text, status_line_t
   use nocdyn_errors, only: error_t, exit_done, exit_failed, exit_file, exit_input, raise
   use nocdyn_input, only: input_t
@@ -58,7 +59,6 @@ contains
     type(sweep_job_t), intent(out) :: job
     type(error_t), allocatable, intent(out) :: error
     type(input_t) :: input
-    type(diagnostics_t) :: diagnostics
     type(sweep_header_t) :: header
 
     if (arguments%shards > 1 .and. arguments%is_given('--csv')) then
@@ -67,12 +67,10 @@ contains
       return
     end if
     job%arguments = arguments
-    call read_input(arguments%operands(1)%text, arguments%overrides, input, error, diagnostics)
-    if (allocated(error)) call add_plan_diagnostics(input, diagnostics, error)
+    call read_machine(arguments, input, job%folder, error)
     if (.not. allocated(error)) call make_plan(input, job%plan, error)
     if (.not. allocated(error)) call prepare_sweep(job%plan, job%setup, error)
     if (allocated(error)) return
-    job%folder = result_folder(arguments, input)
     if (arguments%shards > job%plan%design%variants) then
       call raise(error, exit_input, '--shard ' // to_text(arguments%shard) // '/' // to_text(arguments%shards) // &
                  ': the sweep has ' // to_text(job%plan%design%variants) // ' variants; allowed: at most as many parts')
@@ -84,6 +82,26 @@ contains
     job%progress%title = job%plan%input%shown_file()
     job%progress%line = new_status_line(arguments%is_given('--quiet'), shows_in_logs=.true.)
   end subroutine start_job
+
+  !> Reads the machine of the sweep, or that of its load case, and finds the folder of the results.
+  subroutine read_machine(arguments, input, folder, error)
+    type(arguments_t), intent(in) :: arguments
+    type(input_t), intent(out) :: input
+    character(len=:), allocatable, intent(out) :: folder
+    type(error_t), allocatable, intent(out) :: error
+    type(input_t), allocatable :: load_cases(:)
+    type(diagnostics_t) :: diagnostics
+    integer :: chosen
+
+    call read_input(arguments%operands(1)%text, arguments%overrides, input, error, diagnostics, load_cases)
+    if (allocated(error)) call add_plan_diagnostics(input, diagnostics, error)
+    if (.not. allocated(error)) call choose_case(arguments, input, chosen, error)
+    if (allocated(error)) return
+    folder = result_folder(arguments, input)
+    if (chosen == 0) return
+    folder = folder // '/' // load_cases(chosen)%load_case%name
+    input = load_cases(chosen)
+  end subroutine read_machine
 
   !> Opens the journal of the folder if there is one; else creates it, unless the sweep is done already.
   subroutine prepare_journal(job, header, error)
