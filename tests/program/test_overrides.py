@@ -77,3 +77,17 @@ def test_all_wrong_overrides_are_reported_together(nocdyn):
     outcome = nocdyn("check", CASE_2, "--set", "runn.rtol=1", "--set", "run.rtol=x", "--set", "load.work.viscous=-1")
     assert outcome.returncode == 2
     assert outcome.stderr.count("--set ") == 3
+
+
+@pytest.mark.parametrize(
+    ("value", "shown", "message"),
+    [
+        ("a\x7fb", r"a\x7Fb", "a control character (code 127) does not belong in an input file"),
+        ("a\nb", "a b", "a line end does not belong in a value"),
+    ],
+)
+def test_what_no_input_file_can_hold_is_refused(nocdyn, value, shown, message):
+    outcome = nocdyn("run", CASE_2, "--set", f"case.title={value}")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr == f"nocdyn: --set case.title={shown}: {message}\n"
+    assert list(nocdyn.folder.iterdir()) == []

@@ -12,7 +12,7 @@ module nocdyn_namelist_scanner
   implicit none (type, external)
   private
 
-  public :: scan_namelist, scan_value
+  public :: blank_control_characters, scan_namelist, scan_value
 
 contains
 

@@ -3,7 +3,7 @@ module nocdyn_input_overrides
   use nocdyn_key_path, only: key_path_t, read_path
   use nocdyn_diagnostics, only: diagnostics_t, no_line
   use nocdyn_namelist, only: item_t, namelist_t
-  use nocdyn_namelist_scanner, only: scan_value
+  use nocdyn_namelist_scanner, only: blank_control_characters, scan_value
   use nocdyn_namelist_values, only: longest_list
   use nocdyn_schema, only: holds_texts, key_rules
   use nocdyn_schema_rules, only: a_name, any_number, key_rule_t
@@ -79,6 +79,8 @@ contains
     rule = key_rules(override%key_rule)
     if (holds_texts(rule%value_type) .and. rule%count == 1 .and. scan(adjustl(text), '''"') /= 1) then
       override%namelist%source = text
+      call blank_control_characters(override%namelist%source, diagnostics)
+      if (index(text, new_line('a')) > 0) call diagnostics%add(no_line, 0, 'a line end does not belong in a value')
       call override%namelist%append_item(item_t(first=1, last=len(text)))
     else
       call scan_value(text, override%namelist, diagnostics)
