@@ -190,7 +190,7 @@ contains
     type(machine_t), intent(in) :: machine
     type(segment_t), intent(in) :: segment
     integer, intent(in) :: lane
-    real(wp), contiguous, intent(inout) :: values(:)   !! [N m] or [Pa]
+    real(wp), intent(inout) :: values(:)   !! [N m] or [Pa]
     integer :: p
 
     select type (bank => machine%banks(segment%bank)%bank)
