@@ -171,3 +171,66 @@ def test_a_gain_that_turns_away_from_the_set_speed_is_refused(nocdyn):
     outcome = nocdyn("check", "machine.nml")
     assert outcome.returncode == 2
     assert "&motor 'drive': governor_gain = -0.1; allowed with kind = 'inverter': > 0 [s/rad]" in outcome.stderr
+
+
+TWO_MASSES = """&body name = 'motor' inertia = 12 speed = 80 /
+&body name = 'fly' inertia = 30 speed = 80 /
+&coupling name = 'rubber' bodies = 'motor', 'fly' stiffness = 6e4 damping = 20 /
+&excitation name = 'e' body = 'fly' kind = 'orders' orders = 1 amplitudes = 3 /
+&load name = 'l' body = 'fly' constant = 900 constant_speed = 1 /
+&response body = 'fly' speed = 40, 140 count = 11 /
+&output extremes_from = 17 /
+"""
+RUN = "&run t_end = 20 start = 'equilibrium' rtol = 1e-10 atol = 1e-11 /\n"
+GOVERNED = "governor_gain = 0.4 governor_time = 1"
+# keys of the motor, and its torque with an open throttle at a speed
+GOVERNED_MOTORS = {
+    "inverter": ("kind = 'inverter' torque_limit = 2500", lambda omega: 2500.0),
+    "quadratic": ("a = 3000 b = 4 c = 0.02", lambda omega: 3000 - 4 * omega - 0.02 * omega**2),
+    "dc": ("kind = 'dc' voltage = 800 resistance = 0.5 flux_constant = 3", lambda omega: 3 * (800 - 3 * omega) / 0.5),
+}
+
+
+def moment_amplitude(omega, slope, by_throttle):
+    """Of the coupling at order 1, with the slope of the motor's torque over its speed and its derivative by the throttle."""
+    s = 1j * omega
+    control = 0.4 * (1 + 1 / s)  # throttle for a speed that is too low, integral time 1 s
+    shaft = 6e4 + 20 * s
+    torque = -slope + by_throttle * control
+    matrix = [[12 * s**2 + torque * s + shaft, -shaft], [-shaft, 30 * s**2 + shaft]]
+    angles = np.linalg.solve(matrix, [0, 3])
+    return abs(shaft * (angles[1] - angles[0]))
+
+
+@pytest.mark.parametrize("kind", GOVERNED_MOTORS)
+def test_governors_take_part_in_forced_oscillations(nocdyn, kind):
+    """In closed form at all speeds, and at one of them as the settled motion of a run."""
+    keys, torque = GOVERNED_MOTORS[kind]
+    text = TWO_MASSES + f"&motor name = 'drive' body = 'motor' {keys} governor_speed = 80 {GOVERNED} /\n"
+    run(nocdyn, text + RUN, command="response")
+    header, rows = nocdyn.table("out", "response.csv")
+    speeds, found = (
+        np.array([row[header.index(label)] for row in rows]) for label in ("omega_fly [rad/s]", "half_range_moment_rubber [N m]")
+    )
+    for omega, half_range in zip(speeds, found):
+        if kind == "dc":
+            slope, by_throttle = -9 / 0.5, 3 * 800 / 0.5
+        else:
+            throttle = 900 / torque(omega)
+            slope = throttle * (torque(omega + 1) - torque(omega - 1)) / 2
+            by_throttle = torque(omega)
+        assert half_range == pytest.approx(moment_amplitude(omega, slope, by_throttle), rel=1e-9)
+    run(nocdyn, text + RUN)
+    extremes = nocdyn.summary("out")["columns"]["shaft_rubber [N m]"]
+    settled = 0.5 * (extremes["max"] - extremes["min"])
+    assert found[speeds == 80] == pytest.approx(settled, rel=1e-4)
+
+
+def test_a_governor_at_its_limit_leaves_its_throttle_there(nocdyn):
+    """The load is as large as the torque: whatever the speed is, the throttle is open."""
+    motor = f"&motor name = 'drive' body = 'motor' kind = 'inverter' torque_limit = 900 governor_speed = 80 {GOVERNED} /\n"
+    run(nocdyn, TWO_MASSES + motor + RUN.replace("start = 'equilibrium'", ""), command="response")
+    header, rows = nocdyn.table("out", "response.csv")
+    for row in rows:
+        expected = moment_amplitude(row[0], 0.0, 0.0)
+        assert row[header.index("half_range_moment_rubber [N m]")] == pytest.approx(expected, rel=1e-9)

@@ -1,8 +1,8 @@
 !> Steady states of a machine whose speed is held, and the machine linearised there.
 !>
 !> Mean torques at an arbitrary speed of the reference body need not balance. The drive is what holds the speed: the torques of
-!> all motors are multiplied by one factor if they drive at that speed, as by a throttle, and governors leave their throttles
-!> open. If there are no such motors, a torque on the reference body holds the speed.
+!> all motors are multiplied by one factor if they drive at that speed, as by a throttle. If there are no such motors, a torque
+!> on the reference body holds the speed. Governors leave their throttles open while the speed is found; then they hold it.
 module nocdyn_held_speeds
   use nocdyn_bank, only: role_excitation, role_motor
   use nocdyn_equilibrium, only: t_infinity
@@ -13,6 +13,7 @@ module nocdyn_held_speeds
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: reduced_t
+  use nocdyn_speed_loops, only: close_speed_loops
   use nocdyn_static_twists, only: find_twists
   use nocdyn_text, only: quoted
   use nocdyn_torque_balance, only: set_up_balance, torque_balance_t
@@ -309,7 +310,7 @@ contains
   !> Finds the twists, and linearises.
   subroutine find_state(self, z, state, error)
     type(held_speeds_t), intent(inout) :: self
-    real(wp), intent(inout) :: z(:)
+    real(wp), intent(inout) :: z(:)   !! rigid motions and internal states, which get the throttles of governors
     type(held_state_t), intent(inout) :: state
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: extra(self%balance%coordinates), q(self%balance%coordinates), weight(size(self%balance%is_elastic))
@@ -337,6 +338,9 @@ contains
       call raise(error, exit_failed, 'the torques balance, but no twists of the couplings were found that carry them')
     end if
     if (allocated(error)) return
+    if (self%motors_hold) then
+      call close_speed_loops(self%balance, self%balance%inelastic(self%sources), state%factor, z, weight)
+    end if
     call linearise(self, z, weight, state, error)
   end subroutine find_state
 

@@ -39,9 +39,6 @@ contains
     namelist /case/ title, author, customer, revision
 
     title = ''
-    author = ''
-    customer = ''
-    revision = ''
     rewind (unit)
     read (unit, nml=case, iostat=status)
     if (status > 0) error stop 'case'

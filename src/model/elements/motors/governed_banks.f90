@@ -37,6 +37,7 @@ module nocdyn_governed_banks
     procedure :: add_governor
     procedure :: throttle
     procedure :: hold_speed
+    procedure :: integral_of, least_throttle
     procedure :: start_internal
     procedure :: steady_internal
     procedure :: knees
@@ -121,6 +122,26 @@ contains
 
     self%is_held = .true.
   end subroutine hold_speed
+
+  !> The integral with which a throttle between its limits has a value at a time and a speed, in the first lane.
+  pure real(wp) function integral_of(self, element, t, speed, throttle) result(z)
+    class(governed_bank_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: t        !! [s]
+    real(wp), intent(in) :: speed    !! u' [rad/s]
+    real(wp), intent(in) :: throttle   !! 1: open
+
+    associate (gain => self%parameters(self%number_of('governor_gain'))%value(1, element))
+      z = throttle - gain * (set_speed_at(self, element, t) - speed)
+    end associate
+  end function integral_of
+
+  !> The lower limit of the throttles.
+  pure real(wp) function least_throttle(self)
+    class(governed_bank_t), intent(in) :: self
+
+    least_throttle = self%least
+  end function least_throttle
 
   !> The integral of a governor at rest is its throttle; at the set speed, where any is steady, the open one.
   subroutine steady_internal(self, t, speed, internal)

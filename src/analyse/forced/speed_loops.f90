@@ -1,0 +1,66 @@
+!> The speed control of motors that hold a speed: their governors have that speed as the set one, and a throttle between its
+!> limits follows the oscillations.
+module nocdyn_speed_loops
+  use nocdyn_governed_banks, only: governed_bank_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_torque_balance, only: torque_balance_t
+  implicit none (type, external)
+  private
+
+  public :: close_speed_loops
+
+contains
+
+  !> Gives the governors of the motors that drive the throttles at which these have their torques. A throttle beyond its limits
+  !> stays open; so does that of a motor with an armature current of its own.
+  subroutine close_speed_loops(balance, sources, factor, z, weight)
+    type(torque_balance_t), intent(inout) :: balance
+    integer, intent(in) :: sources(:)      !! elements that drive
+    real(wp), intent(in) :: factor         !! on their torques with open throttles
+    real(wp), intent(inout) :: z(:)        !! rigid motions and internal states, with open throttles
+    real(wp), intent(inout) :: weight(:)   !! on the moments, [elements]
+    integer :: b, e
+
+    do b = 1, size(balance%formulation%machine%banks)
+      select type (bank => balance%formulation%machine%banks(b)%bank)
+      class is (governed_bank_t)
+        if (.not. bank%has_governor .or. bank%states > 1) cycle
+        do e = 1, bank%count
+          if (any(sources == bank%first + e - 1)) call close_loop(balance, bank, e, factor, z, weight(bank%first + e - 1))
+        end do
+      class default
+        cycle
+      end select
+    end do
+  end subroutine close_speed_loops
+
+  !> The torque of a motor is a linear function of its throttle, which two throttles tell.
+  subroutine close_loop(balance, bank, element, factor, z, weight)
+    type(torque_balance_t), intent(inout) :: balance
+    class(governed_bank_t), intent(in) :: bank
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: factor
+    real(wp), intent(inout) :: z(:), weight
+    real(wp), parameter :: half = 0.5_wp
+    real(wp) :: opened(size(z)), torque(2), throttle
+
+    associate (integral => size(balance%motions%free) + bank%first_internal + element - 1, &
+               elements => balance%formulation%machine%elements, e => bank%first + element - 1)
+      opened = z
+      call balance%evaluate(z)
+      torque(1) = elements%restoring(1, e) + elements%applied(1, e)
+      z(integral) = bank%integral_of(element, balance%t(1), elements%speed(1, e), half)
+      call balance%evaluate(z)
+      torque(2) = elements%restoring(1, e) + elements%applied(1, e)
+      throttle = 1.0_wp
+      if (abs(torque(1) - torque(2)) > 0) throttle = half + half * (factor * torque(1) - torque(2)) / (torque(1) - torque(2))
+      if (bank%least_throttle() < throttle .and. throttle < 1.0_wp) then
+        z(integral) = bank%integral_of(element, balance%t(1), elements%speed(1, e), throttle)
+        weight = 1.0_wp
+      else
+        z = opened
+      end if
+    end associate
+  end subroutine close_loop
+
+end module nocdyn_speed_loops
