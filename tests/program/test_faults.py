@@ -148,6 +148,34 @@ def test_every_excitation_has_a_start_an_end_and_a_decay(nocdyn, kind):
     np.testing.assert_allclose(columns["torque_e [N m]"][inside], expected[inside], atol=1e-8)
 
 
+def test_a_decay_begins_at_the_time_of_a_step(nocdyn):
+    machine = "&body name='b' inertia=1 /\n&excitation name='e' body='b' kind='step' amplitude=9 time=0.4 decay=0.2 /\n"
+    nocdyn.write("m.nml", machine + "&run t_end=1 /\n&output points=101 /\n")
+    assert nocdyn("run", "m.nml", "--out", "out").returncode == 0
+    header, rows = nocdyn.table("out")
+    column = header.index("torque_e [N m]")
+    for row in rows:
+        if abs(row[0] - 0.4) > 1e-9:
+            expected = 9 * np.exp(-(row[0] - 0.4) / 0.2) if row[0] > 0.4 else 0.0
+            assert row[column] == pytest.approx(expected, rel=1e-12)
+
+
+def test_torques_that_begin_after_the_run_are_noted(nocdyn):
+    motor = "&motor name='m' body='b' kind='induction_dq' voltage=400 frequency_hz=50 poles=4 stator_resistance=0.4 "
+    motor += (
+        "rotor_resistance=0.3 stator_reactance=0.9 rotor_reactance=0.9 mutual_reactance=25 supply_times=5 supply_factors=1 /\n"
+    )
+    excitations = "&excitation name='e' body='b' kind='step' amplitude=9 time=2 /\n"
+    excitations += "&excitation name='f' body='b' amplitude=9 frequency=5 start=1 /\n"
+    nocdyn.write("m.nml", "&body name='b' inertia=1 /\n" + motor + excitations + "&run t_end=1 /\n")
+    notes = [line for line in nocdyn("run", "m.nml", "--out", "out").stdout.splitlines() if ": note: " in line]
+    assert notes == [
+        "m.nml: note: motor 'm' is not connected in the run: its supply begins at t = 5 s",
+        "m.nml: note: excitation 'e' has no torque in the run: it begins at t = 2 s",
+        "m.nml: note: excitation 'f' has no torque in the run: it begins at t = 1 s",
+    ]
+
+
 def test_a_decay_alone_begins_with_the_run(nocdyn):
     text = (
         "&body name='b' inertia=1 /\n&excitation name='e' body='b' kind='step' amplitude=9 time=-5 decay=0.2 /\n"
@@ -229,6 +257,15 @@ def test_swept_faults_are_those_of_single_runs(nocdyn):
             "bad.nml:1: &excitation 'f': transient_reactance = 0.1; allowed: >= subtransient_reactance = 0.2",
         ),
         ("frequency=300 time=0", "fault"),
+        (
+            "fault='two_phase' rated_torque=1 subtransient_reactance=0.2 frequency=0 time=0",
+            "frequency = 0; allowed with kind = 'fault'",
+        ),
+        (
+            "fault='two_phase' rated_torque=1 subtransient_reactance=0.2 frequency=300 time=0 angle_deg=90",
+            "angle belongs to fault = 'resynchronisation'",
+        ),
+        ("fault='two_phase' rated_torque=1 subtransient_reactance=0.2 frequency=300 time=0.2 end=0.1", "end = 0.1"),
         ("fault='two_phase' rated_torque=1 frequency=300 time=0", "subtransient_reactance"),
         ("fault='four_phase' rated_torque=1 subtransient_reactance=0.2 frequency=300 time=0", "'four_phase'"),
         (
@@ -238,7 +275,7 @@ def test_swept_faults_are_those_of_single_runs(nocdyn):
         ("term_amplitudes=1, 2 term_multiples=1 frequency=300 time=0", "term_multiples"),
         (
             "term_amplitudes=1, 2 term_multiples=1, 2 term_phases=1 frequency=300 time=0",
-            "bad.nml:1: &excitation 'f': term_phases has 1 values, term_amplitudes has 2; needed: as many",
+            "bad.nml:1: &excitation 'f': term_phases has 1 value and term_amplitudes has 2 values; needed: as many of each",
         ),
         ("term_amplitudes=1 frequency=300 time=0", "term_multiples"),
         ("term_amplitudes=1 term_multiples=1 fault='two_phase' frequency=300 time=0", "fault"),

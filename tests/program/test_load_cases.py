@@ -111,7 +111,7 @@ def test_the_damage_of_cases_adds_up_with_their_repeats(nocdyn):
     assert life["damage_of_load_cases"] == pytest.approx(expected, rel=1e-14)
     assert life["damage"] == pytest.approx(sum(expected.values()), rel=1e-14)
     assert life["repeats_to_failure"] == pytest.approx(1 / life["damage"], rel=1e-14)
-    assert f"fatigue 'life': damage of all load cases {life['damage']:.4g} (" in outcome.stdout
+    assert f"fatigue 'life': damage of all load cases {life['damage']:.4g}, all of them may occur " in outcome.stdout
 
 
 SHAFT = """&body name = 'a' inertia = 1.0 /
@@ -206,16 +206,71 @@ def test_a_case_that_fails_does_not_stop_the_others(nocdyn):
     assert [case["status"] for case in cases(nocdyn)["load_cases"]] == ["failed", "done", "done"]
 
 
-def test_after_an_interruption_there_is_no_table_over_the_cases(nocdyn):
-    nocdyn.write("m.nml", MACHINE + FAULT + RUN + CASES)
+def test_after_an_interruption_the_table_says_what_was_run(nocdyn):
+    nocdyn.write("m.nml", MACHINE + FAULT + RUN + LIFE + CASES)
     assert nocdyn("run", "m.nml", "--out", "out").returncode == 0
+    assert cases(nocdyn)["is_complete"]
     process = nocdyn.start("run", "m.nml", "--out", "out", *ENDLESS)
     wait_for(lambda: list((nocdyn.folder / "out/start").glob(".trajectory.csv.*")))
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=30)
     assert process.returncode == 1
-    assert "m.nml: load cases not run after the interruption: 2" in errors
-    assert "cases.json" not in nocdyn.files("out") and "cases.csv" not in nocdyn.files("out")
+    assert "m.nml: load cases not run after the interruption: 'fault', 'idle'\n" in errors
+    found = cases(nocdyn)
+    assert not found["is_complete"]
+    assert [case["status"] for case in found["load_cases"]] == ["interrupted", "not run", "not run"]
+    assert "repeats_to_failure" not in found["fatigue"][0]
+
+
+def test_damage_of_cases_that_fail_is_said_to_be_incomplete(nocdyn):
+    few_steps = "&run load_case = 'fault' t_end = 0.5 method = 'rk853' max_steps = 5 /\n"
+    nocdyn.write("m.nml", MACHINE + FAULT + RUN + few_steps + LIFE + CASES)
+    outcome = nocdyn("run", "m.nml", "--out", "out")
+    assert outcome.returncode == 1
+    assert "\nincomplete: fault (failed)\n" in outcome.stdout
+    assert "may occur" not in outcome.stdout
+    found = cases(nocdyn)
+    assert not found["is_complete"]
+    assert [case["status"] for case in found["load_cases"]] == ["done", "failed", "done"]
+    assert "stopped at t = 0.0147" in found["load_cases"][1]["message"]
+    assert "repeats_to_failure" not in found["fatigue"][0]
+
+
+@pytest.mark.parametrize(
+    "case, message",
+    [
+        ("name = 'a' without = 'shaft'", "m.nml: load case 'a': m.nml:10: &fatigue 'life': there is no coupling 'shaft'"),
+        ("name = 'a' set = 'output.extremes_from=3'", "m.nml:12: &load_case 'a': set 'output.extremes_from=3': &output: "),
+        ("name = 'a' set = 'excitation.sc.time=-1' with = 'sc'", "m.nml:12: &load_case 'a': set 'excitation.sc.time=-1': "),
+    ],
+)
+def test_mistakes_of_cases_are_found_before_any_is_run(nocdyn, case, message):
+    fault = "&excitation name = 'sc' body = 'motor' kind = 'fault' fault = 'two_phase' rated_torque = 100 "
+    fault += "subtransient_reactance = 0.2 frequency_hz = 50 time = 0.1 /\n"
+    text = MACHINE + fault + RUN + LIFE + f"&load_case name = 'b' /\n&load_case {case} /\n"
+    assert complaint(nocdyn, text).startswith(f"nocdyn: {message}")
+
+
+def test_a_damage_above_1_is_said_to_be_too_much(nocdyn):
+    nocdyn.write("m.nml", MACHINE + FAULT + RUN + LIFE + "&load_case name = 'a' repeats = 1e9 /\n")
+    outcome = nocdyn("run", "m.nml", "--out", "out")
+    assert ", above 1: the part does not last (a " in outcome.stdout
+
+
+def test_a_sweep_is_checked_for_the_machine_and_its_cases(nocdyn):
+    sweep = "&sweep design = 'grid' /\n&vary target = 'excitation.fault.amplitude' low = 1 high = 2 count = 3 /\n"
+    sweep += "&record quantity = 'moment_shaft' statistic = 'max' /\n"
+    text = MACHINE + FAULT + RUN + CASES + sweep
+    nocdyn.write("m.nml", text)
+    outcome = nocdyn("check", "m.nml")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    target = "target = 'excitation.fault.amplitude': there is no &excitation 'fault'"
+    assert f"\n  no sweep of this machine: m.nml:14: &vary: {target}\n" in outcome.stdout
+    assert "\n  sweep: grid, 3 variants" in nocdyn("check", "m.nml", "--case", "fault").stdout
+    nocdyn.write("m.nml", text.replace("excitation.fault.a", "excitation.fautl.a"))
+    outcome = nocdyn("check", "m.nml")
+    assert outcome.returncode == 2
+    assert outcome.stderr == "nocdyn: m.nml:14: &vary: target = 'excitation.fautl.amplitude': there is no &excitation 'fautl'\n"
 
 
 @pytest.mark.parametrize(
@@ -285,7 +340,7 @@ def test_a_sweep_varies_the_machine_of_a_case(nocdyn):
     cases = "&load_case name = 'short' with = 'fault' set = 'load.work.quadratic=0.02' /\n&load_case name = 'other' /\n"
     nocdyn.write("m.nml", MACHINE + FAULT + RUN + cases + sweep)
     peaks = {}
-    for case, folder in (("", "alone"), ("short", "out/short"), ("other", "out/other")):
+    for case, folder in (("", "alone"), ("short", "out/short/sweep"), ("other", "out/other/sweep")):
         words = ["--out", "out", "--case", case] if case else ["--out", "alone"]
         outcome = nocdyn("sweep", "m.nml", "--csv", *words)
         assert (outcome.returncode, outcome.stderr) == (0, "")
@@ -293,12 +348,12 @@ def test_a_sweep_varies_the_machine_of_a_case(nocdyn):
         peaks[case] = [line.split(",")[2] for line in lines[1:]]
     assert peaks["other"] == peaks[""]
     assert all(float(peak) > 1.1 * float(plain) for peak, plain in zip(peaks["short"], peaks[""]))
-    run = nocdyn("run", "out/short/input.nml", "--out", "again", "--set", "coupling.shaft.stiffness=1.5e4")
+    run = nocdyn("run", "out/short/sweep/input.nml", "--out", "again", "--set", "coupling.shaft.stiffness=1.5e4")
     assert run.returncode == 0
     column = nocdyn.summary("again")["columns"]["moment_shaft [N m]"]
     assert max(abs(column["min"]), abs(column["max"])) == pytest.approx(float(peaks["short"][1]), rel=1e-4)
     again = nocdyn("sweep", "m.nml", "--csv", "--out", "out", "--case", "short", "--resume")
-    assert "are done already; results in out/short" in again.stdout
+    assert "are done already; results in out/short/sweep" in again.stdout
     refused = nocdyn("sweep", "m.nml", "--case", "shirt")
     assert refused.returncode == 2
     assert refused.stderr == "nocdyn: m.nml: --case: there is no &load_case 'shirt'; did you mean 'short'?\n"

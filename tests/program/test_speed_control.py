@@ -150,6 +150,7 @@ def test_harmonics_excite_the_forced_response_as_orders_do(nocdyn):
     [
         (f"{RAMP} governor_speed = 100", "governor_speed and set_times are both given; allowed: one of them"),
         ("", "governor_gain needs governor_speed or set_times"),
+        (None, "kind = 'inverter' needs a set speed; required: governor_speed [rad/s], or set_times and set_speeds"),
         ("set_times = 1, 2", "set_speeds is missing; needed: 2 values, one for each of set_times\n"),
         ("set_times = 2, 1 set_speeds = 0, 1", "set_times(2) = 1 must be greater than set_times(1) = 2"),
         ("set_times = 1, 2 set_speeds = 0, 1, 2", "set_speeds has 3 values and set_times has 2 values; needed: as many of each"),
@@ -160,7 +161,10 @@ def test_harmonics_excite_the_forced_response_as_orders_do(nocdyn):
     ],
 )
 def test_keys_that_do_not_fit_are_refused(nocdyn, keys, complaint):
-    (nocdyn.folder / "machine.nml").write_text(DRIVE.format(keys=keys))
+    text = DRIVE.format(keys=keys)
+    if keys is None:
+        text = DRIVE.replace(f"governor_gain = {GAIN}", "").replace(f"governor_time = {TIME} {{keys}}", "")
+    (nocdyn.folder / "machine.nml").write_text(text)
     outcome = nocdyn("check", "machine.nml")
     assert outcome.returncode == 2
     assert f"&motor 'drive': {complaint}" in outcome.stderr

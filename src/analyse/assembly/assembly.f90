@@ -4,7 +4,7 @@ module nocdyn_assembly
   use nocdyn_formulation, only: formulation_t
   use nocdyn_induction_assembly, only: note_rated_motors
   use nocdyn_input, only: input_t
-  use nocdyn_joint_notes, only: note_idle_joints
+  use nocdyn_idle_notes, only: note_idle_elements
   use nocdyn_joint_simplifications, only: has_joint_that_locks, refuse_joints
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -34,7 +34,7 @@ contains
     call build_machine(input, machine, error, lanes)
     if (.not. allocated(error)) call start_machine(input, machine, error)
     if (allocated(error) .or. input%takes_means) return
-    call note_idle_joints(input, machine%start_notes)
+    call note_idle_elements(input, machine%start_notes)
     call note_rated_motors(input, machine%start_notes)
   end subroutine assemble_machine
 

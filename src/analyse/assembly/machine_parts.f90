@@ -30,7 +30,7 @@ module nocdyn_machine_parts
   implicit none (type, external)
   private
 
-  public :: build_machine, given_speeds
+  public :: build_machine, check_groups, given_speeds
 
   integer, parameter :: most_names = 12   ! in a message
 

@@ -72,7 +72,7 @@ contains
         if (self%is_order(crossing%line)) then
           line = line // cell(rounded_text(self%order(crossing%line), 6))
         else
-          line = line // cell('fixed')
+          line = line // cell(self%response%lines(crossing%line)%word())
         end if
         line = line // cell(rpm(crossing%speed)) // cell(from_si(crossing%frequency, unit_hz))
         if (size(self%settings%operating) > 0) then

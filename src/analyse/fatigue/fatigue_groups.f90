@@ -5,7 +5,7 @@ module nocdyn_fatigue_groups
   use nocdyn_kinds, only: wp
   use nocdyn_near_words, only: nearest_word
   use nocdyn_sn_curves, only: mean_strength, new_sn_curve, sn_curve_t
-  use nocdyn_text, only: quoted, rounded_text, string_t, to_text
+  use nocdyn_text, only: counted, quoted, rounded_text, string_t, to_text
   use nocdyn_units, only: from_si, unit_rpm
   implicit none (type, external)
   private
@@ -124,7 +124,8 @@ contains
       allocate (half_range, source=group%numbers(trim(key)))
       if (size(half_range) /= size(cycles)) then
         call raise(error, exit_input, input%location(index, trim(key)) // ': ' // trim(key) // ' has ' // &
-                   to_text(size(half_range)) // ' values, table_cycles has ' // to_text(size(cycles)) // '; needed: as many')
+                   counted(size(half_range), 'value', 'values') // ' and table_cycles has ' // &
+                   counted(size(cycles), 'value', 'values') // '; needed: as many of each')
         return
       end if
       do i = 2, size(cycles)

@@ -7,6 +7,7 @@ module nocdyn_excitation_lines
   use nocdyn_held_speeds, only: held_state_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_text, only: rounded_text
   implicit none (type, external)
   private
 
@@ -16,8 +17,11 @@ module nocdyn_excitation_lines
   type, public :: line_t
     real(wp) :: order = 0.0_wp       !! oscillations per turn of the reference body, at the first speed
     logical :: is_order = .true.     !! whether its frequency is proportional to the speed; else a fixed frequency is in it
+    logical :: is_fixed = .false.    !! whether its frequency is the same at all speeds
     integer :: family = 0            !! frequencies of one family keep their ratios at all speeds
     integer, allocatable :: source(:)     !! harmonics, numbered over all elements
+  contains
+    procedure :: word
   end type line_t
 
   !> A harmonic of an element.
@@ -33,6 +37,16 @@ module nocdyn_excitation_lines
   public :: list_sources
 
 contains
+
+  !> What a table calls a line: its order, 'fixed', or 'slip' if its frequency is that of the slip.
+  function word(self) result(text)
+    class(line_t), intent(in) :: self
+    character(len=:), allocatable :: text
+
+    text = 'slip'
+    if (self%is_fixed) text = 'fixed'
+    if (self%is_order) text = rounded_text(self%order, 6)
+  end function word
 
   !> The harmonics of all elements at a steady state.
   subroutine list_sources(machine, state, sources)
@@ -120,7 +134,8 @@ contains
         lines(k)%is_order = is_same(lines(k)%order, high(source)%frequency / abs(high_speed))
         lines(k)%family = k
         if (lines(k)%is_order) lines(k)%family = -1
-        if (is_same(low(source)%frequency, high(source)%frequency)) lines(k)%family = -2
+        lines(k)%is_fixed = is_same(low(source)%frequency, high(source)%frequency)
+        if (lines(k)%is_fixed) lines(k)%family = -2
       end associate
     end do
   end subroutine new_lines

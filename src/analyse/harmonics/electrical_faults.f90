@@ -16,7 +16,7 @@ module nocdyn_electrical_faults
   use nocdyn_fault_excitations, only: fault_terms_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_text, only: to_text
+  use nocdyn_text, only: counted, to_text
   implicit none (type, external)
   private
 
@@ -51,6 +51,11 @@ contains
       if (group%number('time') < t_start) then
         call raise(error, exit_input, input%location(index, 'time') // ': time = ' // to_text(group%number('time')) // &
                    ' is before the run; allowed: >= t_start = ' // to_text(t_start) // ' [s]')
+      else if (group%number('frequency', absent=1.0_wp) <= 0) then
+        call raise(error, exit_input, input%location(index, 'frequency') // ': frequency = ' // &
+                   to_text(group%number('frequency')) // "; allowed with kind = 'fault': > 0 [rad/s]")
+      else if (group%is_given('angle') .and. .not. is_resynchronisation(group)) then
+        call raise(error, exit_input, input%location(index, 'angle') // ": angle belongs to fault = 'resynchronisation'")
       else if (group%has_value('transient_reactance')) then
         if (group%number('transient_reactance') >= group%number('subtransient_reactance')) return
         call raise(error, exit_input, input%location(index, 'transient_reactance') // ': transient_reactance = ' // &
@@ -71,13 +76,21 @@ contains
       associate (group => input%groups(index))
         associate (terms => size(group%numbers('term_amplitudes')), values => size(group%numbers(key)))
           if (values == 0 .or. values == terms) return
-          call raise(error, exit_input, input%location(index, key) // ': ' // key // ' has ' // to_text(values) // &
-                     ' values, term_amplitudes has ' // to_text(terms) // '; needed: as many')
+          call raise(error, exit_input, input%location(index, key) // ': ' // key // ' has ' // &
+                     counted(values, 'value', 'values') // ' and term_amplitudes has ' // counted(terms, 'value', 'values') // &
+                     '; needed: as many of each')
         end associate
       end associate
     end subroutine check_length
 
   end subroutine check_fault
+
+  pure logical function is_resynchronisation(group)
+    type(group_t), intent(in) :: group
+
+    is_resynchronisation = group%has_value('fault')
+    if (is_resynchronisation) is_resynchronisation = group%text('fault') == 'resynchronisation'
+  end function is_resynchronisation
 
   !> The terms of a checked group. The torque of a fault brakes a rotor that turns forwards; that of given terms is as they are.
   subroutine find_fault_terms(group, terms)

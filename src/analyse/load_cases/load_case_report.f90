@@ -18,6 +18,7 @@ module nocdyn_load_case_report
 
   integer, parameter :: most_lines = 25   ! printed
   integer, parameter :: digits = 4        ! of printed damages
+  integer, parameter :: most_parts = 6    ! of a printed damage
 
 contains
 
@@ -30,6 +31,7 @@ contains
     integer :: c
 
     call json%open_report(input%file, input%title())
+    call json%put('is_complete', is_complete(runs))
     call json%open_list('load_cases')
     do c = 1, size(runs)
       associate (load_case => runs(c)%load_case, summary => runs(c)%summary)
@@ -49,6 +51,14 @@ contains
     call json%close()
     text = json%text()
   end function load_cases_json
+
+  !> Whether all load cases have been run to their ends.
+  pure logical function is_complete(runs)
+    type(case_run_t), intent(in) :: runs(:)
+    integer :: c
+
+    is_complete = all([(runs(c)%summary%status == 'done', c=1, size(runs))])
+  end function is_complete
 
   subroutine put_peaks(json, runs)
     type(json_t), intent(inout) :: json
@@ -94,7 +104,7 @@ contains
       call json%put('unit', lives(i)%unit)
       if (lives(i)%is_shaft) call json%put('position', lives(i)%position)
       call json%put('damage', lives(i)%damage)
-      if (lives(i)%damage > 0) call json%put('repeats_to_failure', 1 / lives(i)%damage)
+      if (lives(i)%damage > 0 .and. is_complete(runs)) call json%put('repeats_to_failure', 1 / lives(i)%damage)
       call json%put('mean_exceeds_strength', lives(i)%exceeds_strength)
       call json%open('damage_of_load_cases')
       do c = 1, size(runs)
@@ -161,22 +171,50 @@ contains
     type(text_buffer_t), intent(inout) :: report
     type(case_run_t), intent(in) :: runs(:)
     type(life_t), allocatable :: lives(:)
-    character(len=:), allocatable :: line, parts
+    character(len=:), allocatable :: line
     integer :: c, i
 
     call sum_damage(runs, lives)
     do i = 1, size(lives)
       line = 'fatigue ' // quoted(lives(i)%name) // ': damage of all load cases ' // rounded_text(lives(i)%damage, digits)
       if (lives(i)%is_shaft) line = line // ' at ' // rounded_text(lives(i)%position, digits) // ' m'
-      parts = ''
-      do c = 1, size(runs)
-        if (lives(i)%of_case(c) > 0) parts = parts // ', ' // runs(c)%load_case%name // ' ' // &
-                                             rounded_text(lives(i)%of_case(c), digits)
-      end do
-      if (parts /= '') line = line // ' (' // parts(3:) // ')'
+      if (lives(i)%damage > 1) line = line // ', above 1: the part does not last'
+      if (is_complete(runs) .and. lives(i)%damage > 0 .and. lives(i)%damage <= 1) then
+        line = line // ', all of them may occur ' // rounded_text(1 / lives(i)%damage, digits) // ' times'
+      end if
+      line = line // parts_text(runs, lives(i)%of_case)
       if (lives(i)%exceeds_strength) line = line // '; the mean of a cycle exceeds the strength'
       call report%append_line(line)
     end do
+    if (is_complete(runs)) return
+    line = ''
+    do c = 1, size(runs)
+      if (runs(c)%summary%status == 'done') cycle
+      line = line // ', ' // runs(c)%load_case%name // ' (' // trim(runs(c)%summary%status) // ')'
+    end do
+    call report%append_line('incomplete: ' // line(3:))
   end subroutine append_lives
+
+  !> The largest parts of a damage: " (start 0.2, fault 0.1)".
+  function parts_text(runs, damage) result(text)
+    type(case_run_t), intent(in) :: runs(:)
+    real(wp), intent(in) :: damage(:)   !! [runs]
+    character(len=:), allocatable :: text
+    logical :: is_left(size(damage))
+    integer :: c, k
+
+    text = ''
+    is_left = damage > 0
+    do k = 1, most_parts
+      c = maxloc(damage, dim=1, mask=is_left)
+      if (c == 0) exit
+      is_left(c) = .false.
+      text = text // ', ' // runs(c)%load_case%name // ' ' // rounded_text(damage(c), digits)
+    end do
+    if (text == '') return
+    text = ' (' // text(3:)
+    if (any(is_left)) text = text // ', ' // counted(count(is_left), 'other', 'others')
+    text = text // ')'
+  end function parts_text
 
 end module nocdyn_load_case_report

@@ -98,7 +98,7 @@ contains
     character(len=:), allocatable :: line, stress
 
     line = right(to_text(critical%crossing%mode), 6) // right(rounded_text(critical%crossing%frequency / turn, 7), 16) // &
-           right(rounded_text(analysis%response%lines(critical%crossing%line)%order, 5), 8) // &
+           right(analysis%response%lines(critical%crossing%line)%word(), 8) // &
            right(rpm(critical%crossing%speed), 16) // right(rounded_text(critical%crossing%damping_ratio, 3), 15) // &
            '  ' // padded(coupling_name(analysis, critical), width)
     if (critical%quantity == 0) then

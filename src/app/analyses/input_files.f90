@@ -10,10 +10,11 @@ module nocdyn_input_files
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_joint_simplifications, only: refuse_joints
+  use nocdyn_load_case_checks, only: name_load_case
   use nocdyn_machine, only: machine_t
   use nocdyn_output_times, only: check_output_times
   use nocdyn_result_folders, only: out_folder, refuse_shared_folders, result_folder
-  use nocdyn_sweep_plan, only: add_plan_diagnostics
+  use nocdyn_sweep_plan, only: add_plan_diagnostics, has_sweep, make_plan, sweep_plan_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -104,10 +105,27 @@ contains
       call assemble_for(command, reading%load_cases(c), machine, reading%error)
       if (.not. allocated(reading%error)) call check_output_times(reading%load_cases(c), reading%error)
       if (.not. allocated(reading%error)) cycle
-      reading%error%message = reading%load_cases(c)%shown_case() // ': ' // reading%error%message
+      call name_load_case(reading%load_cases(c), reading%error)
       return
     end do
+    call check_sweep(reading)
   end subroutine check_load_cases
+
+  !> Refuses a sweep that neither the machine nor one of its load cases can make.
+  subroutine check_sweep(reading)
+    type(reading_t), intent(inout) :: reading
+    type(error_t), allocatable :: error
+    type(sweep_plan_t) :: plan
+    integer :: c
+
+    if (.not. has_sweep(reading%input)) return
+    call make_plan(reading%input, plan, reading%error)
+    do c = 1, size(reading%load_cases)
+      if (.not. allocated(reading%error)) return
+      call make_plan(reading%load_cases(c), plan, error)
+      if (.not. allocated(error)) deallocate (reading%error)
+    end do
+  end subroutine check_sweep
 
   !> Reads and checks a file, and finds the folder of its results.
   subroutine read_one(arguments, number, reading, folder, always_writes)

@@ -58,15 +58,19 @@ contains
     if (allocated(error)) return
     sizes = response
     if (note /= '') sizes = sizes // new_line('a') // '  note: nocdyn run refuses it: ' // note
-    if (output_note(input) /= '') sizes = new_line('a') // '  note: ' // output_note(input)
+    if (output_note(input) /= '') sizes = sizes // new_line('a') // '  note: ' // output_note(input)
     if (.not. allocated(input%load_case)) sizes = sizes // load_cases_line(input)
     if (has_sweep(input)) then
       call make_plan(input, plan, error)
-      if (allocated(error)) return
-      bytes = plan%file_bytes(plan%design%variants, has_table=.false.)
-      sizes = sizes // new_line('a') // '  sweep: ' // plan%summary()
-      if (bytes >= large) sizes = sizes // new_line('a') // '  files: about ' // bytes_text(bytes)
-      call check_variants(plan, plan%design%variants, .false., result_folder(arguments, input), 0.0_wp, error)
+      if (.not. allocated(error)) then
+        bytes = plan%file_bytes(plan%design%variants, has_table=.false.)
+        sizes = sizes // new_line('a') // '  sweep: ' // plan%summary()
+        if (bytes >= large) sizes = sizes // new_line('a') // '  files: about ' // bytes_text(bytes)
+        call check_variants(plan, plan%design%variants, .false., result_folder(arguments, input), 0.0_wp, error)
+      else if (has_load_cases(input)) then
+        sizes = sizes // new_line('a') // '  no sweep of this machine: ' // error%message
+        deallocate (error)
+      end if
     else
       bytes = trajectory_bytes(row_count(input), columns, wants_netcdf(input))
       if (bytes >= large) sizes = sizes // new_line('a') // '  trajectory.' // &
@@ -76,6 +80,14 @@ contains
     end if
     call print_text(machine_report(input%shown_file(), machine) // speed_table(input, machine) // sizes)
   end subroutine check
+
+  !> Whether a machine has load cases, or is one.
+  pure logical function has_load_cases(input)
+    type(input_t), intent(in) :: input
+
+    has_load_cases = allocated(input%load_case)
+    if (.not. has_load_cases) has_load_cases = size(input%load_cases) > 0
+  end function has_load_cases
 
   !> The names of the load cases, on a line of their own; nothing if there are none.
   function load_cases_line(input) result(text)

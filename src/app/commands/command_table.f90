@@ -112,7 +112,7 @@ contains
       '&record to sweep.nc, with summary.json and input.nml. A variant that fails is recorded with the reason.' // nl // nl // &
       '  --out DIR          write to DIR; default: &output directory, else results/<name of the file>' // nl // &
       '  --set PATH=VALUE   override a key: sweep.samples=1000, vary(2).high=20, run.rtol=1e-9' // nl // &
-      '  --case NAME        vary the machine of this &load_case, and write to its folder in DIR' // nl // &
+      '  --case NAME        vary the machine of this &load_case, and write to DIR/NAME/sweep' // nl // &
       '  --threads NUMBER   default: OMP_NUM_THREADS, else the number of cores that the process may use' // nl // &
       "  --shard K/N        compute part K of N only, for 'nocdyn merge'" // nl // &
       '  --resume           continue an interrupted sweep' // nl // &

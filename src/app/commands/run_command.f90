@@ -8,6 +8,7 @@ module nocdyn_run_command
   use nocdyn_errors, only: error_t, exit_done, exit_failed, exit_input, raise
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
+  use nocdyn_load_case_checks, only: check_load_case
   use nocdyn_load_case_peaks, only: case_run_t
   use nocdyn_load_case_report, only: load_cases_text
   use nocdyn_posix, only: is_interrupted, catch_interrupts
@@ -16,7 +17,7 @@ module nocdyn_run_command
   use nocdyn_run_limits, only: run_limits_text
   use nocdyn_run_summary, only: method_line, run_summary_t, summary_line
   use nocdyn_run_table, only: summary_table
-  use nocdyn_text, only: append, counted, shown_path, string_t, to_text
+  use nocdyn_text, only: append, counted, quoted, shown_path, string_t, to_text
   use nocdyn_trajectory_file, only: trajectory_file_t
   implicit none (type, external)
   private
@@ -125,19 +126,25 @@ contains
     class(trajectory_file_t), intent(in), optional :: netcdf   !! as in `run_inputs`
     type(case_run_t), allocatable :: runs(:)
     type(error_t), allocatable :: error
+    character(len=:), allocatable :: left
     integer :: c
 
     allocate (runs(size(reading%inputs)))
+    left = ''
     do c = 1, size(runs)
       runs(c)%load_case = reading%inputs(c)%load_case
-      call run_input(arguments, reading%inputs(c), reading%folders(c)%text, code, runs(c)%summary, netcdf)
-      if (.not. is_interrupted()) cycle
-      if (c == size(runs)) return
-      call raise(error, exit_failed, reading%inputs(c)%shown_file() // ': load cases not run after the interruption: ' // &
-                 to_text(size(runs) - c))
-      call report_error(error, code)
-      return
+      if (is_interrupted()) then
+        runs(c)%summary%status = 'not run'
+        left = left // ', ' // quoted(runs(c)%load_case%name)
+      else
+        call run_input(arguments, reading%inputs(c), reading%folders(c)%text, code, runs(c)%summary, netcdf)
+      end if
     end do
+    if (left /= '') then
+      call raise(error, exit_failed, reading%inputs(1)%shown_file() // ': load cases not run after the interruption: ' // left(3:))
+      call report_error(error, code)
+      deallocate (error)
+    end if
     call write_cases_files(reading%inputs(1), runs, reading%folder, error)
     if (allocated(error)) then
       call report_error(error, code)
@@ -196,7 +203,27 @@ contains
       reading%inputs(k) = load_cases(c)
       call append(reading%folders, reading%folder // '/' // load_cases(c)%load_case%name)
     end do
+    call check_cases(reading)
   end subroutine take_inputs
+
+  !> Refuses a file with mistakes in any of the load cases that are wanted, and load cases whose folders hold other results.
+  subroutine check_cases(reading)
+    type(reading_t), intent(inout) :: reading
+    type(error_t), allocatable :: own
+    integer :: c
+
+    do c = 1, size(reading%inputs)
+      if (.not. allocated(reading%inputs(c)%load_case)) cycle
+      call check_load_case(reading%inputs(c), own)
+      if (.not. allocated(own)) call refuse_sweep_folder(reading%inputs(c)%shown_case(), reading%folders(c)%text, own)
+      if (.not. allocated(own)) cycle
+      if (allocated(reading%error)) own%message = reading%error%message // new_line('a') // own%message
+      call move_alloc(own, reading%error)
+    end do
+    if (.not. allocated(reading%error)) return
+    deallocate (reading%inputs)
+    allocate (reading%inputs(0))
+  end subroutine check_cases
 
   !> Whether an input is to be run, but not by a program that cannot write NetCDF.
   logical function needs_companion(reading)
@@ -221,6 +248,9 @@ contains
 
     call run_to_files(input, folder, input%shown_case(), arguments%is_given('--quiet'), summary, error, netcdf)
     if (allocated(error)) then
+      if (.not. summary%has_run) summary%status = 'refused'
+      if (summary%status == 'done') summary%status = 'failed'   ! its files were not written
+      if (.not. allocated(summary%message)) summary%message = error%message
       reached = 'there'
       if (summary%extremes%rows > 0) reached = 't = ' // to_text(summary%extremes%last(1)) // ' s'
       if (error%code == exit_failed .and. summary%has_run) then

@@ -99,7 +99,7 @@ contains
     if (allocated(error)) return
     folder = result_folder(arguments, input)
     if (chosen == 0) return
-    folder = folder // '/' // load_cases(chosen)%load_case%name
+    folder = folder // '/' // load_cases(chosen)%load_case%name // '/sweep'   ! beside the results of its run
     input = load_cases(chosen)
   end subroutine read_machine
 

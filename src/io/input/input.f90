@@ -40,6 +40,7 @@ module nocdyn_input
     procedure :: shown_file     !! the path for messages
     procedure :: shown_case     !! the same with the load case
     procedure :: label          !! "&gear 'reducer'"
+    procedure :: case_overrides !! number of the overrides that the load case gives
     procedure, private :: location_of_group, location_of_key
     generic :: location => location_of_group, location_of_key   !! where they come from, to begin a message with
     procedure :: report             !! adds a diagnostic on a key of a group
@@ -156,15 +157,21 @@ contains
       if (line > 0 .and. line < no_line) source = source // ':' // to_text(line)
       return
     end if
-    if (allocated(input%load_case)) then
-      if (override <= size(input%load_case%overrides)) then
-        source = shown_path(input%file) // ':' // to_text(input%load_case%line) // ': &load_case ' // &
-                 quoted(shortened(input%load_case%name)) // ': set ' // quoted(shortened(input%overrides(override)%text))
-        return
-      end if
+    if (override <= input%case_overrides()) then
+      source = shown_path(input%file) // ':' // to_text(input%load_case%line) // ': &load_case ' // &
+               quoted(shortened(input%load_case%name)) // ': set ' // quoted(shortened(input%overrides(override)%text))
+    else
+      source = '--set ' // shortened(input%overrides(override)%text)
     end if
-    source = '--set ' // shortened(input%overrides(override)%text)
   end subroutine make_source
+
+  !> The number of overrides that the load case gives; they come first.
+  pure integer function case_overrides(self) result(count)
+    class(input_t), intent(in) :: self
+
+    count = 0
+    if (allocated(self%load_case)) count = size(self%load_case%overrides)
+  end function case_overrides
 
   !> Adds a diagnostic on a key of a group, with the line of the key if it is given.
   subroutine report(self, group, key, text, diagnostics, code)

@@ -62,14 +62,17 @@ contains
     end associate
   end subroutine check_induction
 
-  !> Refuses a gain that turns a motor away from its set speed, and an odd number of poles.
+  !> Refuses a motor without a set speed, a gain that turns it away from that, and an odd number of poles.
   subroutine check_inverter(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
     type(error_t), allocatable, intent(out) :: error
 
     associate (group => input%groups(index))
-      if (.not. group%number('governor_gain') > 0) then
+      if (.not. (group%has_value('governor_speed') .or. group%has_value('set_times'))) then
+        call raise(error, exit_input, input%location(index, 'kind') // ": kind = 'inverter' needs a set speed; " // &
+                   'required: governor_speed [rad/s], or set_times and set_speeds')
+      else if (.not. group%number('governor_gain') > 0) then
         call raise(error, exit_input, input%location(index, 'governor_gain') // ': governor_gain = ' // &
                    to_text(group%number('governor_gain')) // "; allowed with kind = 'inverter': > 0 [s/rad]")
       else if (group%has_value('poles')) then

@@ -145,6 +145,7 @@ contains
     rate = 0.0_wp
     do i = 1, size(groups%indices)
       associate (group => groups%input%groups(groups%indices(i)))
+        if (group%has_value('time') .and. .not. group%has_value('start')) begin(:, i) = max(t_start, group%number('time'))
         if (group%has_value('decay')) rate(:, i) = 1 / group%number('decay')
       end associate
     end do

@@ -120,7 +120,7 @@ contains
     end do
   end subroutine split_units
 
-  !> Refuses overrides of numbers that vary: they would have no effect.
+  !> Refuses overrides of numbers that vary: they would have no effect. What a load case sets is for its run.
   subroutine refuse_overrides(input, varied, numbers, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: varied(:)   !! index of the &vary of each number; empty if they are those of a list
@@ -129,7 +129,7 @@ contains
     character(len=:), allocatable :: source
     integer :: i, t
 
-    do i = 1, size(input%overrides)
+    do i = 1 + input%case_overrides(), size(input%overrides)
       associate (text => input%overrides(i)%text)
         t = numbers%number_at(input, text(:index(text, '=') - 1))
       end associate

@@ -237,7 +237,7 @@ module nocdyn_schema_torques
     key_rule_t('excitation', 'term_phases',     a_number,       any_number, 'rad', unset,      anything, &
       'their phases at the time of the fault; 0 if not given', 'fault', 1), &
     key_rule_t('excitation', 'start',           a_number,       1, 's',           unset,       anything, &
-      'the torque is 0 before; t_start if not given'), &
+      'the torque is 0 before; time, or t_start of &run, if not given'), &
     key_rule_t('excitation', 'end',             a_number,       1, 's',           unset,       anything, &
       'the torque is 0 from then on'), &
     key_rule_t('excitation', 'decay',           a_number,       1, 's',           unset,       positive, &
@@ -291,7 +291,8 @@ module nocdyn_schema_torques
     relation_rule_t('excitation', requires, 'term_amplitudes', 'term_multiples'), &
     relation_rule_t('excitation', requires, 'term_multiples term_times term_phases', 'term_amplitudes'), &
     relation_rule_t('excitation', equal_lengths, 'term_amplitudes term_multiples', ''), &
-    relation_rule_t('excitation', less_than, 'start', 'end')]
+    relation_rule_t('excitation', less_than, 'start', 'end'), &
+    relation_rule_t('excitation', less_than, 'time', 'end')]
 
   type(example_t), parameter, public :: torque_examples(*) = [ &
     example_t('motor',      "name = 'drive'    body = 'motor'    a = 200.0  b = 10.0  c = 1.0"), &

@@ -1,5 +1,5 @@
-!> Notes on joints and drives that do nothing in a run, perhaps by mistake.
-module nocdyn_joint_notes
+!> Notes on elements that do nothing in a run, perhaps by mistake.
+module nocdyn_idle_notes
   use nocdyn_input, only: group_t, input_t
   use nocdyn_joint_assembly, only: engagement_at
   use nocdyn_kinds, only: wp
@@ -7,12 +7,13 @@ module nocdyn_joint_notes
   implicit none (type, external)
   private
 
-  public :: note_idle_joints
+  public :: note_idle_elements
 
 contains
 
-  !> Notes clutches whose engagement is 0 during the whole run, and drives that prescribe no motion.
-  subroutine note_idle_joints(input, notes)
+  !> Notes clutches whose engagement is 0 during the whole run, drives that prescribe no motion, and torques that begin after its
+  !> end.
+  subroutine note_idle_elements(input, notes)
     type(input_t), intent(in) :: input
     type(string_t), allocatable, intent(inout) :: notes(:)
     integer :: i
@@ -28,12 +29,20 @@ contains
           case ('drive')
             if (.not. has_motion(group)) call append(notes, 'drive ' // quoted(group%name) // ' has neither a speed, a ' // &
               'table nor an amplitude: it holds its body still, as speed = 0 does')
+          case ('excitation')
+            associate (begin => group%number('start', absent=group%number('time', absent=run%number('t_start'))))
+              if (begin >= run%number('t_end')) call append(notes, 'excitation ' // quoted(group%name) // &
+                ' has no torque in the run: it begins at t = ' // to_text(begin) // ' s')
+            end associate
+          case ('motor')
+            if (.not. is_connected(group, run%number('t_end'))) call append(notes, 'motor ' // quoted(group%name) // &
+              ' is not connected in the run: its supply begins at t = ' // to_text(first_time(group)) // ' s')
           case default   ! these have no such mistakes
           end select
         end associate
       end do
     end associate
-  end subroutine note_idle_joints
+  end subroutine note_idle_elements
 
   !> Whether the engagement of a clutch is above 0 for some time of a run.
   logical function engages(group, t_start, t_end)
@@ -48,6 +57,24 @@ contains
     engages = any([(engagement_at(group, looked_at(i)) > 0, i=1, size(looked_at))])
   end function engages
 
+  !> Whether the supply of a motor begins before the end of the run.
+  logical function is_connected(group, t_end)
+    type(group_t), intent(in) :: group   !! &motor
+    real(wp), intent(in) :: t_end        !! [s]
+
+    is_connected = .not. group%has_value('supply_times')
+    if (.not. is_connected) is_connected = first_time(group) < t_end
+  end function is_connected
+
+  !> When the supply of a motor changes first [s].
+  real(wp) function first_time(group)
+    type(group_t), intent(in) :: group   !! &motor with supply_times
+    real(wp), allocatable :: times(:)
+
+    allocate (times, source=group%numbers('supply_times'))
+    first_time = times(1)
+  end function first_time
+
   !> Whether a drive has keys of a motion.
   pure logical function has_motion(group)
     type(group_t), intent(in) :: group   !! &drive
@@ -56,4 +83,4 @@ contains
                  group%has_value('angle_amplitude')
   end function has_motion
 
-end module nocdyn_joint_notes
+end module nocdyn_idle_notes
