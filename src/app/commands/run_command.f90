@@ -141,7 +141,8 @@ contains
       end if
     end do
     if (left /= '') then
-      call raise(error, exit_failed, reading%inputs(1)%shown_file() // ': load cases not run after the interruption: ' // left(3:))
+      call raise(error, exit_failed, reading%inputs(1)%shown_file() // ': load cases not run after the interruption: ' // &
+                 left(3:))
       call report_error(error, code)
       deallocate (error)
     end if
