@@ -13,9 +13,10 @@ import pandas as pd
 ACCURACY = 1e-7
 
 
-def trajectory(program: Path, file: Path, folder: Path) -> pd.DataFrame:
+def trajectories(program: Path, file: Path, folder: Path) -> list[pd.DataFrame]:
+    """Of a file, or of each of its load cases."""
     subprocess.run([program, "run", "--quiet", "--out", folder, file], check=True)
-    return pd.read_csv(folder / "trajectory.csv")
+    return [pd.read_csv(path) for path in sorted(folder.rglob("trajectory.csv"))]
 
 
 def largest_difference(one: pd.DataFrame, other: pd.DataFrame) -> tuple[float, str]:
@@ -38,8 +39,8 @@ def main() -> None:
     different = 0
     with tempfile.TemporaryDirectory() as folder:
         for file in arguments.files:
-            one, other = (trajectory(programs[i], file, Path(folder) / str(i) / file.stem) for i in range(2))
-            difference, column = largest_difference(one, other)
+            pairs = zip(*(trajectories(programs[i], file, Path(folder) / str(i) / file.stem) for i in range(2)), strict=True)
+            difference, column = max(largest_difference(one, other) for one, other in pairs)
             different += difference > ACCURACY
             print(f"{file.stem:24} " + ("same numbers" if difference == 0.0 else f"differs by {difference:.1e} in {column}"))
     if different:

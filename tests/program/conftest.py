@@ -21,6 +21,14 @@ FORTRAN_FLAGS = re.search(r"^CMAKE_Fortran_FLAGS:STRING=(.*)$", BUILD_SETTINGS, 
 CASE_1 = SOURCE / "input/paper/case1.nml"
 CASE_2 = SOURCE / "input/paper/case2.nml"
 
+
+
+def first_case(path):
+    """Options that choose the first load case of an input, if it has any."""
+    found = re.search(r"^&load_case +name = '(\w+)'", path.read_text(), re.MULTILINE)
+    return ("--case", found[1]) if found else ()
+
+
 # A run that no test waits for, with few rows.
 ENDLESS = ("--set", "run.t_end=1e6", "--set", "run.max_steps=100000000", "--set", "output.interval=1")
 

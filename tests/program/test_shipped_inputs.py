@@ -7,11 +7,12 @@ import subprocess
 
 import f90nml
 import pytest
-from conftest import DATA, SOURCE
+from conftest import DATA, SOURCE, first_case
 
 INPUTS = sorted((SOURCE / "input").rglob("*.nml")) + sorted(DATA.glob("*.nml"))
 WITHOUT_TABLE_FILES = [path for path in INPUTS if "table_file" not in path.read_text()]
-READ_BY_FORTRAN = [path for path in WITHOUT_TABLE_FILES if path.stem != "electrical_kinds"]  # the reader lacks its keys
+# the reader lacks the keys of the one, and a run of a load case leaves groups out of the others
+READ_BY_FORTRAN = [path for path in WITHOUT_TABLE_FILES if path.stem != "electrical_kinds" and not first_case(path)]
 
 
 UNITS = {"_rpm": math.pi / 30, "_hz": 2 * math.pi, "_deg": math.pi / 180}
@@ -44,9 +45,10 @@ def fortran_reader(tmp_path_factory):
 
 
 def used_input(nocdyn, path):
-    """input.nml of a run of this file."""
-    assert nocdyn("run", path, "--out", "out").returncode == 0
-    return nocdyn.folder / "out/input.nml"
+    """input.nml of a run of this file, or of its first load case."""
+    case = first_case(path)
+    assert nocdyn("run", path, "--out", "out", *case).returncode == 0
+    return nocdyn.folder / "/".join(("out", *case[1:], "input.nml"))
 
 
 def groups(namelist):
@@ -54,6 +56,17 @@ def groups(namelist):
     for kind, value in namelist.items():
         for group in value if isinstance(value, list) else [value]:
             yield kind, dict(group)
+
+
+def is_of_other_cases(path, kind, values):
+    """Whether the first load case of a file leaves a group out."""
+    cases = [group for name, group in groups(f90nml.read(path)) if name == "load_case"]
+    named = [element for case in cases[1:] for element in as_list(case.get("with", []))]
+    return kind == "load_case" or "load_case" in values or (kind == "excitation" and values["name"] in named)
+
+
+def as_list(value):
+    return value if isinstance(value, list) else [value]
 
 
 def test_there_are_inputs():
@@ -69,7 +82,7 @@ def test_fortran_reads_the_same_values(nocdyn, fortran_reader, path):
 
 @pytest.mark.parametrize("path", INPUTS, ids=names)
 def test_f90nml_reads_the_same_values(nocdyn, path):
-    given = list(groups(f90nml.read(path)))
+    given = [pair for pair in groups(f90nml.read(path)) if not is_of_other_cases(path, *pair)]
     used = list(groups(f90nml.read(used_input(nocdyn, path))))
     # groups that the file lacks stand at the end
     assert [kind for kind, _ in given] == [kind for kind, _ in used][: len(given)]
