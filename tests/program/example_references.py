@@ -42,7 +42,7 @@ class Machine:
         self.kinds = {}
         for kind, groups in f90nml.read(path).items():
             for group in groups if isinstance(groups, list) else [groups]:
-                self.kinds.setdefault(kind, {})[group.get("name", "")] = in_si(group)
+                self.kinds.setdefault(kind, {})[group.get("name", group.get("load_case", ""))] = in_si(group)
 
     def __getattr__(self, kind):
         return self.kinds[kind]
@@ -79,10 +79,12 @@ class Motion:
     def at(self, t):
         return next(piece[3](t) for piece in reversed(self.pieces) if piece[0] <= t)
 
-    def largest(self, value, sign=1):
-        """Largest value(t, y, mode); with sign = -1 the smallest."""
+    def largest(self, value, sign=1, since=0.0):
+        """Largest value(t, y, mode) in the pieces that begin at `since` or later; with sign = -1 the smallest."""
         best = -np.inf
         for start, end, mode, solution in self.pieces:
+            if start < since:
+                continue
             t = np.linspace(start, end, max(5, min(4000, int(1e5 * (end - start)))))
 
             def objective(s, mode=mode, solution=solution):
