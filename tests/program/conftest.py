@@ -22,7 +22,6 @@ CASE_1 = SOURCE / "input/paper/case1.nml"
 CASE_2 = SOURCE / "input/paper/case2.nml"
 
 
-
 def first_case(path):
     """Options that choose the first load case of an input, if it has any."""
     found = re.search(r"^&load_case +name = '(\w+)'", path.read_text(), re.MULTILINE)

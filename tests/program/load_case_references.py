@@ -244,7 +244,8 @@ def reciprocating_compressor(with_damage=True):
     def rate(t, y, mode, middle):
         angle, omega = y[:n], y[n : 2 * n]
         share = supply["supply_factors"][np.searchsorted(supply["supply_times"], middle) - 1]
-        rate_s, rate_r, torque = motor.rates(t, y[2 * n] + 1j * y[2 * n + 1], y[2 * n + 2] + 1j * y[2 * n + 3], omega[rotor], share)
+        stator, rotating = y[2 * n] + 1j * y[2 * n + 1], y[2 * n + 2] + 1j * y[2 * n + 3]
+        rate_s, rate_r, torque = motor.rates(t, stator, rotating, omega[rotor], share)
         total = torques(angle, omega) - train.stiffness @ angle - train.damping @ omega
         total[rotor] += torque
         return np.concatenate([omega, total / train.inertia, [rate_s.real, rate_s.imag, rate_r.real, rate_r.imag]])
@@ -541,6 +542,11 @@ def steady_speeds():
     return {"reciprocating_compressor": ("omega_flywheel [rad/s]", compressor_speed(m))}
 
 
+def speed_control(motor, torque, frequency):
+    """Dynamic stiffness of a governor that holds the speed with a throttle between its limits."""
+    return torque * motor["governor_gain"] * (1j * frequency + 1 / motor["governor_time"])
+
+
 def generator_response(m, order, speed):
     """Amplitudes of the moments of the couplings: dense complex matrices."""
     train, diesel = Train(m), m.engine["diesel"]
@@ -555,7 +561,8 @@ def generator_response(m, order, speed):
         return group.get("stiffness", 0.0) * (1 + 1j * loss) + 1j * frequency * group.get("damping", 0.0)
 
     matrix = train.summed(stiffness) - np.diag(train.inertia) * frequency**2
-    matrix[train.index("flywheel")[0], train.index("flywheel")[0]] += 1j * frequency * m.load["friction"]["viscous"]
+    flywheel, fuel = train.index("flywheel")[0], m.motor["fuel"]
+    matrix[flywheel, flywheel] += 1j * frequency * m.load["friction"]["viscous"] + speed_control(fuel, fuel["torque"], frequency)
     angle = np.linalg.solve(matrix, force)
     return {f"moment_{name}": abs(stiffness(group) * (train.row[name] @ angle)) for name, group in m.coupling.items()}
 
@@ -566,6 +573,7 @@ def propeller_response(m, order, speed):
     blades = m.excitation["blades"]
     force = blades["share_of_load"][blades["orders"].index(order)] * water * speed**2
     matrix = dynamic_stiffness(m, frequency)
+    matrix[0, 0] += speed_control(m.motor["converter"], m.motor["converter"]["torque_limit"], frequency)
     matrix[2, 2] += 1j * frequency * 2 * water * speed
     angle = np.linalg.solve(matrix, [0.0, 0.0, force])
     result = {}

@@ -266,7 +266,8 @@ def test_the_printed_summary_of_every_shipped_input_fits_a_screen(nocdyn, path):
     ranks = [0 if name.startswith("moment_") and name.removeprefix("moment_") not in damped else rank
              for name, rank in zip(names, ranks, strict=True)]  # fmt: skip
     assert ranks == sorted(ranks)
-    all_names = [name for name in nocdyn.summary("/".join(("out", *case[1:])))["columns"] if "] [" not in name]  # of rods only on request
+    columns = nocdyn.summary("/".join(("out", *case[1:])))["columns"]
+    all_names = [name for name in columns if "] [" not in name]  # of rods only on request
     if len(names) < len(all_names):
         rest = len(all_names) - len(names)
         assert f"({rest} more column{'s' * (rest > 1)}: summary.json has all; " in printed
