@@ -181,6 +181,22 @@ class InductionMotor:
             rate_s = part * rate_r + (turning - 1 / ARC) * (stator - part * rotor)
         return rate_s, rate_r, self.torque(stator, i_s)
 
+    def response(self, speed, frequency):
+        """Amplitude of the torque per amplitude of the speed, about the steady state; fluxes in the frame of the mains."""
+        slip_frequency = self.mains - self.pairs * speed
+        complex_matrix = -np.diag([self.r_s, self.r_r]) @ self.inverse - 1j * np.diag([self.mains, slip_frequency])
+        matrix = np.block([[complex_matrix.real, -complex_matrix.imag], [complex_matrix.imag, complex_matrix.real]])
+        stator, rotor, _ = self.steady(speed)
+        fluxes = np.array([stator, rotor])
+        by_speed = np.array([0.0, 1j * self.pairs * rotor])
+        turned = np.linalg.solve(1j * frequency * np.eye(4) - matrix, np.concatenate([by_speed.real, by_speed.imag]))
+        part = 1.5 * self.pairs * self.inverse[0]  # torque = Im(conj(stator) part . fluxes)
+        weights = np.conj(stator) * part  # of both fluxes
+        direct = np.conj(part @ fluxes)  # of the stator flux, conjugated
+        by_real = weights.imag + np.array([-direct.imag, 0.0])
+        by_imaginary = weights.real + np.array([-direct.real, 0.0])
+        return by_real @ turned[:2] + by_imaginary @ turned[2:]
+
     def steady(self, speed):
         """Fluxes at t = 0 and torque."""
         slip = 1 - self.pairs * speed / self.mains
@@ -222,18 +238,18 @@ def compressor_parts(m):
         torque[bearing_at] -= bearing["constant"] * np.tanh(speed[bearing_at] / bearing["constant_speed"])
         return torque
 
-    return train, mean, torques
+    return train, mean, torques, gas
 
 
 def compressor_speed(m):
-    _, mean, _ = compressor_parts(m)
+    _, mean, *_ = compressor_parts(m)
     motor = InductionMotor(m.motor["mains"])
     return brentq(lambda speed: motor.steady(speed)[2] + mean(speed).sum(), 60.0, 62.8, xtol=1e-14, rtol=1e-15)
 
 
 def reciprocating_compressor(with_damage=True):
     m = LoadCase("reciprocating_compressor", CASES["reciprocating_compressor"])
-    train, mean, torques = compressor_parts(m)
+    train, mean, torques, _ = compressor_parts(m)
     motor, supply = InductionMotor(m.motor["mains"]), m.motor["mains"]
     n, rotor = len(train.names), train.index("rotor")[0]
     speed = compressor_speed(m)
@@ -567,6 +583,34 @@ def generator_response(m, order, speed):
     return {f"moment_{name}": abs(stiffness(group) * (train.row[name] @ angle)) for name, group in m.coupling.items()}
 
 
+def compressor_response(m, order, speed):
+    """The same; the torque of the motor times the factor that holds the speed."""
+    train, mean, _, gas = compressor_parts(m)
+    motor, masses, bearing = InductionMotor(m.motor["mains"]), m.engine["masses"], m.load["bearings"]
+    frequency, rotor, load = order * speed, train.index("rotor")[0], mean(speed)
+    factor = -load.sum() / motor.steady(speed)[2]
+    load[rotor] -= load.sum()
+    angle = static_angles(train, load)
+    force = np.zeros(len(train.names), complex)
+    for body, dead_centre, harmonics in gas:
+        force[body] += harmonics[order] * np.exp(1j * order * (angle[body] - dead_centre))
+    if order <= 4:
+        for body, dead_centre in zip(train.index(*masses["cylinders"]), masses["firing"]):
+            amplitude = -1j * inertia_amplitudes(masses)[order - 1] * speed**2
+            force[body] += amplitude * np.exp(1j * order * (angle[body] - dead_centre))
+
+    def stiffness(group):
+        loss = group.get("relative_damping", 0.0) / (2 * np.pi)
+        return group["stiffness"] * (1 + 1j * loss) + 1j * frequency * group.get("damping", 0.0)
+
+    matrix = train.summed(stiffness) - np.diag(train.inertia) * frequency**2
+    matrix[rotor, rotor] -= 1j * frequency * factor * motor.response(speed, frequency)
+    brake, scale = train.index(bearing["body"])[0], bearing["constant_speed"]
+    matrix[brake, brake] += 1j * frequency * bearing["constant"] / scale / np.cosh(speed / scale) ** 2
+    angle = np.linalg.solve(matrix, force)
+    return {f"moment_{name}": abs(stiffness(group) * (train.row[name] @ angle)) for name, group in m.coupling.items()}
+
+
 def propeller_response(m, order, speed):
     """Amplitudes of the moments at both ends of the shafts, which are continuous."""
     frequency, water = order * speed, m.load["water"]["quadratic"]
@@ -584,6 +628,7 @@ def propeller_response(m, order, speed):
 
 
 RESPONSES = {
+    "reciprocating_compressor": (compressor_response, [(1, 590), (2, 590), (4, 590), (8, 590), (3, 235), (2, 350), (9, 550)]),
     "generator_set": (generator_response, [(4.5, 840), (6, 630), (3, 150), (0.5, 545)]),
     "ice_propeller": (propeller_response, [(4, 64), (8, 32), (4, 150)]),
 }

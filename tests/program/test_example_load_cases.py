@@ -85,6 +85,57 @@ STEADY_SPEEDS = {
 
 # and amplitudes of moments [N m] by order and speed [rpm].
 RESPONSES = {
+    "reciprocating_compressor": {
+        (1, 590): {
+            "moment_rubber": 1102.181053056,
+            "moment_shaft": 2403.445511463,
+            "moment_crank_1": 1938.395221797,
+            "moment_crank_2": 1803.025023862,
+            "moment_crank_3": 900.7681503718,
+        },
+        (2, 590): {
+            "moment_rubber": 55.01823394474,
+            "moment_shaft": 241.4822454611,
+            "moment_crank_1": 4552.692723828,
+            "moment_crank_2": 8842.20506686,
+            "moment_crank_3": 4440.00056411,
+        },
+        (4, 590): {
+            "moment_rubber": 38.78579982245,
+            "moment_shaft": 1025.699513116,
+            "moment_crank_1": 794.7017665291,
+            "moment_crank_2": 546.756012626,
+            "moment_crank_3": 274.9913329793,
+        },
+        (8, 590): {
+            "moment_rubber": 24.94486424646,
+            "moment_shaft": 2847.426000575,
+            "moment_crank_1": 2495.431325572,
+            "moment_crank_2": 1879.886574944,
+            "moment_crank_3": 992.2842008481,
+        },
+        (3, 235): {
+            "moment_rubber": 4708.32463408,
+            "moment_shaft": 1677.639837269,
+            "moment_crank_1": 1168.998397449,
+            "moment_crank_2": 944.1701153319,
+            "moment_crank_3": 468.9716174589,
+        },
+        (2, 350): {
+            "moment_rubber": 244.1046857204,
+            "moment_shaft": 80.79779248503,
+            "moment_crank_1": 3609.936724161,
+            "moment_crank_2": 7100.215758599,
+            "moment_crank_3": 3533.686100813,
+        },
+        (9, 550): {
+            "moment_rubber": 49.34944446908,
+            "moment_shaft": 6209.55093954,
+            "moment_crank_1": 5611.903029627,
+            "moment_crank_2": 4364.794524285,
+            "moment_crank_3": 2316.644218553,
+        },
+    },
     "generator_set": {
         (4.5, 840): {
             "moment_silicone": 1131.803753397,
