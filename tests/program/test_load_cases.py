@@ -280,7 +280,15 @@ def test_a_sweep_is_checked_for_the_machine_and_its_cases(nocdyn):
         ("name = 'a/b'", "m.nml:10: &load_case 'a/b': name = 'a/b' is no name of a folder; allowed: a name without / and "),
         ("name = '..'", "m.nml:10: &load_case '..': name = '..' is no name of a folder; allowed: "),
         ("name = 'a' with = 'faul'", "m.nml:10: &load_case 'a': with: there is no element 'faul'; did you mean 'fault'?"),
-        ("name = 'a' without = 'pump'", "m.nml:10: &load_case 'a': without: there is no element 'pump'"),
+        ("name = 'a' without = 'pump'", "m.nml:10: &load_case 'a': without: 'pump' is a &body; allowed: names of elements"),
+        ("name = 'a' with = 'a'", "m.nml:10: &load_case 'a': with: 'a' is a &load_case; allowed: names of elements"),
+        (
+            "name = 'a' with = 'fault' without = 'fault'",
+            "m.nml:10: &load_case 'a': with and without both name 'fault'; allowed: one of them",
+        ),
+        ("name = 'cases.json'", "m.nml:10: &load_case 'cases.json': name = 'cases.json' is that of a file of all load cases"),
+        ("name = 'a' set = 'output.directory=x'", "m.nml:10: &load_case 'a': set 'output.directory=x': no load case sets that"),
+        ("name = 'a' set = 'load_case.a.repeats=4'", "m.nml:10: &load_case 'a': set 'load_case.a.repeats=4': no load case sets"),
         ("name = 'a' repeats = 0", "m.nml:10: &load_case 'a': repeats = 0 is out of range; allowed: > 0"),
         (
             "name = 'a' set = 'load.work.quadratik=1'",

@@ -25,7 +25,7 @@ module nocdyn_modes
   !> A mode, or a pair of conjugate complex ones.
   type, public :: mode_t
     integer :: kind = mode_oscillating
-    integer :: internal = 0              !! of `mode_internal`: the internal state of the machine that takes part most
+    integer :: internal = 0              !! the internal state that takes part most, if they do more than the motion
     complex(wp) :: eigenvalue = 0.0_wp   !! imaginary part >= 0 [1/s]
     real(wp) :: undamped = 0.0_wp        !! frequency of the most similar undamped mode, negative if that
                                                   !! diverges [Hz]
@@ -134,17 +134,16 @@ contains
     end if
   end subroutine fill_mode
 
-  !> Whether a mode with a real eigenvalue is one of the internal states: they take part more than the motion does. Participation
-  !> factors, products of left and right eigenvectors, compare states of different units.
+  !> Whether a mode is one of the internal states: they take part more than the motion does. With a real eigenvalue it is of a
+  !> kind of its own. Participation factors, products of left and right eigenvectors, compare states of different units.
   subroutine find_internal(linear, participation, mode)
     type(linearisation_t), intent(in) :: linear
     complex(wp), intent(in) :: participation(:)   !! [first-order states]
     type(mode_t), intent(inout) :: mode
 
-    if (mode%kind == mode_oscillating) return
     associate (shares => abs(participation), mechanical => size(linear%natural) + size(linear%flexible))
       if (sum(shares(mechanical + 1:)) <= sum(shares(:mechanical))) return
-      mode%kind = mode_internal
+      if (mode%kind /= mode_oscillating) mode%kind = mode_internal
       mode%internal = maxloc(shares(mechanical + 1:), dim=1)
     end associate
   end subroutine find_internal

@@ -6,7 +6,7 @@ module nocdyn_modes_files
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
-  use nocdyn_modes, only: kind_names, mode_internal, mode_oscillating, mode_t
+  use nocdyn_modes, only: kind_names, mode_oscillating, mode_t
   use nocdyn_modes_report, only: modes_report_t
   use nocdyn_printable, only: as_utf_8
   use nocdyn_text, only: string_t, to_text
@@ -194,7 +194,7 @@ contains
       call json%open()
       if (mode%kind == mode_oscillating) call json%put('mode', count(self%modes(:i)%kind == mode_oscillating))
       call json%put('kind', trim(kind_names(mode%kind)))
-      if (mode%kind == mode_internal) call json%put('state', self%machine%internal_name(mode%internal))
+      if (mode%internal > 0) call json%put('state', self%machine%internal_name(mode%internal))
       call json%put('frequency_Hz', mode%frequency())
       call json%put('undamped_frequency_Hz', mode%undamped)
       call json%put('damping_ratio', mode%damping_ratio())

@@ -157,12 +157,22 @@ contains
         call report%append_line(repeat(' ', number_width - len(to_text(i))) // to_text(i) // cell(mode%frequency()) // rpm // &
                                 cell(mode%undamped) // cell(mode%damping_ratio()) // time_cell(mode) // '  ' // &
                                 padded(shares_text(mode%kinetic, self%kinetic_names), width) // '  ' // &
-                                shares_text(mode%potential, self%elastic_names) // &
+                                shares_text(mode%potential, self%elastic_names) // internal_text(self, mode) // &
                                 trim(merge(', unstable', '          ', mode%is_unstable())))
       end associate
     end do
     if (shown < size(chosen)) call report%append_line('  (' // to_text(size(chosen) - shown) // ' more in modes.csv)')
   end subroutine put_oscillations
+
+  !> "; mostly stator flux d of motor 'mains'".
+  function internal_text(self, mode) result(text)
+    type(modes_report_t), intent(in) :: self
+    type(mode_t), intent(in) :: mode
+    character(len=:), allocatable :: text
+
+    text = ''
+    if (mode%internal > 0) text = '; mostly ' // self%machine%internal_name(mode%internal)
+  end function internal_text
 
   function time_cell(mode) result(text)
     type(mode_t), intent(in) :: mode

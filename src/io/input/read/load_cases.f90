@@ -22,6 +22,8 @@ module nocdyn_load_cases
     integer :: common_run = 0             !! the &run without a case, 0: none
   end type members_t
 
+  character(len=*), parameter :: files_of_all(*) = [character(len=10) :: 'cases.json', 'cases.csv']   ! beside the folders
+
 contains
 
   !> Whether a group is a &run that names a load case.
@@ -52,6 +54,8 @@ contains
       call check_folder(input, members%groups(c), diagnostics)
       call find_members(input, members%groups(c), 'with', members%has(c, :), diagnostics)
       call find_members(input, members%groups(c), 'without', members%lacks(c, :), diagnostics)
+      call check_members(input, members%groups(c), members%has(c, :) .and. members%lacks(c, :), diagnostics)
+      call check_values(input, members%groups(c), diagnostics)
     end do
     do c = 1, size(members%groups)
       call describe_case(input%groups(members%groups(c)), input%load_cases(c))
@@ -145,11 +149,47 @@ contains
     type(diagnostics_t), intent(inout) :: diagnostics
 
     associate (name => input%groups(group)%name)
-      if (index(name, '/') == 0 .and. index(name, '.') /= 1) return
-      call input%report(group, 'name', 'name = ' // quoted(shortened(name)) // &
-                        ' is no name of a folder; allowed: a name without / and without a dot at its beginning', diagnostics)
+      if (any(name == files_of_all)) then
+        call input%report(group, 'name', 'name = ' // quoted(name) // ' is that of a file of all load cases; allowed: ' // &
+                          'another name', diagnostics)
+      else if (index(name, '/') > 0 .or. index(name, '.') == 1) then
+        call input%report(group, 'name', 'name = ' // quoted(shortened(name)) // &
+                          ' is no name of a folder; allowed: a name without / and without a dot at its beginning', diagnostics)
+      end if
     end associate
   end subroutine check_folder
+
+  !> Refuses elements that a load case has and leaves out.
+  subroutine check_members(input, group, are_both, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: group   !! the &load_case
+    logical, intent(in) :: are_both(:)   !! [groups]
+    type(diagnostics_t), intent(inout) :: diagnostics
+    integer :: g
+
+    do g = 1, size(are_both)
+      if (are_both(g)) call input%report(group, 'with', 'with and without both name ' // quoted(input%groups(g)%name) // &
+                                         '; allowed: one of them', diagnostics)
+    end do
+  end subroutine check_members
+
+  !> Refuses values of a load case that are not those of its machine, its run or its output.
+  subroutine check_values(input, group, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: group   !! the &load_case
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(string_t), allocatable :: values(:)
+    character(len=:), allocatable :: value
+    integer :: i
+
+    allocate (values, source=input%groups(group)%texts('set'))
+    do i = 1, size(values)
+      value = adjustl(values(i)%text)
+      if (index(value, 'load_case.') /= 1 .and. index(value, 'output.directory') /= 1) cycle
+      call input%report(group, 'set', 'set ' // quoted(shortened(value)) // ': no load case sets that; allowed: ' // &
+                        'values of the machine, of &run and of &output without directory', diagnostics)
+    end do
+  end subroutine check_values
 
   !> Marks the elements that a load case names.
   subroutine find_members(input, group, key, is_named, diagnostics)
@@ -176,10 +216,27 @@ contains
         found = g
         is_named(g) = .true.
       end do
-      if (found == 0) call input%report(group, key, key // ': there is no element ' // quoted(shortened(names(i)%text)) // &
-                                        suggestion(names(i)%text, elements), diagnostics)
+      if (found > 0) cycle
+      g = other_group(input, names(i)%text)
+      if (g > 0) then
+        call input%report(group, key, key // ': ' // quoted(names(i)%text) // ' is a &' // trim(input%groups(g)%kind) // &
+                          '; allowed: names of elements', diagnostics)
+      else
+        call input%report(group, key, key // ': there is no element ' // quoted(shortened(names(i)%text)) // &
+                          suggestion(names(i)%text, elements), diagnostics)
+      end if
     end do
   end subroutine find_members
+
+  !> A group with a name that is no element, 0 if there is none.
+  pure integer function other_group(input, name) result(group)
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: name
+
+    do group = size(input%groups), 1, -1
+      if (input%groups(group)%name == name .and. name /= '') return
+    end do
+  end function other_group
 
   !> Whether a group is one that load cases can have or lack: one with a name, no body, no load case.
   logical function is_element(group)
