@@ -358,6 +358,7 @@ HELD = "&coupling name = 'g' bodies = 'ground', 'two' stiffness = 1 /\n&run"
             "machine.nml:6: &response: speed = 90, 30 rad/s, which is 859.437, 286.479 rpm; allowed: first the slower speed",
         ),
         ("speed_rpm = 300, 1500", "speed = -10, 30", "both with one sign"),
+        ("speed_rpm = 300, 1500", "speed_rpm = -900, -300", "&response: speed_rpm = -900, -300; allowed: first the slower"),
         ("count = 13", "orders = 3", "no excitation has the order 3 of 'one'; the orders of the excitations are 2"),
         (SHAKEN, "", "nothing excites this machine"),
         ("&run", "&limit coupling = 'shaft' /\n&run", "&limit: nothing is limited; needed: vibratory_moment, moment, stress"),

@@ -168,8 +168,8 @@ def test_no_damage_below_the_endurance_limit_and_means_beyond_the_strength(nocdy
         ("profile_speeds = 100 profile_hours = -1", "profile_hours(1) = -1 is out of range; allowed: > 0 [h]"),
         (
             "profile_speeds_rpm = 600, 1600 profile_hours = 1, 2",
-            "profile_speeds(2) = 167.552 rad/s (1600 rpm) is outside of the speeds of &response; "
-            "allowed: from 40 rad/s (381.972 rpm) to 160 rad/s (1527.89 rpm)",
+            "profile_speeds_rpm(2) = 1600 is outside of the speeds of &response; "
+            "allowed: 381.97186342055 to 1527.8874536822 [rpm]",
         ),
     ],
 )

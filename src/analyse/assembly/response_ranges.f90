@@ -3,8 +3,9 @@ module nocdyn_response_ranges
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_text, only: rounded_text, to_text
+  use nocdyn_text, only: rounded_text
   use nocdyn_units, only: from_si, unit_rpm
+  use nocdyn_written_values, only: unit_of, written_key, written_number
   implicit none (type, external)
   private
 
@@ -36,13 +37,18 @@ contains
     character(len=*), intent(in) :: key
     real(wp), intent(in) :: range(:)   !! [rad/s], or empty
     type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: text
 
     if (size(range) == 0) return
     if (range(1) * range(2) > 0 .and. abs(range(1)) < abs(range(2))) return
-    call raise(error, exit_input, input%location(group, key) // ': ' // key // ' = ' // to_text(range(1)) // ', ' // &
-               to_text(range(2)) // ' rad/s, which is ' // rounded_text(from_si(range(1), unit_rpm), 6) // ', ' // &
-               rounded_text(from_si(range(2), unit_rpm), 6) // ' rpm; allowed: first the slower speed, then the faster one, ' // &
-               'both with one sign')
+    associate (written => input%groups(group))
+      text = written_key(written, key) // ' = ' // written_number(written, key, range(1)) // ', ' // &
+             written_number(written, key, range(2))
+      if (unit_of(written, key) == 0) text = text // ' rad/s, which is ' // rounded_text(from_si(range(1), unit_rpm), 6) // &
+                                             ', ' // rounded_text(from_si(range(2), unit_rpm), 6) // ' rpm'
+    end associate
+    call raise(error, exit_input, input%location(group, key) // ': ' // text // '; allowed: first the slower speed, then ' // &
+               'the faster one, both with one sign')
   end subroutine check_range
 
 end module nocdyn_response_ranges

@@ -5,8 +5,8 @@ module nocdyn_fatigue_groups
   use nocdyn_kinds, only: wp
   use nocdyn_near_words, only: nearest_word
   use nocdyn_sn_curves, only: mean_strength, new_sn_curve, sn_curve_t
-  use nocdyn_text, only: counted, quoted, rounded_text, string_t, to_text
-  use nocdyn_units, only: from_si, unit_rpm
+  use nocdyn_text, only: counted, quoted, string_t, to_text
+  use nocdyn_written_values, only: written_element, written_number, written_unit
   implicit none (type, external)
   private
 
@@ -190,11 +190,12 @@ contains
     allocate (range, source=input%groups(responses(1))%numbers('speed'))
     do i = 1, size(speeds)
       if (minval(range) <= speeds(i) .and. speeds(i) <= maxval(range)) cycle
-      call raise(error, exit_input, input%location(index, 'profile_speeds') // ': profile_speeds(' // to_text(i) // ') = ' // &
-                 rounded_text(speeds(i), 6) // ' rad/s (' // rounded_text(from_si(speeds(i), unit_rpm), 6) // ' rpm) is ' // &
-                 'outside of the speeds of &response; allowed: from ' // rounded_text(range(1), 6) // ' rad/s (' // &
-                 rounded_text(from_si(range(1), unit_rpm), 6) // ' rpm) to ' // rounded_text(range(2), 6) // ' rad/s (' // &
-                 rounded_text(from_si(range(2), unit_rpm), 6) // ' rpm)')
+      associate (group => input%groups(index))
+        call raise(error, exit_input, input%location(index, 'profile_speeds') // ': ' // &
+                   written_element(group, 'profile_speeds', i) // ' is outside of the speeds of &response; allowed: ' // &
+                   written_number(group, 'profile_speeds', range(1)) // ' to ' // &
+                   written_number(group, 'profile_speeds', range(2)) // ' [' // written_unit(group, 'profile_speeds') // ']')
+      end associate
       return
     end do
   end subroutine check_profile

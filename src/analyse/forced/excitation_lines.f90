@@ -28,6 +28,7 @@ module nocdyn_excitation_lines
   type, public :: source_t
     integer :: element = 0
     real(wp) :: frequency = 0.0_wp      !! Omega at this speed [rad/s]
+    real(wp) :: order = 0.0_wp          !! oscillations per turn of the reference body
     complex(wp) :: moment = 0.0_wp      !! moment exp(i Omega t) on `to` [N m], or a twist in series with the element [rad]
     logical :: is_twist = .false.       !! the latter
   end type source_t
@@ -96,6 +97,8 @@ contains
 
     source%is_twist = harmonic%is_twist
     source%frequency = harmonic%frequency + harmonic%order * state%omega(harmonic%body)
+    source%order = abs(source%frequency / state%speed)
+    if (.not. abs(harmonic%frequency) > 0) source%order = abs(harmonic%order * (state%omega(harmonic%body) / state%speed))
     angle = harmonic%order * state%phi(harmonic%body)
     source%moment = harmonic%amplitude * cmplx(cos(angle), sin(angle), wp)
     if (source%frequency >= 0) return
@@ -104,9 +107,8 @@ contains
   end subroutine set_source
 
   !> The lines of sources at the lowest and the highest speed, ascending by frequency. Harmonics of frequency zero are left out.
-  subroutine new_lines(low, high, low_speed, high_speed, lines)
+  subroutine new_lines(low, high, lines)
     type(source_t), intent(in) :: low(:), high(:)       !! the same harmonics at both speeds
-    real(wp), intent(in) :: low_speed, high_speed       !! of the reference body [rad/s]
     type(line_t), allocatable, intent(out) :: lines(:)
     integer :: first, k, line_of(size(low)), least, n
     logical :: is_left(size(low))
@@ -130,8 +132,8 @@ contains
       lines(k)%source = pack([(least, least=1, size(low))], line_of == first)
       is_left = is_left .and. line_of /= first
       associate (source => lines(k)%source(1))
-        lines(k)%order = low(source)%frequency / abs(low_speed)
-        lines(k)%is_order = is_same(lines(k)%order, high(source)%frequency / abs(high_speed))
+        lines(k)%order = low(source)%order
+        lines(k)%is_order = is_same(low(source)%order, high(source)%order)
         lines(k)%family = k
         if (lines(k)%is_order) lines(k)%family = -1
         lines(k)%is_fixed = is_same(low(source)%frequency, high(source)%frequency)

@@ -68,7 +68,7 @@ contains
     if (allocated(error)) return
     call list_sources(machine, low, of_low)
     call list_sources(machine, high, of_high)
-    call new_lines(of_low, of_high, speeds(1), speeds(size(speeds)), self%lines)
+    call new_lines(of_low, of_high, self%lines)
     call list_quantities(machine, reference, self%quantities)
     allocate (self%points(0))
   end subroutine new_forced_response

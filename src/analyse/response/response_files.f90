@@ -190,6 +190,7 @@ contains
         associate (point => response%points(i))
           do l = 1, size(response%lines)
             row(:3) = [point%state%speed, point%frequency(l) / abs(point%state%speed), point%frequency(l) / turn]
+            if (response%lines(l)%is_order) row(2) = response%lines(l)%order   ! without the rounding of the frequency
             n = 3 + 2 * size(response%quantities)
             row(4:n:2) = abs(point%quantity(l, :))
             row(5:n:2) = phase(point%quantity(l, :))
