@@ -184,7 +184,7 @@ BARE = RELEASED.replace(" section_modulus=1e-5", "").format(t_end=1)
         ("coupling='c'", "slope"),
         (
             "coupling='c' table_moment=10, 5, 1 table_cycles=10, 100",
-            ":5: &fatigue 'f': table_moment has 3 values, table_cycles has 2; needed: as many",
+            ":5: &fatigue 'f': table_moment has 3 values and table_cycles has 2 values; needed: as many of each",
         ),
         (
             "coupling='c' table_moment=10, 11 table_cycles=10, 100",

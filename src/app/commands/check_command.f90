@@ -62,14 +62,15 @@ contains
     if (.not. allocated(input%load_case)) sizes = sizes // load_cases_line(input)
     if (has_sweep(input)) then
       call make_plan(input, plan, error)
-      if (.not. allocated(error)) then
+      if (allocated(error)) then
+        if (.not. has_load_cases(input)) return
+        sizes = sizes // new_line('a') // '  no sweep of this machine: ' // error%message
+        deallocate (error)
+      else
         bytes = plan%file_bytes(plan%design%variants, has_table=.false.)
         sizes = sizes // new_line('a') // '  sweep: ' // plan%summary()
         if (bytes >= large) sizes = sizes // new_line('a') // '  files: about ' // bytes_text(bytes)
         call check_variants(plan, plan%design%variants, .false., result_folder(arguments, input), 0.0_wp, error)
-      else if (has_load_cases(input)) then
-        sizes = sizes // new_line('a') // '  no sweep of this machine: ' // error%message
-        deallocate (error)
       end if
     else
       bytes = trajectory_bytes(row_count(input), columns, wants_netcdf(input))

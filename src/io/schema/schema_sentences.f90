@@ -29,11 +29,41 @@ contains
     do i = 1, size(relation_rules)
       associate (relation => relation_rules(i))
         if (relation%group /= rule%group .or. relation%form /= exactly_one) cycle
-        if (has_word(relation%first, rule%name)) text = 'this or ' // relation%second(:index(relation%second, ' ') - 1)
-        if (has_word(relation%second, rule%name)) text = 'this or ' // relation%first(:index(relation%first, ' ') - 1)
+        if (has_word(relation%first, rule%name)) text = 'this or ' // others(rule, relation%second, relation%first)
+        if (has_word(relation%second, rule%name)) text = 'this or ' // others(rule, relation%first, relation%second)
       end associate
     end do
   end function default_text
+
+  !> What may stand in place of a key: keys of the other set, and those of its own that exclude it.
+  pure function others(rule, other_set, own_set) result(text)
+    type(key_rule_t), intent(in) :: rule
+    character(len=*), intent(in) :: other_set, own_set   !! keys, separated by blanks
+    character(len=:), allocatable :: text
+    type(string_t), allocatable :: keys(:), own(:)
+    integer :: i
+
+    allocate (keys, source=words_in(other_set))
+    if (.not. are_alternatives(rule%group, keys)) keys = keys(:1)
+    allocate (own, source=words_in(own_set))
+    if (are_alternatives(rule%group, own)) then
+      do i = 1, size(own)
+        if (own(i)%text /= rule%name) call append(keys, own(i)%text)
+      end do
+    end if
+    text = listed(keys, ' or ')
+  end function others
+
+  !> Whether the first keys of a set exclude each other.
+  pure logical function are_alternatives(group, keys)
+    character(len=*), intent(in) :: group
+    type(string_t), intent(in) :: keys(:)
+
+    are_alternatives = size(keys) > 1
+    if (are_alternatives) are_alternatives = any(relation_rules%group == group .and. relation_rules%form == at_most_one .and. &
+                                                 relation_rules%first == keys(1)%text .and. &
+                                                 relation_rules%second == keys(2)%text)
+  end function are_alternatives
 
   !> "or speed_rpm [rpm]", '' if the key has no other unit.
   pure function unit_sentence(rule) result(text)
@@ -69,7 +99,8 @@ contains
     allocate (second, source=words_in(relation%second))
     select case (relation%form)
     case (exactly_one)
-      text = 'Either ' // listed(first, ' and ') // ' or ' // listed(second, ' and ')
+      text = 'Either ' // listed(first, conjunction(group_rule, first)) // ' or ' // &
+             listed(second, conjunction(group_rule, second))
     case (at_most_one)
       text = 'No ' // listed(second, ' or ') // ' beside ' // listed(first, ' or ')
     case (requires)
@@ -89,5 +120,15 @@ contains
       error stop 'nocdyn_schema_sentences: a relation has no sentence'
     end select
   end function sentence
+
+  !> What joins the keys of a set.
+  pure function conjunction(group_rule, keys) result(word)
+    integer, intent(in) :: group_rule
+    type(string_t), intent(in) :: keys(:)
+    character(len=:), allocatable :: word
+
+    word = ' and '
+    if (are_alternatives(group_rules(group_rule)%name, keys)) word = ' or '
+  end function conjunction
 
 end module nocdyn_schema_sentences

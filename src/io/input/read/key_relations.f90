@@ -29,7 +29,7 @@ contains
       associate (relation => relations%list(i))
         select case (relation%form)
         case (exactly_one, at_most_one)
-          call choose(group, relation, diagnostics)
+          call choose(group, relation, relations, diagnostics)
         case (requires)
           call check_requirement(group, relation%first, relation%second, diagnostics)
         case (equal_lengths, columns)
@@ -130,9 +130,10 @@ contains
   end subroutine refuse_foreign_key
 
   !> Keeps one of two sets of keys.
-  subroutine choose(group, relation, diagnostics)
+  subroutine choose(group, relation, relations, diagnostics)
     type(raw_group_t), intent(inout) :: group
     type(relation_t), intent(in) :: relation   !! `exactly_one` or `at_most_one`
+    type(relations_t), intent(in) :: relations
     type(diagnostics_t), intent(inout) :: diagnostics
     integer :: one, other
 
@@ -153,11 +154,29 @@ contains
     else if (relation%form == exactly_one) then
       if (any(group%keys([relation%first, relation%second])%may_be_missing)) return
       if (any(group%keys([relation%first, relation%second])%is_excluded)) return
-      call group%report([integer ::], listed_keys(group%rule, [relation%first(1), relation%second(1)], ' or ') // &
+      call group%report([integer ::], listed_keys(group%rule, [alternatives(relations, relation%first), &
+                                                               alternatives(relations, relation%second)], ' or ') // &
                         ' is missing; one of them is needed', diagnostics)
       group%keys([relation%first, relation%second])%may_be_missing = .true.   ! it is reported
     end if
   end subroutine choose
+
+  !> The keys of a set that exclude each other; of a set that belongs together the first one.
+  pure function alternatives(relations, keys)
+    type(relations_t), intent(in) :: relations
+    integer, intent(in) :: keys(:)   !! positions
+    integer, allocatable :: alternatives(:)
+    integer :: i
+
+    alternatives = keys(:1)
+    if (size(keys) == 1) return
+    do i = 1, size(relations%list)
+      associate (relation => relations%list(i))
+        if (relation%form /= at_most_one) cycle
+        if (relation%first(1) == keys(1) .and. relation%second(1) == keys(2)) alternatives = keys
+      end associate
+    end do
+  end function alternatives
 
   !> Excludes keys because another set is given.
   subroutine supersede(group, positions)
