@@ -365,3 +365,11 @@ def test_a_sweep_varies_the_machine_of_a_case(nocdyn):
     refused = nocdyn("sweep", "m.nml", "--case", "shirt")
     assert refused.returncode == 2
     assert refused.stderr == "nocdyn: m.nml: --case: there is no &load_case 'shirt'; did you mean 'short'?\n"
+
+
+def test_limits_that_a_case_exceeds_are_told_with_its_name(nocdyn):
+    limit = "&limit coupling = 'shaft' moment = 700 /\n"
+    nocdyn.write("m.nml", MACHINE + FAULT + RUN + limit + CASES)
+    lines = [line for line in nocdyn("run", "m.nml", "--out", "out").stdout.splitlines() if "limit exceeded" in line]
+    assert len(lines) == 1
+    assert lines[0].startswith("m.nml: load case 'fault': limit exceeded: shaft_shaft [N m] has reached ")

@@ -85,17 +85,18 @@ contains
   end subroutine put_run_limits
 
   !> A line for every limit that is exceeded, each with a line feed; '' if all are kept.
-  function run_limits_text(limits) result(text)
+  function run_limits_text(limits, before) result(text)
     type(run_limit_t), intent(in) :: limits(:)
+    character(len=*), intent(in) :: before   !! at the beginning of each line
     character(len=:), allocatable :: text
     integer :: i
 
     text = ''
     do i = 1, size(limits)
       if (limits(i)%largest <= limits(i)%limit) cycle
-      text = text // 'limit exceeded: ' // limits(i)%column // ' has reached ' // rounded_text(limits(i)%largest, 6) // ', ' // &
-             rounded_text(100.0_wp * limits(i)%largest / limits(i)%limit, 3) // ' % of ' // rounded_text(limits(i)%limit, 6) // &
-             new_line('a')
+      text = text // before // 'limit exceeded: ' // limits(i)%column // ' has reached ' // &
+             rounded_text(limits(i)%largest, 6) // ', ' // rounded_text(100.0_wp * limits(i)%largest / limits(i)%limit, 3) // &
+             ' % of ' // rounded_text(limits(i)%limit, 6) // new_line('a')
     end do
   end function run_limits_text
 

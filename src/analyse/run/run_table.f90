@@ -36,7 +36,7 @@ contains
     if (input%title() /= '') call report%append_line(input%title())
     call append_columns(report, summary, left)
     call report%append(text)
-    if (allocated(summary%limits)) call report%append(run_limits_text(summary%limits))
+    if (allocated(summary%limits)) call report%append(run_limits_text(summary%limits, ''))
     if (allocated(summary%fatigue%items)) call report%append(fatigue_text(summary%fatigue))
     text = report%text()
   end function summary_table

@@ -264,7 +264,7 @@ contains
         call print_text(input%shown_case() // ': note: ' // summary%notes(i)%text)
       end do
       if (shows_table(arguments, input)) call print_text(summary_table(input, summary))
-      if (.not. shows_table(arguments, input)) call print_text(run_limits_text(summary%limits))
+      if (.not. shows_table(arguments, input)) call print_text(run_limits_text(summary%limits, input%shown_case() // ': '))
       if (len(method_line(input, summary)) > 0) call print_text(method_line(input, summary))
       call print_text(summary_line(input, summary, folder))
     end if
