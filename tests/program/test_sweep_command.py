@@ -418,7 +418,8 @@ def test_the_program_for_sweeps_has_help_and_version(nocdyn, words, same):
 
 def test_help_on_sweep_names_its_options_and_no_others(nocdyn):
     text = nocdyn("help", "sweep").stdout
-    assert set(re.findall(r"--\w+", text)) == {"--out", "--set", "--threads", "--shard", "--resume", "--csv", "--quiet"}
+    options = {"--out", "--set", "--case", "--threads", "--shard", "--resume", "--csv", "--quiet"}
+    assert set(re.findall(r"--\w+", text)) == options
 
 
 def test_without_the_program_for_sweeps_a_sweep_says_why_it_cannot_be(nocdyn, discs):

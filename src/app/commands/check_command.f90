@@ -62,16 +62,8 @@ contains
     if (.not. allocated(input%load_case)) sizes = sizes // load_cases_line(input)
     if (has_sweep(input)) then
       call make_plan(input, plan, error)
-      if (allocated(error)) then
-        if (.not. has_load_cases(input)) return
-        sizes = sizes // new_line('a') // '  no sweep of this machine: ' // error%message
-        deallocate (error)
-      else
-        bytes = plan%file_bytes(plan%design%variants, has_table=.false.)
-        sizes = sizes // new_line('a') // '  sweep: ' // plan%summary()
-        if (bytes >= large) sizes = sizes // new_line('a') // '  files: about ' // bytes_text(bytes)
-        call check_variants(plan, plan%design%variants, .false., result_folder(arguments, input), 0.0_wp, error)
-      end if
+      if (allocated(error) .and. .not. has_load_cases(input)) return
+      call add_sweep_lines(arguments, input, plan, sizes, error)
     else
       bytes = trajectory_bytes(row_count(input), columns, wants_netcdf(input))
       if (bytes >= large) sizes = sizes // new_line('a') // '  trajectory.' // &
@@ -81,6 +73,26 @@ contains
     end if
     call print_text(machine_report(input%shown_file(), machine) // speed_table(input, machine) // sizes)
   end subroutine check
+
+  !> What the sweep of a machine is. With load cases it may be that of another one.
+  subroutine add_sweep_lines(arguments, input, plan, lines, error)
+    type(arguments_t), intent(in) :: arguments
+    type(input_t), intent(in) :: input
+    type(sweep_plan_t), intent(in) :: plan
+    character(len=:), allocatable, intent(inout) :: lines
+    type(error_t), allocatable, intent(inout) :: error   !! why there is no plan; then why it is too large
+    real(wp) :: bytes
+
+    if (allocated(error)) then
+      lines = lines // new_line('a') // '  no sweep of this machine: ' // error%message
+      deallocate (error)
+      return
+    end if
+    bytes = plan%file_bytes(plan%design%variants, has_table=.false.)
+    lines = lines // new_line('a') // '  sweep: ' // plan%summary()
+    if (bytes >= large) lines = lines // new_line('a') // '  files: about ' // bytes_text(bytes)
+    call check_variants(plan, plan%design%variants, .false., result_folder(arguments, input), 0.0_wp, error)
+  end subroutine add_sweep_lines
 
   !> Whether a machine has load cases, or is one.
   pure logical function has_load_cases(input)

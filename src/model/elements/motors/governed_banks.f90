@@ -129,7 +129,7 @@ contains
     integer, intent(in) :: element   !! numbered within the bank
     real(wp), intent(in) :: t        !! [s]
     real(wp), intent(in) :: speed    !! u' [rad/s]
-    real(wp), intent(in) :: throttle   !! 1: open
+    real(wp), intent(in) :: throttle   !! y, 1 if it is open
 
     associate (gain => self%parameters(self%number_of('governor_gain'))%value(1, element))
       z = throttle - gain * (set_speed_at(self, element, t) - speed)

@@ -62,7 +62,7 @@ module nocdyn_schema_torques
     key_rule_t('motor',      'synchronous_speed', a_number,     1, 'rad/s',       required,    not_zero, &
       'speed without slip', 'induction'), &
     key_rule_t('motor',      'voltage',         a_number,       1, 'V',           required,    anything, &
-      'of the supply; of mains between two lines, rms; on a name plate the rated one (supply_factors)', &
+      'of the supply; of mains between lines, rms; on a name plate the rated one (supply_factors)', &
       'induction_dq dc'), &
     key_rule_t('motor',      'frequency',       a_number,       1, 'rad/s',       required,    positive, &
       'angular frequency of the mains', 'induction_dq synchronous'), &
