@@ -20,7 +20,7 @@ module nocdyn_linearisation
   implicit none (type, external)
   private
 
-  public :: linearise, mass_matrix, undamped_modes
+  public :: linearise, mass_matrix, tangent_stiffness, undamped_modes
 
   !> A mode is rigid if its natural frequency is below these shares of the highest one: the rounding of singular
   !> values and of eigenvalues, which are squares.
@@ -48,24 +48,57 @@ contains
     type(element_coordinates_t) :: incidence
     type(pattern_t) :: pattern
     real(wp), allocatable :: slopes(:, :), stiffness(:)
-    real(wp) :: dfdt(1, formulation%states)
-    integer :: status(1)
 
     pattern = formulation%jacobian_pattern()
-    allocate (slopes(1, size(pattern%row)))
-    status = 0
-    call formulation%start_lane(1, t, reshape(y, [size(y)]))
-    call formulation%jacobian([t], y, slopes, dfdt, status)
+    call differentiate(formulation, t, y, size(pattern%row), slopes)
     incidence = new_element_coordinates(formulation%machine%elements, formulation%machine%coordinates)
-    associate (elements => formulation%machine%elements)
-      stiffness = -(elements%restoring_angle(1, :) + elements%applied_angle(1, :))
-    end associate
+    stiffness = differentiated_stiffness(formulation%machine)
     call refuse_not_finite(formulation%machine, stiffness, error)
     if (.not. allocated(error)) call undamped_modes(formulation%machine, incidence, stiffness, self, error)
     if (allocated(error)) return
     call assemble(formulation, self)
     if (formulation%states > 2 * size(self%natural)) call add_internal(formulation, pattern, slopes(1, :), self)
   end subroutine linearise
+
+  !> Tangent stiffness and damping of all elements at a state of a formulation of one lane without work integrals.
+  subroutine tangent_stiffness(formulation, t, y, stiffness, damping)
+    class(formulation_t), intent(inout) :: formulation
+    real(wp), intent(in) :: t                          !! [s]
+    real(wp), contiguous, intent(in) :: y(:, :)        !! [1, states]
+    real(wp), allocatable, intent(out) :: stiffness(:) !! [N m/rad], [elements]
+    real(wp), allocatable, intent(out) :: damping(:)   !! [N m s/rad], [elements]
+    type(pattern_t) :: pattern
+    real(wp), allocatable :: slopes(:, :)
+
+    pattern = formulation%jacobian_pattern()
+    call differentiate(formulation, t, y, size(pattern%row), slopes)
+    stiffness = differentiated_stiffness(formulation%machine)
+    damping = -formulation%machine%elements%applied_speed(1, :)
+  end subroutine tangent_stiffness
+
+  !> Differentiates the laws of all elements, and the equations of motion.
+  subroutine differentiate(formulation, t, y, entries, slopes)
+    class(formulation_t), intent(inout) :: formulation
+    real(wp), intent(in) :: t                        !! [s]
+    real(wp), contiguous, intent(in) :: y(:, :)      !! [1, states]
+    integer, intent(in) :: entries                   !! of the pattern of the Jacobian
+    real(wp), allocatable, intent(out) :: slopes(:, :)   !! Jacobian, [1, entries]
+    real(wp) :: dfdt(1, formulation%states)
+    integer :: status(1)
+
+    allocate (slopes(1, entries))
+    status = 0
+    call formulation%start_lane(1, t, reshape(y, [size(y)]))
+    call formulation%jacobian([t], y, slopes, dfdt, status)
+  end subroutine differentiate
+
+  !> Of all elements [N m/rad].
+  pure function differentiated_stiffness(machine) result(stiffness)
+    type(machine_t), intent(in) :: machine   !! differentiated
+    real(wp), allocatable :: stiffness(:)
+
+    stiffness = -(machine%elements%restoring_angle(1, :) + machine%elements%applied_angle(1, :))
+  end function differentiated_stiffness
 
   subroutine refuse_not_finite(machine, stiffness, error)
     type(machine_t), intent(in) :: machine   !! differentiated

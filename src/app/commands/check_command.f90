@@ -1,6 +1,7 @@
 !> nocdyn check: reads and analyses machines, integrates nothing.
 module nocdyn_check_command
   use nocdyn_arguments, only: arguments_t
+  use nocdyn_check_file, only: check_json
   use nocdyn_column_names, only: count_columns
   use nocdyn_console, only: print_text
   use nocdyn_disk_room, only: bytes_text
@@ -11,6 +12,7 @@ module nocdyn_check_command
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: machine_report
+  use nocdyn_output_file, only: write_file
   use nocdyn_output_times, only: output_note, row_count
   use nocdyn_result_folders, only: result_folder
   use nocdyn_run_files, only: check_rows, check_variants, trajectory_bytes, wants_netcdf
@@ -30,7 +32,7 @@ module nocdyn_check_command
 
 contains
 
-  !> Prints a report on every file.
+  !> Prints a report on every file; with --out, writes check.json.
   subroutine check_command(arguments, code)
     type(arguments_t), intent(in) :: arguments
     integer, intent(out) :: code   !! the highest exit code of all files
@@ -42,7 +44,7 @@ contains
     type(arguments_t), intent(in) :: arguments
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
-    character(len=*), intent(in) :: folder
+    character(len=*), intent(in) :: folder   !! '': nothing is written
     type(error_t), allocatable, intent(out) :: error
     type(sweep_plan_t) :: plan
     character(len=:), allocatable :: note, response, sizes
@@ -72,6 +74,7 @@ contains
                       result_folder(arguments, input), error)
     end if
     call print_text(machine_report(input%shown_file(), machine) // speed_table(input, machine) // sizes)
+    if (folder /= '' .and. .not. allocated(error)) call write_file(folder, 'check.json', check_json(input, machine), error)
   end subroutine check
 
   !> What the sweep of a machine is. With load cases it may be that of another one.

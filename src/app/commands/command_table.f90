@@ -24,6 +24,10 @@ contains
     type(command_t), allocatable, intent(out) :: commands(:)
 
     call list_analyses(commands)
+    call list_torsional_analyses(commands)
+    call add_command(commands, 'matrices', 'FILE', '--set --case', 'print the matrices of the method for a machine', &
+      'Prints every matrix and vector of the method for the machine at its start, with its equation number.' // nl // nl // &
+      '  --case NAME        look at the machine of this &load_case', matrices_command)
     call list_sweeps(commands)
     call add_command(commands, 'new', 'FILE', '', 'write a commented input to start from', &
                      'Writes a commented input file. A file that exists is not overwritten.', new_command)
@@ -47,11 +51,13 @@ contains
       '  --quiet            print nothing but errors' // nl // nl // &
       'A file with errors does not stop the others; the exit code is the highest of all files. After Ctrl-C or a' // nl // &
       'failed computation, the rows up to there are in trajectory.partial.csv.', run_command)
-    call add_command(commands, 'check', 'FILE...', '--set --case', 'read and analyse, integrate nothing', &
+    call add_command(commands, 'check', 'FILE...', '--out --set --case', 'read and analyse, integrate nothing', &
       'Reads the files and analyses the machines. Prints every error with its line, or the degrees of freedom,' // nl // &
       'independent coordinates, ratios between geared bodies, redundant gears, and the load cases and the sweep if' // nl // &
       'there are some.' // nl // nl // &
-      '  --case NAME        look at the machine of this &load_case', check_command)
+      '  --out DIR          write check.json to DIR, with several files to DIR/<name of the file>: inertias,' // nl // &
+      '                     ratios, stiffnesses' // nl // &
+      '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR', check_command)
     call add_command(commands, 'equilibrium', 'FILE...', '--out --set --case', &
       'steady states: speeds, torques, twists, powers, stability', &
       'Finds the steady states of the machines: constant speeds at which the mean torques balance, and the' // nl // &
@@ -70,10 +76,6 @@ contains
       '  --holzer           print the table of Holzer of each undamped mode; with --out, write holzer.csv' // nl // &
       '  --out DIR          write modes.csv and modes.json to DIR, with several files to DIR/<name of the file>' // nl // &
       '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR', modes_command)
-    call list_torsional_analyses(commands)
-    call add_command(commands, 'matrices', 'FILE', '--set --case', 'print the matrices of the method for a machine', &
-      'Prints every matrix and vector of the method for the machine at its start, with its equation number.' // nl // nl // &
-      '  --case NAME        look at the machine of this &load_case', matrices_command)
   end subroutine list_analyses
 
   subroutine list_torsional_analyses(commands)

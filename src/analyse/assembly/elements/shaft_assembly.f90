@@ -17,7 +17,7 @@ module nocdyn_shaft_assembly
   implicit none (type, external)
   private
 
-  public :: check_shafts, add_shafts, new_shaft_set
+  public :: check_shafts, add_shafts, new_shaft_set, segment_inertia, segment_stiffness
 
   real(wp), parameter :: pi = acos(-1.0_wp)
   real(wp), parameter :: tolerance = 1.0e-9_wp   ! of the states at the ends of a shaft that is as soft as all shafts together
@@ -104,6 +104,22 @@ contains
 
     allocate (moments, source=pi / 32.0_wp * (group%numbers('diameters')**4 - group%numbers('bores')**4))
   end function second_moments
+
+  !> Of each segment [N m/rad].
+  pure function segment_stiffness(group) result(stiffness)
+    type(group_t), intent(in) :: group
+    real(wp), allocatable :: stiffness(:)
+
+    allocate (stiffness, source=group%number('shear_modulus') * second_moments(group) / group%numbers('lengths'))
+  end function segment_stiffness
+
+  !> Of each segment [kg m2].
+  pure function segment_inertia(group) result(inertia)
+    type(group_t), intent(in) :: group
+    real(wp), allocatable :: inertia(:)
+
+    allocate (inertia, source=group%number('density') * second_moments(group) * group%numbers('lengths'))
+  end function segment_inertia
 
   pure real(wp) function compliance_of(group) result(compliance)
     type(group_t), intent(in) :: group
