@@ -1,0 +1,5 @@
+"""python -m nocdyn_report.report"""
+
+from .command import main
+
+main()

@@ -1,0 +1,121 @@
+"""Makes a report on a machine: runs what is missing, and writes report.html and report.pdf beside the results."""
+
+import argparse
+import os
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from .calculations import FAILED, Calculations, calculate
+from .content import Section
+from .failure import FILES, ReportError
+from .notes_text import read_notes
+from .page import render
+from .pdf import print_pdf
+from .program import find_program
+from .sections.appendix import input_section
+from .sections.campbell import campbell_section
+from .sections.energy import energy_section
+from .sections.fatigue import fatigue_section
+from .sections.machine import machine_section
+from .sections.modes import modes_section
+from .sections.motion import motion_section
+from .sections.remarks import notes_section, remarks_section
+from .sections.response import response_section
+from .sections.scope import scope_section
+from .sections.steady import steady_section
+from .sections.summary import summary_section
+from .sources import Sources
+
+PAGE, PDF = "report.html", "report.pdf"
+INTERRUPTED = 130
+
+
+def main() -> None:
+    arguments = _parser().parse_args()
+    try:
+        sys.exit(_make(arguments))
+    except ReportError as error:
+        message = str(error) if str(error).startswith("nocdyn: ") else f"scripts/report: {error}"
+        print(message, file=sys.stderr)
+        sys.exit(error.code)
+    except KeyboardInterrupt:
+        print("scripts/report: interrupted; there is no new report", file=sys.stderr)
+        sys.exit(INTERRUPTED)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="scripts/report", description=__doc__)
+    parser.add_argument("file", metavar="FILE", help="input file")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the results (results/<name of the file>)")
+    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help="override a key of the input, as for nocdyn run")
+    parser.add_argument("--no-pdf", action="store_true", help="write report.html only; Chromium is not needed")
+    parser.add_argument("--quiet", "-q", action="store_true", help="print nothing but errors")
+    return parser
+
+
+def _make(arguments: argparse.Namespace) -> int:
+    """Returns the exit code."""
+    tell: Callable[[str], None] = (lambda line: None) if arguments.quiet else lambda line: print(f"  {line}", flush=True)
+    program = find_program()
+    results = calculate(program, arguments.file, arguments.out, arguments.set, tell)
+    sources = Sources(results, _text(arguments.file))
+    page = render(sources, list(_sections(sources, arguments)))
+    written = _write(results.folder, page, arguments.no_pdf)
+    if not arguments.quiet:
+        print(f"{arguments.file}: {results.folder} has {' and '.join(written)}")
+    return _code(results)
+
+
+def _text(file: str) -> str:
+    return Path(file).read_text(encoding="utf-8", errors="replace")
+
+
+def _sections(sources: Sources, arguments: argparse.Namespace) -> list[Section]:
+    made = [make(sources) for make in (machine_section, steady_section, modes_section, campbell_section, response_section)]
+    made += [make(sources) for make in (motion_section, energy_section, fatigue_section)]
+    body = [section for section in made if section is not None]
+    remarks = remarks_section(_notes(sources, arguments.file))
+    first = [summary_section(sources), *([remarks] if remarks else []), scope_section(sources, body)]
+    return [*first, *body, notes_section(sources), input_section(sources, arguments.set)]
+
+
+def _notes(sources: Sources, file: str) -> str:
+    """The HTML of the author's text; the file is beside the input."""
+    name = sources.case.get("notes_file")
+    if not name:
+        return ""
+    lines = enumerate(sources.text.splitlines(), start=1)
+    line = next((i for i, text in lines if re.search(r"\bnotes_file\b", text.split("!")[0], re.IGNORECASE)), 1)
+    return read_notes(Path(file).parent / name, f"{file}:{line}: &case: notes_file")
+
+
+def _write(folder: Path, page: str, no_pdf: bool) -> list[str]:
+    """Both files get their names when both are complete; a PDF of an earlier report does not stay beside another page."""
+    asides = {name: folder / f".{os.getpid()}.{name}" for name in (PAGE, PDF)}
+    try:
+        asides[PAGE].write_text(page, encoding="utf-8")
+        if not no_pdf:
+            print_pdf(asides[PAGE], asides[PDF])
+        (folder / PDF).unlink(missing_ok=True)
+        os.replace(asides[PAGE], folder / PAGE)
+        if not no_pdf:
+            os.replace(asides[PDF], folder / PDF)
+    except OSError as error:
+        raise ReportError(f"{folder / PAGE}: cannot be written: {error.strerror}", FILES) from None
+    finally:
+        for aside in asides.values():
+            aside.unlink(missing_ok=True)
+    return [PAGE] if no_pdf else [PAGE, PDF]
+
+
+def _code(results: Calculations) -> int:
+    """That of a run that failed: its report says so."""
+    run = results.of["run"]
+    if run.state != "failed":
+        return 0
+    print("\n".join(f"nocdyn: {line}" for line in run.message.splitlines()), file=sys.stderr)
+    return FAILED
+
+

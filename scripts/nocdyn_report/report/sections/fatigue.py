@@ -1,0 +1,101 @@
+"""Fatigue: damage and life of runs, of all load cases, and of continuous operation at a speed."""
+
+from ..content import Figure, Heading, Paragraph, Section, Table, number, text
+from ..numbers import number_text
+from ..sources import Run, Sources
+
+HOURLY = "damage_per_hour_"
+
+
+def fatigue_section(sources: Sources) -> Section | None:
+    section = Section("fatigue", "Fatigue")
+    if sources.results.cases and sources.runs and sources.cases.get("fatigue"):
+        section.add(_of_cases(sources.cases["fatigue"]))
+    for run in sources.runs:
+        if run.summary.get("fatigue"):
+            section.add(_of_run(run))
+    if sources.results.has("response") and sources.response_report.get("fatigue"):
+        section.add(Heading("Continuous operation at a speed", "hourly"), *_of_speeds(sources))
+    return section if section.blocks else None
+
+
+def _of_cases(lives: list[dict]) -> Table:
+    rows = []
+    for one in lives:
+        parts = ", ".join(f"{name}: {number_text(part, 4)}" for name, part in one["damage_of_load_cases"].items())
+        rows.append([text(one["name"]), text(one["element"]), number(one.get("position")), number(one["damage"], 4, _tone(one))])
+        rows[-1] += [number(one.get("repeats_to_failure"), 4), text(parts), _strength(one)]
+    columns = ["name", "element", "position [m]", "damage of all", "repeats of all to failure", "damage of the load cases", "strength"]
+    note = "Damage by Miner, each load case as often as it occurs; failure is expected at 1."
+    return Table("Damage of all load cases", columns, rows, note)
+
+
+def _tone(one: dict) -> str:
+    return "bad" if one.get("damage_of_repeats", one["damage"]) > 1 else ""
+
+
+def _strength(one: dict) -> object:
+    exceeds = one.get("mean_exceeds_strength", False)
+    return text("the mean of a cycle exceeds the strength" if exceeds else "means below the strength", "bad" if exceeds else "")
+
+
+def _of_run(run: Run) -> Table:
+    rows = []
+    for one in run.summary["fatigue"]:
+        row = [text(one["name"]), text(one["element"]), number(one.get("position")), number(one["cycles"]), number(one["largest_range"])]
+        row += [number(one["mean_of_largest_range"]), text(one["unit"]), number(one["damage"], 4), number(one["repeats"])]
+        rows.append([*row, number(one["damage_of_repeats"], 4, _tone(one)), number(one.get("repeats_to_failure"), 4), _strength(one)])
+    columns = ["name", "element", "position [m]", "cycles", "largest range", "its mean", "unit", "damage of the run", "repeats"]
+    columns += ["damage of repeats", "repeats to failure", "strength"]
+    which = f" of load case {run.name}" if run.name else ""
+    note = "Cycles by rainflow counting, damage by Miner; failure is expected at 1. cycles.csv has the cycles by classes."
+    return Table(f"Damage{which}", columns, rows, note)
+
+
+def _of_speeds(sources: Sources) -> list[Paragraph | Table | Figure]:
+    """Every number that response.json has for each &fatigue, and the damage per hour over the speed."""
+    lives = sources.response_report["fatigue"]
+    keys = list(dict.fromkeys(key for one in lives for key, value in one.items() if isinstance(value, (int, float, str, bool))))
+    rows = []
+    for one in lives:
+        rows.append([_cell(sources, key, one.get(key)) for key in keys])
+    columns = [_head(sources, key) for key in keys]
+    blocks: list[Paragraph | Table | Figure] = [Table("Damage of continuous operation", columns, rows)]
+    figure = _hourly(sources)
+    return [*blocks, figure] if figure else blocks
+
+
+def _head(sources: Sources, key: str) -> str:
+    if key.endswith("_rad_s"):
+        return f"{key.removesuffix('_rad_s').replace('_', ' ')} [{sources.speed_unit}]"
+    if key.endswith("_1_h"):
+        return f"{key.removesuffix('_1_h').replace('_', ' ')} [1/h]"
+    return f"{key.removesuffix('_h').replace('_', ' ')} [h]" if key.endswith("_h") else key.replace("_", " ")
+
+
+def _cell(sources: Sources, key: str, value: object) -> object:
+    if isinstance(value, bool):
+        return text("yes" if value else "no", "bad" if value else "")
+    if isinstance(value, (int, float)):
+        return number(sources.speed(value) if key.endswith("_rad_s") else value, 4)
+    return text(value or "")
+
+
+def _hourly(sources: Sources) -> Figure | None:
+    table = sources.table("response.csv")
+    labels = [label for label in table.columns if label.startswith(HOURLY)]
+    if not labels:
+        return None
+    response = sources.response
+    speed = [sources.of_rpm(one) for one in response.speed]
+    order = table.iloc[:, 0].argsort(kind="stable")
+    names = [label.removeprefix(HOURLY).rsplit(" [", 1)[0] for label in labels]
+    curves = [sources.arrays.curve(name, speed, table[label].to_numpy()[order]) for name, label in zip(names, labels)]
+    spec = {
+        "x": {"label": f"speed of {response.body}", "unit": sources.speed_unit},
+        "y": {"label": "damage per hour", "unit": "1/h", "zero": True},
+        "curves": curves,
+        "name": "fatigue",
+    }
+    largest = "; ".join(f"{name} {number_text(float(table[label].max()), 3)}" for name, label in zip(names, labels))
+    return Figure("Damage of an hour over the speed", f"Damage per hour over the speed. Largest: {largest}.", spec)

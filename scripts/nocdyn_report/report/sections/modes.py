@@ -1,0 +1,158 @@
+"""Natural frequencies, modes, and the tables of Holzer."""
+
+import math
+
+import numpy as np
+
+from ...speed_results import roman
+from ...train_layout import GROUND, Train, lay_out
+from ..content import Figure, Heading, Paragraph, Section, Table, first, number, text
+from ..numbers import number_text, percent
+from ..sources import Sources
+
+MOST_ROWS = 60
+MOST_SHAPES = 8  # that are drawn
+SHOWN_SHAPES = 3  # at first
+MOST_TABLES = 4  # of Holzer
+MOST_BODIES = 60  # of such a table
+SHARES, SMALLEST_SHARE = 3, 0.02  # of energies that are named
+
+
+def modes_section(sources: Sources) -> Section | None:
+    if not sources.results.has("modes"):
+        return None
+    section = Section("modes", "Natural frequencies and modes")
+    modes = sources.modes
+    section.add(Paragraph(f"The machine is linearised about {modes['about']}."))
+    oscillating = [mode for mode in modes["modes"] if mode["kind"] == "oscillating"]
+    if oscillating:
+        section.add(_frequencies(oscillating, modes))
+        shaped = [mode for mode in oscillating if "shape" in mode][:MOST_SHAPES]
+        if shaped and len(modes["bodies"]) > 1:
+            section.add(_shapes(sources, shaped))
+    else:
+        section.add(Paragraph("Nothing oscillates: there is no mode with a frequency."))
+    others = [mode for mode in modes["modes"] if mode["kind"] != "oscillating"]
+    if others:
+        section.add(_others(others, modes))
+    section.add(Heading("Holzer tables", "holzer"), *_holzer(sources))
+    return section
+
+
+def _shares(values: list[float], names: list[str]) -> str:
+    """As 'pump 48 %, motor 42 %'."""
+    ranked = sorted(zip(values, names), reverse=True)[:SHARES]
+    return ", ".join(f"{name} {percent(value, 2)}" for value, name in ranked if value >= SMALLEST_SHARE)
+
+
+def _kinetic_names(modes: dict, mode: dict) -> list[str]:
+    """Of the bodies, and of shafts with inner nodes, which come after them."""
+    extra = len(mode.get("kinetic_share", [])) - len(modes["bodies"])
+    shafts = [one["name"] for one in modes["couplings"]][-extra:] if extra > 0 else []
+    return modes["bodies"] + shafts
+
+
+def _frequencies(oscillating: list[dict], modes: dict) -> Table:
+    rows = []
+    for mode in oscillating:
+        damping = mode["damping_ratio"]
+        rows.append(
+            [
+                number(mode["mode"]),
+                number(mode["frequency_Hz"]),
+                number(60.0 * mode["frequency_Hz"]),
+                number(mode["undamped_frequency_Hz"]),
+                number(damping, 3, "bad" if damping < 0 else ""),
+                number(mode.get("time_constant_s"), 3),
+                text(_shares(mode.get("kinetic_share", []), _kinetic_names(modes, mode))),
+                text(_shares(mode.get("potential_share", []), [one["name"] for one in modes["couplings"]])),
+            ]
+        )
+    rows, more = first(rows, MOST_ROWS, "modes.csv")
+    columns = ["mode", "frequency [Hz]", "frequency [1/min]", "undamped [Hz]", "damping ratio", "decay time [s]"]
+    note = f"Negative damping: the mode grows. {more}" if any(mode["damping_ratio"] < 0 for mode in oscillating) else more
+    return Table("Natural frequencies", [*columns, "kinetic energy in", "potential energy in"], rows, note)
+
+
+def _others(others: list[dict], modes: dict) -> Table:
+    rows = []
+    for mode in others:
+        where = mode.get("state") or _shares(mode.get("kinetic_share", []), _kinetic_names(modes, mode))
+        rows.append([text(mode["kind"]), number(mode["eigenvalue_1_s"][0]), number(mode.get("time_constant_s")), text(where)])
+    rows, more = first(rows, MOST_ROWS, "modes.csv")
+    columns = ["kind", "rate [1/s]", "time constant [s]", "kinetic energy in, or state"]
+    return Table("Motions that do not oscillate", columns, rows, f"A negative rate decays. {more}".strip())
+
+
+def _shapes(sources: Sources, shaped: list[dict]) -> Figure:
+    """What moves in phase with the largest motion, along the shaft lines, one beside the other."""
+    modes = sources.modes
+    pairs = [[GROUND if b == 0 else b - 1 for b in one["bodies"]] for one in modes["couplings"]]
+    gears = [[GROUND if b == 0 else b - 1 for b in one["bodies"]] for one in modes["gears"]]
+    train = lay_out(len(modes["bodies"]), [pair for pair in pairs if len(pair) == 2], gears)
+    places, order = _abscissas(train)
+    curves = []
+    for i, mode in enumerate(shaped):
+        motion = np.array(mode["shape"]) * np.cos(np.radians(mode["phase_deg"]))
+        x, y, labels = [], [], []
+        for body in order:
+            if body is None:
+                x, y, labels = [*x, x[-1] + 0.5], [*y, math.nan], [*labels, ""]
+            else:
+                x, y, labels = [*x, places[body]], [*y, motion[body]], [*labels, modes["bodies"][body]]
+        name = f"{roman(mode['mode'])}: {number_text(mode['frequency_Hz'])} Hz"
+        curve = {"name": name, "x": sources.arrays.put(x), "y": sources.arrays.put(y), "labels": labels}
+        curves.append({**curve, "shown": i < SHOWN_SHAPES, "dots": True})
+    ticks = [[places[body], modes["bodies"][body]] for body in range(len(places))]
+    spec = {
+        "x": {"label": "", "unit": "", "ticks": ticks, "range": [min(places) - 0.5, max(places) + 0.5]},
+        "y": {"label": "relative amplitude", "unit": "", "range": [-1.1, 1.1]},
+        "curves": curves,
+        "name": "mode",
+    }
+    told = "; ".join(f"mode {mode['mode']} at {number_text(mode['frequency_Hz'])} Hz" for mode in shaped)
+    lines = " Shaft lines stand one beside the other." if train.lines > 1 else ""
+    return Figure(f"Shapes of the modes along the train.{lines}", f"Curves of the relative amplitudes of the bodies: {told}.", spec)
+
+
+def _abscissas(train: Train) -> tuple[list[float], list[int | None]]:
+    """Where the bodies stand on one axis, and their order with gaps between the shaft lines."""
+    places = [0.0] * len(train.place)
+    order: list[int | None] = []
+    x = 0.0
+    for line in range(train.lines):
+        members = sorted((b for b in range(len(places)) if train.line[b] == line), key=lambda b: train.place[b])
+        if order:
+            order.append(None)
+            x += 0.5
+        for body in members:
+            places[body] = x
+            order.append(body)
+            x += 1.0
+    return places, order
+
+
+def _holzer(sources: Sources) -> list[Paragraph | Table]:
+    if not sources.results.has("holzer"):
+        return [Paragraph(sources.results.of["holzer"].message)]
+    table = sources.table("holzer.csv")
+    if not len(table):
+        return [Paragraph("No mode oscillates: there is no table.")]
+    blocks: list[Paragraph | Table] = []
+    shown = list(dict.fromkeys(table["mode"]))
+    columns = [name for name in table.columns if name not in ("mode", "frequency [Hz]")]
+    for mode in shown[:MOST_TABLES]:
+        part = table[table["mode"] == mode]
+        rows = []
+        for values in part[columns].itertuples(index=False):
+            rows.append([text("" if value != value else value) if _is_text(name) else number(value) for name, value in zip(columns, values)])
+        rows, more = first(rows, MOST_BODIES, "holzer.csv")
+        caption = f"Holzer table of undamped mode {mode}, {number_text(float(part['frequency [Hz]'].iloc[0]))} Hz"
+        blocks.append(Table(caption, columns, rows, more, is_sorted=False))
+    if len(shown) > MOST_TABLES:
+        blocks.append(Paragraph(f"holzer.csv has the tables of all {len(shown)} modes."))
+    return blocks
+
+
+def _is_text(column: str) -> bool:
+    return column in ("body", "to", "by")

@@ -1,0 +1,160 @@
+"""The findings, first of all."""
+
+from ...speed_results import roman
+from ..content import Cell, Section, Table, text
+from ..numbers import name_and_unit, number_text, percent
+from ..sources import Sources
+from .campbell import verdict
+from .response import limited, ratio_tone
+from .steady import stability_text
+
+MOST_NAMED = 6  # of one sort
+MOST_PEAKS = 4
+PEAK_KINDS = ("shaft", "moment", "reaction", "force", "stress")
+
+
+def summary_section(sources: Sources) -> Section:
+    rows: list[list[Cell]] = []
+    for make in (_failures, _steady, _frequencies, _criticals, _limits, _barred, _run_limits, _peaks, _life, _damage_per_hour):
+        rows += make(sources)
+    columns = ["subject", "finding", "assessment"]
+    return Section("summary", "Summary of findings", [Table("Findings", columns, rows, is_sorted=False)])
+
+
+def _row(subject: str, target: str, finding: str, assessment: str = "", tone: str = "") -> list[Cell]:
+    return [text(subject, "", f"#{target}"), text(finding), text(assessment, tone)]
+
+
+def _listed(words: list[str], most: int = MOST_NAMED) -> str:
+    return ", ".join(words[:most]) + (f" and {len(words) - most} more" if len(words) > most else "")
+
+
+def _failures(sources: Sources) -> list[list[Cell]]:
+    run = sources.results.of["run"]
+    return [_row("Run", "scope", run.message, "failed", "bad")] if run.state == "failed" else []
+
+
+def _steady(sources: Sources) -> list[list[Cell]]:
+    if not sources.results.has("equilibrium"):
+        return []
+    states = sources.equilibrium["steady_states"]
+    if len(states) > 1:
+        stable = sum(1 for state in states if state["stability"] == "stable")
+        return [_row("Steady states", "steady", f"{len(states)} steady states, {stable} of them stable.")]
+    (state,) = states
+    is_stable = state["stability"] == "stable"
+    tone = "good" if is_stable else "bad" if state.get("growth_rate_1_s", 0.0) > 0 else ""
+    return [_row("Steady state", "steady", stability_text(state), state["stability"], tone)]
+
+
+def _frequencies(sources: Sources) -> list[list[Cell]]:
+    if not sources.results.has("modes"):
+        return []
+    found = [mode for mode in sources.modes["modes"] if mode["kind"] == "oscillating"]
+    if not found:
+        return []
+    named = [f"{roman(mode['mode'])} {number_text(mode['frequency_Hz'])} Hz" for mode in found]
+    growing = [roman(mode["mode"]) for mode in found if mode["damping_ratio"] < 0]
+    verdicts = (f"unstable: {_listed(growing)}", "bad") if growing else ("damped", "good")
+    return [_row("Natural frequencies", "modes", _listed(named), *verdicts)]
+
+
+def _criticals(sources: Sources) -> list[list[Cell]]:
+    if not sources.results.has("campbell"):
+        return []
+    rows = []
+    crossings = sources.campbell.crossings
+    for wanted, words in (("bad", "in operation"), ("warn", "within the margin of operation")):
+        chosen = [one for one in crossings if verdict(one)[1] == wanted]
+        named = [f"{one.name} at {number_text(sources.of_rpm(one.speed))} {sources.speed_unit}" for one in chosen]
+        if named:
+            rows.append(_row("Critical speeds", "critical", _listed(named), words, "warn"))
+    if rows or not crossings:
+        return rows or [_row("Critical speeds", "critical", "No order meets a natural frequency in the range of speeds.", "none", "good")]
+    named = [f"{one.name} at {number_text(sources.of_rpm(one.speed))} {sources.speed_unit}" for one in crossings]
+    words, tone = ("clear of operation", "good") if sources.campbell.operation else ("", "")
+    return [_row("Critical speeds", "critical", _listed(named), words, tone)]
+
+
+def _limits(sources: Sources) -> list[list[Cell]]:
+    if not sources.results.has("response"):
+        return []
+    rows = []
+    for one in limited(sources.response_report):
+        at = f"{number_text(sources.speed(one['ratio_speed_rad_s']))} {sources.speed_unit}"
+        finding = f"{one['quantity']} reaches {percent(one['ratio_to_limit'])} of its limit at {at}."
+        rows.append(_row("Limit", "limits", finding, *ratio_tone(one["ratio_to_limit"])))
+    return rows
+
+
+def _barred(sources: Sources) -> list[list[Cell]]:
+    if not sources.results.has("response") or not limited(sources.response_report):
+        return []
+    ranges = sources.response_report["barred_speed_ranges"]
+    if not ranges:
+        return [_row("Barred ranges", "limits", "No range of speeds is barred.", "none", "good")]
+    rows = []
+    for one in ranges:
+        ends = sorted((sources.speed(one["from_rad_s"]), sources.speed(one["to_rad_s"])))
+        finding = f"{number_text(ends[0])} to {number_text(ends[1])} {sources.speed_unit}, by {one['quantity']}."
+        words, tone = ("may be passed quickly", "warn") if one["can_be_passed"] else ("not to be passed", "bad")
+        rows.append(_row("Barred range", "limits", finding, words, tone))
+    return rows
+
+
+def _run_limits(sources: Sources) -> list[list[Cell]]:
+    rows = []
+    for run in sources.runs:
+        for one in run.summary.get("limits", []):
+            which = f" in load case {run.name}" if run.name else ""
+            finding = f"{one['column']} reaches {percent(one['ratio'])} of its limit over the time{which}."
+            rows.append(_row("Limit", "motion", finding, *ratio_tone(one["ratio"])))
+    return rows
+
+
+def _peaks(sources: Sources) -> list[list[Cell]]:
+    """The largest values of the kinds that one looks for."""
+    found: dict[str, list[tuple[float, str]]] = {}
+    for run in sources.runs:
+        early = run.summary.get("start_transient", {})
+        for label, column in run.columns.items():
+            name, unit = name_and_unit(label)
+            kind = name.split("_", 1)[0]
+            if kind not in PEAK_KINDS or "max" not in column:
+                continue
+            end = "max" if abs(column["max"]) >= abs(column["min"]) else "min"
+            which = f", {run.name}" if run.name else ""
+            start = ", in the start transient" if label in early.get(f"has_{end}_of", []) else ""
+            value, time = number_text(column[end]), number_text(column[f"time_of_{end}"])
+            finding = f"{name} {value} {unit} at {time} s{which}{start}"
+            found.setdefault(f"{kind} {unit}", []).append((abs(column[end]), finding))
+    if any(key.startswith("shaft ") for key in found):
+        found = {key: values for key, values in found.items() if not key.startswith("moment ")}
+    rows = []
+    for key, values in found.items():
+        kind = {"shaft": "moment"}.get(key.split()[0], key.split()[0])
+        largest = [finding for _, finding in sorted(values, reverse=True)[: MOST_PEAKS // 2]]
+        rows.append(_row(f"Largest {kind}", "motion", "; ".join(largest) + "."))
+    return rows
+
+
+def _life(sources: Sources) -> list[list[Cell]]:
+    rows = []
+    if sources.results.cases and sources.runs:
+        lives = [("all load cases", one) for one in sources.cases.get("fatigue", [])]
+    else:
+        lives = [("the run", one) for run in sources.runs for one in run.summary.get("fatigue", [])]
+    for which, one in lives:
+        damage = one.get("damage_of_repeats", one["damage"])
+        life = f"; failure after {number_text(one['repeats_to_failure'], 4)} repeats" if "repeats_to_failure" in one else ""
+        bad = damage > 1 or one.get("mean_exceeds_strength", False)
+        words = ("exceeded", "bad") if bad else ("not used up", "good")
+        rows.append(_row("Life", "fatigue", f"{one['name']}: damage {number_text(damage, 4)} of {which}{life}.", *words))
+    return rows
+
+
+def _damage_per_hour(sources: Sources) -> list[list[Cell]]:
+    if not sources.results.has("response") or not sources.response_report.get("fatigue"):
+        return []
+    names = [one.get("name", "") for one in sources.response_report["fatigue"]]
+    return [_row("Life", "hourly", f"Damage of continuous operation over the speed: {_listed(names)}.")]

@@ -1,0 +1,150 @@
+"""The files of the results, read when a section needs them."""
+
+import json
+import re
+from functools import cached_property
+from pathlib import Path
+
+import f90nml
+import pandas as pd
+
+from ..results import RPM
+from ..speed_results import Campbell, Response, read_campbell, read_response
+from ..trajectory_files import ResultsError, labels_of, read_columns
+from .calculations import Calculations
+from .curves import Arrays
+from .failure import FILES, ReportError
+
+
+class Sources:
+    """What was calculated, for the sections."""
+
+    def __init__(self, results: Calculations, text: str) -> None:
+        self.results = results
+        self.text = text  # of the input file
+        self.arrays = Arrays()
+
+    @property
+    def check(self) -> dict:
+        return self.results.check
+
+    @cached_property
+    def machine(self) -> f90nml.Namelist:
+        """The complete input, by groups."""
+        return f90nml.reads(self.check["complete_input"])
+
+    def groups(self, kind: str) -> list[f90nml.Namelist]:
+        groups = self.machine.get(kind, [])
+        return groups if isinstance(groups, list) else [groups]
+
+    @property
+    def case(self) -> f90nml.Namelist:
+        """&case."""
+        return self.groups("case")[0]
+
+    @cached_property
+    def equilibrium(self) -> dict:
+        return self.read_json("equilibrium.json")
+
+    @cached_property
+    def modes(self) -> dict:
+        return self.read_json("modes.json")
+
+    @cached_property
+    def response_report(self) -> dict:
+        return self.read_json("response.json")
+
+    @cached_property
+    def response(self) -> Response:
+        return self._read(read_response)
+
+    @cached_property
+    def campbell_report(self) -> dict:
+        return self.read_json("campbell.json")
+
+    @cached_property
+    def campbell(self) -> Campbell:
+        return self._read(read_campbell)
+
+    @cached_property
+    def cases(self) -> dict:
+        return self.read_json("cases.json")
+
+    @cached_property
+    def runs(self) -> list["Run"]:
+        """The run, or that of each load case; also those that ended early."""
+        folder = self.results.folder
+        if not self.results.cases:
+            folders = [("", folder)] if (folder / "summary.json").is_file() and self.results.of["run"].state != "refused" else []
+        elif (folder / "cases.json").is_file() and self.results.of["run"].state != "refused":
+            folders = [(case["name"], folder / case["folder"]) for case in self.cases["load_cases"]]
+        else:
+            folders = []
+        return [Run(name, one, self.read_json(one / "summary.json")) for name, one in folders if (one / "summary.json").is_file()]
+
+    def read_json(self, name: str | Path) -> dict:
+        file = self.results.folder / name if isinstance(name, str) else name
+        try:
+            return json.loads(file.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise ReportError(f"{file}: cannot be read: {error}", FILES) from None
+
+    def table(self, name: str) -> pd.DataFrame:
+        try:
+            return pd.read_csv(self.results.folder / name)
+        except (OSError, ValueError) as error:
+            raise ReportError(f"{self.results.folder / name}: cannot be read: {error}", FILES) from None
+
+    def _read(self, read: object) -> object:
+        try:
+            return read(self.results.folder)
+        except ResultsError as error:
+            raise ReportError(str(error), FILES) from None
+
+    @cached_property
+    def speed_unit(self) -> str:
+        """That of speeds which the files have in rad/s: as the input gives and asks for them."""
+        units = self.groups("output")[0].get("units", []) if self.groups("output") else []
+        units = [units] if isinstance(units, str) else units
+        named = next((unit for unit in units if unit in RPM or unit == "rpm"), None)
+        given = {"_rpm": "rpm", "_hz": "Hz"} if re.search(r"speed\w*_(rpm|hz)\b", self.text, re.IGNORECASE) else {}
+        found = re.search(r"speed\w*(_rpm|_hz)\b", self.text, re.IGNORECASE)
+        return named or (given[found[1].lower()] if found else "rad/s")
+
+    def speed(self, value: float) -> float:
+        """A speed [rad/s] in that unit."""
+        rpm = value * RPM["rad/s"]
+        return {"rpm": rpm, "Hz": rpm / 60.0, "rad/s": value}[self.speed_unit]
+
+    def of_rpm(self, value: float) -> float:
+        return self.speed(value / RPM["rad/s"])
+
+
+class Run:
+    """A run over the time."""
+
+    def __init__(self, name: str, folder: Path, summary: dict) -> None:
+        self.name, self.folder, self.summary = name, folder, summary
+
+    @property
+    def columns(self) -> dict[str, dict]:
+        return self.summary.get("columns", {})
+
+    @property
+    def file(self) -> Path | None:
+        """The trajectory, also that of a run that failed."""
+        names = ("trajectory.csv", "trajectory.nc", "trajectory.partial.csv", "trajectory.partial.nc")
+        return next((self.folder / name for name in names if (self.folder / name).is_file()), None)
+
+    def labels(self) -> list[str]:
+        return _told(labels_of, self.file) if self.file else []
+
+    def values(self, labels: list[str]) -> pd.DataFrame:
+        return _told(read_columns, self.file, labels)
+
+
+def _told(read: object, *arguments: object) -> object:
+    try:
+        return read(*arguments)
+    except ResultsError as error:
+        raise ReportError(str(error), FILES) from None

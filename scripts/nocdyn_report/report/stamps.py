@@ -1,0 +1,67 @@
+"""Which results in a folder belong to an input: strict, for a report must not show those of another."""
+
+import hashlib
+import json
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from .program import Program
+from .writing import write_whole
+
+NAME = "report.json"
+CASE = re.compile(r"^&case\n(?:  .*\n)*/\n", re.MULTILINE)  # who, for whom, title: no number depends on it
+
+
+def without_case(text: str) -> str:
+    """The complete input without &case."""
+    return CASE.sub("", text)
+
+
+def is_run_of(folder: Path, check: dict, program: Program) -> bool:
+    """Whether a folder has the finished run of an input by this program: `nocdyn run` leaves the complete input beside it."""
+    summary_file = folder / "summary.json"
+    try:
+        summary = json.loads(summary_file.read_text(encoding="utf-8"))
+        text = (folder / "input.nml").read_text(encoding="utf-8")
+        is_newer = summary_file.stat().st_mtime_ns > program.path.stat().st_mtime_ns
+    except (OSError, ValueError):
+        return False
+    has_rows = any((folder / name).is_file() for name in ("trajectory.csv", "trajectory.nc"))
+    same = all(summary.get(key) == check[key] for key in ("program", "version", "compiler", "input"))
+    is_same_input = without_case(text) == without_case(check["complete_input"])
+    return is_newer and has_rows and same and is_same_input and summary.get("status") == "done"
+
+
+class Stamps:
+    """What this script computed before, in a file beside the results: the input, the program, and the files as they were."""
+
+    def __init__(self, folder: Path, program: Program, check: dict) -> None:
+        self.folder = folder
+        text = without_case(check["complete_input"]) + "\n".join(str(check[key]) for key in ("version", "compiler", "input"))
+        self.key = hashlib.sha256((text + program.identity).encode()).hexdigest()
+        try:
+            content = json.loads((folder / NAME).read_text(encoding="utf-8"))
+            self.files = content["files"] if content["key"] == self.key else {}
+        except (OSError, ValueError, KeyError, TypeError):
+            self.files = {}
+
+    def holds(self, command: str, names: Sequence[str]) -> bool:
+        """Whether the files of a command are those that were written for this input."""
+        known = self.files.get(command)
+        return isinstance(known, dict) and known == self._digests(names)
+
+    def put(self, command: str, names: Sequence[str]) -> None:
+        self.files[command] = self._digests(names)
+
+    def write(self) -> None:
+        write_whole(self.folder / NAME, json.dumps({"key": self.key, "files": self.files}, indent=2) + "\n")
+
+    def _digests(self, names: Sequence[str]) -> dict[str, str | None]:
+        digests: dict[str, str | None] = {}
+        for name in names:
+            try:
+                digests[name] = hashlib.sha256((self.folder / name).read_bytes()).hexdigest()
+            except OSError:
+                digests[name] = None
+        return digests
