@@ -126,6 +126,17 @@ def number(value: object, digits: int = 5, tone: str = "") -> Cell:
     return Cell(number_text(value, digits), key, "", tone, True)
 
 
+NOISE = 1e-9  # of the largest number of a sort: what rounding leaves of a zero, as the program prints it too
+
+
+def rounded(values: dict[str, float], sorts: dict[str, str]) -> dict[str, float]:
+    """Numbers by names; what is rounding beside the largest one of its sort (unit) is 0."""
+    largest: dict[str, float] = {}
+    for name, value in values.items():
+        largest[sorts[name]] = max(largest.get(sorts[name], 0.0), abs(value))
+    return {name: value if abs(value) > NOISE * largest[sorts[name]] else 0 for name, value in values.items()}
+
+
 def share(value: float | None, digits: int = 3, tone: str = "") -> Cell:
     """A part of 1, in percent."""
     return Cell(number_text(None if value is None else 100.0 * value, digits), float("inf") if value is None else value, "", tone, True)

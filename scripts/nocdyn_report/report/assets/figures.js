@@ -92,6 +92,7 @@ const report = (() => {
       const width = this.width(), height = Math.round(Math.max(230, Math.min(380, 0.52 * width)));
       const margin = { ...MARGIN };
       if (this.spec.x.ticks) margin.bottom = 84;
+      if (this.spec.marks && this.spec.marks.length) margin.top = 42;
       if (width < 480) Object.assign(margin, { left: 60, right: 30 });
       this.x = d3.scaleLinear(this.window.x, [margin.left, width - margin.right]);
       this.y = d3.scaleLinear(this.yDomain(), [height - margin.bottom, margin.top]);

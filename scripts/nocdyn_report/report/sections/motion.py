@@ -1,6 +1,8 @@
 """Runs over the time: peaks with their times, the load cases, curves."""
 
-from ..content import Cell, Figure, Heading, Paragraph, Section, Table, first, number, share, text
+import re
+
+from ..content import Cell, Figure, Heading, Paragraph, Section, Table, first, number, rounded, share, text
 from ..numbers import name_and_unit, number_text, unit_text
 from ..sources import Run, Sources
 from .response import ratio_tone
@@ -21,6 +23,8 @@ RANKS = ["shaft", "moment", "reaction", "force", "stress", "torque", "loss", "be
 MOST_CURVES = 10  # of a figure
 SHOWN_CURVES = 5  # at first
 MOST_ROWS = 200
+INNER = re.compile(r"\[\d+\]$")  # of the names of inner nodes of shafts
+WHOLE = "_max"  # of the largest moment along a shaft
 
 
 def motion_section(sources: Sources) -> Section | None:
@@ -66,7 +70,8 @@ def _cases(sources: Sources) -> Table:
 
 def _peaks(sources: Sources) -> Table:
     rows = []
-    for peak in sorted(sources.cases["peaks"], key=lambda one: rank(one["column"])):
+    peaks = (peak for peak in sources.cases["peaks"] if not INNER.search(peak["column"]))
+    for peak in sorted(peaks, key=lambda one: rank(one["column"])):
         values = [text(peak["column"]), number(peak["largest"]), text(unit_text(peak["unit"])), number(peak["time"])]
         rows.append([*values, text(peak["load_case"], "", f"#case-{peak['load_case']}")])
     rows, more = first(rows, MOST_ROWS, "cases.csv")
@@ -93,16 +98,19 @@ def _extremes(run: Run) -> Table:
     rows: list[list[Cell]] = []
     for label in sorted(run.columns, key=rank):
         column = run.columns[label]
-        if "min" not in column:
-            continue
         name, unit = name_and_unit(label)
+        if "min" not in column or INNER.search(name):
+            continue
         star = "*" if label in [*transient.get("has_min_of", []), *transient.get("has_max_of", [])] else ""
-        row = [text(name + star), text(unit_text(unit)), number(column["min"]), number(column["time_of_min"]), number(column["max"])]
-        rows.append([*row, number(column["time_of_max"]), number(column["last"])])
+        shown = rounded({key: column[key] for key in ("min", "max", "last")}, dict.fromkeys(("min", "max", "last"), unit))
+        row = [text(name + star), text(unit_text(unit)), number(shown["min"]), number(column["time_of_min"]), number(shown["max"])]
+        rows.append([*row, number(column["time_of_max"]), number(shown["last"])])
     rows, more = first(rows, MOST_ROWS, "summary.json")
     notes = [f"The extremes are those {run.summary.get('extremes', 'of the motion')}."]
     if "extremes_from" in run.summary:
         notes.append(f"They are taken from {number_text(run.summary['extremes_from'])} s on.")
+    if any(INNER.search(name_and_unit(label)[0]) for label in run.columns):
+        notes.append("The inner nodes of shafts are in summary.json.")
     if transient:
         notes.append(f"* In the first fast transient of a start out of balance, up to {number_text(transient['until'])} s.")
     columns = ["quantity", "unit", "smallest", "at t [s]", "largest", "largest at t [s]", "last"]
@@ -130,9 +138,11 @@ def _figures(sources: Sources, run: Run) -> list[Figure]:
     for label in labels:
         name, unit = name_and_unit(label)
         kind, _, element = name.partition("_")
-        if kind in FIGURES and not (kind == "moment" and element in shafts):
+        is_told = (kind == "moment" and (element in shafts or element.endswith(WHOLE))) or INNER.search(name)
+        if kind in FIGURES and not is_told:
             chosen.setdefault((kind, unit), []).append(label)
     ranges = {label: column["max"] - column["min"] for label, column in run.columns.items() if "max" in column}
+    counts = {key: len(members) for key, members in chosen.items()}
     for key, members in chosen.items():
         kept = set(sorted(members, key=lambda label: -ranges.get(label, 0.0))[:MOST_CURVES])
         chosen[key] = [label for label in members if label in kept]
@@ -143,7 +153,6 @@ def _figures(sources: Sources, run: Run) -> list[Figure]:
     table = run.values([TIME, *needed])
     if len(table) < 2:
         return []
-    counts = {key: sum(1 for label in labels if label.startswith(f"{key[0]}_") and label.endswith(f"[{key[1]}]")) for key in keys}
     return [_figure(sources, run, table, key, chosen[key], counts[key], ranges) for key in keys]
 
 

@@ -1,6 +1,6 @@
 """What was calculated, by which program, of which input; and why what is missing is missing."""
 
-from ..content import Cell, Section, Table, number, text
+from ..content import Cell, Section, Table, text
 from ..numbers import number_text
 from ..sources import Sources
 
@@ -37,8 +37,8 @@ def _identity(sources: Sources) -> Table:
     rows = [
         [text("program"), text(f"{check['program']} {check['version']}, compiled by {check['compiler']}")],
         [text("input"), text(check["input"], "", "#input")],
-        [text("bodies"), number(len(check["bodies"]))],
-        [text("degrees of freedom"), number(check["degrees_of_freedom"])],
+        [text("bodies"), text(len(check["bodies"]))],
+        [text("degrees of freedom"), text(check["degrees_of_freedom"])],
         [text("independent coordinates"), text(_listed(check["independent"]))],
     ]
     return Table("Program and input", ["what", "value"], rows, is_sorted=False)
