@@ -43,7 +43,10 @@ def one_line(text):
         (["run", CASE_1, "--set"], "--set needs a value: --set PATH=VALUE\n"),
         (["run", CASE_1, "--out", "a", "--out", "b"], "--out is given twice"),
         (["run", CASE_1, "--quiet=yes"], "--quiet takes no value"),
-        (["new", "a.nml", "--out", "a"], "--out is an option of nocdyn run, check, equilibrium, modes, response, campbell and sweep"),
+        (
+            ["new", "a.nml", "--out", "a"],
+            "--out is an option of nocdyn run, check, equilibrium, modes, response, campbell and sweep",
+        ),
         (["modes", CASE_1, "--at"], "--at needs a value: --at equilibrium|rest|TIME\n"),
         (["modes", CASE_1, "--at", "rest", "--at=0"], "--at is given twice"),
         (["equilibrium", CASE_1, "--at", "rest"], "--at is an option of nocdyn modes"),

@@ -2,14 +2,13 @@
 
 import argparse
 import os
-import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 from .calculations import FAILED, Calculations, calculate
 from .content import Section
-from .failure import FILES, ReportError
+from .failure import FILES, USAGE, ReportError
 from .notes_text import read_notes
 from .page import render
 from .pdf import print_pdf
@@ -26,7 +25,7 @@ from .sections.response import response_section
 from .sections.scope import scope_section
 from .sections.steady import steady_section
 from .sections.summary import summary_section
-from .sources import Sources
+from .sources import NOTES_FILE, Sources
 
 PAGE, PDF = "report.html", "report.pdf"
 INTERRUPTED = 130
@@ -40,6 +39,16 @@ def main() -> None:
         message = str(error) if str(error).startswith("nocdyn: ") else f"scripts/report: {error}"
         print(message, file=sys.stderr)
         sys.exit(error.code)
+    except Exception as error:  # a traceback helps nobody at the keyboard
+        place = error.__traceback__
+        while place.tb_next:
+            place = place.tb_next
+        where = f"{Path(place.tb_frame.f_code.co_filename).name}:{place.tb_lineno}"
+        print(
+            f"scripts/report: a mistake in this script, please report it: {type(error).__name__}: {error} ({where})",
+            file=sys.stderr,
+        )
+        sys.exit(FAILED)
     except KeyboardInterrupt:
         print("scripts/report: interrupted; there is no new report", file=sys.stderr)
         sys.exit(INTERRUPTED)
@@ -49,7 +58,9 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="scripts/report", description=__doc__)
     parser.add_argument("file", metavar="FILE", help="input file")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the results (results/<name of the file>)")
-    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help="override a key of the input, as for nocdyn run")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="PATH=VALUE", help="override a key of the input, as for nocdyn run"
+    )
     parser.add_argument("--no-pdf", action="store_true", help="write report.html only; Chromium is not needed")
     parser.add_argument("--quiet", "-q", action="store_true", help="print nothing but errors")
     return parser
@@ -58,9 +69,11 @@ def _parser() -> argparse.ArgumentParser:
 def _make(arguments: argparse.Namespace) -> int:
     """Returns the exit code."""
     tell: Callable[[str], None] = (lambda line: None) if arguments.quiet else lambda line: print(f"  {line}", flush=True)
+    if Path(arguments.file).exists() and not Path(arguments.file).is_file():  # a pipe has its text once
+        raise ReportError(f"{arguments.file}: is no file; the report shows the text of the input", USAGE)
     program = find_program()
     results = calculate(program, arguments.file, arguments.out, arguments.set, tell)
-    sources = Sources(results, _text(arguments.file))
+    sources = Sources(results, _text(arguments.file), arguments.set)
     page = render(sources, list(_sections(sources, arguments)))
     written = _write(results.folder, page, arguments.no_pdf)
     if not arguments.quiet:
@@ -83,11 +96,11 @@ def _sections(sources: Sources, arguments: argparse.Namespace) -> list[Section]:
 
 def _notes(sources: Sources, file: str) -> str:
     """The HTML of the author's text; the file is beside the input."""
-    name = sources.case.get("notes_file")
+    name = sources.notes_file
     if not name:
         return ""
-    lines = enumerate(sources.text.splitlines(), start=1)
-    line = next((i for i, text in lines if re.search(r"\bnotes_file\b", text.split("!")[0], re.IGNORECASE)), 1)
+    found = NOTES_FILE.search(sources.text)
+    line = sources.text.count("\n", 0, found.end()) + 1 if found else 1
     return read_notes(Path(file).parent / name, f"{file}:{line}: &case: notes_file")
 
 
@@ -117,5 +130,3 @@ def _code(results: Calculations) -> int:
         return 0
     print("\n".join(f"nocdyn: {line}" for line in run.message.splitlines()), file=sys.stderr)
     return FAILED
-
-

@@ -139,10 +139,11 @@ def rounded(values: dict[str, float], sorts: dict[str, str]) -> dict[str, float]
 
 def share(value: float | None, digits: int = 3, tone: str = "") -> Cell:
     """A part of 1, in percent."""
-    return Cell(number_text(None if value is None else 100.0 * value, digits), float("inf") if value is None else value, "", tone, True)
+    return Cell(
+        number_text(None if value is None else 100.0 * value, digits), float("inf") if value is None else value, "", tone, True
+    )
 
 
 def first(rows: Sequence[list[Cell]], most: int, where: str) -> tuple[list[list[Cell]], str]:
     """At most so many rows, and a note that says where the others are."""
     return list(rows[:most]), f"{len(rows) - most} more rows are in {where}." if len(rows) > most else ""
-

@@ -21,7 +21,11 @@ SCRIPTS = ("figures.js", "page.js")
 def render(sources: Sources, sections: Sequence[Section]) -> str:
     number_all(sections)
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(ASSETS), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=jinja2.FileSystemLoader(ASSETS),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     environment.filters["css"] = _css_text
     scripts = [LIBRARY.read_text(encoding="utf-8"), *((ASSETS / name).read_text(encoding="utf-8") for name in SCRIPTS)]

@@ -55,7 +55,9 @@ def find_program() -> Program:
     for candidate in (os.environ.get("NOCDYN"), shutil.which("nocdyn"), BUILT):
         if candidate and Path(candidate).is_file():
             return Program(Path(candidate).resolve())
-    raise ReportError("there is no program nocdyn in the PATH, and none in build/release/bin; README.md tells how to build it", FILES)
+    raise ReportError(
+        "there is no program nocdyn in the PATH, and none in build/release/bin; README.md tells how to build it", FILES
+    )
 
 
 def option_words(overrides: Sequence[str]) -> list[str]:

@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 
@@ -15,13 +16,18 @@ from .calculations import Calculations
 from .curves import Arrays
 from .failure import FILES, ReportError
 
+NOTES_FILE = re.compile(
+    r"""^[^!\n]*\bnotes_file\s*=\s*(?:'(?P<one>(?:[^'\n]|'')*)'|"(?P<other>[^"\n]*)")""", re.MULTILINE | re.IGNORECASE
+)
+
 
 class Sources:
     """What was calculated, for the sections."""
 
-    def __init__(self, results: Calculations, text: str) -> None:
+    def __init__(self, results: Calculations, text: str, overrides: Sequence[str] = ()) -> None:
         self.results = results
         self.text = text  # of the input file
+        self.overrides = overrides  # PATH=VALUE of --set
         self.arrays = Arrays()
 
     @property
@@ -41,6 +47,15 @@ class Sources:
     def case(self) -> f90nml.Namelist:
         """&case."""
         return self.groups("case")[0]
+
+    @property
+    def notes_file(self) -> str:
+        """As the file or --set gives it; the complete input, which is for other folders, does not name it."""
+        overrides = [one for one in self.overrides if one.lower().replace(" ", "").startswith("case.notes_file=")]
+        if overrides:
+            return overrides[-1].split("=", 1)[1].strip().strip("'\"")
+        found = NOTES_FILE.search(self.text)
+        return (found["one"] or found["other"] or "").replace("''", "'") if found else ""
 
     @cached_property
     def equilibrium(self) -> dict:

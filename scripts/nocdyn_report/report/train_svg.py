@@ -125,7 +125,9 @@ class _Picture:
             self._line((self.x[a], self.y[a]), (self.x[b], self.y[b]), "gear", f"{one['kind']} {one['name']}")
         if "ratio" in one and not self.dense and GROUND not in bodies:
             a, b = bodies
-            place = f'x="{(self.x[a] + self.x[b]) / 2 + 6:.1f}" y="{(self.y[a] + self.y[b]) / 2 + 4:.1f}"'
+            along = 0.5 if self.x[a] == self.x[b] else 0.68  # beside lines that cross
+            x, y = (one[a] + along * (one[b] - one[a]) for one in (self.x, self.y))
+            place = f'x="{x + 6:.1f}" y="{y + 4:.1f}"'
             self.parts.append(f'<text class="ratio" {place}>1 : {number_text(one["ratio"], 4)}</text>')
 
     def add_discs(self, marks: dict[int, list[tuple[str, str]]]) -> None:

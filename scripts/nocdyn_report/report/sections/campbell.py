@@ -62,7 +62,9 @@ def _diagram(sources: Sources) -> Figure:
     for kind, wanted in (("far", "good"), ("far", ""), ("margin", "warn"), ("inside", "bad")):
         chosen = [one for one in campbell.crossings if verdict(one)[1] == wanted]
         if chosen:
-            name = {"good": "clear of operation", "": "critical speed", "warn": "within the margin", "bad": "in operation"}[wanted]
+            name = {"good": "clear of operation", "": "critical speed", "warn": "within the margin", "bad": "in operation"}[
+                wanted
+            ]
             labels = [f"{one.name} at {number_text(sources.of_rpm(one.speed))} {sources.speed_unit}" for one in chosen]
             places = [sources.of_rpm(one.speed) for one in chosen], [one.frequency for one in chosen]
             curves.append(arrays.points(name, *places, labels, role=kind))
@@ -74,7 +76,9 @@ def _diagram(sources: Sources) -> Figure:
         "nearest": True,
         "name": "line",
     }
-    told = "; ".join(f"{one.name} at {number_text(sources.of_rpm(one.speed))} {sources.speed_unit}" for one in campbell.crossings[:20])
+    told = "; ".join(
+        f"{one.name} at {number_text(sources.of_rpm(one.speed))} {sources.speed_unit}" for one in campbell.crossings[:20]
+    )
     return Figure(
         f"Campbell diagram over the speed of {campbell.body}. Points: mode and order meet, as II/6 where order 6 meets mode 2",
         f"Natural frequencies and orders over the speed. Critical speeds: {told or 'none'}.",

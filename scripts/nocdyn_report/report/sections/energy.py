@@ -28,7 +28,9 @@ def _work(run: Run) -> Table:
     work = rounded(account["work_in_J"], dict.fromkeys(account["work_in_J"], "J"))
     rows = [[text(name), number(amount)] for name, amount in sorted(work.items(), key=lambda item: -item[1])]
     rows, more = first(rows, MOST_ROWS, "summary.json")
-    note = f"The balance error is {number_text(account['residual_J'])} J. Negative work was taken out of the machine. {more}".strip()
+    note = (
+        f"The balance error is {number_text(account['residual_J'])} J. Negative work was taken out of the machine. {more}".strip()
+    )
     return Table(f"Work into the machine{_which(run)}", ["element", "work [J]"], rows, note)
 
 

@@ -25,7 +25,15 @@ def _of_cases(lives: list[dict]) -> Table:
         parts = ", ".join(f"{name}: {number_text(part, 4)}" for name, part in one["damage_of_load_cases"].items())
         rows.append([text(one["name"]), text(one["element"]), number(one.get("position")), number(one["damage"], 4, _tone(one))])
         rows[-1] += [number(one.get("repeats_to_failure"), 4), text(parts), _strength(one)]
-    columns = ["name", "element", "position [m]", "damage of all", "repeats of all to failure", "damage of the load cases", "strength"]
+    columns = [
+        "name",
+        "element",
+        "position [m]",
+        "damage of all",
+        "repeats of all to failure",
+        "damage of the load cases",
+        "strength",
+    ]
     note = "Damage by Miner, each load case as often as it occurs; failure is expected at 1."
     return Table("Damage of all load cases", columns, rows, note)
 
@@ -42,9 +50,17 @@ def _strength(one: dict) -> object:
 def _of_run(run: Run) -> Table:
     rows = []
     for one in run.summary["fatigue"]:
-        row = [text(one["name"]), text(one["element"]), number(one.get("position")), number(one["cycles"]), number(one["largest_range"])]
+        row = [
+            text(one["name"]),
+            text(one["element"]),
+            number(one.get("position")),
+            number(one["cycles"]),
+            number(one["largest_range"]),
+        ]
         row += [number(one["mean_of_largest_range"]), text(one["unit"]), number(one["damage"], 4), number(one["repeats"])]
-        rows.append([*row, number(one["damage_of_repeats"], 4, _tone(one)), number(one.get("repeats_to_failure"), 4), _strength(one)])
+        rows.append(
+            [*row, number(one["damage_of_repeats"], 4, _tone(one)), number(one.get("repeats_to_failure"), 4), _strength(one)]
+        )
     columns = ["name", "element", "position [m]", "cycles", "largest range", "its mean", "unit", "damage of the run", "repeats"]
     columns += ["damage of repeats", "repeats to failure", "strength"]
     which = f" of load case {run.name}" if run.name else ""

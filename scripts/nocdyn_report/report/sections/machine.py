@@ -122,7 +122,9 @@ def _constraints(sources: Sources) -> Table:
     rows = []
     for one in sources.check["constraints"]:
         group = teeth.get(one["name"].lower(), {})
-        given = next((f"{key} {', '.join(map(number_text, _listed(group[key])))}" for key in ("teeth", "radii") if key in group), "")
+        given = next(
+            (f"{key} {', '.join(map(number_text, _listed(group[key])))}" for key in ("teeth", "radii") if key in group), ""
+        )
         terms = [f"{number_text(c)} ω({body})" for c, body in zip(one["coefficients"], one["bodies"])]
         relation = " + ".join(terms).replace("+ \N{MINUS SIGN}", "\N{MINUS SIGN} ") + " = 0"
         rows.append([text(one["name"]), text(one["kind"]), text(relation), number(one.get("ratio")), text(given)])
@@ -150,7 +152,9 @@ def _torques(sources: Sources) -> Table:
         for group in sources.groups(kind):
             bodies = _listed(group.get("body", group.get("cylinders", [])))
             words = [str(group["kind"])] if isinstance(group.get("kind"), str) else []
-            rows.append([text(group.get("name", "")), text(kind), text(", ".join(map(str, bodies))), text(", ".join(words) or NO_KIND)])
+            rows.append(
+                [text(group.get("name", "")), text(kind), text(", ".join(map(str, bodies))), text(", ".join(words) or NO_KIND)]
+            )
     return Table("Motors, loads, excitations", ["name", "group", "acts on", "kind"], rows, "Their data are in the input.")
 
 

@@ -112,7 +112,9 @@ def _shapes(sources: Sources, shaped: list[dict]) -> Figure:
     }
     told = "; ".join(f"mode {mode['mode']} at {number_text(mode['frequency_Hz'])} Hz" for mode in shaped)
     lines = " Shaft lines stand one beside the other." if train.lines > 1 else ""
-    return Figure(f"Shapes of the modes along the train.{lines}", f"Curves of the relative amplitudes of the bodies: {told}.", spec)
+    return Figure(
+        f"Shapes of the modes along the train.{lines}", f"Curves of the relative amplitudes of the bodies: {told}.", spec
+    )
 
 
 def _abscissas(train: Train) -> tuple[list[float], list[int | None]]:
@@ -145,7 +147,12 @@ def _holzer(sources: Sources) -> list[Paragraph | Table]:
         part = table[table["mode"] == mode]
         rows = []
         for values in part[columns].itertuples(index=False):
-            rows.append([text("" if value != value else value) if _is_text(name) else number(value) for name, value in zip(columns, values)])
+            rows.append(
+                [
+                    text("" if value != value else value) if _is_text(name) else number(value)
+                    for name, value in zip(columns, values)
+                ]
+            )
         rows, more = first(rows, MOST_BODIES, "holzer.csv")
         caption = f"Holzer table of undamped mode {mode}, {number_text(float(part['frequency [Hz]'].iloc[0]))} Hz"
         blocks.append(Table(caption, columns, rows, more, is_sorted=False))

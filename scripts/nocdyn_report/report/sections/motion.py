@@ -19,12 +19,27 @@ FIGURES = {  # quantities that get a figure of their own, in this order, with wh
     "slip": "slip",
     "current": "current",
 }
-RANKS = ["shaft", "moment", "reaction", "force", "stress", "torque", "loss", "bearing", "omega", "slip", "twist", "deformation", "damping"]
+RANKS = [
+    "shaft",
+    "moment",
+    "reaction",
+    "force",
+    "stress",
+    "torque",
+    "loss",
+    "bearing",
+    "omega",
+    "slip",
+    "twist",
+    "deformation",
+    "damping",
+]
 MOST_CURVES = 10  # of a figure
 SHOWN_CURVES = 5  # at first
 MOST_ROWS = 200
 INNER = re.compile(r"\[\d+\]$")  # of the names of inner nodes of shafts
 WHOLE = "_max"  # of the largest moment along a shaft
+LEFT_OUT = re.compile(r"(phi|damping|work)_|.*_energy$|energy_residual$")  # of the tables of peaks
 
 
 def motion_section(sources: Sources) -> Section | None:
@@ -45,9 +60,10 @@ def motion_section(sources: Sources) -> Section | None:
 
 def _of_run(sources: Sources, run: Run) -> list[Paragraph | Table | Figure]:
     settings, counts = run.summary["settings"], run.summary.get("counts", {})
-    told = f"From {number_text(settings['t_start'])} to {number_text(run.summary.get('time_reached', settings['t_end']))} s by the method "
-    told += f"{settings['method']}, rtol = {settings['rtol']:g}, atol = {settings['atol']:g}"
-    blocks: list[Paragraph | Table | Figure] = [Paragraph(f"{told}; {counts.get('accepted_steps', 0)} steps.")]
+    end = run.summary.get("time_reached", settings["t_end"])
+    told = f"From {number_text(settings['t_start'])} to {number_text(end)} s by the method {settings['method']}, "
+    told += f"rtol = {settings['rtol']:g}, atol = {settings['atol']:g}; {counts.get('accepted_steps', 0)} steps."
+    blocks: list[Paragraph | Table | Figure] = [Paragraph(told)]
     if run.summary.get("limits"):
         blocks.append(_limits(run))
     blocks.append(_extremes(run))
@@ -63,14 +79,19 @@ def _cases(sources: Sources) -> Table:
     for case in sources.cases["load_cases"]:
         tone = "good" if case["status"] == "done" else "bad"
         rows.append(
-            [text(case["name"], "", f"#case-{case['name']}"), text(case["title"]), number(case["repeats"]), text(case["status"], tone)]
+            [
+                text(case["name"], "", f"#case-{case['name']}"),
+                text(case["title"]),
+                number(case["repeats"]),
+                text(case["status"], tone),
+            ]
         )
     return Table("Load cases", ["name", "title", "repeats in the life", "run"], rows)
 
 
 def _peaks(sources: Sources) -> Table:
     rows = []
-    peaks = (peak for peak in sources.cases["peaks"] if not INNER.search(peak["column"]))
+    peaks = [peak for peak in sources.cases["peaks"] if not INNER.search(peak["column"]) and not LEFT_OUT.match(peak["column"])]
     for peak in sorted(peaks, key=lambda one: rank(one["column"])):
         values = [text(peak["column"]), number(peak["largest"]), text(unit_text(peak["unit"])), number(peak["time"])]
         rows.append([*values, text(peak["load_case"], "", f"#case-{peak['load_case']}")])
@@ -99,18 +120,23 @@ def _extremes(run: Run) -> Table:
     for label in sorted(run.columns, key=rank):
         column = run.columns[label]
         name, unit = name_and_unit(label)
-        if "min" not in column or INNER.search(name):
+        if "min" not in column or INNER.search(name) or LEFT_OUT.match(name):
             continue
         star = "*" if label in [*transient.get("has_min_of", []), *transient.get("has_max_of", [])] else ""
         shown = rounded({key: column[key] for key in ("min", "max", "last")}, dict.fromkeys(("min", "max", "last"), unit))
-        row = [text(name + star), text(unit_text(unit)), number(shown["min"]), number(column["time_of_min"]), number(shown["max"])]
+        row = [
+            text(name + star),
+            text(unit_text(unit)),
+            number(shown["min"]),
+            number(column["time_of_min"]),
+            number(shown["max"]),
+        ]
         rows.append([*row, number(column["time_of_max"]), number(shown["last"])])
     rows, more = first(rows, MOST_ROWS, "summary.json")
     notes = [f"The extremes are those {run.summary.get('extremes', 'of the motion')}."]
     if "extremes_from" in run.summary:
         notes.append(f"They are taken from {number_text(run.summary['extremes_from'])} s on.")
-    if any(INNER.search(name_and_unit(label)[0]) for label in run.columns):
-        notes.append("The inner nodes of shafts are in summary.json.")
+    notes.append("Angles, damping moments, energies and inner nodes of shafts are in summary.json.")
     if transient:
         notes.append(f"* In the first fast transient of a start out of balance, up to {number_text(transient['until'])} s.")
     columns = ["quantity", "unit", "smallest", "at t [s]", "largest", "largest at t [s]", "last"]
@@ -156,7 +182,9 @@ def _figures(sources: Sources, run: Run) -> list[Figure]:
     return [_figure(sources, run, table, key, chosen[key], counts[key], ranges) for key in keys]
 
 
-def _figure(sources: Sources, run: Run, table: object, key: tuple, labels: list[str], count: int, ranges: dict[str, float]) -> Figure:
+def _figure(
+    sources: Sources, run: Run, table: object, key: tuple, labels: list[str], count: int, ranges: dict[str, float]
+) -> Figure:
     kind, unit = key
     time = table[TIME].to_numpy()
     shown = set(sorted(labels, key=lambda label: -ranges.get(label, 0.0))[:SHOWN_CURVES])
@@ -171,9 +199,9 @@ def _figure(sources: Sources, run: Run, table: object, key: tuple, labels: list[
         "name": kind,
     }
     some = f", the {len(labels)} of {count} that vary most" if len(labels) < count else ""
-    told = "; ".join(
-        f"{name_and_unit(label)[0]} from {number_text(run.columns[label]['min'])} to {number_text(run.columns[label]['max'])} {unit}"
-        for label in labels
-        if "max" in run.columns.get(label, {})
-    )
+    told = "; ".join(_range(label, run.columns[label], unit) for label in labels if "max" in run.columns.get(label, {}))
     return Figure(f"{FIGURES[kind].capitalize()}{_of(run)} over the time{some}", f"Curves over the time: {told}.", spec)
+
+
+def _range(label: str, column: dict, unit: str) -> str:
+    return f"{name_and_unit(label)[0]} from {number_text(column['min'])} to {number_text(column['max'])} {unit}"

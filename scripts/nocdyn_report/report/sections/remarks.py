@@ -12,8 +12,8 @@ ASSUMED = {  # what each calculation takes for granted, as the documentation say
     "modes": ["Modes: linearised about the operating point; the damping is that of the elements there."],
     "campbell": ["Campbell diagram: linearised about the steady state at each speed, which the motors hold."],
     "response": [
-        "Forced response: linearised about the steady state at each speed, which the motors hold; the orders are added with their "
-        "phases, and the half range is that of the sum.",
+        "Forced response: linearised about the steady state at each speed, which the motors hold; the orders are added with "
+        "their phases, and the half range is that of the sum.",
         "Limits of speeds apply to continuous operation; where they are exceeded the range is barred.",
     ],
     "run": ["Motion over the time: nonlinear, as the input describes the elements."],

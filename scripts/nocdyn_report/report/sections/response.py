@@ -20,7 +20,9 @@ def response_section(sources: Sources) -> Section | None:
         return None
     section = Section("response", "Forced response")
     report = sources.response_report
-    span = f"from {_speed(sources, report['speed_rad_s'][0])} to {_speed(sources, report['speed_rad_s'][-1])} {sources.speed_unit}"
+    span = (
+        f"from {_speed(sources, report['speed_rad_s'][0])} to {_speed(sources, report['speed_rad_s'][-1])} {sources.speed_unit}"
+    )
     section.add(Paragraph(f"{len(report['lines'])} orders are computed at the speeds of {report['body']} {span}."))
     section.add(Heading("Limits and barred ranges of speed", "limits"), *_limits(sources))
     section.add(Heading("Resonances", "resonances"))
@@ -61,7 +63,11 @@ def _limits(sources: Sources) -> list[Paragraph | Table]:
     rows = []
     for one in barred:
         ends = sorted((sources.speed(one["from_rad_s"]), sources.speed(one["to_rad_s"])))
-        passing = text("may be passed quickly", "warn") if one["can_be_passed"] else text("limit for passing through exceeded too", "bad")
+        passing = (
+            text("may be passed quickly", "warn")
+            if one["can_be_passed"]
+            else text("limit for passing through exceeded too", "bad")
+        )
         rows.append([text(one["quantity"]), *map(number, ends), passing, text(one["limit_at"])])
     columns = ["limit of", f"from [{unit}]", f"to [{unit}]", "passage", "set at"]
     return [*blocks, Table("Barred ranges of speed", columns, rows, "No continuous operation within these speeds.")]
@@ -89,7 +95,14 @@ def _resonances(sources: Sources) -> Table:
         )
     rows, more = first(rows, MOST_ROWS, "response.json")
     unit = sources.speed_unit
-    columns = ["mode/order", f"critical speed [{unit}]", "frequency [Hz]", "damping ratio", "largest in", "moment of the order [N m]"]
+    columns = [
+        "mode/order",
+        f"critical speed [{unit}]",
+        "frequency [Hz]",
+        "damping ratio",
+        "largest in",
+        "moment of the order [N m]",
+    ]
     columns += ["half range of all [N m]", f"at [{unit}]", "stress [Pa]", "of its limit [%]", "operation"]
     return Table("Resonances and what they reach", columns, rows, more)
 
@@ -125,7 +138,9 @@ def _curves(sources: Sources) -> list[Paragraph | Figure]:
     chosen = [one for one in response.quantities if any(one is other for other in ranked)]
     blocks: list[Paragraph | Figure] = [_figure(sources, one) for one in chosen]
     if len(chosen) < len(response.quantities):
-        blocks.append(Paragraph(f"Drawn are the {len(chosen)} largest of {len(response.quantities)} quantities; response.csv has all."))
+        blocks.append(
+            Paragraph(f"Drawn are the {len(chosen)} largest of {len(response.quantities)} quantities; response.csv has all.")
+        )
     return blocks
 
 

@@ -65,6 +65,8 @@ def _without_command(sources: Sources, there: set[str]) -> list[list[Cell]]:
         ],
     ]
     fatigue = "fatigue" in there
-    reason = "summary.json, cycles.csv" if fatigue else "there is no run" if sources.groups("fatigue") else "the input has no &fatigue"
+    reason = (
+        "summary.json, cycles.csv" if fatigue else "there is no run" if sources.groups("fatigue") else "the input has no &fatigue"
+    )
     state = text("calculated", "good") if fatigue else text("left out", "warn")
     return [*rows, [text("Fatigue", "", "#fatigue" if fatigue else ""), state, text(reason)]]

@@ -52,7 +52,9 @@ def _values(state: dict, which: str, elastic: set[str]) -> Iterable[Table]:
             others.append([text(name.replace("_", " ")), number(value), text(unit_text(unit))])
             continue
         end = next((end for end in ENDS if element.removesuffix(end) in elastic and element.endswith(end)), "")
-        column = f"{'speed' if quantity == 'omega' else 'angle' if quantity == 'phi' else quantity}{end.replace('_', ' ')} [{unit}]"
+        column = (
+            f"{'speed' if quantity == 'omega' else 'angle' if quantity == 'phi' else quantity}{end.replace('_', ' ')} [{unit}]"
+        )
         tables[title].setdefault(element.removesuffix(end), {})[column] = value
     for title, rows in tables.items():
         if rows:

@@ -70,7 +70,9 @@ def _criticals(sources: Sources) -> list[list[Cell]]:
         if named:
             rows.append(_row("Critical speeds", "critical", _listed(named), words, "warn"))
     if rows or not crossings:
-        return rows or [_row("Critical speeds", "critical", "No order meets a natural frequency in the range of speeds.", "none", "good")]
+        return rows or [
+            _row("Critical speeds", "critical", "No order meets a natural frequency in the range of speeds.", "none", "good")
+        ]
     named = [f"{one.name} at {number_text(sources.of_rpm(one.speed))} {sources.speed_unit}" for one in crossings]
     words, tone = ("clear of operation", "good") if sources.campbell.operation else ("", "")
     return [_row("Critical speeds", "critical", _listed(named), words, tone)]
