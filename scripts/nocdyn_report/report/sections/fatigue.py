@@ -69,32 +69,28 @@ def _of_run(run: Run) -> Table:
 
 
 def _of_speeds(sources: Sources) -> list[Paragraph | Table | Figure]:
-    """Every number that response.json has for each &fatigue, and the damage per hour over the speed."""
-    lives = sources.response_report["fatigue"]
-    keys = list(dict.fromkeys(key for one in lives for key, value in one.items() if isinstance(value, (int, float, str, bool))))
-    rows = []
-    for one in lives:
-        rows.append([_cell(sources, key, one.get(key)) for key in keys])
-    columns = [_head(sources, key) for key in keys]
-    blocks: list[Paragraph | Table | Figure] = [Table("Damage of continuous operation", columns, rows)]
+    rows, profiles = [], []
+    for one in sources.response_report["fatigue"]:
+        row = [text(one["name"]), text(one["element"]), text(one["quantity"]), number(one["largest_damage_per_hour"], 4)]
+        row += [number(sources.speed(one["speed_rad_s"])), number(one.get("damage_of_profile"), 4, _profile_tone(one))]
+        rows.append([*row, number(one.get("hours_to_failure"), 4), _strength(one)])
+        parts = (one.get(key, []) for key in ("profile_speeds_rad_s", "profile_hours", "profile_damage_per_hour"))
+        for speed, hours, rate in zip(*parts):
+            profiles.append([text(one["name"]), number(sources.speed(speed)), number(hours), number(rate, 4)])
+    unit = sources.speed_unit
+    columns = ["name", "element", "quantity", "largest damage of an hour [1/h]", f"at [{unit}]", "damage of the profile"]
+    note = "Cycles of the synthesis of all orders about their mean; failure is expected at a damage of 1."
+    blocks: list[Paragraph | Table | Figure] = []
+    blocks.append(Table("Damage of continuous operation", [*columns, "hours to failure [h]", "strength"], rows, note))
+    if profiles:
+        heads = ["name", f"speed [{unit}]", "time at it [h]", "damage of an hour [1/h]"]
+        blocks.append(Table("Profile of speeds", heads, profiles))
     figure = _hourly(sources)
     return [*blocks, figure] if figure else blocks
 
 
-def _head(sources: Sources, key: str) -> str:
-    if key.endswith("_rad_s"):
-        return f"{key.removesuffix('_rad_s').replace('_', ' ')} [{sources.speed_unit}]"
-    if key.endswith("_1_h"):
-        return f"{key.removesuffix('_1_h').replace('_', ' ')} [1/h]"
-    return f"{key.removesuffix('_h').replace('_', ' ')} [h]" if key.endswith("_h") else key.replace("_", " ")
-
-
-def _cell(sources: Sources, key: str, value: object) -> object:
-    if isinstance(value, bool):
-        return text("yes" if value else "no", "bad" if value else "")
-    if isinstance(value, (int, float)):
-        return number(sources.speed(value) if key.endswith("_rad_s") else value, 4)
-    return text(value or "")
+def _profile_tone(one: dict) -> str:
+    return "bad" if one.get("damage_of_profile", 0.0) > 1 else ""
 
 
 def _hourly(sources: Sources) -> Figure | None:

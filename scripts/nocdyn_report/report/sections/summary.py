@@ -158,5 +158,17 @@ def _life(sources: Sources) -> list[list[Cell]]:
 def _damage_per_hour(sources: Sources) -> list[list[Cell]]:
     if not sources.results.has("response") or not sources.response_report.get("fatigue"):
         return []
-    names = [one.get("name", "") for one in sources.response_report["fatigue"]]
-    return [_row("Life", "hourly", f"Damage of continuous operation over the speed: {_listed(names)}.")]
+    rows = []
+    for one in sources.response_report["fatigue"]:
+        speed = f"{number_text(sources.speed(one['speed_rad_s']))} {sources.speed_unit}"
+        finding = f"{one['name']}: damage up to {number_text(one['largest_damage_per_hour'], 4)} per hour at {speed}"
+        if "damage_of_profile" in one:
+            finding += f"; damage of the profile {number_text(one['damage_of_profile'], 4)}"
+        if "hours_to_failure" in one:
+            finding += f", failure after {number_text(one['hours_to_failure'], 4)} h of it"
+        words = ("", "")
+        if "damage_of_profile" in one or one["mean_exceeds_strength"]:
+            bad = one.get("damage_of_profile", 0.0) > 1 or one["mean_exceeds_strength"]
+            words = ("exceeded", "bad") if bad else ("not used up", "good")
+        rows.append(_row("Life at a speed", "hourly", f"{finding}.", *words))
+    return rows

@@ -1,0 +1,412 @@
+"""scripts/report: the page in headless Chromium, the PDF, what is computed again, what is refused."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from conftest import SOURCE
+from report_browser import Browser, Reports, faults, require
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.keys import Keys
+
+require()
+
+RPM = 30 / np.pi
+NOTES = """# Purpose
+
+The *yard* asked.
+
+<script>window.harmed = 1</script>
+
+<img src=x onerror='window.harmed = 1'>
+"""
+PLANT = """&case title = 'Plant "</script><b>&amp;</b>'  author = 'A. Author'  customer = 'Yard <Sons>'
+      revision = 'B'  notes_file = 'n.md' /
+&body name = 'engine' inertia = 90.0 speed_rpm = 300 /
+&body name = 'wheel' inertia = 40.0 speed_rpm = 300 /
+&body name = 'pinion' inertia = 2.0 /
+&body name = 'pump' inertia = 6.0 /
+&coupling name = 'tyre' bodies = 'engine', 'wheel' stiffness = 4.0e5 damping = 300.0 section_modulus = 4.0e-4 /
+&coupling name = 'quill' bodies = 'pinion', 'pump' stiffness = 2.0e5 damping = 20.0 /
+&gear name = 'up' bodies = 'wheel', 'pinion' teeth = 60, 20 /
+&motor name = 'drive' body = 'engine' a = 6000.0 b = 100.0 c = 0.0 /
+&load name = 'work' body = 'pump' quadratic = 0.08 /
+&excitation name = 'orders' body = 'engine' kind = 'orders' orders = 1, 2, 3 amplitudes = 300.0, 500.0, 200.0 /
+&excitation name = 'blow' body = 'pump' kind = 'pulse' amplitude = -900.0 time = 0.3 duration = 0.05 /
+&response body = 'engine' speed_rpm = 200, 900 count = 60 operating_rpm = 300, 500 margin = 0.1 /
+&limit coupling = 'tyre' vibratory_moment = 1500.0 /
+&fatigue name = 'life' coupling = 'tyre' reference_stress = 2.0e7 reference_cycles = 1.0e6 slope = 5 /
+&load_case name = 'calm' title = 'Normal' repeats = 1000 without = 'blow' /
+&load_case name = 'blow' title = 'A blow' repeats = 20 /
+&run t_end = 0.6 start = 'projected' /
+&output points = 601 units = 'rpm' /
+"""
+EXAMPLES = ["compressor", "hybrid", "winch", "coupled_clutches", "chain_200"]
+WIDTHS = (400, 1600)
+
+
+@pytest.fixture(scope="module")
+def reports(tmp_path_factory):
+    made = Reports(tmp_path_factory.mktemp("report"))
+    made.write("n.md", NOTES)
+    made.write("m.nml", PLANT)
+    outcome = made("m.nml")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert outcome.stdout.splitlines()[-1] == "m.nml: results/m has report.html and report.pdf"
+    return made
+
+
+@pytest.fixture(scope="module")
+def browser():
+    opened = Browser()
+    yield opened
+    opened.quit()
+
+
+@pytest.fixture
+def fresh(tmp_path_factory):
+    return Reports(tmp_path_factory.mktemp("report"))
+
+
+@pytest.fixture
+def opened(reports, browser):
+    browser.open(reports.page())
+    return browser
+
+
+def without_notes(text):
+    return text.replace("notes_file = 'n.md'", "")
+
+
+def results(reports, name):
+    return json.loads((reports.folder / "results/m" / name).read_text(encoding="utf-8"))
+
+
+def column(browser, table, name):
+    """The texts of a column of the table whose caption has a text."""
+    return browser.ask(
+        """const captions = [...document.querySelectorAll('caption')];
+        const table = captions.find((one) => one.textContent.includes(arguments[0])).parentElement;
+        const heads = [...table.tHead.rows[0].cells].map((head) => head.textContent.trim());
+        const i = heads.findIndex((head) => head.startsWith(arguments[1]));
+        return [...table.tBodies[0].rows].map((row) => row.cells[i].textContent);""",
+        table,
+        name,
+    )
+
+
+def plain(text):
+    """The number that a text shows."""
+    for one, other in (("\N{NARROW NO-BREAK SPACE}", ""), ("\N{MINUS SIGN}", "-"), ("\N{MULTIPLICATION SIGN}10", "e")):
+        text = text.replace(one, other)
+    return float(text.translate(str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")))
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_page_has_no_fault(reports, browser, width, theme):
+    browser.open(reports.page(), width, theme)
+    assert faults(browser) == []
+    assert browser.ask("return document.querySelectorAll('[data-figure]').length") >= 10
+
+
+def test_sections_that_apply_are_there_in_order(opened):
+    found = opened.ask("return [...document.querySelectorAll('main > section')].map((one) => one.id)")
+    parts = ["summary", "remarks", "scope", "machine", "steady", "modes", "campbell", "response", "motion", "energy", "fatigue"]
+    assert found == [*parts, "notes", "input"]
+    pairs = (
+        "return [...document.querySelectorAll('.cover dl > div')].map((one) => [...one.children].map((part) => part.textContent))"
+    )
+    facts = dict(opened.ask(pairs))
+    assert [facts[name] for name in ("Customer", "Author", "Revision", "Input")] == ["Yard <Sons>", "A. Author", "B", "m.nml"]
+    assert facts["Program"].startswith("nocdyn ")
+    assert opened.find("h1").text == 'Plant "</script><b>&amp;</b>'
+
+
+def test_scripts_in_notes_do_no_harm(opened):
+    assert opened.ask("return window.harmed") is None
+    text = opened.find(".prose").text
+    assert "The yard asked." in text and "<script>window.harmed = 1</script>" in text
+    assert opened.ask("return document.querySelectorAll('.prose script, .prose img').length") == 0
+    assert faults(opened) == []
+
+
+def test_every_number_of_the_bodies_is_that_of_check(reports, opened):
+    data = results(reports, "../../results/m/calm/summary.json")
+    assert data["load_case"] == "calm"
+    assert column(opened, "Bodies with their inertias", "body") == ["engine", "wheel", "pinion", "pump"]
+    assert [plain(one) for one in column(opened, "Bodies with their inertias", "inertia")] == [90.0, 40.0, 2.0, 6.0]
+    stiffness = [plain(one) for one in column(opened, "Couplings, shafts and meshes", "stiffness")]
+    assert stiffness == [4.0e5, 2.0e5]
+    assert plain(column(opened, "Gears and other rigid", "ratio")[0]) == -3.0
+
+
+def test_findings_are_those_of_the_files(reports, opened):
+    report, cases = results(reports, "response.json"), results(reports, "cases.json")
+    ratio = next(one["ratio_to_limit"] for one in report["largest"] if "ratio_to_limit" in one)
+    assert f"{100 * ratio:.3g}" in opened.find("#summary").text
+    shown = zip(column(opened, "Barred ranges", "from"), column(opened, "Barred ranges", "to"))
+    ranges = [(one["from_rad_s"] * RPM, one["to_rad_s"] * RPM) for one in report["barred_speed_ranges"]]
+    assert ranges and [tuple(map(plain, pair)) for pair in shown] == [pytest.approx(pair, rel=1e-4) for pair in ranges]
+    peaks = dict(zip(column(opened, "Peaks of all load cases", "quantity"), column(opened, "Peaks of all load cases", "value")))
+    for peak in cases["peaks"]:
+        if peak["column"] in peaks:
+            assert plain(peaks[peak["column"]]) == pytest.approx(peak["largest"], rel=1e-4)
+    assert "shaft_tyre" in peaks and "omega_pump" in peaks
+    assert plain(column(opened, "Damage of all load cases", "damage of all")[0]) == pytest.approx(
+        cases["fatigue"][0]["damage"], rel=1e-3
+    )
+
+
+def test_tables_sort_by_mouse_and_by_keyboard(opened):
+    table = "Peaks of all load cases"
+    given = column(opened, table, "value")
+    head = opened.driver.find_element("xpath", f"//table[caption[contains(., '{table}')]]//th[contains(., 'value')]/button")
+    opened.ask("arguments[0].scrollIntoView({block: 'center'})", head)
+    head.click()
+    numbers = [plain(one) for one in column(opened, table, "value")]
+    assert numbers == sorted(numbers) and column(opened, table, "value") != given
+    head.send_keys(Keys.ENTER)
+    numbers = [plain(one) for one in column(opened, table, "value")]
+    assert numbers == sorted(numbers, reverse=True)
+    assert opened.ask("return arguments[0].parentElement.getAttribute('aria-sort')", head) == "descending"
+    head.send_keys(Keys.SPACE)
+    assert column(opened, table, "value") == given
+    name = opened.driver.find_element("xpath", f"//table[caption[contains(., '{table}')]]//th[1]/button")
+    name.send_keys(Keys.ENTER)
+    names = column(opened, table, "quantity")
+    assert names == sorted(names)
+
+
+def chart(browser, words):
+    """The number of the figure whose caption has some words, scrolled into view, and its picture."""
+    number = browser.ask(
+        "return report.charts.findIndex((one) => one.figure.querySelector('figcaption').textContent.includes(arguments[0]))",
+        words,
+    )
+    assert number >= 0
+    picture = browser.ask("return report.charts[arguments[0]].picture", number)
+    browser.ask("arguments[0].scrollIntoView({block: 'center'})", picture)
+    return number, picture
+
+
+def test_curves_show_their_values_under_the_pointer(reports, opened):
+    number, picture = chart(opened, "moment_tyre: half range")
+    table = pd.read_csv(reports.folder / "results/m/response.csv").sort_values("omega_engine [rpm]")
+    row = table.iloc[(table["omega_engine [rpm]"] - 400).abs().argmin()]
+    at = opened.ask("return report.charts[arguments[0]].x(arguments[1])", number, float(row["omega_engine [rpm]"]))
+    size = picture.size
+    ActionChains(opened.driver).move_to_element_with_offset(picture, round(at - size["width"] / 2), 0).perform()
+    tip = opened.ask("return report.charts[arguments[0]].tip.innerText", number)
+    assert not opened.ask("return report.charts[arguments[0]].tip.hidden", number)
+    speed, *lines = tip.splitlines()
+    row = table.iloc[(table["omega_engine [rpm]"] - plain(speed.split()[0])).abs().argmin()]
+    total = next(line for line in lines if "all orders" in line)
+    assert plain(total.split(": ")[1].removesuffix(" N m")) == pytest.approx(row["half_range_moment_tyre [N m]"], rel=1e-4)
+    limit = next(line for line in lines if "limit" in line)
+    assert plain(limit.split(": ")[1].removesuffix(" N m")) == pytest.approx(1500.0)
+    ActionChains(opened.driver).move_to_element(opened.find("h1")).perform()
+    assert opened.ask("return report.charts[arguments[0]].tip.hidden", number)
+
+
+def test_figures_zoom_by_mouse_and_return(opened):
+    number, picture = chart(opened, "moment_tyre: half range")
+    window = "return report.charts[arguments[0]].window.x"
+    whole = opened.ask(window, number)
+    ActionChains(opened.driver).move_to_element_with_offset(picture, -100, 0).click_and_hold().move_by_offset(
+        200, 5
+    ).release().perform()
+    zoomed = opened.ask(window, number)
+    assert whole[0] < zoomed[0] < zoomed[1] < whole[1]
+    opened.ask("report.charts[arguments[0]].figure.querySelector('[data-zoom=all]').click()", number)
+    assert opened.ask(window, number) == whole
+    opened.ask("report.charts[arguments[0]].figure.querySelector('[data-zoom=in]').click()", number)
+    zoomed = opened.ask(window, number)
+    assert zoomed[1] - zoomed[0] == pytest.approx((whole[1] - whole[0]) / 2)
+    ActionChains(opened.driver).double_click(picture).perform()
+    assert opened.ask(window, number) == whole
+    assert faults(opened) == []
+
+
+def test_figures_are_usable_by_keyboard(opened):
+    number, picture = chart(opened, "Speed of load case blow")
+    window, status = "return report.charts[arguments[0]].window.x", "return report.charts[arguments[0]].status.textContent"
+    whole = opened.ask(window, number)
+    picture.send_keys(Keys.ARROW_RIGHT)
+    first = opened.ask(status, number)
+    assert "engine" in first and first.endswith("rpm")
+    picture.send_keys(Keys.ARROW_RIGHT)
+    assert opened.ask(status, number) != first
+    picture.send_keys("+")
+    zoomed = opened.ask(window, number)
+    assert zoomed[1] - zoomed[0] == pytest.approx((whole[1] - whole[0]) / 2)
+    picture.send_keys(Keys.SHIFT + Keys.ARROW_RIGHT)
+    assert opened.ask(window, number)[0] > zoomed[0]
+    picture.send_keys("0")
+    assert opened.ask(window, number) == whole
+    picture.send_keys(Keys.HOME)
+    assert opened.ask(status, number).startswith("0 s")
+    legend = opened.ask("return report.charts[arguments[0]].figure.querySelector('.legend button')", number)
+    curves = "return report.charts[arguments[0]].figure.querySelectorAll('.picture path.curve[d]').length"
+    shown = opened.ask(curves, number)
+    legend.send_keys(Keys.ENTER)
+    assert opened.ask("return arguments[0].getAttribute('aria-pressed')", legend) == "false"
+    assert opened.ask(curves, number) < shown
+
+
+def test_every_figure_has_a_text_alternative(opened):
+    texts = opened.ask("return [...document.querySelectorAll('figure .picture')].map((one) => one.getAttribute('aria-label'))")
+    assert all(len(text) > 30 for text in texts) and len(set(texts)) == len(texts)
+
+
+def test_colours_follow_the_reader_and_the_button(reports, browser):
+    ground = "return getComputedStyle(document.body).backgroundColor"
+    seen = {}
+    for theme in ("light", "dark"):
+        browser.open(reports.page(), theme=theme)
+        seen[theme] = browser.ask(ground)
+    assert seen["light"] != seen["dark"]
+    browser.find("[data-theme-choice=light]").click()
+    assert browser.ask(ground) == seen["light"]
+    browser.find("[data-theme-choice=auto]").click()
+    assert browser.ask(ground) == seen["dark"]
+    browser.driver.execute_cdp_cmd(
+        "Emulation.setEmulatedMedia", {"media": "print", "features": [{"name": "prefers-color-scheme", "value": "dark"}]}
+    )
+    assert browser.ask(ground) == seen["light"]
+    browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": []})
+
+
+def test_without_scripts_the_tables_are_there(reports):
+    text = reports.page().read_text(encoding="utf-8")
+    assert "<noscript>" in text and text.index("<table") < text.index('id="data"')
+    assert len(text) < 5_000_000
+
+
+def test_the_pdf_is_whole(reports):
+    content = (reports.folder / "results/m/report.pdf").read_bytes()
+    assert content.startswith(b"%PDF") and content.rstrip().endswith(b"%%EOF")
+    assert len(content) > 100_000
+
+
+def test_only_what_does_not_belong_to_the_input_is_computed_again(fresh):
+    fresh.write("n.md", NOTES)
+    fresh.write("m.nml", PLANT)
+
+    def states():
+        outcome = fresh("m.nml", "--no-pdf")
+        assert (outcome.returncode, outcome.stderr) == (0, "")
+        return {line.split()[0]: line.split()[1].rstrip(":") for line in outcome.stdout.splitlines()[:-1]}
+
+    commands = ("equilibrium", "modes", "holzer", "campbell", "response", "run")
+    assert states() == dict.fromkeys(commands, "computed")
+    assert states() == dict.fromkeys(commands, "reused")
+    fresh.write("m.nml", PLANT.replace("revision = 'B'", "revision = 'C'"))
+    assert states() == dict.fromkeys(commands, "reused")
+    assert "<dd>C</dd>" in fresh.page().read_text(encoding="utf-8")
+    fresh.write("results/m/response.json", fresh.page().with_name("response.json").read_text().replace("tyre", "tire"))
+    assert states() == dict.fromkeys(commands, "reused") | {"response": "computed"}
+    fresh.write("m.nml", PLANT.replace("inertia = 90.0", "inertia = 91.0"))
+    assert states() == dict.fromkeys(commands, "computed")
+    (fresh.folder / "results/m/blow/trajectory.csv").unlink()
+    assert states() == dict.fromkeys(commands, "reused") | {"run": "computed"}
+
+
+def test_set_reaches_every_calculation(fresh):
+    text = without_notes(PLANT)
+    fresh.write("m.nml", text)
+    outcome = fresh("m.nml", "--no-pdf", "--quiet", "--set", "body.engine.inertia=70", "--out", "there")
+    assert (outcome.returncode, outcome.stdout, outcome.stderr) == (0, "", "")
+    page = (fresh.folder / "there/report.html").read_text(encoding="utf-8")
+    assert "--set body.engine.inertia=70" in page
+    assert json.loads((fresh.folder / "there/modes.json").read_text())["inertia_kg_m2"][0] == 70
+    assert not (fresh.folder / "there/report.pdf").exists()
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_machines_of_all_sorts_have_a_report(fresh, browser, name):
+    file = SOURCE / f"input/examples/{name}/{name}.nml"
+    outcome = fresh(file, "--no-pdf", "--quiet", "--set", "run.t_end=0.02", "--out", "results/m")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    browser.open(fresh.page(), WIDTHS[0])
+    assert faults(browser) == []
+    for name in column(browser, "Calculations", "calculation"):
+        assert name
+
+
+def test_a_machine_that_a_command_refuses_is_told_in_its_own_words(fresh):
+    fresh.write("m.nml", without_notes(PLANT).replace("b = 100.0", "b = 0.0").replace("quadratic = 0.08", "viscous = 0.0"))
+    outcome = fresh("m.nml", "--no-pdf")
+    refused = [line.split(":", 1)[1].strip() for line in outcome.stdout.splitlines() if " refused" in line or " failed" in line]
+    page = fresh.page().read_text(encoding="utf-8")
+    assert outcome.returncode == 0 and refused
+    assert refused[0].split("'")[0] in page
+
+
+def test_a_refused_input_has_no_report(fresh):
+    fresh.write("m.nml", "&body name = 'a' inertia = -1 /\n&run t_end = 1 /\n")
+    outcome = fresh("m.nml")
+    assert outcome.returncode == 2 and outcome.stdout == ""
+    assert outcome.stderr == "nocdyn: m.nml:1: &body 'a': inertia = -1 is out of range; allowed: >= 0 [kg m2]\n"
+    assert not (fresh.folder / "results").exists()
+    outcome = fresh("none.nml")
+    assert outcome.returncode == 3 and outcome.stderr == "nocdyn: none.nml: cannot be read: there is no such file\n"
+
+
+def test_a_run_that_fails_is_told_and_has_its_exit_code(fresh, browser):
+    fresh.write("m.nml", without_notes(PLANT).replace("t_end = 0.6", "t_end = 0.6 max_steps = 5"))
+    outcome = fresh("m.nml", "--no-pdf", "--quiet")
+    assert outcome.returncode == 1 and outcome.stderr.startswith("nocdyn: m.nml: ")
+    browser.open(fresh.page())
+    assert faults(browser) == []
+    assert "failed" in browser.find("#summary").text
+
+
+def test_pictures_of_notes_are_inside_and_others_refused(fresh, browser):
+    fresh.write("m.nml", PLANT)
+    fresh.write("n.md", "![A shaft](https://example.org/a.png)\n")
+    outcome = fresh("m.nml", "--no-pdf")
+    message = (
+        "nocdyn: m.nml:2: &case: notes_file: picture 'https://example.org/a.png': allowed: a file PNG, JPEG, GIF, WebP or SVG\n"
+    )
+    assert (outcome.returncode, outcome.stderr) == (2, message)
+    assert not fresh.page().exists()
+    fresh.write(
+        "a.svg", "<svg xmlns='http://www.w3.org/2000/svg' width='20' height='20'><script>window.harmed = 1</script></svg>"
+    )
+    fresh.write("n.md", "![A shaft](a.svg)\n")
+    assert fresh("m.nml", "--no-pdf").returncode == 0
+    browser.open(fresh.page())
+    assert browser.ask("return document.querySelector('.prose img').naturalWidth") == 20
+    assert faults(browser) == []
+
+
+def test_without_a_browser_there_is_no_half_a_report(reports):
+    before = reports.page().read_bytes()
+    outcome = reports("m.nml", "--quiet", PATH="/nowhere")
+    assert outcome.returncode == 3
+    assert outcome.stderr == (
+        "scripts/report: there is no chromium, which prints the PDF: apt-get install chromium, or use --no-pdf\n"
+    )
+    assert reports.page().read_bytes() == before
+    assert not list(reports.page().parent.glob(".*"))
+
+
+def test_a_folder_with_a_sweep_is_refused(fresh):
+    fresh.write("m.nml", without_notes(PLANT))
+    (fresh.folder / "results/m").mkdir(parents=True)
+    fresh.write("results/m/sweep.nc", "")
+    outcome = fresh("m.nml", "--no-pdf")
+    assert outcome.returncode == 2 and "holds the results of a sweep" in outcome.stderr
+    assert not fresh.page().exists()
+
+
+def test_names_of_files_are_no_markup(fresh, browser):
+    name = "a&b 'c' <i>.nml"
+    fresh.write(name, "&case author" + without_notes(PLANT).split("  author", 1)[1])
+    outcome = fresh(name, "--no-pdf", "--out", "results/m")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    browser.open(fresh.page())
+    assert browser.find("h1").text == name.removesuffix(".nml")
+    assert faults(browser) == []
