@@ -33,7 +33,7 @@ def make_folder(folder, nocdyn):
     for name in ("docs", "input"):
         (folder / name).symlink_to(ROOT / name)
     (folder / "scripts").mkdir()
-    for script in ("plot", "plot_campbell", "plot_modes", "plot_response", "plot_sweep"):  # without the installation of packages
+    for script in ("plot", "plot_campbell", "plot_modes", "plot_response", "plot_sweep", "report"):  # without the installation of packages
         module = re.search(r"-m (\S+)", (ROOT / "scripts" / script).read_text(encoding="utf-8"))[1]
         stand_in = folder / "scripts" / script
         stand_in.write_text(f'#!/bin/sh\nPYTHONPATH={ROOT}/scripts exec {sys.executable} -m {module} "$@"\n', encoding="utf-8")

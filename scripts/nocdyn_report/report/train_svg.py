@@ -15,6 +15,7 @@ LONGEST = 11  # characters of a name that stands upright
 MARKS = {"motor": "M", "engine": "E", "load": "L", "excitation": "~", "drive": "D"}
 PAD = 46.0
 COLOURS = 7
+LEAST = 600.0  # width on a screen [px]
 
 
 def train_drawing(check: dict, groups: Callable[[str], list[dict]]) -> Drawing:
@@ -82,7 +83,7 @@ class _Picture:
         self.slanted = max((len(name) for name in names), default=0) > LONGEST
         self.parts: list[str] = []
         self.right = max(self.x, default=0.0) + PAD
-        self.left = 0.0
+        self.upper = min((y - h / 2 for y, h in zip(self.y, self.height)), default=0.0) - 8.0
 
     def _line(self, a: tuple[float, float], b: tuple[float, float], name: str, title: str = "", colour: str = "") -> None:
         ends = f'x1="{a[0]:.1f}" y1="{a[1]:.1f}" x2="{b[0]:.1f}" y2="{b[1]:.1f}"'
@@ -146,6 +147,7 @@ class _Picture:
             self.parts.append(f'<text class="name" {where}>{escape(name)}</text>')
             for i, (sign, what) in enumerate(marks.get(body, [])[:3]):
                 above = y - height / 2 - 12 - 19 * i
+                self.upper = min(self.upper, above - 12)
                 self.parts.append(
                     f'<g class="mark"><title>{escape(what)}</title><circle cx="{x:.1f}" cy="{above:.1f}" r="8.5"/>'
                     f'<text x="{x:.1f}" y="{above + 4:.1f}" text-anchor="middle">{sign}</text></g>'
@@ -156,8 +158,7 @@ class _Picture:
         room = 30.0 + (0.6 * 6.5 * max(map(len, self.names), default=0) if self.slanted and not self.dense else 0.0)
         left = -0.82 * 6.5 * max(map(len, self.names), default=0) + PAD if self.slanted and not self.dense else 0.0
         left = min(0.0, left)
-        width, height = self.right - left, bottom + room
-        return (
-            f'<svg class="train" viewBox="{left:.0f} 0 {width:.0f} {height:.0f}" width="{width:.0f}" height="{height:.0f}" '
-            f'aria-hidden="true">{"".join(self.parts)}</svg>'
-        )
+        width, height = self.right - left, bottom + room - self.upper
+        view = f'viewBox="{left:.0f} {self.upper:.0f} {width:.0f} {height:.0f}" width="{width:.0f}" height="{height:.0f}"'
+        least = f"min-width:{min(width, LEAST):.0f}px"  # narrower, nobody could read the names
+        return f'<svg class="train" style="{least}" {view} aria-hidden="true">{"".join(self.parts)}</svg>'

@@ -9,7 +9,7 @@ from .response import limited, ratio_tone
 from .steady import stability_text
 
 MOST_NAMED = 6  # of one sort
-MOST_PEAKS = 4
+MOST_PEAKS = 2  # of a kind
 PEAK_KINDS = ("shaft", "moment", "reaction", "force", "stress")
 
 
@@ -116,7 +116,7 @@ def _run_limits(sources: Sources) -> list[list[Cell]]:
 
 def _peaks(sources: Sources) -> list[list[Cell]]:
     """The largest values of the kinds that one looks for."""
-    found: dict[str, list[tuple[float, str]]] = {}
+    found: dict[str, dict[str, tuple[float, str]]] = {}  # by kind and unit, of each quantity
     for run in sources.runs:
         early = run.summary.get("start_transient", {})
         for label, column in run.columns.items():
@@ -129,13 +129,14 @@ def _peaks(sources: Sources) -> list[list[Cell]]:
             start = ", in the start transient" if label in early.get(f"has_{end}_of", []) else ""
             value, time = number_text(column[end]), number_text(column[f"time_of_{end}"])
             finding = f"{name} {value} {unit} at {time} s{which}{start}"
-            found.setdefault(f"{kind} {unit}", []).append((abs(column[end]), finding))
+            largest = found.setdefault(f"{kind} {unit}", {})
+            largest[name] = max(largest.get(name, (0.0, "")), (abs(column[end]), finding))
     if any(key.startswith("shaft ") for key in found):
         found = {key: values for key, values in found.items() if not key.startswith("moment ")}
     rows = []
     for key, values in found.items():
         kind = {"shaft": "moment"}.get(key.split()[0], key.split()[0])
-        largest = [finding for _, finding in sorted(values, reverse=True)[: MOST_PEAKS // 2]]
+        largest = [finding for _, finding in sorted(values.values(), reverse=True)[:MOST_PEAKS]]
         rows.append(_row(f"Largest {kind}", "motion", "; ".join(largest) + "."))
     return rows
 
