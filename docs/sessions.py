@@ -22,6 +22,8 @@ NUMBER = re.compile(r"[+-]?\d[\d.]*(?:[eE][+-]?\d+)?")
 PROGRESS = re.compile(r"^.* variants, .* left\n", re.MULTILINE)  # lines of a sweep that takes more than 10 s
 SAME = {"relative": 1e-4, "absolute": 1e-8}  # the output has seven digits; sums that should be 0 are rounding errors
 
+SCRIPTS = ("plot", "plot_campbell", "plot_modes", "plot_response", "plot_sweep", "report")  # run without installing packages
+
 
 def sessions_of(page):
     """The commands of a page, each with the output that stands below it."""
@@ -33,7 +35,7 @@ def make_folder(folder, nocdyn):
     for name in ("docs", "input"):
         (folder / name).symlink_to(ROOT / name)
     (folder / "scripts").mkdir()
-    for script in ("plot", "plot_campbell", "plot_modes", "plot_response", "plot_sweep", "report"):  # without the installation of packages
+    for script in SCRIPTS:
         module = re.search(r"-m (\S+)", (ROOT / "scripts" / script).read_text(encoding="utf-8"))[1]
         stand_in = folder / "scripts" / script
         stand_in.write_text(f'#!/bin/sh\nPYTHONPATH={ROOT}/scripts exec {sys.executable} -m {module} "$@"\n', encoding="utf-8")
