@@ -103,7 +103,7 @@ def faults(browser: Browser) -> list[str]:
     found += browser.ask("""
         const found = [];
         for (const figure of document.querySelectorAll('[data-figure]')) {
-          const drawn = figure.querySelectorAll('svg path.curve[d], svg circle.dot, svg circle.point').length;
+          const drawn = figure.querySelectorAll('.picture > svg path.curve[d], .picture > svg circle').length;
           if (!drawn || figure.querySelector('svg path.curve[d*="NaN"]')) found.push('not drawn: ' + figure.id);
         }
         for (const link of document.querySelectorAll('a[href^="#"]'))

@@ -201,6 +201,7 @@ def test_curves_show_their_values_under_the_pointer(reports, opened):
     tip = opened.ask("return report.charts[arguments[0]].tip.innerText", number)
     assert not opened.ask("return report.charts[arguments[0]].tip.hidden", number)
     speed, *lines = tip.splitlines()
+    assert plain(speed.split()[0]) == pytest.approx(row["omega_engine [rpm]"], abs=3)  # pixels are 1 rpm wide
     row = table.iloc[(table["omega_engine [rpm]"] - plain(speed.split()[0])).abs().argmin()]
     total = next(line for line in lines if "all orders" in line)
     assert plain(total.split(": ")[1].removesuffix(" N m")) == pytest.approx(row["half_range_moment_tyre [N m]"], rel=1e-4)
