@@ -31,7 +31,7 @@ def print_pdf(page: Path, pdf: Path) -> None:
     if browser is None:
         raise ReportError("there is no chromium, which prints the PDF: apt-get install chromium, or use --no-pdf", FILES)
     root = ("--no-sandbox",) if os.geteuid() == 0 else ()  # Chromium refuses to be run by root otherwise
-    with tempfile.TemporaryDirectory() as profile:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         words = [browser, *OPTIONS, *root, f"--user-data-dir={profile}", f"--print-to-pdf={pdf}", page.resolve().as_uri()]
         try:
             done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, check=False, timeout=MOST_SECONDS)

@@ -22,7 +22,9 @@ def train_drawing(check: dict, groups: Callable[[str], list[dict]]) -> Drawing:
     names = [body["name"] for body in check["bodies"]]
     index = {name.lower(): i for i, name in enumerate(names)} | {"ground": GROUND}
     couplings = [(one, [index[name.lower()] for name in one["bodies"]]) for one in check["couplings"]]
-    joints = [(group, [index[str(name).lower()] for name in group["bodies"]]) for group in _joints(groups) if "bodies" in group]
+    elastic = {one["name"].lower() for one in check["couplings"]}
+    loose = [group for group in _joints(groups) if "bodies" in group and group["name"].lower() not in elastic]
+    joints = [(group, [index[str(name).lower()] for name in group["bodies"]]) for group in loose]
     meshes = [(one, [index[name.lower()] for name in one["bodies"]]) for one in check["constraints"]]
     pairs = [pair for one, bodies in couplings + joints for pair in _pairs(bodies)]
     train = lay_out(len(names), pairs, [pair for _, bodies in meshes for pair in _pairs(bodies)])
@@ -46,7 +48,8 @@ def _pairs(bodies: list[int]) -> list[tuple[int, int]]:
 
 
 def _joints(groups: Callable[[str], list[dict]]) -> list[dict]:
-    return [group for kind in ("clutch", "freewheel", "cardan", "relation") for group in groups(kind)]
+    """Also couplings without elasticity, that is of friction or damping only."""
+    return [group for kind in ("coupling", "clutch", "freewheel", "cardan", "relation") for group in groups(kind)]
 
 
 def _marks(groups: Callable[[str], list[dict]], index: dict[str, int]) -> dict[int, list[tuple[str, str]]]:

@@ -66,6 +66,7 @@ def _couplings(sources: Sources) -> Table:
         stiffness = one["stiffness_N_m" if is_mesh else "stiffness_N_m_rad"]
         damping = one["damping_N_s_m" if is_mesh else "damping_N_m_s_rad"]
         group = given.get(one["name"].lower(), {})
+        given_damping = {key: value for key, value in group.items() if key != "damping"}  # in a column of its own
         rows.append(
             [
                 text(one["name"]),
@@ -74,7 +75,7 @@ def _couplings(sources: Sources) -> Table:
                 number(stiffness),
                 number(damping),
                 text("N/m, N s/m" if is_mesh else "N m/rad, N m s/rad"),
-                text(_law(group)),
+                text(_law(given_damping)),
             ]
         )
     columns = ["name", "kind", "between", "stiffness", "damping", "units", "law and damping as given"]
@@ -92,6 +93,7 @@ LAW_KEYS = {  # of the input, as the table calls them, with their units
     "relative_damping": ("relative damping", ""),
     "damping_ratio": ("damping ratio", ""),
     "damping_frequency": ("viscous at", "rad/s"),
+    "damping": ("damping", "N m s/rad"),
     "saturation": ("saturation", "N m"),
 }
 
@@ -138,12 +140,18 @@ def _listed(value: object) -> list:
 
 def _joints(sources: Sources) -> Table:
     """What has neither a stiffness nor a row that is always there."""
+    elastic = {one["name"].lower() for one in sources.check["couplings"]}
     rows: list[list[Cell]] = []
-    for kind in ("clutch", "freewheel", "cardan", "crank", "relation"):
+    for kind in ("coupling", "clutch", "freewheel", "cardan", "crank", "relation"):
         for group in sources.groups(kind):
+            if kind == "coupling" and group["name"].lower() in elastic:
+                continue
             bodies = group.get("bodies", group.get("body", []))
-            rows.append([text(group.get("name", "")), text(kind), text(" \N{EN DASH} ".join(map(str, _listed(bodies))))])
-    return Table("Clutches, freewheels and joints that move", ["name", "kind", "bodies"], rows)
+            law = _law(group) if kind == "coupling" else NO_KIND
+            rows.append(
+                [text(group.get("name", "")), text(kind), text(" \N{EN DASH} ".join(map(str, _listed(bodies)))), text(law)]
+            )
+    return Table("Joints without elasticity", ["name", "kind", "bodies", "law"], rows)
 
 
 def _torques(sources: Sources) -> Table:

@@ -69,4 +69,9 @@ def _without_command(sources: Sources, there: set[str]) -> list[list[Cell]]:
         "summary.json, cycles.csv" if fatigue else "there is no run" if sources.groups("fatigue") else "the input has no &fatigue"
     )
     state = text("calculated", "good") if fatigue else text("left out", "warn")
-    return [*rows, [text("Fatigue", "", "#fatigue" if fatigue else ""), state, text(reason)]]
+    rows.append([text("Fatigue", "", "#fatigue" if fatigue else ""), state, text(reason)])
+    if sources.groups("vary"):
+        rows.append(
+            [text("Sweep"), text("left out", "warn"), text("the variants of &sweep are no part of a report: nocdyn sweep")]
+        )
+    return rows
