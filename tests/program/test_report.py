@@ -1,5 +1,7 @@
 """scripts/report: the page in headless Chromium, the PDF, what is computed again, what is refused."""
 
+import html
+import importlib
 import json
 
 import numpy as np
@@ -11,6 +13,7 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 
 require()
+number_text = importlib.import_module("nocdyn_report.report.numbers").number_text
 
 RPM = 30 / np.pi
 NOTES = """# Purpose
@@ -411,3 +414,50 @@ def test_names_of_files_are_no_markup(fresh, browser):
     browser.open(fresh.page())
     assert browser.find("h1").text == name.removesuffix(".nml")
     assert faults(browser) == []
+
+
+def test_a_machine_without_elasticity_has_a_report(fresh, browser):
+    text = PLANT.split("&coupling", 1)[0] + "&gear name = 'up' bodies = 'wheel', 'pinion' teeth = 60, 20 /\n"
+    text += "&response body = 'engine' speed_rpm = 200, 900 count = 9 /\n&motor name = 'm' body = 'wheel' a = 9 b = 1 c = 0 /\n"
+    text += "&excitation name = 'o' body = 'wheel' kind = 'orders' orders = 1 amplitudes = 3 /\n"
+    text += "&run t_end = 0.1 start = 'projected' /\n"
+    fresh.write("m.nml", without_notes(text))
+    outcome = fresh("m.nml", "--no-pdf", "--quiet")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    browser.open(fresh.page())
+    assert faults(browser) == []
+    states = dict(zip(column(browser, "Calculations", "calculation"), column(browser, "Calculations", "state")))
+    assert states["Campbell diagram"] != "calculated" and states["Motion over the time"] == "calculated"
+
+
+def test_the_text_of_the_input_and_of_its_tables_is_there(fresh):
+    folder = SOURCE / "input/examples/compressor"
+    for name in ("compressor.nml", "indicator.csv"):
+        fresh.write(name, (folder / name).read_text(encoding="utf-8"))
+    assert fresh("compressor.nml", "--no-pdf", "--quiet", "--set", "run.t_end=0.02").returncode == 0
+    page = html.unescape(fresh.page("compressor").read_text(encoding="utf-8"))
+    assert (folder / "compressor.nml").read_text(encoding="utf-8").strip() in page
+    assert (folder / "indicator.csv").read_text(encoding="utf-8").strip() in page
+
+
+def test_numbers_look_the_same_in_tables_and_under_the_pointer(opened):
+    values = [
+        0.0,
+        1.0,
+        -1.0,
+        12345.678,
+        99999.96,
+        999999.0,
+        1e6,
+        -2.5e7,
+        1.23456e-3,
+        9.87654e-4,
+        1e-30,
+        0.1 + 0.2,
+        45.5,
+        4e5,
+        -12000,
+    ]
+    shown = opened.ask("return arguments[0].map((value) => report.numberText(value))", values)
+    blanks = str.maketrans({"\N{NARROW NO-BREAK SPACE}": " ", "\N{NO-BREAK SPACE}": " ", "\N{THIN SPACE}": " "})
+    assert [one.translate(blanks) for one in shown] == [number_text(float(value)).translate(blanks) for value in values]

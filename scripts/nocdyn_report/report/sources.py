@@ -29,6 +29,7 @@ class Sources:
         self.text = text  # of the input file
         self.overrides = overrides  # PATH=VALUE of --set
         self.arrays = Arrays()
+        self._read: dict[str, Campbell | Response | str] = {}
 
     @property
     def check(self) -> dict:
@@ -38,6 +39,23 @@ class Sources:
     def machine(self) -> f90nml.Namelist:
         """The complete input, by groups."""
         return f90nml.reads(self.check["complete_input"])
+
+    def has(self, command: str) -> bool:
+        """Whether a command has results that can be shown: a machine without elasticity has no Campbell diagram."""
+        return self.results.has(command) and not self.missing(command)
+
+    def missing(self, command: str) -> str:
+        """Why results that are there have nothing to show."""
+        read = {"campbell": read_campbell, "response": read_response}.get(command)
+        if read is None or not self.results.has(command):
+            return ""
+        if command not in self._read:
+            try:
+                self._read[command] = read(self.results.folder)
+            except ResultsError as error:
+                self._read[command] = str(error)
+        found = self._read[command]
+        return found if isinstance(found, str) else ""
 
     def groups(self, kind: str) -> list[f90nml.Namelist]:
         groups = self.machine.get(kind, [])
@@ -69,17 +87,17 @@ class Sources:
     def response_report(self) -> dict:
         return self.read_json("response.json")
 
-    @cached_property
+    @property
     def response(self) -> Response:
-        return self._read(read_response)
+        return self._shown("response")
 
     @cached_property
     def campbell_report(self) -> dict:
         return self.read_json("campbell.json")
 
-    @cached_property
+    @property
     def campbell(self) -> Campbell:
-        return self._read(read_campbell)
+        return self._shown("campbell")
 
     @cached_property
     def cases(self) -> dict:
@@ -110,11 +128,10 @@ class Sources:
         except (OSError, ValueError) as error:
             raise ReportError(f"{self.results.folder / name}: cannot be read: {error}", FILES) from None
 
-    def _read(self, read: object) -> object:
-        try:
-            return read(self.results.folder)
-        except ResultsError as error:
-            raise ReportError(str(error), FILES) from None
+    def _shown(self, command: str) -> Campbell | Response:
+        if reason := self.missing(command):
+            raise ReportError(reason, FILES)
+        return self._read[command]
 
     @cached_property
     def speed_unit(self) -> str:

@@ -1,7 +1,13 @@
-"""The input as text."""
+"""The input as text, with the tables that it reads."""
 
-from ..content import Items, Listing, Section
+import re
+from pathlib import Path
+
+from ..content import Items, Listing, Paragraph, Section
 from ..sources import Sources
+
+TABLE = re.compile(r"""^[^!\n]*?\b(?!notes_file)\w+_file\s*=\s*(?:'([^'\n]*)'|"([^"\n]*)")""", re.MULTILINE | re.IGNORECASE)
+MOST_LINES = 300  # of a table
 
 
 def input_section(sources: Sources, overrides: list[str]) -> Section:
@@ -9,5 +15,18 @@ def input_section(sources: Sources, overrides: list[str]) -> Section:
     section.add(Listing(f"{sources.check['input']}, as it was read", sources.text))
     if overrides:
         section.add(Items([f"--set {one}" for one in overrides]))
+    folder = Path(sources.results.file).parent
+    for name in dict.fromkeys(one or other for one, other in TABLE.findall(sources.text)):
+        section.add(_table(folder / name, name))
     section.add(Listing("Complete input, defaults and tables included", sources.check["complete_input"], is_folded=True))
     return section
+
+
+def _table(file: Path, name: str) -> Listing | Paragraph:
+    try:
+        lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return Paragraph(f"{name} is in the complete input.")
+    if len(lines) > MOST_LINES:
+        return Paragraph(f"{name} has {len(lines)} lines; its values are in the complete input.")
+    return Listing(f"{name}, which the input reads", "\n".join(lines))

@@ -14,7 +14,7 @@ ROOM = 1.15  # above the highest crossing
 
 
 def campbell_section(sources: Sources) -> Section | None:
-    if not sources.results.has("campbell"):
+    if not sources.has("campbell"):
         return None
     campbell = sources.campbell
     section = Section("campbell", "Campbell diagram and interference")

@@ -3,6 +3,7 @@
 from ..content import Heading, Section, Table, first, number, rounded, text
 from ..numbers import number_text
 from ..sources import Run, Sources
+from .motion import anchor
 
 MOST_ROWS = 120
 
@@ -14,7 +15,7 @@ def energy_section(sources: Sources) -> Section | None:
     section = Section("energy", "Energy account")
     for run in runs:
         if run.name:
-            section.add(Heading(f"Load case {run.name}", f"energy-{run.name}"))
+            section.add(Heading(f"Load case {run.name}", f"energy-{anchor(run.name)}"))
         section.add(_work(run), _stored(run))
     return section
 

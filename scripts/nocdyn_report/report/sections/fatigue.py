@@ -14,7 +14,7 @@ def fatigue_section(sources: Sources) -> Section | None:
     for run in sources.runs:
         if run.summary.get("fatigue"):
             section.add(_of_run(run))
-    if sources.results.has("response") and sources.response_report.get("fatigue"):
+    if sources.has("response") and sources.response_report.get("fatigue"):
         section.add(Heading("Continuous operation at a speed", "hourly"), *_of_speeds(sources))
     return section if section.blocks else None
 

@@ -19,7 +19,7 @@ SHARES, SMALLEST_SHARE = 3, 0.02  # of energies that are named
 
 
 def modes_section(sources: Sources) -> Section | None:
-    if not sources.results.has("modes"):
+    if not sources.has("modes"):
         return None
     section = Section("modes", "Natural frequencies and modes")
     modes = sources.modes
@@ -135,7 +135,7 @@ def _abscissas(train: Train) -> tuple[list[float], list[int | None]]:
 
 
 def _holzer(sources: Sources) -> list[Paragraph | Table]:
-    if not sources.results.has("holzer"):
+    if not sources.has("holzer"):
         return [Paragraph(sources.results.of["holzer"].message)]
     table = sources.table("holzer.csv")
     if not len(table):

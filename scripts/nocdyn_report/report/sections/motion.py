@@ -50,7 +50,7 @@ def motion_section(sources: Sources) -> Section | None:
         section.add(_cases(sources), _peaks(sources))
     for run in sources.runs:
         if run.name:
-            section.add(Heading(f"Load case {run.name}", f"case-{run.name}"))
+            section.add(Heading(f"Load case {run.name}", anchor(run.name)))
         if run.summary["status"] != "done":
             message = run.summary.get("message", "")
             section.add(Paragraph(f"The run {run.summary['status']}: {message}", "bad"))
@@ -80,7 +80,7 @@ def _cases(sources: Sources) -> Table:
         tone = "good" if case["status"] == "done" else "bad"
         rows.append(
             [
-                text(case["name"], "", f"#case-{case['name']}"),
+                text(case["name"], "", f"#{anchor(case['name'])}"),
                 text(case["title"]),
                 number(case["repeats"]),
                 text(case["status"], tone),
@@ -94,10 +94,15 @@ def _peaks(sources: Sources) -> Table:
     peaks = [peak for peak in sources.cases["peaks"] if not INNER.search(peak["column"]) and not LEFT_OUT.match(peak["column"])]
     for peak in sorted(peaks, key=lambda one: rank(one["column"])):
         values = [text(peak["column"]), number(peak["largest"]), text(unit_text(peak["unit"])), number(peak["time"])]
-        rows.append([*values, text(peak["load_case"], "", f"#case-{peak['load_case']}")])
+        rows.append([*values, text(peak["load_case"], "", f"#{anchor(peak['load_case'])}")])
     rows, more = first(rows, MOST_ROWS, "cases.csv")
     columns = ["quantity", "value of largest magnitude", "unit", "at t [s]", "load case"]
     return Table("Peaks of all load cases", columns, rows, more)
+
+
+def anchor(case: str) -> str:
+    """The id of the part on a load case."""
+    return "case-" + "-".join(case.split())
 
 
 def rank(name: str) -> int:

@@ -26,10 +26,9 @@ def remarks_section(html: str) -> Section | None:
 
 def notes_section(sources: Sources) -> Section:
     section = Section("notes", "Assumptions and notes")
-    results = sources.results
     assumed = list(ASSUMED["all"])
     for command in ("equilibrium", "modes", "campbell", "response", "run"):
-        assumed += ASSUMED[command] if results.has(command) else []
+        assumed += ASSUMED[command] if sources.has(command) else []
     section.add(Items(assumed))
     rows = [[text(origin), text(note)] for origin, note in program_notes(sources)]
     if rows:
@@ -41,12 +40,11 @@ def notes_section(sources: Sources) -> Section:
 
 def program_notes(sources: Sources) -> list[tuple[str, str]]:
     """Each once, with the calculations that gave it."""
-    results = sources.results
     given = [("check", sources.check["notes"])]
-    given += [("equilibrium", sources.equilibrium["notes"])] if results.has("equilibrium") else []
-    given += [("modes", sources.modes["notes"])] if results.has("modes") else []
-    given += [("campbell", sources.campbell_report["notes"])] if results.has("campbell") else []
-    given += [("response", sources.response_report["notes"])] if results.has("response") else []
+    given += [("equilibrium", sources.equilibrium["notes"])] if sources.has("equilibrium") else []
+    given += [("modes", sources.modes["notes"])] if sources.has("modes") else []
+    given += [("campbell", sources.campbell_report["notes"])] if sources.has("campbell") else []
+    given += [("response", sources.response_report["notes"])] if sources.has("response") else []
     given += [(f"run {run.name}".strip(), run.summary.get("machine", {}).get("notes", [])) for run in sources.runs]
     origins: dict[str, list[str]] = {}
     for origin, notes in given:

@@ -16,7 +16,7 @@ LIMIT_ROOM = 2.5  # a limit that is higher above the curves is not drawn
 
 
 def response_section(sources: Sources) -> Section | None:
-    if not sources.results.has("response"):
+    if not sources.has("response"):
         return None
     section = Section("response", "Forced response")
     report = sources.response_report

@@ -21,7 +21,9 @@ def scope_section(sources: Sources, sections: list[Section]) -> Section:
     for command, (title, target, files) in TITLES.items():
         calculation = sources.results.of[command]
         link = f"#{target}" if target in there or (command == "holzer" and "modes" in there) else ""
-        if calculation.is_there:
+        if reason := sources.missing(command):
+            rows.append([text(title), text("nothing to show", "warn"), text(reason)])
+        elif calculation.is_there:
             rows.append([text(title, "", link), text("calculated", "good"), text(files)])
         else:
             words = {"left out": "left out", "refused": "not available", "failed": "no result"}[calculation.state]

@@ -16,7 +16,7 @@ ENDS = ("_1", "_2", "_max")  # of a shaft: its moments
 
 
 def steady_section(sources: Sources) -> Section | None:
-    if not sources.results.has("equilibrium"):
+    if not sources.has("equilibrium"):
         return None
     section = Section("steady", "Steady state")
     states = sources.equilibrium["steady_states"]

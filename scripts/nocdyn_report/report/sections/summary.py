@@ -35,7 +35,7 @@ def _failures(sources: Sources) -> list[list[Cell]]:
 
 
 def _steady(sources: Sources) -> list[list[Cell]]:
-    if not sources.results.has("equilibrium"):
+    if not sources.has("equilibrium"):
         return []
     states = sources.equilibrium["steady_states"]
     if len(states) > 1:
@@ -48,7 +48,7 @@ def _steady(sources: Sources) -> list[list[Cell]]:
 
 
 def _frequencies(sources: Sources) -> list[list[Cell]]:
-    if not sources.results.has("modes"):
+    if not sources.has("modes"):
         return []
     found = [mode for mode in sources.modes["modes"] if mode["kind"] == "oscillating"]
     if not found:
@@ -60,7 +60,7 @@ def _frequencies(sources: Sources) -> list[list[Cell]]:
 
 
 def _criticals(sources: Sources) -> list[list[Cell]]:
-    if not sources.results.has("campbell"):
+    if not sources.has("campbell"):
         return []
     rows = []
     crossings = sources.campbell.crossings
@@ -79,7 +79,7 @@ def _criticals(sources: Sources) -> list[list[Cell]]:
 
 
 def _limits(sources: Sources) -> list[list[Cell]]:
-    if not sources.results.has("response"):
+    if not sources.has("response"):
         return []
     rows = []
     for one in limited(sources.response_report):
@@ -90,7 +90,7 @@ def _limits(sources: Sources) -> list[list[Cell]]:
 
 
 def _barred(sources: Sources) -> list[list[Cell]]:
-    if not sources.results.has("response") or not limited(sources.response_report):
+    if not sources.has("response") or not limited(sources.response_report):
         return []
     ranges = sources.response_report["barred_speed_ranges"]
     if not ranges:
@@ -157,7 +157,7 @@ def _life(sources: Sources) -> list[list[Cell]]:
 
 
 def _damage_per_hour(sources: Sources) -> list[list[Cell]]:
-    if not sources.results.has("response") or not sources.response_report.get("fatigue"):
+    if not sources.has("response") or not sources.response_report.get("fatigue"):
         return []
     rows = []
     for one in sources.response_report["fatigue"]:
