@@ -184,6 +184,24 @@ def test_setup_installs_the_second_compiler_where_it_makes_no_program(bare_machi
     assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
 
 
+def test_setup_installs_the_browser_of_reports_where_it_is_missing(bare_machine):
+    assert "chromium chromium-driver fonts-liberation\n" in bare_machine.setup("browser").stderr
+    for name in ("chromium", "chromedriver"):
+        bare_machine.stand_in(name, "#!/usr/bin/env bash\n")
+    bare_machine.stand_in("fc-list", "#!/usr/bin/env bash\necho LiberationSans-Regular.ttf\n")
+    result = bare_machine.setup("browser")
+    assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
+
+
+def test_a_report_says_that_it_can_do_without_a_browser(bare_machine):
+    environment = {"PATH": str(bare_machine.folder), "HOME": str(bare_machine.folder)}
+    result = subprocess.run(
+        [SCRIPTS / "report", "m.nml"], text=True, capture_output=True, env=environment, cwd=bare_machine.folder
+    )
+    assert result.returncode == 3
+    assert result.stderr.endswith("scripts/report: Chromium prints the PDF; with --no-pdf it is not needed\n")
+
+
 def test_setup_without_root_and_sudo_says_what_to_run(bare_machine):
     result = bare_machine.setup("build")
     assert result.returncode == 3
