@@ -15,7 +15,7 @@ from .sources import Sources
 
 ASSETS = Path(__file__).parent / "assets"
 LIBRARY = Path("/usr/share/nodejs/d3/dist/d3.min.js")  # of Debian's node-d3
-SCRIPTS = ("figures.js", "page.js")
+SCRIPTS = ("numbers.js", "picture.js", "figures.js", "page.js")
 
 
 def render(sources: Sources, sections: Sequence[Section]) -> str:
