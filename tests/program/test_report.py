@@ -20,6 +20,10 @@ NOTES = """# Purpose
 
 The *yard* asked.
 
+| a table | that is wide | where a page | of 400 px has no room | for all of its | columns |
+| --- | --- | --- | --- | --- | --- |
+| unbreakable_word | unbreakable_word | unbreakable_word | unbreakable_word | unbreakable_word | unbreakable_word |
+
 <script>window.harmed = 1</script>
 
 <img src=x onerror='window.harmed = 1'>
@@ -45,7 +49,7 @@ PLANT = """&case title = 'Plant "</script><b>&amp;</b>'  author = 'A. Author'  c
 &run t_end = 0.6 start = 'projected' /
 &output points = 601 units = 'rpm' /
 """
-EXAMPLES = ["compressor", "hybrid", "winch", "coupled_clutches", "chain_200"]
+EXAMPLES = ["compressor", "ice_propeller", "hybrid", "winch", "coupled_clutches", "chain_200"]
 WIDTHS = (400, 1600)
 
 
@@ -365,6 +369,7 @@ def test_a_run_that_fails_is_told_and_has_its_exit_code(fresh, browser):
     browser.open(fresh.page())
     assert faults(browser) == []
     assert "failed" in browser.find("#summary").text
+    assert "Not all load cases were run to their ends" in browser.find("#fatigue").text
 
 
 def test_pictures_of_notes_are_inside_and_others_refused(fresh, browser):

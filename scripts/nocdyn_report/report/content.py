@@ -82,6 +82,7 @@ class Listing:
     caption: str
     text: str
     is_folded: bool = False
+    is_narrow: bool = False  # short lines, which stand in columns
     kind: str = "listing"
 
 

@@ -2,12 +2,14 @@
 
 import re
 from pathlib import Path
+from statistics import median
 
 from ..content import Items, Listing, Paragraph, Section
 from ..sources import Sources
 
 TABLE = re.compile(r"""^[^!\n]*?\b(?!notes_file)\w+_file\s*=\s*(?:'([^'\n]*)'|"([^"\n]*)")""", re.MULTILINE | re.IGNORECASE)
 MOST_LINES = 300  # of a table
+NARROW = 40  # characters in a line of a table that has room beside others
 
 
 def input_section(sources: Sources, overrides: list[str]) -> Section:
@@ -29,4 +31,5 @@ def _table(file: Path, name: str) -> Listing | Paragraph:
         return Paragraph(f"{name} is in the complete input.")
     if len(lines) > MOST_LINES:
         return Paragraph(f"{name} has {len(lines)} lines; its values are in the complete input.")
-    return Listing(f"{name}, which the input reads", "\n".join(lines))
+    is_narrow = bool(lines) and median(map(len, lines)) <= NARROW
+    return Listing(f"{name}, which the input reads", "\n".join(lines), is_narrow=is_narrow)

@@ -11,6 +11,8 @@ def fatigue_section(sources: Sources) -> Section | None:
     section = Section("fatigue", "Fatigue")
     if sources.results.cases and sources.runs and sources.cases.get("fatigue"):
         section.add(_of_cases(sources.cases["fatigue"]))
+        if not sources.cases["is_complete"]:
+            section.add(Paragraph("Not all load cases were run to their ends: this is the damage of what was computed.", "bad"))
     for run in sources.runs:
         if run.summary.get("fatigue"):
             section.add(_of_run(run))

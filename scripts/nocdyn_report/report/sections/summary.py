@@ -143,15 +143,17 @@ def _peaks(sources: Sources) -> list[list[Cell]]:
 
 def _life(sources: Sources) -> list[list[Cell]]:
     rows = []
+    is_complete = all(run.summary["status"] == "done" for run in sources.runs)
     if sources.results.cases and sources.runs:
         lives = [("all load cases", one) for one in sources.cases.get("fatigue", [])]
+        is_complete = sources.cases["is_complete"]
     else:
         lives = [("the run", one) for run in sources.runs for one in run.summary.get("fatigue", [])]
     for which, one in lives:
         damage = one.get("damage_of_repeats", one["damage"])
         life = f"; failure after {number_text(one['repeats_to_failure'], 4)} repeats" if "repeats_to_failure" in one else ""
         bad = damage > 1 or one.get("mean_exceeds_strength", False)
-        words = ("exceeded", "bad") if bad else ("not used up", "good")
+        words = ("exceeded", "bad") if bad else ("not used up", "good") if is_complete else ("incomplete", "warn")
         rows.append(_row("Life", "fatigue", f"{one['name']}: damage {number_text(damage, 4)} of {which}{life}.", *words))
     return rows
 
