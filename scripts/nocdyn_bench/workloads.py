@@ -15,6 +15,7 @@ from .nocdyn_sweep import sweepers
 from .peers import heyoka, heyoka_sweep, numbalsoda, numbalsoda_sweep, scipy, scipy_sweep
 from .problems import Case2, Chain
 from .programs import Programs
+from .report_costs import report_costs
 from .shipped import Shipped
 from .throughput import Throughput
 from .torsional import Torsional
@@ -298,6 +299,10 @@ def fatigue(bench: Bench) -> Costs:
     return Costs("fatigue", "Fatigue", lambda rounds: fatigue_costs(bench.nocdyn, programs, scratch, rounds))
 
 
+def report(bench: Bench) -> Costs:
+    return Costs("report", "Report", lambda rounds: report_costs(ROOT, bench.scratch, rounds))
+
+
 WORKLOADS: dict[str, Callable[[Bench], Workload]] = {
     "start_up": start_up,
     "case2": case2,
@@ -313,6 +318,7 @@ WORKLOADS: dict[str, Callable[[Bench], Workload]] = {
     "example_sweeps": examples,
     "opentorsion": opentorsion,
     "fatigue": fatigue,
+    "report": report,
     "step_costs": steps,
     "chunk_costs": chunks,
     "hand_out": hand_out,
