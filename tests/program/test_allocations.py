@@ -60,14 +60,14 @@ def test_nothing_is_allocated_when_auto_switches(nocdyn, counter):
     assert abs(many - few) <= DOUBLINGS
 
 
-@pytest.mark.parametrize("kinds", ["every_kind.nml", "electrical_kinds.nml"])
+@pytest.mark.parametrize(("kinds", "end"), [("every_kind.nml", 3), ("electrical_kinds.nml", 10)])
 @pytest.mark.parametrize("method", ["auto", "rk45", "rodas5p"])
 @pytest.mark.parametrize("formulation", ["reduced", "paper", "multiplier"])
-def test_nothing_is_allocated_by_elements_of_every_kind(nocdyn, counter, kinds, formulation, method):
+def test_nothing_is_allocated_by_elements_of_every_kind(nocdyn, counter, kinds, end, formulation, method):
     common = [f"run.formulation={formulation}", f"run.method={method}", "run.rtol=1e-6", "run.atol=1e-6"]
-    common += ["output.extremes_from=4.0"]  # the summary lists those in the transient of the start
-    few = allocations(nocdyn, counter, DATA / kinds, *common, "run.t_end=10")
+    common += [f"output.extremes_from={0.4 * end}"]  # the summary lists those in the transient of the start
+    few = allocations(nocdyn, counter, DATA / kinds, *common, f"run.t_end={end}")
     steps = nocdyn.summary("out")["counts"]["accepted_steps"]
-    many = allocations(nocdyn, counter, DATA / kinds, *common, "run.t_end=20")
+    many = allocations(nocdyn, counter, DATA / kinds, *common, f"run.t_end={2 * end}")
     assert nocdyn.summary("out")["counts"]["accepted_steps"] > steps + 100
     assert abs(many - few) <= NUMBERS
