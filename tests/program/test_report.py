@@ -3,6 +3,10 @@
 import html
 import importlib
 import json
+import os
+import signal
+import subprocess
+import sys
 
 import numpy as np
 import pandas as pd
@@ -466,3 +470,27 @@ def test_numbers_look_the_same_in_tables_and_under_the_pointer(opened):
     shown = opened.ask("return arguments[0].map((value) => report.numberText(value))", values)
     blanks = str.maketrans({"\N{NARROW NO-BREAK SPACE}": " ", "\N{NO-BREAK SPACE}": " ", "\N{THIN SPACE}": " "})
     assert [one.translate(blanks) for one in shown] == [number_text(float(value)).translate(blanks) for value in values]
+
+
+@pytest.fixture
+def process(fresh):
+    """Starts the script in a process of its own."""
+    fresh.write("m.nml", without_notes(PLANT))
+    words = [sys.executable, "-m", "nocdyn_report.report", "m.nml", "--no-pdf"]
+    environment = os.environ | {"PYTHONPATH": str(SOURCE / "scripts"), "PYTHONUNBUFFERED": "1"}
+    return lambda: subprocess.Popen(words, cwd=fresh.folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+
+def test_a_reader_that_leaves_is_no_mistake_of_the_script(process):
+    started = process()
+    started.stdout.close()
+    assert (started.wait(timeout=60), started.stderr.read()) == (3, b"")
+
+
+def test_an_interruption_leaves_no_report_and_one_sentence(fresh, process):
+    started = process()
+    assert started.stdout.readline() != b""  # it computes
+    started.send_signal(signal.SIGINT)
+    _, errors = started.communicate(timeout=60)
+    assert (started.returncode, errors) == (130, b"scripts/report: interrupted; there is no new report\n")
+    assert not fresh.page().exists()
