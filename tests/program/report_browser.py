@@ -106,6 +106,13 @@ def faults(browser: Browser) -> list[str]:
           const drawn = figure.querySelectorAll('.picture > svg path.curve[d], .picture > svg circle').length;
           if (!drawn || figure.querySelector('svg path.curve[d*="NaN"]')) found.push('not drawn: ' + figure.id);
         }
+        for (const train of document.querySelectorAll('svg.train')) {
+          const frame = train.getBoundingClientRect();
+          for (const text of train.querySelectorAll('text')) {
+            const box = text.getBoundingClientRect();
+            if (box.left < frame.left - 1 || box.right > frame.right + 1) found.push('cut off: ' + text.textContent);
+          }
+        }
         for (const link of document.querySelectorAll('a[href^="#"]'))
           if (!document.getElementById(decodeURIComponent(link.hash.slice(1)))) found.push('no target: ' + link.hash);
         for (const one of document.querySelectorAll('[src], [href], [data], [srcset]'))

@@ -494,3 +494,13 @@ def test_an_interruption_leaves_no_report_and_one_sentence(fresh, process):
     _, errors = started.communicate(timeout=60)
     assert (started.returncode, errors) == (130, b"scripts/report: interrupted; there is no new report\n")
     assert not fresh.page().exists()
+
+
+def test_ratios_at_the_edge_of_the_drawing_are_whole(fresh, browser):
+    bodies = "".join(f"&body name = '{name}' inertia = 1.0 speed = 9.0 /\n" for name in ("motor", "pinion"))
+    elements = "&coupling name = 'c' bodies = 'motor', 'pinion' stiffness = 1e4 damping = 1.0 /\n"
+    elements += "&body name = 'wheel' inertia = 1.0 /\n&gear name = 'g' bodies = 'pinion', 'wheel' radii = 0.05, 0.15 /\n"
+    fresh.write("m.nml", bodies + elements + "&run t_end = 0.1 /\n")
+    assert fresh("m.nml", "--no-pdf").returncode == 0
+    browser.open(fresh.page())
+    assert faults(browser) == []

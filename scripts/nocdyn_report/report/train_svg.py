@@ -15,6 +15,7 @@ LONGEST = 11  # characters of a name that stands upright
 MARKS = {"motor": "M", "engine": "E", "load": "L", "excitation": "~", "drive": "D"}
 PAD = 46.0
 COLOURS = 7
+LETTER = 6.5  # width of one in names and ratios
 LEAST = 600.0  # width on a screen [px]
 
 
@@ -132,7 +133,9 @@ class _Picture:
             along = 0.5 if self.x[a] == self.x[b] else 0.68  # beside lines that cross
             x, y = (one[a] + along * (one[b] - one[a]) for one in (self.x, self.y))
             place = f'x="{x + 6:.1f}" y="{y + 4:.1f}"'
-            self.parts.append(f'<text class="ratio" {place}>1 : {number_text(one["ratio"], 4)}</text>')
+            ratio = f"1 : {number_text(one['ratio'], 4)}"
+            self.right = max(self.right, x + 12 + LETTER * len(ratio))
+            self.parts.append(f'<text class="ratio" {place}>{ratio}</text>')
 
     def add_discs(self, marks: dict[int, list[tuple[str, str]]]) -> None:
         thick = 5.0 if self.dense else THICK
@@ -158,8 +161,8 @@ class _Picture:
 
     def svg(self) -> str:
         bottom = max((y + h / 2 for y, h in zip(self.y, self.height)), default=0.0)
-        room = 30.0 + (0.6 * 6.5 * max(map(len, self.names), default=0) if self.slanted and not self.dense else 0.0)
-        left = -0.82 * 6.5 * max(map(len, self.names), default=0) + PAD if self.slanted and not self.dense else 0.0
+        room = 30.0 + (0.6 * LETTER * max(map(len, self.names), default=0) if self.slanted and not self.dense else 0.0)
+        left = -0.82 * LETTER * max(map(len, self.names), default=0) + PAD if self.slanted and not self.dense else 0.0
         left = min(0.0, left)
         width, height = self.right - left, bottom + room - self.upper
         view = f'viewBox="{left:.0f} {self.upper:.0f} {width:.0f} {height:.0f}" width="{width:.0f}" height="{height:.0f}"'
