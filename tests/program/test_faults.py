@@ -263,7 +263,7 @@ def test_swept_faults_are_those_of_single_runs(nocdyn):
         ),
         (
             "fault='two_phase' rated_torque=1 subtransient_reactance=0.2 frequency=300 time=0 angle_deg=90",
-            "angle belongs to fault = 'resynchronisation'",
+            "angle_deg needs fault = 'resynchronisation'",
         ),
         ("fault='two_phase' rated_torque=1 subtransient_reactance=0.2 frequency=300 time=0.2 end=0.1", "end = 0.1"),
         ("fault='two_phase' rated_torque=1 frequency=300 time=0", "subtransient_reactance"),

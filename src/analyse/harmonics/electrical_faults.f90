@@ -54,8 +54,6 @@ contains
       else if (group%number('frequency', absent=1.0_wp) <= 0) then
         call raise(error, exit_input, input%location(index, 'frequency') // ': frequency = ' // &
                    to_text(group%number('frequency')) // "; allowed with kind = 'fault': > 0 [rad/s]")
-      else if (group%is_given('angle') .and. .not. is_resynchronisation(group)) then
-        call raise(error, exit_input, input%location(index, 'angle') // ": angle belongs to fault = 'resynchronisation'")
       else if (group%has_value('transient_reactance')) then
         if (group%number('transient_reactance') >= group%number('subtransient_reactance')) return
         call raise(error, exit_input, input%location(index, 'transient_reactance') // ': transient_reactance = ' // &

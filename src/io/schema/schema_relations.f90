@@ -12,6 +12,7 @@ module nocdyn_schema_relations
     integer :: form = 0                       !! `exactly_one` ... `less_than` of nocdyn_schema_rules
     integer, allocatable :: first(:), second(:)
     integer :: equal_if_one = 0               !! position of that key, 0: none
+    character(len=18) :: word = ''            !! `requires`: the word of `second` that is needed, '': any value
   end type relation_t
 
   type, public :: relations_t
@@ -36,6 +37,7 @@ contains
       relations%list(n)%form = relation_rules(i)%form
       allocate (relations%list(n)%first, source=positions(group_rule, relation_rules(i)%first))
       allocate (relations%list(n)%second, source=positions(group_rule, relation_rules(i)%second))
+      relations%list(n)%word = relation_rules(i)%word
       relations%list(n)%equal_if_one = sum(positions(group_rule, relation_rules(i)%equal_if_one))
     end do
   end function relations_of

@@ -105,6 +105,7 @@ contains
       text = 'No ' // listed(second, ' or ') // ' beside ' // listed(first, ' or ')
     case (requires)
       text = listed(first, ' and ') // trim(merge(' need ', ' needs', size(first) > 1)) // ' ' // listed(second, ' or ')
+      if (relation%word /= '') text = text // ' = ' // quoted(trim(relation%word))
     case (less_than)
       text = first(1)%text // ' is less than ' // second(1)%text
       if (relation%equal_if_one /= '') text = text // '; with ' // trim(relation%equal_if_one) // ' = 1 they may be equal'

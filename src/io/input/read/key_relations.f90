@@ -9,7 +9,7 @@ module nocdyn_key_relations
   use nocdyn_schema_relations, only: relation_t, relations_t
   use nocdyn_schema_rules, only: any_number, at_most_one, columns, equal_lengths, exactly_one, required, requires, unset
   use nocdyn_schema_text, only: listed_keys, only_if_text
-  use nocdyn_text, only: append, joined, lower_case, string_t
+  use nocdyn_text, only: append, joined, lower_case, quoted, string_t
   implicit none (type, external)
   private
 
@@ -31,7 +31,7 @@ contains
         case (exactly_one, at_most_one)
           call choose(group, relation, relations, diagnostics)
         case (requires)
-          call check_requirement(group, relation%first, relation%second, diagnostics)
+          call check_requirement(group, relation, diagnostics)
         case (equal_lengths, columns)
           call lengthen_defaults(group, relation%first)
         case default   ! of values, which are checked after their conversion
@@ -192,26 +192,51 @@ contains
     end do
   end subroutine supersede
 
-  !> Each of `keys` that is given requires one of `others`.
-  subroutine check_requirement(group, keys, others, diagnostics)
+  !> Each key of the first set that is given requires one of the second set, or its word.
+  subroutine check_requirement(group, relation, diagnostics)
     type(raw_group_t), intent(inout) :: group
-    integer, intent(in) :: keys(:), others(:)   !! positions
+    type(relation_t), intent(in) :: relation   !! `requires`
     type(diagnostics_t), intent(inout) :: diagnostics
+    type(string_t), allocatable :: words(:)
+    logical :: has_needed, is_known
     integer :: i, j
 
-    if (group%first_given(others) > 0) return
-    do i = 1, size(keys)
-      associate (key => group%keys(keys(i)))
-        if (.not. key%is_given()) then
-          if (.not. any([(group%keys(others(j))%has_value(), j=1, size(others))])) call key%exclude()
-        else if (any(group%keys(others)%is_superseded) .and. key%override == 0) then
-          call supersede(group, keys(i:i))
-        else if (.not. (is_zero(key) .or. any(group%keys(others)%may_be_missing))) then
-          call group%report(keys(i:i), key%name() // ' needs ' // listed_keys(group%rule, others, ' or '), diagnostics)
-        end if
-      end associate
-    end do
+    associate (keys => relation%first, others => relation%second)
+      is_known = .true.
+      if (relation%word == '') then
+        if (group%first_given(others) > 0) return
+        has_needed = any([(group%keys(others(j))%has_value(), j=1, size(others))])
+      else
+        call find_words(group%keys(others(1)), words, is_known)
+        has_needed = has_any_word(relation%word, words)
+        if (has_needed) return
+      end if
+      do i = 1, size(keys)
+        associate (key => group%keys(keys(i)))
+          if (.not. key%is_given()) then
+            if (.not. has_needed) call key%exclude()
+          else if (any(group%keys(others)%is_superseded) .and. key%override == 0) then
+            call supersede(group, keys(i:i))
+          else if (key%override == 0 .and. relation%word /= '' .and. any(group%keys(others)%override > 0)) then
+            call supersede(group, keys(i:i))   ! as the keys of another kind
+          else if (is_known .and. .not. any(group%keys(others)%may_be_missing)) then
+            if (.not. is_zero(key)) call group%report(keys(i:i), key%name() // ' needs ' // needed_text(group, relation), &
+                                                      diagnostics)
+          end if
+        end associate
+      end do
+    end associate
   end subroutine check_requirement
+
+  !> "fault", "fault = 'resynchronisation'", "a or b".
+  function needed_text(group, relation) result(text)
+    type(raw_group_t), intent(in) :: group
+    type(relation_t), intent(in) :: relation   !! `requires`
+    character(len=:), allocatable :: text
+
+    text = listed_keys(group%rule, relation%second, ' or ')
+    if (relation%word /= '') text = text // ' = ' // quoted(trim(relation%word))
+  end function needed_text
 
   !> Whether the key has one value, the number 0.
   logical function is_zero(key)

@@ -103,6 +103,7 @@ module nocdyn_schema_rules
     integer :: form                          !! `exactly_one` ... `less_than`
     character(len=144) :: first, second      !! keys, separated by blanks
     character(len=18) :: equal_if_one = ''   !! `less_than`: the numbers may be equal if this key is 1
+    character(len=18) :: word = ''           !! `requires`: the only word of `second` that is enough; '': any value
   end type relation_rule_t
 
   !> Words that other programs use for keys. Both lists are separated by blanks.

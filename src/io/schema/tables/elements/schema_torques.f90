@@ -288,6 +288,7 @@ module nocdyn_schema_torques
     relation_rule_t('excitation', requires, 'fault', 'subtransient_reactance'), &
     relation_rule_t('excitation', requires, 'rated_torque subtransient_reactance transient_reactance', 'fault'), &
     relation_rule_t('excitation', requires, 'subtransient_time armature_time', 'fault'), &
+    relation_rule_t('excitation', requires, 'angle', 'fault', word='resynchronisation'), &
     relation_rule_t('excitation', requires, 'transient_time', 'transient_reactance'), &
     relation_rule_t('excitation', requires, 'term_amplitudes', 'term_multiples'), &
     relation_rule_t('excitation', requires, 'term_multiples term_times term_phases', 'term_amplitudes'), &
