@@ -210,6 +210,33 @@ def test_a_full_disk_leaves_earlier_results_whole(nocdyn):
     assert {name: (nocdyn.folder / "out" / name).read_bytes() for name in nocdyn.files("out")} == before
 
 
+ANALYSED = """&body name = 'a' inertia = 1 speed = 10 /
+&body name = 'b' inertia = 2 speed = 10 /
+&coupling name = 'k' bodies = 'a', 'b' stiffness = 1000 damping = 1 /
+&load name = 'l' body = 'b' viscous = 1 /
+&motor name = 'm' body = 'a' kind = 'constant' torque = 10 /
+&excitation name = 'x' body = 'a' kind = 'orders' orders = 1 amplitudes = 2 /
+&response body = 'a' speed = 8, 12 count = 5 /
+&run t_end = 1 /
+"""
+
+
+# all files but the longest one fit
+@pytest.mark.parametrize("command", ["modes", "response", "campbell", "equilibrium"])
+def test_files_of_an_analysis_appear_together_or_not_at_all(nocdyn, command):
+    nocdyn.write("m.nml", ANALYSED)
+    assert nocdyn(command, "m.nml", "--out", "whole").returncode == 0
+    names = nocdyn.files("whole")
+    longest = max(names, key=lambda name: (nocdyn.folder / "whole" / name).stat().st_size)
+    room = (nocdyn.folder / "whole" / longest).stat().st_size - 1
+    outcome = nocdyn(command, "m.nml", "--out", "new", preexec_fn=limited_to(room))
+    assert (outcome.returncode, outcome.stderr) == (3, f"nocdyn: cannot write 'new/{longest}': File too large\n")
+    assert nocdyn.files("new") == []
+    before = {name: (nocdyn.folder / "whole" / name).read_bytes() for name in names}
+    assert nocdyn(command, "m.nml", "--out", "whole", "--set", "body.a.inertia=3", preexec_fn=limited_to(room)).returncode == 3
+    assert {name: (nocdyn.folder / "whole" / name).read_bytes() for name in nocdyn.files("whole")} == before
+
+
 def test_new_on_a_full_disk_leaves_nothing(nocdyn):
     outcome = nocdyn("new", "mine.nml", preexec_fn=limited_to(100))
     assert outcome.returncode == 3 and outcome.stderr == "nocdyn: cannot write 'mine.nml': File too large\n"

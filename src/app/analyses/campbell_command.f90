@@ -9,9 +9,9 @@ module nocdyn_campbell_command
   use nocdyn_input, only: input_t
   use nocdyn_input_files, only: analyse_files
   use nocdyn_machine, only: machine_t
-  use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: output_units
-  use nocdyn_text, only: shown_path
+  use nocdyn_result_files, only: result_files_t
+  use nocdyn_text, only: shown_path, string_t
   implicit none (type, external)
   private
 
@@ -36,25 +36,16 @@ contains
     character(len=*), intent(in) :: folder
     type(error_t), allocatable, intent(out) :: error
     type(campbell_t) :: campbell
-    type(output_file_t) :: report, table
+    type(result_files_t) :: files
 
     call analyse_campbell(input, machine, campbell, error)
     if (allocated(error)) return
     associate (body => machine%names(campbell%settings%body)%text)
-      call table%open(folder, table_name)
-      call put_campbell_csv(campbell, body, output_units(input), table)
-      call report%open(folder, report_name)
-      call report%put(campbell_json(input, body, campbell))
-      call table%complete(table_name, error)
-      if (.not. allocated(error)) call report%complete(report_name, error)
-      if (.not. allocated(error)) call table%finish(table_name, error)
-      if (.not. allocated(error)) call report%finish(report_name, error)
-      if (allocated(error)) then
-        call table%discard()
-        call report%discard()
-        return
-      end if
-      if (arguments%is_given('--quiet')) return
+      call files%open(folder, [string_t(table_name), string_t(report_name)])
+      call put_campbell_csv(campbell, body, output_units(input), files%files(1))
+      call files%files(2)%put(campbell_json(input, body, campbell))
+      call files%finish(error)
+      if (allocated(error) .or. arguments%is_given('--quiet')) return
       call print_text(campbell_text(input%shown_file(), body, campbell))
       call print_text(input%shown_file() // ': ' // shown_path(folder) // ' has ' // table_name // ' and ' // report_name)
     end associate

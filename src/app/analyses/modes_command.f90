@@ -10,8 +10,9 @@ module nocdyn_modes_command
   use nocdyn_modes_files, only: modes_csv, modes_json
   use nocdyn_modes_report, only: modes_report_t, modes_text, new_modes_report
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
-  use nocdyn_output_file, only: write_file
   use nocdyn_output_units, only: output_units
+  use nocdyn_result_files, only: result_files_t
+  use nocdyn_text, only: append, string_t
   implicit none (type, external)
   private
 
@@ -35,6 +36,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(operating_point_t) :: point
     type(modes_report_t) :: report
+    type(result_files_t) :: files
+    type(string_t), allocatable :: names(:)
     character(len=:), allocatable :: csv, printed
 
     if (arguments%is_given('--at')) then
@@ -57,10 +60,17 @@ contains
     call print_text(modes_text(input%shown_file(), report, output_units(input)))
     if (arguments%is_given('--holzer')) call print_text(printed)
     if (folder == '') return
-    if (arguments%is_given('--holzer')) call write_file(folder, 'holzer.csv', csv, error)
-    if (allocated(error)) return
-    call write_file(folder, 'modes.csv', modes_csv(report), error)
-    if (.not. allocated(error)) call write_file(folder, 'modes.json', modes_json(input, report), error)
+    allocate (names(0))
+    if (arguments%is_given('--holzer')) call append(names, 'holzer.csv')
+    call append(names, 'modes.csv')
+    call append(names, 'modes.json')
+    call files%open(folder, names)
+    associate (n => size(names))
+      if (n > 2) call files%files(1)%put(csv)
+      call files%files(n - 1)%put(modes_csv(report))
+      call files%files(n)%put(modes_json(input, report))
+    end associate
+    call files%finish(error)
   end subroutine analyse_modes
 
 end module nocdyn_modes_command

@@ -6,13 +6,13 @@ module nocdyn_response_command
   use nocdyn_input, only: input_t
   use nocdyn_input_files, only: analyse_files
   use nocdyn_machine, only: machine_t
-  use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: output_units
   use nocdyn_response_analysis, only: add_fatigue, analyse_response, response_analysis_t
   use nocdyn_response_files, only: put_orders_csv, put_response_csv, response_json
   use nocdyn_response_report, only: response_text
   use nocdyn_response_summary, only: response_summary_t, summarise_response
-  use nocdyn_text, only: shown_path
+  use nocdyn_result_files, only: result_files_t
+  use nocdyn_text, only: shown_path, string_t
   implicit none (type, external)
   private
 
@@ -50,31 +50,19 @@ contains
                     ' and ' // report_name)
   end subroutine analyse_one
 
-  !> Writes all files aside before any takes its name.
   subroutine write_files(input, analysis, summary, folder, error)
     type(input_t), intent(in) :: input
     type(response_analysis_t), intent(in) :: analysis
     type(response_summary_t), intent(in) :: summary
     character(len=*), intent(in) :: folder
     type(error_t), allocatable, intent(out) :: error
-    type(output_file_t) :: orders, report, table
+    type(result_files_t) :: files
 
-    call table%open(folder, table_name)
-    call put_response_csv(analysis, output_units(input), table)
-    call orders%open(folder, orders_name)
-    call put_orders_csv(analysis, output_units(input), orders)
-    call report%open(folder, report_name)
-    call report%put(response_json(input, analysis, summary))
-    call table%complete(table_name, error)
-    if (.not. allocated(error)) call orders%complete(orders_name, error)
-    if (.not. allocated(error)) call report%complete(report_name, error)
-    if (.not. allocated(error)) call table%finish(table_name, error)
-    if (.not. allocated(error)) call orders%finish(orders_name, error)
-    if (.not. allocated(error)) call report%finish(report_name, error)
-    if (.not. allocated(error)) return
-    call table%discard()
-    call orders%discard()
-    call report%discard()
+    call files%open(folder, [string_t(table_name), string_t(orders_name), string_t(report_name)])
+    call put_response_csv(analysis, output_units(input), files%files(1))
+    call put_orders_csv(analysis, output_units(input), files%files(2))
+    call files%files(3)%put(response_json(input, analysis, summary))
+    call files%finish(error)
   end subroutine write_files
 
 end module nocdyn_response_command

@@ -4,8 +4,9 @@ module nocdyn_cases_files
   use nocdyn_input, only: input_t
   use nocdyn_load_case_peaks, only: case_run_t
   use nocdyn_load_case_report, only: load_cases_json, put_load_cases_csv
-  use nocdyn_output_file, only: output_file_t
   use nocdyn_posix, only: remove_file
+  use nocdyn_result_files, only: result_files_t
+  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -29,19 +30,12 @@ contains
     type(case_run_t), intent(in) :: runs(:)
     character(len=*), intent(in) :: folder
     type(error_t), allocatable, intent(out) :: error
-    type(output_file_t) :: json, table
+    type(result_files_t) :: files
 
-    call table%open(folder, csv_file)
-    call put_load_cases_csv(runs, table)
-    call json%open(folder, json_file)
-    call json%put(load_cases_json(input, runs))
-    call table%complete(csv_file, error)
-    if (.not. allocated(error)) call json%complete(json_file, error)
-    if (.not. allocated(error)) call table%finish(csv_file, error)
-    if (.not. allocated(error)) call json%finish(json_file, error)
-    if (.not. allocated(error)) return
-    call table%discard()
-    call json%discard()
+    call files%open(folder, [string_t(csv_file), string_t(json_file)])
+    call put_load_cases_csv(runs, files%files(1))
+    call files%files(2)%put(load_cases_json(input, runs))
+    call files%finish(error)
   end subroutine write_cases_files
 
 end module nocdyn_cases_files

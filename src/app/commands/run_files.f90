@@ -1,4 +1,5 @@
-!> The files that a run leaves: trajectory.csv or trajectory.nc, summary.json, input.nml, and cycles.csv with &fatigue.
+!> The files that a run leaves: trajectory.csv or trajectory.nc, summary.json, input.nml, and cycles.csv with &fatigue. A run that fails
+!> leaves trajectory.partial and cycles.partial.csv.
 module nocdyn_run_files
   use nocdyn_console, only: new_status_line, status_line_t
   use nocdyn_disk_room, only: check_room
@@ -7,12 +8,12 @@ module nocdyn_run_files
   use nocdyn_input, only: input_t
   use nocdyn_input_text, only: input_text
   use nocdyn_kinds, only: wp
-  use nocdyn_output_file, only: output_file_t
   use nocdyn_posix, only: is_interrupted, remove_file
   use nocdyn_posix_files, only: free_bytes
+  use nocdyn_result_files, only: result_files_t
   use nocdyn_run_summary, only: run_summary_t, summary_json
   use nocdyn_sweep_plan, only: sweep_plan_t
-  use nocdyn_text, only: counted, string_t, to_text
+  use nocdyn_text, only: append, counted, string_t, to_text
   use nocdyn_trajectory_columns, only: table_bytes
   use nocdyn_trajectory_file, only: csv_trajectory_t, trajectory_file_t
   use nocdyn_transient, only: run_output_t, run_transient
@@ -25,7 +26,8 @@ module nocdyn_run_files
   !> Names of the rows: of a run that is done, of one that is not; as CSV, as NetCDF.
   character(len=22), parameter :: trajectory_names(2, 2) = reshape([character(len=22) :: 'trajectory.csv', &
     'trajectory.partial.csv', 'trajectory.nc', 'trajectory.partial.nc'], [2, 2])
-  character(len=*), parameter, public :: summary_file = 'summary.json', input_file = 'input.nml', cycles_file = 'cycles.csv'
+  character(len=*), parameter, public :: summary_file = 'summary.json', input_file = 'input.nml'
+  character(len=18), parameter :: cycles_names(2) = [character(len=18) :: 'cycles.csv', 'cycles.partial.csv']   !! likewise
 
   !> Writes the rows and shows the progress while the run is integrated.
   type, extends(run_output_t) :: trajectory_writer_t
@@ -102,45 +104,49 @@ contains
     type(run_summary_t), intent(in) :: summary
     type(trajectory_writer_t), intent(inout) :: writer
     type(error_t), allocatable, intent(out) :: error
-    type(output_file_t) :: cycles, input_copy, report
+    type(result_files_t) :: files   ! but for the rows
+    type(string_t), allocatable :: names(:)
 
-    call input_copy%open(writer%folder, input_file)
-    call input_copy%put(input_text(input))
-    if (size(summary%fatigue%items) > 0) then
-      call cycles%open(writer%folder, cycles_file)
-      call put_cycles_csv(summary%fatigue, cycles)
-    end if
-    call report%open(writer%folder, summary_file)
-    call report%put(summary_json(input, summary))
+    allocate (names, source=[string_t(input_file)])
+    if (size(summary%fatigue%items) > 0) call append(names, trim(cycles_names(state_of(summary))))
+    call append(names, summary_file)
+    call files%open(writer%folder, names)
+    call files%files(1)%put(input_text(input))
+    if (size(names) == 3) call put_cycles_csv(summary%fatigue, files%files(2))
+    call files%files(size(names))%put(summary_json(input, summary))
     call writer%file%complete(trim(trajectory_names(1, writer%form)), error)
-    if (.not. allocated(error)) call input_copy%complete(input_file, error)
-    if (.not. allocated(error) .and. size(summary%fatigue%items) > 0) call cycles%complete(cycles_file, error)
-    if (.not. allocated(error)) call report%complete(summary_file, error)
-    if (.not. allocated(error)) call name_files(writer, summary, input_copy, cycles, report, error)
+    if (.not. allocated(error)) call files%complete(error)
+    if (.not. allocated(error)) call name_files(writer, summary, files, error)
     if (.not. allocated(error)) return
     call writer%file%discard()
-    call input_copy%discard()
-    if (size(summary%fatigue%items) > 0) call cycles%discard()
-    call report%discard()
+    call files%discard()
   end subroutine write_results
+
+  !> Row of `trajectory_names` and `cycles_names`.
+  pure integer function state_of(summary) result(state)
+    type(run_summary_t), intent(in) :: summary
+
+    state = merge(1, 2, summary%status == 'done')
+  end function state_of
 
   !> Removes the trajectories of an earlier run under other names. summary.json goes first and comes last: without it there are no
   !> results, if a file in between cannot take its name.
-  subroutine name_files(writer, summary, input_copy, cycles, report, error)
+  subroutine name_files(writer, summary, files, error)
     type(trajectory_writer_t), intent(inout) :: writer
     type(run_summary_t), intent(in) :: summary
-    type(output_file_t), intent(inout) :: input_copy, cycles, report
+    type(result_files_t), intent(inout) :: files
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: name
+    integer :: i
 
-    name = trim(trajectory_names(merge(1, 2, summary%status == 'done'), writer%form))
-    call remove_file(writer%folder // '/' // summary_file)
+    name = trim(trajectory_names(state_of(summary), writer%form))
+    call files%remove_report()
     call remove_trajectories(writer%folder, name)
-    call remove_file(writer%folder // '/' // cycles_file)
+    do i = 1, size(cycles_names)
+      call remove_file(writer%folder // '/' // trim(cycles_names(i)))
+    end do
     call writer%file%finish(name, error)
-    if (.not. allocated(error)) call input_copy%finish(input_file, error)
-    if (.not. allocated(error) .and. size(summary%fatigue%items) > 0) call cycles%finish(cycles_file, error)
-    if (.not. allocated(error)) call report%finish(summary_file, error)
+    if (.not. allocated(error)) call files%finish(error)
   end subroutine name_files
 
   !> Removes the trajectories in a folder.
