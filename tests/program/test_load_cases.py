@@ -286,7 +286,8 @@ def test_a_sweep_is_checked_for_the_machine_and_its_cases(nocdyn):
             "name = 'a' with = 'fault' without = 'fault'",
             "m.nml:10: &load_case 'a': with and without both name 'fault'; allowed: one of them",
         ),
-        ("name = 'cases.json'", "m.nml:10: &load_case 'cases.json': name = 'cases.json' is that of a file of all load cases"),
+        ("name = 'cases.json'", "m.nml:10: &load_case 'cases.json': name = 'cases.json' is that of a file of results; allowed: "),
+        ("name = 'Modes.JSON'", "m.nml:10: &load_case 'Modes.JSON': name = 'Modes.JSON' is that of a file of results; allowed: "),
         ("name = 'a' set = 'output.directory=x'", "m.nml:10: &load_case 'a': set 'output.directory=x': no load case sets that"),
         ("name = 'a' set = 'load_case.a.repeats=4'", "m.nml:10: &load_case 'a': set 'load_case.a.repeats=4': no load case sets"),
         ("name = 'a' repeats = 0", "m.nml:10: &load_case 'a': repeats = 0 is out of range; allowed: > 0"),
@@ -373,3 +374,14 @@ def test_limits_that_a_case_exceeds_are_told_with_its_name(nocdyn):
     lines = [line for line in nocdyn("run", "m.nml", "--out", "out").stdout.splitlines() if "limit exceeded" in line]
     assert len(lines) == 1
     assert lines[0].startswith("m.nml: load case 'fault': limit exceeded: shaft_shaft [N m] has reached ")
+
+
+@pytest.mark.parametrize("mistake", ["coupling.k.stifness=3", "output.extremes_from=5"])
+@pytest.mark.parametrize("command", ["check", "run", "modes", "equilibrium"])
+def test_a_load_case_alone_does_not_fail_by_the_mistake_of_another(nocdyn, command, mistake):
+    text = "&body name='a' inertia=1 /\n&coupling name='k' bodies='ground','a' stiffness=9 /\n&run t_end=1 /\n"
+    text += f"&load_case name='good' /\n&load_case name='bad' set='{mistake}' /\n"
+    nocdyn.write("m.nml", text)
+    assert nocdyn(command, "m.nml", "--case", "good", "--out", "out").returncode == 0
+    refused = nocdyn("run", "m.nml", "--case", "bad", "--out", "bad")
+    assert refused.returncode == 2 and mistake.split("=")[0] in refused.stderr

@@ -2,7 +2,7 @@
 module nocdyn_input_files
   use nocdyn_arguments, only: arguments_t
   use nocdyn_assembly, only: assemble_machine, assemble_steady_machine
-  use nocdyn_case_choice, only: choose_case
+  use nocdyn_case_choice, only: choose_case, wanted_case
   use nocdyn_console, only: report_error
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_equilibrium, only: t_infinity
@@ -139,7 +139,7 @@ contains
 
     folder = out_folder(arguments, arguments%operands(number)%text)
     call read_input(arguments%operands(number)%text, arguments%overrides, reading%input, reading%error, &
-                    diagnostics, reading%load_cases)
+                    diagnostics, reading%load_cases, wanted_case(arguments))
     if (allocated(reading%error)) call add_plan_diagnostics(reading%input, diagnostics, reading%error)
     if (.not. allocated(reading%error)) call choose_case(arguments, reading%input, chosen, reading%error)
     if (allocated(reading%error)) return
@@ -149,6 +149,8 @@ contains
     if (chosen > 0) then
       if (folder /= '') folder = folder // '/' // reading%load_cases(chosen)%load_case%name
       reading%input = reading%load_cases(chosen)
+      deallocate (reading%load_cases)   ! the others are not looked at
+      allocate (reading%load_cases(0))
     end if
     call check_output_times(reading%input, reading%error)
   end subroutine read_one

@@ -8,9 +8,18 @@ module nocdyn_case_choice
   implicit none (type, external)
   private
 
-  public :: choose_case
+  public :: choose_case, wanted_case
 
 contains
+
+  !> The name of the only load case that is wanted, '' if it is not one alone.
+  pure function wanted_case(arguments) result(name)
+    type(arguments_t), intent(in) :: arguments
+    character(len=:), allocatable :: name
+
+    name = ''
+    if (arguments%is_given('--case')) name = arguments%value('--case')
+  end function wanted_case
 
   !> Finds the load case of --case; 0 without that option.
   subroutine choose_case(arguments, machine, chosen, error)

@@ -1,7 +1,7 @@
 !> nocdyn run: integrates machines, or their load cases, and writes the results. Files with errors do not stop the others.
 module nocdyn_run_command
   use nocdyn_arguments, only: arguments_t
-  use nocdyn_case_choice, only: choose_case
+  use nocdyn_case_choice, only: choose_case, wanted_case
   use nocdyn_cases_files, only: remove_cases_files, write_cases_files
   use nocdyn_companion_command, only: become_companion
   use nocdyn_console, only: print_text, report_error
@@ -167,7 +167,8 @@ contains
 
     allocate (reading%inputs(0), reading%folders(0))
     associate (file => arguments%operands(number)%text)
-      call read_input(file, arguments%overrides, machine, reading%error, load_cases=load_cases)
+      call read_input(file, arguments%overrides, machine, reading%error, load_cases=load_cases, &
+                      only_case=wanted_case(arguments))
       if (.not. allocated(reading%error)) call choose_case(arguments, machine, chosen, reading%error)
       if (.not. allocated(reading%error)) then
         reading%folder = result_folder(arguments, machine)

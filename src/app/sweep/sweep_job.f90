@@ -2,7 +2,7 @@
 module nocdyn_sweep_job
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_arguments, only: arguments_t
-  use nocdyn_case_choice, only: choose_case
+  use nocdyn_case_choice, only: choose_case, wanted_case
   use nocdyn_console, only: report_error, new_status_line, print_text, status_line_t
   use nocdyn_errors, only: error_t, exit_done, exit_failed, exit_file, exit_input, raise
   use nocdyn_input, only: input_t
@@ -93,7 +93,8 @@ contains
     type(diagnostics_t) :: diagnostics
     integer :: chosen
 
-    call read_input(arguments%operands(1)%text, arguments%overrides, input, error, diagnostics, load_cases)
+    call read_input(arguments%operands(1)%text, arguments%overrides, input, error, diagnostics, load_cases, &
+                    wanted_case(arguments))
     if (allocated(error)) call add_plan_diagnostics(input, diagnostics, error)
     if (.not. allocated(error)) call choose_case(arguments, input, chosen, error)
     if (allocated(error)) return

@@ -24,22 +24,23 @@ module nocdyn_input_reader
 contains
 
   !> Reads and checks a file. The message of the error has one line for each diagnostic, in the order of the file.
-  subroutine read_input(file, overrides, input, error, diagnostics, load_cases)
+  subroutine read_input(file, overrides, input, error, diagnostics, load_cases, only_case)
     character(len=*), intent(in) :: file
     type(string_t), intent(in) :: overrides(:)   !! PATH=VALUE
     type(input_t), intent(out) :: input
     type(error_t), allocatable, intent(out) :: error            !! the file or an override is wrong
     type(diagnostics_t), intent(out), optional :: diagnostics   !! those of the error
     type(input_t), allocatable, intent(out), optional :: load_cases(:)   !! as of `read_input_text`
+    character(len=*), intent(in), optional :: only_case                  !! likewise
     character(len=:), allocatable :: text
 
     call read_text_file(file, text, error, largest_input)
     if (allocated(error)) return
-    call read_input_text(text, file, overrides, input, error, diagnostics, load_cases)
+    call read_input_text(text, file, overrides, input, error, diagnostics, load_cases, only_case)
   end subroutine read_input
 
   !> Reads and checks the text of a file: the machine itself and, if they are asked for, its load cases.
-  subroutine read_input_text(text, file, overrides, input, error, all_diagnostics, load_cases)
+  subroutine read_input_text(text, file, overrides, input, error, all_diagnostics, load_cases, only_case)
     character(len=*), intent(in) :: text
     character(len=*), intent(in) :: file         !! its name in messages
     type(string_t), intent(in) :: overrides(:)   !! PATH=VALUE
@@ -47,6 +48,7 @@ contains
     type(error_t), allocatable, intent(out) :: error                !! the text or an override is wrong
     type(diagnostics_t), intent(out), optional :: all_diagnostics   !! those of the error, but for those of load cases
     type(input_t), allocatable, intent(out), optional :: load_cases(:)
+    character(len=*), intent(in), optional :: only_case   !! the load case that is read; the others stay empty; '': all are read
     type(diagnostics_t) :: diagnostics
     logical, allocatable :: lacks(:)
     integer :: c
@@ -65,6 +67,9 @@ contains
     if (allocated(error) .or. .not. present(load_cases)) return
     allocate (load_cases(size(input%load_cases)))
     do c = 1, size(load_cases)
+      if (present(only_case)) then
+        if (only_case /= '' .and. only_case /= input%load_cases(c)%name) cycle
+      end if
       call read_load_case(text, input, c, overrides, load_cases(c), error)
     end do
   end subroutine read_input_text

@@ -7,7 +7,7 @@ module nocdyn_load_cases
   use nocdyn_input, only: group_t, input_t, load_case_t, value_t
   use nocdyn_schema, only: group_rules
   use nocdyn_schema_text, only: suggestion
-  use nocdyn_text, only: append, quoted, shortened, string_t, to_text
+  use nocdyn_text, only: append, lower_case, quoted, shortened, string_t, to_text
   implicit none (type, external)
   private
 
@@ -22,7 +22,9 @@ module nocdyn_load_cases
     integer :: common_run = 0             !! the &run without a case, 0: none
   end type members_t
 
-  character(len=*), parameter :: files_of_all(*) = [character(len=10) :: 'cases.json', 'cases.csv']   ! beside the folders
+  ! of the files of results beside the folders of load cases
+  character(len=*), parameter :: file_endings(*) = [character(len=8) :: '.json', '.csv', '.nml', '.nc', '.journal', '.html', &
+                                                    '.pdf', '.png', '.svg']
 
 contains
 
@@ -147,17 +149,26 @@ contains
     type(input_t), intent(in) :: input
     integer, intent(in) :: group   !! the &load_case
     type(diagnostics_t), intent(inout) :: diagnostics
+    integer :: i
 
     associate (name => input%groups(group)%name)
-      if (any(name == files_of_all)) then
-        call input%report(group, 'name', 'name = ' // quoted(name) // ' is that of a file of all load cases; allowed: ' // &
-                          'another name', diagnostics)
+      if (any([(is_ending(name, trim(file_endings(i))), i=1, size(file_endings))])) then
+        call input%report(group, 'name', 'name = ' // quoted(shortened(name)) // ' is that of a file of results; allowed: ' // &
+                          'a name without such an ending, for it is that of a folder', diagnostics)
       else if (index(name, '/') > 0 .or. index(name, '.') == 1) then
         call input%report(group, 'name', 'name = ' // quoted(shortened(name)) // &
                           ' is no name of a folder; allowed: a name without / and without a dot at its beginning', diagnostics)
       end if
     end associate
   end subroutine check_folder
+
+  !> Whether a name has an ending, in upper or lower case.
+  pure logical function is_ending(name, ending)
+    character(len=*), intent(in) :: name, ending
+
+    is_ending = len(name) >= len(ending)
+    if (is_ending) is_ending = lower_case(name(len(name) - len(ending) + 1:)) == ending
+  end function is_ending
 
   !> Refuses elements that a load case has and leaves out.
   subroutine check_members(input, group, are_both, diagnostics)
