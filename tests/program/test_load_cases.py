@@ -385,3 +385,20 @@ def test_a_load_case_alone_does_not_fail_by_the_mistake_of_another(nocdyn, comma
     assert nocdyn(command, "m.nml", "--case", "good", "--out", "out").returncode == 0
     refused = nocdyn("run", "m.nml", "--case", "bad", "--out", "bad")
     assert refused.returncode == 2 and mistake.split("=")[0] in refused.stderr
+
+
+def test_names_that_spreadsheets_would_compute_are_texts_in_tables(nocdyn):
+    text = "&body name='+1+1' inertia=1 speed=1 /\n&body name='@b' inertia=1 /\n&body name='plain' inertia=1 /\n"
+    text += "&coupling name='-k' bodies='+1+1','@b' stiffness=9 /\n&coupling name='+k' bodies='@b','plain' stiffness=9 /\n"
+    text += "&fatigue name='-life' coupling='-k' reference_moment=10 reference_cycles=1e6 slope=5 /\n"
+    nocdyn.write("m.nml", text + "&run t_end=9 /\n&load_case name='+case' /\n")
+    assert nocdyn("run", "m.nml", "--out", "out").returncode == 0
+    assert nocdyn("modes", "m.nml", "--case", "+case", "--holzer", "--out", "modes").returncode == 0
+    paths = ["out/cases.csv", "out/+case/cycles.csv", "out/+case/trajectory.csv", "modes/+case/modes.csv", "modes/+case/holzer.csv"]
+    seen = set()
+    for path in paths:
+        with open(nocdyn.folder / path, newline="") as file:
+            for cell in (cell for row in csv.reader(file) for cell in row):
+                assert cell[:1] not in ("=", "+", "@") and (cell[:1] != "-" or float(cell) <= 0), (path, cell)
+                seen.add(cell)
+    assert {"'+case", "'-life", "'+1+1", "'@b", "'-k", "plain"} <= seen

@@ -395,6 +395,34 @@ def test_pictures_of_notes_are_inside_and_others_refused(fresh, browser):
     assert faults(browser) == []
 
 
+@pytest.mark.parametrize("way", ["absolute", "up", "link", "picture", "picture link"])
+def test_files_of_other_folders_are_in_a_report_only_if_allowed(fresh, way):
+    secret = fresh.folder.parent / f"{fresh.folder.name}.md"
+    secret.write_text("a *secret*\n")
+    image = secret.with_suffix(".svg")
+    image.write_text("<svg xmlns='http://www.w3.org/2000/svg'/>")
+    (fresh.folder / "link.md").symlink_to(secret)
+    (fresh.folder / "link.svg").symlink_to(image)
+    name = {"absolute": str(secret), "up": f"../{secret.name}", "link": "link.md"}.get(way, "n.md")
+    picture = {"picture": f"../{image.name}", "picture link": "link.svg"}.get(way)
+    fresh.write("n.md", f"![A shaft]({picture})\n" if picture else "none\n")
+    fresh.write("m.nml", PLANT.replace("notes_file = 'n.md'", f"notes_file = '{name}'"))
+    outcome = fresh("m.nml", "--no-pdf", "--quiet")
+    assert outcome.returncode == 2 and not fresh.page().exists()
+    assert "m.nml:2: &case: notes_file: " in outcome.stderr and "is not in the folder of the input; allowed: " in outcome.stderr
+    assert fresh("m.nml", "--no-pdf", "--quiet", "--allow-outside").returncode == 0
+    assert ("data:image/svg" if picture else "<em>secret</em>") in fresh.page().read_text()
+
+
+def test_a_table_of_another_folder_is_not_listed(fresh):
+    (fresh.folder.parent / "secret.txt").write_text("0 1.25e-7 ! hidden words\n1 2\n")
+    table = "&excitation name = 'x' body = 'engine' kind = 'table' table_file = '../secret.txt' /\n"
+    fresh.write("m.nml", without_notes(PLANT) + table)
+    for words, is_there in (((), False), (("--allow-outside",), True)):
+        assert fresh("m.nml", "--no-pdf", "--quiet", *words).returncode == 0
+        assert ("hidden words" in fresh.page().read_text()) == is_there
+
+
 def test_without_a_browser_there_is_no_half_a_report(reports):
     before = reports.page().read_bytes()
     outcome = reports("m.nml", "--quiet", PATH="/nowhere")

@@ -1,6 +1,9 @@
 """Tables in files beside the input."""
 
+import os
+
 import f90nml
+import pytest
 
 MACHINE = """&body name = 'b' inertia = 1.0 /
 &load name = 'l' body = 'b' table_file = 'tables/load.csv' interpolation = 'cubic' /
@@ -50,6 +53,24 @@ def test_a_missing_file_has_exit_code_3(nocdyn):
     outcome = nocdyn("check", path)
     assert outcome.returncode == 3
     assert outcome.stderr.endswith("/in/tables/load.csv: cannot be read: there is no such file\n")
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, lambda path: path.symlink_to("/dev/zero"), lambda path: path.mkdir()])
+@pytest.mark.parametrize(
+    "group",
+    [
+        "&excitation name = 'x' body = 'a' kind = 'table' table_file = 'odd' /",
+        "&excitation name = 'x' body = 'a' kind = 'orders' table_file = 'odd' /",
+        "&case notes_file = 'odd' /",
+        "&sweep design = 'list' file = 'odd' /\n&record quantity = 'omega_a' statistic = 'final' /",
+    ],
+)
+def test_a_file_that_an_input_names_is_no_pipe_device_or_folder(nocdyn, make, group):
+    make(nocdyn.folder / "odd")
+    nocdyn.write("m.nml", "&body name = 'a' inertia = 1 /\n&run t_end = 1 /\n" + group + "\n")
+    outcome = nocdyn("check", "m.nml")
+    assert outcome.returncode == 3
+    assert outcome.stderr.startswith("nocdyn: m.nml:3: &") and outcome.stderr.endswith("odd: cannot be read: it is no regular file\n")
 
 
 def test_notes_of_the_author_must_be_there_and_are_not_named_beside_the_results(nocdyn):

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from .calculations import FAILED, Calculations, calculate
+from .confined import Folder
 from .content import Section
 from .failure import FILES, USAGE, ReportError
 from .notes_text import read_notes
@@ -65,6 +66,9 @@ def _parser() -> argparse.ArgumentParser:
         "--set", action="append", default=[], metavar="PATH=VALUE", help="override a key of the input, as for nocdyn run"
     )
     parser.add_argument("--no-pdf", action="store_true", help="write report.html only; Chromium is not needed")
+    parser.add_argument(
+        "--allow-outside", action="store_true", help="take notes, pictures and tables from other folders than that of FILE"
+    )
     parser.add_argument("--quiet", "-q", action="store_true", help="print nothing but errors")
     return parser
 
@@ -92,19 +96,20 @@ def _sections(sources: Sources, arguments: argparse.Namespace) -> list[Section]:
     made = [make(sources) for make in (machine_section, steady_section, modes_section, campbell_section, response_section)]
     made += [make(sources) for make in (motion_section, energy_section, fatigue_section)]
     body = [section for section in made if section is not None]
-    remarks = remarks_section(_notes(sources, arguments.file))
+    folder = Folder(Path(arguments.file).parent, arguments.allow_outside)
+    remarks = remarks_section(_notes(sources, arguments.file, folder))
     first = [summary_section(sources), *([remarks] if remarks else []), scope_section(sources, body)]
-    return [*first, *body, notes_section(sources), input_section(sources, arguments.set)]
+    return [*first, *body, notes_section(sources), input_section(sources, arguments.set, folder)]
 
 
-def _notes(sources: Sources, file: str) -> str:
-    """The HTML of the author's text; the file is beside the input."""
+def _notes(sources: Sources, file: str, folder: Folder) -> str:
+    """The HTML of the author's text; the file is in the folder of the input."""
     name = sources.notes_file
     if not name:
         return ""
     found = NOTES_FILE.search(sources.text)
     line = sources.text.count("\n", 0, found.end()) + 1 if found else 1
-    return read_notes(Path(file).parent / name, f"{file}:{line}: &case: notes_file")
+    return read_notes(folder, name, f"{file}:{line}: &case: notes_file")
 
 
 def _write(folder: Path, page: str, no_pdf: bool) -> list[str]:

@@ -1,11 +1,11 @@
 !> Holzer's tables of the undamped modes, printed and as holzer.csv.
 module nocdyn_holzer_report
+  use nocdyn_csv, only: text_cell
   use nocdyn_errors, only: error_t
   use nocdyn_holzer, only: edge_coupling, edge_gear, edge_none, holzer_line_t, holzer_t, new_holzer
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_modes_report, only: modes_report_t
-  use nocdyn_printable, only: as_utf_8
   use nocdyn_table_text, only: cell, cell_width, padded, text_width
   use nocdyn_text, only: rounded_text, to_text
   use nocdyn_text_buffer, only: text_buffer_t
@@ -98,11 +98,11 @@ contains
     do i = 1, size(holzer%lines)
       associate (line => holzer%lines(i), inertia => machine%inertia(1, holzer%lines(i)%body))
         call rows%append(to_text(number) // ',' // to_text(omega / turn) // ',')
-        call rows%append(as_utf_8(machine%names(line%body)%text) // ',' // to_text(inertia) // ',')
+        call rows%append(text_cell(machine%names(line%body)%text) // ',' // to_text(inertia) // ',')
         call rows%append(to_text(inertia * omega**2) // ',' // to_text(theta(i)) // ',' // &
                          to_text(torque(i)) // ',' // to_text(total(i)) // ',')
-        if (line%edge /= edge_none) call rows%append(as_utf_8(machine%names(line%next)%text) // ',' // &
-                                                     as_utf_8(edge_name(machine, line)))
+        if (line%edge /= edge_none) call rows%append(text_cell(machine%names(line%next)%text) // ',' // &
+                                                     text_cell(edge_name(machine, line)))
         if (line%edge == edge_none) call rows%append(',')
         call rows%append(',')
         if (line%edge == edge_coupling) call rows%append(to_text(line%stiffness))

@@ -8,7 +8,7 @@ module nocdyn_posix_files
   implicit none (type, external)
   private
 
-  public :: open_new, open_existing, file_size, read_at, read_whole, truncate_file, sync_file, sync_path, lock_file, &
+  public :: is_irregular, open_new, open_existing, file_size, read_at, read_whole, truncate_file, sync_file, sync_path, lock_file, &
     disk_failure, free_bytes
 
   integer(c_int), parameter :: from_start = 0, from_end = 2      ! SEEK_SET, SEEK_END
@@ -29,6 +29,11 @@ module nocdyn_posix_files
       integer(c_size_t), value, intent(in) :: length
       integer(c_int64_t), value, intent(in) :: offset
     end function c_pread
+
+    integer(c_int) function c_is_irregular(path) bind(c, name='nocdyn_is_irregular')
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: path(*)
+    end function c_is_irregular
 
     real(c_double) function c_free_bytes(path) bind(c, name='nocdyn_free_bytes')
       import :: c_char, c_double
@@ -77,6 +82,13 @@ contains
 
     open_existing = int(c_open_existing(path // c_null_char, merge(1_c_int, 0_c_int, is_to_change)))
   end function open_existing
+
+  !> Whether there is something at a path that is no regular file, links followed: a pipe, a device, a folder.
+  logical function is_irregular(path)
+    character(len=*), intent(in) :: path
+
+    is_irregular = c_is_irregular(path // c_null_char) /= 0
+  end function is_irregular
 
   !> Size of a file [bytes], negative on failure.
   integer(int64) function file_size(descriptor)

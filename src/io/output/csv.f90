@@ -7,7 +7,7 @@ module nocdyn_csv
   implicit none (type, external)
   private
 
-  public :: write_header, write_row, write_numbers
+  public :: text_cell, write_header, write_row, write_numbers
 
 contains
 
@@ -23,6 +23,15 @@ contains
     end do
     call file%put(new_line('a'))
   end subroutine write_header
+
+  !> A name as a cell. A name that spreadsheets would take for a formula is a text with an apostrophe before it.
+  pure function text_cell(name) result(cell)
+    character(len=*), intent(in) :: name   !! without commas and quotes
+    character(len=:), allocatable :: cell
+
+    cell = as_utf_8(name)
+    if (scan(name(:min(1, len(name))), '=+-@') > 0) cell = '"''' // cell // '"'
+  end function text_cell
 
   !> Writes one row.
   subroutine write_row(file, values)

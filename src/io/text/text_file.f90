@@ -2,7 +2,7 @@
 module nocdyn_text_file
   use nocdyn_errors, only: error_t, exit_file, raise
   use nocdyn_posix, only: close_file, failure_number, last_failure
-  use nocdyn_posix_files, only: open_existing, read_whole
+  use nocdyn_posix_files, only: is_irregular, open_existing, read_whole
   use nocdyn_text, only: shown_path, to_text
   implicit none (type, external)
   private
@@ -33,20 +33,29 @@ contains
     if (index(text, byte_order_mark) == 1) first_position = 1 + len(byte_order_mark)
   end function first_position
 
-  !> Reads all bytes of a file or a pipe.
-  subroutine read_text_file(file, text, error, most)
+  !> Reads all bytes of a file.
+  subroutine read_text_file(file, text, error, most, may_be_pipe)
     character(len=*), intent(in) :: file
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(out) :: error   !! the file cannot be read
     integer, intent(in), optional :: most              !! longest file [bytes]; `largest_table` if absent
+    logical, intent(in), optional :: may_be_pipe       !! of the command line; files that others name are regular ones
     integer :: descriptor, limit
-    logical :: is_closed, is_done
+    logical :: is_closed, is_done, takes_pipes
 
     limit = largest_table
     if (present(most)) limit = most
     if (file == '') then
       call raise(error, exit_file, 'an empty text is not the name of a file')
       return
+    end if
+    takes_pipes = .false.
+    if (present(may_be_pipe)) takes_pipes = may_be_pipe
+    if (.not. takes_pipes) then
+      if (is_irregular(file)) then
+        call raise(error, exit_file, shown_path(file) // ': cannot be read: it is no regular file')
+        return
+      end if
     end if
     descriptor = open_existing(file, is_to_change=.false.)
     if (descriptor < 0) then

@@ -1,33 +1,34 @@
 """The input as text, with the tables that it reads."""
 
 import re
-from pathlib import Path
 from statistics import median
 
+from ..confined import Folder
 from ..content import Items, Listing, Paragraph, Section
+from ..failure import ReportError
 from ..sources import Sources
 
 TABLE = re.compile(r"""^[^!\n]*?\b(?!notes_file)\w+_file\s*=\s*(?:'([^'\n]*)'|"([^"\n]*)")""", re.MULTILINE | re.IGNORECASE)
 MOST_LINES = 300  # of a table
+MOST_BYTES = 1_000_000  # likewise
 NARROW = 40  # characters in a line of a table that has room beside others
 
 
-def input_section(sources: Sources, overrides: list[str]) -> Section:
+def input_section(sources: Sources, overrides: list[str], folder: Folder) -> Section:
     section = Section("input", "Input", is_appendix=True)
     section.add(Listing(f"{sources.check['input']}, as it was read", sources.text))
     if overrides:
         section.add(Items([f"--set {one}" for one in overrides]))
-    folder = Path(sources.results.file).parent
     for name in dict.fromkeys(one or other for one, other in TABLE.findall(sources.text)):
-        section.add(_table(folder / name, name))
+        section.add(_table(folder, name))
     section.add(Listing("Complete input, defaults and tables included", sources.check["complete_input"], is_folded=True))
     return section
 
 
-def _table(file: Path, name: str) -> Listing | Paragraph:
+def _table(folder: Folder, name: str) -> Listing | Paragraph:
     try:
-        lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
+        lines = folder.read(folder.folder, name, name, MOST_BYTES).decode("utf-8", errors="replace").splitlines()
+    except ReportError:
         return Paragraph(f"{name} is in the complete input.")
     if len(lines) > MOST_LINES:
         return Paragraph(f"{name} has {len(lines)} lines; its values are in the complete input.")

@@ -34,7 +34,7 @@ contains
     character(len=*), intent(in), optional :: only_case                  !! likewise
     character(len=:), allocatable :: text
 
-    call read_text_file(file, text, error, largest_input)
+    call read_text_file(file, text, error, largest_input, may_be_pipe=.true.)
     if (allocated(error)) return
     call read_input_text(text, file, overrides, input, error, diagnostics, load_cases, only_case)
   end subroutine read_input
