@@ -34,7 +34,8 @@ def make_case(seed, number, corpus, shares):
 def may_be_long(case):
     """Whether nothing limits what the input asks for: a sweep, or a command line without its limit of steps."""
     is_limited = ("--set", commands.STEPS[1]) in zip(case.words, case.words[1:])
-    return case.words[:1] == ("sweep",) or (case.words[:1] in (("run",), ("modes",)) and not is_limited)
+    has_loop = case.words[:1] in (("sweep",), ("response",), ("campbell",), ("report",))
+    return has_loop or (case.words[:1] in (("run",), ("modes",)) and not is_limited)
 
 
 def is_of_sweep(path):

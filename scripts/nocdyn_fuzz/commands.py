@@ -1,12 +1,18 @@
 """The words of a command: what nocdyn is asked, within which limits, and changes of these words."""
 
+import re
+
 from .corpus import paths
 from .mutations import ODD_BYTES, extreme
 
+BODY = re.compile(rb"&body\s+name\s*=\s*('[^'\n]*')", re.IGNORECASE)
+
 # of a hundred mutants; `check` is the quickest
-COMMANDS = {"check": 70, "run": 11, "equilibrium": 6, "modes": 5, "matrices": 3, "sweep": 5}
+COMMANDS = {"check": 64, "run": 11, "equilibrium": 6, "modes": 5, "matrices": 3, "sweep": 5, "response": 4, "campbell": 2}
 # Fewer `check`, for a long search.
-DEEP = {"check": 25, "run": 30, "equilibrium": 15, "modes": 12, "matrices": 6, "sweep": 12}
+DEEP = {
+    "check": 15, "run": 27, "equilibrium": 13, "modes": 10, "matrices": 5, "sweep": 11, "response": 10, "campbell": 8, "report": 1
+}  # fmt: skip
 
 # What a run may take, whatever the input says.
 STEPS = ("--set", "run.max_steps=300")
@@ -28,17 +34,35 @@ def add_command(rng, case, shares):
     command = rng.choices(list(shares), weights=list(shares.values()))[0]
     if command == "sweep" and b"&sweep" not in case.files[case.main]:
         command = "run"
+    if command in ("response", "campbell", "report"):
+        case = with_response(rng, case)
     words = [command, case.main]
-    if command in ("run", "sweep") or (command in ("equilibrium", "modes") and rng.random() < 0.5):
+    if command in ("run", "sweep", "response", "campbell", "report") or (
+        command in ("equilibrium", "modes") and rng.random() < 0.5
+    ):
         words += ["--out", "out"]
-    if command in ("run", "sweep", "modes"):
+    if command in ("run", "sweep", "modes", "report"):
         words += STEPS
+    if command in ("response", "campbell", "report") and rng.random() < 0.8:
+        words += ("--set", "response.count=5")
+    if command == "report":
+        words += ("--no-pdf", "--quiet")
     if command == "modes":
         words += rng.choice(([], [], ["--at", "rest"], ["--at", "equilibrium"], ["--at", "0.01"]))
     if command == "sweep":
         words += ["--threads", rng.choice("12")]
         words += rng.choice(([], ["--csv"], ["--quiet"]))
     return case.with_words(words)
+
+
+def with_response(rng, case):
+    """A case with speeds for a forced response."""
+    content = case.files[case.main]
+    body = BODY.search(content)
+    if b"&response" in content or not body:
+        return case
+    low = rng.choice((1, 10, 100))
+    return case.with_file(case.main, content + b"&response body = %s speed = %d, %d /\n" % (body[1], low, low * 3))
 
 
 def small_sweep(rng, case):
@@ -85,7 +109,9 @@ def mutate_words(rng, case):
     elif change == "option":
         words += rng.choice(OPTIONS)
     elif change == "command":
-        words[0] = rng.choice(("merge", "new", "help", "sweep", "run", "matrices", "equilibrium", "chek", ""))
+        words[0] = rng.choice(
+            ("merge", "new", "help", "sweep", "run", "matrices", "equilibrium", "response", "campbell", "chek", "")
+        )
     elif change == "twice":
         words.insert(at, words[at])
     elif change == "drop":

@@ -4,6 +4,7 @@ import os
 import resource
 import signal
 import subprocess
+import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,8 +31,9 @@ class Limits:
         resource.setrlimit(resource.RLIMIT_FSIZE, (self.file_size << 20, self.file_size << 20))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
-    def environment(self):
+    def environment(self, program):
         known = {name: value for name, value in os.environ.items() if not name.startswith(("OMP_", "NOCDYN"))}
+        known |= {"NOCDYN": str(program)}  # for reports
         added = SANITIZED if self.is_sanitized else {}
         return known | {"OMP_NUM_THREADS": "2"} | {name: text.format(memory=self.memory) for name, text in added.items()}
 
@@ -83,14 +85,21 @@ def wait_quickly(process, limits):
     return ended(process, is_late)
 
 
+def command_line(program, words):
+    """Reports are made by a script, which calls the program."""
+    if words[:1] == ("report",):
+        return (sys.executable, "-m", "nocdyn_report.report", *words[1:])
+    return (program, *words)
+
+
 def execute(program, words, folder, limits, interrupt=False):
     """With `interrupt`, a command that takes too long is asked to end; that it does so at once is what is wanted of it."""
     out, err = folder.with_suffix(".out"), folder.with_suffix(".err")
     in_time, is_interrupted = True, False
     with open(out, "wb") as out_file, open(err, "wb") as err_file:
-        command = [os.fsencode(word) for word in (program, *words)]
+        command = [os.fsencode(word) for word in command_line(program, words)]
         process = subprocess.Popen(
-            command, cwd=folder, stdin=subprocess.DEVNULL, stdout=out_file, stderr=err_file, env=limits.environment()
+            command, cwd=folder, stdin=subprocess.DEVNULL, stdout=out_file, stderr=err_file, env=limits.environment(program)
         )
         if not wait_quickly(process, limits):
             in_time = False

@@ -7,11 +7,15 @@ import unicodedata
 CRASHES = (
     b"Backtrace", b"ERROR STOP", b"Error termination", b"Fortran runtime", b"On entry to", b"Program received signal",
     b"runtime error", b"Sanitizer",
+    b"Traceback", b"a mistake in this script",
     b"terminate called", b"Assertion", b"IEEE_", b"Error allocating", b"internal error",
 )  # fmt: skip
 NOT_FINITE = re.compile(r"(?<![\w'.])[-+]?(?:nan|inf|infinity)(?!\w)", re.IGNORECASE)
 QUOTED = re.compile(rb"'[^'\n]*'|\"[^\"\n]*\"|=[^/\n]*")
-FINISHED = ("trajectory.csv", "trajectory.nc", "equilibrium.json", "modes.csv", "modes.json", "sweep.nc", "sweep.csv")
+FINISHED = (
+    "trajectory.csv", "trajectory.nc", "cycles.csv", "equilibrium.json", "modes.csv", "modes.json", "sweep.nc", "sweep.csv",
+    "response.csv", "response_orders.csv", "response.json", "campbell.csv", "campbell.json", "report.html",
+)  # fmt: skip
 DIRECTIONS = "\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
 
 
@@ -86,6 +90,8 @@ def failure_findings(case, outcome, folder):
         yield f"exit code {outcome.code} without a message"
     if any(change.startswith("words: ") and change != "words: set" for change in case.changes):
         return  # perhaps of several files, the others of which are done
+    if case.words[:1] == ("report",):
+        return  # it reports failures too, beside what did not fail
     for path in result_files(case, folder):
         if path.name in FINISHED and not (path.name.startswith("sweep.") and outcome.code == 1):
             yield f"exit code {outcome.code} leaves {path.name}"

@@ -1,4 +1,4 @@
-"""The input.nml of a run is an input: a run of it writes the same bytes, for every kind of every group and every word of a key."""
+"""The input.nml of a run is an input: a run of it writes the same bytes, for every kind of group and every word of a key."""
 
 import re
 
@@ -53,16 +53,19 @@ ELEMENTS = {
     "induction_dq": f"&motor name = 'm' body = 'a' {DQ} stator_reactance = 1 rotor_reactance = 1 mutual_reactance = 30 "
     "stator_resistance = 1 rotor_resistance = 1 /",
     "dc": "&motor name = 'm' body = 'a' kind = 'dc' voltage = 24 resistance = 0.5 flux_constant = 0.8 /",
-    "inverter": "&motor name = 'm' body = 'a' kind = 'inverter' torque_limit = 20 governor_speed = 5 governor_gain = 1 governor_time = 1 /",
+    "inverter": "&motor name = 'm' body = 'a' kind = 'inverter' torque_limit = 20 governor_speed = 5 "
+    "governor_gain = 1 governor_time = 1 /",
     "load tables": f"&load name = 'l' body = 'a' {TABLE} interpolation = 'linear' extrapolation = 'constant' /",
     "straight load": f"&load name = 'l' body = 'a' {TABLE} interpolation = 'cubic' extrapolation = 'linear' /",
     "cubic history": "&excitation name = 'x' body = 'a' kind = 'table' table_time = 0, 1, 2 table_torque = 0, 1, 0 "
     "interpolation = 'cubic' /",
-    "history": "&excitation name = 'x' body = 'a' kind = 'table' table_time = 0, 1 table_torque = 0, 1 interpolation = 'linear' /",
+    "history": "&excitation name = 'x' body = 'a' kind = 'table' table_time = 0, 1 table_torque = 0, 1 "
+    "interpolation = 'linear' /",
     "three_phase": f"{FAULT} fault = 'three_phase' rated_torque = 1 subtransient_reactance = 0.2 /",
     "two_phase": f"{FAULT} fault = 'two_phase' rated_torque = 1 subtransient_reactance = 0.2 transient_reactance = 0.3 /",
     "resynchronisation": f"{FAULT} fault = 'resynchronisation' rated_torque = 1 subtransient_reactance = 0.2 /",
-    "angle of a resynchronisation": f"{FAULT} fault = 'resynchronisation' rated_torque = 1 subtransient_reactance = 0.2 angle = 3 /",
+    "angle of a resynchronisation": f"{FAULT} fault = 'resynchronisation' rated_torque = 1 subtransient_reactance = 0.2 "
+    "angle = 3 /",
     "terms": f"{FAULT} term_amplitudes = 1, 2 term_multiples = 0, 1 /",
     "terms in time": f"{FAULT} term_amplitudes = 1, 2 term_multiples = 0, 1 term_times = 0.1, 0.2 term_phases = 1, 2 /",
     "startup": f"&excitation name = 'x' body = 'a' {SINE} /",
@@ -73,7 +76,8 @@ ELEMENTS = {
     "&limit coupling = 'k' rule = 'iacs_m68' tensile_strength = 6e8 rated_speed = 18 /",
     **{
         f"mean stress {word}": "&coupling name = 'k' bodies = 'a', 'b' stiffness = 100 diameter = 0.1 /\n"
-        f"&fatigue name = 'f' coupling = 'k' reference_stress = 1e6 reference_cycles = 1e6 slope = 5 mean_stress = '{word}' {more} /"
+        f"&fatigue name = 'f' coupling = 'k' reference_stress = 1e6 reference_cycles = 1e6 slope = 5 "
+        f"mean_stress = '{word}' {more} /"
         for word, more in (("none", ""), ("goodman", "ultimate_stress = 1e9"), ("soderberg", "yield_stress = 1e9"))
     },
     **{
@@ -89,11 +93,12 @@ ELEMENTS = {
             ("lognormal", "median = 2 log_deviation = 0.1 high = 9 distribution = 'lognormal'"),
         )
     },
-    "statistics": f"&sweep design = 'grid' /\n{VARY} count = 3 /\n&record quantity = 'omega_a' statistic = 'final', 'max', 'min', "
-    "'max_abs', 'mean', 'rms', 'time_of_max', 'settling_time' /",
+    "statistics": f"&sweep design = 'grid' /\n{VARY} count = 3 /\n&record quantity = 'omega_a' statistic = 'final', 'max', "
+    "'min', 'max_abs', 'mean', 'rms', 'time_of_max', 'settling_time' /",
     "modes": f"&coupling name = 'k' bodies = 'a', 'b' stiffness = 100 /\n&sweep design = 'grid' /\n{VARY} count = 3 /\n"
     "&record mode = 1 statistic = 'frequency', 'damping_ratio' /",
-    "responses": f"&coupling name = 'k' bodies = 'a', 'b' stiffness = 100 damping = 1 /\n&sweep design = 'grid' /\n{VARY} count = 3 /\n"
+    "responses": "&coupling name = 'k' bodies = 'a', 'b' stiffness = 100 damping = 1 /\n"
+    f"&sweep design = 'grid' /\n{VARY} count = 3 /\n"
     "&excitation name = 'x' body = 'a' kind = 'orders' orders = 1 amplitudes = 2 /\n"
     "&response body = 'a' speed = 10, 20 operating = 12, 18 /\n&limit coupling = 'k' moment = 100 /\n"
     "&record response = 'moment_k' statistic = 'peak', 'peak_speed', 'margin', 'ratio' /",

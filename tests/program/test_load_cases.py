@@ -394,7 +394,13 @@ def test_names_that_spreadsheets_would_compute_are_texts_in_tables(nocdyn):
     nocdyn.write("m.nml", text + "&run t_end=9 /\n&load_case name='+case' /\n")
     assert nocdyn("run", "m.nml", "--out", "out").returncode == 0
     assert nocdyn("modes", "m.nml", "--case", "+case", "--holzer", "--out", "modes").returncode == 0
-    paths = ["out/cases.csv", "out/+case/cycles.csv", "out/+case/trajectory.csv", "modes/+case/modes.csv", "modes/+case/holzer.csv"]
+    paths = [
+        "out/cases.csv",
+        "out/+case/cycles.csv",
+        "out/+case/trajectory.csv",
+        "modes/+case/modes.csv",
+        "modes/+case/holzer.csv",
+    ]
     seen = set()
     for path in paths:
         with open(nocdyn.folder / path, newline="") as file:

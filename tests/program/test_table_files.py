@@ -70,7 +70,9 @@ def test_a_file_that_an_input_names_is_no_pipe_device_or_folder(nocdyn, make, gr
     nocdyn.write("m.nml", "&body name = 'a' inertia = 1 /\n&run t_end = 1 /\n" + group + "\n")
     outcome = nocdyn("check", "m.nml")
     assert outcome.returncode == 3
-    assert outcome.stderr.startswith("nocdyn: m.nml:3: &") and outcome.stderr.endswith("odd: cannot be read: it is no regular file\n")
+    assert outcome.stderr.startswith("nocdyn: m.nml:3: &") and outcome.stderr.endswith(
+        "odd: cannot be read: it is no regular file\n"
+    )
 
 
 def test_notes_of_the_author_must_be_there_and_are_not_named_beside_the_results(nocdyn):
