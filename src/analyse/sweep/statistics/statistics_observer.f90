@@ -76,7 +76,7 @@ contains
     end do
     allocate (self%default_value, source=value_of_zero_column(statistics))
     call distribute(self, found, columns, may_bend)
-    if (allocated(self%sampled%recorded%formulation)) self%sampled%recorded%formulation%joints%leader => block%joints%mode
+    if (allocated(self%sampled%recorded%formulation)) self%sampled%recorded%formulation%joints%leader => block%joints
     allocate (self%is_complete(block%lanes), source=.false.)
     select type (block)
     class is (reduced_t)
