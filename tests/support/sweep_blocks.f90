@@ -81,7 +81,6 @@ contains
     self%variant(lane) = self%begun
     call self%block%copy_lane(lane, self%source, self%begun)
     y(:) = self%y(self%begun, :)
-    call self%observer%start_lane(lane, y)
   end subroutine next
 
   subroutine finish(self, lane, y, solver_status)
@@ -148,16 +147,12 @@ contains
     class(formulation_t), allocatable, target :: formulation
     type(statistics_observer_t), target :: observer
     type(error_t), allocatable :: error
-    real(wp), allocatable :: start(:), y(:, :)
+    real(wp), allocatable :: y(:, :)
     integer :: lane
 
     call new_formulation('reduced', machine, formulation)
     observer = new_statistics_observer(formulation, statistics, 0.0_wp, t_end, may_bend=.true.)
     y = formulation%start()
-    do lane = 1, machine%lanes
-      start = y(lane, :)
-      call observer%start_lane(lane, start)
-    end do
     call integrate(formulation, settings_of(method, tolerance), [0.0_wp, t_end], y, observer, solver_status, error)
     if (allocated(error)) error stop 'nocdyn_test_sweep_blocks: ' // error%message
     allocate (values(size(statistics), machine%lanes))
