@@ -6,12 +6,13 @@ import random
 
 import numpy as np
 import pytest
+from conftest import IS_SLOW
 from random_machines import RandomMachine
 from sweep_inputs import limited_to, needs_sweeps
 
 pytestmark = needs_sweeps
 
-MACHINES = int(os.environ.get("NOCDYN_RANDOM_MACHINES", "7"))  # more in a campaign
+MACHINES = int(os.environ.get("NOCDYN_RANDOM_MACHINES", "3" if IS_SLOW else "6"))  # more in a campaign
 FIRST = int(os.environ.get("NOCDYN_FIRST_RANDOM_MACHINE", "1"))
 
 RUN = "&run t_end = 0.5 max_steps = 200000 /\n&output points = 504 /\n"  # no row is where an engagement or an excitation jumps
@@ -124,7 +125,7 @@ def test_a_variant_of_a_sweep_is_its_run(nocdyn, seed):
         assert not wrong, "\n".join([machine.text, str(targets), *wrong])
 
 
-@pytest.mark.parametrize("seed", range(FIRST, FIRST + max(2, MACHINES // 10)))
+@pytest.mark.parametrize("seed", range(FIRST, FIRST + 1 + MACHINES // 10))
 def test_threads_shards_and_interruptions_do_not_show_where_joints_lock(nocdyn, seed):
     machine = next(machine for machine in map(RandomMachine, range(1000 * seed, 1000 * seed + 100)) if machine.has_joints)
     targets, rows = variants_of(machine, seed)
@@ -144,3 +145,65 @@ def test_threads_shards_and_interruptions_do_not_show_where_joints_lock(nocdyn, 
         if "--resume" in outcome.stderr:
             break
     assert sweep(nocdyn, "late", "--resume") == table
+
+
+IMPACT = """\
+&body name = 'a' inertia = 1 speed = 10 /
+&body name = 'b' inertia = 1 /
+&clutch name = 'k' bodies = 'a', 'b' kind = 'dog' times = TIME levels = 1 /
+&load name = 'l' body = 'b' viscous = 2 /
+&run t_end = 1 /
+&sweep design = 'grid' /
+&vary target = 'body.b.inertia' low = 1 high = 1.25 count = 2 /
+&record quantity = 'omega_b' statistic = 'max', 'time_of_max' /
+&record quantity = 'omega_a' statistic = 'max', 'time_of_max' /
+"""
+
+
+@pytest.mark.parametrize("time", [0, 0.3])
+def test_extremes_are_those_after_an_impact(nocdyn, time):
+    nocdyn.write("sweep.nml", IMPACT.replace("TIME", str(time)))
+    for row, inertia in zip(sweep(nocdyn, "out"), (1, 1.25)):
+        common = 10 / (1 + inertia)
+        assert float(row["omega_b_max [rad/s]"]) == pytest.approx(common, rel=1e-12)
+        assert float(row["omega_a_max [rad/s]"]) == pytest.approx(10 if time > 0 else common, rel=1e-12)
+        assert float(row["omega_b_time_of_max [s]"]) == pytest.approx(time, abs=1e-12)
+        assert float(row["omega_a_time_of_max [s]"]) == 0
+
+
+def test_the_time_beside_the_largest_magnitude_is_of_that(nocdyn):
+    text = "&body name = 'a' inertia = 1 /\n&coupling name = 'c' bodies = 'ground', 'a' stiffness = 1 /\n"
+    text += (
+        "&excitation name = 'e' body = 'a' kind = 'step' amplitude = -1 time = 0 /\n&run t_end = 6 rtol = 1e-10 atol = 1e-10 /\n"
+    )
+    text += "&sweep design = 'grid' /\n&vary target = 'body.a.inertia' low = 1 high = 4 count = 2 /\n"
+    text += "&record quantity = 'phi_a' statistic = 'max_abs', 'time_of_max', 'time_of_min', 'time_of_max_abs' /\n"
+    text += "&record quantity = 'moment_c' statistic = 'max_abs', 'max', 'time_of_max', 'time_of_max_abs' /\n"
+    nocdyn.write("sweep.nml", text)
+    for row, period in zip(sweep(nocdyn, "out"), (2 * np.pi, 4 * np.pi)):
+        for label in ("time_of_max", "time_of_min", "time_of_max_abs"):
+            assert float(row[f"phi_a_{label} [s]"]) == pytest.approx(min(period / 2, 6), abs=1e-6)  # phi = cos(omega t) - 1
+        assert float(row["moment_c_time_of_max_abs [s]"]) == pytest.approx(min(period / 2, 6), abs=1e-6)
+        assert float(row["moment_c_time_of_max [s]"]) == 0
+
+
+def test_variants_of_a_long_chain_may_end_at_other_times(nocdyn):
+    # their formulation is not laid out as a block
+    text = "".join(f"&body name = 'b{i}' inertia = 1 speed = {3 if i == 0 else 0} /\n" for i in range(24))
+    text += "".join(f"&coupling name = 'c{i}' bodies = 'b{i}', 'b{i + 1}' stiffness = 100 /\n" for i in range(23))
+    text += "&run t_end = 1 /\n&sweep design = 'grid' /\n&vary target = 'run.t_end' low = 1 high = 2 count = 2 /\n"
+    nocdyn.write("sweep.nml", text + "&record quantity = 'kinetic_energy' statistic = 'max', 'final' /\n")
+    for row, t_end in zip(sweep(nocdyn, "out"), (1, 2)):
+        nocdyn("run", "sweep.nml", "--out", "run", "--set", f"run.t_end={t_end}", "--quiet")
+        assert float(row["kinetic_energy_max [J]"]) == 4.5
+        assert float(row["kinetic_energy_final [J]"]) == pytest.approx(
+            nocdyn.summary("run")["columns"]["kinetic_energy [J]"]["last"], rel=1e-6
+        )
+
+
+def test_the_extreme_of_a_run_after_a_jump_is_at_the_jump(nocdyn):
+    text = "&body name = 'a' inertia = 1 /\n&excitation name = 'e' body = 'a' kind = 'step' amplitude = 5 time = 0.25 /\n"
+    nocdyn.write("machine.nml", text + "&run t_end = 1 /\n&output interval = 0.3 /\n")
+    assert nocdyn("run", "machine.nml", "--out", "run").returncode == 0
+    torque = nocdyn.summary("run")["columns"]["torque_e [N m]"]
+    assert (torque["max"], torque["time_of_max"]) == (5, 0.25)

@@ -122,7 +122,7 @@ contains
     type(reduced_t), pointer, intent(in) :: block
 
     call block%formulate(self%has_energy_balance, as_block=.true.)
-    block%is_shared = block%lanes > 1
+    block%is_shared = block%joints%count == 0   ! whatever the number of lanes
     call block%list_parameters(self%parameters)
     self%block => block
     self%formulation => block

@@ -8,8 +8,8 @@ module nocdyn_statistics_observer
   use nocdyn_linear_statistics, only: linear_statistics_t, new_linear_statistics
   use nocdyn_reduced, only: reduced_t
   use nocdyn_sampled_statistics, only: new_sampled_statistics, sampled_statistics_t
-  use nocdyn_statistics, only: find_columns, is_of_fatigue, is_torque, statistic_settling_time, statistic_t, &
-    statistic_time_of_max, value_of_zero_column
+  use nocdyn_statistics, only: find_columns, is_of_fatigue, is_time_of_extreme, is_torque, statistic_settling_time, &
+    statistic_t, value_of_zero_column
   use nocdyn_observer, only: observer_t, step_block_t
   use nocdyn_text, only: string_t
   use nocdyn_trajectory_columns, only: column_point_moment, column_point_stress, column_t, column_work_in, energy_labels, &
@@ -134,7 +134,7 @@ contains
         is_multiple = is_proportional(self%block, column) .and. .not. may_bend
         is_of_linear(i) = is_linear(self%block, column) .or. is_multiple
         if (has_law(self%block%machine, column)) then
-          if (statistics(i)%kind == statistic_time_of_max) is_of_linear(i) = .false.
+          if (is_time_of_extreme(statistics(i)%kind)) is_of_linear(i) = .false.
           if (is_of_fatigue(statistics(i)%kind)) is_of_linear(i) = is_multiple
         end if
       end associate
