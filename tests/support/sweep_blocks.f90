@@ -13,7 +13,8 @@ module nocdyn_test_sweep_blocks
   use nocdyn_recorder, only: recorder, recorder_t
   use nocdyn_reduced, only: new_reduced, reduced_t
   use nocdyn_statistics, only: new_statistic, statistic_final, statistic_max, statistic_max_abs, statistic_mean, statistic_min, &
-    statistic_rms, statistic_settling_time, statistic_t, statistic_time_of_max
+    statistic_rms, statistic_settling_time, statistic_t, statistic_time_of_max, statistic_time_of_max_abs, &
+    statistic_time_of_min
   use nocdyn_statistics_observer, only: new_statistics_observer, statistics_observer_t
   use nocdyn_system, only: system_t
   use nocdyn_text, only: string_t
@@ -81,7 +82,6 @@ contains
     self%variant(lane) = self%begun
     call self%block%copy_lane(lane, self%source, self%begun)
     y(:) = self%y(self%begun, :)
-    call self%observer%start_lane(lane, y)
   end subroutine next
 
   subroutine finish(self, lane, y, solver_status)
@@ -148,16 +148,12 @@ contains
     class(formulation_t), allocatable, target :: formulation
     type(statistics_observer_t), target :: observer
     type(error_t), allocatable :: error
-    real(wp), allocatable :: start(:), y(:, :)
+    real(wp), allocatable :: y(:, :)
     integer :: lane
 
     call new_formulation('reduced', machine, formulation)
     observer = new_statistics_observer(formulation, statistics, 0.0_wp, t_end, may_bend=.true.)
     y = formulation%start()
-    do lane = 1, machine%lanes
-      start = y(lane, :)
-      call observer%start_lane(lane, start)
-    end do
     call integrate(formulation, settings_of(method, tolerance), [0.0_wp, t_end], y, observer, solver_status, error)
     if (allocated(error)) error stop 'nocdyn_test_sweep_blocks: ' // error%message
     allocate (values(size(statistics), machine%lanes))
@@ -217,6 +213,10 @@ contains
       value = sqrt((sum(x(first:)**2) - 0.5_wp * (x(first)**2 + x(last)**2)) / (last - first))
     case (statistic_time_of_max)
       value = times(first - 1 + maxloc(x(first:), dim=1))
+    case (statistic_time_of_min)
+      value = times(first - 1 + minloc(x(first:), dim=1))
+    case (statistic_time_of_max_abs)
+      value = times(first - 1 + maxloc(abs(x(first:)), dim=1))
     case (statistic_settling_time)
       value = 0.0_wp
       do i = last, first, -1

@@ -101,7 +101,7 @@ contains
     end do
   end subroutine update_extremes
 
-  !> Includes the extremes of the motion where they exceed those of the rows by more than rounding.
+  !> Includes the extremes of the motion where they exceed those of the rows by more than rounding, or occur before them.
   pure subroutine widen_extremes(extremes, ranges)
     type(extremes_t), intent(inout) :: extremes
     type(ranges_t), intent(in) :: ranges   !! of the columns
@@ -113,10 +113,14 @@ contains
       if (ranges%lowest(i) < extremes%lowest(i) - rounding) then
         extremes%lowest(i) = ranges%lowest(i)
         extremes%lowest_time(i) = ranges%lowest_time(i)
+      else if (ranges%lowest(i) <= extremes%lowest(i) + rounding) then
+        extremes%lowest_time(i) = min(extremes%lowest_time(i), ranges%lowest_time(i))
       end if
       if (ranges%highest(i) > extremes%highest(i) + rounding) then
         extremes%highest(i) = ranges%highest(i)
         extremes%highest_time(i) = ranges%highest_time(i)
+      else if (ranges%highest(i) >= extremes%highest(i) - rounding) then
+        extremes%highest_time(i) = min(extremes%highest_time(i), ranges%highest_time(i))
       end if
     end do
     extremes%are_continuous = .true.

@@ -118,7 +118,7 @@ contains
     call start_observer(observer, input, formulation, times, error)
     if (allocated(error)) return
     observer%output => output
-    observer%table%columns%formulation%joints%leader => formulation%joints%mode
+    observer%table%columns%formulation%joints%leader => formulation%joints
     call output%start(selected(observer%table%labels, observer%chosen), size(times), error)
     if (allocated(error)) return
     allocate (summary%labels, source=observer%table%labels)

@@ -24,6 +24,7 @@ module nocdyn_observer
     integer :: first_read = 1               !! components whose polynomials `on_steps` reads; may change from variant to variant
     integer :: last_read = huge(0)
   contains
+    procedure :: on_start
     procedure :: on_output
     procedure :: wants_stop
     procedure :: event_values
@@ -54,6 +55,15 @@ module nocdyn_observer
   end type ranges_t
 
 contains
+
+  !> A lane starts at (t, y): the system has its parameters and has chosen its branches. Where these do not hold, the state jumps
+  !> at once.
+  subroutine on_start(self, lane, t, y)
+    class(observer_t), target, intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)   !! before such a jump, [states + quadratures]
+  end subroutine on_start
 
   !> One output time of one lane; the calls of a lane come in the order of the times.
   subroutine on_output(self, lane, t, y)

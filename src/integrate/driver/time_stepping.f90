@@ -173,8 +173,8 @@ contains
     call reset_solver_status(solver_status, lane)
   end subroutine set_start
 
-  !> Starts the lanes in `starting`: lets the system choose their branches, evaluates the slope, passes the start to the observer
-  !> if it is an output time, and chooses the first step.
+  !> Starts the lanes in `starting`: lets the system choose their branches, tells the observer, evaluates the slope, passes the
+  !> start to the observer if it is an output time, and chooses the first step.
   subroutine start_lanes(integrator, stepper, system, times, observer, solver_status)
     type(integrator_t), intent(inout) :: integrator
     class(stepper_t), intent(inout) :: stepper
@@ -189,6 +189,7 @@ contains
         if (.not. integrator%starting(lane)) cycle
         integrator%sample(:) = attempt%y(lane, :attempt%components)
         call system%start_lane(lane, attempt%t(lane), integrator%sample)
+        call observer%on_start(lane, attempt%t(lane), integrator%sample)
         if (integrator%has_switches) call start_switching(integrator%switching, system, attempt, lane, solver_status)
       end do
       call evaluate_starts(integrator, system, solver_status)

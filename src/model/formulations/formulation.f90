@@ -1,7 +1,7 @@
 !> A machine as a first-order system: the common part of the three formulations.
 module nocdyn_formulation
   use nocdyn_error_measures, only: error_measures_t
-  use nocdyn_joint_sets, only: joint_sets_t, new_joint_sets
+  use nocdyn_joint_sets, only: joint_sets_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_system, only: system_t
@@ -103,7 +103,6 @@ contains
       self%internal = machine%elements%internal%count
       self%states = self%mechanical + self%internal
       self%switches = machine%switches%count
-      self%joints = new_joint_sets(machine%banks, machine%switches, machine%elements%count)
       self%limits_steps = any(machine%switches%phase_order > 0)
       self%lane_state = spread(0.0_wp, 1, self%states)
       self%lanes = machine%lanes

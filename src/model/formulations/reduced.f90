@@ -20,6 +20,7 @@ module nocdyn_reduced
   public :: new_reduced
 
   type, extends(coordinate_formulation_t), public :: reduced_t
+    logical :: is_block = .false.                           !! whether it is laid out as a block, whose parameters can be listed
     type(sparse_map_t), private :: accelerations            !! R
     integer, allocatable, private :: response_entry(:)      !! entry of `incidence` of each entry of R
     type(reduced_jacobian_t), private :: element_jacobian   !! R diag U
@@ -57,13 +58,12 @@ contains
     class(reduced_t), intent(inout) :: self
     logical, intent(in) :: with_energy_balance   !! as in `new_reduced`
     logical, intent(in), optional :: as_block    !! as in `new_reduced`
-    logical :: is_block
 
-    is_block = .false.
-    if (present(as_block)) is_block = as_block
-    call self%set_coordinates(with_energy_balance, is_block)
+    self%is_block = self%machine%lanes > 1
+    if (present(as_block)) self%is_block = self%is_block .or. as_block
+    call self%set_coordinates(with_energy_balance, self%is_block)
     associate (machine => self%machine, incidence => self%incidence, freedoms => self%machine%coordinates%freedoms)
-      call form_responses(freedoms, is_block, self)
+      call form_responses(freedoms, self%is_block, self)
       self%element_jacobian = new_reduced_jacobian(freedoms, incidence, machine%with_work(:self%quadratures), machine%elements)
       self%moment = 0.0_wp * self%zero_twist
       if (allocated(self%free_jacobian)) deallocate (self%free_jacobian)

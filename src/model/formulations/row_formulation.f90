@@ -8,6 +8,7 @@
 module nocdyn_row_formulation
   use nocdyn_formulation, only: formulation_t
   use nocdyn_friction_joints, only: locked
+  use nocdyn_joint_sets, only: joint_sets_t, new_joint_sets
   use nocdyn_kinds, only: wp
   use nocdyn_row_obstacles, only: describe_obstacle
   use nocdyn_system, only: evaluation_fatal
@@ -97,13 +98,18 @@ contains
     end associate
   end subroutine push
 
-  !> How the joints of the machine act on one another in the first lane, at the start.
+  !> Makes the joints of the machine anew, with how they act on one another in the first lane at the start: nothing of a motion
+  !> before, which may have had other parameters, is left in them or in the laws.
   subroutine prepare_joints(self)
     class(row_formulation_t), intent(inout) :: self
     real(wp) :: twist(self%lanes, self%machine%elements%count)
+    type(joint_sets_t), pointer :: leader
     integer, allocatable :: elements(:)
     integer :: i, j
 
+    leader => self%joints%leader
+    self%joints = new_joint_sets(self%machine%banks, self%machine%switches, self%machine%elements%count)
+    self%joints%leader => leader
     self%projects = self%joints%motions%count > 0
     if (self%joints%count == 0) return
     self%acceleration = spread(0.0_wp, 1, size(self%moving))
@@ -124,7 +130,7 @@ contains
                                              self%machine%constraints%rows(), self%machine%bodies)
     twist = self%machine%start_twist()
     call self%joints%motions%set_start(self%machine%banks, twist(1, :))
-    call self%joints%start()
+    call self%joints%start(self%machine%banks)
   end subroutine prepare_joints
 
   !> The moments of the joints that hold at a state of a block of one lane, where the branches are known; they are put among those

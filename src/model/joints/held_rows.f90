@@ -58,7 +58,7 @@ module nocdyn_held_rows
     integer, allocatable, private :: pivots(:)
   contains
     procedure :: allocate_rows
-    procedure :: forget_sets
+    procedure :: start_rows
     procedure :: weigh
     procedure :: change_set
     procedure :: find_moments
@@ -95,18 +95,15 @@ contains
     end associate
   end subroutine allocate_rows
 
-  !> Forgets all sets, as `mutual` has changed. The rows that move start at the present slopes.
-  subroutine forget_sets(self)
+  !> Weighs the rows at their first position, where `mutual` is known.
+  subroutine start_rows(self)
     class(held_rows_t), intent(inout) :: self
     integer :: dependent, j
 
-    deallocate (self%sets)
-    allocate (self%sets(0))
-    self%lost = 0
     call self%weigh()
     if (self%motions%count == 0) return
     call self%system%find_rank(self%weight, [(j, j=self%locking + 1, self%count)], self%rank_at_start, dependent)
-  end subroutine forget_sets
+  end subroutine start_rows
 
   !> Forms W with the slopes of the present position.
   subroutine weigh(self)

@@ -27,7 +27,8 @@ module nocdyn_joint_sets
   type, extends(held_rows_t), public :: joint_sets_t
     integer, allocatable :: bank(:), number(:)   !! bank of each joint, and its number there, [joints] as all that follow
     integer, allocatable :: joint_of(:)      !! joint of each switch of the machine, 0 for none, [switches]
-    integer, pointer, contiguous :: leader(:) => null()   !! modes of the motion that is observed; null: by the state
+    type(joint_sets_t), pointer :: leader => null()   !! joints of the motion that is observed, which give the modes; null: by
+                                                      !! the state
     real(wp), allocatable :: impulse(:)      !! of the last impact [N m s]; 0 after other events
     real(wp), allocatable :: shift(:)        !! by which the boundary of a slip lies beyond zero [rad/s]
     real(wp) :: moment_shift = 0.0_wp        !! by which those of the moments lie beyond their ranges [N m]
@@ -83,12 +84,16 @@ contains
     self%log = new_joint_log()
   end function new_joint_sets
 
-  !> Forgets sets and events, before a motion that may have other parameters.
-  subroutine start(self)
+  !> Weighs the rows at the start, where `mutual` is known, and gives the laws the modes.
+  subroutine start(self, banks)
     class(joint_sets_t), intent(inout) :: self
+    type(bank_slot_t), intent(inout) :: banks(:)
+    integer :: j
 
-    call self%forget_sets()
-    self%log%count = 0
+    call self%start_rows()
+    do j = 1, self%locking
+      call set_mode(self, banks, j)
+    end do
   end subroutine start
 
   !> Takes the modes of the motion that is observed.
@@ -97,8 +102,8 @@ contains
     type(bank_slot_t), intent(inout) :: banks(:)
     integer :: j
 
-    if (all(self%mode == self%leader)) return
-    self%mode(:) = self%leader
+    if (all(self%mode == self%leader%mode)) return
+    self%mode(:) = self%leader%mode
     do j = 1, self%locking
       call set_mode(self, banks, j)
     end do

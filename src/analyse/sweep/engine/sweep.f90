@@ -29,7 +29,7 @@ module nocdyn_sweep
   !> What all blocks of a sweep share.
   type, public :: sweep_setup_t
     integer :: lanes = 1                       !! of a block
-    logical :: has_energy_balance = .false.    !! whether a recorded column needs the work integrals
+    logical :: has_energy_balance = .false.    !! whether the work integrals are among the states
   end type sweep_setup_t
 
 contains
@@ -49,6 +49,7 @@ contains
     setup%lanes = merge(large_block, small_block, formulation%states <= max_states)
     if (formulation%joints%count == 0) return
     setup%lanes = 1   ! whose joints may be in different sets
+    setup%has_energy_balance = .true.   ! a run has it, which takes the same steps
     if (size(plan%analyses) > 0) call refuse_joints(plan%input, 'a sweep of modes or responses', error)
   end subroutine prepare_sweep
 

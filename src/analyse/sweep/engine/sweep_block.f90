@@ -74,7 +74,7 @@ contains
   subroutine new_sweep_block(plan, lanes, with_energy_balance, scheduler, block)
     type(sweep_plan_t), target, intent(in) :: plan
     integer, intent(in) :: lanes
-    logical, intent(in) :: with_energy_balance   !! whether a recorded column needs the work integrals
+    logical, intent(in) :: with_energy_balance   !! whether the work integrals are among the states
     class(scheduler_t), target, intent(inout) :: scheduler
     type(sweep_block_t), target, intent(out) :: block
     real(wp) :: typical(plan%design%varied), values(size(plan%numbers%targets))
@@ -214,7 +214,6 @@ contains
       end select
     end do
     self%index(lane) = i
-    call self%block%observer%start_lane(lane, y)
   end subroutine next
 
   subroutine refuse(chunk, index, reason)
@@ -280,7 +279,6 @@ contains
     type(initial_states_t) :: ensemble
     type(solver_status_t) :: solver_status
     character(len=:), allocatable :: message
-    real(wp), allocatable :: start(:)
     real(wp) :: times(2), values(size(self%plan%numbers%targets))
 
     call self%plan%numbers%target_values(chunk%parameters(:, index), values)
@@ -293,8 +291,6 @@ contains
       return
     end if
     ensemble = initial_states(formulation%start())
-    allocate (start, source=ensemble%y(1, :))
-    call observer%start_lane(1, start)
     call integrate_with(stepper, formulation, settings, times, ensemble, observer, solver_status)
     call store_result(chunk, index, 1, solver_status, formulation, settings, self%plan%statistics, observer)
   end subroutine compute_in_own_block

@@ -122,7 +122,7 @@ contains
     type(reduced_t), pointer, intent(in) :: block
 
     call block%formulate(self%has_energy_balance, as_block=.true.)
-    block%is_shared = .true.
+    block%is_shared = block%joints%count == 0   ! whatever the number of lanes
     call block%list_parameters(self%parameters)
     self%block => block
     self%formulation => block
@@ -225,7 +225,8 @@ contains
     type(machine_t) :: machine
 
     call self%own_machine(values, machine, message)
-    if (message == '') call new_asked_formulation(self%input, machine, formulation, self%has_energy_balance)
+    if (message /= '') return
+    call new_asked_formulation(self%input, machine, formulation, count_joints(machine) > 0 .or. self%has_energy_balance)
   end subroutine own_formulation
 
   !> The machine, of one lane, of a variant. Its input is then `input`.

@@ -103,6 +103,7 @@ contains
     type(string_t), allocatable :: words(:)
     real(wp), allocatable :: band, from   ! of the group, if it has them
     integer :: column, i, k, unit
+    logical :: of_magnitude   ! whether that is kept, and not the largest value
 
     call find_column(input, record, labels, column, diagnostics, unit)
     call check_from(input, record, span, diagnostics)
@@ -111,6 +112,8 @@ contains
       words = group%texts('statistic')
       if (group%has_value('from')) from = group%number('from')
       if (group%has_value('band')) band = group%number('band')
+      of_magnitude = any([(words(i)%text == 'max_abs', i=1, size(words))]) &
+                     .and. .not. any([(words(i)%text == 'max', i=1, size(words))])
       do i = 1, size(words)
         k = findloc(statistic_names == words(i)%text, .true., dim=1)
         if (k == 0 .or. is_of_fatigue(k)) then
@@ -118,7 +121,7 @@ contains
                             'needed: ' // trim(merge('fatigue         ', 'mode or response', k > 0)), diagnostics)
           cycle
         end if
-        statistic = new_statistic(labels, column, k, span%t_start, from, band, unit)
+        statistic = new_statistic(labels, column, k, span%t_start, from, band, unit, of_magnitude)
         call append_statistic(input, record, others, statistic, statistics, diagnostics)
       end do
     end associate

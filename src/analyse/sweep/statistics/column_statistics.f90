@@ -8,8 +8,9 @@ module nocdyn_column_statistics
   use nocdyn_kinds, only: wp
   use nocdyn_quadrature, only: gauss_legendre_rule
   use nocdyn_settling_time, only: settling_history_t
-  use nocdyn_statistics, only: is_of_fatigue, statistic_damage, statistic_final, statistic_max, statistic_max_abs, &
-    statistic_mean, statistic_min, statistic_rms, statistic_settling_time, statistic_t, statistic_time_of_max
+  use nocdyn_statistics, only: is_of_fatigue, is_time_of_extreme, statistic_damage, statistic_final, statistic_max, &
+    statistic_max_abs, statistic_mean, statistic_min, statistic_rms, statistic_settling_time, statistic_t, &
+    statistic_time_of_max, statistic_time_of_max_abs, statistic_time_of_min
   implicit none (type, external)
   private
 
@@ -24,7 +25,7 @@ module nocdyn_column_statistics
     logical :: has_max = .false., has_min = .false., has_max_abs = .false., has_time = .false.   !! extremes that are needed
     logical :: has_sums = .false.            !! whether integrals are needed
     logical :: has_history = .false.         !! whether the settling time is needed
-    real(wp), allocatable :: highest(:), lowest(:), highest_time(:)   !! of x; time [s]
+    real(wp), allocatable :: highest(:), lowest(:), highest_time(:), lowest_time(:)   !! of x; times [s]
     real(wp), allocatable :: no_highest(:), no_lowest(:)   !! huge where it is not needed, or for `max_abs` only; else -huge
     real(wp), allocatable :: bound(:)                      !! huge before `from`: x is not of interest; -huge after it
     real(wp), allocatable :: integral(:), square(:)        !! of the column and of its square over time
@@ -146,9 +147,9 @@ contains
     integer, intent(in) :: kind   !! statistic_...
 
     acc%has_max = acc%has_max .or. kind == statistic_max .or. kind == statistic_time_of_max
-    acc%has_time = acc%has_time .or. kind == statistic_time_of_max
-    acc%has_min = acc%has_min .or. kind == statistic_min
-    acc%has_max_abs = acc%has_max_abs .or. kind == statistic_max_abs
+    acc%has_min = acc%has_min .or. kind == statistic_min .or. kind == statistic_time_of_min
+    acc%has_max_abs = acc%has_max_abs .or. kind == statistic_max_abs .or. kind == statistic_time_of_max_abs
+    acc%has_time = acc%has_time .or. is_time_of_extreme(kind)
     acc%has_sums = acc%has_sums .or. kind == statistic_mean .or. kind == statistic_rms
     acc%has_history = acc%has_history .or. kind == statistic_settling_time
   end subroutine add_need
@@ -158,7 +159,7 @@ contains
     integer, intent(in) :: lanes
 
     allocate (acc%highest(lanes), source=0.0_wp)
-    allocate (acc%lowest, acc%highest_time, acc%integral, acc%square, source=acc%highest)
+    allocate (acc%lowest, acc%highest_time, acc%lowest_time, acc%integral, acc%square, source=acc%highest)
     allocate (acc%bound(lanes), source=-huge(0.0_wp))
     allocate (acc%no_highest, acc%no_lowest, source=acc%bound)
     allocate (acc%history(lanes))
@@ -224,6 +225,7 @@ contains
     acc%highest(lane) = x
     acc%lowest(lane) = x
     acc%highest_time(lane) = t
+    acc%lowest_time(lane) = t
   end subroutine start_range
 
   !> Widens the range of a lane by the extremes of a polynomial over the times from t_start to t_end, where they are of interest.
@@ -249,6 +251,7 @@ contains
         negated(:rule%degree) = -values
         call raise_to_maximum(rule, negated, level, position, found)
         if (found) lowest = -level
+        if (found) acc%lowest_time(lane) = time_at(position, t_start, t_end)
       end if
     end associate
   end subroutine widen_range
@@ -281,6 +284,11 @@ contains
                       largest(linear, cubic, -acc%highest(lane), -acc%lowest(lane)))
         case (statistic_time_of_max)
           value = acc%highest_time(lane)
+        case (statistic_time_of_min)
+          value = acc%lowest_time(lane)
+        case (statistic_time_of_max_abs)
+          value = merge(acc%highest_time(lane), acc%lowest_time(lane), acc%highest(lane) >= -acc%lowest(lane))
+          if (.not. abs(acc%highest(lane) + acc%lowest(lane)) > 0) value = min(value, acc%lowest_time(lane))
         case (statistic_mean)
           value = acc%integral(lane) / duration
         case (statistic_rms)

@@ -1,5 +1,6 @@
 !> Columns of the trajectory table that are a linear function x of the state of the reduced formulation, or the elastic moment
-!> of a coupling that is an odd cubic polynomial of x; for all lanes of a block.
+!> of a coupling that is an odd cubic polynomial of x; for all lanes of a block. Where joints lock or move there are none: speeds
+!> jump there, and states between the steps are put back on rows that move.
 !>
 !> x = offset + sum of factor * y(component). An angle, a speed or a twist is x. An elastic moment is (linear + cubic x^2) x,
 !> where x is the twist minus that at rest. The moment of a linear coupling with damping is x = k (u - rest) + d u', its stress
@@ -47,7 +48,7 @@ contains
     is_linear = .false.
     select type (block)
     class is (reduced_t)
-      is_linear = any([column%kind == column_angle, column%kind == column_speed, &
+      is_linear = block%joints%count == 0 .and. any([column%kind == column_angle, column%kind == column_speed, &
                        is_quantity(block%machine, column, 'twist'), has_law(block%machine, column)])
     end select
   end function is_linear
@@ -60,7 +61,7 @@ contains
     integer :: element
 
     is_proportional = .false.
-    if (column%kind /= column_element) return
+    if (column%kind /= column_element .or. block%joints%count > 0) return
     associate (machine => block%machine, bank => block%machine%banks(column%bank)%bank)
       select type (block)
       class is (reduced_t)

@@ -33,7 +33,7 @@ contains
   type(linear_statistics_t) function new_linear_statistics(block, columns, statistics, t_start, t_end) result(self)
     class(formulation_t), intent(in) :: block
     type(column_t), intent(in) :: columns(:)         !! of the trajectory table
-    type(statistic_t), intent(in) :: statistics(:)   !! each of a column that `is_linear`; a moment has no `time_of_max`
+    type(statistic_t), intent(in) :: statistics(:)   !! each of a column that `is_linear`; a moment has no time of extremes
     real(wp), intent(in) :: t_start, t_end           !! of every variant [s]
     integer, allocatable :: wanted(:)
 
@@ -204,7 +204,7 @@ contains
 
     associate (strip => self%strip, at => self%strip%before + 1)
       call widen_by_ends(acc%has_time, strip%t_end, strip%x_end, acc%bound(at), acc%highest(at), acc%lowest(at), &
-                         acc%highest_time(at))
+                         acc%highest_time(at), acc%lowest_time(at))
       call bound_excess(acc%has_max_abs, strip, acc%bound(at), acc%highest(at), acc%lowest(at), acc%no_highest(at), &
                         acc%no_lowest(at), rise, fall)
       if (any_positive(rise, fall)) call exclude_monotonic(degree, self%chord_gap, strip%scale, strip%c, rise, fall)
@@ -226,15 +226,16 @@ contains
   end subroutine widen_strip
 
   !> Widens the range of x by its values at the ends of the steps, in the lanes that have passed `from`.
-  pure subroutine widen_by_ends(has_time, t_end, x_end, bound, highest, lowest, highest_time)
+  pure subroutine widen_by_ends(has_time, t_end, x_end, bound, highest, lowest, highest_time, lowest_time)
     logical, intent(in) :: has_time
     real(wp), intent(in) :: t_end(width), x_end(width), bound(width)
-    real(wp), intent(inout) :: highest(width), lowest(width), highest_time(width)
+    real(wp), intent(inout), dimension(width) :: highest, lowest, highest_time, lowest_time
     integer :: i
 
     if (has_time) then
       do i = 1, width
         highest_time(i) = merge(t_end(i), highest_time(i), min(x_end(i), -bound(i)) > highest(i))
+        lowest_time(i) = merge(t_end(i), lowest_time(i), max(x_end(i), bound(i)) < lowest(i))
       end do
     end if
     do i = 1, width

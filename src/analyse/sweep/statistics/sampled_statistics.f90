@@ -71,16 +71,11 @@ contains
     class(sampled_statistics_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t                  !! [s]
-    real(wp), contiguous, intent(in) :: y(:)   !! the start, [states + quadratures]
-    integer :: i
+    real(wp), contiguous, intent(in) :: y(:)   !! the start, before a jump there, [states + quadratures]
 
     call observe_lane(self, lane, t, y)
     call self%recorded%start_lane(lane)
     call self%start_accumulators(lane)
-    call self%recorded%fill_row(lane, self%t, self%y, self%row)
-    do i = 1, size(self%damages)
-      if (self%damages(i)%from <= self%t_start) call self%damages(i)%add_value(lane, self%row(self%damages(i)%column))
-    end do
   end subroutine start_lane
 
   !> Brings one lane to a time and state; the others stay where they are.

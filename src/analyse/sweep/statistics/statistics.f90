@@ -8,7 +8,7 @@ module nocdyn_statistics
   implicit none (type, external)
   private
 
-  public :: new_statistic, new_fatigue_statistic, find_columns, is_of_fatigue, is_torque, value_of_zero_column
+  public :: new_statistic, new_fatigue_statistic, find_columns, is_of_fatigue, is_time_of_extreme, is_torque, value_of_zero_column
 
   integer, parameter, public :: statistic_final = 1           !! at the end
   integer, parameter, public :: statistic_max = 2             !! in continuous time, as all statistics
@@ -17,18 +17,21 @@ module nocdyn_statistics
   integer, parameter, public :: statistic_mean = 5            !! over time
   integer, parameter, public :: statistic_rms = 6             !! root of the mean square
   integer, parameter, public :: statistic_time_of_max = 7     !! when the largest value is first reached
-  integer, parameter, public :: statistic_settling_time = 8   !! until the last exit from the band, counted from `from`
+  integer, parameter, public :: statistic_time_of_min = 8     !! the same of the smallest value
+  integer, parameter, public :: statistic_time_of_max_abs = 9 !! the same of the largest magnitude
+  integer, parameter, public :: statistic_settling_time = 10  !! until the last exit from the band, counted from `from`
 
-  integer, parameter, public :: statistic_damage = 9          !! of a &fatigue, by its cycles
-  integer, parameter, public :: statistic_cycles = 10         !! their number
+  integer, parameter, public :: statistic_damage = 11         !! of a &fatigue, by its cycles
+  integer, parameter, public :: statistic_cycles = 12         !! their number
 
-  character(len=*), parameter, public :: statistic_names(10) = [character(len=13) :: 'final', 'max', 'min', 'max_abs', 'mean', &
-    'rms', 'time_of_max', 'settling_time', 'damage', 'cycles']
+  character(len=*), parameter, public :: statistic_names(12) = [character(len=15) :: 'final', 'max', 'min', 'max_abs', 'mean', &
+    'rms', 'time_of_max', 'time_of_min', 'time_of_max_abs', 'settling_time', 'damage', 'cycles']
   real(wp), parameter :: default_band = 0.02_wp
 
-  character(len=*), parameter :: descriptions(10) = [character(len=30) :: 'at the end', 'largest value', 'smallest value', &
-    'largest absolute value', 'mean over time', 'root mean square over time', 'time of the largest value', 'settling time', &
-    'damage by Miner''s rule', 'number of cycles']
+  character(len=*), parameter :: descriptions(12) = [character(len=34) :: 'at the end', 'largest value', 'smallest value', &
+    'largest absolute value', 'mean over time', 'root mean square over time', 'time of the largest value', &
+    'time of the smallest value', 'time of the largest absolute value', 'settling time', 'damage by Miner''s rule', &
+    'number of cycles']
 
   !> A result of each variant: a statistic of a column x from the time `from` on. The settling time ends when
   !> |x - x_end| <= band |x(from) - x_end| from then on. Variants of another structure have other columns, in another order.
@@ -52,27 +55,31 @@ module nocdyn_statistics
 contains
 
   !> The statistic of a column with a label such as 'moment_shaft [N m]'.
-  type(statistic_t) function new_statistic(labels, column, kind, t_start, from, band, unit) result(self)
+  type(statistic_t) function new_statistic(labels, column, kind, t_start, from, band, unit, of_magnitude) result(self)
     type(string_t), intent(in) :: labels(:)     !! of the trajectory table
     integer, intent(in) :: column, kind
     real(wp), intent(in) :: t_start             !! [s]
     real(wp), intent(in), optional :: from      !! [s]; t_start if absent
     real(wp), intent(in), optional :: band      !! of a settling time; `default_band` if absent
     integer, intent(in), optional :: unit       !! of its values: index of `units`; absent: that of SI
+    logical, intent(in), optional :: of_magnitude   !! whether `time_of_max` is that of the largest magnitude; absent: it is not
     integer :: bracket
 
     self%quantity = labels(column)%text
     self%column = column
     self%kind = kind
+    if (present(of_magnitude) .and. kind == statistic_time_of_max) then
+      if (of_magnitude) self%kind = statistic_time_of_max_abs
+    end if
     self%from = t_start
     if (present(band)) self%band = band
     associate (text => labels(column)%text)
       bracket = index(text, ' [', back=.true.)
       self%label = text(:bracket - 1) // '_' // trim(statistic_names(kind))
       self%unit = text(bracket + 2:len(text) - 1)
-      self%long_name = text(:bracket - 1) // ', ' // trim(descriptions(kind))
+      self%long_name = text(:bracket - 1) // ', ' // trim(descriptions(self%kind))
     end associate
-    if (kind == statistic_time_of_max .or. kind == statistic_settling_time) then
+    if (is_time_of_extreme(kind) .or. kind == statistic_settling_time) then
       self%unit = 's'
     else if (present(unit)) then
       self%in_unit = unit
@@ -113,6 +120,13 @@ contains
     is_of_fatigue = kind == statistic_damage .or. kind == statistic_cycles
   end function is_of_fatigue
 
+  !> Whether a kind of statistics is the time of an extreme.
+  elemental logical function is_time_of_extreme(kind)
+    integer, intent(in) :: kind   !! statistic_...
+
+    is_time_of_extreme = any(kind == [statistic_time_of_max, statistic_time_of_min, statistic_time_of_max_abs])
+  end function is_time_of_extreme
+
   !> Finds the columns of statistics in the trajectory table of a machine. A coupling without damping has no column for the moment
   !> in the shaft: that is its elastic moment.
   subroutine find_columns(labels, statistics)
@@ -146,7 +160,7 @@ contains
     type(statistic_t), intent(in) :: statistic
 
     value = 0.0_wp
-    if (statistic%kind == statistic_time_of_max) value = statistic%from
+    if (is_time_of_extreme(statistic%kind)) value = statistic%from
   end function value_of_zero_column
 
 end module nocdyn_statistics

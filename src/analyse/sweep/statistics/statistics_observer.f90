@@ -8,8 +8,8 @@ module nocdyn_statistics_observer
   use nocdyn_linear_statistics, only: linear_statistics_t, new_linear_statistics
   use nocdyn_reduced, only: reduced_t
   use nocdyn_sampled_statistics, only: new_sampled_statistics, sampled_statistics_t
-  use nocdyn_statistics, only: find_columns, is_of_fatigue, is_torque, statistic_settling_time, statistic_t, &
-    statistic_time_of_max, value_of_zero_column
+  use nocdyn_statistics, only: find_columns, is_of_fatigue, is_time_of_extreme, is_torque, statistic_settling_time, &
+    statistic_t, value_of_zero_column
   use nocdyn_observer, only: observer_t, step_block_t
   use nocdyn_text, only: string_t
   use nocdyn_trajectory_columns, only: column_point_moment, column_point_stress, column_t, column_work_in, energy_labels, &
@@ -19,8 +19,8 @@ module nocdyn_statistics_observer
 
   public :: new_statistics_observer, needs_work_integrals
 
-  !> The requested times must be, or contain, the start and the end of the variants. After the first `start_lane` the observer
-  !> must stay where it is.
+  !> The requested times must be, or contain, the start and the end of the variants. After the first `on_start` the observer must
+  !> stay where it is.
   !>
   !> A statistic is computed by `linear` if its column allows it, else by `sampled`. A torque that the machine of the block does
   !> not have is 0 at all times. A statistic of a whole shaft has a part for each of its points, of which the worst one counts.
@@ -38,7 +38,7 @@ module nocdyn_statistics_observer
     logical, private :: uses_sampled = .false.                !! whether `sampled` has statistics
     logical, allocatable, private :: is_complete(:)           !! lanes that have reached the end
   contains
-    procedure :: start_lane, results, on_output, on_steps, on_shift
+    procedure :: results, on_start, on_output, on_steps, on_shift
   end type statistics_observer_t
 
 contains
@@ -76,11 +76,11 @@ contains
     end do
     allocate (self%default_value, source=value_of_zero_column(statistics))
     call distribute(self, found, columns, may_bend)
-    if (allocated(self%sampled%recorded%formulation)) self%sampled%recorded%formulation%joints%leader => block%joints%mode
+    if (allocated(self%sampled%recorded%formulation)) self%sampled%recorded%formulation%joints%leader => block%joints
     allocate (self%is_complete(block%lanes), source=.false.)
     select type (block)
     class is (reduced_t)
-      call block%list_parameters(self%parameters)
+      if (block%is_block) call block%list_parameters(self%parameters)
     end select
   end function new_statistics_observer
 
@@ -134,7 +134,7 @@ contains
         is_multiple = is_proportional(self%block, column) .and. .not. may_bend
         is_of_linear(i) = is_linear(self%block, column) .or. is_multiple
         if (has_law(self%block%machine, column)) then
-          if (statistics(i)%kind == statistic_time_of_max) is_of_linear(i) = .false.
+          if (is_time_of_extreme(statistics(i)%kind)) is_of_linear(i) = .false.
           if (is_of_fatigue(statistics(i)%kind)) is_of_linear(i) = is_multiple
         end if
       end associate
@@ -157,19 +157,19 @@ contains
     indices = [(merge(count(mask(:i)), 0, mask(i)), i=1, size(mask))]
   end function indices_among
 
-  !> Starts the statistics of a variant that has been set in a lane of the block.
-  subroutine start_lane(self, lane, y)
+  !> Starts the statistics of a variant that starts in a lane of the block.
+  subroutine on_start(self, lane, t, y)
     class(statistics_observer_t), target, intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), contiguous, intent(in) :: y(:)   !! the start, [states + quadratures]
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)
 
     self%is_complete(lane) = .false.
-    call self%block%reset_origin(lane)
     call self%linear%start_lane(self%block, lane, y)
     if (.not. self%uses_sampled) return
     if (self%parameters%arrays > 0) call self%sampled%recorded%copy_lane(lane, self%parameters)
-    call self%sampled%start_lane(lane, self%t_start, y)
-  end subroutine start_lane
+    call self%sampled%start_lane(lane, t, y)
+  end subroutine on_start
 
   !> The statistics of the last variant in a lane; NaN if it has not reached its end. After the last step, once.
   subroutine results(self, lane, values)

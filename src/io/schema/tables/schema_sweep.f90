@@ -31,7 +31,9 @@ module nocdyn_schema_sweep
     kind_rule_t('record', 'max_abs', 'largest magnitude'), &
     kind_rule_t('record', 'mean',    'mean over time'), &
     kind_rule_t('record', 'rms',     'square root of the mean of the square'), &
-    kind_rule_t('record', 'time_of_max', 'when the largest value occurs'), &
+    kind_rule_t('record', 'time_of_max', 'when max is reached; beside max_abs without max: when max_abs is'), &
+    kind_rule_t('record', 'time_of_min', 'when min is reached'), &
+    kind_rule_t('record', 'time_of_max_abs', 'when max_abs is reached'), &
     kind_rule_t('record', 'settling_time', 'time after from until |x - x_end| stays <= band |x_from - x_end|'), &
     kind_rule_t('record', 'damage',        'of fatigue: by Miner''s rule, of one motion'), &
     kind_rule_t('record', 'cycles',        'of fatigue: number of cycles, where the damage is largest'), &
@@ -120,7 +122,7 @@ module nocdyn_schema_sweep
                         'mean = 3.0 deviation = 0.001', .false.), &
     example_t('vary',   "target = 'coupling.*.stiffness' scale = 'relative' low = 0.9 high = 1.1", .false.), &
     example_t('record', "quantity = 'omega_motor'     statistic = 'final'", .false.), &
-    example_t('record', "quantity = 'moment_coupling' statistic = 'max_abs', 'time_of_max' from = 2.0", .false.), &
+    example_t('record', "quantity = 'moment_coupling' statistic = 'max_abs', 'time_of_max_abs' from = 2.0", .false.), &
     example_t('record', "fatigue = 'life' statistic = 'damage', 'cycles'", .false.), &
     example_t('record', "mode = 2 statistic = 'frequency', 'damping_ratio'", .false.), &
     example_t('record', "response = 'coupling' order = 6 statistic = 'peak', 'peak_speed'", .false.), &

@@ -1,0 +1,209 @@
+"""Each variant of a sweep is what its run is, whatever was computed before it in the same place: machines of all elements."""
+
+import csv
+import os
+import random
+
+import numpy as np
+import pytest
+from conftest import IS_SLOW
+from random_machines import RandomMachine
+from sweep_inputs import limited_to, needs_sweeps
+
+pytestmark = needs_sweeps
+
+MACHINES = int(os.environ.get("NOCDYN_RANDOM_MACHINES", "3" if IS_SLOW else "6"))  # more in a campaign
+FIRST = int(os.environ.get("NOCDYN_FIRST_RANDOM_MACHINE", "1"))
+
+RUN = "&run t_end = 0.5 max_steps = 200000 /\n&output points = 504 /\n"  # no row is where an engagement or an excitation jumps
+STATISTICS = ("final", "max", "min", "max_abs", "mean", "rms", "time_of_max", "settling_time")
+FACTORS = (1.0, 0.8, 1.25, 1.1)
+
+# Of the largest value of a column. Steps of the same bits: extremes differ by the polynomials through their samples, whose degree
+# is that of the step in a run, and the largest of the method in a sweep.
+SAME_STEPS = 1e-4
+OTHER_STEPS = 1e-3  # the tolerances of the steps are 1e-6, and systems of lanes choose other methods
+ROWS = 0.03  # of means: rows miss what lies between them
+ROUNDING = 1e-9  # columns without larger values are zero but for rounding
+
+
+def variants_of(machine, seed):
+    """Some numbers that vary, and their values in each variant."""
+    chance = random.Random(f"variants {seed}")
+    targets = chance.sample(sorted(machine.targets), min(2, len(machine.targets)))
+    rows = [[machine.targets[target] * factor for target in targets] for factor in FACTORS]
+    return targets, rows
+
+
+def run(nocdyn, targets, row):
+    """Labels, rows of numbers and extremes of the run of a variant; None if it fails."""
+    words = [f"--set={target}={value!r}" for target, value in zip(targets, row)]
+    outcome = nocdyn("run", "machine.nml", "--out", "run", "--quiet", *words)
+    if outcome.returncode:
+        return None
+    header, rows = nocdyn.table("run")
+    return dict(zip(header, np.array(rows).T)), nocdyn.summary("run")["columns"]
+
+
+def write_sweep(nocdyn, text, targets, rows, columns):
+    nocdyn.write("list.csv", "\n".join(",".join(map(repr, row)) for row in rows).join([",".join(targets) + "\n", "\n"]))
+    kinds = ", ".join(f"'{statistic}'" for statistic in STATISTICS)
+    records = "".join(f"&record quantity = '{column}' statistic = {kinds} /\n" for column in columns)
+    nocdyn.write("sweep.nml", f"{text}{RUN}&sweep design = 'list' file = 'list.csv' /\n{records}")
+
+
+def sweep(nocdyn, folder, *words, **options):
+    """The rows of sweep.csv."""
+    outcome = nocdyn("sweep", "sweep.nml", "--out", folder, "--csv", "--quiet", *words, **options)
+    assert outcome.returncode in (0, 1), outcome.stderr  # 1: all variants fail
+    with open(nocdyn.folder / folder / "sweep.csv", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def differences(variant, values, extremes, is_exact):
+    """Sentences on all that the sweep has not as the run."""
+    found = []
+    tolerance = SAME_STEPS if is_exact else OTHER_STEPS
+    t = values["t [s]"]
+    for column, course in values.items():
+        if column in ("t [s]", "energy_residual [J]"):
+            continue
+        name, unit = column.removesuffix("]").split(" [")
+        of_run = extremes[column]
+        largest = max(abs(of_run["min"]), abs(of_run["max"]))
+        size = max(largest, ROUNDING)
+
+        def have(statistic, unit=unit, name=name):
+            return float(variant[f"{name}_{statistic} [{unit}]"])
+
+        def compare(statistic, right, error, have=have, name=name):
+            if not abs(have(statistic) - right) <= error:
+                found.append(f"{name} {statistic}: {have(statistic)!r} instead of {right!r}")
+
+        compare("final", course[-1], 0 if is_exact else tolerance * size)
+        compare("max", of_run["max"], tolerance * size)
+        compare("min", of_run["min"], tolerance * size)
+        compare("max_abs", largest, tolerance * size)
+        mean = np.trapezoid(course, t) / (t[-1] - t[0])
+        compare("mean", mean, ROWS * size)
+        compare("rms", np.sqrt(np.trapezoid(course**2, t) / (t[-1] - t[0])), ROWS * size)
+        time = have("time_of_max", "s")
+        if time == of_run["time_of_max"]:
+            continue
+        near = np.abs(t - time) <= 2 * (t[1] - t[0])
+        if course[near].max() < of_run["max"] - max(np.ptp(course[near]), tolerance * size):
+            found.append(f"{name} time_of_max: {time!r} instead of {of_run['time_of_max']!r}")
+    return found
+
+
+@pytest.mark.parametrize("seed", range(FIRST, FIRST + MACHINES))
+def test_a_variant_of_a_sweep_is_its_run(nocdyn, seed):
+    machine = RandomMachine(seed)
+    targets, rows = variants_of(machine, seed)
+    nocdyn.write("machine.nml", machine.text + RUN)
+    runs = [run(nocdyn, targets, row) for row in rows]
+    done = [values for values, _ in filter(None, runs)]
+    if not done:
+        pytest.skip("there is no such machine")
+    columns = [column for column in done[0] if column != "t [s]" and all(column in values for values in done)]
+    write_sweep(nocdyn, machine.text, targets, rows, columns)
+    table = sweep(nocdyn, "one", "--threads", 1)
+    wrong = []
+    for number, (variant, of_run) in enumerate(zip(table, runs), 1):
+        if of_run is None or variant["status"] != "done":
+            if (of_run is None) == (variant["status"] == "done"):
+                wrong.append(f"variant {number}: {variant['status']} {variant['reason']}")
+        else:
+            wrong += [f"variant {number}: {text}" for text in differences(variant, *of_run, machine.has_joints)]
+    assert not wrong, "\n".join([machine.text, str(targets), *wrong])
+    if machine.has_joints:  # the steps of others follow their works too, if these are recorded
+        columns = [column for column in columns if not column.startswith(("work", "energy"))]
+    write_sweep(nocdyn, machine.text, targets, rows[::-1], columns)
+    for row, other in zip(table, sweep(nocdyn, "reverse", "--threads", 1)[::-1]):
+        del other["variant"]
+        wrong = [f"{label}: {other[label]} {row[label]}" for label in other if other[label] != row[label]]
+        assert not wrong, "\n".join([machine.text, str(targets), *wrong])
+
+
+@pytest.mark.parametrize("seed", range(FIRST, FIRST + 1 + MACHINES // 10))
+def test_threads_shards_and_interruptions_do_not_show_where_joints_lock(nocdyn, seed):
+    machine = next(machine for machine in map(RandomMachine, range(1000 * seed, 1000 * seed + 100)) if machine.has_joints)
+    targets, rows = variants_of(machine, seed)
+    rows = [[value * (1 + 0.01 * i) for value in row] for i in range(6) for row in rows]
+    quantities = [f"phi_{machine.bodies[0]}", f"omega_{machine.bodies[-1]}", "kinetic_energy", "work_in"]
+    write_sweep(nocdyn, machine.text, targets, rows, quantities)
+    table = sweep(nocdyn, "one", "--threads", 1)
+    assert sweep(nocdyn, "two", "--threads", 2) == table
+    for part in (1, 2):
+        assert nocdyn("sweep", "sweep.nml", "--out", "parts", "--shard", f"{part}/2", "--quiet").returncode == 0
+    assert nocdyn("merge", "parts", "--csv").returncode == 0
+    with open(nocdyn.folder / "parts/sweep.csv", newline="") as file:
+        assert list(csv.DictReader(file)) == table
+    for size in range(1000, 100000, 1000):  # until the journal has room for some of the variants
+        outcome = nocdyn("sweep", "sweep.nml", "--out", "late", "--csv", "--threads", 1, preexec_fn=limited_to(size))
+        assert outcome.returncode == 3
+        if "--resume" in outcome.stderr:
+            break
+    assert sweep(nocdyn, "late", "--resume") == table
+
+
+IMPACT = """\
+&body name = 'a' inertia = 1 speed = 10 /
+&body name = 'b' inertia = 1 /
+&clutch name = 'k' bodies = 'a', 'b' kind = 'dog' times = TIME levels = 1 /
+&load name = 'l' body = 'b' viscous = 2 /
+&run t_end = 1 /
+&sweep design = 'grid' /
+&vary target = 'body.b.inertia' low = 1 high = 1.25 count = 2 /
+&record quantity = 'omega_b' statistic = 'max', 'time_of_max' /
+&record quantity = 'omega_a' statistic = 'max', 'time_of_max' /
+"""
+
+
+@pytest.mark.parametrize("time", [0, 0.3])
+def test_extremes_are_those_after_an_impact(nocdyn, time):
+    nocdyn.write("sweep.nml", IMPACT.replace("TIME", str(time)))
+    for row, inertia in zip(sweep(nocdyn, "out"), (1, 1.25)):
+        common = 10 / (1 + inertia)
+        assert float(row["omega_b_max [rad/s]"]) == pytest.approx(common, rel=1e-12)
+        assert float(row["omega_a_max [rad/s]"]) == pytest.approx(10 if time > 0 else common, rel=1e-12)
+        assert float(row["omega_b_time_of_max [s]"]) == pytest.approx(time, abs=1e-12)
+        assert float(row["omega_a_time_of_max [s]"]) == 0
+
+
+def test_the_time_beside_the_largest_magnitude_is_of_that(nocdyn):
+    text = "&body name = 'a' inertia = 1 /\n&coupling name = 'c' bodies = 'ground', 'a' stiffness = 1 /\n"
+    text += (
+        "&excitation name = 'e' body = 'a' kind = 'step' amplitude = -1 time = 0 /\n&run t_end = 6 rtol = 1e-10 atol = 1e-10 /\n"
+    )
+    text += "&sweep design = 'grid' /\n&vary target = 'body.a.inertia' low = 1 high = 4 count = 2 /\n"
+    text += "&record quantity = 'phi_a' statistic = 'max_abs', 'time_of_max', 'time_of_min', 'time_of_max_abs' /\n"
+    text += "&record quantity = 'moment_c' statistic = 'max_abs', 'max', 'time_of_max', 'time_of_max_abs' /\n"
+    nocdyn.write("sweep.nml", text)
+    for row, period in zip(sweep(nocdyn, "out"), (2 * np.pi, 4 * np.pi)):
+        for label in ("time_of_max", "time_of_min", "time_of_max_abs"):
+            assert float(row[f"phi_a_{label} [s]"]) == pytest.approx(min(period / 2, 6), abs=1e-6)  # phi = cos(omega t) - 1
+        assert float(row["moment_c_time_of_max_abs [s]"]) == pytest.approx(min(period / 2, 6), abs=1e-6)
+        assert float(row["moment_c_time_of_max [s]"]) == 0
+
+
+def test_variants_of_a_long_chain_may_end_at_other_times(nocdyn):
+    # their formulation is not laid out as a block
+    text = "".join(f"&body name = 'b{i}' inertia = 1 speed = {3 if i == 0 else 0} /\n" for i in range(24))
+    text += "".join(f"&coupling name = 'c{i}' bodies = 'b{i}', 'b{i + 1}' stiffness = 100 /\n" for i in range(23))
+    text += "&run t_end = 1 /\n&sweep design = 'grid' /\n&vary target = 'run.t_end' low = 1 high = 2 count = 2 /\n"
+    nocdyn.write("sweep.nml", text + "&record quantity = 'kinetic_energy' statistic = 'max', 'final' /\n")
+    for row, t_end in zip(sweep(nocdyn, "out"), (1, 2)):
+        nocdyn("run", "sweep.nml", "--out", "run", "--set", f"run.t_end={t_end}", "--quiet")
+        assert float(row["kinetic_energy_max [J]"]) == 4.5
+        assert float(row["kinetic_energy_final [J]"]) == pytest.approx(
+            nocdyn.summary("run")["columns"]["kinetic_energy [J]"]["last"], rel=1e-6
+        )
+
+
+def test_the_extreme_of_a_run_after_a_jump_is_at_the_jump(nocdyn):
+    text = "&body name = 'a' inertia = 1 /\n&excitation name = 'e' body = 'a' kind = 'step' amplitude = 5 time = 0.25 /\n"
+    nocdyn.write("machine.nml", text + "&run t_end = 1 /\n&output interval = 0.3 /\n")
+    assert nocdyn("run", "machine.nml", "--out", "run").returncode == 0
+    torque = nocdyn.summary("run")["columns"]["torque_e [N m]"]
+    assert (torque["max"], torque["time_of_max"]) == (5, 0.25)
