@@ -263,6 +263,29 @@ def test_pressures_act_on_the_bore(nocdyn):
     assert column(other, "omega_a")[-1] == pytest.approx(column(table, "omega_a")[-1], rel=1e-13)
 
 
+def test_the_force_has_all_harmonics_that_a_crank_may_have(nocdyn):
+    """64 orders of a cycle of two turns are 128 harmonics, the most that `harmonics_up_to` allows."""
+    angles = np.arange(0, 720, 1)
+
+    def force_at(angle):
+        return 500 + 300 * np.cos(np.radians(angle / 2)) + 2000 * np.exp(-(((angle - 40) / 3) ** 2))
+
+    forces = force_at(angles)
+    keys = f"stroke = 4 harmonics_up_to = 64 crank_angles_deg = {', '.join(map(str, angles))} "
+    keys += f"forces = {', '.join(map(str, forces))}"
+    text = SLIDER.replace("piston_mass = 1 /", f"piston_mass = 1 {keys} /")
+    table = run(nocdyn, text + "&run t_end = 0.2 /\n&output points = 401 /\n")
+    samples = 4096
+    spectrum = np.fft.rfft(force_at(np.arange(samples) * 720 / samples))[:129] / samples
+    phase = 0.5 * column(table, "phi_a")[:, None] * np.arange(129)
+    expected = -(2 * np.real(spectrum * np.exp(1j * phase)).sum(axis=1) - spectrum[0].real)
+    assert column(table, "gas_force_p") == pytest.approx(expected, abs=10)  # a cubic between the points
+    for up_to in (16, 32, 33, 63.5):
+        table = run(nocdyn, text.replace("up_to = 64", f"up_to = {up_to}") + "&run t_end = 0.01 /\n")
+        force = 2 * spectrum[: int(2 * up_to) + 1].sum().real - spectrum[0].real
+        assert column(table, "gas_force_p")[0] == pytest.approx(-force, abs=10)
+
+
 # Relations: tables of one angle over another.
 
 
