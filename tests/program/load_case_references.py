@@ -12,6 +12,7 @@ import sys
 import numpy as np
 from example_references import EXAMPLES, UNITS, Curve, Machine, motion_of
 from numpy.polynomial import Polynomial
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 # the case that is computed
@@ -296,14 +297,33 @@ def reciprocating_compressor(with_damage=True):
 # --- generator set
 
 
-def fault_torque(group, t):
-    """On the rotor, t seconds after the fault, that begins when the voltage between the two phases is zero."""
-    w = group["frequency"]
-    first, second = 1 / group["subtransient_reactance"], 1 / group["transient_reactance"]
-    size = (first - second) * np.exp(-t / group["subtransient_time"]) + second * np.exp(-t / group["transient_time"])
-    stator = np.exp(-t / group["armature_time"])
-    shape = {"two_phase": stator * np.sin(w * t) - np.sin(2 * w * t) / 2, "three_phase": stator * np.sin(w * t)}
-    return -group["rated_torque"] * size * shape[group["fault"]]
+def two_phase_torque(group, end):
+    """Torque on the rotor over the seconds after the fault, which begins when the voltage between the two phases is zero.
+
+    Flux linkages in the frame of the stator, of its axis across the open phase and of two rotor circuits in both axes.
+    """
+    w, reactance = group["frequency"], group["subtransient_reactance"]
+    shares = np.array([1 / reactance - 1 / group["transient_reactance"], 1 / group["transient_reactance"]])
+    times = np.array([group["subtransient_time"], group["transient_time"]])
+
+    def currents(t, y):
+        wave, circuits = 1j * np.exp(1j * w * t), shares @ (y[1:3] + 1j * y[3:5])
+        flux = (wave + reactance * circuits).real + 1j * y[0]
+        return wave, flux, (flux - wave) / reactance - circuits
+
+    def rate(t, y):
+        wave, flux, current = currents(t, y)
+        z = y[1:3] + 1j * y[3:5]
+        change = 1j * w * z + (flux - wave - z) / times
+        return np.concatenate([[-reactance / group["armature_time"] * current.imag], change.real, change.imag])
+
+    solution = solve_ivp(rate, (0, end), [1.0, 0, 0, 0, 0], method="DOP853", rtol=1e-12, atol=1e-14, dense_output=True).sol
+
+    def torque(t):
+        _, flux, current = currents(t, solution(t))
+        return group["rated_torque"] * (flux.conjugate() * current).imag
+
+    return torque
 
 
 def generator_set(with_damage=True):
@@ -317,6 +337,7 @@ def generator_set(with_damage=True):
     flywheel, rotor = train.index("flywheel", "rotor")
     grid, friction, fault, step = m.load["grid"], m.load["friction"]["viscous"], m.excitation[case], m.excitation["no_load"]
     speed = fuel["governor_speed"]
+    fault_torque = two_phase_torque(fault, m.end() - fault["time"])
 
     def throttle(y):
         return y[2 * n] + fuel["governor_gain"] * (speed - y[n + flywheel])
@@ -329,7 +350,7 @@ def generator_set(with_damage=True):
         torque[flywheel] += fuel["torque"] * opened - friction * omega[flywheel]
         torque[rotor] -= grid["constant"] * np.tanh(omega[rotor] / grid.get("constant_speed", 0.01))
         if middle > fault["time"]:
-            torque[rotor] += step["amplitude"] + fault_torque(fault, t - fault["time"])
+            torque[rotor] += step["amplitude"] + fault_torque(t - fault["time"])
         return np.concatenate([omega, torque / train.inertia, [(opened - y[2 * n]) / fuel["governor_time"]]])
 
     def borders(limit):
@@ -364,9 +385,7 @@ def generator_set(with_damage=True):
         "max shaft_rubber [N m]": largest("rubber", 1),
         "min shaft_tail [N m]": largest("tail", -1),
         "min shaft_crank_6 [N m]": largest("crank_6", -1),
-        f"min torque_{case} [N m]": motion.largest(
-            lambda t, y, mode: fault_torque(fault, t - fault["time"]), sign=-1, since=m.since()
-        ),
+        f"min torque_{case} [N m]": motion.largest(lambda t, y, mode: fault_torque(t - fault["time"]), sign=-1, since=m.since()),
     }
     return result | (damages_of_couplings(m, train, motion, 1e-5) if with_damage else {})
 

@@ -1,19 +1,9 @@
-!> The torques of electrical faults on the rotor of a synchronous or an induction machine, as sums of decaying sines.
-!>
-!> The rotor's flux linkage E = 1 turns with the mains, that of the stator winding at the fault stays and decays with the time
-!> constant T_a of the armature; both act on each other over the subtransient reactance x'', the same in both axes. In units of
-!> the rated apparent power over the synchronous speed, and with x = f t, the torque that brakes the rotor is, after no load,
-!>
-!>   three phases at the terminals   D / x'' e^(-t/T_a) sin x
-!>   two phases at the terminals     D / x'' (e^(-t/T_a) sin x - 1/2 sin 2x), where it is largest: at the zero of their voltage
-!>   closing with a phase angle d    D / x'' (sin d (1 - e^(-t/T_a) cos x) + (1 - cos d) e^(-t/T_a) sin x)
-!>
-!> D is the decay of the rotor's flux, e^(-t/T''). With a transient reactance x', D / x'' is (1/x'' - 1/x') e^(-t/T'') +
-!> 1/x' e^(-t/T'), the decay of the current of a short circuit. Resistances add small mean torques that are left out. The page on
-!> the theory derives the torques.
+!> The torques of electrical faults on the rotor of a synchronous or an induction machine, as sums of decaying sines: of the
+!> fluxes of the machine, or as they are given. They brake a rotor that turns with the mains, at rated voltage and after no load.
 module nocdyn_electrical_faults
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_fault_excitations, only: fault_terms_t
+  use nocdyn_fault_fluxes, only: fault_machine_t, find_flux_terms
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: counted, to_text
@@ -21,8 +11,6 @@ module nocdyn_electrical_faults
   private
 
   public :: check_faults, find_fault_terms
-
-  real(wp), parameter :: quarter = 0.5_wp * acos(-1.0_wp)   ! turn
 
 contains
 
@@ -44,7 +32,9 @@ contains
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
     type(error_t), allocatable, intent(out) :: error
+    type(fault_terms_t) :: terms
     real(wp) :: t_start
+    logical :: has_failed
 
     t_start = input%groups(input%position('run'))%number('t_start')
     associate (group => input%groups(index))
@@ -54,11 +44,14 @@ contains
       else if (group%number('frequency', absent=1.0_wp) <= 0) then
         call raise(error, exit_input, input%location(index, 'frequency') // ': frequency = ' // &
                    to_text(group%number('frequency')) // "; allowed with kind = 'fault': > 0 [rad/s]")
-      else if (group%has_value('transient_reactance')) then
-        if (group%number('transient_reactance') >= group%number('subtransient_reactance')) return
-        call raise(error, exit_input, input%location(index, 'transient_reactance') // ': transient_reactance = ' // &
-                   to_text(group%number('transient_reactance')) // '; allowed: >= subtransient_reactance = ' // &
-                   to_text(group%number('subtransient_reactance')))
+      else if (group%has_value('fault')) then
+        call check_order('transient_reactance', 'subtransient_reactance')
+        if (.not. allocated(error)) call check_order('synchronous_reactance', 'subtransient_reactance')
+        if (.not. allocated(error)) call check_order('synchronous_reactance', 'transient_reactance')
+        if (allocated(error)) return
+        call find_fault_terms(group, terms, has_failed)
+        if (has_failed) call raise(error, exit_input, input%location(index, 'subtransient_reactance') // &
+                                   ': the reactances and time constants are so far apart that no torque can be computed')
       else
         call check_length('term_times')
         if (.not. allocated(error)) call check_length('term_phases')
@@ -66,6 +59,18 @@ contains
     end associate
 
   contains
+
+    !> A reactance is not below one that acts earlier.
+    subroutine check_order(key, earlier)
+      character(len=*), intent(in) :: key, earlier
+
+      associate (group => input%groups(index))
+        if (.not. group%has_value(key) .or. .not. group%has_value(earlier)) return
+        if (group%number(key) >= group%number(earlier)) return
+        call raise(error, exit_input, input%location(index, key) // ': ' // key // ' = ' // to_text(group%number(key)) // &
+                   '; allowed: >= ' // earlier // ' = ' // to_text(group%number(earlier)))
+      end associate
+    end subroutine check_order
 
     !> A list that is given has a value for each term.
     subroutine check_length(key)
@@ -91,58 +96,42 @@ contains
   end function is_resynchronisation
 
   !> The terms of a checked group. The torque of a fault brakes a rotor that turns forwards; that of given terms is as they are.
-  subroutine find_fault_terms(group, terms)
+  subroutine find_fault_terms(group, terms, has_failed)
     type(group_t), intent(in) :: group
     type(fault_terms_t), intent(out) :: terms
-    real(wp), allocatable, dimension(:) :: rate, share   ! of the parts of the rotor's decay D: D = sum of share e^(-rate t)
-    integer :: i
+    logical, intent(out) :: has_failed   !! no terms can be computed; not of a checked group
+    type(fault_machine_t) :: machine
 
     terms%frequency = group%number('frequency')
+    has_failed = .false.
     if (group%has_value('term_amplitudes')) then
       call copy_terms(group, terms)
       return
     end if
-    share = [1 / group%number('subtransient_reactance')]
-    rate = [rate_of(group, 'subtransient_time')]
-    if (group%has_value('transient_reactance')) then
-      associate (transient => 1 / group%number('transient_reactance'))
-        share = [share - transient, transient]
-        rate = [rate, rate_of(group, 'transient_time')]
-      end associate
-    end if
-    call find_shape(group, terms)
-    terms%amplitude = -group%number('rated_torque') * [(share(i) * terms%amplitude, i=1, size(share))]
-    terms%rate = [(rate(i) + terms%rate, i=1, size(rate))]
-    terms%multiple = [(terms%multiple, i=1, size(share))]
-    terms%phase = [(terms%phase, i=1, size(share))]
+    machine%frequency = terms%frequency
+    machine%reactance = group%number('subtransient_reactance')
+    machine%stator_rate = rate_of(group, 'armature_time')
+    machine%share = [admittance_of(group, 'subtransient_reactance'), 0.0_wp]
+    machine%rate = [rate_of(group, 'subtransient_time'), rate_of(group, 'transient_time')]
+    if (group%has_value('transient_reactance')) machine%share(2) = admittance_of(group, 'transient_reactance')
+    machine%share(1) = machine%share(1) - machine%share(2)
+    associate (last => merge(2, 1, group%has_value('transient_reactance')))
+      machine%share(last) = machine%share(last) - admittance_of(group, 'synchronous_reactance')
+    end associate
+    machine%share = pack(machine%share, machine%rate > 0)   ! others do not change
+    machine%rate = pack(machine%rate, machine%rate > 0)
+    call find_flux_terms(machine, group%text('fault'), group%number('angle', absent=0.0_wp), terms, has_failed)
+    if (.not. has_failed) terms%amplitude = -group%number('rated_torque') * terms%amplitude
   end subroutine find_fault_terms
 
-  !> The terms of a fault beside D. Their rates are those of the stator's flux where it takes part.
-  subroutine find_shape(group, terms)
+  !> 1 / a reactance, 0 if that is not given.
+  pure real(wp) function admittance_of(group, key) result(admittance)
     type(group_t), intent(in) :: group
-    type(fault_terms_t), intent(inout) :: terms
-    real(wp) :: angle, stator
+    character(len=*), intent(in) :: key
 
-    stator = rate_of(group, 'armature_time')
-    select case (group%text('fault'))
-    case ('three_phase')
-      terms%amplitude = [1.0_wp]
-      terms%multiple = [1.0_wp]
-      terms%rate = [stator]
-      terms%phase = [0.0_wp]
-    case ('two_phase')
-      terms%amplitude = [1.0_wp, -0.5_wp]
-      terms%multiple = [1.0_wp, 2.0_wp]
-      terms%rate = [stator, 0.0_wp]
-      terms%phase = [0.0_wp, 0.0_wp]
-    case default
-      angle = group%number('angle')
-      terms%amplitude = [sin(angle), -sin(angle), 1 - cos(angle)]
-      terms%multiple = [0.0_wp, 1.0_wp, 1.0_wp]
-      terms%rate = [0.0_wp, stator, stator]
-      terms%phase = [quarter, quarter, 0.0_wp]
-    end select
-  end subroutine find_shape
+    admittance = 0.0_wp
+    if (group%has_value(key)) admittance = 1 / group%number(key)
+  end function admittance_of
 
   !> The given terms.
   subroutine copy_terms(group, terms)

@@ -9,7 +9,7 @@ module nocdyn_law_harmonics
   !> The first columns of the work space of a group; those from the fourth on are H_1 = B_1 + d^4 H_2, H_2 and so on.
   integer, parameter, public :: derivatives = 0, second = 1, third = 2, fourth = 3
 
-  integer, parameter, public :: most_terms = 64   !! of a sum
+  integer, parameter, public :: most_terms = 64   !! of a part of a sum; longer sums have several parts
 
 contains
 

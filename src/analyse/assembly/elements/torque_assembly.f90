@@ -98,6 +98,7 @@ contains
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(fault_terms_t) :: terms(size(groups%indices))
     integer :: before, body(size(groups%indices)), i, shape(size(groups%indices))
+    logical :: has_failed
 
     before = size(banks)
     body = groups%bodies('body', 1)
@@ -116,7 +117,8 @@ contains
                                                     groups%curves('table_time', 'table_torque', extrapolation='constant')))
     case (faults)
       do i = 1, size(body)
-        call find_fault_terms(groups%input%groups(groups%indices(i)), terms(i))
+        call find_fault_terms(groups%input%groups(groups%indices(i)), terms(i), has_failed)
+        if (has_failed) error stop 'nocdyn_torque_assembly: the groups are checked'
       end do
       call append_bank(banks, new_fault_excitations(groups%names, body, terms, groups%values('time')))
     case default

@@ -220,9 +220,11 @@ module nocdyn_schema_torques
     key_rule_t('excitation', 'subtransient_reactance', a_number, 1, '',       unset,       positive, &
       'x'''' per unit, with that of the network up to the fault', 'fault'), &
     key_rule_t('excitation', 'transient_reactance', a_number,   1, '',            unset,       positive, &
-      'x'' per unit; if not given the torque decays to 0 with subtransient_time', 'fault'), &
+      'x'' per unit; without it subtransient_time is the only time constant of the rotor', 'fault'), &
+    key_rule_t('excitation', 'synchronous_reactance', a_number, 1, '',            unset,       positive, &
+      'x per unit, of the current that remains; infinite if not given: the torque decays to 0', 'fault'), &
     key_rule_t('excitation', 'subtransient_time', a_number,     1, 's',           unset,       positive, &
-      'time constant T'''' of the rotor''s flux; no decay if not given', 'fault'), &
+      'time constant T'''' of the short circuit of all phases; no decay if not given', 'fault'), &
     key_rule_t('excitation', 'transient_time',  a_number,       1, 's',           unset,       positive, &
       'time constant T'' beside transient_reactance; no decay if not given', 'fault'), &
     key_rule_t('excitation', 'armature_time',   a_number,       1, 's',           unset,       positive, &
@@ -287,7 +289,7 @@ module nocdyn_schema_torques
     relation_rule_t('excitation', requires, 'fault', 'rated_torque'), &
     relation_rule_t('excitation', requires, 'fault', 'subtransient_reactance'), &
     relation_rule_t('excitation', requires, 'rated_torque subtransient_reactance transient_reactance', 'fault'), &
-    relation_rule_t('excitation', requires, 'subtransient_time armature_time', 'fault'), &
+    relation_rule_t('excitation', requires, 'subtransient_time armature_time synchronous_reactance', 'fault'), &
     relation_rule_t('excitation', requires, 'angle', 'fault', word='resynchronisation'), &
     relation_rule_t('excitation', requires, 'transient_time', 'transient_reactance'), &
     relation_rule_t('excitation', requires, 'term_amplitudes', 'term_multiples'), &
