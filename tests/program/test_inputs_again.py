@@ -42,7 +42,11 @@ ELEMENTS = {
     "speed": "&drive name = 'd' body = 'a' kind = 'speed' speed = 0 speed_amplitude = 1 frequency = 9 /",
     "speed table": "&drive name = 'd' body = 'a' table_time = 0, 1 table_speed = 0, 5 interpolation = 'linear' /",
     "cubic speed table": "&drive name = 'd' body = 'a' table_time = 0, 1, 2 table_speed = 0, 5, 6 interpolation = 'cubic' /",
-    "angle": "&drive name = 'd' body = 'a' kind = 'angle' table_time = 0, 1, 2, 3 table_angle = 0, 0, 0, 0 /",
+    **{
+        f"angle by {word}": "&drive name = 'd' body = 'a' kind = 'angle' table_time = 0, 1, 2, 3 table_angle = 0, 0, 0, 0 "
+        f"interpolation = '{word}' /"
+        for word in ("spline", "dwells", "cubic")
+    },
     "coupling table": "&coupling name = 'k' bodies = 'a', 'b' table_twist = 0, 1, 2 table_moment = 0, 2, 3 "
     "interpolation = 'linear' extrapolation = 'linear' /",
     "shaft": "&shaft name = 's' bodies = 'a', 'b' lengths = 1 diameters = 0.1 shear_modulus = 8e10 density = 7850 /",
@@ -94,7 +98,7 @@ ELEMENTS = {
         )
     },
     "statistics": f"&sweep design = 'grid' /\n{VARY} count = 3 /\n&record quantity = 'omega_a' statistic = 'final', 'max', "
-    "'min', 'max_abs', 'mean', 'rms', 'time_of_max', 'settling_time' /",
+    "'min', 'max_abs', 'mean', 'rms', 'time_of_max', 'time_of_min', 'time_of_max_abs', 'settling_time' /",
     "modes": f"&coupling name = 'k' bodies = 'a', 'b' stiffness = 100 /\n&sweep design = 'grid' /\n{VARY} count = 3 /\n"
     "&record mode = 1 statistic = 'frequency', 'damping_ratio' /",
     "responses": "&coupling name = 'k' bodies = 'a', 'b' stiffness = 100 damping = 1 /\n"

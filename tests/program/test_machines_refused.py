@@ -205,3 +205,30 @@ def test_the_inertia_of_a_pinion_may_stand_at_its_wheel(nocdyn):
         header, rows = nocdyn.table(name)
         columns.append([row[header.index("omega_wheel [rad/s]")] for row in rows])
     assert columns[0] == pytest.approx(columns[1], rel=1e-5, abs=1e-7)
+
+
+MISTAKEN = """&body name='a' inertia=1 /
+&body name='b' inertia=1 /
+&coupling name='k' bodies='a','b' saturation=3 stiffness=0 /
+&coupling name='l' bodies='a','b' damping_frequency=3 relative_damping=0.1 /
+&shaft name='s' bodies='a','b' lengths=1 diameters=0.1 bores=0.2 shear_modulus=8e10 /
+&mesh name='z' bodies='a','b' radii=1,2 stiffness=1e5 transmission_error=1e-5 /
+&gear name='g' bodies='ground','b' teeth=1,2 efficiency=0.9 /
+&clutch name='c' bodies='a','b' capacity=10 static_capacity=5 /
+&crank name='p' body='a' crank_radius=0.1 rod_length=0.11 offset=0.05 piston_mass=1 /
+&motor name='m' body='a' kind='induction' breakdown_torque=-1 breakdown_slip=0.1 synchronous_speed=3 /
+&engine name='e' cylinders='a' stroke=3 firing=0 orders=1 amplitudes=1 /
+&response body='a' speed=20,10 /
+&fatigue name='f' coupling='nope' reference_moment=1 reference_cycles=1e6 slope=3 /
+&run t_end=1 /
+&output interval=1e-30 /
+"""
+
+
+@pytest.mark.parametrize("command", ["check", "run", "modes", "equilibrium"])
+def test_the_mistakes_of_all_groups_are_told_at_once_in_the_order_of_the_file(nocdyn, command):
+    nocdyn.write("m.nml", MISTAKEN)
+    outcome = nocdyn(command, "m.nml")
+    assert outcome.returncode == 2
+    lines = [int(line.split(":")[2]) for line in outcome.stderr.splitlines()]
+    assert lines == [*range(3, 14), 15]

@@ -292,7 +292,11 @@ def test_the_response_to_a_transmission_error_is_the_settled_motion_of_a_loaded_
     [
         ("phases = 0, 0.7", "phases = 0", "error_phases has 1 and transmission_error 2 values; needed: as many of each"),
         ("error_phases", "error_orders = 1, 2, 3 error_phases", "error_orders has 3 and transmission_error 2 values"),
-        ("teeth = 20, 40 module = 0.005 pressure_angle = 0", "radii = 1, 2", "error_orders is missing; needed where radii stand for the teeth"),
+        (
+            "teeth = 20, 40 module = 0.005 pressure_angle = 0",
+            "radii = 1, 2",
+            "error_orders is missing; needed where radii stand for the teeth",
+        ),
         ("error = 1e-6", "error = -1e-6", "transmission_error(1) = -1e-6 is out of range; allowed: >= 0 [m]"),
         ("error_phases", "error_orders = 0, 1 error_phases", "error_orders(1) = 0 is out of range; allowed: > 0"),
         ("transmission_error = 1e-6, 2e-7", "", "error_phases needs transmission_error"),

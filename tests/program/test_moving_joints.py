@@ -235,8 +235,12 @@ def test_a_rod_without_inertia_of_its_own_is_on_its_ends(nocdyn):
 
 def test_the_force_on_the_piston_is_that_of_its_pin_however_the_rod_is_given(nocdyn):
     """At a speed that is held: two masses at its ends, and the same masses as one body with the inertia of both about its centre."""
-    held = FREE.format("a", 0.02) + "&drive name = 'd' body = 'a' speed = 100 /\n&crank name = 'p' body = 'a' crank_radius = 0.05\n"
-    held += "  rod_length = 0.2 piston_mass = 1 rod_mass = 1 rod_center = 0.05 MORE /\n&run t_end = 0.1 /\n&output points = 101 /\n"
+    held = (
+        FREE.format("a", 0.02) + "&drive name = 'd' body = 'a' speed = 100 /\n&crank name = 'p' body = 'a' crank_radius = 0.05\n"
+    )
+    held += (
+        "  rod_length = 0.2 piston_mass = 1 rod_mass = 1 rod_center = 0.05 MORE /\n&run t_end = 0.1 /\n&output points = 101 /\n"
+    )
     ends = run(nocdyn, held.replace("MORE", ""))
     body = run(nocdyn, held.replace("MORE", f"rod_inertia = {0.75 * 0.05**2 + 0.25 * 0.15**2!r}"))
     angle = column(ends, "phi_a")
@@ -393,7 +397,9 @@ def test_accelerations_through_a_table_are_those_of_its_motion(nocdyn, points, g
 
 
 def test_an_angle_whose_table_ends_in_motion_goes_on_and_a_note_says_so(nocdyn):
-    text = FREE.format("a", 1) + "&drive name = 'd' body = 'a' kind = 'angle' table_time = 0, 1, 2, 3 table_angle = 0, 1, 4, 9 /\n"
+    text = (
+        FREE.format("a", 1) + "&drive name = 'd' body = 'a' kind = 'angle' table_time = 0, 1, 2, 3 table_angle = 0, 1, 4, 9 /\n"
+    )
     outcome = nocdyn("run", nocdyn.write("m.nml", text + "&run t_end = 4 /\n&output points = 5 /\n"), "--out", "out")
     assert "m.nml: note: drive 'd': its table ends at t = 3 s in the run, and the angle goes on with the last speed, 6 rad/s" in (
         outcome.stdout
@@ -408,10 +414,14 @@ def test_an_angle_whose_table_ends_in_motion_goes_on_and_a_note_says_so(nocdyn):
 def test_what_the_harmonics_leave_out_is_noted_with_its_size(nocdyn):
     angles = ", ".join(map(str, range(0, 720, 4)))
     forces = ", ".join(str(1000 + 5000 * np.exp(-((((v - 20 + 360) % 720 - 360) / 9) ** 2))) for v in range(0, 720, 4))
-    text = SLIDER.replace("piston_mass = 1 /", f"piston_mass = 1 stroke = 4 crank_angles_deg = {angles}\n forces = {forces} KEY /")
+    text = SLIDER.replace(
+        "piston_mass = 1 /", f"piston_mass = 1 stroke = 4 crank_angles_deg = {angles}\n forces = {forces} KEY /"
+    )
     found = {}
     for orders in (8, 12, 64):
-        outcome = nocdyn("run", nocdyn.write("m.nml", text.replace("KEY", f"harmonics_up_to = {orders}") + "&run t_end = 0.01 /\n"))
+        outcome = nocdyn(
+            "run", nocdyn.write("m.nml", text.replace("KEY", f"harmonics_up_to = {orders}") + "&run t_end = 0.01 /\n")
+        )
         assert outcome.returncode == 0, outcome.stderr
         found[orders] = re.findall(r"note: (crank 'p': .*)", outcome.stdout)
     assert found[64] == []

@@ -4,25 +4,26 @@ module nocdyn_machine_parts
   use nocdyn_constraint_analysis, only: analyse_constraints
   use nocdyn_constraint_assembly, only: assemble_constraints, constraint_groups
   use nocdyn_coordinates, only: build_coordinates
-  use nocdyn_coupling_assembly, only: add_coupling_form, check_couplings, coupling_form
-  use nocdyn_crank_assembly, only: add_cranks, check_cranks
+  use nocdyn_coupling_assembly, only: add_coupling_form, check_coupling, coupling_form
+  use nocdyn_crank_assembly, only: add_cranks, check_crank
   use nocdyn_element_groups, only: add_banks, bodies_of, body_index_t, element_groups_t, new_body_index, new_element_groups
-  use nocdyn_engine_checks, only: check_engines, check_orders
-  use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_electrical_faults, only: check_faults
+  use nocdyn_engine_checks, only: check_engine, check_order_torques
+  use nocdyn_errors, only: add_error, error_t, exit_input, raise
+  use nocdyn_electrical_faults, only: check_fault
   use nocdyn_fatigue_groups, only: check_fatigue
   use nocdyn_input, only: input_t
-  use nocdyn_joint_assembly, only: add_bearings, add_clutch_form, add_freewheels, check_joints, clutch_form
+  use nocdyn_joint_assembly, only: add_bearings, add_clutch_form, add_freewheels, check_clutch, clutch_form
   use nocdyn_joint_simplifications, only: list_simplifications
-  use nocdyn_loss_assembly, only: add_losses, check_losses
+  use nocdyn_loss_assembly, only: add_losses, check_loss
   use nocdyn_machine, only: machine_t
   use nocdyn_massless_motion, only: massless_bodies
-  use nocdyn_mesh_assembly, only: add_mesh_form, check_meshes, mesh_form
-  use nocdyn_motion_assembly, only: add_cardans, add_drive_form, add_relations, check_motions, drive_form
-  use nocdyn_motor_assembly, only: add_motor_form, check_motors, motor_form
+  use nocdyn_mesh_assembly, only: add_mesh_form, check_mesh, mesh_form
+  use nocdyn_motion_assembly, only: add_cardans, add_drive_form, add_relations, check_drive, check_relation, &
+    drive_form
+  use nocdyn_motor_assembly, only: add_motor_form, check_motor, motor_form
   use nocdyn_moving_start, only: fit_moving_rows
-  use nocdyn_response_ranges, only: check_response_ranges
-  use nocdyn_shaft_assembly, only: add_shafts, check_shafts, new_shaft_set, shaft_set_t
+  use nocdyn_response_ranges, only: check_response_range
+  use nocdyn_shaft_assembly, only: add_shafts, check_shaft, new_shaft_set, shaft_set_t
   use nocdyn_start_speeds, only: fit_start_speeds
   use nocdyn_text, only: joined, selected
   use nocdyn_torque_assembly, only: add_engines, add_excitation_form, add_load_form, excitation_form, load_form
@@ -44,12 +45,14 @@ contains
     integer, intent(in), optional :: lanes   !! 1 if absent
     type(body_index_t), target :: body_index
     type(shaft_set_t) :: shafts
+    type(error_t), allocatable :: mistakes
 
     if (present(lanes)) machine%lanes = lanes
     call set_bodies(input, machine)
     body_index = new_body_index(machine%names)
     call assemble_constraints(input, body_index, machine%lanes, machine%constraints, error)
-    if (.not. allocated(error)) call check_groups(input, error)
+    call check_groups(input, mistakes)
+    call add_error(error, mistakes)
     if (allocated(error)) return
     call add_elements(input, body_index, machine)
     call new_shaft_set(input, body_index, shafts)
@@ -62,25 +65,57 @@ contains
     call fit_moving_rows(input, machine, given_speeds(input, machine%nodes), error)
   end subroutine build_machine
 
-  !> Refuses values that do not fit together, which the schema does not know.
+  !> Refuses values that do not fit together, which the schema does not know: one mistake of each group, in the order of the file.
   subroutine check_groups(input, error)
     type(input_t), intent(in) :: input
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(out) :: error   !! has a line for each mistake
+    type(error_t), allocatable :: own
+    integer :: g
 
-    call check_couplings(input, error)
-    if (.not. allocated(error)) call check_shafts(input, error)
-    if (.not. allocated(error)) call check_meshes(input, error)
-    if (.not. allocated(error)) call check_losses(input, error)
-    if (.not. allocated(error)) call check_joints(input, error)
-    if (.not. allocated(error)) call check_motions(input, error)
-    if (.not. allocated(error)) call check_cranks(input, error)
-    if (.not. allocated(error)) call check_motors(input, error)
-    if (.not. allocated(error)) call check_engines(input, error)
-    if (.not. allocated(error)) call check_orders(input, error)
-    if (.not. allocated(error)) call check_faults(input, error)
-    if (.not. allocated(error)) call check_response_ranges(input, error)
-    if (.not. allocated(error)) call check_fatigue(input, error)
+    do g = 1, size(input%groups)
+      call check_group(input, g, own)
+      call add_error(error, own)
+    end do
   end subroutine check_groups
+
+  !> Refuses values of one group.
+  subroutine check_group(input, g, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: g   !! index of the group
+    type(error_t), allocatable, intent(out) :: error   !! names file, line, group and key
+
+    select case (input%groups(g)%kind)
+    case ('coupling')
+      call check_coupling(input, g, error)
+    case ('shaft')
+      call check_shaft(input, g, error)
+    case ('mesh')
+      call check_mesh(input, g, error)
+      if (.not. allocated(error)) call check_loss(input, g, error)
+    case ('gear', 'planetary')
+      call check_loss(input, g, error)
+    case ('clutch')
+      if (input%groups(g)%text('kind') == 'friction') call check_clutch(input, g, error)
+    case ('relation')
+      call check_relation(input, g, error)
+    case ('drive')
+      call check_drive(input, g, error)
+    case ('crank')
+      call check_crank(input, g, error)
+    case ('motor')
+      call check_motor(input, g, error)
+    case ('engine')
+      call check_engine(input, g, error)
+    case ('excitation')
+      if (input%groups(g)%text('kind') == 'orders') call check_order_torques(input, g, error)
+      if (input%groups(g)%text('kind') == 'fault') call check_fault(input, g, error)
+    case ('response')
+      call check_response_range(input, g, error)
+    case ('fatigue')
+      call check_fatigue(input, g, error)
+    case default
+    end select
+  end subroutine check_group
 
   !> Adds the banks of all elements that join or turn bodies of the input.
   subroutine add_elements(input, body_index, machine)

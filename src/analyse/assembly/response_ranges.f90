@@ -9,26 +9,21 @@ module nocdyn_response_ranges
   implicit none (type, external)
   private
 
-  public :: check_response_ranges
+  public :: check_response_range
 
 contains
 
   !> Refuses ranges that begin with the faster speed, or whose ends differ in direction.
-  subroutine check_response_ranges(input, error)
+  subroutine check_response_range(input, index, error)
     type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
     type(error_t), allocatable, intent(out) :: error
-    integer, allocatable :: groups(:)
-    integer :: i
 
-    allocate (groups, source=input%groups_named('response'))
-    do i = 1, size(groups)
-      associate (group => input%groups(groups(i)))
-        call check_range(input, groups(i), 'speed', group%numbers('speed'), error)
-        if (.not. allocated(error)) call check_range(input, groups(i), 'operating', group%numbers('operating'), error)
-      end associate
-      if (allocated(error)) return
-    end do
-  end subroutine check_response_ranges
+    associate (group => input%groups(index))
+      call check_range(input, index, 'speed', group%numbers('speed'), error)
+      if (.not. allocated(error)) call check_range(input, index, 'operating', group%numbers('operating'), error)
+    end associate
+  end subroutine check_response_range
 
   !> Two speeds are the lowest and the highest one, in the same direction.
   subroutine check_range(input, group, key, range, error)

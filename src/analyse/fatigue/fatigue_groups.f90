@@ -42,20 +42,15 @@ contains
   end function quantity_of
 
   !> Refuses elements that do not exist or have no such quantity, and values that do not fit together.
-  subroutine check_fatigue(input, error)
+  subroutine check_fatigue(input, index, error)
     type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
     type(error_t), allocatable, intent(out) :: error
-    integer, allocatable :: groups(:)
-    integer :: i
 
-    allocate (groups, source=input%groups_named('fatigue'))
-    do i = 1, size(groups)
-      call check_element(input, groups(i), error)
-      if (.not. allocated(error)) call check_curve(input, groups(i), error)
-      if (.not. allocated(error)) call check_mean(input, groups(i), error)
-      if (.not. allocated(error)) call check_profile(input, groups(i), error)
-      if (allocated(error)) return
-    end do
+    call check_element(input, index, error)
+    if (.not. allocated(error)) call check_curve(input, index, error)
+    if (.not. allocated(error)) call check_mean(input, index, error)
+    if (.not. allocated(error)) call check_profile(input, index, error)
   end subroutine check_fatigue
 
   !> The element must exist and have the quantity.

@@ -10,24 +10,11 @@ module nocdyn_electrical_faults
   implicit none (type, external)
   private
 
-  public :: check_faults, find_fault_terms
+  public :: check_fault, find_fault_terms
 
 contains
 
   !> Refuses faults before the start of the run, lists of different lengths, and reactances in the wrong order.
-  subroutine check_faults(input, error)
-    type(input_t), intent(in) :: input
-    type(error_t), allocatable, intent(out) :: error
-    integer, allocatable :: indices(:)
-    integer :: i
-
-    allocate (indices, source=input%groups_named('excitation', 'fault'))
-    do i = 1, size(indices)
-      call check_fault(input, indices(i), error)
-      if (allocated(error)) return
-    end do
-  end subroutine check_faults
-
   subroutine check_fault(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group

@@ -11,7 +11,7 @@ module nocdyn_engine_checks
   implicit none (type, external)
   private
 
-  public :: check_engines, check_orders, check_stroke, check_crank_angles
+  public :: check_engine, check_order_torques, check_stroke, check_crank_angles
 
   real(wp), parameter :: pi = acos(-1.0_wp)
   real(wp), parameter :: rounding = 1.0e-9_wp   ! relative, of angles and orders
@@ -20,28 +20,23 @@ module nocdyn_engine_checks
 contains
 
   !> Refuses engines of which something does not fit: firing angles, orders, pressures, loads, numbers of cylinders.
-  subroutine check_engines(input, error)
+  subroutine check_engine(input, index, error)
     type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
     type(error_t), allocatable, intent(out) :: error   !! names file, line, group and key
-    integer, allocatable :: indices(:)
     character(len=:), allocatable :: key, text
-    integer :: i
 
-    allocate (indices, source=input%groups_named('engine'))
-    do i = 1, size(indices)
-      associate (group => input%groups(indices(i)))
-        call check_cylinders(group, key, text)
-        if (text == '') call check_cycle(group, key, text)
-        if (text == '' .and. group%has_value('orders')) call find_table_obstacle(group, key, text)
-        if (text == '') call check_loads(group, key, text)
-        if (text == '' .and. group%has_value('pressures')) call check_crank_angles(group, key, text)
-        if (text == '') call check_names(input, group, key, text)
-      end associate
-      if (text == '') cycle
-      call raise(error, exit_input, input%location(indices(i), key) // ': ' // text)
-      return
-    end do
-  end subroutine check_engines
+    associate (group => input%groups(index))
+      call check_cylinders(group, key, text)
+      if (text == '') call check_cycle(group, key, text)
+      if (text == '' .and. group%has_value('orders')) call find_table_obstacle(group, key, text)
+      if (text == '') call check_loads(group, key, text)
+      if (text == '' .and. group%has_value('pressures')) call check_crank_angles(group, key, text)
+      if (text == '') call check_names(input, group, key, text)
+    end associate
+    if (text == '') return
+    call raise(error, exit_input, input%location(index, key) // ': ' // text)
+  end subroutine check_engine
 
   !> Lists and numbers of cylinders, and whether there is a torque.
   subroutine check_cylinders(group, key, text)
@@ -183,27 +178,23 @@ contains
   end subroutine check_names
 
   !> Refuses orders of &excitation with rows that do not fit together, or without their load.
-  subroutine check_orders(input, error)
+  subroutine check_order_torques(input, index, error)
     type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
     type(error_t), allocatable, intent(out) :: error   !! names file, line, group and key
-    integer, allocatable :: indices(:)
     character(len=:), allocatable :: key, text
-    integer :: i, load
+    integer :: load
 
-    allocate (indices, source=input%groups_named('excitation', 'orders'))
-    do i = 1, size(indices)
-      associate (group => input%groups(indices(i)))
-        text = ''
-        if (group%has_value('speeds')) call find_table_obstacle(group, key, text)
-        if (group%has_value('share_of_load')) then
-          key = 'share_of_load'
-          call find_shared_load(input, indices(i), load, text)
-        end if
-      end associate
-      if (text == '') cycle
-      call raise(error, exit_input, input%location(indices(i), key) // ': ' // text)
-      return
-    end do
-  end subroutine check_orders
+    associate (group => input%groups(index))
+      text = ''
+      if (group%has_value('speeds')) call find_table_obstacle(group, key, text)
+      if (group%has_value('share_of_load')) then
+        key = 'share_of_load'
+        call find_shared_load(input, index, load, text)
+      end if
+    end associate
+    if (text == '') return
+    call raise(error, exit_input, input%location(index, key) // ': ' // text)
+  end subroutine check_order_torques
 
 end module nocdyn_engine_checks

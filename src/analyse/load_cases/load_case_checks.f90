@@ -1,33 +1,45 @@
-!> What is wrong with the values of a load case, before any of them is run.
+!> What is wrong with the values of an input, before anything is computed.
 module nocdyn_load_case_checks
-  use nocdyn_errors, only: error_t
+  use nocdyn_errors, only: add_error, error_t
   use nocdyn_input, only: input_t
   use nocdyn_machine_parts, only: check_groups
   use nocdyn_output_times, only: check_output_times
   implicit none (type, external)
   private
 
-  public :: check_load_case, name_load_case
+  public :: check_input, name_load_case
 
 contains
 
-  !> Refuses values that do not fit together; the message names the load case.
-  subroutine check_load_case(input, error)
-    type(input_t), intent(in) :: input   !! of the load case
+  !> Refuses values that do not fit together: all mistakes at once. The message names the load case, if it is one.
+  subroutine check_input(input, error)
+    type(input_t), intent(in) :: input   !! of a machine or a load case
     type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable :: own
 
     call check_groups(input, error)
-    if (.not. allocated(error)) call check_output_times(input, error)
-    if (allocated(error)) call name_load_case(input, error)
-  end subroutine check_load_case
+    call check_output_times(input, own)
+    call add_error(error, own)
+    if (allocated(error) .and. allocated(input%load_case)) call name_load_case(input, error)
+  end subroutine check_input
 
-  !> Begins a message with the load case, unless it tells of a value that the load case sets.
+  !> Begins each line of a message with the load case, unless it tells of a value that the load case sets.
   subroutine name_load_case(input, error)
     type(input_t), intent(in) :: input   !! of the load case
     type(error_t), intent(inout) :: error
+    character(len=:), allocatable :: left, line, message
+    integer :: length
 
-    if (index(error%message, ": &load_case '" // input%load_case%name // "': ") > 0) return
-    error%message = input%shown_case() // ': ' // error%message
+    message = ''
+    left = error%message // new_line('a')
+    do while (len(left) > 0)
+      length = index(left, new_line('a'))
+      line = left(:length)
+      if (index(line, ": &load_case '" // input%load_case%name // "': ") == 0) line = input%shown_case() // ': ' // line
+      message = message // line
+      left = left(length + 1:)
+    end do
+    error%message = message(:len(message) - 1)
   end subroutine name_load_case
 
 end module nocdyn_load_case_checks

@@ -6,14 +6,13 @@ module nocdyn_input_files
   use nocdyn_console, only: report_error
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_equilibrium, only: t_infinity
-  use nocdyn_errors, only: error_t, exit_done
+  use nocdyn_errors, only: add_error, error_t, exit_done
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_joint_simplifications, only: refuse_joints
   use nocdyn_label_checks, only: refuse_equal_labels
-  use nocdyn_load_case_checks, only: name_load_case
+  use nocdyn_load_case_checks, only: check_input, name_load_case
   use nocdyn_machine, only: machine_t
-  use nocdyn_output_times, only: check_output_times
   use nocdyn_result_folders, only: out_folder, refuse_shared_folders, result_folder
   use nocdyn_sweep_plan, only: add_plan_diagnostics, has_sweep, make_plan, sweep_plan_t
   use nocdyn_text, only: string_t
@@ -98,19 +97,21 @@ contains
   !> Builds the machines of the load cases for `check`.
   subroutine check_load_cases(command, reading)
     character(len=*), intent(in) :: command
-    type(reading_t), intent(inout) :: reading   !! gets the first error
+    type(reading_t), intent(inout) :: reading   !! gets the mistakes of all of them
     type(machine_t) :: machine
+    type(error_t), allocatable :: own
     integer :: c
 
     if (command /= 'check') return
     do c = 1, size(reading%load_cases)
-      call assemble_for(command, reading%load_cases(c), machine, reading%error)
-      if (.not. allocated(reading%error)) call check_output_times(reading%load_cases(c), reading%error)
-      if (.not. allocated(reading%error)) cycle
-      call name_load_case(reading%load_cases(c), reading%error)
-      return
+      call check_input(reading%load_cases(c), own)
+      if (.not. allocated(own)) then
+        call assemble_for(command, reading%load_cases(c), machine, own)
+        if (allocated(own)) call name_load_case(reading%load_cases(c), own)
+      end if
+      call add_error(reading%error, own)
     end do
-    call check_sweep(reading)
+    if (.not. allocated(reading%error)) call check_sweep(reading)
   end subroutine check_load_cases
 
   !> Refuses a sweep that neither the machine nor one of its load cases can make.
@@ -154,7 +155,7 @@ contains
       deallocate (reading%load_cases)   ! the others are not looked at
       allocate (reading%load_cases(0))
     end if
-    call check_output_times(reading%input, reading%error)
+    call check_input(reading%input, reading%error)
   end subroutine read_one
 
 end module nocdyn_input_files

@@ -5,10 +5,10 @@ module nocdyn_run_command
   use nocdyn_cases_files, only: remove_cases_files, write_cases_files
   use nocdyn_companion_command, only: become_companion
   use nocdyn_console, only: print_text, report_error
-  use nocdyn_errors, only: error_t, exit_done, exit_failed, exit_input, raise
+  use nocdyn_errors, only: add_error, error_t, exit_done, exit_failed, exit_input, raise
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
-  use nocdyn_load_case_checks, only: check_load_case
+  use nocdyn_load_case_checks, only: check_input
   use nocdyn_load_case_peaks, only: case_run_t
   use nocdyn_load_case_report, only: load_cases_text
   use nocdyn_posix, only: is_interrupted, catch_interrupts
@@ -208,19 +208,19 @@ contains
     call check_cases(reading)
   end subroutine take_inputs
 
-  !> Refuses a file with mistakes in any of the load cases that are wanted, and load cases whose folders hold other results.
+  !> Refuses a file with mistakes in the machine or any of the load cases that are wanted, and load cases whose folders hold other
+  !> results.
   subroutine check_cases(reading)
     type(reading_t), intent(inout) :: reading
     type(error_t), allocatable :: own
     integer :: c
 
     do c = 1, size(reading%inputs)
-      if (.not. allocated(reading%inputs(c)%load_case)) cycle
-      call check_load_case(reading%inputs(c), own)
-      if (.not. allocated(own)) call refuse_sweep_folder(reading%inputs(c)%shown_case(), reading%folders(c)%text, own)
-      if (.not. allocated(own)) cycle
-      if (allocated(reading%error)) own%message = reading%error%message // new_line('a') // own%message
-      call move_alloc(own, reading%error)
+      call check_input(reading%inputs(c), own)
+      if (allocated(reading%inputs(c)%load_case) .and. .not. allocated(own)) then
+        call refuse_sweep_folder(reading%inputs(c)%shown_case(), reading%folders(c)%text, own)
+      end if
+      call add_error(reading%error, own)
     end do
     if (.not. allocated(reading%error)) return
     deallocate (reading%inputs)

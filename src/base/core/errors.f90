@@ -3,7 +3,7 @@ module nocdyn_errors
   implicit none (type, external)
   private
 
-  public :: raise
+  public :: add_error, raise
 
   integer, parameter, public :: exit_done = 0     !! success
   integer, parameter, public :: exit_failed = 1   !! the computation failed
@@ -28,5 +28,19 @@ contains
     error%code = code
     error%message = message
   end subroutine raise
+
+  !> Adds the lines of another error, if there is one, to an error or to none; the worst exit code stays.
+  subroutine add_error(error, another)
+    type(error_t), allocatable, intent(inout) :: error, another   !! `another` is not allocated afterwards
+
+    if (.not. allocated(another)) return
+    if (.not. allocated(error)) then
+      call move_alloc(another, error)
+      return
+    end if
+    error%message = error%message // new_line('a') // another%message
+    error%code = max(error%code, another%code)
+    deallocate (another)
+  end subroutine add_error
 
 end module nocdyn_errors

@@ -15,7 +15,7 @@ module nocdyn_coupling_assembly
   implicit none (type, external)
   private
 
-  public :: coupling_form, add_coupling_form, check_couplings
+  public :: coupling_form, add_coupling_form, check_coupling
 
   integer, parameter :: cubic = 1, slipping = 2, polynomial = 3, gap = 4, saturated = 5, table = 6   ! elastic forms
   integer, parameter :: elastic_forms = 6   ! the same with relative damping follow
@@ -23,35 +23,30 @@ module nocdyn_coupling_assembly
 contains
 
   !> Refuses gaps and saturations without stiffness, and gaps of which a power is beyond all numbers.
-  subroutine check_couplings(input, error)
+  subroutine check_coupling(input, index, error)
     type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
     type(error_t), allocatable, intent(out) :: error   !! names file, line, group and key
-    integer, allocatable :: indices(:)
     character(len=:), allocatable :: obstacle
-    integer :: i
 
-    allocate (indices, source=input%groups_named('coupling'))
-    do i = 1, size(indices)
-      associate (group => input%groups(indices(i)))
-        call check_relative_damping(input, indices(i), error)
-        if (allocated(error)) return
-        select case (elastic_form(group))
-        case (gap)
-          call find_gap_obstacle(coefficients_of(group), group%number('gap'), obstacle)
-          if (obstacle == '') cycle
-          call raise(error, exit_input, input%location(indices(i), 'gap') // ': gap = ' // &
-                     to_text(group%number('gap')) // obstacle)
-        case (saturated)
-          if (group%number('stiffness') > 0) cycle
-          call raise(error, exit_input, input%location(indices(i), 'saturation') // ': saturation = ' // &
-                     to_text(group%number('saturation')) // ' needs stiffness > 0 [N m/rad]')
-        case default
-          cycle
-        end select
+    associate (group => input%groups(index))
+      call check_relative_damping(input, index, error)
+      if (allocated(error)) return
+      select case (elastic_form(group))
+      case (gap)
+        call find_gap_obstacle(coefficients_of(group), group%number('gap'), obstacle)
+        if (obstacle == '') return
+        call raise(error, exit_input, input%location(index, 'gap') // ': gap = ' // &
+                   to_text(group%number('gap')) // obstacle)
+      case (saturated)
+        if (group%number('stiffness') > 0) return
+        call raise(error, exit_input, input%location(index, 'saturation') // ': saturation = ' // &
+                   to_text(group%number('saturation')) // ' needs stiffness > 0 [N m/rad]')
+      case default
         return
-      end associate
-    end do
-  end subroutine check_couplings
+      end select
+    end associate
+  end subroutine check_coupling
 
   !> What is wrong with the stiffness sum |p_k| gap^(k - 1) at the edges of a gap, '' if nothing is.
   pure subroutine find_gap_obstacle(coefficient, width, text)

@@ -20,43 +20,38 @@ module nocdyn_crank_assembly
   implicit none (type, external)
   private
 
-  public :: check_cranks, add_cranks, force_of, sampled_force
+  public :: check_crank, add_cranks, force_of, sampled_force
 
   real(wp), parameter :: pi = acos(-1.0_wp)
 
 contains
 
   !> Refuses cranks that cannot turn, and forces that are not those of one cycle.
-  subroutine check_cranks(input, error)
+  subroutine check_crank(input, index, error)
     type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: key, text
-    integer, allocatable :: cranks(:)
-    integer :: i
 
-    allocate (cranks, source=input%groups_named('crank'))
-    do i = 1, size(cranks)
-      associate (group => input%groups(cranks(i)))
-        if (group%number('crank_radius') + abs(group%number('offset')) >= group%number('rod_length')) then
-          call raise(error, exit_input, input%location(cranks(i), 'offset') // ': offset = ' // &
-                     to_text(group%number('offset')) // ' m: the rod of ' // to_text(group%number('rod_length')) // ' m ' // &
-                     'does not reach the piston at all angles; allowed: crank_radius + |offset| below rod_length')
-          return
-        end if
-        if (group%number('rod_mass') > 0 .and. .not. group%has_value('rod_center')) then
-          call raise(error, exit_input, input%location(cranks(i), 'rod_mass') // ': rod_mass = ' // &
-                     to_text(group%number('rod_mass')) // ' kg, but rod_center is missing')
-          return
-        end if
-        if (.not. group%has_value('crank_angles')) cycle
-        call check_stroke(group, key, text)
-        if (text == '') call check_crank_angles(group, key, text)
-        if (text == '') cycle
-        call raise(error, exit_input, input%location(cranks(i), key) // ': ' // text)
+    associate (group => input%groups(index))
+      if (group%number('crank_radius') + abs(group%number('offset')) >= group%number('rod_length')) then
+        call raise(error, exit_input, input%location(index, 'offset') // ': offset = ' // &
+                   to_text(group%number('offset')) // ' m: the rod of ' // to_text(group%number('rod_length')) // ' m ' // &
+                   'does not reach the piston at all angles; allowed: crank_radius + |offset| below rod_length')
         return
-      end associate
-    end do
-  end subroutine check_cranks
+      end if
+      if (group%number('rod_mass') > 0 .and. .not. group%has_value('rod_center')) then
+        call raise(error, exit_input, input%location(index, 'rod_mass') // ': rod_mass = ' // &
+                   to_text(group%number('rod_mass')) // ' kg, but rod_center is missing')
+        return
+      end if
+      if (.not. group%has_value('crank_angles')) return
+      call check_stroke(group, key, text)
+      if (text == '') call check_crank_angles(group, key, text)
+      if (text == '') return
+      call raise(error, exit_input, input%location(index, key) // ': ' // text)
+    end associate
+  end subroutine check_crank
 
   !> Adds the pistons and rods and the banks of their rows and forces to a machine.
   subroutine add_cranks(groups, machine)

@@ -12,7 +12,7 @@ module nocdyn_joint_assembly
   implicit none (type, external)
   private
 
-  public :: clutch_form, add_clutch_form, add_freewheels, add_bearings, check_joints, engagement_at, find_rest_range
+  public :: clutch_form, add_clutch_form, add_freewheels, add_bearings, check_clutch, engagement_at, find_rest_range
 
   integer, parameter :: engaged = 1, with_engagement = 2
   integer, parameter :: forms_of_friction = 2   ! as many follow of dog clutches, and then of friction by a table
@@ -20,32 +20,20 @@ module nocdyn_joint_assembly
 contains
 
   !> Refuses clutches that hold less than they slip, and tables that do not begin with the slip.
-  subroutine check_joints(input, error)
-    type(input_t), intent(in) :: input
-    type(error_t), allocatable, intent(out) :: error
-    integer, allocatable :: clutches(:)
-    integer :: i
-
-    allocate (clutches, source=input%groups_named('clutch', 'friction'))
-    do i = 1, size(clutches)
-      call check_clutch(input, clutches(i), input%groups(clutches(i)), error)
-      if (allocated(error)) return
-    end do
-  end subroutine check_joints
-
-  subroutine check_clutch(input, index, group, error)
+  subroutine check_clutch(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index
-    type(group_t), intent(in) :: group   !! with this index
     type(error_t), allocatable, intent(out) :: error
 
     call check_from_standstill(input, index, 'table_slip', 'slips', error)
-    if (allocated(error) .or. .not. group%has_value('static_capacity')) return
-    if (group%number('static_capacity') < sliding_capacity(group)) then
-      call raise(error, exit_input, input%location(index, 'static_capacity') // ': static_capacity = ' // &
+    associate (group => input%groups(index))
+      if (allocated(error) .or. .not. group%has_value('static_capacity')) return
+      if (group%number('static_capacity') < sliding_capacity(group)) then
+        call raise(error, exit_input, input%location(index, 'static_capacity') // ': static_capacity = ' // &
                  to_text(group%number('static_capacity')) // ' is below capacity = ' // to_text(sliding_capacity(group)) // &
                  '; allowed: at least that of slip [N m]')
-    end if
+      end if
+    end associate
   end subroutine check_clutch
 
   !> Form of the law of a group &clutch.

@@ -12,7 +12,7 @@ module nocdyn_loss_assembly
   implicit none (type, external)
   private
 
-  public :: add_losses, check_losses, has_losses
+  public :: add_losses, check_loss, has_losses
 
 contains
 
@@ -28,29 +28,26 @@ contains
   end function has_losses
 
   !> Refuses losses of gears whose first wheel does not turn, and tables that do not begin at standstill.
-  subroutine check_losses(input, error)
+  subroutine check_loss(input, index, error)
     type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
     type(error_t), allocatable, intent(out) :: error
-    integer :: i
 
-    do i = 1, size(input%groups)
-      associate (group => input%groups(i))
-        if (.not. has_losses(group)) cycle
-        call check_from_standstill(input, i, 'table_speed', 'speeds', error)
-        if (allocated(error)) return
-        if (group%has_value('table_reverse') .and. &
-                 size(group%numbers('table_reverse')) /= size(group%numbers('table_speed'))) then
-          call raise(error, exit_input, input%location(i, 'table_reverse') // ': table_reverse has ' // &
-                     to_text(size(group%numbers('table_reverse'))) // ' values; needed: ' // &
-                     to_text(size(group%numbers('table_speed'))) // ', as table_speed')
-        else if (first_is_ground(group)) then
-          call raise(error, exit_input, input%location(i) // ": 'ground' is the first wheel, which does not turn; " // &
-                     'allowed: a body, as a gear with losses turns')
-        end if
-        if (allocated(error)) return
-      end associate
-    end do
-  end subroutine check_losses
+    associate (group => input%groups(index))
+      if (.not. has_losses(group)) return
+      call check_from_standstill(input, index, 'table_speed', 'speeds', error)
+      if (allocated(error)) return
+      if (group%has_value('table_reverse') .and. &
+          size(group%numbers('table_reverse')) /= size(group%numbers('table_speed'))) then
+        call raise(error, exit_input, input%location(index, 'table_reverse') // ': table_reverse has ' // &
+                   to_text(size(group%numbers('table_reverse'))) // ' values; needed: ' // &
+                   to_text(size(group%numbers('table_speed'))) // ', as table_speed')
+      else if (first_is_ground(group)) then
+        call raise(error, exit_input, input%location(index) // ": 'ground' is the first wheel, which does not turn; " // &
+                   'allowed: a body, as a gear with losses turns')
+      end if
+    end associate
+  end subroutine check_loss
 
   !> Whether the first wheel of a gear or a mesh stands still.
   logical function first_is_ground(group)

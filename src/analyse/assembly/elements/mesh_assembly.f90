@@ -14,7 +14,7 @@ module nocdyn_mesh_assembly
   implicit none (type, external)
   private
 
-  public :: mesh_form, add_mesh_form, check_meshes, radii_of
+  public :: mesh_form, add_mesh_form, check_mesh, radii_of
 
   integer, parameter :: tight = 1, with_backlash = 2
   integer, parameter :: forms_without_error = 2   ! as many follow with one
@@ -22,31 +22,27 @@ module nocdyn_mesh_assembly
 contains
 
   !> Refuses transmission errors without orders, and lists of other lengths.
-  subroutine check_meshes(input, error)
+  subroutine check_mesh(input, index, error)
     type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
     type(error_t), allocatable, intent(out) :: error
     character(len=*), parameter :: keys(*) = [character(len=12) :: 'error_orders', 'error_phases']
-    integer, allocatable :: meshes(:)
-    integer :: i, k
+    integer :: k
 
-    allocate (meshes, source=input%groups_named('mesh'))
-    do i = 1, size(meshes)
-      associate (mesh => input%groups(meshes(i)), errors => size(input%groups(meshes(i))%numbers('transmission_error')))
-        if (errors == 0) cycle
-        do k = 1, size(keys)
-          if (any(size(mesh%numbers(keys(k))) == [0, errors])) cycle
-          call raise(error, exit_input, input%location(meshes(i), keys(k)) // ': ' // keys(k) // ' has ' // &
-                     to_text(size(mesh%numbers(keys(k)))) // ' and transmission_error ' // to_text(errors) // &
-                     ' values; needed: as many of each')
-          return
-        end do
-        if (mesh%has_value('teeth') .or. mesh%has_value('error_orders')) cycle
-        call raise(error, exit_input, input%location(meshes(i), 'transmission_error') // ': error_orders is missing; needed ' // &
-                   'where radii stand for the teeth, whose number is the order')
+    associate (mesh => input%groups(index), errors => size(input%groups(index)%numbers('transmission_error')))
+      if (errors == 0) return
+      do k = 1, size(keys)
+        if (any(size(mesh%numbers(keys(k))) == [0, errors])) cycle
+        call raise(error, exit_input, input%location(index, keys(k)) // ': ' // keys(k) // ' has ' // &
+                   to_text(size(mesh%numbers(keys(k)))) // ' and transmission_error ' // to_text(errors) // &
+                   ' values; needed: as many of each')
         return
-      end associate
-    end do
-  end subroutine check_meshes
+      end do
+      if (mesh%has_value('teeth') .or. mesh%has_value('error_orders')) return
+      call raise(error, exit_input, input%location(index, 'transmission_error') // ': error_orders is missing; needed ' // &
+                 'where radii stand for the teeth, whose number is the order')
+    end associate
+  end subroutine check_mesh
 
   !> Form of the law of a group &mesh.
   pure integer function mesh_form(group)

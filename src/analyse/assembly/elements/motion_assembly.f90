@@ -17,44 +17,43 @@ module nocdyn_motion_assembly
   implicit none (type, external)
   private
 
-  public :: check_motions, add_cardans, add_relations, drive_form, add_drive_form, holds_still, spline_shape, drive_interpolation
+  public :: check_drive, check_relation, add_cardans, add_relations, drive_form, add_drive_form, &
+    holds_still, spline_shape, drive_interpolation
 
   integer, parameter :: by_formula = 1, by_table = 2
   integer, parameter :: forms_of_speed = 2   ! as many follow of angles
 
 contains
 
-  !> Refuses cams that do not return, gears that turn back, and drives that jump.
-  subroutine check_motions(input, error)
+  !> Refuses tables that are no motion over a turn.
+  subroutine check_relation(input, index, error)
     type(input_t), intent(in) :: input
-    type(error_t), allocatable, intent(out) :: error
-    integer, allocatable :: drives(:), relations(:)
+    integer, intent(in) :: index   !! of the group
+    type(error_t), allocatable, intent(out) :: error   !! names file, line, group and key
     character(len=:), allocatable :: text
-    integer :: i
 
-    allocate (relations, source=input%groups_named('relation'))
-    do i = 1, size(relations)
-      call find_table_mistake(input%groups(relations(i)), text)
-      if (text == '') cycle
-      call raise(error, exit_input, input%location(relations(i), 'table_driven') // ': ' // text)
-      return
-    end do
-    allocate (drives, source=input%groups_named('drive'))
-    do i = 1, size(drives)
-      associate (group => input%groups(drives(i)))
-        if (group%text('kind') == 'angle' .and. group%has_value('interpolation')) then
-          if (group%text('interpolation') == 'linear') call raise(error, exit_input, input%location(drives(i), 'interpolation') // &
-            ": interpolation = 'linear' with kind = 'angle': the speed would jump at the points, which needs an infinite " // &
-            "torque; allowed: spline, dwells, cubic")
-        end if
-      end associate
+    call find_table_mistake(input%groups(index), text)
+    if (text /= '') call raise(error, exit_input, input%location(index, 'table_driven') // ': ' // text)
+  end subroutine check_relation
+
+  !> Refuses drives whose motion jumps.
+  subroutine check_drive(input, index, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    type(error_t), allocatable, intent(out) :: error   !! names file, line, group and key
+    character(len=:), allocatable :: text
+
+    associate (group => input%groups(index))
+      if (group%text('kind') == 'angle' .and. group%has_value('interpolation')) then
+        if (group%text('interpolation') == 'linear') call raise(error, exit_input, input%location(index, 'interpolation') // &
+          ": interpolation = 'linear' with kind = 'angle': the speed would jump at the points, which needs an infinite " // &
+          "torque; allowed: spline, dwells, cubic")
+      end if
       if (allocated(error)) return
-      call find_jump(input%groups(drives(i)), text)
-      if (text == '') cycle
-      call raise(error, exit_input, input%location(drives(i), 'table_time') // ': table_time' // text)
-      return
-    end do
-  end subroutine check_motions
+      call find_jump(group, text)
+      if (text /= '') call raise(error, exit_input, input%location(index, 'table_time') // ': table_time' // text)
+    end associate
+  end subroutine check_drive
 
   !> What is wrong with the times of a drive, '' if nothing is.
   pure subroutine find_jump(group, text)

@@ -16,7 +16,7 @@ module nocdyn_motor_assembly
   implicit none (type, external)
   private
 
-  public :: motor_form, add_motor_form, check_motors
+  public :: motor_form, add_motor_form, check_motor
 
   ! forms; a motor with a governor has the next one, and so has one of `fluxes` or `rated` with a supply over the time; one whose
   ! set speed follows the time has the one after that
@@ -26,28 +26,23 @@ module nocdyn_motor_assembly
 contains
 
   !> Refuses motors whose values do not fit together.
-  subroutine check_motors(input, error)
+  subroutine check_motor(input, index, error)
     type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
     type(error_t), allocatable, intent(out) :: error
-    integer, allocatable :: indices(:)
-    integer :: i
 
-    allocate (indices, source=input%groups_named('motor'))
-    do i = 1, size(indices)
-      select case (input%groups(indices(i))%text('kind'))
-      case ('induction')
-        call check_induction(input, indices(i), error)
-      case ('induction_dq')
-        call check_flux_motor(input, indices(i), error)
-      case ('inverter')
-        call check_inverter(input, indices(i), error)
-      case ('synchronous')
-        call check_synchronous(input, indices(i), error)
-      case default
-      end select
-      if (allocated(error)) return
-    end do
-  end subroutine check_motors
+    select case (input%groups(index)%text('kind'))
+    case ('induction')
+      call check_induction(input, index, error)
+    case ('induction_dq')
+      call check_flux_motor(input, index, error)
+    case ('inverter')
+      call check_inverter(input, index, error)
+    case ('synchronous')
+      call check_synchronous(input, index, error)
+    case default
+    end select
+  end subroutine check_motor
 
   !> Refuses a breakdown torque and a synchronous speed of different signs.
   subroutine check_induction(input, index, error)

@@ -17,7 +17,7 @@ module nocdyn_shaft_assembly
   implicit none (type, external)
   private
 
-  public :: check_shafts, add_shafts, new_shaft_set, segment_inertia, segment_stiffness
+  public :: check_shaft, add_shafts, new_shaft_set, segment_inertia, segment_stiffness
 
   real(wp), parameter :: pi = acos(-1.0_wp)
   real(wp), parameter :: tolerance = 1.0e-9_wp   ! of the states at the ends of a shaft that is as soft as all shafts together
@@ -45,33 +45,29 @@ module nocdyn_shaft_assembly
 contains
 
   !> Refuses bores that are no smaller than the diameter, and numbers of nodes that do not fit the segments.
-  subroutine check_shafts(input, error)
+  subroutine check_shaft(input, index, error)
     type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
     type(error_t), allocatable, intent(out) :: error
-    integer, allocatable :: indices(:)
-    integer :: i, k
+    integer :: k
 
-    allocate (indices, source=input%groups_named('shaft'))
-    do i = 1, size(indices)
-      associate (group => input%groups(indices(i)))
-        associate (bores => group%numbers('bores'), diameters => group%numbers('diameters'))
-          do k = 1, size(bores)
-            if (bores(k) < diameters(k)) cycle
-            call raise(error, exit_input, input%location(indices(i), 'bores') // ': bores(' // to_text(k) // ') = ' // &
-                       to_text(bores(k)) // ' m is not less than diameters(' // to_text(k) // ') = ' // to_text(diameters(k)) // &
-                       ' m; allowed: 0 to below the diameter')
-            return
-          end do
-          if (.not. group%has_value('nodes') .or. .not. group%number('density') > 0) cycle
-          if (group%whole_number('nodes') >= size(bores) - 1) cycle
-          call raise(error, exit_input, input%location(indices(i), 'nodes') // ': nodes = ' // &
-                     to_text(group%whole_number('nodes')) // ' is out of range; allowed: from ' // to_text(size(bores) - 1) // &
-                     ', one between two segments, to 1000')
+    associate (group => input%groups(index))
+      associate (bores => group%numbers('bores'), diameters => group%numbers('diameters'))
+        do k = 1, size(bores)
+          if (bores(k) < diameters(k)) cycle
+          call raise(error, exit_input, input%location(index, 'bores') // ': bores(' // to_text(k) // ') = ' // &
+                     to_text(bores(k)) // ' m is not less than diameters(' // to_text(k) // ') = ' // to_text(diameters(k)) // &
+                     ' m; allowed: 0 to below the diameter')
           return
-        end associate
+        end do
+        if (.not. group%has_value('nodes') .or. .not. group%number('density') > 0) return
+        if (group%whole_number('nodes') >= size(bores) - 1) return
+        call raise(error, exit_input, input%location(index, 'nodes') // ': nodes = ' // &
+                   to_text(group%whole_number('nodes')) // ' is out of range; allowed: from ' // to_text(size(bores) - 1) // &
+                   ', one between two segments, to 1000')
       end associate
-    end do
-  end subroutine check_shafts
+    end associate
+  end subroutine check_shaft
 
   !> The nodes and slices of all shafts.
   subroutine new_shaft_set(input, body_index, set)
