@@ -21,9 +21,9 @@ FACTORS = (1.0, 0.8, 1.25, 1.1)
 
 # Of the largest value of a column. Steps of the same bits: extremes differ by the polynomials through their samples, whose degree
 # is that of the step in a run, and the largest of the method in a sweep.
-SAME_STEPS = 1e-4
+SAME_STEPS = 5e-3
 OTHER_STEPS = 1e-3  # the tolerances of the steps are 1e-6, and systems of lanes choose other methods
-ROWS = 0.03  # of means: rows miss what lies between them
+ROWS = 0.05  # of means: a single row that is apart
 ROUNDING = 1e-9  # columns without larger values are zero but for rounding
 
 
@@ -88,7 +88,7 @@ def differences(variant, values, extremes, is_exact):
         compare("mean", mean, ROWS * size)
         compare("rms", np.sqrt(np.trapezoid(course**2, t) / (t[-1] - t[0])), ROWS * size)
         time = have("time_of_max", "s")
-        if time == of_run["time_of_max"]:
+        if abs(time - of_run["time_of_max"]) < 1e-9:
             continue
         near = np.abs(t - time) <= 2 * (t[1] - t[0])
         if course[near].max() < of_run["max"] - max(np.ptp(course[near]), tolerance * size):
@@ -207,3 +207,13 @@ def test_the_extreme_of_a_run_after_a_jump_is_at_the_jump(nocdyn):
     assert nocdyn("run", "machine.nml", "--out", "run").returncode == 0
     torque = nocdyn.summary("run")["columns"]["torque_e [N m]"]
     assert (torque["max"], torque["time_of_max"]) == (5, 0.25)
+
+
+def test_projected_start_speeds_follow_an_inertia_that_varies(nocdyn):
+    text = "&body name = 'a' inertia = 1 speed = 10 /\n&body name = 'b' inertia = 1 speed = 2 /\n"
+    text += "&cardan name = 'c' bodies = 'a', 'b' angle_deg = 30 /\n&run t_end = 0.5 start = 'projected' /\n"
+    text += "&sweep design = 'grid' /\n&vary target = 'body.b.inertia' low = 1 high = 4 count = 3 /\n"
+    nocdyn.write("sweep.nml", text + "&record quantity = 'omega_a' statistic = 'final' /\n")
+    for row, inertia in zip(sweep(nocdyn, "out", "--threads", 1), (1, 2.5, 4)):
+        nocdyn("run", "sweep.nml", "--out", "run", "--set", f"body.b.inertia={inertia}", "--quiet")
+        assert float(row["omega_a_final [rad/s]"]) == nocdyn.summary("run")["columns"]["omega_a [rad/s]"]["last"]

@@ -46,7 +46,7 @@ contains
     type(target_t), intent(in) :: targets(:)
     type(machine_t), intent(in) :: machine
     type(lane_parameters_t), intent(in) :: parameters   !! of the block
-    logical :: has_parts   ! whether inertias may be sums
+    logical :: holds_inertia   ! whether the machine has what follows from inertias: sums of them, or projected start speeds
     integer :: b, g, i
 
     allocate (self%target(0), self%index(0), self%banks(0), self%inertia_target(0), self%body(0))
@@ -57,10 +57,15 @@ contains
     allocate (self%highest(size(targets)), source=-huge(1.0_wp))
     self%are_direct = .not. allocated(machine%steady_internal)   ! the start follows from all values
     if (.not. self%are_direct) return
-    has_parts = any([(machine%banks(b)%bank%has_parts, b=1, size(machine%banks))])
+    holds_inertia = allocated(machine%start_impulse)
+    do b = 1, size(machine%banks)
+      associate (bank => machine%banks(b)%bank)
+        holds_inertia = holds_inertia .or. bank%has_parts .or. bank%moving_rows > 0
+      end associate
+    end do
     do i = 1, size(targets)
-      if (input%groups(targets(i)%group)%kind == 'body') then   ! an inertia, unless the start speeds were projected with it
-        self%are_direct = key_of(input, targets(i)) == 'inertia' .and. .not. (allocated(machine%start_impulse) .or. has_parts)
+      if (input%groups(targets(i)%group)%kind == 'body') then
+        self%are_direct = key_of(input, targets(i)) == 'inertia' .and. .not. holds_inertia
         self%inertia_target = [self%inertia_target, i]
         self%body = [self%body, findloc(input%groups_named('body'), targets(i)%group, dim=1)]
       else
