@@ -3,6 +3,7 @@
 import cmath
 import csv
 import json
+import re
 from functools import cache
 from math import cos, pi, radians, sin, sqrt
 
@@ -42,7 +43,20 @@ def test_the_steady_force_is_that_of_a_gear(nocdyn, keys, speed):
 
 def test_teeth_and_module_give_the_radii(nocdyn):
     by_radii = run(nocdyn, MESH.format("radii = 0.2, 0.5", ""))
-    assert run(nocdyn, MESH.format("teeth = 40, 100 module = 0.01", "")) == by_radii
+    assert run(nocdyn, MESH.format("teeth = 40, 100 module = 0.01 pressure_angle = 0", "")) == by_radii
+
+
+@pytest.mark.parametrize(("keys", "angle"), [("", 20), ("pressure_angle_deg = 25", 25), ("pressure_angle = 0", 0)])
+def test_teeth_and_module_act_on_the_base_circles(nocdyn, keys, angle):
+    text = "&body name = 'a' inertia = 0.5 /\n&body name = 'b' inertia = 8 /\n&run t_end = 1 /\n"
+    text += f"&mesh name = 'z' bodies = 'a', 'b' teeth = 20, 60 module = 0.005 stiffness = 4e8 damping = 1e3 {keys} /\n"
+    outcome = nocdyn("modes", nocdyn.write("m.nml", text), "--out", "out")
+    radii = [0.5 * 0.005 * teeth * cos(radians(angle)) for teeth in (20, 60)]
+    squared = 4e8 * (radii[0] ** 2 / 0.5 + radii[1] ** 2 / 8)
+    frequency = float(re.search(r"^ +1 +\S+ +(\S+)", outcome.stdout, re.MULTILINE)[1])
+    assert frequency == pytest.approx(sqrt(squared) / (2 * pi), rel=1e-6)
+    if not keys:
+        assert frequency == pytest.approx(264.4, abs=0.05)
 
 
 def test_the_frequency_is_that_of_the_line_of_action(nocdyn):
@@ -106,8 +120,8 @@ ERRORS = ((20, 1e-6, 0.0), (40, 2e-7, 0.7))
 WHEELS = f"""\
 &body name = 'one' inertia = {INERTIAS[0]} speed_rpm = 3000 /
 &body name = 'two' inertia = {INERTIAS[1]} speed_rpm = INTERNAL1500 /
-&mesh name = 'teeth' bodies = 'one', 'two' teeth = 20, 40 module = 0.005 stiffness = {STIFFNESS} damping = {DAMPING}
-  transmission_error = 1e-6, 2e-7 error_phases = 0, 0.7 /
+&mesh name = 'teeth' bodies = 'one', 'two' teeth = 20, 40 module = 0.005 pressure_angle = 0
+  stiffness = {STIFFNESS} damping = {DAMPING} transmission_error = 1e-6, 2e-7 error_phases = 0, 0.7 /
 &run t_end = 1 /
 &response body = 'one' speed_rpm = 500, 8000 count = 16 /
 """
@@ -141,7 +155,7 @@ def test_the_force_of_a_transmission_error_has_the_closed_form(nocdyn, text):
 
 def test_orders_of_a_transmission_error_may_be_given(nocdyn):
     by_teeth = respond(nocdyn, EXTERNAL)
-    given = EXTERNAL.replace("teeth = 20, 40 module = 0.005", "radii = 0.05, 0.1").replace(
+    given = EXTERNAL.replace("teeth = 20, 40 module = 0.005 pressure_angle = 0", "radii = 0.05, 0.1").replace(
         "error_phases", "error_orders = 20, 40 error_phases"
     )
     assert respond(nocdyn, given) == by_teeth
@@ -278,7 +292,11 @@ def test_the_response_to_a_transmission_error_is_the_settled_motion_of_a_loaded_
     [
         ("phases = 0, 0.7", "phases = 0", "error_phases has 1 and transmission_error 2 values; needed: as many of each"),
         ("error_phases", "error_orders = 1, 2, 3 error_phases", "error_orders has 3 and transmission_error 2 values"),
-        ("teeth = 20, 40 module = 0.005", "radii = 1, 2", "error_orders is missing; needed where radii stand for the teeth"),
+        (
+            "teeth = 20, 40 module = 0.005 pressure_angle = 0",
+            "radii = 1, 2",
+            "error_orders is missing; needed where radii stand for the teeth",
+        ),
         ("error = 1e-6", "error = -1e-6", "transmission_error(1) = -1e-6 is out of range; allowed: >= 0 [m]"),
         ("error_phases", "error_orders = 0, 1 error_phases", "error_orders(1) = 0 is out of range; allowed: > 0"),
         ("transmission_error = 1e-6, 2e-7", "", "error_phases needs transmission_error"),

@@ -130,7 +130,8 @@ contains
     if (size(error%phase) == 0) error%phase = 0.0_wp * error%amplitude
   end subroutine read_error
 
-  !> R1 and R2 [m], the latter negative in an internal gear.
+  !> R1 and R2 [m], the latter negative in an internal gear. Deformations are along the line of action, which touches both base
+  !> circles.
   pure function radii_of(group) result(radii)
     type(group_t), intent(in) :: group
     real(wp) :: radii(2)
@@ -138,7 +139,7 @@ contains
     if (group%has_value('radii')) then
       radii = group%numbers('radii')
     else
-      radii = 0.5_wp * group%number('module') * group%whole_numbers('teeth')
+      radii = 0.5_wp * group%number('module') * group%whole_numbers('teeth') * cos(group%number('pressure_angle'))
     end if
     if (group%flag('internal')) radii(2) = -radii(2)
   end function radii_of

@@ -1,10 +1,13 @@
 !> Rows of the schema: the group &mesh with its keys.
 module nocdyn_schema_meshes
-  use nocdyn_schema_rules, only: a_flag, a_name, a_number, an_integer, any_number, any_times, anything, at_most_one, &
+  use nocdyn_kinds, only: wp
+  use nocdyn_schema_rules, only: a_flag, a_name, a_number, allowed_t, an_integer, any_number, any_times, anything, at_most_one, &
     body_or_ground, efficiencies, equal_lengths, exactly_one, example_t, from_1, group_rule_t, in_machine, key_rule_t, &
     not_negative, positive, relation_rule_t, required, requires, reverse_efficiencies, unset
   implicit none (type, external)
   private
+
+  type(allowed_t), parameter :: pressure_angles = allowed_t(low=0.0_wp, high=0.7854_wp)   ! [rad]
 
   type(group_rule_t), parameter, public :: mesh_groups(*) = [ &
     group_rule_t('mesh', in_machine, any_times, 'coupling', 'An elastic mesh of two wheels.')]
@@ -17,9 +20,11 @@ module nocdyn_schema_meshes
     key_rule_t('mesh',       'radii',           a_number,       2, 'm',           unset,       positive, &
       'radii at which the force acts, in the order of the bodies: those of the base circles'), &
     key_rule_t('mesh',       'teeth',           an_integer,     2, '',            unset,       from_1, &
-      'numbers of teeth, in the order of the bodies; the radii are module * teeth / 2'), &
+      'numbers of teeth by body; the radii are module * teeth / 2 * cos(pressure_angle)'), &
     key_rule_t('mesh',       'module',          a_number,       1, 'm',           unset,       positive, &
-      'module of the teeth'), &
+      'module of the teeth, of helical ones in the transverse plane'), &
+    key_rule_t('mesh',       'pressure_angle',  a_number,       1, 'rad', '0.3490658504', pressure_angles, &
+      'pressure angle beside teeth and module, in the transverse plane; 20 degrees if not given'), &
     key_rule_t('mesh',       'internal',        a_flag,         1, '',            '.false.',   anything, &
       'an internal gear: both wheels turn in the same direction'), &
     key_rule_t('mesh',       'stiffness',       a_number,       1, 'N/m',         required,    positive, &
@@ -49,6 +54,7 @@ module nocdyn_schema_meshes
     relation_rule_t('mesh', exactly_one, 'radii', 'teeth'), &
     relation_rule_t('mesh', requires, 'module', 'teeth'), &
     relation_rule_t('mesh', requires, 'teeth', 'module'), &
+    relation_rule_t('mesh', requires, 'pressure_angle', 'teeth'), &
     relation_rule_t('mesh', at_most_one, 'efficiency reverse_efficiency', 'table_speed table_efficiency'), &
     relation_rule_t('mesh', requires, 'reverse_efficiency', 'efficiency'), &
     relation_rule_t('mesh', requires, 'table_reverse', 'table_efficiency'), &
