@@ -132,13 +132,15 @@ def test_a_list_is_refused_with_its_own_file_and_line(nocdyn):
     )
 
 
-def test_a_list_of_another_form_is_refused_once(nocdyn):
-    nocdyn.write("list.csv", '"load.drag.viscous";"run.t_end"\n0,5;1\n0,75;2\n')
-    message = refusal(nocdyn, sweep="&sweep design = 'list' file = 'list.csv' /\n", vary="")
-    assert message == (
-        "nocdyn: m.nml:5: &sweep: file: list.csv:1: the columns are separated by semicolons; "
-        "needed: commas, and points in numbers\n"
-    )
+def test_a_list_may_have_semicolons_and_decimal_commas(nocdyn):
+    record = GROUPS["record"] + "&sweep design = 'list' file = 'list.csv' /\n"
+    swept = []
+    for text in ('"load.drag.viscous";"run.t_end"\n0,5;1\n0,75;2\n', "load.drag.viscous, run.t_end\n0.5, 1\n0.75, 2\n"):
+        nocdyn.write("list.csv", text)
+        outcome = nocdyn("sweep", nocdyn.write("m.nml", SPINNER + record), "--out", f"out{len(swept)}", "--csv")
+        assert outcome.returncode == 0, outcome.stderr
+        swept.append((nocdyn.folder / f"out{len(swept)}/sweep.csv").read_text())
+    assert swept[0] == swept[1]
 
 
 def test_columns_of_a_table_of_results_are_a_list(nocdyn):

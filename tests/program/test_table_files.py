@@ -44,6 +44,20 @@ def test_errors_in_a_table_file_are_reported_with_its_line(nocdyn):
     assert outcome.stderr == f"{place}:2: column 2, 'x', is not a number\n"
 
 
+def test_decimal_commas_are_read_where_semicolons_or_tabs_separate_columns(nocdyn):
+    path = write(nocdyn, b"")
+    for table in ("# v; M\n-1,5;-2,5\n0,1;0,2\n1e1;3\n", "-1,5\t-2,5\r\n0,1\t0,2\r\n1e1\t3\r\n"):
+        (path.parent / "tables/load.csv").write_text(table)
+        assert nocdyn("run", path, "--out", "out").returncode == 0
+        load = f90nml.read(nocdyn.folder / "out/input.nml")["load"]
+        assert load["table_speed"] == [-1.5, 0.1, 10.0]
+        assert load["table_torque"] == [-2.5, 0.2, 3.0]
+    (path.parent / "tables/load.csv").write_text("-1,5 -2,5\n0,1 0,2\n")
+    assert "4 columns in '-1,5 -2,5'; needed: 2, separated by blanks or a comma; with decimal commas by semicolons or tabs" in (
+        nocdyn("check", path).stderr
+    )
+
+
 def test_a_missing_file_has_exit_code_3(nocdyn):
     path = write(nocdyn, b"")
     (path.parent / "tables/load.csv").unlink()

@@ -1,5 +1,7 @@
-!> Tables in files: columns of numbers, separated by blanks, tabs or a comma; # and ! begin comments. The table of an element has
-!> two columns, of which the first ascends. A list of variants begins with the names of its columns, separated by commas.
+!> Tables in files: columns of numbers, separated by blanks, tabs or a comma; # and ! begin comments. In a file whose columns are
+!> separated by semicolons, or by tabs with commas inside of numbers, these are decimal commas. The table of an element has two
+!> columns, of which the first ascends. A list of variants begins with the names of its columns, separated by commas, semicolons
+!> or tabs.
 module nocdyn_table_file
   use nocdyn_errors, only: error_t, exit_file, exit_input
   use nocdyn_kinds, only: wp
@@ -22,6 +24,7 @@ module nocdyn_table_file
     character(len=:), allocatable :: file        !! its name in messages
     integer :: columns = 2
     logical :: is_list = .false.                 !! a list of variants, else the table of an element
+    character :: separator = ','                 !! of columns; ';' or a tab: commas are those of decimals
     integer :: line = 0                          !! of the text that is being read
     integer :: last_row_line = 0                 !! line of the last row
     integer :: errors = 0                        !! number of wrong lines
@@ -63,6 +66,7 @@ contains
 
     allocate (reading%messages(0))
     reading%file = shown_path(file)
+    reading%separator = separator_of(text)
     call read_rows(text, first_position(text), reading, values, rows)
     call check_whole(reading, rows, least=2, is_binary=index(text, achar(0)) > 0)
     first = values(1, :rows)
@@ -85,6 +89,7 @@ contains
     allocate (reading%messages(0))
     reading%file = shown_path(file)
     reading%is_list = .true.
+    reading%separator = separator_of(text)
     start = first_position(text)
     call read_names(text, start, reading, names)
     line = reading%line
@@ -96,6 +101,70 @@ contains
     values = lines(:, :rows)
     call move_alloc(reading%messages, messages)
   end subroutine read_list_text
+
+  !> The separator of the columns of a text: ';' if there is one in any line; a tab if all lines have one and some of them commas
+  !> that do not stand beside a blank or tab; else a comma, beside which blanks and tabs separate as well.
+  pure character function separator_of(text) result(separator)
+    character(len=*), intent(in) :: text
+    integer :: begin, last, lines, start, tabbed
+    logical :: has_decimals, has_lists
+
+    separator = ','
+    lines = 0
+    tabbed = 0
+    has_decimals = .false.
+    has_lists = .false.
+    start = first_position(text)
+    do while (start <= len(text))
+      last = content_end(text, start, line_last(text, start))
+      begin = start
+      start = line_last(text, start) + 2
+      if (last < begin) cycle
+      associate (content => text(begin - 1 + verify(text(begin:last), blanks):last))
+        if (index(content, ';') > 0) then
+          separator = ';'
+          return
+        end if
+        lines = lines + 1
+        if (index(content, tab) > 0) tabbed = tabbed + 1
+        has_decimals = has_decimals .or. index(content, ',') > 0
+        has_lists = has_lists .or. has_comma_at_blank(content)
+      end associate
+    end do
+    if (has_decimals .and. tabbed == lines .and. .not. has_lists) separator = tab
+  end function separator_of
+
+  !> Whether a comma stands beside a blank, or at an end.
+  pure logical function has_comma_at_blank(content) result(has)
+    character(len=*), intent(in) :: content
+    integer :: i
+
+    has = .false.
+    do i = 1, len(content)
+      if (content(i:i) /= ',') cycle
+      has = i == 1 .or. i == len(content)
+      if (.not. has) has = scan(content(i - 1:i - 1), blanks) > 0 .or. scan(content(i + 1:i + 1), blanks) > 0
+      if (has) return
+    end do
+  end function has_comma_at_blank
+
+  !> A line with points in its numbers and commas between its columns.
+  pure function plain(content, separator)
+    character(len=*), intent(in) :: content
+    character, intent(in) :: separator   !! of its columns
+    character(len=len(content)) :: plain
+    integer :: i
+
+    plain = content
+    if (separator == ',') return
+    do i = 1, len(plain)
+      if (plain(i:i) == ',') then
+        plain(i:i) = '.'
+      else if (plain(i:i) == separator) then
+        plain(i:i) = ','
+      end if
+    end do
+  end function plain
 
   !> Last position of the line that begins at `start`.
   pure integer function line_last(text, start)
@@ -112,6 +181,7 @@ contains
     integer, intent(inout) :: start   !! position of the first line; on return, of the line after the names
     type(table_reader_t), intent(inout) :: reading
     type(string_t), allocatable, intent(out) :: names(:)
+    character :: separator
     integer :: columns, comma, first, i, last
 
     last = start - 2
@@ -125,13 +195,15 @@ contains
     end do
     columns = merge(1, 0, last >= first)
     last = first - 1 + len_trim(text(first:last))
-    if (columns > 0) last = last - merge(1, 0, text(last:last) == ',')   ! nothing after the last comma is no column
+    separator = reading%separator
+    if (separator == ',' .and. index(text(first:last), ',') == 0 .and. index(text(first:last), tab) > 0) separator = tab
+    if (columns > 0) last = last - merge(1, 0, text(last:last) == separator)   ! nothing after the last one is no column
     do i = first, last
-      if (text(i:i) == ',') columns = columns + 1
+      if (text(i:i) == separator) columns = columns + 1
     end do
     allocate (names(columns))
     do i = 1, size(names)
-      comma = first + index(text(first:last), ',') - 1
+      comma = first + index(text(first:last), separator) - 1
       if (comma < first) comma = last + 1
       names(i)%text = text(first - 1 + verify(text(first:comma - 1) // '.', blanks // quotes): &
                            first - 1 + verify(text(first:comma - 1), blanks // quotes // carriage_return, back=.true.))
@@ -150,11 +222,7 @@ contains
     if (size(names) > most_columns) message = to_text(size(names)) // ' columns; allowed: at most ' // to_text(most_columns)
     do i = 1, size(names)
       if (message /= '') exit
-      if (index(names(i)%text, ';') > 0) then
-        message = 'the columns are separated by semicolons; needed: commas, and points in numbers'
-      else if (index(names(i)%text, tab) > 0) then
-        message = 'the names of the columns are separated by tabs; needed: commas'
-      else if (names(i)%text == 'variant') then
+      if (names(i)%text == 'variant') then
         message = "'variant' is a column of a sweep.csv; needed: only columns of numbers that vary"
       else if (names(i)%text == '') then
         message = 'column ' // to_text(i) // ' has no name; needed: the path of a number'
@@ -222,14 +290,14 @@ contains
       return
     end if
     allocate (begins(reading%columns), ends(reading%columns))
-    call split(content, begins, ends, found)
+    call split(plain(content, reading%separator), begins, ends, found)
     if (found /= reading%columns) then
-      message = counted(found, 'column', 'columns') // ' in ' // excerpt(content) // &
-                  '; needed: ' // to_text(reading%columns) // ', separated by blanks or a comma'
+      message = counted(found, 'column', 'columns') // ' in ' // excerpt(content) // '; needed: ' // to_text(reading%columns) // &
+                separation(reading%separator, found > reading%columns .and. index(content, ',') > 0)
     else
       message = ''
       do column = 1, found
-        if (message == '') call read_column(content(begins(column):ends(column)), column, reading%is_list, &
+        if (message == '') call read_column(content(begins(column):ends(column)), column, reading, &
                                             values(column, rows + 1), message)
       end do
     end if
@@ -246,6 +314,23 @@ contains
       reading%last_row_line = reading%line
     end if
   end subroutine read_line
+
+  !> What columns are separated by.
+  pure function separation(separator, has_commas) result(text)
+    character, intent(in) :: separator
+    logical, intent(in) :: has_commas   !! which may be those of decimals
+    character(len=:), allocatable :: text
+
+    select case (separator)
+    case (';')
+      text = ', separated by semicolons as in other lines'
+    case (tab)
+      text = ', separated by tabs, as the commas are those of decimals'
+    case default
+      text = ', separated by blanks or a comma'
+      if (has_commas) text = text // '; with decimal commas by semicolons or tabs'
+    end select
+  end function separation
 
   !> Positions of the columns and their number; a comma without a value before it counts as a column.
   pure subroutine split(content, begins, ends, found)
@@ -290,19 +375,19 @@ contains
   end subroutine skip_blanks
 
   !> Reads one number.
-  subroutine read_column(text, column, has_any_size, value, message)
+  subroutine read_column(text, column, reading, value, message)
     character(len=*), intent(in) :: text
     integer, intent(in) :: column           !! index, for the message
-    logical, intent(in) :: has_any_size     !! a number of a list is checked as a value of its variant
+    type(table_reader_t), intent(in) :: reading
     real(wp), intent(out) :: value
     character(len=:), allocatable, intent(out) :: message
     character(len=:), allocatable :: limit
     integer :: status
 
-    call read_real(text, value, status)
+    call read_real(plain(text, reading%separator), value, status)
     message = number_problem(status)
-    limit = size_limit(value, anything, ascends=column == 1)
-    if (limit /= '' .and. .not. has_any_size) message = ' is out of range; allowed: ' // limit(3:)
+    limit = size_limit(value, anything, ascends=column == 1)   ! a number of a list is checked as a value of its variant
+    if (limit /= '' .and. .not. reading%is_list) message = ' is out of range; allowed: ' // limit(3:)
     if (message /= '') message = 'column ' // to_text(column) // ', ' // excerpt(text) // ',' // message
   end subroutine read_column
 
