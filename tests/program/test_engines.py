@@ -1,7 +1,8 @@
 """Engines and orders from the input file to the results: files, refusals, sweeps."""
 
 import csv
-from math import cos, pi, radians, sin
+import re
+from math import cos, exp, pi, radians, sin
 
 import pytest
 
@@ -220,6 +221,26 @@ def test_a_file_of_harmonics_that_is_not_there_is_refused(nocdyn):
 def test_pressures_that_are_not_one_cycle_are_refused(nocdyn, rows, complaint):
     nocdyn.write("p.csv", "crank_angle_deg, pressure\n" + rows)
     assert LABEL + complaint in refusal(nocdyn, PRESSURES.format(""))
+
+
+def test_harmonics_that_are_left_out_are_noted_in_runs_and_responses(nocdyn):
+    rows = "".join(f"{angle}, {1e5 + 6e6 * exp(-(((angle - 10) / 12) ** 2))}\n" for angle in range(-180, 181, 2))
+    nocdyn.write("p.csv", "crank_angle_deg, pressure\n" + rows)
+    text = PRESSURES.format("crankcase_pressure = 1e5 KEY")
+    shares = {}
+    for orders in (4, 8, 24):
+        nocdyn.write("m.nml", MACHINE.format(text.replace("KEY", f"harmonics_up_to = {orders}")))
+        outcome = nocdyn("run", "m.nml", "--out", "out")
+        assert outcome.returncode == 0, outcome.stderr
+        found = re.findall(rf"engine 'e': harmonics_up_to = {orders} leaves out up to .* cylinder, (.*) % of its", outcome.stdout)
+        shares[orders] = [float(share) for share in found]
+    assert shares[24] == []
+    assert shares[4][0] > 1.5 * shares[8][0] > 1
+    shaft = "&body name = 'end' inertia = 2 /\n&coupling name = 'k' bodies = 'crank', 'end' stiffness = 1e5 damping = 10 /\n"
+    shaft += "&response body = 'crank' speed = 5, 20 count = 3 /\n"
+    nocdyn.write("r.nml", MACHINE.format(text.replace("KEY", "harmonics_up_to = 4")) + shaft)
+    outcome = nocdyn("response", "r.nml", "--out", "response")
+    assert "note: engine 'e': harmonics_up_to = 4 leaves out up to" in outcome.stdout, outcome.stderr
 
 
 SWEEP = """&sweep design = 'grid' /

@@ -4,11 +4,12 @@ module nocdyn_cylinder_torques
   use nocdyn_input, only: group_t
   use nocdyn_kinds, only: wp
   use nocdyn_order_excitations, only: order_torque_t
-  use nocdyn_slider_cranks, only: close_cycle, gas_harmonics, inertia_harmonics, slider_crank_t
+  use nocdyn_slider_cranks, only: close_cycle, gas_harmonics, inertia_harmonics, sampled_gas_torque, samples, &
+    slider_crank_t
   implicit none (type, external)
   private
 
-  public :: cylinder_torques, cycle_of
+  public :: cylinder_torques, cycle_of, gas_torque, sampled_torque
 
   real(wp), parameter :: pi = acos(-1.0_wp)
 
@@ -89,13 +90,33 @@ contains
       allocate (torque%speed(1), torque%mean(1), torque%sine(n, 1), torque%cosine(n, 1), source=0.0_wp)
     end associate
     allocate (torque%square_order(0), torque%square_sine(0), torque%square_cosine(0))
-    allocate (pressure, source=group%numbers(pressures))
-    if (size(pressure) == 0) return
-    allocate (angle, source=group%numbers('crank_angles'))
-    call close_cycle(cycle, angle, pressure)
-    call gas_harmonics(slider_crank(group), cycle, angle, pressure - group%number('crankcase_pressure'), &
-                       torque%mean(1), torque%sine(:, 1), torque%cosine(:, 1))
+    if (size(group%numbers(pressures)) == 0) return
+    call take_pressures(group, pressures, angle, pressure)
+    call gas_harmonics(slider_crank(group), cycle, angle, pressure, torque%mean(1), torque%sine(:, 1), torque%cosine(:, 1))
   end function gas_torque
+
+  !> The torque of a cylinder by its pressure at equal distances over a cycle, with all its harmonics [N m].
+  function sampled_torque(group, pressures) result(torque)
+    type(group_t), intent(in) :: group
+    character(len=*), intent(in) :: pressures   !! key of the pressures, which are given
+    real(wp) :: torque(samples)
+    real(wp), allocatable :: angle(:), pressure(:)
+
+    call take_pressures(group, pressures, angle, pressure)
+    torque = sampled_gas_torque(slider_crank(group), cycle_of(group), angle, pressure)
+  end function sampled_torque
+
+  !> The points of one cycle, with the pressure above that of the crankcase.
+  pure subroutine take_pressures(group, pressures, angle, pressure)
+    type(group_t), intent(in) :: group
+    character(len=*), intent(in) :: pressures   !! key of the pressures
+    real(wp), allocatable, intent(out) :: angle(:), pressure(:)   !! [rad], [Pa]
+
+    allocate (pressure, source=group%numbers(pressures))
+    allocate (angle, source=group%numbers('crank_angles'))
+    call close_cycle(cycle_of(group), angle, pressure)
+    pressure = pressure - group%number('crankcase_pressure')
+  end subroutine take_pressures
 
   type(slider_crank_t) function slider_crank(group)
     type(group_t), intent(in) :: group

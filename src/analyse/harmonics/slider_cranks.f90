@@ -6,7 +6,7 @@ module nocdyn_slider_cranks
   implicit none (type, external)
   private
 
-  public :: lever, gas_harmonics, inertia_harmonics, close_cycle, sample_cycle
+  public :: lever, gas_harmonics, sampled_gas_torque, inertia_harmonics, close_cycle, sample_cycle
 
   type, public :: slider_crank_t
     real(wp) :: bore = 0.0_wp           !! diameter of the piston [m]
@@ -66,15 +66,23 @@ contains
     real(wp), intent(in) :: pressure(:)               !! at the points, above that of the crankcase [Pa]
     real(wp), intent(out) :: mean                     !! [N m]
     real(wp), intent(out) :: sine(:), cosine(:)       !! [N m], [harmonics]
-    real(wp) :: torque(samples)
+
+    call fourier_coefficients(sampled_gas_torque(crank, cycle, theta, pressure), mean, sine, cosine)
+  end subroutine gas_harmonics
+
+  !> The gas torque at equal distances over a cycle from the angle 0 on.
+  function sampled_gas_torque(crank, cycle, theta, pressure) result(torque)
+    type(slider_crank_t), intent(in) :: crank
+    real(wp), intent(in) :: cycle                   !! 2 pi or 4 pi [rad]
+    real(wp), intent(in) :: theta(:), pressure(:)   !! as of `gas_harmonics`
+    real(wp) :: torque(samples)                     !! [N m]
     integer :: i
 
     torque = sample_cycle(cycle, theta, pressure)
     do i = 1, samples
       torque(i) = torque(i) * 0.25_wp * pi * crank%bore**2 * lever(crank, cycle * (i - 1) / samples)
     end do
-    call fourier_coefficients(torque, mean, sine, cosine)
-  end subroutine gas_harmonics
+  end function sampled_gas_torque
 
   !> Amplitudes of sin(k theta), k = 1 to 4, of the torque of a reciprocating mass m over omega^2:
   !> m r^2 (lambda / 4, -1/2, -3 lambda / 4, -lambda^2 / 4), lambda = r / l. The terms that are left out are smaller by

@@ -5,6 +5,7 @@ module nocdyn_response_analysis
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_excitation_lines, only: line_order, line_t
   use nocdyn_forced_response, only: forced_response_t, new_forced_response
+  use nocdyn_harmonic_notes, only: note_left_out_harmonics
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_limit_edges, only: refine_edges
@@ -47,6 +48,7 @@ contains
     call system_clock(began, rate)
     allocate (self%crossings(0))
     call note_simplifications(machine, self%notes)
+    call note_left_out_harmonics(input, self%notes)
     call read_response_settings(input, machine, self%settings, error)
     if (allocated(error)) return
     self%body_name = machine%names(self%settings%body)%text

@@ -20,7 +20,7 @@ module nocdyn_crank_assembly
   implicit none (type, external)
   private
 
-  public :: check_cranks, add_cranks
+  public :: check_cranks, add_cranks, force_of, sampled_force
 
   real(wp), parameter :: pi = acos(-1.0_wp)
 
@@ -76,7 +76,7 @@ contains
     end do
   end subroutine add_cranks
 
-  !> One crank, whose rows are a bank of their own. A rod without an inertia of its own is a part of the piston and of the body.
+  !> One crank, whose rows are a bank of their own. A rod without an inertia of its own is two masses.
   subroutine add_crank(group, name, body, machine)
     type(group_t), intent(in) :: group
     type(string_t), intent(in) :: name
@@ -93,6 +93,7 @@ contains
     do k = 1, size(inertia)
       call append(nodes, name%text // '[' // trim(part_names(k)) // ']')
     end do
+    if (size(inertia) == 2) nodes(2)%text = name%text // '[rod end]'
     piston = machine%bodies + 1
     call machine%add_nodes(nodes, inertia)
     bank = new_crank_rows(machine%lanes, spread(name, 1, size(inertia)), [(piston - 1 + k, k=1, size(inertia))], crank_of(group))
@@ -106,7 +107,8 @@ contains
     call append_bank(machine%banks, new_phases(machine%lanes, [name], [body]))
   end subroutine add_crank
 
-  !> The masses of piston and rod and the inertia of the rod. One without its own is a part of the piston and of the body.
+  !> The masses of piston and rod and the inertia of the rod. One without its own is two masses, at the pin
+  !> of the piston and on the body.
   subroutine find_masses(group, body, machine, inertia)
     type(group_t), intent(in) :: group
     integer, intent(in) :: body
@@ -119,7 +121,8 @@ contains
       if (group%has_value('rod_inertia')) then
         inertia = [group%number('piston_mass'), rod, rod, group%number('rod_inertia')]
       else
-        inertia = [group%number('piston_mass') + share * rod]
+        inertia = [group%number('piston_mass'), share * rod]
+        inertia = pack(inertia, inertia > 0)
         machine%inertia(:, body) = machine%inertia(:, body) + (1.0_wp - share) * rod * group%number('crank_radius')**2
       end if
     end associate
@@ -195,6 +198,18 @@ contains
   function force_of(group) result(force)
     type(group_t), intent(in) :: group
     type(periodic_force_t) :: force
+
+    force%base = 2.0_wp * pi / cycle_of(group)
+    associate (n => int(group%number('harmonics_up_to') / force%base + 1.0e-9_wp))
+      allocate (force%sine(n), force%cosine(n))
+    end associate
+    call fourier_coefficients(sampled_force(group), force%mean, force%sine, force%cosine)
+  end function force_of
+
+  !> The same at equal distances over a cycle.
+  function sampled_force(group) result(force)
+    type(group_t), intent(in) :: group
+    real(wp) :: force(samples)   !! [N]
     real(wp), allocatable :: angle(:), values(:)
 
     allocate (angle, source=group%numbers('crank_angles'))
@@ -203,14 +218,8 @@ contains
     else
       values = (group%number('crankcase_pressure') - group%numbers('pressures')) * 0.25_wp * pi * group%number('bore')**2
     end if
-    associate (cycle => cycle_of(group))
-      call close_cycle(cycle, angle, values)
-      force%base = 2.0_wp * pi / cycle
-      associate (n => int(group%number('harmonics_up_to') / force%base + 1.0e-9_wp))
-        allocate (force%sine(n), force%cosine(n))
-      end associate
-      call fourier_coefficients(sample_cycle(cycle, angle, values), force%mean, force%sine, force%cosine)
-    end associate
-  end function force_of
+    call close_cycle(cycle_of(group), angle, values)
+    force = sample_cycle(cycle_of(group), angle, values)
+  end function sampled_force
 
 end module nocdyn_crank_assembly

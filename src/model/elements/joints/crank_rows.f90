@@ -3,7 +3,8 @@
 !> piston is at x = r cos(v) + sqrt(l^2 - p^2), p = r sin(v) - e; F. Freudenstein, Trans. ASME 77 (1955) 853 for e = 0 likewise.
 !>
 !> A rod with an inertia of its own has three rows more: the position of its centre of mass along the line and across, and its
-!> angle asin(p / l). Without one its mass is on its two ends.
+!> angle asin(p / l). Without one its mass is on its two ends; the part at the piston has one more row with the motion of the piston.
+!> The force of the first row is therefore that of the rod on the pin of the piston, however the rod is given.
 module nocdyn_crank_rows
   use nocdyn_bank, only: quantity_t, role_crank
   use nocdyn_element_rows, only: rows_between
@@ -43,7 +44,7 @@ contains
   function new_crank_rows(lanes, names, driven, crank) result(bank)
     integer, intent(in) :: lanes
     type(string_t), intent(in) :: names(:)           !! that of the crank, [elements]
-    integer, intent(in) :: driven(:)                 !! piston, and what stands for the rod; [elements], 1 or 4
+    integer, intent(in) :: driven(:)                 !! piston, and what stands for the rod; [elements], 1, 2 or 4
     type(slider_crank_t), intent(in) :: crank
     type(crank_rows_t) :: bank
 
@@ -63,6 +64,10 @@ contains
 
     crank = self%crank()
     share = crank%rod_center / crank%rod_length
+    if (self%count == 2) then   ! the end of the rod moves with the piston
+      g = piston_motion(crank, v)
+      return
+    end if
     select case (element)
     case (part_piston)
       g = piston_motion(crank, v)
