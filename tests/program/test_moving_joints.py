@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from math import asin, atan2, cos, pi, radians, sin, sqrt
 
 import numpy as np
@@ -17,6 +18,10 @@ FORMULATIONS = ["reduced", "multiplier", "paper"]
 def run(nocdyn, text, *words):
     outcome = nocdyn("run", nocdyn.write("machine.nml", text), "--out", "out", *words)
     assert outcome.returncode == 0, outcome.stderr
+    return results(nocdyn)
+
+
+def results(nocdyn):
     header, rows = nocdyn.table("out")
     return dict(zip(header, np.array(rows).T, strict=True))
 
@@ -228,6 +233,27 @@ def test_a_rod_without_inertia_of_its_own_is_on_its_ends(nocdyn):
     assert column(table, "omega_a") == pytest.approx(column(other, "omega_a"), rel=1e-11)
 
 
+def test_the_force_on_the_piston_is_that_of_its_pin_however_the_rod_is_given(nocdyn):
+    """At a speed that is held: two masses at its ends, and one body of the same masses with their inertia about its centre."""
+    held = (
+        FREE.format("a", 0.02) + "&drive name = 'd' body = 'a' speed = 100 /\n&crank name = 'p' body = 'a' crank_radius = 0.05\n"
+    )
+    held += (
+        "  rod_length = 0.2 piston_mass = 1 rod_mass = 1 rod_center = 0.05 MORE /\n&run t_end = 0.1 /\n&output points = 101 /\n"
+    )
+    ends = run(nocdyn, held.replace("MORE", ""))
+    body = run(nocdyn, held.replace("MORE", f"rod_inertia = {0.75 * 0.05**2 + 0.25 * 0.15**2!r}"))
+    angle = column(ends, "phi_a")
+    reach = np.sqrt(0.2**2 - (0.05 * np.sin(angle)) ** 2)
+    rate = -(0.05**2) * np.sin(angle) * np.cos(angle) / reach
+    bend = -(0.05**2 * np.cos(2 * angle) + rate**2) / reach
+    expected = 100**2 * (bend - 0.05 * np.cos(angle))
+    assert column(ends, "force_p") == pytest.approx(expected, rel=1e-6, abs=1e-6)
+    assert min(column(ends, "force_p")) == pytest.approx(-625, abs=0.5)
+    assert column(body, "force_p") == pytest.approx(expected, rel=1e-6, abs=1e-6)
+    assert column(body, "torque_p") == pytest.approx(column(ends, "torque_p"), abs=1e-6)
+
+
 @pytest.mark.parametrize("stroke", [2, 4])
 def test_the_force_on_the_piston_does_its_work(nocdyn, stroke):
     """A force of few harmonics, sampled: its work over the way of the piston is the change of the energy."""
@@ -312,7 +338,103 @@ def test_a_cam_returns_and_a_lever_goes_on_straight(nocdyn):
     assert column(table, "phi_b")[-1] == pytest.approx(column(table, "phi_a")[-1] / 2, rel=1e-9)
 
 
+DWELLS = "table_angle_deg = 0, 60, 90, 120, 150, 180, 210, 240, 270, 300, 330, 360 "
+DWELLS += "table_driven_deg = 0, 0, 2.5, 10, 17.5, 20, 20, 20, 17.5, 10, 2.5, 0"
+
+
+def cam(nocdyn, keys):
+    """The rise of the cam over its angle at an even speed, in degrees, and the notes of the run."""
+    text = FREE.format("a", 5) + FREE.format("b", 0.1) + "&drive name = 'd' body = 'a' speed_rpm = 60 /\n"
+    text += f"&relation name = 'r' bodies = 'a', 'b' {keys} /\n&run t_end = 1 /\n&output points = 721 /\n"
+    outcome = nocdyn("run", nocdyn.write("machine.nml", text), "--out", "out")
+    assert outcome.returncode == 0, outcome.stderr
+    table = results(nocdyn)
+    notes = [line for line in outcome.stdout.splitlines() if "note" in line]
+    return np.degrees(column(table, "phi_b")), column(table, "torque_d"), notes
+
+
+def test_dwells_are_kept_on_request_and_the_size_of_the_overshoot_is_noted(nocdyn):
+    rise, _, notes = cam(nocdyn, DWELLS)
+    overshoot = max(max(abs(rise[:121])), max(rise) - 20)
+    assert 0.1 < overshoot < 1
+    (note,) = notes
+    assert "relation 'r': the spline leaves equal values of table_driven by up to " in note
+    assert float(re.search(r"up to ([\d.]+) degrees", note)[1]) == pytest.approx(overshoot, rel=0.03)
+    assert float(re.search(r", ([\d.]+) % of", note)[1]) == pytest.approx(5 * overshoot, rel=0.03)
+    for word in ("dwells", "cubic"):
+        rise, _, notes = cam(nocdyn, f"{DWELLS} interpolation = '{word}'")
+        assert notes == []
+        assert max(abs(rise[:121])) < 1e-9
+        assert max(rise) == pytest.approx(20, abs=1e-9)
+        assert rise[[180, 240, 300]] == pytest.approx([2.5, 10, 17.5], abs=1e-9)
+
+
 # Drives: prescribed motions.
+
+
+HEIGHT = 0.05
+
+
+@pytest.mark.parametrize("points", [10, 40])
+@pytest.mark.parametrize("given", ["angle", "speed"])
+def test_accelerations_through_a_table_are_those_of_its_motion(nocdyn, points, given):
+    """0.05 (1 - cos(2 pi t)) needs 0.05 (2 pi)^2 cos(2 pi t) N m of 1 kg m2; the error of a spline is (2 pi h)^2 / 12 of that."""
+    t = np.arange(points + 1) / points
+    if given == "angle":
+        values, keys = HEIGHT * (1 - np.cos(2 * pi * t)), "kind = 'angle' table_angle = "
+    else:
+        values, keys = 2 * pi * HEIGHT * np.sin(2 * pi * t), "interpolation = 'spline' table_speed = "
+    text = FREE.format("a", 1) + f"&drive name = 'd' body = 'a' table_time = {', '.join(map(repr, map(float, t)))}\n"
+    text += f"  {keys}{', '.join(map(repr, map(float, values)))} /\n&run t_end = 1 /\n&output points = 201 /\n"
+    table = run(nocdyn, text)
+    largest = HEIGHT * (2 * pi) ** 2
+    bound = 1.1 * (2 * pi / points) ** 2 / 12 + 0.01 * (10 / points) ** 2
+    expected = largest * np.cos(2 * pi * column(table, "t"))
+    assert column(table, "torque_d")[:-1] == pytest.approx(expected[:-1], abs=bound * largest)
+    extremes = nocdyn.summary("out")["columns"]["torque_d [N m]"]
+    assert [extremes["min"], extremes["max"]] == pytest.approx([-largest, largest], rel=bound)
+    assert column(table, "phi_a") == pytest.approx(HEIGHT * (1 - np.cos(2 * pi * column(table, "t"))), abs=2e-3 * HEIGHT)
+
+
+def test_an_angle_whose_table_ends_in_motion_goes_on_and_a_note_says_so(nocdyn):
+    text = (
+        FREE.format("a", 1) + "&drive name = 'd' body = 'a' kind = 'angle' table_time = 0, 1, 2, 3 table_angle = 0, 1, 4, 9 /\n"
+    )
+    outcome = nocdyn("run", nocdyn.write("m.nml", text + "&run t_end = 4 /\n&output points = 5 /\n"), "--out", "out")
+    assert "m.nml: note: drive 'd': its table ends at t = 3 s in the run, and the angle goes on with the last speed, 6 rad/s" in (
+        outcome.stdout
+    )
+    table = results(nocdyn)
+    assert column(table, "phi_a") == pytest.approx([0, 1, 4, 9, 15], abs=1e-9)
+    assert column(table, "torque_d")[:3] == pytest.approx([2, 2, 2], abs=1e-9)
+    outcome = nocdyn("run", nocdyn.write("m.nml", text + "&run t_end = 3 /\n"), "--out", "out")
+    assert "note" not in outcome.stdout
+
+
+def test_what_the_harmonics_leave_out_is_noted_with_its_size(nocdyn):
+    angles = ", ".join(map(str, range(0, 720, 4)))
+    forces = ", ".join(str(1000 + 5000 * np.exp(-((((v - 20 + 360) % 720 - 360) / 20) ** 2))) for v in range(0, 720, 4))
+    text = SLIDER.replace(
+        "piston_mass = 1 /", f"piston_mass = 1 stroke = 4 crank_angles_deg = {angles}\n forces = {forces} KEY /"
+    )
+    found = {}
+    for orders in (4, 6, 64):
+        outcome = nocdyn(
+            "run", nocdyn.write("m.nml", text.replace("KEY", f"harmonics_up_to = {orders}") + "&run t_end = 0.01 /\n")
+        )
+        assert outcome.returncode == 0, outcome.stderr
+        found[orders] = re.findall(r"note: (crank 'p': .*)", outcome.stdout)
+    assert found[64] == []
+    spectrum = np.fft.rfft([1000 + 5000 * np.exp(-(((v / 8) / 20) ** 2)) for v in range(-2880, 2880)]) / 5760
+    for orders in (4, 6):
+        left_out = 2 * np.abs(spectrum[2 * orders + 1 :]).sum()
+        size, share = re.fullmatch(
+            rf"crank 'p': harmonics_up_to = {orders} leaves out up to ([\d.]+) N of the force on the piston, ([\d.]+) % "
+            "of its largest value",
+            found[orders][0],
+        ).groups()
+        assert float(size) == pytest.approx(left_out, rel=0.05)
+        assert float(share) == pytest.approx(100 * left_out / 6000, rel=0.06)
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
@@ -427,6 +549,12 @@ FORCES = "crank_angles_deg = 0, 30, 60, 90, 120, 150, 180, 210 forces = 1, 2, 3,
             ":2: &crank 'p': rod_length = 0.2 is out of range; allowed: > crank_radius = 0.3",
         ),
         (CRANK.format("offset = 0.16"), ":2: &crank 'p': offset = 0.16 m: the rod of 0.2 m does not reach the piston at all"),
+        (
+            FREE.format("a", 1) + "&drive name = 'd' body = 'a' kind = 'angle' interpolation = 'linear' table_time = 0, 1\n"
+            "  table_angle = 0, 1 /\n",
+            ":2: &drive 'd': interpolation = 'linear' with kind = 'angle': the speed would jump at the points, which needs an "
+            "infinite torque; allowed: spline, dwells, cubic",
+        ),
         (CRANK.format("rod_mass = 1"), ":2: &crank 'p': rod_mass = 1 kg, but rod_center is missing"),
         (CRANK.format(FORCES), "crank_angles_deg from 0 to 210 are not those of one cycle; needed: a range of 360 with stroke"),
         (

@@ -18,6 +18,7 @@ module nocdyn_test_machines
   use nocdyn_phases, only: new_phases
   use nocdyn_piston_forces, only: new_piston_force, periodic_force_t
   use nocdyn_relation_rows, only: new_relation_rows
+  use nocdyn_splines, only: spline_smooth
   use nocdyn_text, only: string_t, strings, to_text
   use nocdyn_tooth_losses, only: new_tooth_losses, teeth_t
   implicit none (type, external)
@@ -140,7 +141,7 @@ contains
     call append_bank(machine%banks, new_phases(1, numbered_names('cardan', 1), [2]))
     call append_bank(machine%banks, new_relation_rows(1, numbered_names('cam', 1), [4], [1, 6], &
                                                       reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.8_wp, 3.0_wp, 0.3_wp, 5.0_wp, -0.6_wp, &
-                                                               6.0_wp, 0.0_wp], [2, 5]), [.true.]))
+                                                               6.0_wp, 0.0_wp], [2, 5]), [.true.], [spline_smooth]))
     call append_bank(machine%banks, new_phases(1, numbered_names('cam', 1), [3]))
     names = numbered_names('crank', 4)
     call append_bank(machine%banks, new_crank_rows(1, names, [6, 7, 8, 9], &

@@ -2,6 +2,7 @@
 module nocdyn_assembly
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
+  use nocdyn_harmonic_notes, only: note_left_out_harmonics
   use nocdyn_induction_assembly, only: note_rated_motors
   use nocdyn_input, only: input_t
   use nocdyn_idle_notes, only: note_idle_elements
@@ -9,6 +10,7 @@ module nocdyn_assembly
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_parts, only: build_machine, given_speeds
+  use nocdyn_motion_notes, only: note_motions
   use nocdyn_multiplier, only: new_multiplier
   use nocdyn_paper, only: new_paper
   use nocdyn_reduced, only: new_reduced
@@ -36,6 +38,8 @@ contains
     if (allocated(error) .or. input%takes_means) return
     call note_idle_elements(input, machine%start_notes)
     call note_rated_motors(input, machine%start_notes)
+    call note_motions(input, machine%start_notes)
+    call note_left_out_harmonics(input, machine%start_notes)
   end subroutine assemble_machine
 
   !> Builds the machine as it is in a steady state: with means over a turn, and with locked joints as constraint rows.

@@ -1,16 +1,17 @@
-!> Interpolation of points: piecewise linear, or piecewise cubic without overshoot (monotone).
-!>
-!> The cubic has the slopes of F. N. Fritsch, J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304: between points
-!> it is monotone wherever the points are, by the criterion of F. N. Fritsch, R. E. Carlson, SIAM J. Numer. Anal. 17 (1980)
-!> 238-246. At the ends the three-point formula is limited likewise, as in PCHIM of SLATEC and in SciPy.
+!> Interpolation of points: by straight lines, or by cubics with the slopes of a monotone cubic, of a spline, or of splines between
+!> dwells.
 module nocdyn_curves
+  use nocdyn_curve_slopes, only: dwell_slopes, monotone_slopes, spline_slopes
   use nocdyn_kinds, only: wp
   implicit none (type, external)
   private
 
   public :: new_curve, new_steps
 
-  integer, parameter, public :: interpolation_linear = 1, interpolation_cubic = 2
+  integer, parameter, public :: interpolation_linear = 1
+  integer, parameter, public :: interpolation_cubic = 2    !! without overshoot (monotone); its second derivative jumps
+  integer, parameter, public :: interpolation_spline = 3   !! with two continuous derivatives
+  integer, parameter, public :: interpolation_dwells = 4   !! the same between dwells, which stay
   integer, parameter, public :: extrapolation_linear = 1     !! with the slope at the end
   integer, parameter, public :: extrapolation_constant = 2   !! with the value at the end
 
@@ -61,8 +62,15 @@ contains
     self%coefficient(0, :) = [y(1), y]
     self%coefficient(1, 1:n - 1) = secant
     slope = [secant, secant(n - 1)]
-    if (interpolation == interpolation_cubic .and. n > 2) then
-      slope = monotone_slopes(h, secant)
+    if (interpolation /= interpolation_linear .and. n > 2) then
+      select case (interpolation)
+      case (interpolation_spline)
+        slope = spline_slopes(h, secant, [.false., .false.])
+      case (interpolation_dwells)
+        slope = dwell_slopes(h, secant, .false.)
+      case default
+        slope = monotone_slopes(h, secant)
+      end select
       do i = 1, n - 1
         self%coefficient(1, i) = slope(i)
         self%coefficient(2, i) = (3.0_wp * secant(i) - 2.0_wp * slope(i) - slope(i + 1)) / h(i)
@@ -91,47 +99,6 @@ contains
       self%area(i + 1) = integral_to(self, i, x(i + 1))
     end do
   end function new_steps
-
-  !> Slopes at the points: weighted harmonic means of the adjacent secants, 0 at extremes.
-  pure function monotone_slopes(h, secant) result(slope)
-    real(wp), intent(in) :: h(:), secant(:)   !! widths and slopes of the segments, [points - 1], at least 2
-    real(wp) :: slope(size(h) + 1)
-    real(wp) :: after, before
-    integer :: i, n
-
-    n = size(h)
-    slope(1) = end_slope(h(1), h(2), secant(1), secant(2))
-    slope(n + 1) = end_slope(h(n), h(n - 1), secant(n), secant(n - 1))
-    do i = 2, n
-      slope(i) = 0.0_wp
-      if (have_same_sign(secant(i - 1), secant(i))) then
-        before = 2.0_wp * h(i) + h(i - 1)
-        after = h(i) + 2.0_wp * h(i - 1)
-        slope(i) = (before + after) / (before / secant(i - 1) + after / secant(i))
-      end if
-    end do
-  end function monotone_slopes
-
-  !> The slope at an end of the parabola through three points, limited so that the curve keeps the shape of the points.
-  pure function end_slope(h, next_h, secant, next_secant) result(slope)
-    real(wp), intent(in) :: h, next_h, secant, next_secant   !! from the end inwards
-    real(wp) :: slope
-
-    slope = ((2.0_wp * h + next_h) * secant - h * next_secant) / (h + next_h)
-    if (.not. have_same_sign(slope, secant)) then
-      slope = 0.0_wp
-    else if (.not. have_same_sign(secant, next_secant) .and. abs(slope) > 3.0_wp * abs(secant)) then
-      slope = 3.0_wp * secant
-    end if
-  end function end_slope
-
-  !> Zero has no sign, nor has a slope that is next to it: its inverse would overflow.
-  pure logical function have_same_sign(a, b)
-    real(wp), intent(in) :: a, b
-    real(wp), parameter :: least = 1.0e-150_wp
-
-    have_same_sign = (a > least .and. b > least) .or. (a < -least .and. b < -least)
-  end function have_same_sign
 
   !> Number of points.
   pure integer function points(self)

@@ -1,10 +1,16 @@
-!> Cubic splines: twice differentiable curves through points, which repeat with their span or go on straight beyond it.
+!> Cubic splines: twice differentiable curves through points, which repeat with their span or go on straight beyond it; the same
+!> between dwells, and monotone cubics.
 module nocdyn_splines
+  use nocdyn_curve_slopes, only: dwell_slopes, has_dwell, monotone_slopes, spline_slopes
   use nocdyn_kinds, only: wp
   implicit none (type, external)
   private
 
   public :: new_spline
+
+  integer, parameter, public :: spline_smooth = 1     !! with two continuous derivatives
+  integer, parameter, public :: spline_dwells = 2     !! the same between segments of equal values, which stay
+  integer, parameter, public :: spline_monotone = 3   !! without overshoot; the second derivative jumps at the points
 
   !> Segment s lies between points s and s + 1.
   type, public :: spline_t
@@ -27,35 +33,87 @@ module nocdyn_splines
 
 contains
 
-  !> The spline through points (x, y). If it repeats, y - advance x / span is periodic; else the curvature at the ends is zero.
-  function new_spline(x, y, repeats) result(self)
+  !> The spline through points (x, y). If it repeats, y - advance x / span is periodic; else it has no knots next to its ends.
+  function new_spline(x, y, repeats, shape) result(self)
     real(wp), intent(in) :: x(:)      !! ascending, at least 2; 3 if it repeats
     real(wp), intent(in) :: y(:)      !! [points]
     logical, intent(in) :: repeats
+    integer, intent(in), optional :: shape   !! spline_..., smooth if absent
     type(spline_t) :: self
-    real(wp) :: bend(size(x))         ! second derivatives
     real(wp), dimension(size(x) - 1) :: h, secant
-    integer :: n
+    integer :: kind, n
 
     n = size(x)
+    kind = spline_smooth
+    if (present(shape)) kind = shape
     h = x(2:) - x(:n - 1)
     if (n < merge(3, 2, repeats) .or. any(h <= 0)) error stop 'nocdyn_splines: a spline needs ascending points'
     secant = (y(2:) - y(:n - 1)) / h
-    bend = 0.0_wp
-    if (repeats) then
-      call find_periodic_bends(h, secant, bend)
-    else if (n > 2) then
-      call solve_tridiagonal(2.0_wp * (h(:n - 2) + h(2:)), h(2:n - 2), 6.0_wp * (secant(2:) - secant(:n - 2)), bend(2:n - 1))
-    end if
+    if (kind == spline_dwells .and. .not. any(has_dwell(secant))) kind = spline_smooth
     self%repeats = repeats
     if (repeats) self%advance = y(n) - y(1)
     allocate (self%x, source=x)
     allocate (self%c(0:3, n - 1))
     self%c(0, :) = y(:n - 1)
-    self%c(1, :) = secant - h * (2.0_wp * bend(:n - 1) + bend(2:)) / 6.0_wp
-    self%c(2, :) = 0.5_wp * bend(:n - 1)
-    self%c(3, :) = (bend(2:) - bend(:n - 1)) / (6.0_wp * h)
+    if (repeats .and. kind == spline_smooth) then
+      call set_periodic(h, secant, self%c)
+    else
+      call set_slopes(h, secant, slopes_of(kind, h, secant, repeats), self%c)
+    end if
   end function new_spline
+
+  !> The slopes at the points, but for smooth splines that repeat.
+  pure function slopes_of(kind, h, secant, repeats) result(slope)
+    integer, intent(in) :: kind
+    real(wp), intent(in) :: h(:), secant(:)   !! widths and slopes of the segments
+    logical, intent(in) :: repeats
+    real(wp) :: slope(size(h) + 1)
+    real(wp) :: longer(size(h) + 3)
+
+    select case (kind)
+    case (spline_smooth)
+      slope = spline_slopes(h, secant, [.false., .false.])
+    case (spline_dwells)
+      slope = dwell_slopes(h, secant, repeats)
+    case default
+      associate (m => size(h))
+        if (repeats) then
+          longer = monotone_slopes([h(m), h, h(1)], [secant(m), secant, secant(1)])
+          slope = longer(2:m + 2)
+        else if (m > 1) then
+          slope = monotone_slopes(h, secant)
+        else
+          slope = secant(1)
+        end if
+      end associate
+    end select
+  end function slopes_of
+
+  !> Hermite's cubics.
+  pure subroutine set_slopes(h, secant, slope, c)
+    real(wp), intent(in) :: h(:), secant(:)   !! widths and slopes of the segments
+    real(wp), intent(in) :: slope(:)          !! at the points
+    real(wp), intent(inout) :: c(0:, :)
+
+    associate (m => size(h))
+      c(1, :) = slope(:m)
+      c(2, :) = (3.0_wp * secant - 2.0_wp * slope(:m) - slope(2:)) / h
+      c(3, :) = (slope(:m) + slope(2:) - 2.0_wp * secant) / h**2
+    end associate
+  end subroutine set_slopes
+
+  subroutine set_periodic(h, secant, c)
+    real(wp), intent(in) :: h(:), secant(:)   !! widths and slopes of the segments
+    real(wp), intent(inout) :: c(0:, :)
+    real(wp) :: bend(size(h) + 1)             ! second derivatives
+
+    call find_periodic_bends(h, secant, bend)
+    associate (m => size(h))
+      c(1, :) = secant - h * (2.0_wp * bend(:m) + bend(2:)) / 6.0_wp
+      c(2, :) = 0.5_wp * bend(:m)
+      c(3, :) = (bend(2:) - bend(:m)) / (6.0_wp * h)
+    end associate
+  end subroutine set_periodic
 
   !> The second derivatives of a periodic spline: a tridiagonal system with two corners, which is one without them and a product
   !> of two vectors (Sherman and Morrison).

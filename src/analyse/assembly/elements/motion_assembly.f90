@@ -2,7 +2,8 @@
 module nocdyn_motion_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
   use nocdyn_cardan_rows, only: new_cardan_rows
-  use nocdyn_curves, only: curve_t, extrapolation_linear, interpolation_cubic, new_curve
+  use nocdyn_curves, only: curve_t, extrapolation_constant, extrapolation_linear, interpolation_cubic, interpolation_dwells, &
+    interpolation_linear, interpolation_spline, new_curve
   use nocdyn_drives, only: drive_motion_t, new_drives
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_errors, only: error_t, exit_input, raise
@@ -10,13 +11,13 @@ module nocdyn_motion_assembly
   use nocdyn_kinds, only: wp
   use nocdyn_phases, only: new_phases
   use nocdyn_relation_rows, only: new_relation_rows
-  use nocdyn_splines, only: new_spline, spline_t
+  use nocdyn_splines, only: new_spline, spline_dwells, spline_monotone, spline_smooth, spline_t
   use nocdyn_text, only: to_text
   use nocdyn_written_values, only: written_element, written_key, written_number
   implicit none (type, external)
   private
 
-  public :: check_motions, add_cardans, add_relations, drive_form, add_drive_form, holds_still
+  public :: check_motions, add_cardans, add_relations, drive_form, add_drive_form, holds_still, spline_shape, drive_interpolation
 
   integer, parameter :: by_formula = 1, by_table = 2
   integer, parameter :: forms_of_speed = 2   ! as many follow of angles
@@ -40,12 +41,24 @@ contains
     end do
     allocate (drives, source=input%groups_named('drive'))
     do i = 1, size(drives)
+      if (is_polygon_of_angles(input%groups(drives(i)))) then
+        call raise(error, exit_input, input%location(drives(i), 'interpolation') // ": interpolation = 'linear' with kind = " // &
+                   "'angle': the speed would jump at the points, which needs an infinite torque; allowed: spline, dwells, cubic")
+        return
+      end if
       call find_jump(input%groups(drives(i)), text)
       if (text == '') cycle
       call raise(error, exit_input, input%location(drives(i), 'table_time') // ': table_time' // text)
       return
     end do
   end subroutine check_motions
+
+  pure logical function is_polygon_of_angles(group) result(is)
+    type(group_t), intent(in) :: group   !! &drive
+
+    is = group%text('kind') == 'angle' .and. group%has_value('interpolation')
+    if (is) is = group%text('interpolation') == 'linear'
+  end function is_polygon_of_angles
 
   !> What is wrong with the times of a drive, '' if nothing is.
   pure subroutine find_jump(group, text)
@@ -85,7 +98,7 @@ contains
         ': a cam returns: the last value must be the first, ' // written_number(group, 'table_driven', y(1)) // &
         "; kind = 'gear' advances from turn to turn, kind = 'lever' does not repeat"
     case ('gear')
-      spline = new_spline(x, y, .true.)
+      spline = new_spline(x, y, .true., spline_shape(group%text('interpolation')))
       do i = 0, looks * (size(x) - 1) - 1
         slope = spline%derivatives(x(1 + i / looks) + modulo(i, looks) * (x(2 + i / looks) - x(1 + i / looks)) / looks)
         if (slope(1) * way > 0) cycle
@@ -118,7 +131,7 @@ contains
   subroutine add_relations(groups, banks)
     type(element_groups_t), intent(in) :: groups
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    integer :: first(size(groups%indices) + 1), i
+    integer :: first(size(groups%indices) + 1), i, shape(size(groups%indices))
     logical :: repeats(size(groups%indices))
     real(wp), allocatable :: driven(:), driving(:)
 
@@ -130,11 +143,12 @@ contains
         driving = [driving, group%numbers('table_angle')]
         driven = [driven, group%numbers('table_driven')]
         repeats(i) = group%text('kind') /= 'lever'
+        shape(i) = spline_shape(group%text('interpolation'))
         first(i + 1) = size(driving) + 1
       end associate
     end do
     call append_bank(banks, new_relation_rows(groups%lanes, groups%names, groups%bodies('bodies', 2), first, &
-                                              transpose(reshape([driving, driven], [size(driving), 2])), repeats))
+                                              transpose(reshape([driving, driven], [size(driving), 2])), repeats, shape))
     call append_bank(banks, new_phases(groups%lanes, groups%names, groups%bodies('bodies', 1)))
   end subroutine add_relations
 
@@ -191,19 +205,51 @@ contains
     type(element_groups_t), intent(in) :: groups
     logical, intent(in) :: are_angles
     type(curve_t), allocatable :: tables(:, :)
-    integer :: i
+    character(len=:), allocatable :: key
+    integer :: beyond, i, lane
 
+    key = 'table_speed'
+    beyond = extrapolation_constant
     if (are_angles) then
-      allocate (tables(groups%lanes, size(groups%indices)))
-      do i = 1, size(groups%indices)
-        associate (group => groups%input%groups(groups%indices(i)))
-          tables(:, i) = new_curve(group%numbers('table_time'), group%numbers('table_angle'), interpolation_cubic, &
-                                   extrapolation_linear)
-        end associate
-      end do
-    else
-      tables = groups%curves('table_time', 'table_speed', 'constant')
+      key = 'table_angle'
+      beyond = extrapolation_linear
     end if
+    allocate (tables(groups%lanes, size(groups%indices)))
+    do i = 1, size(groups%indices)
+      associate (group => groups%input%groups(groups%indices(i)))
+        tables(1, i) = new_curve(group%numbers('table_time'), group%numbers(key), drive_interpolation(group), beyond)
+      end associate
+      do lane = 2, groups%lanes
+        tables(lane, i) = tables(1, i)
+      end do
+    end do
   end function drive_tables
+
+  !> Interpolation of the table of a drive: what it asks for, else lines between speeds, a spline through angles.
+  pure integer function drive_interpolation(group) result(interpolation)
+    type(group_t), intent(in) :: group
+
+    interpolation = merge(interpolation_spline, interpolation_linear, group%text('kind') == 'angle')
+    if (.not. group%has_value('interpolation')) return
+    select case (group%text('interpolation'))
+    case ('linear')
+      interpolation = interpolation_linear
+    case ('cubic')
+      interpolation = interpolation_cubic
+    case ('dwells')
+      interpolation = interpolation_dwells
+    case default
+      interpolation = interpolation_spline
+    end select
+  end function drive_interpolation
+
+  !> Shape of a spline by the word of its interpolation.
+  pure integer function spline_shape(word) result(shape)
+    character(len=*), intent(in) :: word
+
+    shape = spline_smooth
+    if (word == 'dwells') shape = spline_dwells
+    if (word == 'cubic') shape = spline_monotone
+  end function spline_shape
 
 end module nocdyn_motion_assembly

@@ -14,6 +14,7 @@ module nocdyn_relation_rows
   type, extends(moving_rows_t), public :: relation_rows_t
     integer, allocatable :: points(:)          !! first point of each element, [elements + 1]
     logical, allocatable :: repeats(:)         !! whether its table does, [elements]
+    integer, allocatable :: shape(:)           !! spline_..., [elements]
     type(spline_t), allocatable :: spline(:)   !! of each element, in the first lane
   contains
     procedure :: motion
@@ -23,13 +24,14 @@ module nocdyn_relation_rows
 contains
 
   !> A bank of relations; their first bodies are the drivers.
-  function new_relation_rows(lanes, names, driven, first, points, repeats) result(bank)
+  function new_relation_rows(lanes, names, driven, first, points, repeats, shape) result(bank)
     integer, intent(in) :: lanes
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: driven(:)        !! the second bodies
     integer, intent(in) :: first(:)         !! first point of each relation, [relations + 1]
     real(wp), intent(in) :: points(:, :)    !! angles of the first and second bodies [rad], [2, points]
     logical, intent(in) :: repeats(:)       !! [relations]
+    integer, intent(in) :: shape(:)         !! spline_..., [relations]
     type(relation_rows_t) :: bank
     integer :: e, k
 
@@ -37,6 +39,7 @@ contains
     allocate (bank%spline(size(driven)))
     bank%points = first
     bank%repeats = repeats
+    bank%shape = shape
     associate (owner => [((e, k=first(e), first(e + 1) - 1), e=1, size(driven))])
       call bank%add_parameter('driving', spread(points(1, :), 1, lanes), .false., owner)
       call bank%add_parameter('driven', spread(points(2, :), 1, lanes), .false., owner)
@@ -54,7 +57,7 @@ contains
     do e = 1, self%count
       associate (first => self%points(e), last => self%points(e + 1) - 1)
         self%spline(e) = new_spline(self%parameters(1)%value(1, first:last), self%parameters(2)%value(1, first:last), &
-                                    self%repeats(e))
+                                    self%repeats(e), self%shape(e))
       end associate
     end do
   end subroutine refresh_lane

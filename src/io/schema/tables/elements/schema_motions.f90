@@ -3,11 +3,12 @@ module nocdyn_schema_motions
   use nocdyn_kinds, only: wp
   use nocdyn_schema_rules, only: a_body, a_file, a_name, a_number, a_selector, a_word, allowed_t, an_integer, any_number, &
     any_times, anything, at_most_one, columns, equal_lengths, example_t, exactly_one, group_rule_t, in_machine, in_torques, &
-    interpolations, key_rule_t, kind_rule_t, less_than, not_negative, positive, relation_rule_t, required, requires, unset
+    key_rule_t, kind_rule_t, less_than, not_negative, positive, relation_rule_t, required, requires, unset
   implicit none (type, external)
   private
 
-  character(len=*), parameter :: linear = "'linear'"
+  type(allowed_t), parameter :: spline_shapes = allowed_t(words='spline dwells cubic')
+  type(allowed_t), parameter :: drive_shapes = allowed_t(words='linear spline dwells cubic')
   type(allowed_t), parameter :: below_right_angle = allowed_t(low=0.0_wp, high=1.57_wp)   ! [rad]
 
   type(allowed_t), parameter :: strokes = allowed_t(low=2.0_wp, high=4.0_wp)
@@ -87,6 +88,8 @@ module nocdyn_schema_motions
       'angles of the second body', fewest=3), &
     key_rule_t('relation',   'table_file',      a_file,         1, '',            unset,       anything, &
       'two columns, the angles of both [rad]'), &
+    key_rule_t('relation',   'interpolation',   a_word,         1, '',            "'spline'",  spline_shapes, &
+      'a spline; splines between dwells, which stay; or a monotone cubic, whose accelerations jump'), &
     key_rule_t('drive',      'name',            a_name,         1, '',            required,    anything, &
       'name in messages and results'), &
     key_rule_t('drive',      'body',            a_body,         1, '',            required,    anything, &
@@ -100,11 +103,11 @@ module nocdyn_schema_motions
     key_rule_t('drive',      'table_speed',     a_number,       any_number, 'rad/s', unset,    anything, &
       'speed at these times, with ramps between them; constant before the first and after the last', 'speed', fewest=2), &
     key_rule_t('drive',      'table_angle',     a_number,       any_number, 'rad', unset,      anything, &
-      'angle at these times; a monotone cubic between them, straight on beyond them', 'angle', fewest=2), &
+      'angle at these times; a spline between them, straight on beyond them', 'angle', fewest=2), &
     key_rule_t('drive',      'table_file',      a_file,         1, '',            unset,       anything, &
       'two columns, time [s] and speed [rad/s] or angle [rad]'), &
-    key_rule_t('drive',      'interpolation',   a_word,         1, '',            linear,      interpolations, &
-      'of the speed between points: straight lines, or the monotone cubic of Fritsch and Butland', 'speed'), &
+    key_rule_t('drive',      'interpolation',   a_word,         1, '',            unset,       drive_shapes, &
+      'as of &relation; if not given straight lines between speeds and a spline through angles'), &
     key_rule_t('drive',      'speed_amplitude', a_number,       1, 'rad/s',       unset,       anything, &
       'amplitude of a sine that is added', 'speed'), &
     key_rule_t('drive',      'angle_amplitude', a_number,       1, 'rad',         unset,       anything, &
