@@ -120,8 +120,8 @@ ERRORS = ((20, 1e-6, 0.0), (40, 2e-7, 0.7))
 WHEELS = f"""\
 &body name = 'one' inertia = {INERTIAS[0]} speed_rpm = 3000 /
 &body name = 'two' inertia = {INERTIAS[1]} speed_rpm = INTERNAL1500 /
-&mesh name = 'teeth' bodies = 'one', 'two' teeth = 20, 40 module = 0.005 pressure_angle = 0 stiffness = {STIFFNESS} damping = {DAMPING}
-  transmission_error = 1e-6, 2e-7 error_phases = 0, 0.7 /
+&mesh name = 'teeth' bodies = 'one', 'two' teeth = 20, 40 module = 0.005 pressure_angle = 0
+  stiffness = {STIFFNESS} damping = {DAMPING} transmission_error = 1e-6, 2e-7 error_phases = 0, 0.7 /
 &run t_end = 1 /
 &response body = 'one' speed_rpm = 500, 8000 count = 16 /
 """

@@ -52,8 +52,8 @@ contains
     associate (share => left_out / max(maxval(abs(sample)), tiny(1.0_wp)))
       if (share <= worth_noting) return
       call append(notes, group%kind // ' ' // quoted(group%name) // ': harmonics_up_to = ' // &
-                  to_text(group%number('harmonics_up_to')) // ' leaves out up to ' // rounded_text(left_out, 3) // ' ' // what // &
-                  ', ' // rounded_text(100 * share, 2) // ' % of its largest value')
+                  to_text(group%number('harmonics_up_to')) // ' leaves out up to ' // rounded_text(left_out, 3) // ' ' // &
+                  what // ', ' // rounded_text(100 * share, 2) // ' % of its largest value')
     end associate
   end subroutine add_note
 

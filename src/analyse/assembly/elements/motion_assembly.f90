@@ -44,16 +44,22 @@ contains
     character(len=:), allocatable :: text
 
     associate (group => input%groups(index))
-      if (group%text('kind') == 'angle' .and. group%has_value('interpolation')) then
-        if (group%text('interpolation') == 'linear') call raise(error, exit_input, input%location(index, 'interpolation') // &
-          ": interpolation = 'linear' with kind = 'angle': the speed would jump at the points, which needs an infinite " // &
-          "torque; allowed: spline, dwells, cubic")
+      if (is_polygon_of_angles(group)) then
+        call raise(error, exit_input, input%location(index, 'interpolation') // ": interpolation = 'linear' with kind = " // &
+                   "'angle': the speed would jump at the points, which needs an infinite torque; allowed: spline, dwells, cubic")
+        return
       end if
-      if (allocated(error)) return
       call find_jump(group, text)
       if (text /= '') call raise(error, exit_input, input%location(index, 'table_time') // ': table_time' // text)
     end associate
   end subroutine check_drive
+
+  pure logical function is_polygon_of_angles(group) result(is)
+    type(group_t), intent(in) :: group   !! &drive
+
+    is = group%text('kind') == 'angle' .and. group%has_value('interpolation')
+    if (is) is = group%text('interpolation') == 'linear'
+  end function is_polygon_of_angles
 
   !> What is wrong with the times of a drive, '' if nothing is.
   pure subroutine find_jump(group, text)

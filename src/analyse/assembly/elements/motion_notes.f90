@@ -27,8 +27,9 @@ contains
       associate (group => input%groups(i))
         select case (group%kind)
         case ('relation')
-          if (spline_shape(group%text('interpolation')) == spline_smooth) &
+          if (spline_shape(group%text('interpolation')) == spline_smooth) then
             call note_dwells(group, 'table_angle', 'table_driven', group%text('kind') /= 'lever', notes)
+          end if
         case ('drive')
           if (.not. group%has_value('table_time')) cycle
           if (group%text('kind') == 'angle') then
