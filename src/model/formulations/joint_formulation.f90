@@ -176,8 +176,8 @@ contains
     integer, intent(in) :: which        !! the joint, or by_state: those without slip are at rest
     real(wp), intent(in) :: t           !! [s]
     real(wp), intent(inout) :: y(:)     !! [states] at least
-    logical :: is_at_rest(self%joints%count), is_solved, is_struck
-    real(wp) :: slip(self%joints%count), moments, speed
+    logical :: has_stopped, is_at_rest(self%joints%count), is_solved, is_struck
+    real(wp) :: slip(self%joints%count), moments, resting(size(y)), speed
     integer :: j
 
     associate (joints => self%joints, elements => self%machine%elements)
@@ -191,12 +191,17 @@ contains
         if (which /= by_state .and. .not. is_struck) is_at_rest(j) = is_at_rest(j) .or. joints%mode(j) == locked &
                                                                      .or. (j == which .and. joints%has_stopped(j, slip(j)))
       end do
+      has_stopped = .false.
+      if (which /= by_state) has_stopped = joints%mode(which) /= locked .and. is_at_rest(which)
       call joints%assume(self%machine%banks, is_at_rest, slip)
-      call self%find_held_moments(t, y(:self%states))
-      call joints%decide(self%machine%banks, t, is_at_rest, slip, is_solved)
+      resting = y
+      if (has_stopped) call bring_to_rest(self, rest_width * speed, resting, is_at_rest, slip)
+      call self%find_held_moments(t, resting(:self%states))
+      call self%clean_rates()
       moments = sum(abs(elements%applied(1, :))) + sum(abs(elements%restoring(1, :)))
       joints%moment_shift = boundary_shift * max(moments, tiny(moments))
-      call joints%teeth%shift_boundaries(elements)
+      call joints%decide(self%machine%banks, t, is_at_rest, slip, is_solved)
+      call joints%teeth%shift_boundaries(elements, joints%moment_errors())
       call self%hold(joints%motions%speed, y)
       do j = 1, joints%count
         if (is_at_rest(j) .and. joints%mode(j) /= locked) then   ! a drive may leave it a slip in the other direction
@@ -206,6 +211,31 @@ contains
       end do
     end associate
   end subroutine settle_joints
+
+  !> The state after a joint has stopped, in which those at rest have no slip that is left, so that no acceleration comes from one.
+  !> Others are at rest as well that they now hold there: of joints that stop at one time, the first one stops them all.
+  subroutine bring_to_rest(self, tolerance, y, is_at_rest, slip)
+    class(joint_formulation_t), intent(inout) :: self
+    real(wp), intent(in) :: tolerance             !! of a slip that is none [rad/s]
+    real(wp), intent(inout) :: y(:)               !! [states] at least
+    logical, intent(inout) :: is_at_rest(:)       !! [joints], assumed
+    real(wp), intent(inout) :: slip(:)            !! [rad/s], [joints]
+    real(wp), parameter :: near = 1.0e3_wp        ! times the tolerance: from farther off it is not brought
+    integer :: j
+    logical :: is_changed
+
+    associate (joints => self%joints)
+      call self%hold(joints%motions%speed, y(:size(self%moving)))
+      is_changed = .false.
+      do j = 1, joints%locking
+        if (is_at_rest(j) .or. abs(slip(j)) > near * tolerance) cycle
+        slip(j) = self%joint_rate(j, y)
+        is_at_rest(j) = abs(slip(j)) <= tolerance
+        is_changed = is_changed .or. is_at_rest(j)
+      end do
+      if (is_changed) call joints%assume(self%machine%banks, is_at_rest, slip)
+    end associate
+  end subroutine bring_to_rest
 
   !> Changes the speeds where joints lock with a slip. The energy that is lost is work of these joints.
   subroutine strike(self, t, tolerance, y, is_struck)

@@ -311,11 +311,13 @@ contains
         call bank%share(self%number(j), .false., speed, choices%driven(j), slope)
       end select
     end do
+    choices%most_beyond = 0.1_wp * self%moment_shift
     call choices%choose()
     self%mode(:) = choices%mode
     self%moment(:) = choices%moment
     is_solved = choices%doubtful == 0
     if (.not. is_solved) self%lost = choices%doubtful
+    if (choices%jammed > 0) self%lost = choices%jammed
   end subroutine decide_with_teeth
 
   !> The moments between which a joint is at rest, and those of its slips forwards and backwards.
