@@ -15,7 +15,8 @@ module nocdyn_bounded_complementarity
   public :: solve_bounded_complementarity, solve_scaled_complementarity
 
   integer, parameter, public :: is_free = 0, at_lower = -1, at_upper = 1   !! where a force is
-  real(wp), parameter :: rounding = 1.0e-12_wp                             ! of a, relative to the largest of its terms
+  real(wp), parameter :: rounding = 1.0e-12_wp                             ! of a, relative to the sum of its terms
+  real(wp), parameter :: mixed = 1.0e-2_wp                                 ! of the largest terms, in those of all a
   real(wp), parameter :: inconsistent = 1.0e-7_wp                          ! a of free forces that none can make zero, likewise
   real(wp), parameter :: far = 1.0e30_wp                                   ! beyond all bounds that are not huge
 
@@ -45,7 +46,7 @@ contains
       where (state == at_lower) wrong = -a
       where (state == at_upper) wrong = a
       where (upper <= lower) wrong = 0.0_wp
-      where (wrong <= rounding * (abs(b) + matmul(abs(w), abs(x)))) wrong = 0.0_wp
+      where (wrong <= rounding * sizes_of_terms(w, b, x)) wrong = 0.0_wp
       is_solved = all(wrong <= 0)
       if (is_solved) return
       worst = maxloc(wrong, dim=1)
@@ -79,6 +80,19 @@ contains
     a = a / scale
   end subroutine solve_scaled_complementarity
 
+  !> The sizes of the terms of all a, of which their rounding errors are parts. The forces come from equations that mix them:
+  !> those without a load have errors of the largest ones, by the square roots of the diagonal of W, in which units cancel.
+  pure function sizes_of_terms(w, b, x) result(sizes)
+    real(wp), intent(in) :: w(:, :), b(:), x(:)   !! as in `solve_bounded_complementarity`
+    real(wp) :: sizes(size(b))
+    integer :: i
+    real(wp) :: root(size(b))
+
+    root = [(sqrt(max(w(i, i), tiny(1.0_wp))), i=1, size(b))]
+    sizes = [(abs(b(i)) + sum(abs(w(i, :) * x)), i=1, size(b))]
+    if (size(b) > 0) sizes = max(sizes, mixed * root * maxval(sizes / root))
+  end function sizes_of_terms
+
   !> Moves the free forces to where their a is zero; those that reach a bound on the way stay there.
   subroutine move_free(w, b, lower, upper, x, state, is_endless)
     real(wp), intent(in) :: w(:, :), b(:), lower(:), upper(:)   !! as in `solve_bounded_complementarity`
@@ -87,7 +101,7 @@ contains
     logical, intent(out) :: is_endless   !! whether no forces make the a of the free ones zero
     integer, allocatable :: bound(:), free(:)
     real(wp), allocatable :: rest(:), wanted(:)
-    real(wp) :: share, step
+    real(wp) :: share, sizes(size(b)), step
     integer :: first, i
 
     is_endless = .false.
@@ -98,7 +112,9 @@ contains
       bound = pack([(i, i=1, size(x))], state /= is_free)
       wanted = -matmul(pseudo_inverse(w(free, free), null_tolerance), matmul(w(free, bound), x(bound)) + b(free))
       rest = matmul(w(free, free), wanted) + matmul(w(free, bound), x(bound)) + b(free)
-      is_endless = maxval(abs(rest)) > inconsistent * (maxval(abs(b(free))) + maxval(abs(matmul(w(free, bound), x(bound)))))
+      sizes = sizes_of_terms(w, b, x)
+      is_endless = maxval(abs(rest)) > inconsistent * (maxval(abs(b(free))) + maxval(abs(matmul(w(free, bound), x(bound))))) &
+                   .and. any(abs(rest) > rounding * sizes(free))
       if (is_endless) wanted = x(free) - far * rest / maxval(abs(rest))   ! without resistance a force grows up to a bound
       step = 1.0_wp
       first = 0

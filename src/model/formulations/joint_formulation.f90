@@ -170,33 +170,28 @@ contains
   end function speed_scale
 
   !> Decides which joints are locked at a state of a block of one lane: of those that are at rest, the one that has just come to
-  !> rest or reached its capacity among them. Slips that are left over from rounding are taken out of the speeds.
+  !> rest or reached its capacity among them. Slips that are left over from rounding are taken out of the speeds. Teeth that jam
+  !> are stopped in an event, by which the others are looked at again.
   subroutine settle_joints(self, which, t, y)
     class(joint_formulation_t), intent(inout) :: self
     integer, intent(in) :: which        !! the joint, or by_state: those without slip are at rest
     real(wp), intent(in) :: t           !! [s]
     real(wp), intent(inout) :: y(:)     !! [states] at least
-    logical :: is_at_rest(self%joints%count), is_solved, is_struck
-    real(wp) :: slip(self%joints%count), moments, speed
-    integer :: j
+    logical :: is_at_rest(self%joints%count), is_struck
+    real(wp) :: speed
+    integer :: j, turn
 
-    associate (joints => self%joints, elements => self%machine%elements)
-      if (joints%motions%count > 0) call self%project(t, y)
-      speed = speed_scale(self, y)
-      is_struck = .false.
-      if (which /= by_state) call strike(self, t, rest_width * speed, y, is_struck)
-      do j = 1, joints%count
-        slip(j) = self%joint_rate(j, y)
-        is_at_rest(j) = abs(slip(j)) <= rest_width * speed .or. j > joints%locking
-        if (which /= by_state .and. .not. is_struck) is_at_rest(j) = is_at_rest(j) .or. joints%mode(j) == locked &
-                                                                     .or. (j == which .and. joints%has_stopped(j, slip(j)))
+    associate (joints => self%joints)
+      if (which /= by_state) joints%impulse(:) = 0.0_wp
+      do turn = 0, joints%teeth%count
+        if (joints%motions%count > 0) call self%project(t, y)
+        speed = speed_scale(self, y)
+        is_struck = turn > 0
+        if (which /= by_state) call strike(self, t, rest_width * speed, y, is_struck)
+        call decide_at(self, merge(by_state, which, is_struck), t, y, is_at_rest)
+        if (which == by_state .or. .not. any(joints%is_jammed)) exit
       end do
-      call joints%assume(self%machine%banks, is_at_rest, slip)
-      call self%find_held_moments(t, y(:self%states))
-      call joints%decide(self%machine%banks, t, is_at_rest, slip, is_solved)
-      moments = sum(abs(elements%applied(1, :))) + sum(abs(elements%restoring(1, :)))
-      joints%moment_shift = boundary_shift * max(moments, tiny(moments))
-      call joints%teeth%shift_boundaries(elements)
+      call joints%teeth%shift_boundaries(self%machine%elements, joints%moment_errors())
       call self%hold(joints%motions%speed, y)
       do j = 1, joints%count
         if (is_at_rest(j) .and. joints%mode(j) /= locked) then   ! a drive may leave it a slip in the other direction
@@ -207,35 +202,95 @@ contains
     end associate
   end subroutine settle_joints
 
+  !> Decides the modes at a state.
+  subroutine decide_at(self, which, t, y, is_at_rest)
+    class(joint_formulation_t), intent(inout) :: self
+    integer, intent(in) :: which                !! as in `settle_joints`; by_state also after an impact
+    real(wp), intent(in) :: t                   !! [s]
+    real(wp), intent(in) :: y(:)                !! [states] at least
+    logical, intent(out) :: is_at_rest(:)       !! [joints]
+    logical :: has_stopped, is_solved
+    real(wp) :: moments, resting(size(y)), slip(self%joints%count), tolerance
+    integer :: j
+
+    associate (joints => self%joints, elements => self%machine%elements)
+      tolerance = rest_width * speed_scale(self, y)
+      do j = 1, joints%count
+        slip(j) = self%joint_rate(j, y)
+        is_at_rest(j) = abs(slip(j)) <= tolerance .or. j > joints%locking
+        if (which /= by_state) is_at_rest(j) = is_at_rest(j) .or. joints%mode(j) == locked &
+                                               .or. (j == which .and. joints%has_stopped(j, slip(j)))
+      end do
+      has_stopped = .false.
+      if (which /= by_state) has_stopped = joints%mode(which) /= locked .and. is_at_rest(which)
+      call joints%assume(self%machine%banks, is_at_rest, slip)
+      resting = y
+      if (has_stopped) call bring_to_rest(self, tolerance, resting, is_at_rest, slip)
+      call self%find_held_moments(t, resting(:self%states))
+      call self%clean_rates()
+      moments = sum(abs(elements%applied(1, :))) + sum(abs(elements%restoring(1, :)))
+      joints%moment_shift = boundary_shift * max(moments, tiny(moments))
+      call joints%decide(self%machine%banks, t, is_at_rest, slip, is_solved)
+    end associate
+  end subroutine decide_at
+
+  !> The state after a joint has stopped, in which those at rest have no slip that is left, so that no acceleration comes from one.
+  !> Others are at rest as well that they now hold there: of joints that stop at one time, the first one stops them all.
+  subroutine bring_to_rest(self, tolerance, y, is_at_rest, slip)
+    class(joint_formulation_t), intent(inout) :: self
+    real(wp), intent(in) :: tolerance             !! of a slip that is none [rad/s]
+    real(wp), intent(inout) :: y(:)               !! [states] at least
+    logical, intent(inout) :: is_at_rest(:)       !! [joints], assumed
+    real(wp), intent(inout) :: slip(:)            !! [rad/s], [joints]
+    real(wp), parameter :: near = 1.0e3_wp        ! times the tolerance: from farther off it is not brought
+    integer :: j
+    logical :: is_changed
+
+    associate (joints => self%joints)
+      call self%hold(joints%motions%speed, y(:size(self%moving)))
+      is_changed = .false.
+      do j = 1, joints%locking
+        if (is_at_rest(j) .or. abs(slip(j)) > near * tolerance) cycle
+        slip(j) = self%joint_rate(j, y)
+        is_at_rest(j) = abs(slip(j)) <= tolerance
+        is_changed = is_changed .or. is_at_rest(j)
+      end do
+      if (is_changed) call joints%assume(self%machine%banks, is_at_rest, slip)
+    end associate
+  end subroutine bring_to_rest
+
   !> Changes the speeds where joints lock with a slip. The energy that is lost is work of these joints.
   subroutine strike(self, t, tolerance, y, is_struck)
     class(joint_formulation_t), intent(inout) :: self
     real(wp), intent(in) :: t            !! [s]
     real(wp), intent(in) :: tolerance    !! of a slip that is none [rad/s]
     real(wp), intent(inout) :: y(:)      !! [states] at least
-    logical, intent(out) :: is_struck
-    real(wp), dimension(self%joints%count) :: before, slip
+    logical, intent(inout) :: is_struck   !! set where there are any
+    real(wp), dimension(self%joints%count) :: before, impulse, slip
     integer :: j, work
+    logical :: is_hit
 
     associate (joints => self%joints, elements => self%machine%elements)
       before = [(self%joint_rate(j, y), j=1, joints%count)]
       slip = before
       slip(joints%locking + 1:) = 0.0_wp
-      call joints%find_impact(self%machine%banks, t, slip, tolerance, joints%impulse, is_struck)
-      if (.not. is_struck) return
+      call joints%find_impact(self%machine%banks, t, slip, tolerance, impulse, is_hit)
+      if (.not. is_hit) return
+      is_struck = .true.
+      joints%impulse(:) = joints%impulse + impulse
       do j = 1, joints%locking
-        if (abs(joints%impulse(j)) <= 0) cycle
+        if (abs(impulse(j)) <= 0) cycle
         if (has_other_ratio(self%machine%coordinates, elements%rows, joints%element(j))) joints%lost = j
       end do
       do j = 1, joints%count
-        call self%push(j, joints%impulse(j), y)
+        call self%push(j, impulse(j), y)
       end do
       if (size(y) <= self%states) return
       do j = 1, joints%count
         work = findloc(self%machine%with_work, joints%element(j), dim=1)
         if (work == 0) cycle   ! it has none
         work = self%states + work
-        y(work) = y(work) + 0.5_wp * joints%impulse(j) * (before(j) + self%joint_rate(j, y))
+        y(work) = y(work) + 0.5_wp * impulse(j) * (before(j) + self%joint_rate(j, y))
       end do
     end associate
   end subroutine strike

@@ -31,6 +31,7 @@ module nocdyn_row_formulation
     procedure :: find_accelerations
     procedure, private :: hold_accelerations
     procedure :: find_held_moments
+    procedure :: clean_rates
     procedure :: add_powers
     procedure :: differentiate_rows
     procedure :: hold_derivative
@@ -210,6 +211,38 @@ contains
       end do
     end associate
   end subroutine hold
+
+  !> Sets the accelerations of the joints without those that hold to zero where they are rounding errors of what the elements
+  !> do to them, and so the torques of teeth; after `find_held_moments`. What has no load then is free of any.
+  subroutine clean_rates(self)
+    class(row_formulation_t), intent(inout) :: self
+    real(wp), parameter :: rounding = 64.0_wp * epsilon(1.0_wp)
+    real(wp), dimension(self%machine%elements%count) :: moment
+    real(wp) :: size_of_terms(self%joints%count), response(size(self%moving))
+    integer :: e, j
+
+    associate (joints => self%joints, elements => self%machine%elements)
+      moment = abs(elements%applied(1, :)) + abs(elements%restoring(1, :))
+      do j = 1, joints%count
+        if (.not. joints%is_active(j, .true.)) cycle
+        moment(joints%element(j)) = 0.0_wp
+        if (joints%driver(j) > 0) moment(joints%driver(j)) = 0.0_wp
+      end do
+      size_of_terms = 0.0_wp
+      size_of_terms(joints%locking + 1:) = abs(joints%motions%acceleration)
+      do e = 1, elements%count
+        if (moment(e) <= 0) cycle
+        response = 0.0_wp
+        call self%push_element(e, moment(e), response)
+        do j = 1, joints%count
+          size_of_terms(j) = size_of_terms(j) + abs(self%joint_rate(j, response))
+        end do
+      end do
+      where (abs(joints%rate) <= rounding * size_of_terms) joints%rate = 0.0_wp
+      if (joints%teeth%count == 0) return
+      where (abs(joints%teeth%applied) <= rounding * matmul(abs(joints%teeth%by_moment), moment)) joints%teeth%applied = 0.0_wp
+    end associate
+  end subroutine clean_rates
 
   !> Adds the powers of prescribed motions, and of teeth with losses, to those of the elements.
   subroutine add_powers(self, powers)

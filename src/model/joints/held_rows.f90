@@ -62,6 +62,7 @@ module nocdyn_held_rows
     procedure :: weigh
     procedure :: change_set
     procedure :: find_moments
+    procedure :: moment_errors
     procedure :: nearly_lost
     procedure :: partners
     procedure :: is_active
@@ -253,6 +254,19 @@ contains
     end if
     self%has_factors = .true.
   end subroutine factor_with_teeth
+
+  !> Bounds of the rounding errors of the present moments: equations that mix them give all errors of the largest ones, in the unit
+  !> of the square roots of the diagonal of W.
+  pure function moment_errors(self) result(error)
+    class(held_rows_t), intent(in) :: self
+    real(wp) :: error(self%count)   !! [N m]
+    real(wp), parameter :: rounding = 64.0_wp * epsilon(1.0_wp)
+    integer :: j
+    real(wp) :: root(self%count)
+
+    root = [(merge(sqrt(abs(self%weight(j, j))), 1.0_wp, self%weight(j, j) > 0), j=1, self%count)]
+    error = rounding * maxval(abs(self%moment) * root) / root
+  end function moment_errors
 
   !> A row that moves and is a combination of others, or almost one, at the last position; 0: none.
   pure integer function nearly_lost(self)

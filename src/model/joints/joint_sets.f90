@@ -31,6 +31,7 @@ module nocdyn_joint_sets
                                                       !! the state
     real(wp), allocatable :: impulse(:)      !! of the last impact [N m s]; 0 after other events
     real(wp), allocatable :: shift(:)        !! by which the boundary of a slip lies beyond zero [rad/s]
+    logical, allocatable :: is_jammed(:)     !! teeth that turn and stop at once, by an impulse
     real(wp) :: moment_shift = 0.0_wp        !! by which those of the moments lie beyond their ranges [N m]
     type(joint_log_t) :: log                 !! of the motion
   contains
@@ -81,6 +82,7 @@ contains
     self%teeth = new_tooth_loads(banks, self%bank, self%number, elements)
     call self%allocate_rows(slips_forwards)
     allocate (self%shift(self%count), self%impulse(self%count), source=0.0_wp)
+    allocate (self%is_jammed(self%count), source=.false.)
     self%log = new_joint_log()
   end function new_joint_sets
 
@@ -190,8 +192,8 @@ contains
     is_unbounded = abs(moment) >= huge(moment)
   end function is_unbounded
 
-  !> The impulses that end slips which joints without bounds do not allow; those of others are zero, as friction has no time. A
-  !> slip that none can end is `lost`: another joint or a drive does not let it.
+  !> The impulses that end slips which joints without bounds do not allow, and those of teeth that jam; those of others are zero, as
+  !> friction has no time. A slip that none can end is `lost`: another joint or a drive does not let it.
   subroutine find_impact(self, banks, t, slip, tolerance, impulse, is_struck)
     class(joint_sets_t), intent(inout) :: self
     type(bank_slot_t), intent(in) :: banks(:)
@@ -209,6 +211,10 @@ contains
     do j = 1, self%count
       call find_ranges(self, banks, j, t, least(j), most(j), sliding)
     end do
+    where (self%is_jammed)
+      least = -huge(1.0_wp)
+      most = huge(1.0_wp)
+    end where
     where (.not. is_unbounded(least)) least = 0.0_wp
     where (.not. is_unbounded(most)) most = 0.0_wp
     is_wrong = (slip > tolerance .and. is_unbounded(least)) .or. (slip < -tolerance .and. is_unbounded(most))
@@ -216,6 +222,7 @@ contains
     if (.not. is_struck) return
     call solve_bounded_complementarity(self%weight, slip, least, most, impulse, slip_after, state, is_solved)
     if (.not. is_solved) self%lost = findloc(is_wrong, .true., dim=1)
+    self%is_jammed(:) = .false.
   end subroutine find_impact
 
   !> Whether the accelerations of the joints, after `find_moments`, move a joint whose slip has ended.
@@ -316,11 +323,13 @@ contains
         call bank%share(self%number(j), .false., speed, choices%driven(j), slope)
       end select
     end do
+    choices%most_beyond = 0.1_wp * self%moment_shift
     call choices%choose()
     self%mode(:) = choices%mode
     self%moment(:) = choices%moment
     is_solved = choices%doubtful == 0
     if (.not. is_solved) self%lost = choices%doubtful
+    if (choices%jammed > 0) self%is_jammed(choices%jammed) = .true.
   end subroutine decide_with_teeth
 
   !> The moments between which a joint is at rest, and those of its slips forwards and backwards.
@@ -379,7 +388,9 @@ contains
 
     call find_ranges(self, banks, joint, t, least, most, sliding)
     associate (mode => self%mode(joint), moment => self%moment(joint))
-      if (mode == locked) then
+      if (self%is_jammed(joint)) then
+        g = -1.0_wp   ! an impulse is due
+      else if (mode == locked) then
         g = min(most - moment, moment - least) + self%moment_shift
       else if (mode == idle) then
         g = self%shift(joint) - abs(slip)

@@ -193,14 +193,15 @@ contains
   end subroutine add_moments
 
   !> Shifts the boundaries of T beyond its rounding errors.
-  pure subroutine shift_boundaries(self, elements)
+  pure subroutine shift_boundaries(self, elements, error)
     class(tooth_loads_t), intent(inout) :: self
     type(elements_t), intent(in) :: elements
+    real(wp), intent(in) :: error(:)          !! of the moments of the joints [N m], [joints]
     real(wp), parameter :: width = 1.0e-11_wp   ! relative to the terms of T
 
     if (self%count == 0) return
     self%shift(:) = width * matmul(abs(self%by_moment), abs(elements%restoring(1, :)) + abs(elements%applied(1, :)))
-    self%shift(:) = max(self%shift, mixed * maxval(self%shift), tiny(width))
+    self%shift(:) = max(self%shift, mixed * maxval(self%shift), matmul(abs(self%by_joint), error), tiny(width))
   end subroutine shift_boundaries
 
 end module nocdyn_tooth_loads
