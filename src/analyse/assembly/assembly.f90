@@ -38,10 +38,12 @@ contains
     call note_rated_motors(input, machine%start_notes)
   end subroutine assemble_machine
 
-  !> Builds the machine as it is in a steady state: with means over a turn, and with locked joints as constraint rows.
-  recursive subroutine assemble_steady_machine(input, t, machine, error)
+  !> Builds the machine as it is in a steady state: with means over a turn, and, if it is asked for, with clutches and freewheels
+  !> that are locked as constraint rows.
+  recursive subroutine assemble_steady_machine(input, t, locks_joints, machine, error)
     type(input_t), intent(inout) :: input   !! afterwards it says which joints are open
     real(wp), intent(in) :: t               !! the time at which clutches are engaged or not [s]
+    logical, intent(in) :: locks_joints     !! whether locked joints are rows
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
     logical :: is_changed
@@ -49,6 +51,7 @@ contains
 
     input%takes_means = .true.
     input%means_at = t
+    input%locks_joints = locks_joints
     if (allocated(input%overruns)) deallocate (input%overruns)
     allocate (input%overruns(size(input%groups)), source=.false.)
     do trials = 0, 2 * size(input%groups_named('freewheel'))
@@ -58,7 +61,8 @@ contains
         call raise(error, exit_failed, input%shown_file() // ': ' // machine%simplifications(1)%text // ', so that nothing moves')
         return
       end if
-      call choose_overruns(input, machine, is_changed)
+      is_changed = .false.
+      if (locks_joints) call choose_overruns(input, machine, is_changed)
       if (.not. is_changed) exit
     end do
     if (is_changed) then
@@ -89,7 +93,7 @@ contains
       if (allocated(error)) return
       allocate (steady)
       view = input
-      call assemble_steady_machine(view, run%number('t_start'), steady, error)
+      call assemble_steady_machine(view, run%number('t_start'), .false., steady, error)
       if (.not. allocated(error)) call start_as(steady, machine)
     end associate
   end subroutine start_machine

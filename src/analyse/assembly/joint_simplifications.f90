@@ -57,7 +57,7 @@ contains
     end select
   end subroutine find_refusal
 
-  !> What an analysis about a steady state replaces, and which joints are locked there.
+  !> What an analysis about a steady state replaces, and which joints are locked there for good.
   subroutine list_simplifications(input, notes)
     type(input_t), intent(in) :: input
     type(string_t), allocatable, intent(out) :: notes(:)
@@ -72,6 +72,7 @@ contains
     do i = 1, size(input%groups)
       associate (group => input%groups(i))
         if (group%kind == 'clutch' .or. group%kind == 'freewheel') then
+          if (.not. input%locks_joints) cycle
           if (is_open_joint(input, i)) then
             call add_to(open, group)
           else
