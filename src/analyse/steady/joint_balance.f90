@@ -103,7 +103,7 @@ contains
     type(rigid_motions_t), intent(in) :: motions           !! which twist no element of `rigid`
     integer, intent(in) :: rigid(:)                        !! elements, [rigid]
     real(wp), allocatable :: by_moment(:, :)               !! [losses, elements], 0 of those that are rigid
-    real(wp), allocatable :: inertia(:, :), n(:, :), rows(:, :), torque(:, :)
+    real(wp), allocatable :: inertia(:, :), inverse(:, :), n(:, :), rows(:, :), torque(:, :)
     real(wp) :: weight(size(rigid))
     integer :: e, i
 
@@ -111,10 +111,14 @@ contains
     if (teeth%count == 0) return
     by_moment = teeth%by_moment
     allocate (n, source=dense_motions(motions))
-    allocate (inertia, source=matmul(mass_matrix(machine), n))
-    torque = -transpose(rates_of_elements(incidence, [(e, e=1, machine%elements%count)], size(n, 1)))
-    torque = torque - matmul(inertia, matmul(pseudo_inverse(matmul(transpose(n), inertia), singular), &
-                                             matmul(transpose(n), torque)))
+    allocate (inertia, source=mass_matrix(machine))
+    inertia = matmul(inertia, n)
+    allocate (rows, source=rates_of_elements(incidence, [(e, e=1, machine%elements%count)], size(n, 1)))
+    torque = -transpose(rows)
+    deallocate (rows)
+    allocate (inverse, source=pseudo_inverse(matmul(transpose(n), inertia), singular))
+    torque = torque - matmul(inertia, matmul(inverse, matmul(transpose(n), torque)))
+    deallocate (inverse)
     weight = sqrt(abs(machine%elements%restoring_angle(1, rigid)))
     if (size(weight) > 0) weight = max(weight, 1.0e-3_wp * maxval(weight))
     where (weight <= 0.0_wp) weight = 1.0_wp
@@ -122,7 +126,8 @@ contains
     do i = 1, size(rigid)
       rows(i, :) = weight(i) * rows(i, :)
     end do
-    torque = matmul(pseudo_inverse(transpose(rows), singular), torque)   ! moments of `rigid` by those of all
+    allocate (inverse, source=pseudo_inverse(transpose(rows), singular))
+    torque = matmul(inverse, torque)   ! moments of `rigid` by those of all
     by_moment = by_moment + matmul(teeth%by_moment(:, rigid), spread(weight, 2, size(torque, 2)) * torque)
     by_moment(:, rigid) = 0.0_wp
   end function loads_by_moments
@@ -182,10 +187,15 @@ contains
     real(wp), intent(in) :: free(:)      !! T without losses [N m], [losses]
     real(wp), intent(out) :: moment(:)   !! M [N m], [losses]
     logical, intent(out) :: is_wrong(:)
+    real(wp), dimension(size(moment), size(moment)) :: inverse, matrix
+    real(wp) :: drag(size(moment))
     integer :: i
 
     call self%set_shares(machine)
-    moment = -matmul(pseudo_inverse(self%loss_matrix(), singular), self%share * free)
+    matrix = self%loss_matrix()
+    inverse = pseudo_inverse(matrix, singular)
+    drag = self%share * free
+    moment = -matmul(inverse, drag)
     associate (own => self%element(self%teeth%joint))
       self%load = free + matmul(self%by_moment(:, own), moment)
       is_wrong = [(self%turns(i) .and. abs(self%load(i)) > 1.0e-12_wp * (abs(free(i)) + &
@@ -236,10 +246,14 @@ contains
   function change_of_losses(self, by_moments, by_speeds) result(change)
     class(joint_balance_t), intent(in) :: self
     real(wp), intent(in) :: by_moments(:), by_speeds(:)   !! [elements]
-    real(wp) :: change(self%teeth%count)
+    real(wp) :: change(self%teeth%count), drag(self%teeth%count)
+    real(wp), dimension(self%teeth%count, self%teeth%count) :: inverse, matrix
 
-    change = -matmul(pseudo_inverse(self%loss_matrix(), singular), self%share * matmul(self%by_moment, by_moments) &
-                     + self%share_slope * self%load * by_speeds(self%element(self%teeth%joint)))
+    matrix = self%loss_matrix()
+    inverse = pseudo_inverse(matrix, singular)
+    drag = self%share * matmul(self%by_moment, by_moments) &
+           + self%share_slope * self%load * by_speeds(self%element(self%teeth%joint))
+    change = -matmul(inverse, drag)
   end function change_of_losses
 
 end module nocdyn_joint_balance

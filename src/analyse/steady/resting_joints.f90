@@ -45,12 +45,15 @@ contains
     type(torque_balance_t), intent(in) :: balance        !! without joints at rest
     logical, allocatable, intent(out) :: sets(:, :)      !! [joints, sets]
     logical, intent(out) :: is_complete                  !! false: there are too many
+    real(wp), allocatable :: n(:, :), rows(:, :)
     real(wp) :: rates(balance%joints%count, size(balance%loose%free))
     logical :: is_candidate(size(rates, 1)), larger(size(rates, 1))
     integer :: i, j, next
 
     is_complete = .true.
-    rates = matmul(rates_of_elements(balance%incidence, balance%joints%element, balance%coordinates), dense_motions(balance%loose))
+    allocate (n, source=dense_motions(balance%loose))
+    allocate (rows, source=rates_of_elements(balance%incidence, balance%joints%element, balance%coordinates))
+    rates = matmul(rows, n)
     larger = .false.
     do j = 1, size(larger)
       call look_at_bounds(balance, j, is_candidate(j), larger(j))
@@ -135,14 +138,16 @@ contains
   function new_resting_joints(balance) result(self)
     type(torque_balance_t), intent(inout) :: balance
     type(resting_joints_t) :: self
-    real(wp), allocatable :: n(:, :)
+    real(wp), allocatable :: inertia(:, :), n(:, :), rows(:, :)
     integer :: e
 
     allocate (n, source=dense_motions(balance%loose))
     associate (machine => balance%formulation%machine)
-      allocate (self%mobility, source=pseudo_inverse(matmul(transpose(n), matmul(mass_matrix(machine), n)), singular))
-      allocate (self%by_element, source=matmul(rates_of_elements(balance%incidence, [(e, e=1, machine%elements%count)], &
-                                                                 balance%coordinates), n))
+      allocate (inertia, source=mass_matrix(machine))
+      inertia = matmul(transpose(n), matmul(inertia, n))
+      allocate (self%mobility, source=pseudo_inverse(inertia, singular))
+      allocate (rows, source=rates_of_elements(balance%incidence, [(e, e=1, machine%elements%count)], balance%coordinates))
+      allocate (self%by_element, source=matmul(rows, n))
       allocate (self%rates, source=self%by_element(balance%joints%element, :))
       call balance%differentiate_at_start()
       allocate (self%loads, source=loads_by_moments(balance%joints%teeth, machine, balance%incidence, balance%loose, &
@@ -156,7 +161,8 @@ contains
     class(resting_joints_t), intent(inout) :: self
     type(torque_balance_t), intent(inout) :: balance
     type(joint_choices_t) :: choices
-    real(wp) :: applied(balance%formulation%machine%elements%count), torque(size(self%mobility, 1)), scale(size(torque))
+    real(wp) :: applied(balance%formulation%machine%elements%count)
+    real(wp), dimension(size(self%mobility, 1)) :: acceleration, scale, torque
     logical :: holds
     integer :: e, j
 
@@ -167,14 +173,15 @@ contains
       do e = 1, size(applied)
         if (.not. balance%is_elastic(e)) applied(e) = elements%restoring(1, e) + elements%applied(1, e)
       end do
-      torque = matmul(transpose(self%by_element), applied)
-      scale = matmul(transpose(abs(self%by_element)), abs(applied))
-      call gather(self, balance, matmul(self%rates, matmul(self%mobility, torque)), applied, choices)
+      torque = 0.0_wp
+      scale = 0.0_wp
+      call add_torques(self%by_element, applied, torque, scale)
+      acceleration = matmul(self%mobility, torque)
+      call gather(self, balance, matmul(self%rates, acceleration), applied, choices)
       call self%share_friction(choices, holds)
       if (.not. holds) call choices%choose()
       self%moment = choices%moment
-      scale = scale + matmul(transpose(abs(self%rates)), abs(self%moment))
-      torque = torque + matmul(transpose(self%rates), self%moment)
+      call add_torques(self%rates, self%moment, torque, scale)
       if (choices%doubtful == 0 .and. all(abs(torque) <= rounding * maxval([scale, tiny(1.0_wp)]))) then
         elements%applied(1, joints%element) = elements%applied(1, joints%element) + self%moment
         return
@@ -190,16 +197,30 @@ contains
     self%needed = locked_moment(choices, self%overloaded)
   end subroutine hold
 
+  !> Adds the torques of moments along the rigid motions, and the sums of their absolute terms.
+  pure subroutine add_torques(rates, moment, torque, scale)
+    real(wp), intent(in) :: rates(:, :)                  !! of the elements by the motions, [elements, motions]
+    real(wp), intent(in) :: moment(:)                    !! [N m], [elements]
+    real(wp), intent(inout) :: torque(:), scale(:)       !! [N m], [motions]
+    integer :: m
+
+    do m = 1, size(torque)
+      torque(m) = torque(m) + sum(rates(:, m) * moment)
+      scale(m) = scale(m) + sum(abs(rates(:, m) * moment))
+    end do
+  end subroutine add_torques
+
   !> The moment of a joint if all at rest are locked, with the least norm.
   real(wp) function locked_moment(choices, joint) result(moment)
     type(joint_choices_t), intent(in) :: choices
     integer, intent(in) :: joint
     integer, allocatable :: resting(:)
-    real(wp), allocatable :: moments(:)
+    real(wp), allocatable :: inverse(:, :), moments(:)
     integer :: j
 
     resting = pack([(j, j=1, size(choices%mode))], choices%is_at_rest)
-    moments = -matmul(pseudo_inverse(choices%w(resting, resting), singular), choices%rate(resting))
+    allocate (inverse, source=pseudo_inverse(choices%w(resting, resting), singular))
+    moments = -matmul(inverse, choices%rate(resting))
     moment = sum(pack(moments, resting == joint))
   end function locked_moment
 
@@ -210,11 +231,14 @@ contains
     real(wp), intent(in) :: rate(:)                 !! accelerations of the joints without those at rest [rad/s2], [joints]
     real(wp), intent(in) :: applied(:)              !! moments of the elements that are not elastic [N m], [elements]
     type(joint_choices_t), intent(out) :: choices
+    real(wp), allocatable :: turned(:, :)   ! accelerations of the motions by moments of the joints
     real(wp) :: load(balance%joints%teeth%count), slope, speed
     integer :: j
 
     associate (joints => balance%joints, n => balance%joints%count)
-      choices%w = matmul(self%rates, matmul(self%mobility, transpose(self%rates)))
+      allocate (turned, source=transpose(self%rates))
+      turned = matmul(self%mobility, turned)
+      choices%w = matmul(self%rates, turned)
       choices%rate = rate
       choices%is_at_rest = joints%is_at_rest
       choices%slip = balance%formulation%machine%elements%speed(1, joints%element)
@@ -247,7 +271,7 @@ contains
     type(joint_choices_t), intent(inout) :: choices
     logical, intent(out) :: holds   !! whether that is within all bounds
     real(wp), parameter :: unbounded = 1.0e3_wp   ! times the largest bound
-    real(wp), allocatable :: share(:)
+    real(wp), allocatable :: inverse(:, :), share(:), weighted(:, :)
     real(wp) :: capacity(size(choices%mode))
     integer, allocatable :: resting(:)
     integer :: i, j
@@ -260,9 +284,10 @@ contains
     where (choices%least > -huge(1.0_wp)) capacity = max(capacity, -choices%least)
     capacity = merge(unbounded * max(1.0_wp, maxval([0.0_wp, capacity])), capacity, &
                      choices%least <= -huge(1.0_wp) .or. choices%most >= huge(1.0_wp))
-    share = -matmul(pseudo_inverse(spread(capacity(resting), 2, size(resting)) * choices%w(resting, resting) * &
-                                   spread(capacity(resting), 1, size(resting)), singular), &
-                    capacity(resting) * choices%rate(resting))
+    weighted = spread(capacity(resting), 2, size(resting)) * choices%w(resting, resting) * &
+               spread(capacity(resting), 1, size(resting))
+    allocate (inverse, source=pseudo_inverse(weighted, singular))
+    share = -matmul(inverse, capacity(resting) * choices%rate(resting))
     choices%moment(:) = 0.0_wp
     do i = 1, size(resting)
       choices%moment(resting(i)) = capacity(resting(i)) * share(i)
