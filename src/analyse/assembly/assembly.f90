@@ -5,7 +5,7 @@ module nocdyn_assembly
   use nocdyn_induction_assembly, only: note_rated_motors
   use nocdyn_input, only: input_t
   use nocdyn_idle_notes, only: note_idle_elements
-  use nocdyn_joint_simplifications, only: has_joint_that_locks, refuse_joints
+  use nocdyn_joint_simplifications, only: has_joint_that_locks, has_joint_that_moves, refuse_joints
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_parts, only: build_machine, given_speeds
@@ -83,7 +83,8 @@ contains
 
     associate (run => input%groups(input%position('run')))
       if (run%text('start') /= 'equilibrium') return
-      if (machine%lanes == 1 .and. (input%takes_means .or. .not. has_joint_that_locks(input))) then
+      if (machine%lanes == 1 .and. (input%takes_means .or. .not. (has_joint_that_locks(input) .or. &
+                                                                  has_joint_that_moves(input)))) then
         call start_steadily(machine, given_speeds(input, machine%nodes), run%number('t_start'), error)
         if (allocated(error)) error%message = input%location(input%position('run'), 'start') // ": start = 'equilibrium': " // &
           error%message // "; start = 'given' starts with the speeds of the bodies"

@@ -10,7 +10,7 @@ module nocdyn_joint_simplifications
   implicit none (type, external)
   private
 
-  public :: refuse_joints, list_simplifications, has_joint_that_locks
+  public :: refuse_joints, list_simplifications, has_joint_that_locks, has_joint_that_moves
 
 contains
 
@@ -119,6 +119,18 @@ contains
       end associate
     end do
   end function has_joint_that_locks
+
+  !> Whether there are joints whose ratio depends on the position, or drives.
+  pure logical function has_joint_that_moves(input)
+    type(input_t), intent(in) :: input
+    integer :: i
+
+    has_joint_that_moves = .false.
+    do i = 1, size(input%groups)
+      has_joint_that_moves = has_joint_that_moves .or. any(input%groups(i)%kind == [character(len=8) :: 'cardan', 'crank', &
+                                                                                    'relation', 'drive'])
+    end do
+  end function has_joint_that_moves
 
   !> Whether the ratio of a joint has a mean that tells how its bodies turn.
   pure logical function has_mean(group)

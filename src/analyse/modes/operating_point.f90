@@ -95,7 +95,10 @@ contains
     integer :: nearest
 
     call find_equilibria(machine, t_infinity, point%formulation, equilibria, point%notes, error)
-    if (allocated(error)) return
+    if (allocated(error)) then
+      error%message = error%message // '; --at rest linearises at the start angles without speeds'
+      return
+    end if
     if (size(equilibria) > 1) call find_stability(point%formulation, t_infinity, equilibria)
     nearest = nearest_equilibrium(point%formulation, equilibria)
     point%t = t_infinity

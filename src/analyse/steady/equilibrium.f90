@@ -81,6 +81,7 @@ contains
       call complete_states(formulation, t, equilibria, notes)
     else if (size(refusals) > 0) then
       call raise(error, exit_failed, 'no steady state was found: ' // refusals(size(refusals))%text)
+      if (allocated(first_error)) error%message = error%message // '; slipping, ' // first_error%message
     else
       call move_alloc(first_error, error)
     end if
@@ -176,6 +177,7 @@ contains
     integer :: i
 
     call set_up_balance(formulation, t, balance, is_at_rest)
+    call balance%hold_floating()
     resting = new_resting_joints(balance)
     call search_balance(balance, blocks)
     do i = 1, size(blocks)
@@ -187,7 +189,7 @@ contains
     end do
     call combine(balance, resting, blocks, equilibria, notes, refusals, error)
     do i = 1, merge(size(blocks), 0, size(equilibria) > 0)
-      if (.not. blocks(i)%is_unloaded) cycle
+      if (.not. blocks(i)%is_unloaded .and. balance%floating(blocks(i)%members(1)) == 0) cycle
       call list_moving_bodies(balance, blocks(i)%members, text)
       call append_new(notes, 'nothing drives or brakes ' // text // ': any speed is steady, and the one of the start is kept')
     end do
@@ -262,7 +264,8 @@ contains
       if (refusal /= '') then
         if (refusal /= 'none') call append(refusals, refusal)
       else if (is_found) then
-        found%free_modes = count(blocks%is_unloaded .or. [(blocks(i)%is_range(choice(i)), i=1, size(blocks))])
+        found%free_modes = count(blocks%is_unloaded .or. [(blocks(i)%is_range(choice(i)), i=1, size(blocks))]) &
+                           + sum(balance%floating)
         equilibria = [equilibria, found]
         call add_range_notes(balance, blocks, choice, z, notes)
       else
