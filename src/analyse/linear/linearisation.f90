@@ -53,6 +53,7 @@ contains
     type(element_coordinates_t) :: incidence
     type(pattern_t) :: pattern
     real(wp), allocatable :: slopes(:, :), stiffness(:)
+    integer :: e
 
     pattern = formulation%jacobian_pattern()
     call differentiate(formulation, t, y, size(pattern%row), slopes)
@@ -64,18 +65,39 @@ contains
     if (allocated(error)) return
     call assemble(formulation, self)
     if (formulation%internal > 0) call add_internal(formulation, pattern, slopes(1, :), self)
-    if (formulation%joints%teeth%count > 0) call follow_losses(formulation, pattern, slopes(1, :), self)
+    associate (teeth => formulation%joints%teeth)
+      if (teeth%count > 0 .and. .not. any([(carries_nothing(formulation, teeth%joint(e)), e=1, teeth%count)])) then
+        call follow_losses(formulation, pattern, slopes(1, :), self)
+      end if
+    end associate
   end subroutine linearise
 
   !> The elements of joints that hold.
   function held_elements(formulation) result(elements)
     class(formulation_t), intent(in) :: formulation   !! started in its state
     integer, allocatable :: elements(:)
+    integer :: j
 
-    associate (joints => formulation%joints)
-      allocate (elements, source=pack(joints%element(:joints%locking), joints%mode(:joints%locking) == locked))
-    end associate
+    allocate (elements(0))
+    do j = 1, formulation%joints%locking
+      if (formulation%joints%mode(j) /= locked .or. carries_nothing(formulation, j)) cycle
+      elements = [elements, formulation%joints%element(j)]
+    end do
   end function held_elements
+
+  !> Whether a joint is one of teeth at rest that carry no torque, so that their friction holds nothing.
+  pure logical function carries_nothing(formulation, joint)
+    class(formulation_t), intent(in) :: formulation   !! started in its state
+    integer, intent(in) :: joint
+    real(wp), parameter :: rounding = 1.0e-9_wp       ! of the moments of the elements
+
+    carries_nothing = .false.
+    associate (teeth => formulation%joints%teeth, elements => formulation%machine%elements)
+      if (teeth%loss_of(joint) == 0 .or. formulation%joints%mode(joint) /= locked) return
+      carries_nothing = abs(teeth%load(teeth%loss_of(joint))) <= rounding * &
+                        maxval([tiny(rounding), abs(elements%restoring(1, :)), abs(elements%applied(1, :))])
+    end associate
+  end function carries_nothing
 
   !> Tangent stiffness and damping of all elements at a state of a formulation of one lane without work integrals.
   subroutine tangent_stiffness(formulation, t, y, stiffness, damping)

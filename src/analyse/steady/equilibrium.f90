@@ -6,6 +6,7 @@ module nocdyn_equilibrium
   use nocdyn_block_solutions, only: block_solutions_t
   use nocdyn_element_sets, only: element_names
   use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_floating_motions, only: hold_floating
   use nocdyn_formulation, only: formulation_t
   use nocdyn_joint_texts, only: describe_joints, describe_overload
   use nocdyn_kinds, only: wp
@@ -177,7 +178,7 @@ contains
     integer :: i
 
     call set_up_balance(formulation, t, balance, is_at_rest)
-    call balance%hold_floating()
+    call hold_floating(balance)
     resting = new_resting_joints(balance)
     call search_balance(balance, blocks)
     do i = 1, size(blocks)

@@ -9,7 +9,6 @@ module nocdyn_torque_balance
   use nocdyn_formulation, only: formulation_t
   use nocdyn_joint_balance, only: joint_balance_t, loads_by_moments, new_joint_balance
   use nocdyn_kinds, only: wp
-  use nocdyn_lapack_eigen, only: singular_vectors
   use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
   use nocdyn_union_find, only: find_root, join_components
   implicit none (type, external)
@@ -41,12 +40,12 @@ module nocdyn_torque_balance
     real(wp), allocatable :: ratio(:)               !! G, [entries]
     real(wp), allocatable :: y(:, :)   !! state after `set_state`, [1, states]
     real(wp), allocatable :: rate(:, :)
-    real(wp), allocatable, private :: drag(:, :)       !! torques that keep motions that float at their start, by rigid motions
-    real(wp), allocatable, private :: start_speed(:)   !! of the rigid motions, with `drag` [rad/s]
+    real(wp), allocatable :: drag(:, :)       !! torques that keep motions that float at their start, by rigid motions
+    real(wp), allocatable :: start_speed(:)   !! of the rigid motions, with `drag` [rad/s]
     real(wp), allocatable, private :: start_twist(:)   !! [rad], [elements]
   contains
     procedure :: unknowns, start, set_state, settle, moments_at, inertia, evaluate, differentiate
-    procedure :: blocks, body_speeds, differentiate_at_start, hold_floating
+    procedure :: blocks, body_speeds, differentiate_at_start
     procedure, private :: evaluate_laws, differentiate_losses
   end type torque_balance_t
 
@@ -449,89 +448,6 @@ contains
       block_of(i) = root
     end do
   end function blocks
-
-  !> Keeps motions of several speeds that no torque acts on, such as that of two discs with a damper between them, at their
-  !> momentum of the start: any is steady. A drag on these motions alone does so, which vanishes there.
-  subroutine hold_floating(self)
-    class(torque_balance_t), intent(inout) :: self
-    integer :: block_of(self%unknowns()), i, k, speeds
-    integer, allocatable :: members(:)
-    logical :: is_silent(size(self%inelastic))
-    real(wp), allocatable :: drag(:, :), start(:)
-
-    allocate (self%floating(size(block_of)), source=0)
-    block_of = self%blocks()
-    speeds = size(self%motions%free)
-    call find_silent(self, is_silent)
-    allocate (start, source=self%start())
-    do i = 1, speeds
-      members = pack([(k, k=1, speeds)], block_of(:speeds) == block_of(i))
-      if (members(1) /= i .or. size(members) < 2) cycle
-      call find_drag(self, members, is_silent, drag, self%floating(block_of(i)))
-      if (self%floating(block_of(i)) == 0) cycle
-      if (.not. allocated(self%drag)) allocate (self%drag(speeds, speeds), source=0.0_wp)
-      self%drag(members, members) = drag
-      self%start_speed = start(:speeds)
-    end do
-  end subroutine hold_floating
-
-  !> The inelastic elements without a moment at any speed, by some speeds.
-  subroutine find_silent(self, is_silent)
-    type(torque_balance_t), intent(inout) :: self
-    logical, intent(out) :: is_silent(:)
-    real(wp), parameter :: some(*) = [-311.0_wp, -1.7_wp, -1.0e-3_wp, 1.3e-3_wp, 2.3_wp, 173.0_wp]
-    real(wp) :: moments(size(is_silent))
-    integer :: i
-
-    is_silent = .true.
-    do i = 1, size(some)
-      moments = self%moments_at(some(i))
-      is_silent = is_silent .and. abs(moments) <= 0.0_wp
-    end do
-    if (.not. allocated(self%joints%by_moment)) return
-    do i = 1, size(is_silent)   ! teeth have moments that follow from others
-      if (any(self%joints%element(self%joints%teeth%joint) == self%inelastic(i))) is_silent(i) = .false.
-    end do
-  end subroutine find_silent
-
-  !> The drag on the motions of a block that move no element with a moment: A d d^T A with the inertias A and d^T A d = 1.
-  subroutine find_drag(self, members, is_silent, drag, count)
-    type(torque_balance_t), intent(in) :: self
-    integer, intent(in) :: members(:)      !! unknowns
-    logical, intent(in) :: is_silent(:)    !! [inelastic]
-    real(wp), allocatable, intent(out) :: drag(:, :)
-    integer, intent(out) :: count          !! of these motions
-    real(wp), parameter :: none = 1.0e-10_wp
-    real(wp), dimension(size(members), size(members)) :: inertia, vectors
-    real(wp), dimension(size(members)) :: momentum, values
-    real(wp) :: rates(size(is_silent), size(members))
-    integer :: i, k, n
-    logical :: has_failed
-
-    rates = 0.0_wp
-    do i = 1, size(is_silent)
-      if (is_silent(i)) cycle
-      do k = self%first(i), self%first(i + 1) - 1
-        n = findloc(members, self%freedom(k), dim=1)
-        if (n > 0) rates(i, n) = self%ratio(k)
-      end do
-      if (any(abs(rates(i, :)) > 0)) rates(i, :) = rates(i, :) / norm2(rates(i, :))
-    end do
-    count = 0
-    allocate (drag(size(members), size(members)), source=0.0_wp)
-    call singular_vectors(rates, values, vectors, has_failed)
-    if (has_failed) return
-    inertia = self%inertia(members)
-    do n = 1, size(members)
-      if (values(n) > none * max(values(1), tiny(none))) cycle
-      count = count + 1
-      momentum = matmul(inertia, vectors(:, n))
-      momentum = momentum / sqrt(dot_product(momentum, vectors(:, n)))
-      do k = 1, size(members)
-        drag(:, k) = drag(:, k) + momentum * momentum(k)
-      end do
-    end do
-  end subroutine find_drag
 
   !> Joins what teeth that turn join: their losses depend on the moments of other elements.
   subroutine join_by_losses(self, block_of)
