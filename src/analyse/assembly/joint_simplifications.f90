@@ -50,7 +50,9 @@ contains
       if (.not. allows_locks) text = 'does not know which joints are locked; allowed: no clutches and freewheels'
     case ('cardan', 'crank', 'relation', 'drive')
       if (takes_means .and. has_mean(group)) return
-      if (allows_locks .and. holds_still(group) .and. .not. group%has_value('table_time')) return
+      if (allows_locks .and. holds_still(group)) then
+        if (.not. group%has_value('table_time')) return
+      end if
       text = 'is for machines whose ratios are constant; allowed: no cardans, cranks, relations, drives'
       if (takes_means) text = 'is for machines whose ratios are constant; allowed: no cams, no levers, and drives that hold still'
     case default
