@@ -348,14 +348,12 @@ def test_bad_losses_are_refused(nocdyn, group, words):
     assert "bad.nml:3: &" in outcome.stderr and words in outcome.stderr
 
 
-def test_vibrations_leave_losses_out_and_say_so(nocdyn):
+def test_forced_vibrations_leave_losses_out_and_say_so(nocdyn):
     text = body("one", 0.2) + body("two", 3.0, 0, "bearing_friction = 1") + GEAR.format("efficiency = 0.9")
     text += "&excitation name = 'e' body = 'one' kind = 'step' amplitude = 6 time = 0 /\n" + LOAD
     text += "&response body = 'one' speed = 10, 20 /\n&excitation name = 'v' body = 'one' amplitude = 1 frequency = 9 /\n"
     path = nocdyn.write("steady.nml", text + "&run t_end = 1 /\n")
     for command, words in (
-        ("equilibrium", "note: the moments of the losses of g are taken as constant in vibrations"),
-        ("modes", "note: the moments of the losses of g are taken as constant in vibrations"),
         ("response", "note: the losses of g are left out"),
         ("campbell", "note: the losses of g are left out"),
     ):

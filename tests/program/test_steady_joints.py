@@ -98,23 +98,30 @@ def test_a_freewheel_that_would_pull_overruns(nocdyn):
         assert same_state(found["steady_states"][0], last_row(nocdyn, text + joint + END), 1e-5)
 
 
-def test_a_clutch_that_cannot_hold_is_no_steady_state(nocdyn):
+def test_a_clutch_that_cannot_hold_slips_in_the_steady_state(nocdyn):
     text = GEARBOX + "&clutch name = 'b' bodies = 'ring', 'ground' capacity = 20 /\n" + GEAR.format("g", "out", "load") + END
-    outcome = nocdyn("equilibrium", nocdyn.write("machine.nml", text))
-    assert outcome.returncode == 1
-    assert "clutch 'b' does not hold: locked it would carry -36.3636 N m; allowed: -20 to 20" in outcome.stderr
-    assert nocdyn("modes", "machine.nml", "--at", "rest").returncode == 0
+    found = steady_states(nocdyn, text)
+    assert found["notes"] == ["in this state there are slipping: clutch 'b'"]
+    # the sun has half of the torque of the ring, 10 N m, so that the motor turns with 90 rad/s
+    assert found["steady_states"][0]["values"]["omega_sun [rad/s]"] == pytest.approx(90, rel=1e-12)
+    assert found["steady_states"][0]["values"]["torque_b [N m]"] == pytest.approx(-20, rel=1e-12)
+    assert same_state(found["steady_states"][0], last_row(nocdyn, text), 1e-5)
 
 
-def test_a_machine_that_is_locked_as_a_whole_is_refused(nocdyn):
+def test_a_brake_that_holds_nothing_back_is_a_state_without_modes(nocdyn):
     text = "&body name = 'a' inertia = 1 /\n&clutch name = 'b' bodies = 'a', 'ground' capacity = 20 /\n&run t_end = 1 /\n"
-    for command in ("equilibrium", "modes"):
-        outcome = nocdyn(command, nocdyn.write("machine.nml", text))
-        assert outcome.returncode == 1
-        assert (
-            outcome.stderr.replace(f"{nocdyn.folder}/", "")
-            == "nocdyn: machine.nml: in this state there are locked: clutch 'b', so that nothing moves\n"
-        )
+    assert "steady state, at rest, stable: joints hold all that could move" in nocdyn("equilibrium", nocdyn.write("m.nml", text)).stdout
+    outcome = nocdyn("modes", "m.nml")
+    assert outcome.returncode == 1
+    assert outcome.stderr.endswith("m.nml: in this state there are locked: clutch 'b', so that nothing moves\n")
+
+
+def test_what_a_brake_cannot_hold_and_nothing_else_brakes_has_no_steady_state(nocdyn):
+    text = "&body name = 'a' inertia = 1 /\n&clutch name = 'b' bodies = 'a', 'ground' capacity = 20 /\n"
+    text += "&motor name = 'm' body = 'a' kind = 'constant' torque = 30 /\n&run t_end = 1 /\n"
+    outcome = nocdyn("equilibrium", nocdyn.write("m.nml", text))
+    assert outcome.returncode == 1
+    assert "clutch 'b' does not hold: locked it would carry 30 N m; allowed: -20 to 20; slipping, there is no" in outcome.stderr
 
 
 def test_gears_that_contradict_each_other_are_refused_beside_brakes(nocdyn):
@@ -159,12 +166,13 @@ def test_a_run_starts_in_the_steady_state_with_its_losses_and_locks(nocdyn):
     assert "in this state there are locked: clutch 'c'" in notes
 
 
-def test_teeth_that_lock_themselves_have_no_steady_motion(nocdyn):
+def test_teeth_that_lock_themselves_hold_in_a_steady_state(nocdyn):
     text = WORM.replace("&motor name = 'm' body = 'motor' a = 100", "&motor name = 'm' body = 'drum' a = -900")
-    text = text.replace("&load name = 'l' body = 'drum'", "&load name = 'l' body = 'motor'")
-    outcome = nocdyn("equilibrium", nocdyn.write("machine.nml", text + "&run t_end = 1 /\n"))
-    assert outcome.returncode == 1
-    assert "no steady state was found with the losses of w; teeth that lock" in outcome.stderr.replace("'", "")
+    text = text.replace("&load name = 'l' body = 'drum'", "&load name = 'l' body = 'motor'") + "&run t_end = 60 /\n"
+    found = steady_states(nocdyn, text)
+    assert found["notes"] == ["in this state there are locked: teeth of 'w'"]
+    assert found["steady_states"][0]["is_at_rest"]
+    assert abs(last_row(nocdyn, text)["omega_drum [rad/s]"]) < 1e-9
 
 
 def random_train(seed):

@@ -160,7 +160,7 @@ contains
     allocate (teeth%forward_over_speed, teeth%backward_over_speed)
     teeth%forward_over_speed = new_curve([0.0_wp, 9.0_wp], [0.7_wp, 0.9_wp], interpolation_linear, extrapolation_constant)
     teeth%backward_over_speed = new_curve([0.0_wp, 9.0_wp], [0.4_wp, 0.8_wp], interpolation_linear, extrapolation_constant)
-    call append_bank(machine%banks, new_tooth_losses(numbered_names('gear', 1), [0], [1], teeth, .false.))
+    call append_bank(machine%banks, new_tooth_losses(numbered_names('gear', 1), [0], [1], teeth))
     machine%start_angle(1, 6:9) = [(0.3_wp * k, k=1, 4)]
     call finish(machine, [integer ::], 1)
   end function moving_machine

@@ -6,7 +6,7 @@ module nocdyn_assembly
   use nocdyn_induction_assembly, only: note_rated_motors
   use nocdyn_input, only: input_t
   use nocdyn_idle_notes, only: note_idle_elements
-  use nocdyn_joint_simplifications, only: has_joint_that_locks, refuse_joints
+  use nocdyn_joint_simplifications, only: has_joint_that_locks, has_joint_that_moves, refuse_joints
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_parts, only: build_machine, given_speeds
@@ -42,10 +42,12 @@ contains
     call note_left_out_harmonics(input, machine%start_notes)
   end subroutine assemble_machine
 
-  !> Builds the machine as it is in a steady state: with means over a turn, and with locked joints as constraint rows.
-  recursive subroutine assemble_steady_machine(input, t, machine, error)
+  !> Builds the machine as it is in a steady state: with means over a turn, and, if it is asked for, with clutches and freewheels
+  !> that are locked as constraint rows.
+  recursive subroutine assemble_steady_machine(input, t, locks_joints, machine, error)
     type(input_t), intent(inout) :: input   !! afterwards it says which joints are open
     real(wp), intent(in) :: t               !! the time at which clutches are engaged or not [s]
+    logical, intent(in) :: locks_joints     !! whether locked joints are rows
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
     logical :: is_changed
@@ -53,6 +55,7 @@ contains
 
     input%takes_means = .true.
     input%means_at = t
+    input%locks_joints = locks_joints
     if (allocated(input%overruns)) deallocate (input%overruns)
     allocate (input%overruns(size(input%groups)), source=.false.)
     do trials = 0, 2 * size(input%groups_named('freewheel'))
@@ -62,7 +65,8 @@ contains
         call raise(error, exit_failed, input%shown_file() // ': ' // machine%simplifications(1)%text // ', so that nothing moves')
         return
       end if
-      call choose_overruns(input, machine, is_changed)
+      is_changed = .false.
+      if (locks_joints) call choose_overruns(input, machine, is_changed)
       if (.not. is_changed) exit
     end do
     if (is_changed) then
@@ -83,7 +87,8 @@ contains
 
     associate (run => input%groups(input%position('run')))
       if (run%text('start') /= 'equilibrium') return
-      if (machine%lanes == 1 .and. (input%takes_means .or. .not. has_joint_that_locks(input))) then
+      if (machine%lanes == 1 .and. (input%takes_means .or. .not. (has_joint_that_locks(input) .or. &
+                                                                  has_joint_that_moves(input)))) then
         call start_steadily(machine, given_speeds(input, machine%nodes), run%number('t_start'), error)
         if (allocated(error)) error%message = input%location(input%position('run'), 'start') // ": start = 'equilibrium': " // &
           error%message // "; start = 'given' starts with the speeds of the bodies"
@@ -93,7 +98,7 @@ contains
       if (allocated(error)) return
       allocate (steady)
       view = input
-      call assemble_steady_machine(view, run%number('t_start'), steady, error)
+      call assemble_steady_machine(view, run%number('t_start'), .false., steady, error)
       if (.not. allocated(error)) call start_as(steady, machine)
     end associate
   end subroutine start_machine

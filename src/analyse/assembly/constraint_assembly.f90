@@ -45,7 +45,7 @@ contains
       case ('cardan', 'relation')
         is_row = input%takes_means
       case ('clutch', 'freewheel')
-        is_row = input%takes_means
+        is_row = input%takes_means .and. input%locks_joints
         if (is_row) is_row = .not. is_open_joint(input, index)
       case ('drive')
         is_row = input%takes_means .and. holds_still(group)

@@ -10,7 +10,7 @@ module nocdyn_joint_simplifications
   implicit none (type, external)
   private
 
-  public :: refuse_joints, list_simplifications, has_joint_that_locks
+  public :: refuse_joints, list_simplifications, has_joint_that_locks, has_joint_that_moves
 
 contains
 
@@ -50,6 +50,9 @@ contains
       if (.not. allows_locks) text = 'does not know which joints are locked; allowed: no clutches and freewheels'
     case ('cardan', 'crank', 'relation', 'drive')
       if (takes_means .and. has_mean(group)) return
+      if (allows_locks .and. holds_still(group)) then
+        if (.not. group%has_value('table_time')) return
+      end if
       text = 'is for machines whose ratios are constant; allowed: no cardans, cranks, relations, drives'
       if (takes_means) text = 'is for machines whose ratios are constant; allowed: no cams, no levers, and drives that hold still'
     case default
@@ -57,7 +60,7 @@ contains
     end select
   end subroutine find_refusal
 
-  !> What an analysis about a steady state replaces, and which joints are locked there.
+  !> What an analysis about a steady state replaces, and which joints are locked there for good.
   subroutine list_simplifications(input, notes)
     type(input_t), intent(in) :: input
     type(string_t), allocatable, intent(out) :: notes(:)
@@ -72,6 +75,7 @@ contains
     do i = 1, size(input%groups)
       associate (group => input%groups(i))
         if (group%kind == 'clutch' .or. group%kind == 'freewheel') then
+          if (.not. input%locks_joints) cycle
           if (is_open_joint(input, i)) then
             call add_to(open, group)
           else
@@ -118,6 +122,18 @@ contains
       end associate
     end do
   end function has_joint_that_locks
+
+  !> Whether there are joints whose ratio depends on the position, or drives.
+  pure logical function has_joint_that_moves(input)
+    type(input_t), intent(in) :: input
+    integer :: i
+
+    has_joint_that_moves = .false.
+    do i = 1, size(input%groups)
+      has_joint_that_moves = has_joint_that_moves .or. any(input%groups(i)%kind == [character(len=8) :: 'cardan', 'crank', &
+                                                                                    'relation', 'drive'])
+    end do
+  end function has_joint_that_moves
 
   !> Whether the ratio of a joint has a mean that tells how its bodies turn.
   pure logical function has_mean(group)

@@ -128,7 +128,7 @@ contains
     associate (n => machine%lanes)
       call add_banks(new_element_groups(input, 'coupling', n, body_index), coupling_form, add_coupling_form, machine%banks)
       call add_banks(new_element_groups(input, 'mesh', n, body_index), mesh_form, add_mesh_form, machine%banks)
-      if (.not. input%takes_means) then
+      if (.not. (input%takes_means .and. input%locks_joints)) then
         call add_banks(new_element_groups(input, 'clutch', n, body_index), clutch_form, add_clutch_form, machine%banks)
         call add_freewheels(new_element_groups(input, 'freewheel', n, body_index), machine%banks)
       end if

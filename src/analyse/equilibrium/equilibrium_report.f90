@@ -12,7 +12,6 @@ module nocdyn_equilibrium_report
   use nocdyn_machine_report, only: named_coordinates
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: new_reduced
-  use nocdyn_steady_losses, only: tell_losses
   use nocdyn_table_text, only: append_table, cell, cell_digits, clear_rounding, padded, rounding
   use nocdyn_text, only: rounded_text, selected, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
@@ -62,7 +61,6 @@ contains
     allocate (self%values(size(self%labels), size(equilibria)), self%power(size(self%work_elements), size(equilibria)))
     allocate (row(size(table%labels)), watts(1, size(self%work_elements)))
     do k = 1, size(equilibria)
-      call tell_losses(table%columns%formulation%machine, equilibria(k)%losses)
       y = [equilibria(k)%y(1, :), (0.0_wp, i=1, size(self%work_elements))]
       call table%fill(t_infinity, y, row)
       call table%columns%formulation%machine%power(watts)
@@ -142,6 +140,10 @@ contains
     type(equilibrium_t), intent(in) :: equilibrium
     character(len=:), allocatable :: text
 
+    if (equilibrium%is_fixed) then
+      text = 'at rest, stable: joints hold all that could move'
+      return
+    end if
     select case (equilibrium%stability)
     case ('stable')
       text = 'stable: disturbances decay with '
@@ -155,6 +157,7 @@ contains
     case default
       text = 'of which the stability is not determined'
     end select
+    if (equilibrium%is_at_rest) text = 'at rest, ' // text
   end function stability_text
 
   !> The power of every element and their sum, which is zero but for rounding.
@@ -190,7 +193,9 @@ contains
     do k = 1, size(self%equilibria)
       call json%open()
       call json%put('stability', trim(self%equilibria(k)%stability))
-      if (self%equilibria(k)%stability /= 'not determined') call json%put('growth_rate_1_s', self%equilibria(k)%growth)
+      call json%put('is_at_rest', self%equilibria(k)%is_at_rest)
+      if (self%equilibria(k)%stability /= 'not determined' .and. .not. self%equilibria(k)%is_fixed) &
+        call json%put('growth_rate_1_s', self%equilibria(k)%growth)
       call json%put('values', self%labels, self%values(:, k))
       call json%put('power_W', self%work_elements, self%power(:, k))
       call json%put('power_put_in_W', sum(max(self%power(:, k), 0.0_wp)))

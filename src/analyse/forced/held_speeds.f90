@@ -4,7 +4,7 @@
 !> all motors are multiplied by one factor if they drive at that speed, as by a throttle. If there are no such motors, a torque
 !> on the reference body holds the speed. Governors leave their throttles open while the speed is found; then they hold it.
 module nocdyn_held_speeds
-  use nocdyn_bank, only: role_excitation, role_motor
+  use nocdyn_bank, only: role_bearing, role_excitation, role_motor
   use nocdyn_equilibrium, only: t_infinity
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_finite, only: is_finite
@@ -319,6 +319,8 @@ contains
 
     weight = 1.0_wp
     if (self%motors_hold) weight(self%balance%inelastic(self%sources)) = state%factor
+    call refuse_standing_friction(self%balance, error)
+    if (allocated(error)) return
     extra = 0.0_wp
     associate (map => self%balance%formulation%machine%coordinates)
       do k = map%first(self%reference), map%first(self%reference + 1) - 1
@@ -343,6 +345,24 @@ contains
     end if
     call linearise(self, z, weight, state, error)
   end subroutine find_state
+
+  !> Refuses bearings with friction that stand still: whether they hold in vibrations is not known.
+  subroutine refuse_standing_friction(balance, error)
+    type(torque_balance_t), intent(in) :: balance   !! evaluated
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: none = 1.0e-10_wp        ! relative to the largest speed
+    integer :: j
+
+    associate (joints => balance%joints, machine => balance%formulation%machine)
+      do j = 1, joints%count
+        if (machine%banks(joints%bank(j))%bank%role /= role_bearing) cycle
+        if (abs(machine%elements%speed(1, joints%element(j))) > none * maxval(abs(machine%elements%speed(1, :)))) cycle
+        call raise(error, exit_failed, quoted(machine%element_name(joints%element(j))) // ' stands still: whether the ' // &
+                   'friction of its bearing holds in vibrations is not known; allowed: bearing_friction = 0 there')
+        return
+      end do
+    end associate
+  end subroutine refuse_standing_friction
 
   subroutine linearise(self, z, weight, state, error)
     type(held_speeds_t), intent(inout) :: self

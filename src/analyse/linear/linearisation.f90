@@ -5,6 +5,9 @@
 !> frequencies. Their error is a rounding of the highest frequency; with the eigenvalues of K and M the squares would have such an
 !> error. The symmetric eigenproblem is solved only if a stiffness is negative.
 !>
+!> Joints that hold are rows u' = 0: the modes are those of the motions that leave these joints at rest. The moments of teeth with
+!> losses that turn follow from those of all elements; with them the first-order matrix is made of the Jacobian of a run.
+!>
 !> The first-order states are p, the rates of the modal coordinates; e = natural frequency * modal coordinate, for the modes that
 !> are not rigid; and the internal states. So |p|^2 and |e|^2 are twice the energies, and rigid rotation is not a state.
 module nocdyn_linearisation
@@ -12,6 +15,7 @@ module nocdyn_linearisation
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_finite, only: is_finite
   use nocdyn_formulation, only: formulation_t
+  use nocdyn_friction_joints, only: locked
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_eigen, only: cholesky_factor, singular_vectors, solve_triangular, symmetric_eigenvectors
   use nocdyn_machine, only: machine_t
@@ -28,7 +32,8 @@ module nocdyn_linearisation
 
   !> The modes and the first-order matrix at one state.
   type, public :: linearisation_t
-    real(wp), allocatable :: shapes(:, :)   !! modes in the coordinates q, M-normalised, [coordinates, modes]
+    real(wp), allocatable :: shapes(:, :)   !! modes in the coordinates q, M-normalised, [coordinates, modes]; there are as many as
+                                            !! coordinates, less what joints hold
     real(wp), allocatable :: twists(:, :)   !! modes in the twists of all elements, [elements, modes]
     real(wp), allocatable :: natural(:)     !! natural frequencies, negative for diverging modes [rad/s], [modes]
     integer, allocatable :: flexible(:)     !! modes that are not rigid
@@ -48,17 +53,51 @@ contains
     type(element_coordinates_t) :: incidence
     type(pattern_t) :: pattern
     real(wp), allocatable :: slopes(:, :), stiffness(:)
+    integer :: e
 
     pattern = formulation%jacobian_pattern()
     call differentiate(formulation, t, y, size(pattern%row), slopes)
     incidence = new_element_coordinates(formulation%machine%elements, formulation%machine%coordinates)
     stiffness = differentiated_stiffness(formulation%machine)
     call refuse_not_finite(formulation%machine, stiffness, error)
-    if (.not. allocated(error)) call undamped_modes(formulation%machine, incidence, stiffness, self, error)
+    if (.not. allocated(error)) call undamped_modes(formulation%machine, incidence, stiffness, self, error, &
+                                                    held_elements(formulation))
     if (allocated(error)) return
     call assemble(formulation, self)
-    if (formulation%states > 2 * size(self%natural)) call add_internal(formulation, pattern, slopes(1, :), self)
+    if (formulation%internal > 0) call add_internal(formulation, pattern, slopes(1, :), self)
+    associate (teeth => formulation%joints%teeth)
+      if (teeth%count > 0 .and. .not. any([(carries_nothing(formulation, teeth%joint(e)), e=1, teeth%count)])) then
+        call follow_losses(formulation, pattern, slopes(1, :), self)
+      end if
+    end associate
   end subroutine linearise
+
+  !> The elements of joints that hold.
+  function held_elements(formulation) result(elements)
+    class(formulation_t), intent(in) :: formulation   !! started in its state
+    integer, allocatable :: elements(:)
+    integer :: j
+
+    allocate (elements(0))
+    do j = 1, formulation%joints%locking
+      if (formulation%joints%mode(j) /= locked .or. carries_nothing(formulation, j)) cycle
+      elements = [elements, formulation%joints%element(j)]
+    end do
+  end function held_elements
+
+  !> Whether a joint is one of teeth at rest that carry no torque, so that their friction holds nothing.
+  pure logical function carries_nothing(formulation, joint)
+    class(formulation_t), intent(in) :: formulation   !! started in its state
+    integer, intent(in) :: joint
+    real(wp), parameter :: rounding = 1.0e-9_wp       ! of the moments of the elements
+
+    carries_nothing = .false.
+    associate (teeth => formulation%joints%teeth, elements => formulation%machine%elements)
+      if (teeth%loss_of(joint) == 0 .or. formulation%joints%mode(joint) /= locked) return
+      carries_nothing = abs(teeth%load(teeth%loss_of(joint))) <= rounding * &
+                        maxval([tiny(rounding), abs(elements%restoring(1, :)), abs(elements%applied(1, :))])
+    end associate
+  end function carries_nothing
 
   !> Tangent stiffness and damping of all elements at a state of a formulation of one lane without work integrals.
   subroutine tangent_stiffness(formulation, t, y, stiffness, damping)
@@ -115,13 +154,14 @@ contains
   end subroutine refuse_not_finite
 
   !> The undamped modes of a machine: all of `self` but `matrix`.
-  subroutine undamped_modes(machine, incidence, stiffness, self, error)
+  subroutine undamped_modes(machine, incidence, stiffness, self, error, held)
     type(machine_t), intent(in) :: machine
     type(element_coordinates_t), intent(in) :: incidence   !! of its elements
     real(wp), intent(in) :: stiffness(:)                   !! of all elements [N m/rad]
     type(linearisation_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
-    real(wp), allocatable :: factor(:, :), flexibility(:, :)
+    integer, intent(in), optional :: held(:)           !! elements that do not turn; absent: none
+    real(wp), allocatable :: factor(:, :), flexibility(:, :), free(:, :)
     logical :: has_failed
     integer :: e, i
 
@@ -134,19 +174,22 @@ contains
         call raise(error, exit_failed, 'rounding makes the mass matrix of this machine singular: its inertias differ too much')
         return
       end if
-      allocate (flexibility(size(elastic), f), self%shapes(f, f), self%natural(f), source=0.0_wp)
-      do i = 1, size(elastic)
-        do e = incidence%first(elastic(i)), incidence%first(elastic(i) + 1) - 1
-          flexibility(i, incidence%coordinate(e)) = incidence%ratio(1, e) * sqrt(abs(self%stiffness(elastic(i))))
-        end do
-      end do
-      if (size(elastic) > 0) call solve_triangular(factor, flexibility, from_right=.true.)
-      call solve_undamped(flexibility, self%stiffness(elastic), self, has_failed)
+      flexibility = scaled_rates(incidence, elastic, sqrt(abs(self%stiffness(elastic))), factor)
+      has_failed = .false.
+      if (present(held)) then
+        if (size(held) > 0) call find_free(scaled_rates(incidence, held, spread(1.0_wp, 1, size(held)), factor), free, has_failed)
+      end if
+      if (allocated(free)) flexibility = matmul(flexibility, free)
+      associate (modes => size(flexibility, 2))
+        allocate (self%shapes(modes, modes), self%natural(modes), source=0.0_wp)
+      end associate
+      if (.not. has_failed) call solve_undamped(flexibility, self%stiffness(elastic), self, has_failed)
       if (has_failed) then
         call raise(error, exit_failed, 'the natural frequencies were not found: they are not finite, or LAPACK did not converge')
         return
       end if
-      call solve_triangular(factor, self%shapes, from_right=.false.)
+      if (allocated(free)) self%shapes = matmul(free, self%shapes)
+      if (size(self%natural) > 0) call solve_triangular(factor, self%shapes, from_right=.false.)
     end associate
     allocate (self%twists(size(self%stiffness), size(self%natural)), source=0.0_wp)
     do e = 1, size(self%stiffness)
@@ -155,6 +198,40 @@ contains
       end do
     end do
   end subroutine undamped_modes
+
+  !> The rates of elements by the coordinates x = R q, times a factor each, [elements, coordinates].
+  function scaled_rates(incidence, elements, scale, factor) result(rates)
+    type(element_coordinates_t), intent(in) :: incidence
+    integer, intent(in) :: elements(:)
+    real(wp), intent(in) :: scale(:)                 !! [elements]
+    real(wp), contiguous, intent(in) :: factor(:, :) !! R, [coordinates, coordinates]
+    real(wp) :: rates(size(elements), size(factor, 1))
+    integer :: e, i
+
+    rates = 0.0_wp
+    do i = 1, size(elements)
+      do e = incidence%first(elements(i)), incidence%first(elements(i) + 1) - 1
+        rates(i, incidence%coordinate(e)) = incidence%ratio(1, e) * scale(i)
+      end do
+    end do
+    if (size(elements) > 0) call solve_triangular(factor, rates, from_right=.true.)
+  end function scaled_rates
+
+  !> Orthonormal motions that leave joints at rest, [coordinates, motions].
+  subroutine find_free(rates, free, has_failed)
+    real(wp), intent(in) :: rates(:, :)                   !! of the joints, [joints, coordinates]
+    real(wp), allocatable, intent(out) :: free(:, :)
+    logical, intent(out) :: has_failed                    !! LAPACK has not converged
+    real(wp), parameter :: rounding = 1.0e-10_wp          ! relative to the largest singular value
+    real(wp) :: rows(size(rates, 1), size(rates, 2)), values(size(rates, 2)), vectors(size(rates, 2), size(rates, 2))
+    integer :: j
+
+    do j = 1, size(rates, 1)
+      rows(j, :) = rates(j, :) / max(norm2(rates(j, :)), tiny(1.0_wp))
+    end do
+    call singular_vectors(rows, values, vectors, has_failed)
+    allocate (free, source=vectors(:, 1 + count(values > rounding * maxval([tiny(1.0_wp), values])):))
+  end subroutine find_free
 
   !> Natural frequencies, ascending, and orthonormal modes of B^T diag(sign of k) B.
   subroutine solve_undamped(b, stiffness, self, has_failed)
@@ -166,6 +243,9 @@ contains
     integer :: i
 
     associate (natural => self%natural, n => size(self%natural))
+      has_failed = .false.
+      allocate (self%flexible(0))
+      if (n == 0) return
       if (all(stiffness >= 0.0_wp)) then
         call singular_vectors(b, natural, self%shapes, has_failed)
         natural = natural(n:1:-1)
@@ -211,7 +291,7 @@ contains
     integer :: e, i, n, states
 
     n = size(self%natural)
-    states = n + size(self%flexible) + formulation%states - 2 * n
+    states = n + size(self%flexible) + formulation%internal
     allocate (self%matrix(states, states), source=0.0_wp)
     associate (damping => formulation%machine%elements%applied_speed(1, :))
       damped = pack([(e, e=1, size(damping))], abs(damping) > 0.0_wp)
@@ -236,23 +316,24 @@ contains
     real(wp), intent(in) :: slopes(:)        !! values at these positions
     type(linearisation_t), intent(inout) :: self
     real(wp), allocatable :: by_state(:, :), by_speed(:, :), by_angle(:, :)
-    integer :: i, n, p, before
+    integer :: before, f, i, n, p
 
+    f = formulation%machine%coordinates%freedoms
     n = size(self%natural)
     before = n + size(self%flexible)
-    associate (internal => formulation%states - 2 * n)
-      allocate (by_state(n, internal), by_speed(internal, n), by_angle(internal, n), source=0.0_wp)
+    associate (internal => formulation%internal)
+      allocate (by_state(f, internal), by_speed(internal, f), by_angle(internal, f), source=0.0_wp)
     end associate
     do p = 1, size(slopes)
       associate (row => pattern%row(p), column => pattern%column(p))
-        if (row <= n .and. column > 2 * n) then
-          by_state(row, column - 2 * n) = slopes(p)
-        else if (row > 2 * n .and. column <= n) then
-          by_speed(row - 2 * n, column) = slopes(p)
-        else if (row > 2 * n .and. column <= 2 * n) then
-          by_angle(row - 2 * n, column - n) = slopes(p)
-        else if (row > 2 * n) then
-          self%matrix(before + row - 2 * n, before + column - 2 * n) = slopes(p)
+        if (row <= f .and. column > 2 * f) then
+          by_state(row, column - 2 * f) = slopes(p)
+        else if (row > 2 * f .and. column <= f) then
+          by_speed(row - 2 * f, column) = slopes(p)
+        else if (row > 2 * f .and. column <= 2 * f) then
+          by_angle(row - 2 * f, column - f) = slopes(p)
+        else if (row > 2 * f) then
+          self%matrix(before + row - 2 * f, before + column - 2 * f) = slopes(p)
         end if
       end associate
     end do
@@ -264,5 +345,33 @@ contains
       end associate
     end do
   end subroutine add_internal
+
+  !> Replaces the accelerations by the speeds and twists by those with the losses of teeth.
+  subroutine follow_losses(formulation, pattern, slopes, self)
+    class(formulation_t), intent(in) :: formulation
+    type(pattern_t), intent(in) :: pattern   !! positions of the Jacobian
+    real(wp), intent(in) :: slopes(:)        !! values at these positions
+    type(linearisation_t), intent(inout) :: self
+    real(wp), allocatable :: by_speed(:, :), by_angle(:, :), left(:, :)
+    integer :: f, i, n, p
+
+    f = formulation%machine%coordinates%freedoms
+    n = size(self%natural)
+    allocate (by_speed(f, f), by_angle(f, f), source=0.0_wp)
+    do p = 1, size(slopes)
+      associate (row => pattern%row(p), column => pattern%column(p))
+        if (row > f .or. column > 2 * f) cycle
+        if (column <= f) by_speed(row, column) = slopes(p)
+        if (column > f) by_angle(row, column - f) = slopes(p)
+      end associate
+    end do
+    left = matmul(transpose(self%shapes), mass_matrix(formulation%machine))
+    self%matrix(:n, :n) = matmul(left, matmul(by_speed, self%shapes))
+    do i = 1, size(self%flexible)
+      associate (mode => self%flexible(i))
+        self%matrix(:n, n + i) = matmul(left, matmul(by_angle, self%shapes(:, mode))) / abs(self%natural(mode))
+      end associate
+    end do
+  end subroutine follow_losses
 
 end module nocdyn_linearisation

@@ -54,6 +54,10 @@ contains
 
     call linearise(point%formulation, point%t, point%y, linear, error)
     if (allocated(error)) return
+    if (size(linear%matrix) == 0) then
+      call raise(error, exit_failed, point%notes(1)%text // ', so that nothing moves')
+      return
+    end if
     self%machine = point%formulation%machine
     self%linear = linear
     allocate (self%elastic, source=self%machine%elastic())

@@ -12,7 +12,6 @@ module nocdyn_operating_point
   use nocdyn_reduced, only: new_reduced
   use nocdyn_run_settings, only: choose_settings, find_lossy_element
   use nocdyn_solve, only: solve
-  use nocdyn_steady_losses, only: tell_losses
   use nocdyn_text, only: append, string_t, to_text
   implicit none (type, external)
   private
@@ -96,12 +95,14 @@ contains
     integer :: nearest
 
     call find_equilibria(machine, t_infinity, point%formulation, equilibria, point%notes, error)
-    if (allocated(error)) return
+    if (allocated(error)) then
+      error%message = error%message // '; --at rest linearises at the start angles without speeds'
+      return
+    end if
     if (size(equilibria) > 1) call find_stability(point%formulation, t_infinity, equilibria)
     nearest = nearest_equilibrium(point%formulation, equilibria)
     point%t = t_infinity
     point%y = equilibria(nearest)%y
-    call tell_losses(point%formulation%machine, equilibria(nearest)%losses)
     point%text = 'the steady state'
     if (size(equilibria) == 1) return
     call append(point%notes, 'there are ' // to_text(size(equilibria)) // ' steady states, ' // &

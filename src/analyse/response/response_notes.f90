@@ -5,11 +5,11 @@ module nocdyn_response_notes
   use nocdyn_forced_response, only: forced_response_t
   use nocdyn_gap_couplings, only: gap_couplings_t
   use nocdyn_input, only: input_t
+  use nocdyn_joint_texts, only: describe_losses
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_response_quantities, only: quantity_moment
   use nocdyn_response_settings, only: response_settings_t
-  use nocdyn_steady_losses, only: describe_losses
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
   use nocdyn_units, only: from_si, unit_rpm
   implicit none (type, external)

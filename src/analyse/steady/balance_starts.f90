@@ -9,7 +9,7 @@ module nocdyn_balance_starts
   implicit none (type, external)
   private
 
-  public :: search_from_starts
+  public :: search_from_starts, solve_by_newton
 
   real(wp), parameter :: singular = 1.0e-13_wp   ! relative to the largest singular value
 
@@ -39,13 +39,13 @@ contains
       reduced%z(reduced%speeds) = matmul(reduced%basis, speeds)
       call reduced%solve(speeds(1), holds_rising=.true.)
       point = reduced%z
-      call newton(reduced%balance, point, block)
+      call solve_by_newton(reduced%balance, point, block)
     end do
     point = start
-    call newton(reduced%balance, point, block)
+    call solve_by_newton(reduced%balance, point, block)
     point = start
     call follow_motion(reduced%balance, point, block)
-    call newton(reduced%balance, point, block)
+    call solve_by_newton(reduced%balance, point, block)
   end subroutine search_from_starts
 
   !> Speeds to begin with for a column of the basis [rad/s]: rest, those at which laws bend, and between them; one for others.
@@ -80,7 +80,7 @@ contains
   end function combination
 
   !> Newton's method with steps of minimum norm, halved until the residuals fall. Adds the solution if it converges.
-  subroutine newton(balance, z, block)
+  subroutine solve_by_newton(balance, z, block)
     type(torque_balance_t), intent(inout) :: balance
     real(wp), intent(inout) :: z(:)   !! start, then the last iterate, [unknowns]
     type(block_solutions_t), intent(inout) :: block
@@ -118,7 +118,7 @@ contains
         block%least_speed = z(members(1))
       end if
     end associate
-  end subroutine newton
+  end subroutine solve_by_newton
 
   !> Follows the motion of the rigid bodies and the internal states by Euler's implicit method, with steps that grow while
   !> Newton's method converges in a few iterations: at the end they are long, and what is left is steady.

@@ -73,7 +73,9 @@ contains
       moves = moves .or. abs(balance%body_speeds(unit)) > 0.0_wp
     end do
     bodies = pack([(b, b=1, size(moves))], moves)
-    bodies = pack(bodies, bodies <= size(moves) - balance%formulation%machine%nodes)
+    if (any(bodies <= size(moves) - balance%formulation%machine%nodes)) then
+      bodies = pack(bodies, bodies <= size(moves) - balance%formulation%machine%nodes)
+    end if
     associate (names => balance%formulation%machine%names)
       text = joined(selected(names, bodies), ', ', most_names)
     end associate

@@ -1,20 +1,22 @@
 !> Steady states of a machine: constant speeds, mean torques, constant twists.
 module nocdyn_equilibrium
   use nocdyn_balance_search, only: search_balance
+  use nocdyn_balance_starts, only: solve_by_newton
   use nocdyn_balance_texts, only: describe_speeds, describe_state_speeds, explain_no_balance, list_moving_bodies
   use nocdyn_block_solutions, only: block_solutions_t
   use nocdyn_element_sets, only: element_names
   use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_floating_motions, only: hold_floating
   use nocdyn_formulation, only: formulation_t
+  use nocdyn_joint_texts, only: describe_joints, describe_overload
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_eigen, only: eigenvectors
   use nocdyn_linearisation, only: linearisation_t, linearise
   use nocdyn_machine, only: machine_t
-  use nocdyn_overloads, only: describe_overload
   use nocdyn_reduced, only: reduced_t
+  use nocdyn_resting_joints, only: list_resting_sets, new_resting_joints, resting_joints_t, slips_where_it_cannot
   use nocdyn_static_twists, only: find_twists, undetermined_elements
-  use nocdyn_steady_losses, only: describe_losses, new_steady_losses, steady_losses_t, tell_losses
-  use nocdyn_text, only: append, joined, string_t
+  use nocdyn_text, only: append, joined, string_t, to_text
   use nocdyn_torque_balance, only: set_up_balance, torque_balance_t
   implicit none (type, external)
   private
@@ -26,20 +28,22 @@ module nocdyn_equilibrium
   integer, parameter :: most_combinations = 64   ! of the solutions of independent parts of a machine
   integer, parameter :: most_states = 1000       ! up to which eigenvalues are computed, which takes some seconds
   integer, parameter :: most_names = 5           ! of bodies in a message
-  integer, parameter :: most_trials = 50         ! of moments of losses
+  integer, parameter :: most_trials = 50         ! of the torques of teeth
 
   !> A steady state and its stability.
   type, public :: equilibrium_t
     real(wp), allocatable :: y(:, :)   !! state of the reduced formulation without work integrals, [1, states]
-    real(wp), allocatable :: losses(:) !! moments of the teeth with losses, for `tell_losses` [N m]
+    type(string_t), allocatable :: joints(:)   !! which joints hold, slip or are open, ends of sentences
     character(len=14) :: stability = 'not determined'   !! stable, unstable, neutral, not determined
     real(wp) :: growth = 0.0_wp   !! largest real part of the eigenvalues without those of free rigid motions [1/s]
     integer :: free_modes = 0   !! number of rigid motions without torques, or in a range of steady speeds
+    logical :: is_at_rest = .false.   !! whether nothing turns, as joints hold
+    logical :: is_fixed = .false.     !! whether they hold all that could move
   end type equilibrium_t
 
 contains
 
-  !> Finds the steady states of a machine with mean torques.
+  !> Finds the steady states of a machine with mean torques: for each set of joints that can be at rest those in which they are.
   subroutine find_equilibria(machine, t, formulation, equilibria, notes, error)
     type(machine_t), intent(in) :: machine                          !! one lane
     real(wp), intent(in) :: t   !! time at which torques over the time have their values [s]; `t_infinity` after all changes
@@ -47,106 +51,151 @@ contains
     type(equilibrium_t), allocatable, intent(out) :: equilibria(:)
     type(string_t), allocatable, intent(out) :: notes(:)   !! remarks for the report
     type(error_t), allocatable, intent(out) :: error       !! if no steady state was found
-    character(len=:), allocatable :: lossy
+    type(torque_balance_t), target :: balance
+    type(error_t), allocatable :: first_error
+    type(equilibrium_t), allocatable :: found(:)
+    type(string_t), allocatable :: refusals(:)
+    logical, allocatable :: sets(:, :)   ! joints at rest, [joints, sets]
+    integer :: i
+    logical :: is_complete
 
     call mean_formulation(machine, formulation)
-    allocate (notes(0))
+    allocate (notes(0), equilibria(0), refusals(0))
     if (allocated(machine%simplifications)) notes = machine%simplifications
-    call find_balances(formulation, t, equilibria, notes, error)
+    call refuse_moving_rows(formulation, error)
     if (allocated(error)) return
-    call describe_losses(machine, lossy)
-    if (lossy /= '') call append(notes, 'the moments of the losses of ' // lossy // ' are taken as constant in vibrations')
-    call add_losses(formulation, t, equilibria, notes, error)
-    if (.not. allocated(error)) call drop_overloaded(formulation, t, equilibria, notes, error)
+    call set_up_balance(formulation, t, balance)
+    call list_resting_sets(balance, sets, is_complete)
+    call move_alloc(balance%formulation, formulation)
+    do i = 1, size(sets, 2)
+      call find_balances(formulation, t, sets(:, i), found, notes, refusals, error)
+      if (allocated(error)) then
+        if (error%code /= exit_failed) return
+        if (.not. allocated(first_error)) call move_alloc(error, first_error)
+        if (allocated(error)) deallocate (error)
+      end if
+      if (allocated(found)) call add_others(formulation, found, equilibria)
+    end do
+    if (.not. is_complete) call append(notes, 'more combinations of joints at rest are possible than the ' // &
+                                              to_text(size(sets, 2)) // ' that were tried')
+    if (size(equilibria) > 0) then
+      call complete_states(formulation, t, equilibria, notes)
+    else if (size(refusals) > 0) then
+      call raise(error, exit_failed, 'no steady state was found: ' // refusals(size(refusals))%text)
+      if (allocated(first_error)) error%message = error%message // '; slipping, ' // first_error%message
+    else
+      call move_alloc(first_error, error)
+    end if
   end subroutine find_equilibria
 
-  !> Finds the states in which all torques balance, with given moments of losses.
-  subroutine find_balances(formulation, t, equilibria, notes, error)
+  !> Refuses joints that move: how they do is not known at a time after all changes.
+  subroutine refuse_moving_rows(formulation, error)
+    class(formulation_t), intent(in) :: formulation
+    type(error_t), allocatable, intent(out) :: error
+
+    if (formulation%joints%motions%count > 0) call raise(error, exit_failed, 'joints move in this machine, which then has no ' // &
+      'steady state but that of the means over a turn')
+  end subroutine refuse_moving_rows
+
+  !> Orders the states by their speeds, and says which joints hold in each.
+  subroutine complete_states(formulation, t, equilibria, notes)
+    class(formulation_t), intent(inout) :: formulation
+    real(wp), intent(in) :: t   !! [s]
+    type(equilibrium_t), intent(inout) :: equilibria(:)
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    type(equilibrium_t) :: moved
+    real(wp) :: speed(size(equilibria))
+    type(string_t), allocatable :: listed(:)
+    integer :: i, k
+
+    if (formulation%joints%locking == 0) return
+    do i = 1, size(equilibria)
+      call formulation%observe([t], equilibria(i)%y)
+      call describe_joints(formulation, equilibria(i)%joints)
+      equilibria(i)%is_at_rest = all(abs(formulation%omega(1, 1:)) <= 0.0_wp)
+      speed(i) = formulation%omega(1, maxloc(abs(formulation%omega(1, 1:)), dim=1))
+    end do
+    do i = 2, size(equilibria)
+      do k = i, 2, -1
+        if (speed(k - 1) <= speed(k)) exit
+        moved = equilibria(k)
+        equilibria(k) = equilibria(k - 1)
+        equilibria(k - 1) = moved
+        speed(k - 1:k) = speed(k:k - 1:-1)
+      end do
+    end do
+    allocate (listed(0))
+    do i = 1, size(equilibria)
+      do k = 1, size(equilibria(i)%joints)
+        if (size(equilibria) == 1) then
+          call append(listed, 'in this state ' // equilibria(i)%joints(k)%text)
+        else
+          call append(listed, 'in steady state ' // to_text(i) // ' of ' // to_text(size(equilibria)) // ' ' // &
+                              equilibria(i)%joints(k)%text)
+        end if
+      end do
+    end do
+    notes = [listed, notes]
+  end subroutine complete_states
+
+  !> Adds the states of a set of joints at rest, but those that are known from another one.
+  subroutine add_others(formulation, found, equilibria)
+    class(formulation_t), intent(inout) :: formulation
+    type(equilibrium_t), intent(in) :: found(:)
+    type(equilibrium_t), allocatable, intent(inout) :: equilibria(:)
+    real(wp), parameter :: same = 1.0e-9_wp   ! relative
+    real(wp) :: omega(formulation%machine%bodies), other(formulation%machine%bodies)
+    integer :: i, k
+    logical :: is_known
+
+    do i = 1, size(found)
+      call formulation%set_state(found(i)%y)
+      omega = formulation%omega(1, 1:)
+      is_known = .false.
+      do k = 1, size(equilibria)
+        call formulation%set_state(equilibria(k)%y)
+        other = formulation%omega(1, 1:)
+        is_known = is_known .or. (formulation%joints%locking > 0 .and. &
+                                  all(abs(other - omega) <= same * maxval(abs([other, omega]))))
+      end do
+      if (.not. is_known) equilibria = [equilibria, found(i)]
+    end do
+  end subroutine add_others
+
+  !> Finds the states in which all torques balance, with some joints at rest.
+  subroutine find_balances(formulation, t, is_at_rest, equilibria, notes, refusals, error)
     class(formulation_t), allocatable, intent(inout) :: formulation
     real(wp), intent(in) :: t   !! [s]
+    logical, intent(in) :: is_at_rest(:)   !! [joints]
     type(equilibrium_t), allocatable, intent(out) :: equilibria(:)
     type(string_t), allocatable, intent(inout) :: notes(:)
+    type(string_t), allocatable, intent(inout) :: refusals(:)   !! what joints at rest cannot hold
     type(error_t), allocatable, intent(out) :: error
     type(torque_balance_t), target :: balance
     type(block_solutions_t), allocatable :: blocks(:)
+    type(resting_joints_t) :: resting
     character(len=:), allocatable :: text
     integer :: i
 
-    call set_up_balance(formulation, t, balance)
+    call set_up_balance(formulation, t, balance, is_at_rest)
+    call hold_floating(balance)
+    resting = new_resting_joints(balance)
     call search_balance(balance, blocks)
     do i = 1, size(blocks)
       if (size(blocks(i)%values, 2) > 0) cycle
       call explain_no_balance(balance, blocks(i), text)
       call raise(error, exit_failed, text)
+      call move_alloc(balance%formulation, formulation)
       return
     end do
-    do i = 1, size(blocks)
-      if (.not. blocks(i)%is_unloaded) cycle
+    call combine(balance, resting, blocks, equilibria, notes, refusals, error)
+    do i = 1, merge(size(blocks), 0, size(equilibria) > 0)
+      if (.not. blocks(i)%is_unloaded .and. balance%floating(blocks(i)%members(1)) == 0) cycle
       call list_moving_bodies(balance, blocks(i)%members, text)
-      call append(notes, 'nothing drives or brakes ' // text // ': any speed is steady, and the one of the start is kept')
+      call append_new(notes, 'nothing drives or brakes ' // text // ': any speed is steady, and the one of the start is kept')
     end do
-    call combine(balance, blocks, equilibria, notes, error)
     call move_alloc(balance%formulation, formulation)
   end subroutine find_balances
-
-  !> Adds the losses of teeth to steady states without them. States in which they do not let the machine turn are dropped.
-  subroutine add_losses(formulation, t, equilibria, notes, error)
-    class(formulation_t), allocatable, intent(inout) :: formulation
-    real(wp), intent(in) :: t   !! [s]
-    type(equilibrium_t), allocatable, intent(inout) :: equilibria(:)
-    type(string_t), allocatable, intent(inout) :: notes(:)
-    type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: lossy, speeds
-    logical :: turns(size(equilibria))
-    integer :: i
-
-    do i = 1, size(equilibria)
-      call balance_losses(formulation, t, equilibria(i), turns(i))
-      if (turns(i)) cycle
-      call formulation%set_state(equilibria(i)%y)
-      call describe_state_speeds(formulation, speeds)
-      call append(notes, 'of the steady state without losses at ' // speeds // ' there is none with them')
-    end do
-    equilibria = pack(equilibria, turns)
-    if (size(equilibria) > 0) return
-    call describe_losses(formulation%machine, lossy)
-    call raise(error, exit_failed, 'no steady state was found with the losses of ' // lossy // &
-               '; teeth that lock themselves may stand still')
-  end subroutine add_losses
-
-  !> Finds the moments of the losses in a steady state, and the state with them.
-  subroutine balance_losses(formulation, t, equilibrium, is_solved)
-    class(formulation_t), allocatable, intent(inout) :: formulation
-    real(wp), intent(in) :: t   !! [s]
-    type(equilibrium_t), intent(inout) :: equilibrium   !! without losses at first
-    logical, intent(out) :: is_solved
-    type(equilibrium_t), allocatable :: found(:)
-    type(error_t), allocatable :: error
-    type(steady_losses_t) :: losses
-    type(string_t), allocatable :: notes(:)   ! those of the state without losses stand
-    real(wp) :: omega(formulation%machine%bodies)
-    integer :: i
-
-    is_solved = .true.
-    losses = new_steady_losses(formulation%machine)
-    allocate (equilibrium%losses, source=losses%moment)
-    if (losses%count == 0) return
-    do i = 1, most_trials
-      call tell_losses(formulation%machine, equilibrium%losses)
-      call losses%improve(formulation, t, equilibrium%y, is_solved)
-      if (is_solved) return
-      call tell_losses(formulation%machine, losses%moment)
-      allocate (notes(0))
-      call find_balances(formulation, t, found, notes, error)
-      if (allocated(error)) exit
-      call formulation%set_state(equilibrium%y)
-      omega = formulation%omega(1, 1:)
-      equilibrium%y = found(minloc(distances(formulation, found, omega), dim=1))%y
-      equilibrium%losses = losses%moment
-      deallocate (notes)
-    end do
-    is_solved = .false.
-  end subroutine balance_losses
 
   !> The kinetic energies of steady states relative to given speeds [J], [equilibria].
   function distances(formulation, equilibria, omega, counts)
@@ -164,27 +213,6 @@ contains
       distances(i) = formulation%machine%kinetic_energy(1, difference)
     end do
   end function distances
-
-  !> Drops states in which joints that are taken as locked would slip.
-  subroutine drop_overloaded(formulation, t, equilibria, notes, error)
-    class(formulation_t), intent(inout) :: formulation
-    real(wp), intent(in) :: t   !! [s]
-    type(equilibrium_t), allocatable, intent(inout) :: equilibria(:)
-    type(string_t), allocatable, intent(inout) :: notes(:)
-    type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: text
-    logical :: holds(size(equilibria))
-    integer :: i
-
-    do i = 1, size(equilibria)
-      call tell_losses(formulation%machine, equilibria(i)%losses)
-      call describe_overload(formulation, t, equilibria(i)%y, text)
-      holds(i) = text == ''
-      if (.not. holds(i)) call append(notes, text)
-    end do
-    equilibria = pack(equilibria, holds)
-    if (size(equilibria) == 0) call raise(error, exit_failed, 'no steady state was found: ' // text)
-  end subroutine drop_overloaded
 
   !> The reduced formulation of a machine with mean torques, without work integrals.
   subroutine mean_formulation(machine, formulation)
@@ -207,22 +235,22 @@ contains
     integer :: i
 
     do i = 1, size(equilibria)
-      call tell_losses(formulation%machine, equilibria(i)%losses)
       call classify(formulation, t, equilibria(i))
     end do
   end subroutine find_stability
 
   !> Combines the solutions of the blocks in all ways and finds the twists of each combination.
-  subroutine combine(balance, blocks, equilibria, notes, error)
+  subroutine combine(balance, resting, blocks, equilibria, notes, refusals, error)
     type(torque_balance_t), intent(inout) :: balance
+    type(resting_joints_t), intent(inout) :: resting
     type(block_solutions_t), intent(in) :: blocks(:)
     type(equilibrium_t), allocatable, intent(out) :: equilibria(:)
-    type(string_t), allocatable, intent(inout) :: notes(:)
+    type(string_t), allocatable, intent(inout) :: notes(:), refusals(:)
     type(error_t), allocatable, intent(out) :: error
     integer :: choice(size(blocks)), i, number
     real(wp) :: z(balance%unknowns())
     type(equilibrium_t) :: found
-    character(len=:), allocatable :: speeds
+    character(len=:), allocatable :: refusal, speeds
     logical :: is_found
 
     allocate (equilibria(0))
@@ -232,20 +260,23 @@ contains
       do i = 1, size(blocks)
         z(blocks(i)%members) = blocks(i)%values(:, choice(i))
       end do
-      call complete(balance, z, found, is_found, error)
+      call complete(balance, resting, z, found, refusal, is_found, error)
       if (allocated(error)) return
-      if (is_found) then
-        found%free_modes = count(blocks%is_unloaded .or. [(blocks(i)%is_range(choice(i)), i=1, size(blocks))])
+      if (refusal /= '') then
+        if (refusal /= 'none') call append(refusals, refusal)
+      else if (is_found) then
+        found%free_modes = count(blocks%is_unloaded .or. [(blocks(i)%is_range(choice(i)), i=1, size(blocks))]) &
+                           + sum(balance%floating)
         equilibria = [equilibria, found]
         call add_range_notes(balance, blocks, choice, z, notes)
       else
         call describe_speeds(balance, z, [(i, i=1, size(z))], speeds)
-        call append(notes, 'the torques balance at ' // speeds // ', but no twists of the couplings were found that carry them')
+        refusal = 'the torques balance at ' // speeds // ', but no twists of the couplings were found that carry them'
+        call append(refusals, refusal)
+        call append_new(notes, refusal)
       end if
       if (.not. advance(blocks, choice)) exit
     end do
-    if (size(equilibria) > 0) return
-    call raise(error, exit_failed, 'no steady state was found: ' // notes(size(notes))%text)
   end subroutine combine
 
   !> Adds notes about other steady speeds and twists beside a solution.
@@ -297,22 +328,72 @@ contains
     advance = .false.
   end function advance
 
-  !> The state with these speeds and internal states, and with the twists that balance the torques.
-  subroutine complete(balance, z, equilibrium, is_found, error)
+  !> The state with these speeds and internal states, the moments of joints at rest, and the twists that balance the torques.
+  subroutine complete(balance, resting, z, equilibrium, refusal, is_found, error)
     type(torque_balance_t), intent(inout) :: balance
-    real(wp), intent(in) :: z(:)   !! [unknowns]
+    type(resting_joints_t), intent(inout) :: resting
+    real(wp), intent(inout) :: z(:)   !! [unknowns]
     type(equilibrium_t), intent(out) :: equilibrium
+    character(len=:), allocatable, intent(out) :: refusal   !! why joints do not allow it, 'none' if that is no news; ''
     logical, intent(out) :: is_found   !! whether such twists exist
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: q(balance%coordinates)
+    real(wp) :: difference(balance%joints%teeth%count), q(balance%coordinates)
+    real(wp), parameter :: tolerance = 1.0e-11_wp   ! of torques of teeth, relative
+    integer :: trial
 
-    q = 0.0_wp
-    call balance%evaluate(z)
-    call find_twists(balance, q, is_found, error)
-    call balance%set_state(z)
-    balance%y(1, size(q) + 1:2 * size(q)) = q
+    refusal = ''
+    is_found = .false.
+    balance%joints%offset = 0.0_wp
+    do trial = 1, most_trials
+      q = 0.0_wp
+      call balance%evaluate(z)
+      if (slips_where_it_cannot(balance)) then
+        refusal = 'none'
+        return
+      end if
+      if (balance%joints%count > 0) call resting%hold(balance)
+      if (resting%overloaded > 0) then
+        call describe_overload(balance, resting, refusal)
+        return
+      end if
+      call find_twists(balance, q, is_found, error)
+      call balance%set_state(z)
+      balance%y(1, balance%coordinates + 1:2 * balance%coordinates) = q
+      if (.not. is_found .or. allocated(error) .or. size(difference) == 0) exit
+      difference = loads_in(balance, balance%y) - balance%joints%load
+      where (balance%joints%is_at_rest(balance%joints%teeth%joint)) difference = 0.0_wp
+      if (all(abs(difference) <= tolerance * maxval(abs(balance%joints%load)))) exit
+      balance%joints%offset = balance%joints%offset + difference
+      call balance%evaluate(z)
+      call improve(balance, z)
+    end do
     equilibrium%y = balance%y
   end subroutine complete
+
+  !> The torques of teeth in a state [N m], [losses].
+  function loads_in(balance, y) result(load)
+    type(torque_balance_t), intent(inout) :: balance
+    real(wp), intent(in) :: y(:, :)   !! [1, states]
+    real(wp) :: load(balance%joints%teeth%count)
+    real(wp), allocatable :: state(:, :)
+
+    allocate (state, source=y)
+    call balance%formulation%observe(balance%t, state)
+    load = balance%formulation%joints%teeth%load
+  end function loads_in
+
+  !> Solves for the unknowns again, from those before a correction.
+  subroutine improve(balance, z)
+    type(torque_balance_t), intent(inout) :: balance
+    real(wp), intent(inout) :: z(:)   !! [unknowns]
+    type(block_solutions_t) :: block
+    integer :: i
+
+    if (size(z) == 0) return
+    block%members = [(i, i=1, size(z))]
+    allocate (block%values(size(z), 0), block%is_range(0))
+    call solve_by_newton(balance, z, block)
+  end subroutine improve
 
   !> Determines the stability by the eigenvalues of the linearised machine, unless it has too many states.
   subroutine classify(formulation, t, equilibrium)
@@ -332,6 +413,11 @@ contains
     allocate (values(size(linear%matrix, 1)), vectors(size(linear%matrix, 1), size(linear%matrix, 1)))
     call eigenvectors(linear%matrix, values, vectors, has_failed)
     if (has_failed) return
+    equilibrium%is_fixed = size(values) == 0
+    if (equilibrium%is_fixed) then
+      equilibrium%stability = 'stable'
+      return
+    end if
     equilibrium%growth = growth_rate(values, equilibrium%free_modes)
     if (equilibrium%growth < -rounding * maxval(abs(values))) then
       equilibrium%stability = 'stable'

@@ -148,11 +148,11 @@ contains
     type(twist_problem_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error   !! if the band is too large
     type(entries_t) :: entries
-    integer :: number(balance%coordinates), order(balance%coordinates - size(balance%motions%free))
+    integer :: number(balance%coordinates), order(balance%coordinates - size(balance%loose%free))
     integer :: c, upper
 
     number = 1
-    number(balance%motions%free) = 0
+    number(balance%loose%free) = 0
     self%unknown = pack([(c, c=1, size(number))], number == 1)
     number(self%unknown) = [(c, c=1, size(self%unknown))]
     entries = joined_coordinates(balance, number)

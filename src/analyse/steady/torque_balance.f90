@@ -2,10 +2,12 @@
 !> constant.
 !>
 !> With the rigid motions q' = N s, elastic elements do no work, as their twists are constant. The torques along s are the sum of
-!> G^T M over the other elements, whose speeds are G s. The unknowns are z = (s, internal states).
+!> G^T M over the other elements, whose speeds are G s. The unknowns are z = (s, internal states). Joints that are at rest have no
+!> speed in the rigid motions.
 module nocdyn_torque_balance
   use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates
   use nocdyn_formulation, only: formulation_t
+  use nocdyn_joint_balance, only: joint_balance_t, loads_by_moments, new_joint_balance
   use nocdyn_kinds, only: wp
   use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
   use nocdyn_union_find, only: find_root, join_components
@@ -18,13 +20,17 @@ module nocdyn_torque_balance
   type, public :: torque_balance_t
     class(formulation_t), allocatable :: formulation   !! reduced, one lane, without work integrals
     type(element_coordinates_t) :: incidence
-    type(rigid_motions_t) :: motions
+    type(rigid_motions_t) :: motions        !! of which `s` are the speeds
+    type(rigid_motions_t) :: loose          !! those of which the joints at rest slip too
+    type(joint_balance_t) :: joints
     logical, allocatable :: is_elastic(:)   !! whether an element can have a restoring moment, [elements]
     integer, allocatable :: elastic(:)      !! elements that the rigid motions do not twist
     integer :: coordinates = 0
     integer :: internal = 0                !! number of internal states
     real(wp), allocatable :: residual(:)   !! after `evaluate`: torques [N m], rates of internal states, [unknowns]
     real(wp), allocatable :: scale(:)      !! sum of the absolute terms of each residual, [unknowns]
+    integer, allocatable :: floating(:)    !! motions that no torque acts on, in the block that begins with each unknown, after
+                                           !! `hold_floating`, [unknowns]
     ! work space:
     real(wp) :: t(1) = 0.0_wp
     integer :: status(1) = 0
@@ -34,19 +40,23 @@ module nocdyn_torque_balance
     real(wp), allocatable :: ratio(:)               !! G, [entries]
     real(wp), allocatable :: y(:, :)   !! state after `set_state`, [1, states]
     real(wp), allocatable :: rate(:, :)
+    real(wp), allocatable :: drag(:, :)       !! torques that keep motions that float at their start, by rigid motions
+    real(wp), allocatable :: start_speed(:)   !! of the rigid motions, with `drag` [rad/s]
     real(wp), allocatable, private :: start_twist(:)   !! [rad], [elements]
   contains
     procedure :: unknowns, start, set_state, settle, moments_at, inertia, evaluate, differentiate
-    procedure :: blocks, body_speeds
+    procedure :: blocks, body_speeds, differentiate_at_start
+    procedure, private :: evaluate_laws, differentiate_losses
   end type torque_balance_t
 
 contains
 
   !> The equations of a machine with mean torques.
-  subroutine set_up_balance(formulation, t, self)
+  subroutine set_up_balance(formulation, t, self, is_at_rest)
     class(formulation_t), allocatable, intent(inout) :: formulation   !! reduced, one lane, without work integrals
     real(wp), intent(in) :: t                                         !! [s]
     type(torque_balance_t), intent(out) :: self
+    logical, intent(in), optional :: is_at_rest(:)   !! joints that are; absent: none, and teeth lose nothing
     integer :: e
 
     call move_alloc(formulation, self%formulation)
@@ -58,15 +68,47 @@ contains
       allocate (self%is_elastic(machine%elements%count), source=.false.)
       self%is_elastic(self%elastic) = .true.
       self%inelastic = pack([(e, e=1, size(self%is_elastic))], .not. self%is_elastic)
-      self%motions = new_rigid_motions(self%coordinates, self%incidence, self%elastic)
+      self%loose = new_rigid_motions(self%coordinates, self%incidence, self%elastic)
+      self%motions = self%loose
     end associate
     self%t = t
+    allocate (self%start_twist, source=pack(self%formulation%machine%start_twist(), .true.))
+    self%joints = new_joint_balance(self%formulation%joints)
+    if (present(is_at_rest)) call hold_joints(self, is_at_rest)
     call gather_ratios(self)
     allocate (self%y(1, self%formulation%states), source=0.0_wp)
     allocate (self%rate, source=self%y)
-    allocate (self%start_twist, source=pack(self%formulation%machine%start_twist(), .true.))
     allocate (self%residual(self%unknowns()), self%scale(self%unknowns()), source=0.0_wp)
   end subroutine set_up_balance
+
+  !> Holds joints at rest, and finds what the teeth carry.
+  subroutine hold_joints(self, is_at_rest)
+    type(torque_balance_t), intent(inout) :: self
+    logical, intent(in) :: is_at_rest(:)   !! [joints]
+    integer, allocatable :: rigid(:)       ! elements
+
+    self%joints%is_at_rest = is_at_rest
+    rigid = [self%elastic, pack(self%joints%element, is_at_rest)]
+    if (any(is_at_rest)) self%motions = new_rigid_motions(self%coordinates, self%incidence, rigid)
+    call self%differentiate_at_start()
+    associate (joints => self%joints, machine => self%formulation%machine)
+      joints%by_moment = loads_by_moments(joints%teeth, machine, self%incidence, self%motions, rigid)
+    end associate
+  end subroutine hold_joints
+
+  !> Differentiates the laws of the elements at the start twists, without speeds.
+  subroutine differentiate_at_start(self)
+    class(torque_balance_t), intent(inout) :: self
+
+    associate (machine => self%formulation%machine)
+      machine%elements%angle(1, :) = self%start_twist
+      machine%elements%speed(1, :) = 0.0_wp
+      call machine%settle_internal(self%t(1))
+      call machine%choose_branches(self%t)
+      call machine%evaluate_elements(self%t)
+      call machine%differentiate_elements(self%t)
+    end associate
+  end subroutine differentiate_at_start
 
   !> Computes G = U N of the inelastic elements.
   subroutine gather_ratios(self)
@@ -248,6 +290,7 @@ contains
       machine%elements%speed(1, :) = 0.0_wp
       machine%elements%speed(1, self%inelastic) = speed
       call machine%settle_internal(self%t(1))
+      call self%joints%choose_modes(machine)
       call machine%choose_branches(self%t)
       call machine%evaluate_elements(self%t)
       moments = machine%elements%restoring(1, self%inelastic) + machine%elements%applied(1, self%inelastic)
@@ -266,8 +309,7 @@ contains
     self%residual = 0.0_wp
     self%scale = 0.0_wp
     associate (machine => self%formulation%machine, r => size(self%motions%free))
-      call machine%choose_branches(self%t)
-      call machine%evaluate_elements(self%t)
+      call self%evaluate_laws()
       do i = 1, size(self%inelastic)
         e = self%inelastic(i)
         do k = self%first(i), self%first(i + 1) - 1
@@ -276,10 +318,28 @@ contains
           self%scale(self%freedom(k)) = self%scale(self%freedom(k)) + abs(term)
         end do
       end do
+      if (allocated(self%drag)) then
+        do i = 1, r
+          self%residual(i) = self%residual(i) - dot_product(self%drag(:, i), z(:r) - self%start_speed)
+          self%scale(i) = self%scale(i) + dot_product(abs(self%drag(:, i)), abs(z(:r)) + abs(self%start_speed))
+        end do
+      end if
       self%residual(r + 1:) = machine%elements%internal%rate(1, :)
       self%scale(r + 1:) = abs(self%residual(r + 1:))
     end associate
   end subroutine evaluate
+
+  !> Evaluates the elements, whose joints that are not at rest slip.
+  subroutine evaluate_laws(self)
+    class(torque_balance_t), intent(inout) :: self
+
+    associate (machine => self%formulation%machine)
+      call self%joints%choose_modes(machine)
+      call machine%choose_branches(self%t)
+      call machine%evaluate_elements(self%t)
+      if (allocated(self%joints%by_moment)) call self%joints%add_losses(machine)
+    end associate
+  end subroutine evaluate_laws
 
   !> Derivatives of the residuals by the unknowns, after `evaluate` with the same unknowns.
   subroutine differentiate(self, matrix)
@@ -300,8 +360,47 @@ contains
         end do
       end do
     end associate
+    if (allocated(self%drag)) then
+      associate (r => size(self%motions%free))
+        matrix(:r, :r) = matrix(:r, :r) - self%drag
+      end associate
+    end if
     call differentiate_internal(self, matrix)
+    if (allocated(self%joints%by_moment) .and. self%joints%teeth%count > 0) call self%differentiate_losses(matrix)
   end subroutine differentiate
+
+  !> Adds the derivatives of the losses of teeth that turn.
+  subroutine differentiate_losses(self, matrix)
+    class(torque_balance_t), intent(in) :: self
+    real(wp), intent(inout) :: matrix(:, :)   !! [unknowns, unknowns]
+    real(wp), dimension(self%formulation%machine%elements%count) :: moments, speeds
+    real(wp) :: change(self%joints%teeth%count)
+    integer :: i, k, place, unknown
+
+    associate (elements => self%formulation%machine%elements, r => size(self%motions%free), joints => self%joints)
+      do unknown = 1, size(matrix, 2)
+        speeds = 0.0_wp
+        moments = 0.0_wp
+        if (unknown > r) then
+          moments(elements%internal%element(unknown - r)) = elements%internal%applied(1, unknown - r)
+        else
+          do i = 1, size(self%inelastic)
+            do k = self%first(i), self%first(i + 1) - 1
+              if (self%freedom(k) == unknown) speeds(self%inelastic(i)) = self%ratio(k)
+            end do
+          end do
+          moments(self%inelastic) = elements%applied_speed(1, self%inelastic) * speeds(self%inelastic)
+        end if
+        change = joints%change_of_losses(moments, speeds)
+        do i = 1, size(change)
+          place = findloc(self%inelastic, joints%element(joints%teeth%joint(i)), dim=1)
+          do k = self%first(place), self%first(place + 1) - 1
+            matrix(self%freedom(k), unknown) = matrix(self%freedom(k), unknown) + self%ratio(k) * change(i)
+          end do
+        end do
+      end do
+    end associate
+  end subroutine differentiate_losses
 
   !> Fills the rows and columns of the internal states x.
   subroutine differentiate_internal(self, matrix)
@@ -336,6 +435,7 @@ contains
         call join_components(self%freedom(self%first(i)), self%freedom(k), block_of)
       end do
     end do
+    call join_by_losses(self, block_of)
     associate (states => self%formulation%machine%elements%internal, r => size(self%motions%free))
       do x = 1, self%internal
         call join_components(r + states%first(x), r + x, block_of)
@@ -348,5 +448,26 @@ contains
       block_of(i) = root
     end do
   end function blocks
+
+  !> Joins what teeth that turn join: their losses depend on the moments of other elements.
+  subroutine join_by_losses(self, block_of)
+    class(torque_balance_t), intent(in) :: self
+    integer, intent(inout) :: block_of(:)
+    real(wp), parameter :: rounding = 1.0e-9_wp
+    integer :: i, l, place
+
+    if (.not. allocated(self%joints%by_moment)) return
+    associate (joints => self%joints, first => self%first)
+      do l = 1, joints%teeth%count
+        place = findloc(self%inelastic, joints%element(joints%teeth%joint(l)), dim=1)
+        if (first(place) == first(place + 1)) cycle
+        do i = 1, size(self%inelastic)
+          if (first(i) == first(i + 1)) cycle
+          if (abs(joints%by_moment(l, self%inelastic(i))) <= rounding * maxval(abs(joints%by_moment(l, :)))) cycle
+          call join_components(self%freedom(first(place)), self%freedom(first(i)), block_of)
+        end do
+      end do
+    end associate
+  end subroutine join_by_losses
 
 end module nocdyn_torque_balance

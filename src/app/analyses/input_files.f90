@@ -88,7 +88,8 @@ contains
     if (command /= 'check') call refuse_joints(input, 'nocdyn ' // command, error)
     if (allocated(error)) return
     if (input%takes_means) then
-      call assemble_steady_machine(input, t_infinity, machine, error)
+      call assemble_steady_machine(input, t_infinity, all(command /= [character(len=11) :: 'equilibrium', 'modes']), machine, &
+                                   error)
     else
       call assemble_machine(input, machine, error)
     end if

@@ -63,7 +63,7 @@ contains
     do b = 1, size(banks)
       select type (bank => banks(b)%bank)
       class is (friction_joints_t)
-        do e = 1, merge(bank%count, 0, bank%are_joints)
+        do e = 1, bank%count
           self%element = [self%element, bank%first - 1 + e]
           self%bank = [self%bank, b]
           self%number = [self%number, e]

@@ -7,7 +7,6 @@ module nocdyn_joint_assembly
   use nocdyn_friction_joints, only: joint_ranges_t, new_friction_joints
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_loads, only: new_nonlinear_loads
   use nocdyn_text, only: to_text
   implicit none (type, external)
   private
@@ -192,7 +191,7 @@ contains
                                                 groups%bodies('bodies', 2), ranges))
   end subroutine add_freewheels
 
-  !> Adds the bank of the bearings with friction. Where means are taken, a constant load stands for the friction.
+  !> Adds the bank of the bearings with friction.
   subroutine add_bearings(bodies, banks)
     type(element_groups_t), intent(in) :: bodies
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
@@ -210,16 +209,7 @@ contains
     ranges%least = -ranges%most
     ranges%sliding_most = ranges%most
     ranges%sliding_least = ranges%least
-    if (bodies%input%takes_means) then
-      do i = 1, size(body)
-        groups%names(i)%text = 'bearing_' // groups%names(i)%text
-      end do
-      associate (none => 0.0_wp * ranges%most)
-        call append_bank(banks, new_nonlinear_loads(groups%names, body, none, none, ranges%most, none + 1.0_wp))
-      end associate
-    else
-      call append_bank(banks, new_friction_joints(role_bearing, groups%names, 0 * body, body, ranges))
-    end if
+    call append_bank(banks, new_friction_joints(role_bearing, groups%names, 0 * body, body, ranges))
   end subroutine add_bearings
 
 end module nocdyn_joint_assembly

@@ -103,7 +103,7 @@ contains
     teeth%backward = groups%values('reverse_efficiency', absent=huge(1.0_wp))
     where (teeth%backward > 1) teeth%backward = teeth%forward
     call read_tables(groups%input%groups(groups%indices(1)), teeth)
-    call append_bank(banks, new_tooth_losses(groups%names, from, to, teeth, groups%input%takes_means))
+    call append_bank(banks, new_tooth_losses(groups%names, from, to, teeth))
   end subroutine add_bank
 
   !> The torque on the first wheel by the multiplier of a gear or the force of a mesh.

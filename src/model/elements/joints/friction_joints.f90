@@ -37,7 +37,6 @@ module nocdyn_friction_joints
 
   type, extends(bank_t), public :: friction_joints_t
     integer :: mode_switch = 1   !! of each element, the switch of its mode
-    logical :: are_joints = .true.   !! whether their modes and moments follow from the machine; false: it is told the moments
     type(curve_t), allocatable :: over_slip   !! friction while it slips [N m] over the speed of the slip [rad/s] of all elements
   contains
     procedure :: connect_joints
@@ -47,6 +46,8 @@ module nocdyn_friction_joints
     procedure :: range_of_slip
     procedure :: mode_of
     procedure :: set_mode
+    procedure :: set_mode_by_slip
+    procedure :: knees
     procedure :: quantities
     procedure :: observe
   end type friction_joints_t
@@ -221,6 +222,27 @@ contains
 
     call self%set_branch(element + (self%mode_switch - 1) * self%count, 1, mode)
   end subroutine set_mode
+
+  !> Sets the mode of a joint that slips, or is locked.
+  subroutine set_mode_by_slip(self, element, slip, is_locked)
+    class(friction_joints_t), intent(inout) :: self
+    integer, intent(in) :: element     !! numbered within the bank
+    real(wp), intent(in) :: slip       !! u' [rad/s]
+    logical, intent(in) :: is_locked
+
+    call self%set_mode(element, merge(locked, merge(slips_forwards, slips_backwards, slip >= 0), is_locked))
+  end subroutine set_mode_by_slip
+
+  !> The friction jumps where the slip changes its direction, and bends at the points of a table.
+  function knees(self, element, t) result(speeds)
+    class(friction_joints_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: t        !! [s]
+    real(wp), allocatable :: speeds(:)
+
+    allocate (speeds(1), source=0.0_wp)
+    if (allocated(self%over_slip)) speeds = [speeds, self%over_slip%knots(), -self%over_slip%knots()]
+  end function knees
 
   function quantities(self) result(columns)
     class(friction_joints_t), intent(in) :: self

@@ -37,10 +37,10 @@ module nocdyn_tooth_losses
     type(curve_t), allocatable, private :: forward_over_speed, backward_over_speed
   contains
     procedure :: describe
-    procedure :: tell
     procedure :: share
     procedure :: range_under_load
     procedure :: is_self_locking
+    procedure :: knees
     procedure :: quantities
     procedure :: observe
   end type tooth_losses_t
@@ -48,11 +48,10 @@ module nocdyn_tooth_losses
 contains
 
   !> A bank of losses.
-  function new_tooth_losses(names, from, to, teeth, are_told) result(bank)
+  function new_tooth_losses(names, from, to, teeth) result(bank)
     type(string_t), intent(in) :: names(:)   !! of the gears
     integer, intent(in) :: from(:), to(:)    !! what the first wheel moves against, 0 = ground, and the first wheel
     type(teeth_t), intent(in) :: teeth
-    logical, intent(in) :: are_told         !! whether their moments are given by `tell`
     type(tooth_losses_t) :: bank
 
     call bank%connect_joints(role_loss, size(teeth%forward, 1), names, from, to)
@@ -62,34 +61,16 @@ contains
     call bank%add_parameter('backward efficiency', teeth%backward, is_key=.false.)
     if (allocated(teeth%forward_over_speed)) allocate (bank%forward_over_speed, source=teeth%forward_over_speed)
     if (allocated(teeth%backward_over_speed)) allocate (bank%backward_over_speed, source=teeth%backward_over_speed)
-    bank%are_joints = .not. are_told
-    if (bank%are_joints) then
-      call bank%add_modes()
-    else
-      call bank%add_parameter('moment', 0.0_wp * teeth%forward, is_key=.false.)
-    end if
+    call bank%add_modes()
     call bank%prepare_law()
   end function new_tooth_losses
 
-  !> Tells a bank of one lane the moments of its elements.
-  subroutine tell(self, moments)
-    class(tooth_losses_t), intent(inout) :: self
-    real(wp), intent(in) :: moments(:)   !! [N m], [elements of the bank]
-
-    self%parameters(self%number_of('moment'))%value(1, :) = moments
-    call self%refresh_lane(1)
-  end subroutine tell
-
-  !> There is no moment before all others are known, or it is told.
+  !> There is no moment before all others are known.
   subroutine describe(self, tape)
     class(tooth_losses_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape
 
-    if (self%are_joints) then
-      tape%applied = node_of(literal(tape, 0.0_wp))
-    else
-      tape%applied = node_of(self%parameter(tape, 'moment'))
-    end if
+    tape%applied = node_of(literal(tape, 0.0_wp))
   end subroutine describe
 
   !> The share s of the torque T that is lost, of the first lane, and its derivative by the speed.
@@ -149,6 +130,20 @@ contains
     call self%share(element, .false., 0.0_wp, s, slope)
     is_self_locking = s >= 1
   end function is_self_locking
+
+  !> The loss jumps where the wheels change their direction, and bends at the points of tables.
+  function knees(self, element, t) result(speeds)
+    class(tooth_losses_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: t        !! [s]
+    real(wp), allocatable :: speeds(:)
+
+    allocate (speeds(1), source=0.0_wp)
+    if (allocated(self%forward_over_speed)) then
+      speeds = [speeds, self%forward_over_speed%knots(), -self%forward_over_speed%knots(), &
+                self%backward_over_speed%knots(), -self%backward_over_speed%knots()]
+    end if
+  end function knees
 
   !> The moment of the loss on the first wheel.
   function quantities(self) result(columns)
