@@ -7,6 +7,7 @@ module nocdyn_response_notes
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_mean_slopes, only: note_mean_slopes
   use nocdyn_response_quantities, only: quantity_moment
   use nocdyn_response_settings, only: response_settings_t
   use nocdyn_steady_losses, only: describe_losses
@@ -55,6 +56,7 @@ contains
     integer :: held, i
 
     call note_open_gaps(response, notes)
+    call note_mean_slopes(response%machine, steepest_slopes(response), notes)
     held = 0
     do i = 1, size(response%points)
       if (abs(response%points(i)%state%torque) > 0) held = held + 1
@@ -66,6 +68,20 @@ contains
     end if
     call note_range(settings, notes)
   end subroutine note_steady_states
+
+  !> The slopes over the mean speed with the largest size at any speed [N m s/rad], [elements].
+  pure function steepest_slopes(response) result(slope)
+    type(forced_response_t), intent(in) :: response
+    real(wp) :: slope(response%machine%elements%count)
+    integer :: i
+
+    slope = 0.0_wp
+    do i = 1, size(response%points)
+      associate (here => response%points(i)%state%mean_slope)
+        where (abs(here) > abs(slope)) slope = here
+      end associate
+    end do
+  end function steepest_slopes
 
   !> Adds a note on each elastic element whose moment does not change with its twist at some speeds.
   subroutine note_open_gaps(response, notes)
