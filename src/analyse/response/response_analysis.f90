@@ -146,6 +146,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(wp), intent(inout) :: failed_speed
     integer :: i
+    real(wp) :: unrefined
 
     if (self%response%matrix%coordinates > most_coordinates) then
       call append(self%notes, 'this machine has ' // to_text(self%response%matrix%coordinates) // ' degrees of freedom: ' // &
@@ -161,7 +162,12 @@ contains
       end do
       call find_crossings(self%response%speeds(), self%response%frequencies(), self%modes, self%crossings)
     end if
-    call refine_peaks(self%response, self%crossings, error, failed_speed)
+    call refine_peaks(self%response, self%crossings, unrefined, error, failed_speed)
+    if (.not. allocated(error) .and. unrefined > 0) then
+      call append(self%notes, 'there are too many peaks between the speeds of the grid to refine all: some may be higher by ' // &
+                              rounded_text(100.0_wp * unrefined, 2) // ' % of the largest one of their quantity; fewer ' // &
+                              'orders or a shorter range of speeds refine all')
+    end if
     if (.not. allocated(error)) call refine_edges(self%response, self%limits, error, failed_speed)
   end subroutine find_peaks
 
