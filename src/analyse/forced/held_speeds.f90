@@ -30,6 +30,8 @@ module nocdyn_held_speeds
     real(wp) :: torque = 0.0_wp   !! on the reference body that holds the speed [N m]; 0 if the motors do
     real(wp), allocatable :: omega(:)       !! speeds of the bodies [rad/s], [bodies]
     real(wp), allocatable :: phi(:)         !! angles of the bodies when that of the reference body is zero [rad], [bodies]
+    real(wp), allocatable :: twist(:)       !! of the elements [rad], [elements]
+    real(wp), allocatable :: rate(:)        !! of twist [rad/s], [elements]
     real(wp), allocatable :: mean(:)        !! moments of the elements [N m], [elements] as all that follow
     real(wp), allocatable :: stiffness(:)   !! minus the derivatives of the moments by the twists [N m/rad]
     real(wp), allocatable :: damping(:)     !! minus the derivatives by the rates of twist [N m s/rad]; 0 of what follows the mean
@@ -350,6 +352,8 @@ contains
       state%phi = state%phi - state%omega * (state%phi(self%reference) / state%omega(self%reference))
     end associate
     associate (elements => self%balance%formulation%machine%elements)
+      state%twist = elements%angle(1, :)
+      state%rate = elements%speed(1, :)
       state%mean = weight * (elements%restoring(1, :) + elements%applied(1, :))
       state%stiffness = -weight * (elements%restoring_angle(1, :) + elements%applied_angle(1, :))
       state%damping = -weight * elements%applied_speed(1, :)
