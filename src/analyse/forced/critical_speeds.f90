@@ -3,7 +3,7 @@
 !>
 !> The speeds at which the lines cross the undamped natural frequencies are added to the speeds, so that no narrow peak is
 !> missed. Then every maximum of an amplitude is refined: near a resonance 1 / |amplitude|^2 is a parabola over the speed, whose
-!> vertex is the next speed.
+!> vertex is the next speed. Of more maxima than a table should have, those that promise most are refined.
 module nocdyn_critical_speeds
   use nocdyn_errors, only: error_t
   use nocdyn_forced_response, only: forced_response_t
@@ -16,6 +16,7 @@ module nocdyn_critical_speeds
 
   public :: find_crossings, keep_new, refine_peaks
 
+  real(wp), parameter :: most_refined = 4.0e6_wp   ! numbers at the speeds between those of the grid: 0.06 GB
   real(wp), parameter, public :: undamped = 1.0e-9_wp   !! a mode with a smaller damping ratio has no finite response
 
   !> Where a line crosses a mode.
@@ -26,6 +27,13 @@ module nocdyn_critical_speeds
     real(wp) :: frequency = 0.0_wp    !! [rad/s]
     real(wp) :: damping_ratio = 0.0_wp
   end type crossing_t
+
+  !> Where maxima are expected.
+  type :: vertices_t
+    integer :: count = 0
+    real(wp), allocatable :: speed(:)   !! [rad/s]
+    real(wp), allocatable :: gain(:)    !! of the amplitude, as a share of the largest one of the quantity
+  end type vertices_t
 
 contains
 
@@ -63,23 +71,27 @@ contains
   end function between
 
   !> Adds speeds to a response until the maxima of all amplitudes are found.
-  subroutine refine_peaks(response, crossings, error, failed_speed)
+  subroutine refine_peaks(response, crossings, unrefined, error, failed_speed)
     type(forced_response_t), intent(inout) :: response
     type(crossing_t), intent(in) :: crossings(:)
+    real(wp), intent(out) :: unrefined      !! by how much a maximum that was left is higher, as a share of the largest one
     type(error_t), allocatable, intent(out) :: error
     real(wp), intent(out) :: failed_speed   !! as in `add_points`
     integer, parameter :: most_rounds = 12
     real(wp), allocatable :: speeds(:)
-    integer :: i, round
+    integer :: i, room, round
 
     failed_speed = 0.0_wp
+    unrefined = 0.0_wp
+    room = int(most_refined / response%values_at_a_speed())
     speeds = pack([(crossings(i)%speed, i=1, size(crossings))], [(crossings(i)%damping_ratio > undamped, i=1, size(crossings))])
     call keep_new(response, speeds)
     do round = 1, most_rounds
       if (size(speeds) == 0) return
+      room = room - size(speeds)
       call response%add_points(speeds, .false., error, failed_speed)
       if (allocated(error)) return
-      call find_vertices(response, crossings, speeds)
+      call find_vertices(response, crossings, max(0, room / 3), speeds, unrefined)   ! the next rounds know better which ones matter
     end do
   end subroutine refine_peaks
 
@@ -103,32 +115,55 @@ contains
   end subroutine keep_new
 
   !> The vertices of the parabolas through the maxima and their neighbours, where they promise a higher peak.
-  subroutine find_vertices(response, crossings, speeds)
+  subroutine find_vertices(response, crossings, most, speeds, unrefined)
     type(forced_response_t), intent(in) :: response
     type(crossing_t), intent(in) :: crossings(:)
+    integer, intent(in) :: most                  !! speeds
     real(wp), allocatable, intent(out) :: speeds(:)
+    real(wp), intent(out) :: unrefined           !! as in `refine_peaks`
     real(wp), parameter :: counts = 1.0e-2_wp   ! of the largest amplitude of all lines: smaller ones are left as they are
-    real(wp) :: smallest, square(size(response%points), size(response%lines))   ! of the amplitudes
+    real(wp) :: largest, square(size(response%points), size(response%lines))   ! of the amplitudes
+    type(vertices_t) :: vertices
     integer :: i, l, q
 
-    allocate (speeds(0))
+    allocate (vertices%speed(64), vertices%gain(64))
     associate (points => response%points)
       do q = 1, size(response%quantities)
         do i = 1, size(points)
           square(i, :) = real(points(i)%quantity(:, q), wp)**2 + aimag(points(i)%quantity(:, q))**2
         end do
-        smallest = counts**2 * maxval(square)
+        largest = maxval(square)
         do l = 1, size(response%lines)
           do i = 2, size(points) - 1
-            if (square(i, l) < max(square(i - 1, l), square(i + 1, l)) .or. .not. square(i, l) > smallest) cycle
+            if (square(i, l) < max(square(i - 1, l), square(i + 1, l)) .or. .not. square(i, l) > counts**2 * largest) cycle
             if (has_undamped(crossings, l, points(i - 1)%state%speed, points(i + 1)%state%speed)) cycle
-            call add_vertex(points(i - 1:i + 1), square(i - 1:i + 1, l), speeds)
+            call add_vertex(points(i - 1:i + 1), square(i - 1:i + 1, l), sqrt(square(i, l) / largest), vertices)
           end do
         end do
       end do
     end associate
+    call keep_highest(vertices, most, speeds, unrefined)
     call keep_new(response, speeds)
   end subroutine find_vertices
+
+  !> The speeds of the maxima that promise most.
+  subroutine keep_highest(vertices, most, speeds, unrefined)
+    type(vertices_t), intent(in) :: vertices
+    integer, intent(in) :: most
+    real(wp), allocatable, intent(out) :: speeds(:)
+    real(wp), intent(out) :: unrefined
+    real(wp), allocatable :: gain(:)
+
+    unrefined = 0.0_wp
+    allocate (gain, source=vertices%gain(:vertices%count))
+    if (size(gain) <= most) then
+      allocate (speeds, source=vertices%speed(:vertices%count))
+      return
+    end if
+    call sort_ascending(gain)
+    unrefined = gain(size(gain) - most)
+    speeds = pack(vertices%speed(:vertices%count), vertices%gain(:vertices%count) > unrefined)
+  end subroutine keep_highest
 
   !> Whether a mode without damping is crossed between two speeds.
   pure logical function has_undamped(crossings, line, first, last)
@@ -141,13 +176,16 @@ contains
   end function has_undamped
 
   !> Adds the vertex of a maximum, unless it is so near that the peak grows by rounding only, or another speed is there.
-  subroutine add_vertex(points, amplitude, speeds)
+  subroutine add_vertex(points, amplitude, share, vertices)
     type(response_point_t), intent(in) :: points(3)
     real(wp), intent(in) :: amplitude(3)   !! squares of the amplitudes, the second one is the largest
-    real(wp), allocatable, intent(inout) :: speeds(:)
+    real(wp), intent(in) :: share          !! the second one, as a share of the largest one of the quantity
+    type(vertices_t), intent(inout) :: vertices
     real(wp), parameter :: accuracy = 1.0e-5_wp   ! relative, of the square of a peak
     real(wp), parameter :: narrow = 1.0e-12_wp    ! relative distance of speeds
-    real(wp) :: bend, distance, gain, slope, vertex, x(3), y(3)
+    real(wp), parameter :: believed = 0.5_wp      ! a parabola beside an antiresonance falls below zero
+    real(wp) :: bend, distance, gain, promised, slope, vertex, x(3), y(3)
+    integer :: k
 
     x = [points(1)%state%speed, points(2)%state%speed, points(3)%state%speed]
     x = x - points(2)%state%speed
@@ -159,8 +197,21 @@ contains
     gain = 0.25_wp * slope**2 / bend   ! y falls by so much
     if (gain <= accuracy .or. abs(vertex) <= narrow * abs(points(2)%state%speed)) return
     distance = sqrt(accuracy / bend)
-    if (any(abs(speeds - (points(2)%state%speed + vertex)) <= distance)) return
-    speeds = [speeds, points(2)%state%speed + vertex]
+    promised = share * (1.0_wp / sqrt(1.0_wp - min(gain, believed)) - 1.0_wp)
+    associate (n => vertices%count, speed => points(2)%state%speed + vertex)
+      do k = 1, n
+        if (abs(vertices%speed(k) - speed) > distance) cycle
+        vertices%gain(k) = max(vertices%gain(k), promised)
+        return
+      end do
+      if (n == size(vertices%speed)) then
+        vertices%speed = [vertices%speed, vertices%speed]
+        vertices%gain = [vertices%gain, vertices%gain]
+      end if
+      n = n + 1
+      vertices%speed(n) = speed
+      vertices%gain(n) = promised
+    end associate
   end subroutine add_vertex
 
 end module nocdyn_critical_speeds

@@ -3,6 +3,9 @@
 !> Every element e has a complex stiffness D_e(Omega) along its twist u_e = U_e q, so that the matrix is the sum of U_e^T D_e U_e
 !> minus Omega^2 L_tau^T J L_tau. The coordinates are in an order that makes the band narrow: a chain needs time linear in its
 !> bodies.
+!>
+!> An element that is much stiffer than the inertia beside it would take all digits of the others from the matrix, and its twist
+!> would be a rounding. Its moment m is an unknown instead: U_e q - m / D_e = 0, and U_e^T m in place of U_e^T D_e U_e q.
 module nocdyn_dynamic_stiffness
   use nocdyn_element_coordinates, only: element_coordinates_t
   use nocdyn_errors, only: error_t, exit_input, raise
@@ -19,6 +22,7 @@ module nocdyn_dynamic_stiffness
   public :: new_dynamic_stiffness, new_band_work
 
   real(wp), parameter :: most_entries = 4.0e7_wp   ! of a band, 0.6 GB
+  real(wp), parameter :: stiff = 1.0e8_wp          ! over Omega^2 times the inertia: half of the digits
 
   !> Some products of ratios, and where they are added in the band as one array.
   type :: products_t
@@ -30,50 +34,56 @@ module nocdyn_dynamic_stiffness
   type, public :: dynamic_stiffness_t
     integer :: coordinates = 0
     integer :: width = 0                            !! number of diagonals on either side of the main one
-    integer, allocatable :: position(:)             !! of each coordinate in the band, [coordinates]
+    integer, allocatable :: position(:)             !! in the band, of each coordinate and then of each moment, [unknowns]
+    integer, allocatable, private :: unknown(:)     !! number of the moment of each element, 0: it is none, [elements]
     type(element_coordinates_t) :: incidence        !! U
     type(products_t), private :: stiffness          !! U_e^T U_e of each element
     type(products_t), private :: mass               !! entries of the mass matrix, one "element" [kg m2]
   contains
-    procedure :: factor, add_forces, solve, twist
+    procedure :: factor, add_forces, add_twist, solve, find_moment
   end type dynamic_stiffness_t
 
   !> Work space of one thread.
   type, public :: band_work_t
     complex(wp), allocatable :: band(:, :)         !! factors after `factor`, but for chains
     complex(wp), allocatable :: diagonals(:, :)    !! the factors of chains, whose band is tridiagonal
-    complex(wp), allocatable :: x(:)               !! forces, then coordinates, in the order of the band
+    complex(wp), allocatable :: x(:)               !! forces, then coordinates and scaled moments, in the order of the band
+    real(wp), allocatable, private :: scale(:)     !! of the moments: unknown * scale [N m], [elements]
     integer, allocatable :: pivots(:)
   end type band_work_t
 
 contains
 
   !> The pattern of a machine's matrices. A machine with too wide a band is refused.
-  subroutine new_dynamic_stiffness(machine, incidence, self, error)
+  subroutine new_dynamic_stiffness(machine, incidence, frequency, stiffness, self, error)
     type(machine_t), intent(in) :: machine
     type(element_coordinates_t), intent(in) :: incidence   !! of its elements
+    real(wp), intent(in) :: frequency                      !! the lowest one [rad/s]
+    real(wp), intent(in) :: stiffness(:)                   !! the largest |D_e| at low frequencies [N m/rad], [elements]
     type(dynamic_stiffness_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
     type(entries_t) :: entries
-    integer, allocatable :: mass_row(:), mass_column(:)
-    integer :: order(machine%coordinates%freedoms), c, upper
+    integer, allocatable :: mass_row(:), mass_column(:), order(:)
+    integer :: c, unknowns, upper
 
     self%coordinates = machine%coordinates%freedoms
     self%incidence = incidence
     call list_mass(machine, mass_row, mass_column, self%mass%value)
-    call list_pairs(self%incidence, entries, self%stiffness)
+    call choose_moments(self, mass_row, mass_column, frequency**2, stiffness)
+    unknowns = self%coordinates + count(self%unknown > 0)
+    call list_pairs(self, entries, self%stiffness)
     entries%row = [entries%row, mass_row]
     entries%column = [entries%column, mass_column]
-    order = reverse_cuthill_mckee(self%coordinates, entries%row, entries%column)
+    order = reverse_cuthill_mckee(unknowns, entries%row, entries%column)
     call half_bandwidths(order, entries, self%width, upper)
     self%width = max(self%width, upper)
-    if ((3.0_wp * self%width + 1.0_wp) * self%coordinates > most_entries) then
+    if ((3.0_wp * self%width + 1.0_wp) * unknowns > most_entries) then
       call raise(error, exit_input, 'the response needs a matrix of ' // to_text(3 * self%width + 1) // ' x ' // &
-                 to_text(self%coordinates) // ' entries for this machine, whose couplings leave no narrower band')
+                 to_text(unknowns) // ' entries for this machine, whose couplings leave no narrower band')
       return
     end if
-    allocate (self%position(self%coordinates))
-    self%position(order) = [(c, c=1, self%coordinates)]
+    allocate (self%position(unknowns))
+    self%position(order) = [(c, c=1, unknowns)]
     self%stiffness%place = places(self, entries%row(:size(self%stiffness%value)), entries%column(:size(self%stiffness%value)))
     self%mass%place = places(self, mass_row, mass_column)
   end subroutine new_dynamic_stiffness
@@ -111,19 +121,58 @@ contains
     end associate
   end subroutine list_mass
 
-  !> The products of all pairs of ratios of each element.
-  subroutine list_pairs(incidence, entries, products)
-    type(element_coordinates_t), intent(in) :: incidence
+  !> Numbers the moments of the elements that are too stiff.
+  subroutine choose_moments(self, row, column, square, stiffness)
+    type(dynamic_stiffness_t), intent(inout) :: self
+    integer, intent(in) :: row(:), column(:)   !! of the entries of the mass matrix
+    real(wp), intent(in) :: square             !! of the lowest frequency [rad2/s2]
+    real(wp), intent(in) :: stiffness(:)       !! |D_e| [N m/rad], [elements]
+    integer :: e, k, n
+    real(wp) :: inertia(self%coordinates), least
+
+    inertia = 0.0_wp
+    do k = 1, size(row)
+      if (row(k) == column(k)) inertia(row(k)) = inertia(row(k)) + self%mass%value(k)
+    end do
+    allocate (self%unknown(size(stiffness)), source=0)
+    n = self%coordinates
+    do e = 1, size(stiffness)
+      associate (members => self%incidence%coordinate(self%incidence%first(e):self%incidence%first(e + 1) - 1), &
+                 ratios => self%incidence%ratio(1, self%incidence%first(e):self%incidence%first(e + 1) - 1))
+        if (size(members) == 0) cycle
+        least = minval(inertia(members) / ratios**2)
+      end associate
+      if (.not. stiffness(e) > stiff * square * least) cycle
+      n = n + 1
+      self%unknown(e) = n
+    end do
+  end subroutine choose_moments
+
+  !> The products of all pairs of ratios of each element; of an element whose moment is an unknown, its ratios in the column and in
+  !> the row of the moment, and the diagonal.
+  subroutine list_pairs(self, entries, products)
+    type(dynamic_stiffness_t), intent(in) :: self
     type(entries_t), intent(out) :: entries   !! their rows and columns
     type(products_t), intent(out) :: products
     integer :: e, i, k, n
 
-    associate (first => incidence%first)
-      n = sum((first(2:) - first(:size(first) - 1))**2)
+    associate (incidence => self%incidence, first => self%incidence%first)
+      n = sum(merge(2 * (first(2:) - first(:size(first) - 1)) + 1, (first(2:) - first(:size(first) - 1))**2, self%unknown > 0))
       allocate (entries%row(n), entries%column(n), products%value(n), products%first(size(first)))
       n = 0
       do e = 1, size(first) - 1
         products%first(e) = n + 1
+        if (self%unknown(e) > 0) then
+          associate (members => first(e + 1) - first(e), c => incidence%coordinate(first(e):first(e + 1) - 1))
+            entries%row(n + 1:n + 2 * members + 1) = [c, spread(self%unknown(e), 1, members + 1)]
+            entries%column(n + 1:n + 2 * members + 1) = [spread(self%unknown(e), 1, members), c, self%unknown(e)]
+            products%value(n + 1:n + 2 * members) = [incidence%ratio(1, first(e):first(e + 1) - 1), &
+                                                     incidence%ratio(1, first(e):first(e + 1) - 1)]
+            n = n + 2 * members + 1
+            products%value(n) = 1.0_wp
+          end associate
+          cycle
+        end if
         do i = first(e), first(e + 1) - 1
           do k = first(e), first(e + 1) - 1
             n = n + 1
@@ -142,10 +191,12 @@ contains
     type(dynamic_stiffness_t), intent(in) :: matrix
     type(band_work_t) :: work
 
-    allocate (work%band(3 * matrix%width + 1, matrix%coordinates), work%x(matrix%coordinates), &
-              source=(0.0_wp, 0.0_wp))
-    allocate (work%pivots(matrix%coordinates))
-    if (matrix%width == 1) allocate (work%diagonals(matrix%coordinates, 4))
+    associate (unknowns => size(matrix%position))
+      allocate (work%band(3 * matrix%width + 1, unknowns), work%x(unknowns), source=(0.0_wp, 0.0_wp))
+      allocate (work%pivots(unknowns))
+      allocate (work%scale(size(matrix%unknown)), source=0.0_wp)
+      if (matrix%width == 1) allocate (work%diagonals(unknowns, 4))
+    end associate
   end function new_band_work
 
   !> Sets and factors the matrix at a frequency.
@@ -156,9 +207,9 @@ contains
     type(band_work_t), intent(inout) :: work
     logical, intent(out) :: singular           !! an undamped resonance, exactly
 
-    call fill(self, size(work%band), frequency, stiffness, work%band)
+    call fill(self, size(work%band), frequency, stiffness, work%band, work%scale)
     if (self%width == 1) then
-      associate (n => self%coordinates)
+      associate (n => size(self%position))
         work%diagonals(:n - 1, 1) = work%band(4, :n - 1)
         work%diagonals(:, 2) = work%band(3, :)
         work%diagonals(:n - 1, 3) = work%band(2, 2:)
@@ -170,16 +221,18 @@ contains
   end subroutine factor
 
   !> Sets the matrix, as one array.
-  pure subroutine fill(self, n, frequency, stiffness, band)
+  pure subroutine fill(self, n, frequency, stiffness, band, scale)
     type(dynamic_stiffness_t), intent(in) :: self
     integer, intent(in) :: n
     real(wp), intent(in) :: frequency
     complex(wp), intent(in) :: stiffness(:)
     complex(wp), intent(out) :: band(n)
+    real(wp), intent(inout) :: scale(:)   !! of the moments that are unknowns
     integer :: e, k
 
     band = (0.0_wp, 0.0_wp)
     do e = 1, size(stiffness)
+      if (self%unknown(e) > 0) cycle
       do k = self%stiffness%first(e), self%stiffness%first(e + 1) - 1
         band(self%stiffness%place(k)) = band(self%stiffness%place(k)) + self%stiffness%value(k) * stiffness(e)
       end do
@@ -187,7 +240,65 @@ contains
     do k = 1, size(self%mass%place)
       band(self%mass%place(k)) = band(self%mass%place(k)) - frequency**2 * self%mass%value(k)
     end do
+    do e = 1, size(stiffness)
+      if (self%unknown(e) == 0) cycle
+      scale(e) = moment_scale(self, e, band)
+      call fill_moment(self, e, scale(e), stiffness(e), band)
+    end do
   end subroutine fill
+
+  !> A power of two above the entries beside a moment: the pivots are those of rigid rows, whose sums around a ring are exact.
+  pure real(wp) function moment_scale(self, element, band) result(scale)
+    class(dynamic_stiffness_t), intent(in) :: self
+    integer, intent(in) :: element
+    complex(wp), intent(in) :: band(:)   !! with the other stiffnesses and the masses
+    real(wp), parameter :: above = 4.0_wp
+    integer :: k
+
+    scale = tiny(1.0_wp)
+    do k = self%incidence%first(element), self%incidence%first(element + 1) - 1
+      associate (diagonal => (3 * self%width + 1) * (self%position(self%incidence%coordinate(k)) - 1) + 2 * self%width + 1)
+        scale = max(scale, abs(band(diagonal)) / abs(self%incidence%ratio(1, k)))
+      end associate
+    end do
+    scale = 2.0_wp**exponent(above * scale)
+  end function moment_scale
+
+  !> The column and the row of a moment m = scale * unknown, both times the scale. Without stiffness the moment is zero.
+  pure subroutine fill_moment(self, element, scale, stiffness, band)
+    class(dynamic_stiffness_t), intent(in) :: self
+    integer, intent(in) :: element
+    real(wp), intent(in) :: scale           !! [N m]
+    complex(wp), intent(in) :: stiffness    !! [N m/rad]
+    complex(wp), intent(inout) :: band(:)
+    integer :: k
+
+    associate (first => self%stiffness%first(element), last => self%stiffness%first(element + 1) - 1)
+      do k = first, last - 1
+        if (2 * (k - first) >= last - first .and. .not. abs(stiffness) > 0) cycle
+        band(self%stiffness%place(k)) = band(self%stiffness%place(k)) + self%stiffness%value(k) * scale
+      end do
+      band(self%stiffness%place(last)) = scale
+      if (abs(stiffness) > 0) band(self%stiffness%place(last)) = -scale * (scale / stiffness)
+    end associate
+  end subroutine fill_moment
+
+  !> Adds a twist in series with an element to the forces `work%x`, after `factor`.
+  pure subroutine add_twist(self, element, stiffness, twist, work)
+    class(dynamic_stiffness_t), intent(in) :: self
+    integer, intent(in) :: element
+    complex(wp), intent(in) :: stiffness    !! D_e [N m/rad]
+    complex(wp), intent(in) :: twist        !! [rad]
+    type(band_work_t), intent(inout) :: work
+
+    if (self%unknown(element) == 0) then
+      call self%add_forces(element, stiffness * twist, work)
+    else if (abs(stiffness) > 0) then
+      associate (x => work%x(self%position(self%unknown(element))))
+        x = x + work%scale(element) * twist
+      end associate
+    end if
+  end subroutine add_twist
 
   !> Adds the moment of an element to the forces `work%x`.
   pure subroutine add_forces(self, element, moment, work)
@@ -216,17 +327,28 @@ contains
     end if
   end subroutine solve
 
-  !> The twist of an element, after `solve` [rad].
-  pure complex(wp) function twist(self, element, work)
+  !> The twist of an element without that in series, and its moment, after `solve`.
+  pure subroutine find_moment(self, element, stiffness, series, work, twist, moment)
     class(dynamic_stiffness_t), intent(in) :: self
     integer, intent(in) :: element
+    complex(wp), intent(in) :: stiffness   !! D_e [N m/rad]
+    complex(wp), intent(in) :: series      !! twist in series [rad]
     type(band_work_t), intent(in) :: work
+    complex(wp), intent(out) :: twist      !! u_e - series [rad]
+    complex(wp), intent(out) :: moment     !! -D_e (u_e - series) [N m]
     integer :: k
 
     twist = (0.0_wp, 0.0_wp)
+    if (self%unknown(element) > 0) then
+      moment = -work%scale(element) * work%x(self%position(self%unknown(element)))
+      if (abs(stiffness) > 0) twist = -moment / stiffness
+      return
+    end if
     do k = self%incidence%first(element), self%incidence%first(element + 1) - 1
       twist = twist + self%incidence%ratio(1, k) * work%x(self%position(self%incidence%coordinate(k)))
     end do
-  end function twist
+    twist = twist - series
+    moment = -stiffness * twist
+  end subroutine find_moment
 
 end module nocdyn_dynamic_stiffness

@@ -35,7 +35,7 @@ module nocdyn_forced_response
     real(wp), allocatable :: loss_factor(:)            !! [elements]
     real(wp), allocatable :: loss_damping(:)           !! damping that stands for it over the time [N m s/rad], [elements]
   contains
-    procedure :: add_points, complex_stiffness, speeds, frequencies
+    procedure :: add_points, complex_stiffness, speeds, frequencies, values_at_a_speed
   end type forced_response_t
 
   !> Work space of one thread.
@@ -57,10 +57,10 @@ contains
     type(error_t), allocatable, intent(out) :: error   !! a message of a steady state begins with its speed
     type(held_state_t) :: high, low
     type(source_t), allocatable :: of_high(:), of_low(:)
+    real(wp) :: lowest   ! frequency [rad/s]
 
     self%machine = machine
     call new_held_speeds(machine, reference, self%held, error)
-    if (.not. allocated(error)) call new_dynamic_stiffness(machine, self%held%balance%incidence, self%matrix, error)
     if (allocated(error)) return
     call gather_losses(self)
     call self%held%hold(speeds(size(speeds)), high, error)
@@ -69,6 +69,11 @@ contains
     call list_sources(machine, low, of_low)
     call list_sources(machine, high, of_high)
     call new_lines(of_low, of_high, self%lines)
+    lowest = minval([sqrt(huge(1.0_wp)), of_low%frequency], mask=[.true., of_low%frequency > 0])
+    call new_dynamic_stiffness(machine, self%held%balance%incidence, lowest, &
+                               max(abs(low%stiffness) + lowest * abs(low%damping), &
+                                   abs(high%stiffness) + lowest * abs(high%damping)), self%matrix, error)
+    if (allocated(error)) return
     call list_quantities(machine, reference, self%quantities)
     allocate (self%points(0))
   end subroutine new_forced_response
@@ -99,16 +104,11 @@ contains
     integer :: i
 
     failed_speed = 0.0_wp
-    associate (values => real(size(self%lines), wp) * (size(self%quantities) + self%machine%bodies) &
-                         * (size(self%points) + size(speeds)))
-      if (values > most_values) then
-        call raise(error, exit_input, 'the response of all lines at all speeds is ' // to_text(nint(values / 1.0e6_wp)) // &
-                   ' million numbers; at most ' // to_text(nint(most_values / 1.0e6_wp)) // ' million are allowed: ' // &
-                   'for instance count = ' // to_text(max(2, int(0.5_wp * most_values / values * size(speeds)))) // ' speeds')
-        failed_speed = speeds(1)
-        return
-      end if
-    end associate
+    call refuse_too_many(self, size(speeds), are_of_grid, error)
+    if (allocated(error)) then
+      failed_speed = speeds(1)
+      return
+    end if
     allocate (new(size(speeds)))
     do i = 1, size(speeds)
       failed_speed = speeds(i)
@@ -120,6 +120,34 @@ contains
     call solve_points(self, new)
     call merge_points(self%points, new)
   end subroutine add_points
+
+  !> Numbers that are kept of each speed.
+  pure real(wp) function values_at_a_speed(self) result(values)
+    class(forced_response_t), intent(in) :: self
+
+    values = max(1.0_wp, real(size(self%lines), wp) * (size(self%quantities) + self%machine%bodies))
+  end function values_at_a_speed
+
+  !> Refuses more numbers than memory and files should have.
+  subroutine refuse_too_many(self, speeds, are_of_grid, error)
+    type(forced_response_t), intent(in) :: self
+    integer, intent(in) :: speeds       !! that are added
+    logical, intent(in) :: are_of_grid
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: advice
+
+    associate (each => self%values_at_a_speed(), all => size(self%points) + speeds)
+      if (each * all <= most_values) return
+      if (are_of_grid .and. 2 * each <= most_values) then
+        advice = 'allowed: at most count = ' // to_text(int(most_values / each)) // ' or fewer orders'
+      else
+        advice = 'allowed: fewer orders or a shorter range of speeds'
+      end if
+      call raise(error, exit_input, 'the response of ' // to_text(size(self%lines)) // ' orders and frequencies at ' // &
+                 to_text(all) // ' speeds is ' // to_text(nint(each * all / 1.0e6_wp)) // &
+                 ' million numbers; at most ' // to_text(nint(most_values / 1.0e6_wp)) // ' million are kept; ' // advice)
+    end associate
+  end subroutine refuse_too_many
 
   !> Solves at all points, by threads. They wait for each other longer than they compute few points.
   subroutine solve_points(self, points)
@@ -230,8 +258,7 @@ contains
       call add_sources(self, sources(line%source), work)
       call self%matrix%solve(work%band)
       do e = 1, size(work%stiffness)
-        twist = self%matrix%twist(e, work%band) - work%series(e)
-        work%moment(e, l) = -work%stiffness(e) * twist
+        call self%matrix%find_moment(e, work%stiffness(e), work%series(e), work%band, twist, work%moment(e, l))
         point%heat(e) = point%heat(e) + 0.5_wp * frequency * aimag(work%stiffness(e)) * (real(twist, wp)**2 + aimag(twist)**2)
       end do
       do i = 1, size(line%source)
@@ -256,7 +283,7 @@ contains
       associate (e => sources(i)%element, amplitude => sources(i)%moment)
         if (sources(i)%is_twist) then
           work%series(e) = work%series(e) + amplitude
-          call self%matrix%add_forces(e, work%stiffness(e) * amplitude, work%band)
+          call self%matrix%add_twist(e, work%stiffness(e), amplitude, work%band)
         else
           call self%matrix%add_forces(e, amplitude, work%band)
         end if

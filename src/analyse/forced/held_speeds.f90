@@ -30,9 +30,13 @@ module nocdyn_held_speeds
     real(wp) :: torque = 0.0_wp   !! on the reference body that holds the speed [N m]; 0 if the motors do
     real(wp), allocatable :: omega(:)       !! speeds of the bodies [rad/s], [bodies]
     real(wp), allocatable :: phi(:)         !! angles of the bodies when that of the reference body is zero [rad], [bodies]
+    real(wp), allocatable :: twist(:)       !! of the elements [rad], [elements]
+    real(wp), allocatable :: rate(:)        !! of twist [rad/s], [elements]
     real(wp), allocatable :: mean(:)        !! moments of the elements [N m], [elements] as all that follow
     real(wp), allocatable :: stiffness(:)   !! minus the derivatives of the moments by the twists [N m/rad]
-    real(wp), allocatable :: damping(:)     !! minus the derivatives by the rates of twist [N m s/rad]
+    real(wp), allocatable :: damping(:)     !! minus the derivatives by the rates of twist [N m s/rad]; 0 of what follows the mean
+                                            !! speed of a cycle, whose oscillation is zero
+    real(wp), allocatable :: mean_slope(:)  !! derivatives by the speed of what follows the mean one, 0 of others [N m s/rad]
     real(wp), allocatable :: by_internal(:)        !! derivatives of the moments by internal states, [internal states]
     real(wp), allocatable :: rate_speed(:)         !! derivatives of their rates by the speed of the element, the same
     real(wp), allocatable :: rate_internal(:, :)   !! derivatives of the rates by the states of the element, [members, the same]
@@ -42,6 +46,7 @@ module nocdyn_held_speeds
   type, public :: held_speeds_t
     type(torque_balance_t) :: balance        !! of the machine with mean torques
     integer :: reference = 0                 !! body whose speed is held
+    logical, allocatable, private :: follows_mean_speed(:)   !! as in `machine_t`, [elements]
     integer, allocatable, private :: sources(:)      !! elements whose torques are multiplied, numbered in `balance%inelastic`
     real(wp), allocatable, private :: ratio(:)       !! speed of the reference body by the rigid motions, [freedoms]
     real(wp), allocatable, private :: z(:)           !! last rigid motions and internal states
@@ -74,7 +79,7 @@ contains
     call reduced%formulate(.false., .false.)
     call move_alloc(reduced, formulation)
     call set_up_balance(formulation, t_infinity, self%balance)
-    call leave_out_silent(self%balance)
+    call leave_out_silent(self%balance%formulation%machine)
     self%twists = new_twist_solver(self%balance)
     self%reference = reference
     allocate (self%ratio(size(self%balance%motions%free)))
@@ -87,6 +92,7 @@ contains
     self%z = self%balance%start()
     allocate (self%q(self%balance%coordinates), source=0.0_wp)
     self%sources = sources_of(self%balance)
+    self%follows_mean_speed = machine%follows_mean_speed()
     self%last_speed = sum(self%ratio * self%z(:size(self%ratio)))
   end subroutine new_held_speeds
 
@@ -106,33 +112,16 @@ contains
     end do
   end subroutine find_ratios
 
-  !> Leaves out the excitations without a mean torque, whose laws take most of the time.
-  subroutine leave_out_silent(balance)
-    type(torque_balance_t), intent(inout) :: balance
-    real(wp), parameter :: somewhere = 0.7_wp
+  !> Leaves out the banks without a mean torque, whose laws take most of the time.
+  subroutine leave_out_silent(machine)
+    type(machine_t), intent(inout) :: machine   !! with mean torques
     integer :: i
-    logical :: is_needed(size(balance%formulation%machine%general_banks))
 
-    associate (machine => balance%formulation%machine, elements => balance%formulation%machine%elements)
-      elements%angle = somewhere
-      elements%speed = somewhere
-      call machine%evaluate_elements(balance%t)
-      call machine%differentiate_elements(balance%t)
-      do i = 1, size(is_needed)
-        associate (bank => machine%banks(machine%general_banks(i))%bank)
-          is_needed(i) = bank%role /= role_excitation .or. &
-                         any(abs(elements%applied(1, bank%first:bank%last())) > 0 .or. &
-                             abs(elements%applied_angle(1, bank%first:bank%last())) > 0 .or. &
-                             abs(elements%applied_speed(1, bank%first:bank%last())) > 0)
-        end associate
-      end do
-      machine%general_banks = pack(machine%general_banks, is_needed)
-      elements%angle = 0.0_wp
-      elements%speed = 0.0_wp
-    end associate
+    machine%general_banks = pack(machine%general_banks, [(.not. machine%banks(machine%general_banks(i))%bank%is_silent, &
+                                                          i=1, size(machine%general_banks))])
   end subroutine leave_out_silent
 
-  !> The elements that drive: motors; if there are none, excitations, whose means are those of engines.
+  !> The elements that drive: motors; if there are none, the cylinders of engines.
   function sources_of(balance) result(sources)
     type(torque_balance_t), intent(in) :: balance
     integer, allocatable :: sources(:)
@@ -143,7 +132,7 @@ contains
       is_source = .false.
       do b = 1, size(balance%formulation%machine%banks)
         associate (bank => balance%formulation%machine%banks(b)%bank)
-          if (bank%role /= role) cycle
+          if (bank%role /= role .or. (role == role_excitation .and. .not. bank%is_engine)) cycle
           is_source = is_source .or. (balance%inelastic >= bank%first .and. balance%inelastic <= bank%last())
         end associate
       end do
@@ -383,9 +372,13 @@ contains
       state%phi = state%phi - state%omega * (state%phi(self%reference) / state%omega(self%reference))
     end associate
     associate (elements => self%balance%formulation%machine%elements)
+      state%twist = elements%angle(1, :)
+      state%rate = elements%speed(1, :)
       state%mean = weight * (elements%restoring(1, :) + elements%applied(1, :))
       state%stiffness = -weight * (elements%restoring_angle(1, :) + elements%applied_angle(1, :))
       state%damping = -weight * elements%applied_speed(1, :)
+      state%mean_slope = merge(-state%damping, 0.0_wp, self%follows_mean_speed)
+      where (self%follows_mean_speed) state%damping = 0.0_wp
       state%by_internal = weight(elements%internal%element) * elements%internal%applied(1, :)
       state%rate_speed = elements%internal%rate_speed(1, :)
       state%rate_internal = elements%internal%rate_internal(1, :, :)

@@ -10,7 +10,7 @@ module nocdyn_synthesis
   public :: new_synthesis
 
   real(wp), parameter :: pi = acos(-1.0_wp)
-  integer, parameter :: most_parts = 240, most_multiple = 2000   ! of the common frequency
+  integer, parameter :: most_multiple = 2000     ! of the common frequency
   integer, parameter :: samples_per_period = 6                   ! of the highest multiple
 
   !> Oscillations with whole ratios: multiples of one frequency.
@@ -30,56 +30,80 @@ module nocdyn_synthesis
 
 contains
 
-  !> Groups oscillations by their frequencies.
+  !> Groups oscillations by their frequencies: the simplest ratios first, so that a frequency without a simple ratio to others
+  !> does not separate these.
   type(synthesis_t) function new_synthesis(frequency, family) result(self)
     real(wp), intent(in) :: frequency(:)   !! in any unit, positive, [lines]
     integer, intent(in) :: family(:)       !! only frequencies of one family have whole ratios, [lines]
-    integer :: i, k
-    logical :: is_left(size(frequency))
-    real(wp) :: angle
+    integer, parameter :: limits(*) = [16, 32, 64, 125, 250, 500, 1000, most_multiple]
+    real(wp) :: base(size(frequency))      ! the common frequency of each part
+    integer :: i, n, part_of(size(frequency))
+    integer, allocatable :: members(:)
     type(periodic_t) :: part
 
+    part_of = [(i, i=1, size(frequency))]
+    base = frequency
+    do n = 1, size(limits)
+      call join_parts(frequency, family, limits(n), part_of, base)
+    end do
     allocate (self%parts(0))
-    is_left = .true.
-    do while (any(is_left))
-      call collect(frequency, is_left .and. family == family(findloc(is_left, .true., dim=1)), part)
-      part%samples = max(16, samples_per_period * maxval(part%multiple))
-      allocate (part%cosine(part%samples / 2, size(part%line)), part%sine(part%samples / 2, size(part%line)))
-      do k = 1, size(part%line)
-        do i = 1, part%samples / 2
-          angle = 2.0_wp * pi * modulo(part%multiple(k) * (i - 1), part%samples) / part%samples
-          part%cosine(i, k) = cos(angle)
-          part%sine(i, k) = sin(angle)
-        end do
-      end do
+    do n = 1, size(frequency)
+      members = pack([(i, i=1, size(frequency))], part_of == n)
+      if (size(members) == 0) cycle
+      call new_part(members, nint(frequency(members) / base(n)), part)
       self%parts = [self%parts, part]
-      is_left(part%line) = .false.
     end do
   end function new_synthesis
 
-  !> The remaining lines that have whole ratios with the first one.
-  subroutine collect(frequency, is_left, part)
+  !> Joins parts as long as no oscillation is more than a multiple of the common frequency.
+  pure subroutine join_parts(frequency, family, most, part_of, base)
     real(wp), intent(in) :: frequency(:)
-    logical, intent(in) :: is_left(:)
-    type(periodic_t), intent(out) :: part
-    integer :: first, k, parts
-    real(wp) :: base
+    integer, intent(in) :: family(:), most
+    integer, intent(inout) :: part_of(:)   !! number of the part of each oscillation: its first one
+    real(wp), intent(inout) :: base(:)     !! of each part
+    integer :: divisor, first, second
+    real(wp) :: highest
+    logical :: has_changed
 
-    first = findloc(is_left, .true., dim=1)
-    base = frequency(first)
-    part%line = [first]
-    do k = first + 1, size(frequency)
-      if (.not. is_left(k)) cycle
-      do parts = 1, most_parts   ! of the present base, which becomes smaller
-        if (.not. is_whole(frequency(k) / (base / parts))) cycle
-        if (max(maxval(frequency(part%line)), frequency(k)) / (base / parts) > most_multiple) exit
-        base = base / parts
-        part%line = [part%line, k]
-        exit
+    has_changed = .true.
+    do while (has_changed)
+      has_changed = .false.
+      do first = 1, size(frequency)
+        if (part_of(first) /= first) cycle
+        do second = first + 1, size(frequency)
+          if (part_of(second) /= second .or. family(first) /= family(second)) cycle
+          highest = maxval(frequency, mask=part_of == first .or. part_of == second)
+          do divisor = 1, int(most * base(first) / highest + 0.5_wp)   ! of the base, which becomes smaller
+            if (.not. is_whole(base(second) / (base(first) / divisor))) cycle
+            base(first) = base(first) / divisor
+            where (part_of == second) part_of = first
+            has_changed = .true.
+            exit
+          end do
+        end do
       end do
     end do
-    part%multiple = nint(frequency(part%line) / base)
-  end subroutine collect
+  end subroutine join_parts
+
+  !> The oscillations of a part, and their values at its samples.
+  subroutine new_part(line, multiple, part)
+    integer, intent(in) :: line(:), multiple(:)
+    type(periodic_t), intent(out) :: part
+    integer :: i, k
+    real(wp) :: angle
+
+    allocate (part%line, source=line)
+    allocate (part%multiple, source=multiple)
+    part%samples = max(16, samples_per_period * maxval(multiple))
+    allocate (part%cosine(part%samples / 2, size(line)), part%sine(part%samples / 2, size(line)))
+    do k = 1, size(line)
+      do i = 1, part%samples / 2
+        angle = 2.0_wp * pi * modulo(multiple(k) * (i - 1), part%samples) / part%samples
+        part%cosine(i, k) = cos(angle)
+        part%sine(i, k) = sin(angle)
+      end do
+    end do
+  end subroutine new_part
 
   elemental logical function is_whole(ratio)
     real(wp), intent(in) :: ratio
@@ -160,7 +184,7 @@ contains
     real(wp), intent(in) :: value(0:)  !! samples, [0 to samples + 1]
     real(wp), intent(in) :: sign       !! 1 or -1
     real(wp), dimension(part%samples) :: top, vertex   ! of the parabola through a maximum and its neighbours
-    real(wp) :: beside, bend, highest, slope
+    real(wp) :: beside, bend, error, highest, slope
     integer :: i, k, n
 
     refined = maxval(sign * value)
@@ -184,8 +208,11 @@ contains
         highest = max(highest, top(n))
       end associate
     end do
-    do k = 1, n   ! the error of a parabola, at six samples of the shortest period, is a small part of its height
-      if (top(k) < highest - 0.2_wp * beside) cycle
+    ! a parabola through three samples errs by h^3 / (9 sqrt(3)) of the third derivative at most, which is bounded too
+    error = sum(size_of(amplitude(part%line)) * real(part%multiple, wp)**3) * (2.0_wp * pi / part%samples)**3 &
+            / (9.0_wp * sqrt(3.0_wp))
+    do k = 1, n
+      if (top(k) + error < max(refined, highest - error)) cycle
       refined = max(refined, climbed(part, amplitude, 2.0_wp * pi * vertex(k) / part%samples, sign))
     end do
   end function refined

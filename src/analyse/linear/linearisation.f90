@@ -282,7 +282,8 @@ contains
     end associate
   end function mass_matrix
 
-  !> Fills the matrix for p' = -C p - sign(natural) |natural| e and e' = |natural| p.
+  !> Fills the matrix for p' = -C p - sign(natural) |natural| e and e' = |natural| p. C is not symmetric where a torque follows
+  !> the mean speed of a cycle: the rigid motions change it, and it acts on all modes.
   subroutine assemble(formulation, self)
     class(formulation_t), intent(in) :: formulation
     type(linearisation_t), intent(inout) :: self
@@ -299,8 +300,9 @@ contains
       do i = 1, n
         rates(:, i) = damping(damped) * self%twists(damped, i)
       end do
-      self%matrix(:n, :n) = matmul(transpose(self%twists(damped, :)), rates)
     end associate
+    call leave_out_oscillations(formulation%machine, damped, self%flexible, rates)
+    self%matrix(:n, :n) = matmul(transpose(self%twists(damped, :)), rates)
     do i = 1, size(self%flexible)
       associate (natural => self%natural(self%flexible(i)))
         self%matrix(self%flexible(i), n + i) = -natural
@@ -308,6 +310,21 @@ contains
       end associate
     end do
   end subroutine assemble
+
+  !> Torques that follow the mean speed of a cycle change with the rigid motions only.
+  subroutine leave_out_oscillations(machine, elements, flexible, rates)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: elements(:)
+    integer, intent(in) :: flexible(:)         !! modes
+    real(wp), intent(inout) :: rates(:, :)     !! derivatives of the torques by the rates of the modes, [elements, modes]
+    logical :: follows(machine%elements%count)
+    integer :: i
+
+    follows = machine%follows_mean_speed()
+    do i = 1, size(flexible)
+      where (follows(elements)) rates(:, flexible(i)) = 0.0_wp
+    end do
+  end subroutine leave_out_oscillations
 
   !> Fills the rows and columns of the internal states. No internal state depends on a rigid rotation.
   subroutine add_internal(formulation, pattern, slopes, self)

@@ -6,6 +6,7 @@ module nocdyn_modes_report
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: linearisation_t, linearise
   use nocdyn_machine, only: machine_t
+  use nocdyn_mean_slopes, only: note_mean_slopes
   use nocdyn_modes, only: find_modes, kind_names, mode_diverging, mode_internal, mode_oscillating, mode_overdamped, mode_rigid, &
     mode_t
   use nocdyn_operating_point, only: operating_point_t
@@ -59,6 +60,7 @@ contains
       return
     end if
     self%machine = point%formulation%machine
+    call note_mean_slopes(self%machine, self%machine%elements%applied_speed(1, :), point%notes)
     self%linear = linear
     allocate (self%elastic, source=self%machine%elastic())
     call find_modes(point%formulation, linear, self%elastic, self%modes, error)

@@ -12,7 +12,8 @@ module nocdyn_response_analysis
   use nocdyn_machine, only: machine_t
   use nocdyn_response_fatigue, only: find_response_fatigue, response_fatigue_t
   use nocdyn_response_limits, only: read_limits, response_limit_t
-  use nocdyn_response_notes, only: note_rated_speeds, note_separation, note_simplifications, note_steady_states
+  use nocdyn_response_notes, only: note_linear_ranges, note_overloads, note_rated_speeds, note_separation, &
+    note_simplifications, note_steady_states
   use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
   use nocdyn_speed_modes, only: most_coordinates, new_speed_modes, speed_modes_t
   use nocdyn_synthesis, only: new_synthesis
@@ -66,6 +67,8 @@ contains
     if (.not. allocated(error)) then
       call note_steady_states(self%settings, self%response, self%notes)
       call note_separation(self%response, self%notes)
+      call note_linear_ranges(self%response, self%notes)
+      call note_overloads(self%response, self%notes)
       call note_rated_speeds(input, self%settings, self%notes)
     end if
     if (allocated(error)) call place_error(input, self%settings, failed_speed, error)
@@ -148,6 +151,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(wp), intent(inout) :: failed_speed
     integer :: i
+    real(wp) :: unrefined
 
     if (self%response%matrix%coordinates > most_coordinates) then
       call append(self%notes, 'this machine has ' // to_text(self%response%matrix%coordinates) // ' degrees of freedom: ' // &
@@ -163,7 +167,12 @@ contains
       end do
       call find_crossings(self%response%speeds(), self%response%frequencies(), self%modes, self%crossings)
     end if
-    call refine_peaks(self%response, self%crossings, error, failed_speed)
+    call refine_peaks(self%response, self%crossings, unrefined, error, failed_speed)
+    if (.not. allocated(error) .and. unrefined > 0) then
+      call append(self%notes, 'there are too many peaks between the speeds of the grid to refine all: some may be higher by ' // &
+                              rounded_text(100.0_wp * unrefined, 2) // ' % of the largest one of their quantity; fewer ' // &
+                              'orders or a shorter range of speeds refine all')
+    end if
     if (.not. allocated(error)) call refine_edges(self%response, self%limits, error, failed_speed)
   end subroutine find_peaks
 

@@ -7,15 +7,17 @@ module nocdyn_response_notes
   use nocdyn_input, only: input_t
   use nocdyn_joint_texts, only: describe_losses
   use nocdyn_kinds, only: wp
+  use nocdyn_linear_ranges, only: excursion_t, find_excursions
   use nocdyn_machine, only: machine_t
-  use nocdyn_response_quantities, only: quantity_moment
+  use nocdyn_mean_slopes, only: note_mean_slopes
+  use nocdyn_response_quantities, only: quantity_moment, quantity_reaction
   use nocdyn_response_settings, only: response_settings_t
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
   use nocdyn_units, only: from_si, unit_rpm
   implicit none (type, external)
   private
 
-  public :: note_simplifications, note_steady_states, note_separation, note_rated_speeds
+  public :: note_simplifications, note_steady_states, note_separation, note_linear_ranges, note_overloads, note_rated_speeds
 
 contains
 
@@ -55,6 +57,7 @@ contains
     integer :: held, i
 
     call note_open_gaps(response, notes)
+    call note_mean_slopes(response%machine, steepest_slopes(response), notes)
     held = 0
     do i = 1, size(response%points)
       if (abs(response%points(i)%state%torque) > 0) held = held + 1
@@ -66,6 +69,20 @@ contains
     end if
     call note_range(settings, notes)
   end subroutine note_steady_states
+
+  !> The slopes over the mean speed with the largest size at any speed [N m s/rad], [elements].
+  pure function steepest_slopes(response) result(slope)
+    type(forced_response_t), intent(in) :: response
+    real(wp) :: slope(response%machine%elements%count)
+    integer :: i
+
+    slope = 0.0_wp
+    do i = 1, size(response%points)
+      associate (here => response%points(i)%state%mean_slope)
+        where (abs(here) > abs(slope)) slope = here
+      end associate
+    end do
+  end function steepest_slopes
 
   !> Adds a note on each elastic element whose moment does not change with its twist at some speeds.
   subroutine note_open_gaps(response, notes)
@@ -130,6 +147,70 @@ contains
       end associate
     end do
   end subroutine note_separation
+
+  !> Elements whose laws are not straight over their oscillations, which no linear response has.
+  subroutine note_linear_ranges(response, notes)
+    type(forced_response_t), intent(in) :: response
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    real(wp), parameter :: least = 0.01_wp   ! a shift of half of this share of a natural frequency
+    type(excursion_t), allocatable :: excursions(:)
+    character(len=:), allocatable :: change, law
+    integer :: i
+
+    call find_excursions(response, least, excursions)
+    do i = 1, size(excursions)
+      associate (one => excursions(i))
+        law = 'stiffness'
+        if (.not. one%is_elastic) law = 'slope over the speed'
+        if (abs(one%tangent) > 0) then
+          change = rounded_text(100.0_wp * abs(one%equivalent / one%tangent - 1.0_wp), 2) // ' % ' // &
+                   trim(merge('above', 'below', one%equivalent / one%tangent > 1.0_wp)) // ' that at its mean'
+        else
+          change = rounded_text(one%equivalent, 3) // ', and 0 at its mean'
+        end if
+        call append(notes, 'over the vibration of ' // quoted(response%machine%element_name(one%element)) // ' at ' // &
+                           rounded_text(from_si(response%points(one%worst)%state%speed, unit_rpm), 6) // ' rpm its ' // law // &
+                           ' is on average ' // change // '; by more than 1 % at ' // to_text(one%points) // ' of ' // &
+                           to_text(size(response%points)) // ' speeds: the linear response does not hold there, nocdyn run ' // &
+                           'gives the motion')
+      end associate
+    end do
+  end subroutine note_linear_ranges
+
+  !> Joints that are taken as locked, and would slip or open.
+  subroutine note_overloads(response, notes)
+    type(forced_response_t), intent(in) :: response
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    real(wp), parameter :: rounding = 1.0e-9_wp
+    integer :: i, q, row, slipping, worst
+    real(wp) :: excess, most
+
+    associate (constraints => response%machine%constraints, points => response%points)
+      row = 0
+      do q = 1, size(response%quantities)
+        if (response%quantities(q)%kind /= quantity_reaction) cycle
+        row = row + 1
+        slipping = 0
+        worst = 1
+        most = 0.0_wp
+        do i = 1, size(points)
+          excess = max(points(i)%mean(q) + points(i)%highest(q) - constraints%most(row), &
+                       constraints%least(row) - points(i)%mean(q) - points(i)%lowest(q))
+          if (excess <= rounding * points(i)%peak(q)) cycle
+          slipping = slipping + 1
+          if (excess <= most) cycle
+          most = excess
+          worst = i
+        end do
+        if (slipping == 0) cycle
+        call append(notes, constraints%kinds(row)%text // ' ' // quoted(constraints%names(row)%text) // ' does not hold at ' // &
+                           to_text(slipping) // ' of ' // to_text(size(points)) // ' speeds: locked it would carry up to ' // &
+                           rounded_text(points(worst)%peak(q), 4) // ' N m at ' // &
+                           rounded_text(from_si(points(worst)%state%speed, unit_rpm), 6) // ' rpm, ' // &
+                           rounded_text(most, 4) // ' N m more than allowed; nocdyn run gives the motion')
+      end do
+    end associate
+  end subroutine note_overloads
 
   logical function has_gap(response, element)
     type(forced_response_t), intent(in) :: response

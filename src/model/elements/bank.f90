@@ -61,6 +61,9 @@ module nocdyn_bank
     integer :: first_value = 1                    !! index of lane 1 of `first` in the flat arrays of the machine
     logical :: has_polynomial_potential = .true.  !! whether `polynomials` gives its whole restoring moment
     logical :: has_paper_law = .true.             !! whether its law is that of eqs. (3), (5), (17) or (20)
+    logical :: is_silent = .false.                !! after `to_mean_torque`: whether the torque is zero in every state
+    logical :: is_engine = .false.                !! whether its elements are excitations whose means drive
+    logical :: follows_mean_speed = .false.       !! whether its torque changes with the speed from cycle to cycle, not within one
     logical :: has_parts = .false.                !! whether consecutive elements of one name are parts of one element
     character(len=24), allocatable :: internal_names(:)   !! e.g. 'armature current', [states]
     integer :: first_internal = 1                 !! number of the first internal state of `first` in the machine
@@ -174,7 +177,7 @@ contains
   end function is_source
 
   !> Replaces torques that keep changing, with the time or with the angle of a turning body, by their means. By default there
-  !> are none. Changes that end, such as a ramp, stay as they are: evaluate at a late time.
+  !> are none. Changes that end, such as a ramp, stay as they are: evaluate at a late time. A bank without a mean gets silent.
   subroutine to_mean_torque(self)
     class(bank_t), intent(inout) :: self
   end subroutine to_mean_torque

@@ -52,6 +52,7 @@ module nocdyn_machine
     procedure :: number_elements
     procedure :: list_parameters
     procedure :: to_mean_torque
+    procedure :: follows_mean_speed
     procedure :: elastic
     procedure :: element_name
     procedure :: start_twist
@@ -164,6 +165,20 @@ contains
     end do
     call self%number_elements()
   end subroutine to_mean_torque
+
+  !> Whether the torque of each element follows the mean speed of a cycle, and not its oscillations, [elements].
+  pure function follows_mean_speed(self) result(follows)
+    class(machine_t), intent(in) :: self
+    logical, allocatable :: follows(:)
+    integer :: i
+
+    allocate (follows(self%elements%count), source=.false.)
+    do i = 1, size(self%banks)
+      associate (bank => self%banks(i)%bank)
+        if (bank%follows_mean_speed) follows(bank%first:bank%last()) = .true.
+      end associate
+    end do
+  end function follows_mean_speed
 
   !> Elements that can have a restoring moment, ascending.
   pure function elastic(self) result(elements)

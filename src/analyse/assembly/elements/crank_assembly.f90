@@ -11,7 +11,7 @@ module nocdyn_crank_assembly
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_order_excitations, only: new_order_excitations, order_torque_t
+  use nocdyn_order_excitations, only: new_order_excitations, order_excitations_t, order_torque_t
   use nocdyn_phases, only: new_phases
   use nocdyn_piston_forces, only: new_piston_force, periodic_force_t
   use nocdyn_slider_cranks, only: close_cycle, sample_cycle, samples
@@ -132,6 +132,7 @@ contains
     type(machine_t), intent(inout) :: machine
     integer, parameter :: most_orders = 12   ! of the inertia
     type(order_torque_t) :: torque
+    type(order_excitations_t) :: bank
     type(periodic_force_t) :: force
     type(crank_rows_t) :: rows
     real(wp), allocatable :: masses(:)
@@ -156,7 +157,9 @@ contains
     torque%speed = [0.0_wp]
     allocate (torque%mean(1), torque%sine(size(torque%order), 1), torque%cosine(size(torque%order), 1))
     call fourier_coefficients(gas, torque%mean(1), torque%sine(:, 1), torque%cosine(:, 1))
-    call append_bank(machine%banks, new_order_excitations([name], [body], in_lanes([torque], machine%lanes)))
+    bank = new_order_excitations([name], [body], in_lanes([torque], machine%lanes))
+    bank%is_engine = .true.
+    call append_bank(machine%banks, bank)
   end subroutine add_mean_crank
 
   !> Inertia, its torque over the square of the speed, and torque of the force of a crank over one cycle of the force.

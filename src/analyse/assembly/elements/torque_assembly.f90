@@ -13,7 +13,7 @@ module nocdyn_torque_assembly
   use nocdyn_kinds, only: wp
   use nocdyn_load_shares, only: new_load_shares, shared_load_t
   use nocdyn_loads, only: new_loads, new_nonlinear_loads
-  use nocdyn_order_excitations, only: new_order_excitations, order_torque_t
+  use nocdyn_order_excitations, only: new_order_excitations, order_excitations_t, order_torque_t
   use nocdyn_shared_loads, only: find_shared_load
   use nocdyn_table_excitations, only: new_table_excitations
   use nocdyn_timed_excitations, only: new_timed_excitations, shape_pulse, shape_ramp, shape_step
@@ -262,6 +262,7 @@ contains
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(order_torque_t), allocatable :: torque(:)
     type(string_t), allocatable :: names(:)
+    type(order_excitations_t) :: bank
     integer :: c, i
 
     do i = 1, size(groups%indices)
@@ -270,7 +271,9 @@ contains
       do c = 1, size(torque)
         names(c)%text = groups%names(i)%text // '_' // to_text(c)
       end do
-      call append_bank(banks, new_order_excitations(names, groups%listed_bodies('cylinders', i), in_lanes(torque, groups%lanes)))
+      bank = new_order_excitations(names, groups%listed_bodies('cylinders', i), in_lanes(torque, groups%lanes))
+      bank%is_engine = .true.
+      call append_bank(banks, bank)
       deallocate (names)
     end do
   end subroutine add_engines

@@ -51,6 +51,7 @@ contains
 
     where (abs(self%values_of('frequency')) > 0.0_wp) self%parameters(self%number_of('amplitude'))%value = 0.0_wp
     self%parameters(self%number_of('frequency'))%value = 0.0_wp
+    self%is_silent = .not. any(abs(self%values_of('amplitude')) > 0)
     call self%prepare_law()
   end subroutine to_mean_torque
 

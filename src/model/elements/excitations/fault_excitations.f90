@@ -90,6 +90,7 @@ contains
     class(fault_excitations_t), intent(inout) :: self
 
     self%parameters(self%number_of('amplitude'))%value = 0.0_wp
+    self%is_silent = .true.
     call self%prepare_law()
   end subroutine to_mean_torque
 

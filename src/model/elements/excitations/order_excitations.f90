@@ -1,7 +1,8 @@
 !> Excitations with a mean and harmonics of the angle u of their body that follow its speed: the cylinders of engines.
 !>
 !> The torque is M + sum of S sin(order u) + C cos(order u), plus a sum of the same form times u'^2 for reciprocating masses.
-!> M, S and C are known at some speeds, linear between them, and constant below the lowest and above the highest one.
+!> M, S and C are known at some speeds, linear between them, and constant below the lowest and above the highest one. They are
+!> those of a cycle at a constant speed: fuel is metered by the cycle. Their slopes over the speed belong to its mean.
 module nocdyn_order_excitations
   use nocdyn_bank, only: harmonic_t, role_excitation
   use nocdyn_described_elements, only: boundary_width
@@ -50,6 +51,7 @@ contains
 
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
+    bank%follows_mean_speed = .true.
     call bank%connect(role_excitation, size(torque, 1), names, body)
     bank%segments = 1 + maxval([0, (size(torque(1, e)%speed), e=1, size(body))])
     if (bank%segments <= 2) bank%segments = 1
@@ -264,6 +266,8 @@ contains
     do i = 1, size(self%parameters)
       if (index(self%parameters(i)%name, 'sine') > 0) self%parameters(i)%value = 0.0_wp
     end do
+    self%is_silent = .not. any(abs(self%values_of('mean')) > 0)
+    if (self%segments > 1) self%is_silent = self%is_silent .and. .not. any(abs(self%values_of('mean slope')) > 0)
     call self%prepare_law()
   end subroutine to_mean_torque
 

@@ -104,6 +104,7 @@ contains
 
     self%parameters(self%number_of('amplitude'))%value = 0.0_wp
     self%parameters(self%number_of('frequency'))%value = 0.0_wp
+    self%is_silent = .true.
     call self%prepare_law()
   end subroutine to_mean_torque
 

@@ -1,0 +1,222 @@
+!> How far a forced response is within the range in which the laws of its elements are linear.
+!>
+!> A law M(u, u') that oscillates by u = u_0 + a cos(theta) has the equivalent stiffness -1 / (pi a) times the integral of
+!> M cos(theta) over a turn: its first harmonic (describing function). It is compared with the tangent stiffness of the linear
+!> response. The same over u' is compared with the damping. As the amplitude a of several lines stands half the range of their sum.
+module nocdyn_linear_ranges
+  use nocdyn_bank, only: bank_t, role_coupling, role_load, role_motor
+  use nocdyn_forced_response, only: forced_response_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_response_points, only: response_point_t
+  implicit none (type, external)
+  private
+
+  public :: find_excursions
+
+  integer, parameter :: samples = 96   ! of half a turn: the share of a kink is right to some per cent
+  real(wp), parameter :: pi = acos(-1.0_wp)
+
+  !> An element that oscillates beyond the range of its linear law: where it is worst, and at how many points it does.
+  type, public :: excursion_t
+    integer :: element = 0
+    integer :: points = 0
+    integer :: worst = 0                     !! point
+    logical :: is_elastic = .true.           !! whether the stiffness changes, else the damping
+    real(wp) :: tangent = 0.0_wp             !! stiffness [N m/rad] or damping [N m s/rad] of the linear response there
+    real(wp) :: equivalent = 0.0_wp          !! the same over the oscillation
+    real(wp) :: amplitude = 0.0_wp           !! of the oscillation [rad] or [rad/s]
+    real(wp), private :: size = 0.0_wp       !! what makes a point worse than another one
+  end type excursion_t
+
+contains
+
+  !> Finds the elements whose stiffness changes by more than a share over their oscillation, and those whose damping does so much
+  !> that it moves a moment of the share of the largest half range.
+  subroutine find_excursions(response, share, excursions)
+    type(forced_response_t), intent(in) :: response
+    real(wp), intent(in) :: share
+    type(excursion_t), allocatable, intent(out) :: excursions(:)
+    type(machine_t) :: machine
+    type(excursion_t), allocatable :: elastic(:), moving(:)
+    integer, allocatable :: curved(:)
+    integer :: i, k
+    real(wp) :: t(1)
+
+    machine = response%held%balance%formulation%machine
+    t = response%held%balance%t
+    allocate (curved, source=curved_elements(machine))
+    allocate (elastic(size(curved)), moving(size(curved)))
+    elastic%element = curved
+    moving%element = curved
+    moving%is_elastic = .false.
+    if (size(curved) > 0) then
+      do i = 1, size(response%points)
+        call compare(response, i, machine, t, share, elastic)
+        call compare(response, i, machine, t, share, moving)
+      end do
+    end if
+    excursions = [(pack(elastic(k:k), elastic(k:k)%points > 0), pack(moving(k:k), moving(k:k)%points > 0), k=1, size(curved))]
+  end subroutine find_excursions
+
+  !> The elements with laws that are not straight lines, without those with internal states.
+  pure function curved_elements(machine) result(elements)
+    type(machine_t), intent(in) :: machine
+    integer, allocatable :: elements(:)
+    integer :: e, i
+
+    allocate (elements(0))
+    do i = 1, size(machine%banks)
+      associate (bank => machine%banks(i)%bank)
+        if (all(bank%role /= [role_coupling, role_load, role_motor]) .or. bank%states > 0) cycle
+        if (.not. is_curved(bank)) cycle
+        elements = [elements, [(e, e=bank%first, bank%last())]]
+      end associate
+    end do
+  end function curved_elements
+
+  pure logical function is_curved(bank)
+    class(bank_t), intent(in) :: bank
+    integer :: cubic
+
+    is_curved = .not. bank%is_polynomial
+    cubic = bank%number_of('cubic_stiffness')
+    if (cubic > 0) is_curved = is_curved .or. any(abs(bank%parameters(cubic)%value) > 0)
+  end function is_curved
+
+  !> Compares all elements at one point.
+  subroutine compare(response, point, machine, t, share, excursions)
+    type(forced_response_t), intent(in) :: response
+    integer, intent(in) :: point
+    type(machine_t), intent(inout) :: machine   !! with mean torques; its elements are work space
+    real(wp), intent(in) :: t(:), share
+    type(excursion_t), intent(inout) :: excursions(:)   !! all of stiffness or all of damping
+    real(wp), parameter :: rounding = 1.0e-7_wp         ! of the moment at the mean
+    real(wp), dimension(size(excursions)) :: amplitude, equivalent, tangent
+    real(wp) :: largest, moved, weight
+    integer :: k
+
+    associate (here => response%points(point), is_elastic => excursions(1)%is_elastic)
+      do k = 1, size(excursions)
+        amplitude(k) = oscillation(response, here, excursions(k)%element, .not. is_elastic)
+      end do
+      call set_mean(here, machine)
+      call find_equivalent(machine, t, excursions%element, is_elastic, amplitude, equivalent, tangent)
+      largest = maxval([0.0_wp, here%half_range([(k, k=1, size(response%quantities))])])
+      do k = 1, size(excursions)
+        weight = 1.0_wp
+        if (here%state%factor > 0 .and. machine%banks(bank_number(machine, excursions(k)%element))%bank%role == role_motor) &
+          weight = here%state%factor
+        moved = weight * abs(equivalent(k) - tangent(k)) * amplitude(k)
+        if (moved <= rounding * abs(here%state%mean(excursions(k)%element))) cycle
+        if (is_elastic) then
+          if (abs(equivalent(k) - tangent(k)) <= share * abs(tangent(k))) cycle
+          call keep_worst(abs(equivalent(k) - tangent(k)) / max(abs(tangent(k)), tiny(1.0_wp)))
+        else
+          if (moved <= share * largest) cycle
+          call keep_worst(moved)
+        end if
+      end do
+    end associate
+  contains
+    subroutine keep_worst(size)
+      real(wp), intent(in) :: size
+
+      associate (one => excursions(k))
+        one%points = one%points + 1
+        if (one%points > 1 .and. size <= one%size) return
+        one%size = size
+        one%worst = point
+        one%amplitude = amplitude(k)
+        one%equivalent = weight * equivalent(k)
+        one%tangent = weight * tangent(k)
+      end associate
+    end subroutine keep_worst
+  end subroutine compare
+
+  pure integer function bank_number(machine, element) result(number)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: element
+
+    do number = 1, size(machine%banks) - 1
+      if (element <= machine%banks(number)%bank%last()) return
+    end do
+  end function bank_number
+
+  !> Half the range of the twist of an element, without that in series, or of its rate.
+  pure real(wp) function oscillation(response, point, element, is_rate) result(amplitude)
+    type(forced_response_t), intent(in) :: response
+    type(response_point_t), intent(in) :: point
+    integer, intent(in) :: element
+    logical, intent(in) :: is_rate
+    complex(wp) :: twist(size(response%lines))
+    real(wp) :: highest, lowest
+    integer :: i, k, l
+
+    twist = (0.0_wp, 0.0_wp)
+    associate (rows => response%machine%elements%rows)
+      do k = rows%first(element), rows%first(element + 1) - 1
+        if (rows%body(k) > 0) twist = twist + rows%coefficient(k) * point%angle(:, rows%body(k))
+      end do
+    end associate
+    do l = 1, size(twist)
+      do i = 1, size(response%lines(l)%source)
+        associate (source => point%sources(response%lines(l)%source(i)))
+          if (source%is_twist .and. source%element == element) twist(l) = twist(l) - source%moment
+        end associate
+      end do
+    end do
+    if (is_rate) twist = twist * cmplx(0.0_wp, point%frequency, wp)
+    call response%synthesis%extremes(twist, lowest, highest)
+    amplitude = 0.5_wp * (highest - lowest)
+  end function oscillation
+
+  !> Gives the elements their twists and speeds of the steady state.
+  pure subroutine set_mean(point, machine)
+    type(response_point_t), intent(in) :: point
+    type(machine_t), intent(inout) :: machine
+
+    machine%elements%angle(1, :) = point%state%twist
+    machine%elements%speed(1, :) = point%state%rate
+  end subroutine set_mean
+
+  !> The slopes of the laws at the mean, and those of the first harmonics over the oscillations.
+  subroutine find_equivalent(machine, t, element, is_elastic, amplitude, equivalent, tangent)
+    type(machine_t), intent(inout) :: machine   !! at its mean
+    real(wp), intent(in) :: t(:)
+    integer, intent(in) :: element(:)
+    logical, intent(in) :: is_elastic
+    real(wp), intent(in) :: amplitude(:)
+    real(wp), intent(out) :: equivalent(:), tangent(:)
+    real(wp) :: mean(size(element)), moment(size(element))
+    integer :: i
+
+    call machine%choose_branches(t)
+    call machine%evaluate_elements(t)
+    call machine%differentiate_elements(t)
+    if (is_elastic) then
+      tangent = -(machine%elements%restoring_angle(1, element) + machine%elements%applied_angle(1, element))
+      mean = machine%elements%angle(1, element)
+    else
+      tangent = -machine%elements%applied_speed(1, element)
+      mean = machine%elements%speed(1, element)
+    end if
+    equivalent = 0.0_wp
+    do i = 1, samples
+      associate (wave => cos(pi * (i - 0.5_wp) / samples))
+        if (is_elastic) machine%elements%angle(1, element) = mean + amplitude * wave
+        if (.not. is_elastic) machine%elements%speed(1, element) = mean + amplitude * wave
+        call machine%choose_branches(t)
+        call machine%evaluate_elements(t)
+        moment = machine%elements%restoring(1, element) + machine%elements%applied(1, element)
+        equivalent = equivalent - moment * wave
+      end associate
+    end do
+    where (amplitude > tiny(1.0_wp))
+      equivalent = 2.0_wp / samples * equivalent / amplitude
+    elsewhere
+      equivalent = tangent
+    end where
+  end subroutine find_equivalent
+
+end module nocdyn_linear_ranges
