@@ -22,7 +22,8 @@ module nocdyn_machine_parts
   use nocdyn_motor_assembly, only: add_motor_form, check_motors, motor_form
   use nocdyn_moving_start, only: fit_moving_rows
   use nocdyn_response_ranges, only: check_response_ranges
-  use nocdyn_shaft_assembly, only: add_shafts, check_shafts, new_shaft_set, shaft_set_t
+  use nocdyn_shaft_assembly, only: add_shafts, new_shaft_set, shaft_set_t
+  use nocdyn_shaft_segments, only: check_shafts
   use nocdyn_start_speeds, only: fit_start_speeds
   use nocdyn_text, only: joined, selected
   use nocdyn_torque_assembly, only: add_engines, add_excitation_form, add_load_form, excitation_form, load_form
@@ -52,7 +53,7 @@ contains
     if (.not. allocated(error)) call check_groups(input, error)
     if (allocated(error)) return
     call add_elements(input, body_index, machine)
-    call new_shaft_set(input, body_index, shafts)
+    call new_shaft_set(input, body_index, machine%constraints, shafts)
     call add_shafts(shafts, machine)
     call add_cranks(new_element_groups(input, 'crank', machine%lanes, body_index), machine)
     call machine%number_elements()

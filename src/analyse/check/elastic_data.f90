@@ -10,7 +10,7 @@ module nocdyn_elastic_data
   use nocdyn_linearisation, only: tangent_stiffness
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: new_reduced
-  use nocdyn_shaft_assembly, only: segment_inertia, segment_stiffness
+  use nocdyn_shaft_segments, only: segment_inertia, segment_stiffness
   use nocdyn_shafts, only: shafts_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
