@@ -28,7 +28,7 @@ module nocdyn_spectral_elements
 contains
 
   !> An element with n + 1 nodes.
-  type(spectral_element_t) function new_spectral_element(order) result(self)
+  pure type(spectral_element_t) function new_spectral_element(order) result(self)
     integer, intent(in) :: order   !! n, from 1 on
     integer :: j, q
 
