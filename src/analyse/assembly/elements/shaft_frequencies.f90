@@ -7,7 +7,7 @@ module nocdyn_shaft_frequencies
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_reached_speeds, only: reached_speeds
-  use nocdyn_shaft_segments, only: segments_of, segments_t
+  use nocdyn_shaft_segments, only: has_inertia, segments_of, segments_t
   implicit none (type, external)
   private
 
@@ -18,7 +18,7 @@ module nocdyn_shaft_frequencies
   real(wp), parameter :: reserve = 1.2_wp
   real(wp), parameter :: inertia_orders = 4.0_wp   ! of slider-cranks; the following ones are small
   real(wp), parameter :: cardan_orders = 4.0_wp
-  real(wp), parameter :: least_turn = 0.05_wp      ! of the range of a table: less is no oscillation
+  real(wp), parameter :: least_rise = 0.05_wp      ! of the range of a table: less is no oscillation
 
 contains
 
@@ -38,7 +38,7 @@ contains
     frequency = 0.0_wp
     do i = 1, size(indices)
       associate (group => input%groups(indices(i)))
-        if (.not. group%number('density') > 0) cycle
+        if (.not. has_inertia(group)) cycle
         segments = segments_of(group)
         frequencies = [frequencies, (n * pi / sum(segments%wave_time), n=1, least_modes)]
       end associate
@@ -139,12 +139,12 @@ contains
     end select
   end function frequency_of_excitation
 
-  !> Of a table, pi over the shortest half wave: the steepest rise continued over the whole range, or from one turning point to the
-  !> next, where that is more than a small share of the range; 0 of a constant.
+  !> Of a table, pi over the shortest half wave: a rise or a fall of more than a small share of the range, or the steepest part of
+  !> one continued over the whole range; 0 of a constant.
   pure real(wp) function half_wave(x, y) result(frequency)
     real(wp), intent(in) :: x(:), y(:)
     real(wp) :: range
-    integer :: i, last   ! point of the last turn
+    integer :: first, i   ! point where the present rise or fall begins
 
     frequency = 0.0_wp
     if (size(x) < 2 .or. size(y) /= size(x)) return
@@ -152,11 +152,15 @@ contains
     if (.not. range > 0) return
     associate (rise => y(2:) - y(:size(y) - 1), run => x(2:) - x(:size(x) - 1))
       frequency = maxval(pi * abs(rise) / (range * run))
-      last = 1
-      do i = 2, size(rise)
-        if (rise(i - 1) * rise(i) >= 0) cycle
-        if (last > 1 .and. abs(y(i) - y(last)) > least_turn * range) frequency = max(frequency, pi / (x(i) - x(last)))
-        last = i
+      first = 1
+      do i = 1, size(rise)
+        if (i > 1) then
+          if (.not. rise(i - 1) * rise(i) > 0) first = i
+        end if
+        if (i < size(rise)) then
+          if (rise(i) * rise(i + 1) > 0) cycle
+        end if
+        if (abs(y(i + 1) - y(first)) > least_rise * range) frequency = max(frequency, pi / (x(i + 1) - x(first)))
       end do
     end associate
   end function half_wave

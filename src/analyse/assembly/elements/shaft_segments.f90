@@ -8,7 +8,7 @@ module nocdyn_shaft_segments
   implicit none (type, external)
   private
 
-  public :: check_shafts, choose_elements, has_own_nodes, segment_inertia, segment_stiffness, segments_of
+  public :: check_shafts, choose_elements, has_inertia, has_own_nodes, segment_inertia, segment_stiffness, segments_of
 
   real(wp), parameter :: pi = acos(-1.0_wp)
   integer, parameter, public :: most_nodes = 1000   !! inside of a shaft
@@ -50,7 +50,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     associate (values => input%groups(index)%numbers(key), segments => size(input%groups(index)%numbers('lengths')))
-      if (all(size(values) /= [1, segments])) then
+      if (size(values) > 0 .and. all(size(values) /= [1, segments])) then
         call raise(error, exit_input, input%location(index, key) // ': ' // key // ' has ' // to_text(size(values)) // &
                    ' values, lengths has ' // to_text(segments) // '; allowed: one for the whole shaft, or one for each segment')
       else if (any(values > 0) .and. .not. all(values > 0)) then
@@ -75,7 +75,7 @@ contains
                      ' m; allowed: 0 to below the diameter')
           return
         end do
-        if (.not. group%has_value('nodes') .or. .not. group%number('density') > 0) return
+        if (.not. group%has_value('nodes') .or. .not. has_inertia(group)) return
         if (group%whole_number('nodes') >= size(bores) - 1) return
         call raise(error, exit_input, input%location(index, 'nodes') // ': nodes = ' // &
                    to_text(group%whole_number('nodes')) // ' is out of range; allowed: from ' // to_text(size(bores) - 1) // &
@@ -100,13 +100,14 @@ contains
     allocate (segments%wave_time, source=segments%length * sqrt(segments%density / segments%shear_modulus))
   end function segments_of
 
-  !> A value for each segment, from one for all of them or as many.
+  !> A value for each segment, from one for all of them or as many; 0 from none.
   pure function one_for_each(values, segments) result(list)
     real(wp), intent(in) :: values(:)
     integer, intent(in) :: segments
     real(wp), allocatable :: list(:)
 
-    allocate (list(segments), source=values(1))
+    allocate (list(segments), source=0.0_wp)
+    if (size(values) == 1) list(:) = values(1)
     if (size(values) > 1) list(:) = values
   end function one_for_each
 
@@ -130,11 +131,18 @@ contains
     allocate (inertia, source=segments%density * segments%second_moment * segments%length)
   end function segment_inertia
 
+  !> Whether a shaft has inertia.
+  pure logical function has_inertia(group)
+    type(group_t), intent(in) :: group
+
+    has_inertia = group%number('density', absent=0.0_wp) > 0
+  end function has_inertia
+
   !> Whether a shaft has inertia and chooses its nodes by itself.
   pure logical function has_own_nodes(group)
     type(group_t), intent(in) :: group
 
-    has_own_nodes = group%number('density') > 0 .and. .not. group%has_value('nodes')
+    has_own_nodes = has_inertia(group) .and. .not. group%has_value('nodes')
   end function has_own_nodes
 
   !> The spectral elements of a shaft, from its first end on. Without inertia it is one slice: there are none.
@@ -149,7 +157,7 @@ contains
     integer :: i, parts, one
 
     allocate (segment(0), order(0))
-    if (.not. group%number('density') > 0) return
+    if (.not. has_inertia(group)) return
     segments = segments_of(group)
     if (group%has_value('nodes')) then
       sums = given_orders(segments%length, group%whole_number('nodes') + 1)

@@ -101,7 +101,7 @@ contains
     type(statistic_t), allocatable, intent(out) :: parts(:)
     type(column_t), allocatable :: points(:)
     integer, allocatable :: column(:), kind(:), owner(:)
-    integer :: i, k
+    integer :: first, i, k
 
     allocate (owner(0), column(0), kind(0))
     allocate (self%first_part(size(statistics) + 1), source=1)
@@ -114,15 +114,15 @@ contains
           column = [column, statistic%column]
           kind = [kind, statistic%kind]
         end if
+        call add_columns(points, columns, first)
         if (self%is_along(i) .and. statistic%kind == statistic_time_of_max) then
           owner = [owner, (i, k=1, size(points))]
-          column = [column, (size(columns) + k, k=1, size(points))]
+          column = [column, (first - 1 + k, k=1, size(points))]
           kind = [kind, spread(statistic_max, 1, size(points))]
         end if
         owner = [owner, (i, k=1, size(points))]
-        column = [column, (size(columns) + k, k=1, size(points))]
+        column = [column, (first - 1 + k, k=1, size(points))]
         kind = [kind, spread(statistic%kind, 1, size(points))]
-        columns = [columns, points]
       end associate
       self%first_part(i + 1) = size(owner) + 1
     end do
@@ -133,6 +133,22 @@ contains
       parts(i)%kind = kind(i)
     end do
   end subroutine list_parts
+
+  !> Adds the columns of the points of a shaft, unless they are there.
+  pure subroutine add_columns(points, columns, first)
+    type(column_t), intent(in) :: points(:)
+    type(column_t), allocatable, intent(inout) :: columns(:)
+    integer, intent(out) :: first   !! column of the first point
+    integer :: c
+
+    first = size(columns) + 1
+    if (size(points) == 0) return
+    do c = 1, size(columns)
+      if (columns(c)%kind == points(1)%kind .and. columns(c)%bank == points(1)%bank .and. &
+          columns(c)%quantity == points(1)%quantity .and. columns(c)%index == points(1)%index) first = min(first, c)
+    end do
+    if (first > size(columns)) columns = [columns, points]
+  end subroutine add_columns
 
   !> The points of a shaft that a statistic is of, or an extreme of the largest moment or stress along it.
   subroutine find_points(machine, statistic, columns, points, is_along)

@@ -37,7 +37,7 @@ module nocdyn_shafts
   contains
     procedure :: quantities
     procedure :: observe
-    procedure :: positions, section_moduli, section_modulus, moment_at
+    procedure :: positions, section_moduli, moment_at
     procedure, nopass :: is_largest_moment, is_stress
   end type shafts_t
 
@@ -117,9 +117,10 @@ contains
     integer, intent(in) :: lane
     real(wp), intent(out) :: values(:)   !! [elements of the bank]
     real(wp) :: found
-    integer :: p, s
+    integer :: modulus, p, s
 
     values = 0.0_wp
+    modulus = self%number_of('shaft_modulus')
     do s = 1, size(self%shafts)
       associate (shaft => self%shafts(s), value => values(self%shafts(s)%first), offset => self%first - 1)
         if (quantity == twist) then
@@ -129,8 +130,7 @@ contains
         do p = 1, size(shaft%moments, 2)
           if (quantity == moment_1 .and. p > 1 .or. quantity == moment_2 .and. p < size(shaft%moments, 2)) cycle
           found = self%moment_at(elements, s, p, lane)
-          if (quantity == stress) found = found / self%parameters(self%number_of('shaft_modulus')) &
-                                                   %value(lane, shaft%first_point + p - 1)
+          if (quantity == stress) found = found / self%parameters(modulus)%value(lane, shaft%first_point + p - 1)
           if (abs(found) > abs(value)) value = found
         end do
       end associate
@@ -160,15 +160,6 @@ contains
       positions = self%parameters(self%number_of('position'))%value(lane, one%first_point:one%last_point)
     end associate
   end function positions
-
-  !> The section modulus against torsion at a point of a shaft [m3].
-  pure real(wp) function section_modulus(self, shaft, point, lane)
-    class(shafts_t), intent(in) :: self
-    integer, intent(in) :: shaft, point, lane
-
-    section_modulus = self%parameters(self%number_of('shaft_modulus')) &
-                      %value(lane, self%shafts(shaft)%first_point + point - 1)
-  end function section_modulus
 
   !> Section moduli against torsion at the points of a shaft [m3], [points].
   pure function section_moduli(self, shaft, lane)

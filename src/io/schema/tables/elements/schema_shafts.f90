@@ -26,8 +26,8 @@ module nocdyn_schema_shafts
       'inner diameter of each segment, less than the outer one', fewest=1), &
     key_rule_t('shaft',      'shear_modulus',   a_number,       any_number, 'Pa', required,    positive, &
       'shear modulus G: 8e10 of steel; one value, or one for each segment', fewest=1), &
-    key_rule_t('shaft',      'density',         a_number,       any_number, 'kg/m3', '0',      not_negative, &
-      'density: 7850 of steel; one value, or one for each segment; 0: the shaft has no inertia', fewest=1), &
+    key_rule_t('shaft',      'density',         a_number,       any_number, 'kg/m3', unset,    not_negative, &
+      'density: 7850 of steel; one value, or one for each segment; 0 or not given: no inertia', fewest=1), &
     key_rule_t('shaft',      'damping_ratio',   a_number,       1, '',            unset,       not_negative, &
       'damping ratio D of its oscillations at damping_frequency, in place of relative_damping'), &
     key_rule_t('shaft',      'relative_damping', a_number,      1, '',            unset,       not_negative, &
