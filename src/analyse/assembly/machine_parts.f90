@@ -23,7 +23,8 @@ module nocdyn_machine_parts
   use nocdyn_motor_assembly, only: add_motor_form, check_motor, motor_form
   use nocdyn_moving_start, only: fit_moving_rows
   use nocdyn_response_ranges, only: check_response_range
-  use nocdyn_shaft_assembly, only: add_shafts, check_shaft, new_shaft_set, shaft_set_t
+  use nocdyn_shaft_assembly, only: add_shafts, new_shaft_set, shaft_set_t
+  use nocdyn_shaft_segments, only: check_shaft
   use nocdyn_start_speeds, only: fit_start_speeds
   use nocdyn_text, only: joined, selected
   use nocdyn_torque_assembly, only: add_engines, add_excitation_form, add_load_form, excitation_form, load_form
@@ -55,7 +56,7 @@ contains
     call add_error(error, mistakes)
     if (allocated(error)) return
     call add_elements(input, body_index, machine)
-    call new_shaft_set(input, body_index, shafts)
+    call new_shaft_set(input, body_index, machine%constraints, shafts)
     call add_shafts(shafts, machine)
     call add_cranks(new_element_groups(input, 'crank', machine%lanes, body_index), machine)
     call machine%number_elements()

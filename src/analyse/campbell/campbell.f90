@@ -11,7 +11,7 @@ module nocdyn_campbell
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: sort_ascending
   use nocdyn_machine, only: machine_t
-  use nocdyn_response_notes, only: note_simplifications, note_steady_states
+  use nocdyn_response_notes, only: note_shaft_modes, note_simplifications, note_steady_states
   use nocdyn_response_settings, only: operating_distance, place_error, read_response_settings, response_settings_t
   use nocdyn_speed_modes, only: most_coordinates, new_speed_modes, speed_modes_t
   use nocdyn_text, only: string_t, to_text
@@ -60,6 +60,7 @@ contains
     end if
     call note_simplifications(machine, self%notes)
     call note_steady_states(self%settings, self%response, self%notes)
+    call note_shaft_modes(machine, self%modes, self%crossings, .true., self%notes)
     allocate (self%distance(size(self%crossings)), self%is_too_near(size(self%crossings)))
     do i = 1, size(self%crossings)
       call operating_distance(self%settings, self%crossings(i)%speed, self%distance(i), self%is_too_near(i))

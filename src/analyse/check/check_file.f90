@@ -36,7 +36,7 @@ contains
     call json%put('notes', notes)
     call put_bodies(json, input, machine)
     call put_couplings(json, machine)
-    call put_shafts(json, input)
+    call put_shafts(json, input, machine)
     call put_constraints(json, machine)
     call put_load_cases(json, input)
     call json%put('complete_input', input_text(input))

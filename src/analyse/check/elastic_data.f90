@@ -10,7 +10,7 @@ module nocdyn_elastic_data
   use nocdyn_linearisation, only: tangent_stiffness
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: new_reduced
-  use nocdyn_shaft_assembly, only: segment_inertia, segment_stiffness
+  use nocdyn_shaft_segments, only: segment_inertia, segment_stiffness
   use nocdyn_shafts, only: shafts_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -125,12 +125,13 @@ contains
     end do
   end function names_of
 
-  !> The segments of every shaft.
-  subroutine put_shafts(json, input)
+  !> The segments of every shaft, and the number of its internal nodes.
+  subroutine put_shafts(json, input, machine)
     type(json_t), intent(inout) :: json
     type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
     integer, allocatable :: groups(:)
-    integer :: i
+    integer :: b, i
 
     allocate (groups, source=input%groups_named('shaft'))
     call json%open_list('shafts')
@@ -143,6 +144,7 @@ contains
         call json%put('bore_m', group%numbers('bores'))
         call json%put('stiffness_N_m_rad', segment_stiffness(group))
         call json%put('inertia_kg_m2', segment_inertia(group))
+        call json%put('nodes', count([(index(machine%names(b)%text, group%name // '[') == 1, b=1, machine%bodies)]))
         call json%close()
       end associate
     end do

@@ -197,6 +197,9 @@ contains
       if (mode%internal > 0) call json%put('state', self%machine%internal_name(mode%internal))
       call json%put('frequency_Hz', mode%frequency())
       call json%put('undamped_frequency_Hz', mode%undamped)
+      if (allocated(self%shaft_errors) .and. mode%kind == mode_oscillating) then
+        call json%put('error_by_shaft_nodes', self%shaft_errors(i))
+      end if
       call json%put('damping_ratio', mode%damping_ratio())
       if (mode%time_constant() < huge(1.0_wp)) call json%put('time_constant_s', mode%time_constant())
       call json%put('eigenvalue_1_s', [real(mode%eigenvalue, wp), aimag(mode%eigenvalue)])

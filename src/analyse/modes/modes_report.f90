@@ -9,6 +9,7 @@ module nocdyn_modes_report
   use nocdyn_mean_slopes, only: note_mean_slopes
   use nocdyn_modes, only: find_modes, kind_names, mode_diverging, mode_internal, mode_oscillating, mode_overdamped, mode_rigid, &
     mode_t
+  use nocdyn_shaft_errors, only: error_text, has_shaft_nodes, noted_error, shaft_error
   use nocdyn_operating_point, only: operating_point_t
   use nocdyn_table_text, only: cell, cell_width, padded, text_width
   use nocdyn_text, only: append, rounded_text, string_t, to_text
@@ -30,6 +31,7 @@ module nocdyn_modes_report
     type(machine_t) :: machine
     type(linearisation_t) :: linear               !! at the operating point
     type(mode_t), allocatable :: modes(:)
+    real(wp), allocatable :: shaft_errors(:)      !! relative, of frequencies by the nodes of shafts, [modes]; not allocated: no nodes
     integer :: shapes = 0                         !! number of modes, from the first, whose shapes and shares are in the files
     type(string_t), allocatable :: body_names(:)      !! of the bodies of the input
     type(string_t), allocatable :: kinetic_names(:)   !! of the parts of the kinetic energy: these, and shafts with nodes
@@ -74,6 +76,7 @@ contains
                  ' has a frequency, shape or share of an energy that is not a finite number')
       return
     end do
+    call find_shaft_errors(self)
     call point%formulation%set_state(point%y)
     allocate (self%omega, source=point%formulation%omega(1, 1:))
     call join_parts(linear%stiffness(self%elastic), self)
@@ -81,11 +84,42 @@ contains
     self%point = point%text
     allocate (self%notes, source=point%notes)
     self%shapes = min(size(self%modes), max_values / (3 * size(self%kinetic_names) + size(self%elastic_names)))
+    if (allocated(self%shaft_errors)) call note_shaft_errors(self)
     if (self%shapes < size(self%modes)) then
       call append(self%notes, 'of the ' // to_text(size(self%modes)) // ' modes, modes.csv and modes.json have the ' // &
                               'shapes and energies of the first ' // to_text(self%shapes))
     end if
   end subroutine new_modes_report
+
+  !> The errors of the undamped modes that are most similar to the modes.
+  subroutine find_shaft_errors(self)
+    type(modes_report_t), intent(inout) :: self
+    real(wp) :: errors(size(self%linear%natural))
+    integer :: i
+
+    if (.not. has_shaft_nodes(self%machine)) return
+    associate (linear => self%linear)
+      do i = 1, size(errors)
+        errors(i) = shaft_error(self%machine, self%machine%coordinates%body_speeds(1, linear%shapes(:, i)), linear%natural(i))
+      end do
+      allocate (self%shaft_errors(size(self%modes)), source=0.0_wp)
+      do i = 1, size(self%modes)
+        if (self%modes(i)%kind /= mode_oscillating) cycle
+        self%shaft_errors(i) = errors(minloc(abs(from_si(linear%natural, unit_hz) - self%modes(i)%undamped), dim=1))
+      end do
+    end associate
+  end subroutine find_shaft_errors
+
+  !> Notes how many modes the nodes of the shafts do not resolve.
+  subroutine note_shaft_errors(self)
+    type(modes_report_t), intent(inout) :: self
+
+    associate (poor => count(self%shaft_errors > noted_error), all => count(self%modes%kind == mode_oscillating))
+      if (poor > 0) call append(self%notes, 'the nodes of shafts resolve ' // to_text(all - poor) // ' of the ' // &
+                                to_text(all) // ' oscillating modes; the others are marked with their error; ' // &
+                                'more nodes of &shaft resolve more')
+    end associate
+  end subroutine note_shaft_errors
 
   !> Adds up the energies of the nodes and of the slices of each shaft.
   subroutine join_parts(stiffness, self)
@@ -164,11 +198,23 @@ contains
                                 cell(mode%undamped) // cell(mode%damping_ratio()) // time_cell(mode) // '  ' // &
                                 padded(shares_text(mode%kinetic, self%kinetic_names), width) // '  ' // &
                                 shares_text(mode%potential, self%elastic_names) // internal_text(self, mode) // &
+                                shaft_text(self, chosen(i)) // &
                                 trim(merge(', unstable', '          ', mode%is_unstable())))
       end associate
     end do
     if (shown < size(chosen)) call report%append_line('  (' // to_text(size(chosen) - shown) // ' more in modes.csv)')
   end subroutine put_oscillations
+
+  !> "; nodes too few: error about 6 %".
+  function shaft_text(self, i) result(text)
+    type(modes_report_t), intent(in) :: self
+    integer, intent(in) :: i   !! mode
+    character(len=:), allocatable :: text
+
+    text = ''
+    if (.not. allocated(self%shaft_errors)) return
+    if (self%shaft_errors(i) > noted_error) text = '; nodes too few: error ' // error_text(self%shaft_errors(i))
+  end function shaft_text
 
   !> "; mostly stator flux d of motor 'mains'".
   function internal_text(self, mode) result(text)

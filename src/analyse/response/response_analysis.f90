@@ -12,7 +12,7 @@ module nocdyn_response_analysis
   use nocdyn_machine, only: machine_t
   use nocdyn_response_fatigue, only: find_response_fatigue, response_fatigue_t
   use nocdyn_response_limits, only: read_limits, response_limit_t
-  use nocdyn_response_notes, only: note_linear_ranges, note_overloads, note_rated_speeds, note_separation, &
+  use nocdyn_response_notes, only: note_linear_ranges, note_overloads, note_rated_speeds, note_shaft_modes, note_separation, &
     note_simplifications, note_steady_states
   use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
   use nocdyn_speed_modes, only: most_coordinates, new_speed_modes, speed_modes_t
@@ -66,6 +66,7 @@ contains
     if (.not. allocated(error)) call find_peaks(self, error, failed_speed)
     if (.not. allocated(error)) then
       call note_steady_states(self%settings, self%response, self%notes)
+      if (self%modes%modes > 0) call note_shaft_modes(machine, self%modes, self%crossings, .false., self%notes)
       call note_separation(self%response, self%notes)
       call note_linear_ranges(self%response, self%notes)
       call note_overloads(self%response, self%notes)

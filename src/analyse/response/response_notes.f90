@@ -1,6 +1,7 @@
 !> Notes on a forced response: where it may be other than its reader expects.
 module nocdyn_response_notes
   use nocdyn_bank, only: bank_of
+  use nocdyn_critical_speeds, only: crossing_t
   use nocdyn_element_sets, only: element_names
   use nocdyn_forced_response, only: forced_response_t
   use nocdyn_gap_couplings, only: gap_couplings_t
@@ -12,12 +13,15 @@ module nocdyn_response_notes
   use nocdyn_mean_slopes, only: note_mean_slopes
   use nocdyn_response_quantities, only: quantity_moment, quantity_reaction
   use nocdyn_response_settings, only: response_settings_t
+  use nocdyn_shaft_errors, only: error_text, has_shaft_nodes, noted_error, shaft_error
+  use nocdyn_speed_modes, only: speed_modes_t
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
-  use nocdyn_units, only: from_si, unit_rpm
+  use nocdyn_units, only: from_si, unit_hz, unit_rpm
   implicit none (type, external)
   private
 
   public :: note_simplifications, note_steady_states, note_separation, note_linear_ranges, note_overloads, note_rated_speeds
+  public :: note_shaft_modes
 
 contains
 
@@ -32,6 +36,32 @@ contains
     if (lossy /= '') call append(notes, 'the losses of ' // lossy // ' are left out')
     call note_ended_excitations(machine, notes)
   end subroutine note_simplifications
+
+  !> Modes that the nodes of shafts do not resolve, and critical speeds of these.
+  subroutine note_shaft_modes(machine, modes, crossings, lists_modes, notes)
+    type(machine_t), intent(in) :: machine
+    type(speed_modes_t), intent(in) :: modes
+    type(crossing_t), intent(in) :: crossings(:)
+    logical, intent(in) :: lists_modes   !! whether modes are reported that no line crosses
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    character(len=:), allocatable :: text
+    real(wp) :: errors(modes%modes)
+    integer :: first, m
+
+    if (modes%modes == 0 .or. .not. has_shaft_nodes(machine)) return
+    errors = [(shaft_error(machine, modes%shape(:, m), modes%natural(m, 1)), m=1, modes%modes)]
+    if (.not. any(errors > noted_error)) return
+    first = minloc(modes%natural(:, 1), dim=1, mask=errors > noted_error)
+    text = 'the nodes of shafts resolve ' // to_text(count(errors <= noted_error)) // ' of the ' // to_text(modes%modes) // &
+           ' modes: that at ' // rounded_text(from_si(modes%natural(first, 1), unit_hz), 6) // ' Hz has an error of ' // &
+           error_text(errors(first)) // ', higher ones a larger one'
+    associate (crossed => count([(errors(crossings(m)%mode) > noted_error, m=1, size(crossings))]))
+      if (crossed == 0 .and. .not. lists_modes) return
+      if (crossed > 0) text = text // ', and with them ' // to_text(crossed) // ' of the ' // to_text(size(crossings)) // &
+                              ' critical speeds'
+    end associate
+    call append(notes, text // '; more nodes of &shaft resolve more')
+  end subroutine note_shaft_modes
 
   !> Excitations that are over in a steady state.
   subroutine note_ended_excitations(machine, notes)

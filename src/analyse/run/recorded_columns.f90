@@ -191,16 +191,18 @@ contains
     type(segment_t), intent(in) :: segment
     integer, intent(in) :: lane
     real(wp), intent(inout) :: values(:)   !! [N m] or [Pa]
+    real(wp), allocatable :: moduli(:)
     integer :: p
 
     select type (bank => machine%banks(segment%bank)%bank)
     type is (shafts_t)
       do p = 1, size(values)
-        associate (point => segment%index + p - 1)
-          values(p) = bank%moment_at(machine%elements, segment%quantity, point, lane)
-          if (segment%kind == column_point_stress) values(p) = values(p) / bank%section_modulus(segment%quantity, point, lane)
-        end associate
+        values(p) = bank%moment_at(machine%elements, segment%quantity, segment%index + p - 1, lane)
       end do
+      if (segment%kind == column_point_stress) then
+        moduli = bank%section_moduli(segment%quantity, lane)
+        values(:) = values / moduli(segment%index:segment%index + size(values) - 1)
+      end if
     class default
       error stop 'nocdyn_recorded_columns: the points are of a shaft'
     end select

@@ -17,6 +17,7 @@ module nocdyn_trajectory_table
 
   type, public :: trajectory_table_t
     type(string_t), allocatable :: labels(:)
+    type(column_t), allocatable :: list(:)         !! the columns
     integer, allocatable, private :: unit(:)       !! of each column: index of `units`, 0: that of SI
     type(recorded_columns_t) :: columns            !! with a copy of the formulation
     real(wp), private :: t(1) = 0.0_wp             !! [s]
@@ -34,11 +35,10 @@ contains
     class(formulation_t), intent(in) :: formulation   !! of one lane, with work integrals
     real(wp), intent(in) :: t_start                   !! [s]
     integer, intent(in), optional :: wanted(:)        !! units of columns: indices of `units`; absent: those of SI
-    type(column_t), allocatable :: columns(:)
 
-    call list_columns(formulation%machine, columns, table%labels)
-    table%columns = new_recorded_columns(formulation, columns)
-    allocate (table%unit(size(columns)), source=0)
+    call list_columns(formulation%machine, table%list, table%labels)
+    table%columns = new_recorded_columns(formulation, table%list)
+    allocate (table%unit(size(table%list)), source=0)
     if (present(wanted)) call turn_labels(table%labels, wanted, table%unit)
     table%t(1) = t_start
     table%y = formulation%start()

@@ -21,6 +21,7 @@ module nocdyn_transient
   use nocdyn_run_settings, only: check_size, choose_settings
   use nocdyn_run_summary, only: check_energy_balance, check_extremes, describe_machine, extremes_t, run_summary_t, &
     start_extremes, update_extremes, widen_extremes
+  use nocdyn_shaft_extremes, only: new_shaft_extremes, shaft_extremes_t
   use nocdyn_solver_status, only: failure_message, integration_done, integration_interrupted, integration_not_finite, &
     solver_status_t
   use nocdyn_observer, only: observer_t, ranges_t
@@ -76,7 +77,9 @@ module nocdyn_transient
     real(wp), allocatable :: row(:)          !! [columns]
     integer, allocatable :: chosen(:)        !! columns that are written
     real(wp), allocatable :: written(:)      !! their values in the row
-    type(run_fatigue_t) :: fatigue           !! of signals, which are tracked after the columns
+    type(shaft_extremes_t) :: along          !! shafts, whose points are tracked after the columns
+    type(run_fatigue_t) :: fatigue           !! of signals, which are tracked after these
+    integer :: before_signals = 0            !! number of functions before the signals
     type(vibration_t) :: vibration           !! its energy in the rows
     real(wp) :: last_time = 0.0_wp           !! of the rows [s]
     real(wp), allocatable :: last_state(:)   !! at that time, [states + quadratures]
@@ -170,7 +173,9 @@ contains
     allocate (observer%last_state(formulation%states + formulation%quadratures), source=0.0_wp)
     call new_run_fatigue(input, formulation%machine, observer%table%labels, observer%fatigue)
     observer%turning = size(observer%fatigue%counters)
-    observer%tracked = size(observer%row) + observer%turning
+    observer%along = new_shaft_extremes(formulation%machine, observer%table%list)
+    observer%before_signals = size(observer%row) + observer%along%points
+    observer%tracked = observer%before_signals + observer%turning
     call start_extremes(observer%extremes, size(observer%row), observer%tracked_from)
     call choose_columns(input, observer%table%labels, observer%chosen, error)
     if (.not. allocated(error)) allocate (observer%written(size(observer%chosen)))
@@ -268,12 +273,13 @@ contains
     integer, intent(in) :: lane
     real(wp), intent(in) :: t                  !! [s]
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
-    real(wp), contiguous, intent(inout) :: values(:)   !! [columns + signals]
+    real(wp), contiguous, intent(inout) :: values(:)   !! [columns + points of shafts + signals]
 
     if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
-    associate (columns => size(self%row))
+    associate (columns => size(self%row), machine => self%table%columns%formulation%machine)
       call self%table%fill(t, y, values(:columns))
-      call self%fatigue%evaluate(self%table%columns%formulation%machine, values(:columns), values(columns + 1:))
+      call self%along%evaluate(machine, values(columns + 1:self%before_signals))
+      call self%fatigue%evaluate(machine, values(:columns), values(self%before_signals + 1:))
     end associate
     self%has_ranges = .true.
   end subroutine tracked_values
@@ -285,7 +291,7 @@ contains
     real(wp), intent(in) :: value
 
     if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
-    call self%fatigue%counters(function - size(self%row))%add(value)
+    call self%fatigue%counters(function - self%before_signals)%add(value)
   end subroutine on_turn
 
   !> The ranges of a signal that do not count.
@@ -294,7 +300,7 @@ contains
     integer, intent(in) :: lane, function
 
     if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
-    least_range = self%fatigue%counters(function - size(self%row))%hysteresis()
+    least_range = self%fatigue%counters(function - self%before_signals)%hysteresis()
   end function least_range
 
   subroutine on_shift(self, lane, shift)
@@ -309,10 +315,14 @@ contains
   subroutine on_extremes(self, lane, ranges)
     class(run_observer_t), intent(inout) :: self
     integer, intent(in) :: lane
-    type(ranges_t), intent(in) :: ranges   !! of the columns
+    type(ranges_t), intent(in) :: ranges   !! of the tracked functions
+    type(ranges_t) :: corrected
 
     if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
-    if (self%has_ranges) call widen_extremes(self%extremes, ranges)
+    if (.not. self%has_ranges) return
+    corrected = ranges
+    call self%along%correct_ranges(self%table%columns%formulation%machine, size(self%row) + 1, corrected)
+    call widen_extremes(self%extremes, corrected)
   end subroutine on_extremes
 
   !> Whether the caller wants the run to end.

@@ -11,7 +11,7 @@ module nocdyn_spectral_elements
 
   public :: new_spectral_element, least_order
 
-  integer, parameter, public :: highest_order = 64
+  integer, parameter, public :: highest_order = 24   !! of elements that are good for all: longer bars are several ones
 
   type, public :: spectral_element_t
     integer :: order = 1                     !! n
@@ -28,8 +28,8 @@ module nocdyn_spectral_elements
 contains
 
   !> An element with n + 1 nodes.
-  type(spectral_element_t) function new_spectral_element(order) result(self)
-    integer, intent(in) :: order   !! n, 1 to highest_order
+  pure type(spectral_element_t) function new_spectral_element(order) result(self)
+    integer, intent(in) :: order   !! n, from 1 on
     integer :: j, q
 
     self%order = order
@@ -120,13 +120,13 @@ contains
     end do
   end function interpolation
 
-  !> The least order at which the error of an element is at most `tolerance`; at most highest_order.
+  !> The least order at which the error of an element is at most `tolerance`; above highest_order if that does not suffice.
   integer function least_order(b, tolerance) result(order)
     real(wp), intent(in) :: b           !! highest frequency times the time that a wave takes through the bar [rad]
     real(wp), intent(in) :: tolerance   !! as of `error`
     type(spectral_element_t) :: element
 
-    do order = 1, highest_order - 1
+    do order = 1, highest_order
       if (order + 1 < b) cycle   ! two nodes for a wave length and less resolve nothing
       element = new_spectral_element(order)
       if (element%error(b) <= tolerance) return

@@ -11,6 +11,7 @@ module nocdyn_direct_parameters
   use nocdyn_lane_parameters, only: lane_parameters_t, parameter_index_t
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: reduced_t
+  use nocdyn_shaft_segments, only: has_own_nodes
   use nocdyn_schema, only: first_key, key_rules
   use nocdyn_schema_rules, only: is_too_small
   use nocdyn_targets, only: target_t
@@ -90,7 +91,7 @@ contains
     integer :: b, e
 
     self%are_direct = .false.
-    if (is_shared(input, target)) return
+    if (is_shared(input, target) .or. sets_nodes(input, target)) return
     associate (group => input%groups(target%group))
       do b = 1, size(machine%banks)
         associate (bank => machine%banks(b)%bank)
@@ -122,6 +123,22 @@ contains
       is_shared = is_shared .or. input%groups(g)%has_value('share_of_load')
     end do
   end function is_shared
+
+  !> Whether nodes of shafts may follow from the target: from frequencies, durations, and numbers of motors, which set speeds.
+  pure logical function sets_nodes(input, target)
+    type(input_t), intent(in) :: input
+    type(target_t), intent(in) :: target
+    integer :: g
+
+    sets_nodes = .false.
+    associate (unit => key_rules(first_key(input%groups(target%group)%rule) + target%key - 1)%unit)
+      if (input%groups(target%group)%kind /= 'motor' .and. unit /= 'rad/s' .and. unit /= 's') return
+    end associate
+    do g = 1, size(input%groups)
+      if (input%groups(g)%kind /= 'shaft') cycle
+      sets_nodes = sets_nodes .or. has_own_nodes(input%groups(g))
+    end do
+  end function sets_nodes
 
   !> The name of the parameter that holds the values of a key: the backlash of a mesh is the gap of its law.
   pure function parameter_of(key) result(name)

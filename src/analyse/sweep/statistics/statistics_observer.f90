@@ -6,10 +6,12 @@ module nocdyn_statistics_observer
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_linear_columns, only: has_law, is_linear, is_proportional
   use nocdyn_linear_statistics, only: linear_statistics_t, new_linear_statistics
+  use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: reduced_t
   use nocdyn_sampled_statistics, only: new_sampled_statistics, sampled_statistics_t
-  use nocdyn_statistics, only: find_columns, is_of_fatigue, is_time_of_extreme, is_torque, statistic_settling_time, &
-    statistic_t, value_of_zero_column
+  use nocdyn_shaft_extremes, only: is_largest_along
+  use nocdyn_statistics, only: find_columns, is_of_fatigue, is_time_of_extreme, is_torque, statistic_max, statistic_max_abs, &
+    statistic_min, statistic_settling_time, statistic_t, statistic_time_of_max, statistic_time_of_min, value_of_zero_column
   use nocdyn_observer, only: observer_t, step_block_t
   use nocdyn_text, only: string_t
   use nocdyn_trajectory_columns, only: column_point_moment, column_point_stress, column_t, column_work_in, energy_labels, &
@@ -35,6 +37,8 @@ module nocdyn_statistics_observer
     integer, allocatable, private :: linear_index(:)          !! of each part in `linear`, or 0; [parts]
     integer, allocatable, private :: sampled_index(:)         !! in `sampled`, or 0
     real(wp), allocatable, private :: default_value(:)        !! where a statistic has no column, [statistics]
+    integer, allocatable, private :: kind(:)                  !! statistic_..., [statistics]
+    logical, allocatable, private :: is_along(:)              !! extremes of the largest moment or stress along a shaft
     logical, private :: uses_sampled = .false.                !! whether `sampled` has statistics
     logical, allocatable, private :: is_complete(:)           !! lanes that have reached the end
   contains
@@ -57,7 +61,7 @@ contains
     type(statistic_t), intent(in) :: statistics(:)         !! each with t_start <= from < t_end
     real(wp), intent(in) :: t_start, t_end                 !! of every variant [s]
     logical, intent(in) :: may_bend                        !! whether variants differ in cubic stiffnesses
-    type(statistic_t), allocatable :: found(:)
+    type(statistic_t), allocatable :: found(:), parts(:)
     type(column_t), allocatable :: columns(:)
     type(string_t), allocatable :: labels(:)
     integer :: i
@@ -68,14 +72,18 @@ contains
     self%wants_steps = .true.
     self%takes_shifts = .true.
     call list_columns(block%machine, columns, labels)
-    call list_parts(self, statistics, columns, found)
+    allocate (found, source=statistics)
     call find_columns(labels, found)
+    call list_parts(self, found, columns, parts)
     self%missing = ''
     do i = size(found), 1, -1
+      if (allocated(found(i)%shaft)) cycle
       if (found(i)%column == 0 .and. .not. is_torque(found(i))) self%missing = found(i)%quantity
     end do
     allocate (self%default_value, source=value_of_zero_column(statistics))
-    call distribute(self, found, columns, may_bend)
+    allocate (self%kind(size(statistics)))
+    self%kind(:) = statistics%kind
+    call distribute(self, parts, columns, may_bend)
     if (allocated(self%sampled%recorded%formulation)) self%sampled%recorded%formulation%joints%leader => block%joints
     allocate (self%is_complete(block%lanes), source=.false.)
     select type (block)
@@ -84,37 +92,89 @@ contains
     end select
   end function new_statistics_observer
 
-  !> The parts of all statistics. The points of shafts become columns after those of the table.
+  !> The parts of all statistics. The points of shafts become columns after those of the table. An extreme of the largest moment
+  !> or stress along a shaft has its column as the first part, then the extremes at the points, and the times of these.
   subroutine list_parts(self, statistics, columns, parts)
     type(statistics_observer_t), intent(inout) :: self
     type(statistic_t), intent(in) :: statistics(:)
     type(column_t), allocatable, intent(inout) :: columns(:)
     type(statistic_t), allocatable, intent(out) :: parts(:)
     type(column_t), allocatable :: points(:)
-    integer, allocatable :: column(:), owner(:)
-    integer :: i, k
+    integer, allocatable :: column(:), kind(:), owner(:)
+    integer :: first, i, k
 
-    allocate (owner(0), column(0))
+    allocate (owner(0), column(0), kind(0))
     allocate (self%first_part(size(statistics) + 1), source=1)
+    allocate (self%is_along(size(statistics)), source=.false.)
     do i = 1, size(statistics)
-      if (allocated(statistics(i)%shaft)) then
-        call list_points(self%block%machine, statistics(i)%shaft, &
-                         merge(column_point_stress, column_point_moment, statistics(i)%is_stress), points)
+      associate (statistic => statistics(i))
+        call find_points(self%block%machine, statistic, columns, points, self%is_along(i))
+        if (self%is_along(i) .or. size(points) == 0 .and. .not. allocated(statistic%shaft)) then
+          owner = [owner, i]
+          column = [column, statistic%column]
+          kind = [kind, statistic%kind]
+        end if
+        call add_columns(points, columns, first)
+        if (self%is_along(i) .and. is_time_of_extreme(statistic%kind)) then
+          owner = [owner, (i, k=1, size(points))]
+          column = [column, (first - 1 + k, k=1, size(points))]
+          kind = [kind, spread(extreme_of(statistic%kind), 1, size(points))]
+        end if
         owner = [owner, (i, k=1, size(points))]
-        column = [column, (size(columns) + k, k=1, size(points))]
-        columns = [columns, points]
-      else
-        owner = [owner, i]
-        column = [column, statistics(i)%column]
-      end if
+        column = [column, (first - 1 + k, k=1, size(points))]
+        kind = [kind, spread(statistic%kind, 1, size(points))]
+      end associate
       self%first_part(i + 1) = size(owner) + 1
     end do
     allocate (parts(size(owner)))
     do i = 1, size(parts)
       parts(i) = statistics(owner(i))
       parts(i)%column = column(i)
+      parts(i)%kind = kind(i)
     end do
   end subroutine list_parts
+
+  !> Adds the columns of the points of a shaft, unless they are there.
+  pure subroutine add_columns(points, columns, first)
+    type(column_t), intent(in) :: points(:)
+    type(column_t), allocatable, intent(inout) :: columns(:)
+    integer, intent(out) :: first   !! column of the first point
+    integer :: c
+
+    first = size(columns) + 1
+    if (size(points) == 0) return
+    do c = 1, size(columns)
+      if (columns(c)%kind == points(1)%kind .and. columns(c)%bank == points(1)%bank .and. &
+          columns(c)%quantity == points(1)%quantity .and. columns(c)%index == points(1)%index) first = min(first, c)
+    end do
+    if (first > size(columns)) columns = [columns, points]
+  end subroutine add_columns
+
+  !> The points of a shaft that a statistic is of, or an extreme of the largest moment or stress along it.
+  subroutine find_points(machine, statistic, columns, points, is_along)
+    type(machine_t), intent(in) :: machine
+    type(statistic_t), intent(in) :: statistic
+    type(column_t), intent(in) :: columns(:)
+    type(column_t), allocatable, intent(out) :: points(:)   !! columns; none if it is of no shaft
+    logical, intent(out) :: is_along                        !! whether it is such an extreme
+    integer :: shaft
+    logical :: is_stress
+
+    is_along = .false.
+    is_stress = statistic%is_stress
+    if (allocated(statistic%shaft)) then
+      call list_points(machine, statistic%shaft, merge(column_point_stress, column_point_moment, is_stress), points)
+      return
+    end if
+    if (statistic%column > 0 .and. any(extreme_of(statistic%kind) == [statistic_max, statistic_min, statistic_max_abs])) then
+      associate (column => columns(statistic%column))
+        is_along = is_largest_along(machine, column, shaft, is_stress)
+        if (is_along) call list_points(machine, machine%banks(column%bank)%bank%names(column%index)%text, &
+                                       merge(column_point_stress, column_point_moment, is_stress), points)
+      end associate
+    end if
+    if (.not. is_along) allocate (points(0))
+  end subroutine find_points
 
   !> Chooses how each statistic is computed. The time of the largest moment is not that of the largest twist in a coupling that
   !> softens.
@@ -183,12 +243,61 @@ contains
     call self%linear%finish_damages(lane)
     if (self%uses_sampled) call self%sampled%finish_damages(lane)
     do i = 1, size(values)
+      if (self%is_along(i)) then
+        values(i) = value_along(self, i, lane)
+        cycle
+      end if
       part = worst_part(self, i, lane)
       values(i) = self%default_value(i)
       if (self%linear_index(part) > 0) values(i) = self%linear%value(self%linear_index(part), lane)
       if (self%sampled_index(part) > 0) values(i) = self%sampled%value(self%sampled_index(part), lane)
     end do
   end subroutine results
+
+  !> An extreme of the largest moment or stress along a shaft: as in a run, that of the points; where all of these have one sign,
+  !> the smaller end of the range is that of the column itself, which does not jump then.
+  real(wp) function value_along(self, statistic, lane) result(value)
+    class(statistics_observer_t), intent(in) :: self
+    integer, intent(in) :: statistic, lane
+    real(wp) :: extremes(self%first_part(statistic) + 1:self%first_part(statistic + 1) - 1)
+    integer :: part, points
+
+    associate (first => self%first_part(statistic))
+      value = self%sampled%value(self%sampled_index(first), lane)
+      do part = lbound(extremes, 1), ubound(extremes, 1)
+        extremes(part) = self%sampled%value(self%sampled_index(part), lane)
+      end do
+      points = size(extremes) / 2
+      select case (self%kind(statistic))
+      case (statistic_max)
+        if (maxval(extremes) > 0 .or. value > maxval(extremes)) value = maxval(extremes)
+      case (statistic_min)
+        if (minval(extremes) < 0 .or. value < minval(extremes)) value = minval(extremes)
+      case (statistic_max_abs)
+        value = maxval(extremes)
+      case (statistic_time_of_min)   ! the smallest values, then their times
+        if (minval(extremes(first + 1:first + points)) < 0) &
+          value = extremes(first + points + minloc(extremes(first + 1:first + points), dim=1))
+      case default   ! the largest values or magnitudes, then their times
+        if (maxval(extremes(first + 1:first + points)) > 0) &
+          value = extremes(first + points + maxloc(extremes(first + 1:first + points), dim=1))
+      end select
+    end associate
+  end function value_along
+
+  !> The extreme of which a statistic is the time; other statistics as they are.
+  pure integer function extreme_of(kind)
+    integer, intent(in) :: kind   !! statistic_...
+
+    extreme_of = kind
+    if (kind == statistic_time_of_max) then
+      extreme_of = statistic_max
+    else if (kind == statistic_time_of_min) then
+      extreme_of = statistic_min
+    else if (is_time_of_extreme(kind)) then
+      extreme_of = statistic_max_abs
+    end if
+  end function extreme_of
 
   !> The part of a statistic that counts: that with the largest damage; without any damage, with the largest range.
   pure integer function worst_part(self, statistic, lane) result(worst)

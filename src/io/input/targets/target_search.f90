@@ -165,7 +165,7 @@ contains
       only_if_text(rule) // '; here ' // selector_name(group%rule) // ' = ' // quoted(law)
   end subroutine check_law
 
-  !> Index of the value in the list of the key. Only a list has a subscript.
+  !> Index of the value in the list of the key. Only a list has a subscript; a list of one value needs none.
   subroutine find_position(group, text, path, position, message)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: text   !! the path
@@ -181,6 +181,8 @@ contains
         if (.not. path%target%is_whole) message = path%target%key // ' is a single value and takes no subscript'
       else if (count == 0) then
         message = path%target%key // ' has no values in the input'
+      else if (path%target%is_whole .and. count == 1) then
+        position = 1
       else if (path%target%is_whole) then
         message = path%target%key // ' is a list; allowed: one of its values, ' // value_paths(text, count)
       else if (path%target%last /= position) then

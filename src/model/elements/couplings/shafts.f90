@@ -13,13 +13,23 @@ module nocdyn_shafts
 
   public :: new_shafts
 
+  !> A spectral element: a uniform part of a shaft.
+  type, public :: shaft_element_t
+    integer, allocatable :: bodies(:)   !! its nodes from end to end, 0 = ground
+    real(wp) :: stiffness = 0.0_wp      !! [N m/rad]
+    real(wp) :: inertia = 0.0_wp        !! [kg m2]
+  end type shaft_element_t
+
   !> The slices of a shaft, and its moments at points along it, from end to end, two at every step of the diameter. Slices are
   !> numbered within the bank, and points over all of its shafts.
   type, public :: shaft_t
     integer :: first = 1, last = 0               !! slices
     integer :: first_point = 1, last_point = 0
     integer, allocatable :: ends(:)              !! its two bodies, 0 = ground
-    real(wp), allocatable :: moments(:, :)       !! moments at the points from those of the slices, [points, slices]
+    type(shaft_element_t), allocatable :: elements(:)   !! none if it has no inertia
+    real(wp), allocatable :: moments(:, :)       !! moments at the points from those of the slices there, [most slices, points]
+    integer, allocatable :: before(:)            !! slices of the shaft before these, [points]
+    integer, allocatable :: slices(:)            !! their number, [points]
   end type shaft_t
 
   type, extends(couplings_t), public :: shafts_t
@@ -27,7 +37,8 @@ module nocdyn_shafts
   contains
     procedure :: quantities
     procedure :: observe
-    procedure :: positions, section_moduli, section_modulus, moment_at
+    procedure :: positions, section_moduli, moment_at
+    procedure, nopass :: is_largest_moment, is_stress
   end type shafts_t
 
   ! the order of `quantities`
@@ -83,6 +94,20 @@ contains
     columns(stress)%unit = 'Pa'
   end function quantities
 
+  !> Whether a quantity is the largest moment along a shaft.
+  pure logical function is_largest_moment(quantity)
+    integer, intent(in) :: quantity   !! index in `quantities`
+
+    is_largest_moment = quantity == largest_moment
+  end function is_largest_moment
+
+  !> Whether a quantity is the largest stress along a shaft.
+  pure logical function is_stress(quantity)
+    integer, intent(in) :: quantity   !! index in `quantities`
+
+    is_stress = quantity == stress
+  end function is_stress
+
   !> The twist of the second end against the first one [rad], the moment in the shaft [N m], elastic and of its damping, positive
   !> with the twist, and the shear stress at the surface [Pa]. The values of a shaft are those of its first slice.
   pure subroutine observe(self, elements, quantity, lane, values)
@@ -92,20 +117,20 @@ contains
     integer, intent(in) :: lane
     real(wp), intent(out) :: values(:)   !! [elements of the bank]
     real(wp) :: found
-    integer :: p, s
+    integer :: modulus, p, s
 
     values = 0.0_wp
+    modulus = self%number_of('shaft_modulus')
     do s = 1, size(self%shafts)
       associate (shaft => self%shafts(s), value => values(self%shafts(s)%first), offset => self%first - 1)
         if (quantity == twist) then
           value = sum(elements%angle(lane, offset + shaft%first:offset + shaft%last))
           cycle
         end if
-        do p = 1, size(shaft%moments, 1)
-          if (quantity == moment_1 .and. p > 1 .or. quantity == moment_2 .and. p < size(shaft%moments, 1)) cycle
+        do p = 1, size(shaft%moments, 2)
+          if (quantity == moment_1 .and. p > 1 .or. quantity == moment_2 .and. p < size(shaft%moments, 2)) cycle
           found = self%moment_at(elements, s, p, lane)
-          if (quantity == stress) found = found / self%parameters(self%number_of('shaft_modulus')) &
-                                                   %value(lane, shaft%first_point + p - 1)
+          if (quantity == stress) found = found / self%parameters(modulus)%value(lane, shaft%first_point + p - 1)
           if (abs(found) > abs(value)) value = found
         end do
       end associate
@@ -118,9 +143,10 @@ contains
     type(elements_t), intent(in) :: elements
     integer, intent(in) :: shaft, point, lane
 
-    associate (one => self%shafts(shaft), offset => self%first - 1)
-      moment = 0.0_wp - sum(one%moments(point, :) * (elements%restoring(lane, offset + one%first:offset + one%last) &
-                                                     + elements%applied(lane, offset + one%first:offset + one%last)))
+    associate (one => self%shafts(shaft), first => self%first - 1 + self%shafts(shaft)%first + self%shafts(shaft)%before(point), &
+               n => self%shafts(shaft)%slices(point))
+      moment = 0.0_wp - sum(one%moments(:n, point) * (elements%restoring(lane, first:first + n - 1) &
+                                                      + elements%applied(lane, first:first + n - 1)))
     end associate
   end function moment_at
 
@@ -134,15 +160,6 @@ contains
       positions = self%parameters(self%number_of('position'))%value(lane, one%first_point:one%last_point)
     end associate
   end function positions
-
-  !> The section modulus against torsion at a point of a shaft [m3].
-  pure real(wp) function section_modulus(self, shaft, point, lane)
-    class(shafts_t), intent(in) :: self
-    integer, intent(in) :: shaft, point, lane
-
-    section_modulus = self%parameters(self%number_of('shaft_modulus')) &
-                      %value(lane, self%shafts(shaft)%first_point + point - 1)
-  end function section_modulus
 
   !> Section moduli against torsion at the points of a shaft [m3], [points].
   pure function section_moduli(self, shaft, lane)

@@ -24,10 +24,10 @@ module nocdyn_schema_shafts
       'outer diameter of each segment', fewest=1), &
     key_rule_t('shaft',      'bores',           a_number,       any_number, 'm',  '0',         not_negative, &
       'inner diameter of each segment, less than the outer one', fewest=1), &
-    key_rule_t('shaft',      'shear_modulus',   a_number,       1, 'Pa',          required,    positive, &
-      'shear modulus G: 8e10 of steel'), &
-    key_rule_t('shaft',      'density',         a_number,       1, 'kg/m3',       '0',         not_negative, &
-      'density: 7850 of steel; 0: the shaft has no inertia'), &
+    key_rule_t('shaft',      'shear_modulus',   a_number,       any_number, 'Pa', required,    positive, &
+      'shear modulus G: 8e10 of steel; one value, or one for each segment', fewest=1), &
+    key_rule_t('shaft',      'density',         a_number,       any_number, 'kg/m3', unset,    not_negative, &
+      'density: 7850 of steel; one value, or one for each segment; 0 or not given: no inertia', fewest=1), &
     key_rule_t('shaft',      'damping_ratio',   a_number,       1, '',            unset,       not_negative, &
       'damping ratio D of its oscillations at damping_frequency, in place of relative_damping'), &
     key_rule_t('shaft',      'relative_damping', a_number,      1, '',            unset,       not_negative, &
@@ -35,7 +35,7 @@ module nocdyn_schema_shafts
     key_rule_t('shaft',      'damping_frequency', a_number,     1, 'rad/s',       unset,       positive, &
       'frequency at which a viscous damping stands for the relative one over the time (run, sweep)'), &
     key_rule_t('shaft',      'nodes',           an_integer,     1, '',            unset,       node_counts, &
-      'internal nodes; as many as the frequencies of &response need if not given')]
+      'internal nodes; as many as the excited frequencies and the first modes need if not given')]
 
   type(relation_rule_t), parameter, public :: shaft_relations(*) = [ &
     relation_rule_t('shaft', equal_lengths, 'lengths diameters bores', ''), &

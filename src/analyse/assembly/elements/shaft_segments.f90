@@ -1,0 +1,202 @@
+!> The uniform segments of a shaft, and the spectral elements that they are divided into.
+module nocdyn_shaft_segments
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_spectral_elements, only: highest_order, least_order
+  use nocdyn_text, only: to_text
+  implicit none (type, external)
+  private
+
+  public :: check_shaft, choose_elements, has_inertia, has_own_nodes, segment_inertia, segment_stiffness, segments_of
+
+  real(wp), parameter :: pi = acos(-1.0_wp)
+  integer, parameter, public :: most_nodes = 1000   !! inside of a shaft
+
+  !> Uniform segments, from the first end on.
+  type, public :: segments_t
+    real(wp), allocatable :: length(:)          !! [m]
+    real(wp), allocatable :: second_moment(:)   !! of area against torsion [m4]
+    real(wp), allocatable :: section_modulus(:) !! the same over the radius [m3]
+    real(wp), allocatable :: shear_modulus(:)   !! G [Pa]
+    real(wp), allocatable :: density(:)         !! [kg/m3]; of all of them positive, or 0
+    real(wp), allocatable :: flexibility(:)     !! [rad/(N m)]
+    real(wp), allocatable :: wave_time(:)       !! in which a wave passes [s]
+  end type segments_t
+
+contains
+
+  !> Refuses bores that are no smaller than the diameter, numbers of nodes that do not fit the segments, and materials that are
+  !> neither one nor as many as the segments.
+  subroutine check_shaft(input, index, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    type(error_t), allocatable, intent(out) :: error
+
+    call check_material(input, index, 'shear_modulus', error)
+    if (.not. allocated(error)) call check_material(input, index, 'density', error)
+    if (.not. allocated(error)) call check_sizes(input, index, error)
+  end subroutine check_shaft
+
+  subroutine check_material(input, index, key, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index
+    character(len=*), intent(in) :: key
+    type(error_t), allocatable, intent(out) :: error
+
+    associate (values => input%groups(index)%numbers(key), segments => size(input%groups(index)%numbers('lengths')))
+      if (size(values) > 0 .and. all(size(values) /= [1, segments])) then
+        call raise(error, exit_input, input%location(index, key) // ': ' // key // ' has ' // to_text(size(values)) // &
+                   ' values, lengths has ' // to_text(segments) // '; allowed: one for the whole shaft, or one for each segment')
+      else if (any(values > 0) .and. .not. all(values > 0)) then
+        call raise(error, exit_input, input%location(index, key) // ': ' // key // '(' // &
+                   to_text(findloc(values > 0, .false., dim=1)) // ') = 0, others are not; allowed: all are 0, or none')
+      end if
+    end associate
+  end subroutine check_material
+
+  subroutine check_sizes(input, index, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index
+    type(error_t), allocatable, intent(out) :: error
+    integer :: k
+
+    associate (group => input%groups(index))
+      associate (bores => group%numbers('bores'), diameters => group%numbers('diameters'))
+        do k = 1, size(bores)
+          if (bores(k) < diameters(k)) cycle
+          call raise(error, exit_input, input%location(index, 'bores') // ': bores(' // to_text(k) // ') = ' // &
+                     to_text(bores(k)) // ' m is not less than diameters(' // to_text(k) // ') = ' // to_text(diameters(k)) // &
+                     ' m; allowed: 0 to below the diameter')
+          return
+        end do
+        if (.not. group%has_value('nodes') .or. .not. has_inertia(group)) return
+        if (group%whole_number('nodes') >= size(bores) - 1) return
+        call raise(error, exit_input, input%location(index, 'nodes') // ': nodes = ' // &
+                   to_text(group%whole_number('nodes')) // ' is out of range; allowed: from ' // to_text(size(bores) - 1) // &
+                   ', one between two segments, to ' // to_text(most_nodes))
+      end associate
+    end associate
+  end subroutine check_sizes
+
+  !> The segments of a group &shaft.
+  pure function segments_of(group) result(segments)
+    type(group_t), intent(in) :: group
+    type(segments_t) :: segments
+
+    allocate (segments%length, source=group%numbers('lengths'))
+    associate (diameters => group%numbers('diameters'), n => size(segments%length))
+      allocate (segments%second_moment, source=pi / 32.0_wp * (diameters**4 - group%numbers('bores')**4))
+      allocate (segments%section_modulus, source=2.0_wp * segments%second_moment / diameters)
+      allocate (segments%shear_modulus, source=one_for_each(group%numbers('shear_modulus'), n))
+      allocate (segments%density, source=one_for_each(group%numbers('density'), n))
+    end associate
+    allocate (segments%flexibility, source=segments%length / (segments%shear_modulus * segments%second_moment))
+    allocate (segments%wave_time, source=segments%length * sqrt(segments%density / segments%shear_modulus))
+  end function segments_of
+
+  !> A value for each segment, from one for all of them or as many; 0 from none.
+  pure function one_for_each(values, segments) result(list)
+    real(wp), intent(in) :: values(:)
+    integer, intent(in) :: segments
+    real(wp), allocatable :: list(:)
+
+    allocate (list(segments), source=0.0_wp)
+    if (size(values) == 1) list(:) = values(1)
+    if (size(values) > 1) list(:) = values
+  end function one_for_each
+
+  !> Of each segment [N m/rad].
+  pure function segment_stiffness(group) result(stiffness)
+    type(group_t), intent(in) :: group
+    real(wp), allocatable :: stiffness(:)
+    type(segments_t) :: segments
+
+    segments = segments_of(group)
+    allocate (stiffness, source=segments%shear_modulus * segments%second_moment / segments%length)
+  end function segment_stiffness
+
+  !> Of each segment [kg m2].
+  pure function segment_inertia(group) result(inertia)
+    type(group_t), intent(in) :: group
+    real(wp), allocatable :: inertia(:)
+    type(segments_t) :: segments
+
+    segments = segments_of(group)
+    allocate (inertia, source=segments%density * segments%second_moment * segments%length)
+  end function segment_inertia
+
+  !> Whether a shaft has inertia.
+  pure logical function has_inertia(group)
+    type(group_t), intent(in) :: group
+
+    has_inertia = group%number('density', absent=0.0_wp) > 0
+  end function has_inertia
+
+  !> Whether a shaft has inertia and chooses its nodes by itself.
+  pure logical function has_own_nodes(group)
+    type(group_t), intent(in) :: group
+
+    has_own_nodes = has_inertia(group) .and. .not. group%has_value('nodes')
+  end function has_own_nodes
+
+  !> The spectral elements of a shaft, from its first end on. Without inertia it is one slice: there are none.
+  subroutine choose_elements(group, frequency, tolerance, segment, order)
+    type(group_t), intent(in) :: group
+    real(wp), intent(in) :: frequency   !! up to which they are as the continuous shaft [rad/s]
+    real(wp), intent(in) :: tolerance   !! error that is allowed [rad/(N m)]
+    integer, allocatable, intent(out) :: segment(:)   !! of each element, equal elements of a segment one after the other
+    integer, allocatable, intent(out) :: order(:)     !! of each element
+    type(segments_t) :: segments
+    integer, allocatable :: sums(:)   ! of the orders in each segment
+    integer :: i, parts, one
+
+    allocate (segment(0), order(0))
+    if (.not. has_inertia(group)) return
+    segments = segments_of(group)
+    if (group%has_value('nodes')) then
+      sums = given_orders(segments%length, group%whole_number('nodes') + 1)
+      do i = 1, size(sums)
+        parts = (sums(i) + highest_order - 1) / highest_order
+        segment = [segment, spread(i, 1, parts)]
+        order = [order, spread_evenly(sums(i), parts)]
+      end do
+      return
+    end if
+    do i = 1, size(segments%length)
+      associate (b => frequency * segments%wave_time(i))
+        do parts = max(1, int(b / highest_order)), most_nodes
+          one = least_order(b / parts, tolerance / segments%flexibility(i))
+          if (one <= highest_order) exit
+        end do
+        one = min(one, highest_order)
+        segment = [segment, spread(i, 1, parts)]
+        order = [order, spread(one, 1, parts)]
+      end associate
+    end do
+  end subroutine choose_elements
+
+  !> The orders of the segments whose sum is given, the higher the longer they are.
+  pure function given_orders(lengths, total) result(orders)
+    real(wp), intent(in) :: lengths(:)
+    integer, intent(in) :: total
+    integer :: orders(size(lengths))
+    integer :: i, longest
+
+    orders = 1
+    do i = 1, total - size(lengths)
+      longest = maxloc(lengths / orders, dim=1)
+      orders(longest) = orders(longest) + 1
+    end do
+  end function given_orders
+
+  !> A whole number as the sum of some that differ by at most one.
+  pure function spread_evenly(total, parts) result(list)
+    integer, intent(in) :: total, parts
+    integer :: list(parts)
+    integer :: i
+
+    list = [(total / parts + merge(1, 0, i <= modulo(total, parts)), i=1, parts)]
+  end function spread_evenly
+
+end module nocdyn_shaft_segments
