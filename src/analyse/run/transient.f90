@@ -85,7 +85,7 @@ module nocdyn_transient
     logical :: has_ranges = .false.          !! whether the columns were evaluated between the rows
     class(run_output_t), pointer :: output => null()
   contains
-    procedure :: on_output, wants_stop, tracked_values, on_extremes, on_turn, least_range, on_shift
+    procedure :: on_output, wants_stop, tracked_values, find_pace, on_extremes, on_turn, least_range, on_shift
   end type run_observer_t
 
 contains
@@ -169,6 +169,8 @@ contains
     call new_run_fatigue(input, formulation%machine, observer%table%labels, observer%fatigue)
     observer%turning = size(observer%fatigue%counters)
     observer%tracked = size(observer%row) + observer%turning
+    allocate (observer%bends(observer%tracked), source=.true.)
+    observer%bends(:size(observer%row)) = observer%table%bends
     call start_extremes(observer%extremes, size(observer%row), observer%tracked_from)
     call choose_columns(input, observer%table%labels, observer%chosen, error)
     if (.not. allocated(error)) allocate (observer%written(size(observer%chosen)))
@@ -275,6 +277,16 @@ contains
     end associate
     self%has_ranges = .true.
   end subroutine tracked_values
+
+  !> How fast they oscillate where they were evaluated last.
+  subroutine find_pace(self, lane, fastest, scale)
+    class(run_observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(out) :: fastest, scale   !! [rad/s], [N m]
+
+    if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
+    call self%table%columns%find_pace(lane, fastest, scale)
+  end subroutine find_pace
 
   !> The next value of a signal.
   subroutine on_turn(self, lane, function, value)

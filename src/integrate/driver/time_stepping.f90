@@ -92,7 +92,7 @@ contains
     end if
     integrator%has_extremes = observer%tracked > 0
     if (integrator%has_extremes) then
-      call allocate_extremes(integrator%extremes, observer%tracked, stepper%degrees, integrator%attempt)
+      call allocate_extremes(integrator%extremes, observer, stepper%degrees, integrator%attempt)
     end if
     if (.not. allocated(observer%directions)) return
     integrator%has_events = size(observer%directions) > 0
