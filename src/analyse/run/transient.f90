@@ -77,6 +77,8 @@ module nocdyn_transient
     real(wp), allocatable :: written(:)      !! their values in the row
     type(run_fatigue_t) :: fatigue           !! of signals, which are tracked after the columns
     type(vibration_t) :: vibration           !! its energy in the rows
+    real(wp) :: largest_moment = 0.0_wp      !! of the elements [N m]
+    real(wp) :: atol = 0.0_wp                !! absolute tolerance [rad], [rad/s]
     real(wp) :: last_time = 0.0_wp           !! of the rows [s]
     real(wp), allocatable :: last_state(:)   !! at that time, [states + quadratures]
     real(wp) :: t_start, t_end               !! [s]
@@ -117,6 +119,7 @@ contains
     call start_observer(observer, input, formulation, times, error)
     if (allocated(error)) return
     observer%output => output
+    observer%atol = settings%atol
     observer%table%columns%formulation%joints%leader => formulation%joints%mode
     call output%start(selected(observer%table%labels, observer%chosen), size(times), error)
     if (allocated(error)) return
@@ -221,7 +224,7 @@ contains
     summary%fatigue = observer%fatigue
     call check_run_limits(input, summary%labels, summary%extremes%lowest, summary%extremes%highest, summary%limits)
     if (.not. allocated(error)) call check_extremes(summary%extremes, summary%labels, error)
-    call check_energy_balance(summary%extremes, observer%vibration%largest, summary%notes)
+    call check_energy_balance(summary%extremes, observer%vibration%largest, observer%atol * observer%largest_moment, summary%notes)
     if (summary%extremes%rows > 0) then
       allocate (summary%energy_balance)
       call observer%table%find_energy_balance(observer%last_time, observer%last_state, summary%energy_balance)
@@ -286,6 +289,7 @@ contains
 
     if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
     call self%table%columns%find_pace(lane, fastest, scale)
+    self%largest_moment = max(self%largest_moment, scale)
   end subroutine find_pace
 
   !> The next value of a signal.
