@@ -26,7 +26,8 @@ module nocdyn_extremes
     real(wp), allocatable, private :: values(:, :)         !! [functions, most nodes]
     real(wp), allocatable, private :: y(:)                 !! [components]
     type(step_pieces_t), allocatable, private :: pieces(:) !! of the steps of the lanes, [lanes]
-    logical, allocatable, private :: bends(:), replaced(:) !! functions that may; whose polynomials count in a piece, [functions]
+    integer, allocatable, private :: bending(:)            !! functions that may bend more than the solution
+    logical, allocatable, private :: replaced(:)           !! whose polynomials count in a piece, [functions]
     real(wp), allocatable, private :: fastest(:), scale(:) !! waves [rad/s] and scale of these at the ends of the steps, [lanes]
   end type extremes_t
 
@@ -55,8 +56,9 @@ contains
     end do
     allocate (extremes%last(observer%tracked, attempt%lanes), extremes%values(observer%tracked, maxval(degrees) + 1), &
               extremes%y(attempt%components), extremes%fastest(attempt%lanes), extremes%scale(attempt%lanes), source=0.0_wp)
-    allocate (extremes%bends(observer%tracked), extremes%replaced(observer%tracked), source=.false.)
-    if (allocated(observer%bends)) extremes%bends(:) = observer%bends
+    allocate (extremes%replaced(observer%tracked), source=.false.)
+    allocate (extremes%bending(0))
+    if (allocated(observer%bends)) extremes%bending = pack([(i, i=1, observer%tracked)], observer%bends)
     allocate (extremes%pieces(attempt%lanes))
     do lane = 1, attempt%lanes
       extremes%pieces(lane) = new_step_pieces(observer%tracked)
@@ -125,7 +127,7 @@ contains
     logical, intent(in) :: ends_at_crossing
     real(wp) :: t_start
     logical :: has_moved
-    integer :: function, last
+    integer :: function, i, last
 
     if (t_end <= observer%tracked_from) return
     t_start = max(dense%t, observer%tracked_from)
@@ -135,11 +137,11 @@ contains
       call pieces%start_step(t_start, t_end, extremes%fastest(lane), dense%degree)
       do while (.not. pieces%is_done)
         call sample_piece(extremes, observer, dense, pieces%begin, pieces%end, ends_at_crossing .and. pieces%end >= t_end)
-        do function = 1, observer%tracked
-          extremes%replaced(function) = pieces%is_open(function, pieces%depth)
+        extremes%replaced(:) = pieces%is_open(:, pieces%depth)
+        do i = 1, size(extremes%bending)
+          function = extremes%bending(i)
           if (.not. extremes%replaced(function)) cycle
-          call pieces%replaces(function, rule, extremes%values(function, :last), extremes%bends(function), extremes%scale(lane), &
-                               extremes%replaced(function))
+          call pieces%replaces(function, rule, extremes%values(function, :last), extremes%scale(lane), extremes%replaced(function))
         end do
         call widen_ranges(rule, extremes%values(:, :last), extremes%replaced, extremes%ranges(lane), pieces%begin, pieces%end)
         call tell_turns(observer, lane, rule, extremes%values(:, :last), extremes%replaced)

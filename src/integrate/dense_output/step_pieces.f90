@@ -13,7 +13,7 @@ module nocdyn_step_pieces
 
   integer, parameter :: most_halvings = 12
   real(wp), parameter :: wave_part = 0.5_wp       ! of a wave in a piece, times the degree of the polynomials [rad]
-  real(wp), parameter :: tolerance = 1.0e-3_wp    ! of the last terms, relative to the range of the function so far
+  real(wp), parameter :: tolerance = 2.0e-5_wp    ! of the last terms, relative to the range of the function so far
   real(wp), parameter :: least_range = 1.0e-3_wp  ! that counts, relative to the largest absolute value so far
   real(wp), parameter :: rounding = 1.0e-6_wp     ! a range that does not count, relative to the scale of the functions
   real(wp), parameter :: progress = 0.7_wp        ! larger terms after a halving, relative to those before, are noise
@@ -77,19 +77,18 @@ contains
     self%is_open(:, 1) = .false.
   end subroutine start_piece
 
-  !> Whether the polynomial of an open function replaces it in the present piece. If not, it stays open in the halves.
-  pure subroutine replaces(self, function, rule, values, bends, scale, answer)
+  !> Whether the polynomial of an open function that may bend more than the solution replaces it in the present piece. If not, it
+  !> stays open in the halves.
+  pure subroutine replaces(self, function, rule, values, scale, answer)
     class(step_pieces_t), intent(inout) :: self
     integer, intent(in) :: function
     type(interpolation_t), intent(in) :: rule
     real(wp), intent(in) :: values(0:rule%degree)   !! of the function at the nodes of the piece
-    logical, intent(in) :: bends                    !! whether it may bend more than the solution
     real(wp), intent(in) :: scale                   !! of which a small part is rounding, in the unit of the function
     logical, intent(out) :: answer
     real(wp) :: range
 
     answer = .true.
-    if (.not. bends) return
     associate (depth => self%depth, terms => self%terms(function, self%depth), lowest => self%lowest(function), &
                highest => self%highest(function))
       lowest = min(lowest, minval(values))

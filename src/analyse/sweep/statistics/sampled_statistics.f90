@@ -167,9 +167,9 @@ contains
     self%replaced(:) = self%pieces(lane)%is_open(:, self%pieces(lane)%depth)
     if (.not. self%interpolates) return
     do column = 1, size(self%replaced)
-      if (.not. self%replaced(column)) cycle
-      call self%pieces(lane)%replaces(column, self%rule, self%values(:self%rule%degree + 1, column, lane), self%bends(column), &
-                                      self%scale(lane), self%replaced(column))
+      if (.not. (self%replaced(column) .and. self%bends(column))) cycle
+      call self%pieces(lane)%replaces(column, self%rule, self%values(:self%rule%degree + 1, column, lane), self%scale(lane), &
+                                      self%replaced(column))
     end do
   end subroutine find_replaced
 
