@@ -15,6 +15,7 @@ module nocdyn_transient
   use nocdyn_missed_states, only: note_missed_state
   use nocdyn_output_times, only: check_output_times, output_note, output_times
   use nocdyn_output_units, only: output_units
+  use nocdyn_row_intervals, only: note_sparse_rows
   use nocdyn_run_fatigue, only: new_run_fatigue, run_fatigue_t
   use nocdyn_run_limits, only: check_run_limits
   use nocdyn_run_settings, only: check_size, choose_settings
@@ -78,9 +79,13 @@ module nocdyn_transient
     type(run_fatigue_t) :: fatigue           !! of signals, which are tracked after the columns
     type(vibration_t) :: vibration           !! its energy in the rows
     real(wp) :: largest_moment = 0.0_wp      !! of the elements [N m]
+    real(wp) :: works(2) = 0.0_wp            !! in and out where the columns were evaluated last between the rows ...
+    real(wp) :: last_works(2) = 0.0_wp       !! ... and at the end of the last step [J]
+    real(wp) :: passed = 0.0_wp              !! what they have changed by, to and fro, in all steps [J]
     real(wp) :: atol = 0.0_wp                !! absolute tolerance [rad], [rad/s]
     real(wp) :: last_time = 0.0_wp           !! of the rows [s]
     real(wp), allocatable :: last_state(:)   !! at that time, [states + quadratures]
+    real(wp), allocatable :: lowest(:), highest(:)   !! speeds of the bodies in the rows [rad/s]
     real(wp) :: t_start, t_end               !! [s]
     integer :: not_finite = 0                !! column of the first row with a number that is not finite, which ends the run
     real(wp) :: failure_time = 0.0_wp        !! of that row [s]
@@ -128,6 +133,9 @@ contains
     summary%t_start = times(1)
     call solve(formulation, settings, times, observer, summary, error)
     if (summary%has_run) call complete_summary(input, observer, error, summary)
+    if (summary%has_run .and. .not. allocated(error)) then
+      call note_sparse_rows(formulation%machine, observer%lowest, observer%highest, times(2) - times(1), summary%notes)
+    end if
     if (.not. summary%has_run .or. allocated(error) .or. allocated(formulation%machine%steady_internal)) return
     if (formulation%joints%count > 0) return   ! which of them a steady state has locked is not known
     associate (last => observer%table%columns%formulation)
@@ -168,6 +176,8 @@ contains
       observer%tracked_from = input%groups(input%position('output'))%number('extremes_from')
     end if
     allocate (observer%row(size(observer%table%labels)))
+    allocate (observer%lowest(formulation%machine%bodies), source=huge(0.0_wp))
+    allocate (observer%highest(formulation%machine%bodies), source=-huge(0.0_wp))
     allocate (observer%last_state(formulation%states + formulation%quadratures), source=0.0_wp)
     call new_run_fatigue(input, formulation%machine, observer%table%labels, observer%fatigue)
     observer%turning = size(observer%fatigue%counters)
@@ -224,7 +234,8 @@ contains
     summary%fatigue = observer%fatigue
     call check_run_limits(input, summary%labels, summary%extremes%lowest, summary%extremes%highest, summary%limits)
     if (.not. allocated(error)) call check_extremes(summary%extremes, summary%labels, error)
-    call check_energy_balance(summary%extremes, observer%vibration%largest, observer%atol * observer%largest_moment, summary%notes)
+    call check_energy_balance(summary%extremes, observer%vibration%largest, observer%passed, &
+                              observer%atol * observer%largest_moment, summary%notes)
     if (summary%extremes%rows > 0) then
       allocate (summary%energy_balance)
       call observer%table%find_energy_balance(observer%last_time, observer%last_state, summary%energy_balance)
@@ -258,6 +269,8 @@ contains
     call update_extremes(self%extremes, self%row)
     associate (formulation => self%table%columns%formulation)
       call self%vibration%include_energy(formulation%machine, formulation%omega(1, 1:))
+      self%lowest(:) = min(self%lowest, formulation%omega(1, 1:))
+      self%highest(:) = max(self%highest, formulation%omega(1, 1:))
     end associate
     self%written(:) = self%row(self%chosen)
     call self%output%write_row(self%written)
@@ -277,6 +290,7 @@ contains
     associate (columns => size(self%row))
       call self%table%fill(t, y, values(:columns))
       call self%fatigue%evaluate(self%table%columns%formulation%machine, values(:columns), values(columns + 1:))
+      self%works(:) = values(columns - 2:columns - 1)
     end associate
     self%has_ranges = .true.
   end subroutine tracked_values
@@ -290,6 +304,8 @@ contains
     if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
     call self%table%columns%find_pace(lane, fastest, scale)
     self%largest_moment = max(self%largest_moment, scale)
+    self%passed = self%passed + sum(abs(self%works - self%last_works))
+    self%last_works(:) = self%works
   end subroutine find_pace
 
   !> The next value of a signal.
