@@ -1,4 +1,4 @@
-"""Machines that stand still, or hardly move, while torques change: break-aways, extremes, cycles and rows are those of the torques."""
+"""Machines that stand still, or hardly move: break-aways, extremes, cycles and rows are those of the torques."""
 
 import csv
 import os
@@ -180,7 +180,8 @@ def test_extremes_of_what_a_brake_holds_are_those_of_the_torque(nocdyn, method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_teeth_that_hold_still_count_the_cycles_of_their_force(nocdyn, method):
-    _, summary = run(nocdyn, GEARED, "--set", f"run.method={method}", "--set", "excitation.y.amplitude=0", "--set", "excitation.y.frequency=1")
+    only_x = ("--set", "excitation.y.amplitude=0", "--set", "excitation.y.frequency=1")
+    _, summary = run(nocdyn, GEARED, "--set", f"run.method={method}", *only_x)
     assert summary["fatigue"][0]["cycles"] == pytest.approx(8 * 50 / (2 * np.pi), abs=0.6)
     assert summary["fatigue"][0]["largest_range"] == pytest.approx(400, rel=2e-6)
     assert summary["columns"]["reaction_g [N]"]["max"] == pytest.approx(200, rel=2e-6)
@@ -218,7 +219,7 @@ def test_friction_never_exceeds_its_capacity(nocdyn):
 """
     _, summary = run(nocdyn, text, "--set", "run.method=rodas5p")
     extremes = summary["columns"]["torque_rub [N m]"]
-    assert -2 * (1 + 1e-4) <= extremes["min"] and extremes["max"] <= 2 * (1 + 1e-4)  # 2.08 by one polynomial a step
+    assert extremes["min"] >= -2 * (1 + 1e-4) and extremes["max"] <= 2 * (1 + 1e-4)
     assert extremes["min"] == pytest.approx(-2, rel=1e-4)
 
 
@@ -253,7 +254,7 @@ def test_the_row_at_a_torque_step_shows_a_clutch_that_slips(nocdyn):
         assert row[header.index("torque_k [N m]")] == pytest.approx(50, rel=1e-12)
         assert row[header.index("reaction_g [N]")] == pytest.approx(-4000 / 9, rel=1e-12)
         assert summary["columns"]["torque_k [N m]"]["max"] == pytest.approx(50, rel=1e-12)
-        assert next(line for line in stdout.splitlines() if line.startswith("torque_k")).split()[3:] == ["50", "0", "0", "50", "2"]
+        assert next(line for line in stdout.splitlines() if line.startswith("torque_k")).split()[-2:] == ["50", "2"]
 
 
 VIBRATING = """\

@@ -1,16 +1,17 @@
-!> Whether the rows of a run are dense enough to show the vibration that its excitations cause.
+!> How dense the rows of a run must be to show the vibration that its excitations cause.
 module nocdyn_row_intervals
   use nocdyn_bank, only: harmonic_t, role_load, role_names
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_text, only: append, quoted, rounded_text, string_t
+  use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
   implicit none (type, external)
   private
 
-  public :: note_sparse_rows
+  public :: note_sparse_rows, wanted_rows
 
   real(wp), parameter :: sparse = 0.25_wp        ! of an oscillation between two rows: what they show is not its size
   real(wp), parameter :: dense = 0.1_wp          ! what is recommended
+  integer, parameter :: most_rows = 100001       ! that a run writes without having been asked
   real(wp), parameter :: small = 0.05_wp         ! of the largest amplitude of an excitation: smaller harmonics do not count
   real(wp), parameter :: pi = acos(-1.0_wp)
 
@@ -41,6 +42,28 @@ contains
                   rounded_text(dense / frequency, 2) // '. Smallest and largest values are those of the motion between rows')
     end associate
   end subroutine note_sparse_rows
+
+  !> The number of rows that show the fastest excitation at the speeds of the start, with a note on it; 0 where usual ones do.
+  subroutine wanted_rows(machine, span, usual, rows, notes)
+    type(machine_t), intent(in) :: machine   !! one lane
+    real(wp), intent(in) :: span             !! of the times [s]
+    integer, intent(in) :: usual             !! rows
+    integer, intent(out) :: rows
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    type(oscillation_t) :: fastest
+    real(wp) :: oscillations
+
+    rows = 0
+    fastest = fastest_oscillation(machine, machine%start_speed(1, :), machine%start_speed(1, :))
+    oscillations = fastest%rate / (2 * pi) * span
+    if (.not. oscillations > sparse * (usual - 1)) return
+    rows = 1 + ceiling(min(oscillations / dense, real(most_rows - 1, wp)))
+    associate (bank => machine%banks(fastest%bank)%bank)
+      call append(notes, to_text(rows) // ' rows for ' // trim(role_names(bank%role)) // ' ' // &
+                  quoted(bank%names(fastest%element)%text) // ' with ' // rounded_text(fastest%rate / (2 * pi), 3) // &
+                  ' Hz, as &output gives no interval')
+    end associate
+  end subroutine wanted_rows
 
   !> The fastest oscillation of an excitation at any of the speeds, with an amplitude that counts among those of its element.
   type(oscillation_t) function fastest_oscillation(machine, lowest, highest) result(fastest)

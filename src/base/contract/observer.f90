@@ -18,7 +18,7 @@ module nocdyn_observer
     integer, allocatable :: directions(:)   !! event_... of each event function; not allocated: there are none
     integer :: tracked = 0                  !! number of tracked functions
     integer :: turning = 0                  !! number of the last ones of them whose turning points `on_turn` receives
-    logical, allocatable :: bends(:)        !! whether a tracked function may bend more than the solution; not allocated: none does
+    logical, allocatable :: bends(:)        !! whether a tracked function may bend more than the solution; by default none does
     real(wp) :: tracked_from = -huge(1.0_wp)   !! time from which their extremes are taken [s]
     logical :: wants_steps = .false.        !! whether `on_steps` is called
     logical :: takes_shifts = .false.       !! whether `on_shift` is overridden; a system shifts no states without

@@ -141,7 +141,8 @@ contains
         do i = 1, size(extremes%bending)
           function = extremes%bending(i)
           if (.not. extremes%replaced(function)) cycle
-          call pieces%replaces(function, rule, extremes%values(function, :last), extremes%scale(lane), extremes%replaced(function))
+          call pieces%replaces(function, rule, extremes%values(function, :last), extremes%scale(lane), &
+                               extremes%replaced(function))
         end do
         call widen_ranges(rule, extremes%values(:, :last), extremes%replaced, extremes%ranges(lane), pieces%begin, pieces%end)
         call tell_turns(observer, lane, rule, extremes%values(:, :last), extremes%replaced)
