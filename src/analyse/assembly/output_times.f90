@@ -87,8 +87,9 @@ contains
   end function output_note
 
   !> The number of the requested times.
-  pure integer function row_count(input)
-    type(input_t), intent(in) :: input   !! that `check_output_times` accepts
+  pure integer function row_count(input, wanted)
+    type(input_t), intent(in) :: input          !! that `check_output_times` accepts
+    integer, intent(in), optional :: wanted     !! at least so many where the input asks for no number and no interval
     type(group_t) :: output, run
     real(wp) :: rounding   ! of the times [s]
 
@@ -101,12 +102,14 @@ contains
       end associate
     else
       row_count = output%whole_number('points')
+      if (present(wanted) .and. .not. output%is_given('points')) row_count = max(row_count, wanted)
     end if
   end function row_count
 
   !> The requested times: a row at t_start, one every `interval`, and one at t_end; or `points` rows evenly spaced.
-  pure function output_times(input) result(times)
-    type(input_t), intent(in) :: input   !! that `check_output_times` accepts
+  pure function output_times(input, wanted) result(times)
+    type(input_t), intent(in) :: input          !! that `check_output_times` accepts
+    integer, intent(in), optional :: wanted     !! as in `row_count`
     real(wp), allocatable :: times(:)
     type(group_t) :: output, run
     integer :: i, intervals
@@ -120,7 +123,7 @@ contains
           times = [(t_start + i * interval, i=0, intervals)]
         end associate
       else
-        intervals = output%whole_number('points') - 1
+        intervals = row_count(input, wanted) - 1
         times = [(t_start + (t_end - t_start) * i / intervals, i=0, intervals)]
       end if
       times(size(times)) = t_end

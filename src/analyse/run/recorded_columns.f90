@@ -1,5 +1,6 @@
 !> The values of columns of the trajectory table, for all lanes of a block.
 module nocdyn_recorded_columns
+  use nocdyn_bank, only: role_coupling
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
@@ -12,7 +13,7 @@ module nocdyn_recorded_columns
   implicit none (type, external)
   private
 
-  public :: new_recorded_columns
+  public :: new_recorded_columns, may_bend
 
   !> Columns one after the other whose indices are consecutive.
   type, extends(column_t) :: segment_t
@@ -36,7 +37,7 @@ module nocdyn_recorded_columns
     real(wp), private :: energies(column_kinetic:column_residual) = 0.0_wp   !! of one row [J]; work space
     real(wp), allocatable, private :: start_energy(:)    !! [J], [lanes]
   contains
-    procedure :: copy_lane, start_lane, move_origin, observe, fill_row, kinetic_energy
+    procedure :: copy_lane, start_lane, move_origin, observe, fill_row, kinetic_energy, find_pace
   end type recorded_columns_t
 
 contains
@@ -89,6 +90,35 @@ contains
     end do
     segments = all(1:n)
   end function segments_of
+
+  !> Whether a column may bend more than the solution: torques, reactions and what follows from them, but not moments in
+  !> proportion to twists and their rates.
+  logical function may_bend(machine, column)
+    type(machine_t), intent(in) :: machine
+    type(column_t), intent(in) :: column
+
+    may_bend = any(column%kind == [column_element, column_reaction, column_member, column_point_moment, column_point_stress])
+    if (column%kind /= column_element) return
+    associate (bank => machine%banks(column%bank)%bank)
+      if (bank%role == role_coupling .and. bank%has_paper_law .and. bank%has_polynomial_potential) then
+        may_bend = any(abs(machine%laws%cubic(:, bank%first:bank%last())) > 0)
+      end if
+    end associate
+  end function may_bend
+
+  !> How fast the columns of a lane oscillate where they were observed last, and the size of its moments.
+  subroutine find_pace(self, lane, fastest, scale)
+    class(recorded_columns_t), intent(in) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(out) :: fastest   !! [rad/s]
+    real(wp), intent(out) :: scale     !! [N m]
+
+    fastest = self%formulation%fastest_wave(lane)
+    associate (elements => self%formulation%machine%elements)
+      scale = 0.0_wp
+      if (elements%count > 0) scale = maxval(abs(elements%applied(lane, :))) + maxval(abs(elements%restoring(lane, :)))
+    end associate
+  end subroutine find_pace
 
   !> Copies the parameters of a lane from the formulation that is integrated.
   subroutine copy_lane(self, lane, parameters)

@@ -6,7 +6,7 @@ module nocdyn_trajectory_table
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_output_units, only: turn_labels
-  use nocdyn_recorded_columns, only: new_recorded_columns, recorded_columns_t
+  use nocdyn_recorded_columns, only: may_bend, new_recorded_columns, recorded_columns_t
   use nocdyn_text, only: string_t
   use nocdyn_trajectory_columns, only: column_t, list_columns
   use nocdyn_units, only: from_si
@@ -24,6 +24,7 @@ module nocdyn_trajectory_table
     real(wp), allocatable, private :: y(:, :)      !! [1, states + quadratures]
     real(wp), private :: start_kinetic = 0.0_wp    !! [J]
     real(wp), allocatable, private :: start_stored(:)   !! of the elastic elements [J]
+    logical, allocatable :: bends(:)               !! columns that may bend more than the solution
   contains
     procedure :: fill, find_energy_balance
   end type trajectory_table_t
@@ -35,9 +36,11 @@ contains
     class(formulation_t), intent(in) :: formulation   !! of one lane, with work integrals
     real(wp), intent(in) :: t_start                   !! [s]
     integer, intent(in), optional :: wanted(:)        !! units of columns: indices of `units`; absent: those of SI
+    integer :: i
 
     call list_columns(formulation%machine, table%list, table%labels)
     table%columns = new_recorded_columns(formulation, table%list)
+    allocate (table%bends, source=[(may_bend(formulation%machine, table%list(i)), i=1, size(table%list))])
     allocate (table%unit(size(table%list)), source=0)
     if (present(wanted)) call turn_labels(table%labels, wanted, table%unit)
     table%t(1) = t_start

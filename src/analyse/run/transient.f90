@@ -14,8 +14,9 @@ module nocdyn_transient
   use nocdyn_label_checks, only: refuse_equal_labels
   use nocdyn_machine, only: machine_t
   use nocdyn_missed_states, only: note_missed_state
-  use nocdyn_output_times, only: check_output_times, output_note, output_times
+  use nocdyn_output_times, only: check_output_times, output_note, output_times, row_count
   use nocdyn_output_units, only: output_units
+  use nocdyn_row_intervals, only: note_sparse_rows, wanted_rows
   use nocdyn_run_fatigue, only: new_run_fatigue, run_fatigue_t
   use nocdyn_run_limits, only: check_run_limits
   use nocdyn_run_settings, only: check_size, choose_settings
@@ -81,15 +82,21 @@ module nocdyn_transient
     type(run_fatigue_t) :: fatigue           !! of signals, which are tracked after these
     integer :: before_signals = 0            !! number of functions before the signals
     type(vibration_t) :: vibration           !! its energy in the rows
+    real(wp) :: largest_moment = 0.0_wp      !! of the elements [N m]
+    real(wp) :: works(2) = 0.0_wp            !! in and out where the columns were evaluated last between the rows ...
+    real(wp) :: last_works(2) = 0.0_wp       !! ... and at the end of the last step [J]
+    real(wp) :: passed = 0.0_wp              !! what they have changed by, to and fro, in all steps [J]
+    real(wp) :: atol = 0.0_wp                !! absolute tolerance [rad], [rad/s]
     real(wp) :: last_time = 0.0_wp           !! of the rows [s]
     real(wp), allocatable :: last_state(:)   !! at that time, [states + quadratures]
+    real(wp), allocatable :: lowest(:), highest(:)   !! speeds of the bodies in the rows [rad/s]
     real(wp) :: t_start, t_end               !! [s]
     integer :: not_finite = 0                !! column of the first row with a number that is not finite, which ends the run
     real(wp) :: failure_time = 0.0_wp        !! of that row [s]
     logical :: has_ranges = .false.          !! whether the columns were evaluated between the rows
     class(run_output_t), pointer :: output => null()
   contains
-    procedure :: on_output, wants_stop, tracked_values, on_extremes, on_turn, least_range, on_shift
+    procedure :: on_output, wants_stop, tracked_values, find_pace, on_extremes, on_turn, least_range, on_shift
   end type run_observer_t
 
 contains
@@ -111,7 +118,7 @@ contains
     call check_output_times(input, error)
     if (.not. allocated(error)) call build_formulation(input, formulation, settings, notes, error)
     if (allocated(error)) return
-    times = output_times(input)
+    call choose_rows(input, formulation%machine, times, notes)
     summary%method = trim(settings%method)
     call describe_machine(formulation%machine, summary)
     if (output_note(input) /= '') call append(notes, output_note(input))
@@ -121,6 +128,7 @@ contains
     call start_observer(observer, input, formulation, times, error)
     if (allocated(error)) return
     observer%output => output
+    observer%atol = settings%atol
     observer%table%columns%formulation%joints%leader => formulation%joints
     call output%start(selected(observer%table%labels, observer%chosen), size(times), error)
     if (allocated(error)) return
@@ -129,6 +137,9 @@ contains
     summary%t_start = times(1)
     call solve(formulation, settings, times, observer, summary, error)
     if (summary%has_run) call complete_summary(input, observer, error, summary)
+    if (summary%has_run .and. .not. allocated(error)) then
+      call note_sparse_rows(formulation%machine, observer%lowest, observer%highest, times(2) - times(1), summary%notes)
+    end if
     if (.not. summary%has_run .or. allocated(error) .or. allocated(formulation%machine%steady_internal)) return
     if (formulation%joints%count > 0) return   ! which of them a steady state has locked is not known
     associate (last => observer%table%columns%formulation)
@@ -154,6 +165,23 @@ contains
     call choose_settings(input, formulation, settings, notes, error)
   end subroutine build_formulation
 
+  !> The times of the rows. Where the input gives no interval, the rows show the fastest excitation.
+  subroutine choose_rows(input, machine, times, notes)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    real(wp), allocatable, intent(out) :: times(:)   !! [s]
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    integer :: wanted
+
+    wanted = 0
+    associate (output => input%groups(input%position('output')), run => input%groups(input%position('run')))
+      if (.not. (output%has_value('interval') .or. output%is_given('points'))) then
+        call wanted_rows(machine, run%number('t_end') - run%number('t_start'), row_count(input), wanted, notes)
+      end if
+    end associate
+    times = output_times(input, wanted)
+  end subroutine choose_rows
+
   subroutine start_observer(observer, input, formulation, times, error)
     type(run_observer_t), intent(inout) :: observer
     type(input_t), intent(in) :: input
@@ -170,12 +198,17 @@ contains
       observer%tracked_from = input%groups(input%position('output'))%number('extremes_from')
     end if
     allocate (observer%row(size(observer%table%labels)))
+    allocate (observer%lowest(formulation%machine%bodies), source=huge(0.0_wp))
+    allocate (observer%highest(formulation%machine%bodies), source=-huge(0.0_wp))
     allocate (observer%last_state(formulation%states + formulation%quadratures), source=0.0_wp)
     call new_run_fatigue(input, formulation%machine, observer%table%labels, observer%fatigue)
     observer%turning = size(observer%fatigue%counters)
     observer%along = new_shaft_extremes(formulation%machine, observer%table%list)
     observer%before_signals = size(observer%row) + observer%along%points
     observer%tracked = observer%before_signals + observer%turning
+    allocate (observer%bends(observer%tracked), source=.true.)
+    observer%bends(:size(observer%row)) = observer%table%bends
+    observer%bends(size(observer%row) + 1:observer%before_signals) = .false.   ! moments of shafts are linear
     call start_extremes(observer%extremes, size(observer%row), observer%tracked_from)
     call choose_columns(input, observer%table%labels, observer%chosen, error)
     if (.not. allocated(error)) allocate (observer%written(size(observer%chosen)))
@@ -226,7 +259,8 @@ contains
     summary%fatigue = observer%fatigue
     call check_run_limits(input, summary%labels, summary%extremes%lowest, summary%extremes%highest, summary%limits)
     if (.not. allocated(error)) call check_extremes(summary%extremes, summary%labels, error)
-    call check_energy_balance(summary%extremes, observer%vibration%largest, summary%notes)
+    call check_energy_balance(summary%extremes, observer%vibration%largest, observer%passed, &
+                              observer%atol * observer%largest_moment, summary%notes)
     if (summary%extremes%rows > 0) then
       allocate (summary%energy_balance)
       call observer%table%find_energy_balance(observer%last_time, observer%last_state, summary%energy_balance)
@@ -260,6 +294,8 @@ contains
     call update_extremes(self%extremes, self%row)
     associate (formulation => self%table%columns%formulation)
       call self%vibration%include_energy(formulation%machine, formulation%omega(1, 1:))
+      self%lowest(:) = min(self%lowest, formulation%omega(1, 1:))
+      self%highest(:) = max(self%highest, formulation%omega(1, 1:))
     end associate
     self%written(:) = self%row(self%chosen)
     call self%output%write_row(self%written)
@@ -280,9 +316,23 @@ contains
       call self%table%fill(t, y, values(:columns))
       call self%along%evaluate(machine, values(columns + 1:self%before_signals))
       call self%fatigue%evaluate(machine, values(:columns), values(self%before_signals + 1:))
+      self%works(:) = values(columns - 2:columns - 1)
     end associate
     self%has_ranges = .true.
   end subroutine tracked_values
+
+  !> How fast they oscillate where they were evaluated last.
+  subroutine find_pace(self, lane, fastest, scale)
+    class(run_observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(out) :: fastest, scale   !! [rad/s], [N m]
+
+    if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
+    call self%table%columns%find_pace(lane, fastest, scale)
+    self%largest_moment = max(self%largest_moment, scale)
+    self%passed = self%passed + sum(abs(self%works - self%last_works))
+    self%last_works(:) = self%works
+  end subroutine find_pace
 
   !> The next value of a signal.
   subroutine on_turn(self, lane, function, value)

@@ -18,6 +18,7 @@ module nocdyn_observer
     integer, allocatable :: directions(:)   !! event_... of each event function; not allocated: there are none
     integer :: tracked = 0                  !! number of tracked functions
     integer :: turning = 0                  !! number of the last ones of them whose turning points `on_turn` receives
+    logical, allocatable :: bends(:)        !! whether a tracked function may bend more than the solution; by default none does
     real(wp) :: tracked_from = -huge(1.0_wp)   !! time from which their extremes are taken [s]
     logical :: wants_steps = .false.        !! whether `on_steps` is called
     logical :: takes_shifts = .false.       !! whether `on_shift` is overridden; a system shifts no states without
@@ -29,7 +30,7 @@ module nocdyn_observer
     procedure :: wants_stop
     procedure :: event_values
     procedure :: on_event
-    procedure :: tracked_values
+    procedure :: tracked_values, find_pace
     procedure :: on_extremes
     procedure :: on_turn, least_range
     procedure :: on_steps
@@ -115,6 +116,18 @@ contains
 
     error stop 'nocdyn_observer: an observer with tracked functions overrides tracked_values'
   end subroutine tracked_values
+
+  !> How fast tracked functions that bend may oscillate with the time, or with angles, where they were evaluated last, and a size
+  !> of which a small part is rounding in them.
+  subroutine find_pace(self, lane, fastest, scale)
+    class(observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(out) :: fastest   !! [rad/s]
+    real(wp), intent(out) :: scale     !! in the unit of the functions
+
+    fastest = 0.0_wp
+    scale = 0.0_wp
+  end subroutine find_pace
 
   !> The ranges of the tracked functions when a lane has ended; not called if it has ended before `tracked_from`.
   subroutine on_extremes(self, lane, ranges)

@@ -46,6 +46,7 @@ module nocdyn_system
     logical :: may_shift = .false.   !! whether `find_far` is called after every step
     logical :: projects = .false.    !! whether `project_state` is called after every step
     logical :: limits_steps = .false. !! whether `limit_steps` is called before every step
+    logical :: follows_waves = .false.  !! whether indicators may oscillate where the state hardly moves: `find_fastest_wave`
     logical :: has_block_indicators = .false.   !! whether `block_indicators` is overridden; else lanes are looked at one by one
   contains
     procedure(derivative_interface), deferred :: derivative
@@ -70,6 +71,7 @@ module nocdyn_system
     procedure :: indicator_values
     procedure :: set_indicator
     procedure :: block_indicators
+    procedure :: find_fastest_wave
     procedure :: change_branch
     procedure :: switch_name
   end type system_t
@@ -285,6 +287,17 @@ contains
 
     error stop 'nocdyn_system: a system with block indicators overrides block_indicators'
   end subroutine block_indicators
+
+  !> The largest rate at which the indicators of a lane oscillate at a state [rad/s], other than by its own oscillations; 0 by
+  !> default. Crossings are looked for at several times in each of these oscillations, and where indicators bend towards zero.
+  subroutine find_fastest_wave(self, lane, y, fastest)
+    class(system_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+    real(wp), intent(out) :: fastest
+
+    fastest = 0.0_wp
+  end subroutine find_fastest_wave
 
   !> A lane changes to the branch on the other side of an indicator's zero. The indicator must be zero or positive there
   !> afterwards. A boundary that is moved outwards a little, so that it is positive, prevents that rounding crosses back. The

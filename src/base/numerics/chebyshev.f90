@@ -8,7 +8,7 @@ module nocdyn_chebyshev
   implicit none (type, external)
   private
 
-  public :: new_interpolation, raise_to_maximum, find_last_exit, list_extremes, time_at
+  public :: new_interpolation, raise_to_maximum, find_last_exit, list_extremes, last_terms, time_at
 
   integer, parameter, public :: max_degree = 39
   integer, parameter :: max_halvings = 52           !! of [-1, 1], until no number is left inside a part
@@ -242,6 +242,17 @@ contains
       c(k:k + rows - 1) = sum
     end do
   end subroutine find_series
+
+  !> The size of the last terms of a polynomial, by which that of those that it lacks is judged. That of the last but one counts
+  !> a little, as the last one may be zero by symmetry.
+  pure real(wp) function last_terms(rule, values) result(size)
+    type(interpolation_t), intent(in) :: rule
+    real(wp), intent(in) :: values(0:rule%degree)   !! at the nodes
+    real(wp), parameter :: weight = 0.02_wp         ! of the last but one
+
+    size = abs(dot_product(rule%series(rule%degree, :), values))
+    if (rule%degree > 2) size = max(size, weight * abs(dot_product(rule%series(rule%degree - 1, :), values)))
+  end function last_terms
 
   !> Whether bounds show that there is no maximum, or minimum, between the ends, or one.
   pure subroutine count_turns(n, slopes, bends, has_none, has_one)

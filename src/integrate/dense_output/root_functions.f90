@@ -25,9 +25,9 @@ module nocdyn_root_functions
     integer :: parts = least_parts                      !! number of parts of the last step
     integer, allocatable :: side(:, :)                  !! sign of the last value, 0 after a zero; [lanes, functions]
     real(wp), allocatable :: values(:, :)               !! at their ends; [functions, 0:most parts]
-    real(wp), allocatable, private :: last(:, :)        !! values at the end of the last step; [functions, lanes]
+    real(wp), allocatable :: last(:, :)                 !! values at the end of the last step; [functions, lanes]
     real(wp), allocatable :: g(:)                       !! values at one theta
-    real(wp), allocatable, private :: y(:)              !! state at which the functions are evaluated
+    real(wp), allocatable :: y(:)                       !! state at which the functions are evaluated
   end type root_functions_t
 
   !> Two values of theta between which a function changes its sign.

@@ -3,6 +3,7 @@ module nocdyn_switching
   use nocdyn_block_scan, only: allocate_block_scan, block_scan_t, has_minimum, scan_block
   use nocdyn_dense_output, only: dense_output_t, sample
   use nocdyn_finite, only: is_finite
+  use nocdyn_followed_crossings, only: find_followed_crossing
   use nocdyn_kinds, only: wp
   use nocdyn_observer, only: observer_t
   use nocdyn_root_functions, only: allocate_root_functions, bracket_t, find_grazing, find_root, part_bracket, &
@@ -96,6 +97,10 @@ contains
     theta = 1.0_wp
     switching%known = -1.0_wp
     switching%pending(dense%lane) = 0
+    if (system%follows_waves) then
+      call find_followed_crossing(switching%roots, system, observer, dense, switching%pending(dense%lane), theta)
+      return
+    end if
     if (switching%scan%is_used) then
       call take_scan(switching%scan, dense%lane, switching%roots)
     else

@@ -18,6 +18,8 @@ module nocdyn_after_step
 
   public :: process_steps, observe_steps, change_branches
 
+  real(wp), parameter :: same_time = 16.0_wp   ! spacings of the time by which a row may be before a crossing that it is at
+
 contains
 
   !> Finds what lies in the accepted steps, ends steps at changes of branches and terminal events, and informs the observer of
@@ -138,26 +140,32 @@ contains
       theta_end = integrator%events%theta(i)
       integrator%t_new(lane) = t
       integrator%attempt%y_new(lane, :integrator%attempt%components) = integrator%sample
+      integrator%steps%crosses(lane) = .false.
       exit
     end do
   end subroutine process_events
 
-  !> Passes the output times up to t that are due to the observer.
+  !> Passes the output times up to t that are due to the observer. Rows at a crossing where joints may
+  !> change wait until the lane is on its next branch.
   subroutine output_until(integrator, lane, t, times, observer)
     type(integrator_t), intent(inout) :: integrator
     integer, intent(in) :: lane
     real(wp), intent(in) :: t
     real(wp), contiguous, intent(in) :: times(:)
     class(observer_t), intent(inout) :: observer
-    real(wp) :: theta(batch)
+    real(wp) :: end_of_rows, theta(batch)
+    logical :: waits
     integer :: ahead, i
 
+    end_of_rows = integrator%t_new(lane)
+    waits = integrator%has_jumps .and. integrator%steps%crosses(lane)
+    if (waits) end_of_rows = end_of_rows - same_time * spacing(end_of_rows)
     associate (next => integrator%next(lane))
       do while (next <= size(times))
         theta = 0.0_wp
         ahead = 0
         do while (ahead < min(batch, size(times) + 1 - next))
-          if (times(next + ahead) > t .or. times(next + ahead) >= integrator%t_new(lane)) exit
+          if (times(next + ahead) > t .or. times(next + ahead) >= end_of_rows) exit
           ahead = ahead + 1
           theta(ahead) = (times(next + ahead - 1) - integrator%dense%t) / integrator%dense%h
         end do
@@ -168,7 +176,7 @@ contains
           next = next + 1
         end do
       end do
-      if (next > size(times)) return
+      if (next > size(times) .or. waits) return
       if (times(next) > t) return
       integrator%sample(:) = integrator%attempt%y_new(lane, :integrator%attempt%components)
       call observer%on_output(lane, times(next), integrator%sample)
@@ -176,22 +184,48 @@ contains
     end associate
   end subroutine output_until
 
-  !> Lanes whose step ended at the boundary of a branch change to the next branch and restart there.
-  subroutine change_branches(integrator, stepper, system, observer, solver_status)
+  !> Passes the output times at a crossing, where the lane now is on its next branch.
+  subroutine output_at_crossing(integrator, lane, times, observer)
+    type(integrator_t), intent(inout) :: integrator
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: times(:)
+    class(observer_t), intent(inout) :: observer
+
+    integrator%sample(:) = integrator%attempt%y(lane, :integrator%attempt%components)
+    associate (next => integrator%next(lane))
+      do while (next <= size(times))
+        if (times(next) > integrator%attempt%t(lane)) exit
+        call observer%on_output(lane, times(next), integrator%sample)
+        next = next + 1
+      end do
+      integrator%next_time(lane) = huge(integrator%next_time)
+      if (next <= size(times)) integrator%next_time(lane) = times(next)
+    end associate
+  end subroutine output_at_crossing
+
+  !> Lanes whose step ended at the boundary of a branch change to the next branch and restart there; those that have come to the
+  !> end only show it in their last row.
+  subroutine change_branches(integrator, stepper, system, times, observer, solver_status)
     type(integrator_t), intent(inout) :: integrator
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(inout) :: system
+    real(wp), contiguous, intent(in) :: times(:)   !! output times [s]
     class(observer_t), intent(inout) :: observer
     type(solver_status_t), intent(inout) :: solver_status
     integer :: lane
 
     associate (attempt => integrator%attempt, starting => integrator%starting)
       do lane = 1, attempt%lanes
-        starting(lane) = integrator%accepted(lane) .and. solver_status%code(lane) == integration_running &
-                         .and. integrator%switching%pending(lane) > 0
-        if (.not. starting(lane)) cycle
-        call cross_boundaries(integrator%switching, system, attempt, lane, solver_status)
-        call resume_control(integrator%control, lane, solver_status%h(lane))
+        starting(lane) = .false.
+        if (.not. integrator%accepted(lane) .or. integrator%switching%pending(lane) == 0) cycle
+        starting(lane) = solver_status%code(lane) == integration_running
+        if (starting(lane)) then
+          call cross_boundaries(integrator%switching, system, attempt, lane, solver_status)
+          call resume_control(integrator%control, lane, solver_status%h(lane))
+        else if (solver_status%code(lane) == integration_done .and. integrator%has_jumps) then
+          call cross_boundaries(integrator%switching, system, attempt, lane, solver_status)
+        end if
+        if (integrator%has_jumps .and. integrator%steps%crosses(lane)) call output_at_crossing(integrator, lane, times, observer)
       end do
       if (.not. any(starting)) return
       call evaluate_starts(integrator, system, solver_status)

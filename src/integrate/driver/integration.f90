@@ -91,7 +91,7 @@ contains
         if (system%projects) call project_states(integrator, system)
         if (integrator%may_shift) call shift_states(integrator, system, observer)
         call stepper%accept(integrator%accepted)
-        if (integrator%has_switches) call change_branches(integrator, stepper, system, observer, solver_status)
+        if (integrator%has_switches) call change_branches(integrator, stepper, system, times, observer, solver_status)
       end if
       call interrupt_if_asked(integrator, observer, solver_status, is_interrupted)
       call release_lanes(integrator, system, ensemble, observer, solver_status)

@@ -36,6 +36,7 @@ module nocdyn_time_stepping
     logical :: has_events = .false.
     logical :: has_extremes = .false.
     logical :: has_switches = .false.
+    logical :: has_jumps = .false.                   !! whether what holds may change at a crossing, and speeds jump
     logical :: may_shift = .false.                   !! whether the system may shift states
     logical :: wants_steps = .false.                 !! whether the observer receives the dense output of all steps
     logical :: wants_dense_steps = .false.           !! whether that is the result of `interpolate`
@@ -87,12 +88,13 @@ contains
     integrator%wants_dense_steps = integrator%wants_steps .and. .not. stepper%passes_series
     integrator%may_shift = system%may_shift .and. observer%takes_shifts
     integrator%has_switches = system%switches > 0
+    integrator%has_jumps = system%follows_waves
     if (integrator%has_switches) then
       call allocate_switching(integrator%switching, system, stepper%degree, integrator%attempt, times(size(times)) - times(1))
     end if
     integrator%has_extremes = observer%tracked > 0
     if (integrator%has_extremes) then
-      call allocate_extremes(integrator%extremes, observer%tracked, stepper%degrees, integrator%attempt)
+      call allocate_extremes(integrator%extremes, observer, stepper%degrees, integrator%attempt)
     end if
     if (.not. allocated(observer%directions)) return
     integrator%has_events = size(observer%directions) > 0

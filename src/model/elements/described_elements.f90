@@ -76,6 +76,7 @@ module nocdyn_described_elements
     procedure :: set_branch
     procedure :: indicator
     procedure :: block_indicators
+    procedure :: fastest_wave
     procedure :: list_parameters
   end type described_elements_t
 
@@ -396,5 +397,15 @@ contains
 
     call self%law%lowest_guards(self%branch, time, angle, speed, internal, distance)
   end subroutine block_indicators
+
+  !> The largest rate at which the moments of one lane oscillate with the time or an angle [rad/s]: that of the sines of the law.
+  pure real(wp) function fastest_wave(self, lane, speed)
+    class(described_elements_t), intent(in) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: speed(:)   !! u' of the elements, then of their phases [rad/s]
+
+    fastest_wave = 0.0_wp
+    if (allocated(self%law)) fastest_wave = self%law%fastest(lane, speed)
+  end function fastest_wave
 
 end module nocdyn_described_elements

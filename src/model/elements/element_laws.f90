@@ -10,6 +10,7 @@ module nocdyn_element_laws
   use nocdyn_law_strips, only: fill, load, load_lanes, unload
   use nocdyn_law_tape, only: at_phase, law_inputs_t, law_tape_t
   use nocdyn_law_walk, only: walk
+  use nocdyn_law_waves, only: fastest_wave, has_waves
   use nocdyn_law_work, only: law_work_t, new_law_work
   use nocdyn_curves, only: curve_t
   use nocdyn_laws, only: law_parameter_t, law_t, new_law
@@ -27,6 +28,7 @@ module nocdyn_element_laws
     type(law_work_t), private :: energies
     type(law_work_t), private :: guards
     logical :: is_ready = .false.               !! whether there is work space for values and guards
+    logical :: has_waves = .false.              !! whether there are sines of variables
     type(law_numbers_t) :: numbers              !! the guards, and all values if there are few elements
   contains
     procedure :: refresh
@@ -34,6 +36,7 @@ module nocdyn_element_laws
     procedure :: differentiate
     procedure :: evaluate_energies
     procedure :: lowest_guards
+    procedure :: fastest => fastest_of_elements
     procedure :: make_ready
     procedure :: prepare_series
   end type element_law_t
@@ -50,6 +53,7 @@ contains
 
     self%law = new_law(tape, lanes, elements, strip)
     self%states = states
+    self%has_waves = has_waves(tape)
     self%law_inputs_t = tape%inputs()
   end function new_element_law
 
@@ -367,6 +371,20 @@ contains
       g(l) = merge(min(g(l), guard(l) + shift(l)), g(l), branch == 0 .or. present_branch(l) == branch)
     end do
   end subroutine keep_lower
+
+  !> The largest rate of the sines of all elements of one lane [rad/s].
+  pure real(wp) function fastest_of_elements(self, lane, speed) result(fastest)
+    class(element_law_t), intent(in) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: speed(self%law%elements, self%ports)   !! u' of the elements, and of their phases [rad/s]
+    integer :: e
+
+    fastest = 0.0_wp
+    if (.not. self%has_waves) return
+    do e = 1, self%law%elements
+      fastest = max(fastest, fastest_wave(self%law, self%law%slot(lane, e), speed(e, :)))
+    end do
+  end function fastest_of_elements
 
   !> Allocates work space for Taylor series.
   subroutine prepare_series(self, order)

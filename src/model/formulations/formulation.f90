@@ -46,6 +46,7 @@ module nocdyn_formulation
     procedure :: refresh_lane
     procedure :: start_lane => start_branches
     procedure :: limit_steps
+    procedure :: fastest_wave
     procedure :: indicator_values
     procedure :: set_indicator => indicate_branch
     procedure :: change_branch => change_to_branch
@@ -104,6 +105,7 @@ contains
       self%states = self%mechanical + self%internal
       self%switches = machine%switches%count
       self%limits_steps = any(machine%switches%phase_order > 0)
+      self%follows_waves = self%joints%count > 0
       self%lane_state = spread(0.0_wp, 1, self%states)
       self%lanes = machine%lanes
       self%has_energy_balance = with_energy_balance
@@ -265,6 +267,22 @@ contains
       end associate
     end do
   end subroutine limit_steps
+
+  !> The largest rate at which moments and reactions of a lane oscillate with the time or with angles [rad/s], after `gather`.
+  pure real(wp) function fastest_wave(self, lane) result(fastest)
+    class(formulation_t), intent(in) :: self
+    integer, intent(in) :: lane
+    real(wp), parameter :: order = 4.0_wp   ! of what cardan joints and cranks do over the angle of their driver
+    integer :: i
+
+    fastest = self%machine%fastest_wave(lane)
+    associate (motions => self%joints%motions)
+      do i = 1, motions%count
+        if (motions%driver(i) == 0) cycle
+        fastest = max(fastest, order * abs(self%machine%elements%speed(lane, motions%driver(i))))
+      end do
+    end associate
+  end function fastest_wave
 
   !> Indicators of all switches of one lane: positive on the present branches, zero at their boundaries.
   subroutine indicator_values(self, lane, t, y, g)

@@ -20,6 +20,7 @@ module nocdyn_joint_formulation
     procedure :: start_lane => start_with_joints
     procedure :: indicator_values => indicate_all
     procedure :: set_indicator => indicate_one
+    procedure :: find_fastest_wave
     procedure :: change_branch => change_with_joints
   end type joint_formulation_t
 
@@ -132,6 +133,18 @@ contains
       g(switch) = self%joints%indicator(self%machine%banks, joint, t, self%joint_rate(joint, y))
     end associate
   end subroutine set_joint_indicator
+
+  !> The largest rate at which the moments of joints that hold oscillate at a state [rad/s].
+  subroutine find_fastest_wave(self, lane, y, fastest)
+    class(joint_formulation_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+    real(wp), intent(out) :: fastest
+
+    self%joint_state(1, :) = y(:self%states)
+    call self%gather(self%joint_state)
+    fastest = self%fastest_wave(lane)
+  end subroutine find_fastest_wave
 
   !> Changes the branch of a law, or decides anew which joints are locked.
   subroutine change_with_joints(self, lane, which, t, y)

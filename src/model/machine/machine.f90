@@ -64,6 +64,7 @@ module nocdyn_machine
     procedure :: evaluate_elements
     procedure :: differentiate_elements
     procedure :: evaluate_energies
+    procedure :: fastest_wave
     procedure :: refresh_lane
     procedure :: power
     procedure :: has_operation
@@ -376,6 +377,23 @@ contains
       end associate
     end do
   end subroutine evaluate_energies
+
+  !> The largest rate at which the moments of one lane oscillate with the time or an angle [rad/s], at the speeds in `elements`.
+  pure real(wp) function fastest_wave(self, lane) result(fastest)
+    class(machine_t), intent(in) :: self
+    integer, intent(in) :: lane
+    integer :: i
+
+    fastest = 0.0_wp
+    do i = 1, size(self%banks)
+      associate (bank => self%banks(i)%bank)
+        if (bank%is_polynomial .and. bank%moving_rows == 0) cycle
+        associate (last => bank%first - 1 + bank%ports * bank%count)   ! of its phases
+          fastest = max(fastest, bank%fastest_wave(lane, self%elements%speed(lane, bank%first:last)))
+        end associate
+      end associate
+    end do
+  end function fastest_wave
 
   !> Computes what the laws keep of the parameters of a lane, after these have changed.
   subroutine refresh_lane(self, lane)

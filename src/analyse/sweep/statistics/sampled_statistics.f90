@@ -2,16 +2,18 @@
 !>
 !> In every step, or in the part of it after `from`, a column is replaced by the polynomial through its values at the nodes of the
 !> interpolation; there are as many as the solution has coefficients in a step. Integrals use as many Gauss nodes: they are exact
-!> for a linear function of the state and for its square.
+!> for a linear function of the state and for its square. Columns that bend more than the solution are replaced piece by piece
+!> (`nocdyn_step_pieces`).
 module nocdyn_sampled_statistics
   use nocdyn_column_statistics, only: accumulator_t, column_statistics_t, start_range, widen_range
   use nocdyn_damage_sums, only: damage_sum_t
   use nocdyn_extremes, only: before_jump
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
-  use nocdyn_recorded_columns, only: new_recorded_columns, recorded_columns_t
-  use nocdyn_statistics, only: statistic_t
   use nocdyn_observer, only: step_block_t
+  use nocdyn_recorded_columns, only: may_bend, new_recorded_columns, recorded_columns_t
+  use nocdyn_statistics, only: statistic_t
+  use nocdyn_step_pieces, only: new_step_pieces, step_pieces_t
   use nocdyn_trajectory_columns, only: column_t
   implicit none (type, external)
   private
@@ -23,7 +25,11 @@ module nocdyn_sampled_statistics
     real(wp), allocatable, private :: from(:)               !! the different ones of the accumulators [s]
     logical, private :: interpolates = .false., integrates = .false.   !! whether there are polynomials, integrals
     logical, allocatable, private :: active(:)              !! lanes whose step is sampled
-    real(wp), allocatable, private :: start(:), sampled_start(:)   !! of the part of the step [s], [lanes]
+    real(wp), allocatable, private :: start(:)              !! of the part of the step [s], [lanes]
+    type(step_pieces_t), allocatable, private :: pieces(:)  !! of that part, [lanes]
+    logical, allocatable, private :: bends(:), replaced(:)  !! columns that may; whose polynomials count in a piece
+    logical, allocatable, private :: is_begun(:)            !! lanes whose pieces are known
+    real(wp), allocatable, private :: scale(:)              !! of their columns [N m], [lanes]
     real(wp), allocatable, private :: nodes(:)              !! those of the interpolation, those of Gauss; -1 to 1
     real(wp), allocatable, private :: values(:, :, :)       !! there, [nodes, columns, lanes]
     real(wp), allocatable, private :: row(:)                !! of one lane, [columns]
@@ -41,7 +47,7 @@ contains
     type(statistic_t), intent(in) :: statistics(:)   !! each of a column
     real(wp), intent(in) :: t_start, t_end           !! of every variant [s]
     integer, allocatable :: wanted(:)
-    integer :: i
+    integer :: i, lane
 
     if (size(statistics) == 0) return   ! without a copy of the formulation
     call self%set_statistics(statistics, formulation%lanes, t_start, t_end, wanted)
@@ -58,11 +64,15 @@ contains
       self%interpolates = .true.
       if (.not. any(abs(self%from - self%damages(i)%from) <= 0)) self%from = [self%from, self%damages(i)%from]
     end do
+    allocate (self%bends, source=[(may_bend(formulation%machine, columns(wanted(i))), i=1, size(wanted))])
     associate (lanes => formulation%lanes)
-      allocate (self%active(lanes), source=.false.)
-      allocate (self%start(lanes), self%sampled_start(lanes), self%t(lanes), self%theta(lanes), &
-                self%row(size(wanted)), source=0.0_wp)
+      allocate (self%active(lanes), self%is_begun(lanes), self%replaced(size(wanted)), source=.false.)
+      allocate (self%start(lanes), self%t(lanes), self%theta(lanes), self%scale(lanes), self%row(size(wanted)), source=0.0_wp)
       allocate (self%y(lanes, formulation%states + formulation%quadratures), source=0.0_wp)
+      allocate (self%pieces(lanes))
+      do lane = 1, lanes
+        self%pieces(lane) = new_step_pieces(size(wanted))
+      end do
     end associate
   end function new_sampled_statistics
 
@@ -74,6 +84,7 @@ contains
     real(wp), contiguous, intent(in) :: y(:)   !! the start, before a jump there, [states + quadratures]
 
     call observe_lane(self, lane, t, y)
+    call self%pieces(lane)%restart()
     call self%recorded%start_lane(lane)
     call self%start_accumulators(lane)
   end subroutine start_lane
@@ -108,30 +119,84 @@ contains
     type(step_block_t), intent(in) :: steps
     real(wp), contiguous, intent(in) :: y(:, :)      !! starts of the steps, [lanes, padded components]
     real(wp), contiguous, intent(in) :: c(:, :, :)   !! coefficients of the steps, [lanes, padded components, degree]
-    integer :: i, k, lane
+    integer :: i
 
     if (size(self%accumulators) + size(self%damages) == 0) return
     if (.not. allocated(self%nodes)) call set_nodes(self, size(c, 3))
-    self%sampled_start(:) = huge(0.0_wp)
     do i = 1, size(self%from)
       self%active(:) = steps%taken .and. steps%t_new > self%from(i)
+      if (i > 1) self%active(:) = self%active .and. steps%t < self%from(i)   ! else it is the part of the first
       if (.not. any(self%active)) cycle
       self%start(:) = merge(max(steps%t, self%from(i)), huge(0.0_wp), self%active)
-      if (any(abs(self%start - self%sampled_start) > 0)) call sample_parts(self, steps, y, c)
-      do k = 1, size(self%accumulators)
-        if (abs(self%accumulators(k)%from - self%from(i)) > 0) cycle
-        do lane = 1, size(self%active)
-          if (self%active(lane)) call add_part(self, self%accumulators(k), lane, steps%t_new(lane))
-        end do
-      end do
-      do k = 1, size(self%damages)
-        if (abs(self%damages(k)%from - self%from(i)) > 0) cycle
-        do lane = 1, size(self%active)
-          if (self%active(lane)) call count_part(self, self%damages(k), lane)
-        end do
-      end do
+      call sample_pieces(self, steps, y, c)
     end do
   end subroutine add_steps
+
+  !> Samples the parts of the steps of the active lanes piece by piece, and adds the pieces to what counts them.
+  subroutine sample_pieces(self, steps, y, c)
+    class(sampled_statistics_t), intent(inout) :: self
+    type(step_block_t), intent(in) :: steps
+    real(wp), contiguous, intent(in) :: y(:, :), c(:, :, :)
+    integer :: lane
+    logical :: has_moved
+
+    self%is_begun(:) = .false.
+    do while (any(self%active))
+      call sample_parts(self, steps, y, c)
+      do lane = 1, size(self%active)
+        if (.not. self%active(lane)) cycle
+        call find_replaced(self, lane)
+        call add_piece(self, lane, steps%t(lane), steps%t_new(lane))
+        call self%pieces(lane)%advance(has_moved)
+        self%active(lane) = .not. self%pieces(lane)%is_done
+      end do
+    end do
+  end subroutine sample_pieces
+
+  !> Finds the columns of a lane whose polynomials count in the present piece.
+  subroutine find_replaced(self, lane)
+    class(sampled_statistics_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    integer :: column
+
+    self%replaced(:) = self%pieces(lane)%is_open(:, self%pieces(lane)%depth)
+    if (.not. self%interpolates) return
+    do column = 1, size(self%replaced)
+      if (.not. (self%replaced(column) .and. self%bends(column))) cycle
+      call self%pieces(lane)%replaces(column, self%rule, self%values(:self%rule%degree + 1, column, lane), self%scale(lane), &
+                                      self%replaced(column))
+    end do
+  end subroutine find_replaced
+
+  !> Adds a piece of a lane's step to the accumulators and damages that begin where its part of the step does.
+  subroutine add_piece(self, lane, t, t_new)
+    class(sampled_statistics_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t, t_new   !! of the step [s]
+    integer :: k
+
+    do k = 1, size(self%accumulators)
+      associate (acc => self%accumulators(k))
+        if (.not. (self%replaced(acc%column) .and. counts(acc%from))) cycle
+        call add_part(self, acc, lane, self%pieces(lane)%begin, self%pieces(lane)%end)
+      end associate
+    end do
+    do k = 1, size(self%damages)
+      associate (damage => self%damages(k))
+        if (self%replaced(damage%column) .and. counts(damage%from)) call count_part(self, damage, lane)
+      end associate
+    end do
+
+  contains
+
+    !> Whether what counts from a time on begins here in this step.
+    pure logical function counts(from)
+      real(wp), intent(in) :: from   !! [s]
+
+      counts = from < t_new .and. abs(max(t, from) - self%start(lane)) <= 0
+    end function counts
+
+  end subroutine add_piece
 
   !> The nodes that are needed for a degree of the solution inside the steps.
   subroutine set_nodes(self, degree)
@@ -145,34 +210,57 @@ contains
     allocate (self%values(size(self%nodes), size(self%row), size(self%active)), source=0.0_wp)
   end subroutine set_nodes
 
-  !> Samples the columns in the parts of the steps of the active lanes. A column that jumps at a crossing where the step ends is
-  !> sampled right before it: the jump is no part of the step.
+  !> Samples the columns in the pieces of the steps of the active lanes. A column that jumps at a crossing where the step ends is
+  !> sampled right before it: the jump is no part of the step. How long the first piece is shows at its start.
   subroutine sample_parts(self, steps, y, c)
     type(sampled_statistics_t), intent(inout) :: self
     type(step_block_t), intent(in) :: steps
     real(wp), contiguous, intent(in) :: y(:, :), c(:, :, :)
-    real(wp) :: half
     integer :: i, lane
 
-    self%sampled_start(:) = self%start
     do i = 1, size(self%nodes)
       self%t(:) = steps%t
       do lane = 1, size(self%active)
         if (.not. self%active(lane)) cycle
-        half = 0.5_wp * (steps%t_new(lane) - self%start(lane))
-        self%t(lane) = self%start(lane) + half + self%nodes(i) * half
-        if (steps%crosses(lane)) then
-          self%t(lane) = max(self%start(lane), min(self%t(lane), steps%t_new(lane) - before_jump * spacing(steps%t_new(lane))))
-        end if
+        if (.not. self%is_begun(lane)) call self%pieces(lane)%start_step(self%start(lane), steps%t_new(lane), 0.0_wp, &
+                                                                         self%rule%degree)
+        self%t(lane) = time_of_node(self%pieces(lane), self%nodes(i), steps%crosses(lane), steps%t_new(lane))
       end do
       call observe_parts(self, steps, y, c)
       do lane = 1, size(self%active)
         if (.not. self%active(lane)) cycle
         call self%recorded%fill_row(lane, self%t, self%y, self%row)
         self%values(i, :, lane) = self%row
+        if (.not. self%is_begun(lane)) call begin_pieces(self, lane, steps%t_new(lane))
       end do
     end do
   end subroutine sample_parts
+
+  !> The time of a node in a piece [s].
+  pure real(wp) function time_of_node(piece, node, crosses, t_new) result(t)
+    type(step_pieces_t), intent(in) :: piece
+    real(wp), intent(in) :: node      !! -1 to 1
+    logical, intent(in) :: crosses    !! whether the step ends at a crossing
+    real(wp), intent(in) :: t_new     !! end of the step [s]
+    real(wp) :: half
+
+    half = 0.5_wp * (piece%end - piece%begin)
+    t = piece%begin + half + node * half
+    if (crosses .and. piece%end >= t_new) t = max(piece%begin, min(t, t_new - before_jump * spacing(t_new)))
+  end function time_of_node
+
+  !> Chooses the pieces of a lane that has been observed at the first node.
+  subroutine begin_pieces(self, lane, t_new)
+    type(sampled_statistics_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t_new   !! end of the step [s]
+    real(wp) :: fastest
+
+    self%is_begun(lane) = .true.
+    if (.not. any(self%bends)) return
+    call self%recorded%find_pace(lane, fastest, self%scale(lane))
+    call self%pieces(lane)%start_step(self%start(lane), t_new, fastest, self%rule%degree)
+  end subroutine begin_pieces
 
   !> Brings the active lanes to the times `t`, the other lanes to where their steps start.
   subroutine observe_parts(self, steps, y, c)
@@ -198,7 +286,7 @@ contains
     call self%recorded%observe(self%t, self%y)
   end subroutine observe_parts
 
-  !> Counts the cycles of a column in the part of a lane's step.
+  !> Counts the cycles of a column in a part of a lane's step.
   subroutine count_part(self, sum, lane)
     class(sampled_statistics_t), intent(in) :: self
     type(damage_sum_t), intent(inout) :: sum
@@ -207,15 +295,15 @@ contains
     call sum%add_polynomial(self%rule, lane, self%values(:self%rule%degree + 1, sum%column, lane))
   end subroutine count_part
 
-  !> Adds the part of a lane's step to an accumulator.
-  subroutine add_part(self, acc, lane, t_end)
+  !> Adds a part of a lane's step to an accumulator.
+  subroutine add_part(self, acc, lane, t_start, t_end)
     class(sampled_statistics_t), intent(in) :: self
     type(accumulator_t), intent(inout) :: acc
     integer, intent(in) :: lane
-    real(wp), intent(in) :: t_end   !! of the step
+    real(wp), intent(in) :: t_start, t_end   !! of the part [s]
     integer :: k
 
-    associate (t_start => self%start(lane), values => self%values(:, acc%column, lane))
+    associate (values => self%values(:, acc%column, lane))
       if (acc%bound(lane) > 0) call start_range(acc, lane, values(1), t_start)
       if (acc%has_range()) call widen_range(acc, self%rule, lane, values, t_start, t_end, .true., .true.)
       if (acc%has_history) call acc%history(lane)%add(t_start, t_end, values(:self%rule%degree + 1))

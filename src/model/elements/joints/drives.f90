@@ -32,6 +32,7 @@ module nocdyn_drives
   contains
     procedure :: describe
     procedure :: motion
+    procedure :: fastest_wave
   end type drives_t
 
 contains
@@ -108,5 +109,16 @@ contains
       end if
     end associate
   end function table_motion
+
+  !> That of the sines.
+  pure real(wp) function fastest_wave(self, lane, speed)
+    class(drives_t), intent(in) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: speed(:)
+
+    fastest_wave = 0.0_wp
+    if (size(speed) > 0) fastest_wave = maxval(self%parameters(3)%value(lane, :), mask=abs(self%parameters(2)%value(lane, :)) > 0)
+    fastest_wave = max(fastest_wave, 0.0_wp)
+  end function fastest_wave
 
 end module nocdyn_drives

@@ -1,0 +1,68 @@
+!> How fast the sines of a law oscillate while the time and the angles advance.
+module nocdyn_law_waves
+  use nocdyn_kinds, only: wp
+  use nocdyn_law_tape, only: law_tape_t, op_add, op_angle, op_cosine, op_harmonics, op_scale, op_shift, op_sine, op_subtract, &
+    op_time, op_wave
+  use nocdyn_laws, only: law_t
+  implicit none (type, external)
+  private
+
+  public :: has_waves, fastest_wave
+
+contains
+
+  !> Whether a law has sines of variables.
+  pure logical function has_waves(tape)
+    type(law_tape_t), intent(in) :: tape
+    integer :: i
+
+    has_waves = any([(is_wave(tape%node(i)%operation) .and. .not. tape%node(i)%is_constant, i=1, tape%count)])
+  end function has_waves
+
+  pure logical function is_wave(operation)
+    integer, intent(in) :: operation
+
+    is_wave = any(operation == [op_wave, op_sine, op_cosine, op_harmonics])
+  end function is_wave
+
+  !> The largest rate of the arguments of its sines [rad/s], in which harmonics count with their largest multiple. Arguments are
+  !> sums of multiples of the time and of angles; those of other form do not count.
+  pure real(wp) function fastest_wave(law, slot, speed) result(fastest)
+    type(law_t), intent(in) :: law
+    integer, intent(in) :: slot            !! of the element, counted through all strips
+    real(wp), intent(in) :: speed(:)       !! u' of the element, and of its phase if it has one [rad/s]
+    real(wp) :: rate(0:law%tape%count)     ! of the nodes [1/s]
+    integer :: i
+
+    fastest = 0.0_wp
+    rate = 0.0_wp
+    do i = 1, law%tape%count
+      associate (node => law%tape%node(i))
+        if (node%is_constant) cycle
+        select case (node%operation)
+        case (op_time)
+          rate(i) = 1.0_wp
+        case (op_angle)
+          rate(i) = speed(node%a)
+        case (op_add)
+          rate(i) = rate(node%a) + rate(node%b)
+        case (op_subtract)
+          rate(i) = rate(node%a) - rate(node%b)
+        case (op_shift)
+          rate(i) = rate(node%a)
+        case (op_scale)
+          rate(i) = rate(node%a) * law%constant(slot, law%column(node%b))
+        case (op_wave, op_sine, op_cosine)
+          fastest = max(fastest, abs(rate(node%a)))
+        case (op_harmonics)
+          associate (last => node%first + (node%last - node%first + 1) / 3 - 1)   ! of the multiples
+            fastest = max(fastest, maxval(law%tape%list(node%first:last)) * abs(rate(node%a)))
+          end associate
+        case default
+          cycle
+        end select
+      end associate
+    end do
+  end function fastest_wave
+
+end module nocdyn_law_waves

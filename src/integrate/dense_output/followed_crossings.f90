@@ -1,0 +1,180 @@
+!> The first crossing of indicator functions that may bend where the solution does not, such as what the torques leave of the
+!> capacity of a clutch that holds: the functions are evaluated several times in each of their waves, and between these times
+!> wherever they may fall through zero and come back.
+!>
+!> Between two times a function is as far from its chord as a parabola with twice the second difference of three values would
+!> be. Parts are halved until that shows that it does not reach zero, or that it falls once.
+module nocdyn_followed_crossings
+  use nocdyn_dense_output, only: dense_output_t, sample
+  use nocdyn_finite, only: is_finite
+  use nocdyn_kinds, only: wp
+  use nocdyn_observer, only: observer_t
+  use nocdyn_root_functions, only: bracket_t, find_root, parts_of, root_functions_t, sign_of
+  use nocdyn_system, only: system_t
+  implicit none (type, external)
+  private
+
+  public :: find_followed_crossing
+
+  real(wp), parameter :: part_of_wave = 0.5_wp   ! between two times [rad]
+  integer, parameter :: most_halvings = 14       ! of such a part
+  real(wp), parameter :: safety = 2.0_wp         ! factor of the second difference
+  real(wp), parameter :: far = 1.0e300_wp        ! a function so large stands for none
+  real(wp), parameter :: early = 0.5_wp          ! of a step: an earlier crossing is no sign that there is none before
+
+  !> The first crossing so far.
+  type, private :: crossing_t
+    integer :: function = 0        ! 0: there is none
+    real(wp) :: theta = 1.0_wp
+  end type crossing_t
+
+contains
+
+  !> Finds the first crossing in the last step of a lane: the theta where an indicator falls through zero. The functions are
+  !> looked at up to there; it is done again where it is early in the step, as they may have no sense beyond.
+  subroutine find_followed_crossing(roots, system, observer, dense, function, theta)
+    type(root_functions_t), intent(inout) :: roots   !! `side` and `last` of the lane are those at the start of the step
+    class(system_t), intent(inout) :: system
+    class(observer_t), intent(inout) :: observer
+    type(dense_output_t), intent(inout) :: dense     !! of the lane
+    integer, intent(out) :: function                 !! 0 if there is none
+    real(wp), intent(out) :: theta                   !! of the crossing, 1 if there is none
+    type(crossing_t) :: first, next
+    real(wp) :: fastest, searched
+    integer :: side(size(roots%g))
+
+    side = roots%side(dense%lane, :)
+    call sample(dense, 0.0_wp, roots%y)
+    call system%find_fastest_wave(dense%lane, roots%y, fastest)
+    searched = 1.0_wp
+    call search_step(roots, system, observer, dense, fastest, searched, first)
+    do while (first%function > 0 .and. first%theta < early * searched)
+      searched = first%theta
+      roots%side(dense%lane, :) = side
+      call search_step(roots, system, observer, dense, fastest, searched, next)
+      if (next%function == 0 .or. next%function == first%function) exit
+      if (next%theta < first%theta) first = next
+    end do
+    function = first%function
+    theta = first%theta
+  end subroutine find_followed_crossing
+
+  !> Looks at a step up to theta_end, pair by pair of its parts.
+  subroutine search_step(roots, system, observer, dense, fastest, theta_end, first)
+    type(root_functions_t), intent(inout) :: roots
+    class(system_t), intent(inout) :: system
+    class(observer_t), intent(inout) :: observer
+    type(dense_output_t), intent(inout) :: dense
+    real(wp), intent(in) :: fastest   !! [rad/s]
+    real(wp), intent(in) :: theta_end
+    type(crossing_t), intent(out) :: first
+    real(wp), dimension(size(roots%g)) :: before, middle, after
+    integer :: pair, pairs
+
+    pairs = (parts_of(dense%degree) + 1) / 2
+    pairs = max(pairs, ceiling(min(0.25_wp * huge(1), 0.5_wp * theta_end * dense%h * fastest / part_of_wave)))
+    before = roots%last(:, dense%lane)
+    do pair = 1, pairs
+      associate (a => theta_end * (2 * pair - 2) / (2 * pairs), m => theta_end * (2 * pair - 1) / (2 * pairs), &
+                 b => theta_end * (2 * pair) / (2 * pairs))
+        call evaluate(roots, system, dense, m, middle)
+        call evaluate(roots, system, dense, b, after)
+        call search_pair(roots, system, observer, dense, [a, m, b], before, middle, after, most_halvings, first)
+      end associate
+      if (first%function > 0) return
+      before = after
+    end do
+    roots%last(:, dense%lane) = after
+  end subroutine search_step
+
+  !> Looks at two parts of a step of equal length, between three times.
+  recursive subroutine search_pair(roots, system, observer, dense, theta, before, middle, after, halvings, first)
+    type(root_functions_t), intent(inout) :: roots
+    class(system_t), intent(inout) :: system
+    class(observer_t), intent(inout) :: observer
+    type(dense_output_t), intent(inout) :: dense
+    real(wp), intent(in) :: theta(3)
+    real(wp), intent(in), dimension(size(roots%g)) :: before, middle, after
+    integer, intent(in) :: halvings               !! that are left
+    type(crossing_t), intent(inout) :: first
+    real(wp), dimension(size(roots%g)) :: between
+    real(wp) :: quarter
+
+    if (halvings == 0 .or. all(is_settled(before, middle, after))) then
+      call cross_part(roots, system, observer, dense, theta(1), theta(2), before, middle, first)
+      if (first%function == 0) call cross_part(roots, system, observer, dense, theta(2), theta(3), middle, after, first)
+      return
+    end if
+    quarter = theta(1) + 0.5_wp * (theta(2) - theta(1))
+    call evaluate(roots, system, dense, quarter, between)
+    call search_pair(roots, system, observer, dense, [theta(1), quarter, theta(2)], before, between, middle, halvings - 1, first)
+    if (first%function > 0) return
+    quarter = theta(2) + 0.5_wp * (theta(3) - theta(2))
+    call evaluate(roots, system, dense, quarter, between)
+    call search_pair(roots, system, observer, dense, [theta(2), quarter, theta(3)], middle, between, after, halvings - 1, first)
+  end subroutine search_pair
+
+  !> Whether three values of a function show where it crosses zero.
+  elemental logical function is_settled(before, middle, after)
+    real(wp), intent(in) :: before, middle, after
+    real(wp) :: bend
+
+    is_settled = .true.
+    if (min(before, middle, after) > far .or. max(before, middle, after) <= 0) return
+    if (.not. (is_finite(before) .and. is_finite(middle) .and. is_finite(after))) return
+    bend = safety * abs(0.25_wp * before - 0.5_wp * middle + 0.25_wp * after) * 4
+    is_settled = is_settled_part(before, middle, bend) .and. is_settled_part(middle, after, bend)
+  end function is_settled
+
+  !> The same for one of the parts: it is monotonic, or stays above zero.
+  elemental logical function is_settled_part(before, after, bend)
+    real(wp), intent(in) :: before, after
+    real(wp), intent(in) :: bend   !! second difference
+    real(wp) :: change
+
+    change = after - before
+    is_settled_part = abs(change) >= 0.5_wp * bend .or. max(before, after) <= 0
+    if (is_settled_part .or. min(before, after) <= 0) return
+    is_settled_part = 0.5_wp * (before + after) - 0.125_wp * bend - 0.5_wp * change * (change / bend) > 0
+  end function is_settled_part
+
+  !> Finds the first function that falls through zero in a part of a step. A function that is zero at the start and then negative
+  !> crosses at the start.
+  subroutine cross_part(roots, system, observer, dense, a, b, before, after, first)
+    type(root_functions_t), intent(inout) :: roots
+    class(system_t), intent(inout) :: system
+    class(observer_t), intent(inout) :: observer
+    type(dense_output_t), intent(inout) :: dense
+    real(wp), intent(in) :: a, b                    !! theta of the ends
+    real(wp), intent(in) :: before(:), after(:)     !! values of the functions there
+    type(crossing_t), intent(inout) :: first
+    real(wp) :: root
+    integer :: function
+
+    do function = 1, size(after)
+      associate (side => roots%side(dense%lane, function), g => after(function))
+        if (.not. is_finite(g)) cycle
+        if (side > 0 .and. g <= 0) then
+          call find_root(roots, system, observer, dense, bracket_t(function, a, b, before(function), g), root)
+          if (first%function == 0 .or. root < first%theta) first = crossing_t(function, root)
+        else if (side == 0 .and. g < 0) then
+          if (first%function == 0 .or. a < first%theta) first = crossing_t(function, a)
+        end if
+        side = sign_of(g)
+      end associate
+    end do
+  end subroutine cross_part
+
+  !> The functions at one theta.
+  subroutine evaluate(roots, system, dense, theta, g)
+    type(root_functions_t), intent(inout) :: roots
+    class(system_t), intent(inout) :: system
+    type(dense_output_t), intent(inout) :: dense
+    real(wp), intent(in) :: theta
+    real(wp), contiguous, intent(inout) :: g(:)
+
+    call sample(dense, theta, roots%y)
+    call system%indicator_values(dense%lane, dense%t + theta * dense%h, roots%y, g)
+  end subroutine evaluate
+
+end module nocdyn_followed_crossings
