@@ -119,6 +119,7 @@ contains
     type(group_t), intent(in) :: group
     real(wp), intent(in) :: speed   !! of its body [rad/s]
     type(fault_terms_t) :: terms
+    logical :: has_failed
 
     select case (group%text('kind'))
     case ('harmonic')
@@ -132,7 +133,7 @@ contains
     case ('ramp', 'pulse')
       frequency = 2.0_wp * pi / group%number('duration')
     case ('fault')
-      call find_fault_terms(group, terms)
+      call find_fault_terms(group, terms, has_failed)
       frequency = terms%frequency * maxval(terms%multiple)
     case default   ! a step
       frequency = 0.0_wp
