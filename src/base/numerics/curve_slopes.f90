@@ -58,8 +58,8 @@ contains
     end do
   end function spline_slopes
 
-  !> The slope at an end: 0 if it is clamped, else that of the polynomial through six points, by Newton's divided differences. It is
-  !> not known if there are fewer points, or if the last term is not small.
+  !> The slope at an end: 0 if it is clamped, else that of the polynomial through six points, by Newton's divided differences. It
+  !> is not known if there are fewer points, or if the last term is not small.
   pure subroutine find_end_slope(h, secant, is_clamped, slope, is_known)
     real(wp), intent(in) :: h(:), secant(:)   !! from the end inwards
     logical, intent(in) :: is_clamped

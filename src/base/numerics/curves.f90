@@ -1,5 +1,5 @@
-!> Interpolation of points: by straight lines, or by cubics with the slopes of a monotone cubic, of a spline, or of splines between
-!> dwells.
+!> Interpolation of points: by straight lines, or by cubics with the slopes of a monotone cubic, of a spline, or of splines
+!> between dwells.
 module nocdyn_curves
   use nocdyn_curve_slopes, only: dwell_slopes, monotone_slopes, spline_slopes
   use nocdyn_kinds, only: wp

@@ -3,8 +3,8 @@
 !> piston is at x = r cos(v) + sqrt(l^2 - p^2), p = r sin(v) - e; F. Freudenstein, Trans. ASME 77 (1955) 853 for e = 0 likewise.
 !>
 !> A rod with an inertia of its own has three rows more: the position of its centre of mass along the line and across, and its
-!> angle asin(p / l). Without one its mass is on its two ends; the part at the piston has one more row with the motion of the piston.
-!> The force of the first row is therefore that of the rod on the pin of the piston, however the rod is given.
+!> angle asin(p / l). Without one its mass is on its two ends; the part at the piston has one more row with the motion of the
+!> piston. The force of the first row is therefore that of the rod on the pin of the piston, however the rod is given.
 module nocdyn_crank_rows
   use nocdyn_bank, only: quantity_t, role_crank
   use nocdyn_element_rows, only: rows_between
