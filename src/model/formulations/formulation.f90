@@ -105,7 +105,6 @@ contains
       self%states = self%mechanical + self%internal
       self%switches = machine%switches%count
       self%limits_steps = any(machine%switches%phase_order > 0)
-      self%follows_waves = self%joints%count > 0
       self%lane_state = spread(0.0_wp, 1, self%states)
       self%lanes = machine%lanes
       self%has_energy_balance = with_energy_balance

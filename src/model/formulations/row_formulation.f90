@@ -112,6 +112,7 @@ contains
     self%joints = new_joint_sets(self%machine%banks, self%machine%switches, self%machine%elements%count)
     self%joints%leader => leader
     self%projects = self%joints%motions%count > 0
+    self%follows_waves = self%joints%count > 0
     if (self%joints%count == 0) return
     self%acceleration = spread(0.0_wp, 1, size(self%moving))
     self%joint_state = reshape(spread(0.0_wp, 1, self%states), [1, self%states])
