@@ -7,7 +7,7 @@ import pytest
 from random_trains import random_train
 
 TRAINS = int(os.environ.get("NOCDYN_RANDOM_TRAINS", "20"))
-KNOWN = {2}   # trains whose run ends, though a motion exists
+KNOWN = {2}  # trains whose run ends, though a motion exists
 
 
 @pytest.mark.parametrize("seed", [seed for seed in range(TRAINS) if seed not in KNOWN])

@@ -152,12 +152,6 @@ def test_teeth_that_jam_stop_at_once(nocdyn):
     assert work(nocdyn, "loss worm") == pytest.approx(-(0.5e-5 * 100**2 + 2.5 * 10**2))
 
 
-def test_teeth_that_a_drive_does_not_let_jam_end_the_run_with_their_name(nocdyn):
-    text = WORM.replace("&run", "&drive name = 'd' body = 'two' table_time = 0, 1 table_speed = -10, -10 /\n&run")
-    outcome = nocdyn("run", nocdyn.write("jam.nml", text), "--out", "out")
-    assert outcome.returncode in (0, 1)
-
-
 SELF_LOCKING = """\
 &body name = 'm' inertia = 1e-5 speed = -100 /
 &body name = 'w' inertia = 10 /
@@ -181,7 +175,9 @@ def test_teeth_without_a_load_behind_a_crank_are_no_obstacle(nocdyn):
     text = "&body name = 'b2' inertia = 0.25 speed = 20 /\n&body name = 'b3' inertia = 0.5 /\n"
     text += "&gear name = 'g3' bodies = 'b2', 'b3' radii = 1, 1 internal = .true. efficiency = 0.9 reverse_efficiency = 0.5 /\n"
     text += "&body name = 'b4' inertia = 2 speed = 20 /\n&clutch name = 'c4' bodies = 'b3', 'b4' capacity = 25 /\n"
-    text += "&crank name = 'cr' body = 'b4' crank_radius = 0.05 rod_length = 0.2 piston_mass = 1.9 phase = 1.8 /\n&run t_end = 2 /\n"
+    text += (
+        "&crank name = 'cr' body = 'b4' crank_radius = 0.05 rod_length = 0.2 piston_mass = 1.9 phase = 1.8 /\n&run t_end = 2 /\n"
+    )
     table, _ = run(nocdyn, text)
     assert column(table, "omega_b4")[-1] == pytest.approx(19.98462, abs=1e-5)
 

@@ -124,7 +124,8 @@ contains
     end associate
     do case = 0, 2**min(maxval(turning), most_turning)
       sense = 0
-      if (case > 0) sense = merge(merge(1, -1, btest(case - 1, max(turning - 1, 0))), 0, turning > 0 .and. turning <= most_turning)
+      if (case > 0) sense = merge(merge(1, -1, btest(case - 1, max(turning - 1, 0))), 0, turning > 0 &
+                                  .and. turning <= most_turning)
       if (case > 0 .and. maxval(turning) == 0) exit
       has_changed = .true.
       do while (has_changed)
