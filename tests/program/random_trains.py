@@ -10,7 +10,8 @@ def link(chance, name, pair):
     kind = chance.choice(LINKS)
     bodies = f"name = '{name}' bodies = {pair}"
     radii = f"radii = {chance.uniform(0.5, 2):.3f}, 1 internal = {chance.choice(['.true.', '.false.'])}"
-    losses = f"efficiency = {chance.uniform(0.5, 0.98):.3f} reverse_efficiency = {chance.choice([-0.1, 0.0, 0.3, 0.5, 0.8, 0.95])}"
+    losses = f"efficiency = {chance.uniform(0.5, 0.98):.3f} "
+    losses += f"reverse_efficiency = {chance.choice([-0.1, 0.0, 0.3, 0.5, 0.8, 0.95])}"
     late = f"times = {chance.uniform(0.1, 1):.3f} levels = 1" if chance.random() < 0.3 else ""
     texts = {
         "coupling": f"&coupling {bodies} stiffness = {chance.choice([100, 1000, 5000])} damping = {chance.choice([0, 2])} /",

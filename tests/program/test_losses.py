@@ -133,13 +133,53 @@ def test_a_brake_that_closes_at_rest_shares_what_a_worm_holds(nocdyn):
     assert [(event["joint"], event["from"], event["to"]) for event in events] == [("clutch brake", "open", "locked")]
 
 
-def test_teeth_that_jam_end_the_run_with_their_name(nocdyn):
-    text = body("one", 1e-5, 100) + body("two", 5, -10) + "&gear name = 'worm' bodies = 'one', 'two' teeth = 1, 10\n"
-    text += "  efficiency = 0.45 reverse_efficiency = -0.5 /\n"
-    text += "&excitation name = 'e' body = 'two' kind = 'step' amplitude = -100 time = 0.5 /\n&run t_end = 1 /\n"
-    outcome = nocdyn("run", nocdyn.write("jam.nml", text), "--out", "out")
-    assert outcome.returncode == 1
-    assert "beyond t = 0.5 s: the teeth of 'worm' jam: their second wheel brakes the first one" in outcome.stderr
+WORM = """\
+&body name = 'one' inertia = 1e-5 speed = 100 /
+&body name = 'two' inertia = 5 speed = -10 /
+&gear name = 'worm' bodies = 'one', 'two' teeth = 1, 10 efficiency = 0.45 reverse_efficiency = -0.5 /
+&excitation name = 'e' body = 'two' kind = 'step' amplitude = -100 time = 0.5 /
+&run t_end = 1 /
+"""
+
+
+def test_teeth_that_jam_stop_at_once(nocdyn):
+    table, events = run(nocdyn, WORM)
+    speed, times = column(table, "omega_one"), np.array(table["t [s]"])
+    assert speed[times < 0.5] == pytest.approx(100.0) and not any(abs(speed[times > 0.5]) > 1e-12)
+    # the impulse stops both: that of the second wheel comes by the teeth, 10 times less on the first one
+    assert [(event["time"], event["to"]) for event in events] == [(0.5, "locked")]
+    assert events[0]["impulse_N_m_s"] == pytest.approx(-(1e-5 * 100 + 5 * 10 / 10))
+    assert work(nocdyn, "loss worm") == pytest.approx(-(0.5e-5 * 100**2 + 2.5 * 10**2))
+
+
+SELF_LOCKING = """\
+&body name = 'm' inertia = 1e-5 speed = -100 /
+&body name = 'w' inertia = 10 /
+&gear name = 'worm' bodies = 'm', 'w' teeth = 1, 40 internal = .true. efficiency = 0.4 reverse_efficiency = -0.5 /
+&motor name = 'T' body = 'w' kind = 'constant' torque = -60 /
+&motor name = 'D' body = 'm' kind = 'constant' torque = -3 /
+&run t_end = 0.3 /
+"""
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_of_two_motions_the_limit_of_elastic_teeth_is_taken(nocdyn, formulation):
+    # 1e-5 * 40 a = -3 - T / 0.4 and 10 a = -60 + 40 T
+    table, events = run(nocdyn, SELF_LOCKING, "--set", f"run.formulation={formulation}")
+    acceleration = (-60 - 40 * 3 * 0.4) / (10 + 40 * 40 * 1e-5 * 0.4)
+    assert column(table, "omega_m")[-1] == pytest.approx(-100 + 0.3 * 40 * acceleration, rel=1e-9)
+    assert events == []
+
+
+def test_teeth_without_a_load_behind_a_crank_are_no_obstacle(nocdyn):
+    text = "&body name = 'b2' inertia = 0.25 speed = 20 /\n&body name = 'b3' inertia = 0.5 /\n"
+    text += "&gear name = 'g3' bodies = 'b2', 'b3' radii = 1, 1 internal = .true. efficiency = 0.9 reverse_efficiency = 0.5 /\n"
+    text += "&body name = 'b4' inertia = 2 speed = 20 /\n&clutch name = 'c4' bodies = 'b3', 'b4' capacity = 25 /\n"
+    text += (
+        "&crank name = 'cr' body = 'b4' crank_radius = 0.05 rod_length = 0.2 piston_mass = 1.9 phase = 1.8 /\n&run t_end = 2 /\n"
+    )
+    table, _ = run(nocdyn, text)
+    assert column(table, "omega_b4")[-1] == pytest.approx(19.98462, abs=1e-5)
 
 
 @pytest.mark.parametrize(("drive", "speed"), [("sun", 0.25 * (1 + 3 * 0.9)), ("carrier", 0.25 * (1 + 3 / 0.8))])

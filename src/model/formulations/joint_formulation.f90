@@ -247,7 +247,7 @@ contains
     end associate
   end subroutine decide_at
 
-  !> The state after a joint has stopped, in which those at rest have no slip that is left, so that no acceleration comes from one.
+  !> The state after a joint has stopped, in which those at rest have no slip left, so that no acceleration comes from one.
   !> Others are at rest as well that they now hold there: of joints that stop at one time, the first one stops them all.
   subroutine bring_to_rest(self, tolerance, y, is_at_rest, slip)
     class(joint_formulation_t), intent(inout) :: self

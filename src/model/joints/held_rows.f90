@@ -255,8 +255,8 @@ contains
     self%has_factors = .true.
   end subroutine factor_with_teeth
 
-  !> Bounds of the rounding errors of the present moments: equations that mix them give all errors of the largest ones, in the unit
-  !> of the square roots of the diagonal of W.
+  !> Bounds of the rounding errors of the present moments: equations that mix them give all errors of the largest ones, in the
+  !> unit of the square roots of the diagonal of W.
   pure function moment_errors(self) result(error)
     class(held_rows_t), intent(in) :: self
     real(wp) :: error(self%count)   !! [N m]

@@ -110,7 +110,7 @@ contains
   subroutine pivot(self, is_found)
     class(joint_choices_t), intent(inout) :: self
     logical, intent(out) :: is_found
-    integer, parameter :: most_turning = 8
+    integer, parameter :: most_turning = 5
     integer :: case, i, sense(size(self%mode)), turning(size(self%mode)), mode(size(self%mode))
     real(wp), dimension(size(self%mode)) :: least, most, slipping
     logical :: has_changed
@@ -124,7 +124,8 @@ contains
     end associate
     do case = 0, 2**min(maxval(turning), most_turning)
       sense = 0
-      if (case > 0) sense = merge(merge(1, -1, btest(case - 1, max(turning - 1, 0))), 0, turning > 0 .and. turning <= most_turning)
+      if (case > 0) sense = merge(merge(1, -1, btest(case - 1, max(turning - 1, 0))), 0, turning > 0 &
+                                  .and. turning <= most_turning)
       if (case > 0 .and. maxval(turning) == 0) exit
       has_changed = .true.
       do while (has_changed)
@@ -150,7 +151,7 @@ contains
     end do
   end subroutine pivot
 
-  !> Tries all combinations of modes.
+  !> Tries all combinations of modes, where they are few.
   subroutine try_all(self, is_found)
     class(joint_choices_t), intent(inout) :: self
     logical, intent(out) :: is_found
@@ -163,8 +164,9 @@ contains
     where (self%is_at_rest) choices = 3
     where (self%is_at_rest .and. self%has_teeth) choices = 5
     where (self%holds_always()) choices = 1   ! that of a lock
-    number = 0
-    do while (number < min(real(most_tried, wp), product(real(choices, wp))))
+    is_found = .false.
+    if (product(real(choices, wp)) > most_tried) return
+    do number = 0, product(choices) - 1
       rest = number
       do i = 1, size(choices)
         if (self%is_at_rest(i)) then
@@ -178,9 +180,7 @@ contains
       end do
       call self%settle(1, is_found)
       if (is_found) return
-      number = number + 1
     end do
-    is_found = .false.
   end subroutine try_all
 
   !> Finds turning teeth whose second wheel brakes the first one more than its inertia allows where all joints at rest are locked:

@@ -192,8 +192,8 @@ contains
     is_unbounded = abs(moment) >= huge(moment)
   end function is_unbounded
 
-  !> The impulses that end slips which joints without bounds do not allow, and those of teeth that jam; those of others are zero, as
-  !> friction has no time. A slip that none can end is `lost`: another joint or a drive does not let it.
+  !> The impulses that end slips which joints without bounds do not allow, and those of teeth that jam; those of others are zero,
+  !> as friction has no time. A slip that none can end is `lost`: another joint or a drive does not let it.
   subroutine find_impact(self, banks, t, slip, tolerance, impulse, is_struck)
     class(joint_sets_t), intent(inout) :: self
     type(bank_slot_t), intent(in) :: banks(:)
