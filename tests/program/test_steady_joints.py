@@ -110,7 +110,10 @@ def test_a_clutch_that_cannot_hold_slips_in_the_steady_state(nocdyn):
 
 def test_a_brake_that_holds_nothing_back_is_a_state_without_modes(nocdyn):
     text = "&body name = 'a' inertia = 1 /\n&clutch name = 'b' bodies = 'a', 'ground' capacity = 20 /\n&run t_end = 1 /\n"
-    assert "steady state, at rest, stable: joints hold all that could move" in nocdyn("equilibrium", nocdyn.write("m.nml", text)).stdout
+    assert (
+        "steady state, at rest, stable: joints hold all that could move"
+        in nocdyn("equilibrium", nocdyn.write("m.nml", text)).stdout
+    )
     outcome = nocdyn("modes", "m.nml")
     assert outcome.returncode == 1
     assert outcome.stderr.endswith("m.nml: in this state there are locked: clutch 'b', so that nothing moves\n")

@@ -1,8 +1,8 @@
 !> The joints of a machine in a balance of its torques: bearings with friction, clutches, freewheels and teeth with losses.
 !>
 !> Of the joints some are at rest; the others slip, and have the moment of slip in the direction of their speed. Teeth with losses
-!> that turn have M = -s T, and T follows from the moments of all elements (`nocdyn_tooth_loads`). Those of elastic elements and of
-!> joints at rest are the ones with which the rigid motions take the accelerations that all moments give them (d'Alembert): in a
+!> that turn have M = -s T, and T follows from the moments of all elements (`nocdyn_tooth_loads`). Those of elastic elements and
+!> of joints at rest are the ones with which the rigid motions take the accelerations that all moments give them (d'Alembert): in a
 !> steady state there are none, so that they are the true ones. Where the twists are statically indeterminate, the moments are
 !> those of springs with the stiffness of the start, and `offset` corrects T.
 module nocdyn_joint_balance
@@ -242,7 +242,7 @@ contains
     end do
   end function loss_matrix
 
-  !> The derivatives of the moments of the losses by an unknown, from those of the moments of the other elements and of the speeds.
+  !> The derivatives of the moments of the losses by an unknown, from those of the other moments and of the speeds.
   function change_of_losses(self, by_moments, by_speeds) result(change)
     class(joint_balance_t), intent(in) :: self
     real(wp), intent(in) :: by_moments(:), by_speeds(:)   !! [elements]
