@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-TRAINS = int(os.environ.get("NOCDYN_LOSSY_TRAINS", "8"))   # 80 of 80 have been found
+TRAINS = int(os.environ.get("NOCDYN_LOSSY_TRAINS", "8"))  # 80 of 80 have been found
 
 
 def states(nocdyn, text):
@@ -149,7 +149,10 @@ def test_discs_with_a_damper_between_them_keep_their_speed(nocdyn):
 
 @pytest.mark.parametrize("joint", ["drive", "cardan"])
 def test_a_steady_start_with_joints_that_move_is_refused(nocdyn, joint):
-    joints = {"drive": "&drive name = 'j' body = 'm' speed = 100 /\n", "cardan": "&cardan name = 'j' bodies = 'm', 'n' angle = 0.3 /\n"}
+    joints = {
+        "drive": "&drive name = 'j' body = 'm' speed = 100 /\n",
+        "cardan": "&cardan name = 'j' bodies = 'm', 'n' angle = 0.3 /\n",
+    }
     text = "".join(f"&body name = '{name}' inertia = 1 /\n" for name in "mno") + joints[joint]
     text += "&coupling name = 'c' bodies = 'n', 'o' stiffness = 1000 damping = 1 /\n&load name = 'l' body = 'o' viscous = 0.5 /\n"
     outcome = nocdyn("run", nocdyn.write("m.nml", text + "&run t_end = 1 start = 'equilibrium' /\n"), "--out", "run")
@@ -190,7 +193,7 @@ class Train:
             speeds.append(speeds[-1] * ratio)
         torque = self.hoist - self.constant * math.tanh(speeds[-1] / self.speed)
         for (ratio, forward, backward), turning in zip(self.stages[::-1], speeds[-2::-1], strict=True):
-            torque *= ratio   # of the teeth on the first wheel, without losses
+            torque *= ratio  # of the teeth on the first wheel, without losses
             torque *= 1 / forward if torque * turning < 0 else backward
         return self.motor(speed) + torque
 

@@ -29,16 +29,12 @@ contains
     class(formulation_t), allocatable :: formulation
     type(equilibrium_t), allocatable :: equilibria(:)
     type(error_t), allocatable :: error
-    type(machine_t) :: unlimited
     type(string_t), allocatable :: notes(:)
     integer :: freewheel
 
     is_changed = .false.
     if (size(input%groups_named('freewheel')) == 0) return
-    unlimited = machine
-    unlimited%constraints%least = -huge(1.0_wp)
-    unlimited%constraints%most = huge(1.0_wp)
-    call find_equilibria(unlimited, input%means_at, formulation, equilibria, notes, error)
+    call find_equilibria(machine, input%means_at, formulation, equilibria, notes, error)
     if (allocated(error)) return
     if (size(equilibria) > 1) call find_stability(formulation, input%means_at, equilibria)
     call formulation%observe([input%means_at], equilibria(nearest_equilibrium(formulation, equilibria))%y)

@@ -194,8 +194,9 @@ contains
       call json%open()
       call json%put('stability', trim(self%equilibria(k)%stability))
       call json%put('is_at_rest', self%equilibria(k)%is_at_rest)
-      if (self%equilibria(k)%stability /= 'not determined' .and. .not. self%equilibria(k)%is_fixed) &
+      if (self%equilibria(k)%stability /= 'not determined' .and. .not. self%equilibria(k)%is_fixed) then
         call json%put('growth_rate_1_s', self%equilibria(k)%growth)
+      end if
       call json%put('values', self%labels, self%values(:, k))
       call json%put('power_W', self%work_elements, self%power(:, k))
       call json%put('power_put_in_W', sum(max(self%power(:, k), 0.0_wp)))

@@ -32,8 +32,8 @@ module nocdyn_linearisation
 
   !> The modes and the first-order matrix at one state.
   type, public :: linearisation_t
-    real(wp), allocatable :: shapes(:, :)   !! modes in the coordinates q, M-normalised, [coordinates, modes]; there are as many as
-                                            !! coordinates, less what joints hold
+    real(wp), allocatable :: shapes(:, :)   !! modes in the coordinates q, M-normalised, [coordinates, modes]; as many modes
+                                            !! as coordinates, less what joints hold
     real(wp), allocatable :: twists(:, :)   !! modes in the twists of all elements, [elements, modes]
     real(wp), allocatable :: natural(:)     !! natural frequencies, negative for diverging modes [rad/s], [modes]
     integer, allocatable :: flexible(:)     !! modes that are not rigid

@@ -79,15 +79,17 @@ contains
     logical, intent(in) :: is_downwards   !! whether it begins at the highest speed
     type(block_solutions_t), intent(inout) :: block
     integer, parameter :: points_alone = 100, points = 25   ! per decade; of a speed alone, or with others to be found
+    integer, parameter :: few_points = 5   ! with two others or more beside joints, whose sets are scanned one after the other
     type(scan_t) :: found
     real(wp) :: start, unit(size(reduced%balance%motions%free))
-    integer :: i, k
+    integer :: density, i, k
 
     start = dot_product(reduced%row, reduced%z(reduced%speeds))
     unit = 0.0_wp
     unit(reduced%speeds) = reduced%basis(:, 1)
-    allocate (found%grid, source=new_speed_grid(merge(points_alone, points, size(unit(reduced%speeds)) == 1), &
-                                                1.0_wp / maxval(abs(reduced%balance%body_speeds(unit))), reduced%knees))
+    density = merge(points_alone, points, size(reduced%speeds) == 1)
+    if (size(reduced%speeds) > 2 .and. reduced%balance%joints%count > 0) density = few_points
+    allocate (found%grid, source=new_speed_grid(density, 1.0_wp / maxval(abs(reduced%balance%body_speeds(unit))), reduced%knees))
     allocate (found%torque(size(found%grid)), found%is_balanced(size(found%grid)))
     allocate (found%speeds(size(reduced%speeds), size(found%grid)))
     do k = 1, size(found%grid)

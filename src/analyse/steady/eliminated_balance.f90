@@ -139,7 +139,7 @@ contains
     end associate
   end subroutine gather_rows
 
-  !> Finds the elements whose torques rise somewhere with the speed, or jump.
+  !> Finds the elements whose torques rise somewhere with the speed, or jump. Those of friction jump downwards only.
   subroutine find_rising_laws(balance, elements, rises)
     type(torque_balance_t), intent(inout) :: balance
     integer, intent(in) :: elements(:)   !! numbered among the inelastic ones
@@ -149,8 +149,10 @@ contains
     real(wp), parameter :: level = 1.0e-12_wp                   ! relative change that is rounding
     real(wp), allocatable :: grid(:), knees(:), torques(:, :)
     real(wp) :: moments(size(balance%inelastic)), change(size(elements)), scale(size(elements))
+    logical :: is_friction(size(elements))
     integer :: e, k
 
+    is_friction = [(any(balance%joints%element == balance%inelastic(elements(e))), e=1, size(elements))]
     allocate (knees(0))
     do e = 1, size(elements)
       knees = [knees, element_knees(balance, elements(e))]
@@ -166,7 +168,7 @@ contains
       rises = rises .or. change > level * max(abs(torques(:, k)), abs(torques(:, k - 1)))
       if (grid(k) - grid(k - 1) > near * abs(grid(k))) cycle
       scale = maxval(abs(torques), dim=2, mask=spread(abs(grid) <= 2.0_wp * abs(grid(k)), 1, size(elements)))
-      rises = rises .or. abs(change) > jump * scale
+      rises = rises .or. (abs(change) > jump * scale .and. .not. is_friction)
     end do
   end subroutine find_rising_laws
 

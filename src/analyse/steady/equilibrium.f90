@@ -93,8 +93,8 @@ contains
     class(formulation_t), intent(in) :: formulation
     type(error_t), allocatable, intent(out) :: error
 
-    if (formulation%joints%motions%count > 0) call raise(error, exit_failed, 'joints move in this machine, which then has no ' // &
-      'steady state but that of the means over a turn')
+    if (formulation%joints%motions%count == 0) return
+    call raise(error, exit_failed, 'joints move in this machine, which has no steady state but that of means over a turn')
   end subroutine refuse_moving_rows
 
   !> Orders the states by their speeds, and says which joints hold in each.

@@ -1,9 +1,9 @@
 !> The joints of a machine in a balance of its torques: bearings with friction, clutches, freewheels and teeth with losses.
 !>
 !> Of the joints some are at rest; the others slip, and have the moment of slip in the direction of their speed. Teeth with losses
-!> that turn have M = -s T, and T follows from the moments of all elements (`nocdyn_tooth_loads`). Those of elastic elements and of
-!> joints at rest are the ones with which the rigid motions take the accelerations that all moments give them (d'Alembert): in a
-!> steady state there are none, so that they are the true ones. Where the twists are statically indeterminate, the moments are
+!> that turn have M = -s T, and T follows from the moments of all elements (`nocdyn_tooth_loads`). Those of elastic elements and
+!> of joints at rest are the ones with which the rigid motions take the accelerations that all moments give them (d'Alembert): in
+!> a steady state there are none, so that they are the true ones. Where the twists are statically indeterminate, the moments are
 !> those of springs with the stiffness of the start, and `offset` corrects T.
 module nocdyn_joint_balance
   use nocdyn_element_coordinates, only: element_coordinates_t
@@ -192,10 +192,13 @@ contains
     integer :: i
 
     call self%set_shares(machine)
-    matrix = self%loss_matrix()
-    inverse = pseudo_inverse(matrix, singular)
     drag = self%share * free
-    moment = -matmul(inverse, drag)
+    moment = -drag
+    if (any(abs(drag) > 0.0_wp)) then
+      matrix = self%loss_matrix()
+      inverse = pseudo_inverse(matrix, singular)
+      moment = -matmul(inverse, drag)
+    end if
     associate (own => self%element(self%teeth%joint))
       self%load = free + matmul(self%by_moment(:, own), moment)
       is_wrong = [(self%turns(i) .and. abs(self%load(i)) > 1.0e-12_wp * (abs(free(i)) + &
@@ -242,7 +245,7 @@ contains
     end do
   end function loss_matrix
 
-  !> The derivatives of the moments of the losses by an unknown, from those of the moments of the other elements and of the speeds.
+  !> The derivatives of the moments of the losses by an unknown, from those of the other moments and of the speeds.
   function change_of_losses(self, by_moments, by_speeds) result(change)
     class(joint_balance_t), intent(in) :: self
     real(wp), intent(in) :: by_moments(:), by_speeds(:)   !! [elements]

@@ -44,7 +44,7 @@ contains
   subroutine list_resting_sets(balance, sets, is_complete)
     type(torque_balance_t), intent(in) :: balance        !! without joints at rest
     logical, allocatable, intent(out) :: sets(:, :)      !! [joints, sets]
-    logical, intent(out) :: is_complete                  !! false: there are too many
+    logical, intent(out) :: is_complete                  !! whether all are listed
     real(wp), allocatable :: n(:, :), rows(:, :)
     real(wp) :: rates(balance%joints%count, size(balance%loose%free))
     logical :: is_candidate(size(rates, 1)), larger(size(rates, 1))
