@@ -57,13 +57,14 @@ contains
     type(error_t), allocatable, intent(out) :: error   !! a message of a steady state begins with its speed
     type(held_state_t) :: high, low
     type(source_t), allocatable :: of_high(:), of_low(:)
+    real(wp), parameter :: beside = 1.01_wp   ! a second speed, which tells orders from frequencies
     real(wp) :: lowest   ! frequency [rad/s]
 
     self%machine = machine
     call new_held_speeds(machine, reference, self%held, error)
     if (allocated(error)) return
     call gather_losses(self)
-    call self%held%hold(speeds(size(speeds)), high, error)
+    call self%held%hold(merge(speeds(size(speeds)), beside * speeds(1), size(speeds) > 1), high, error)
     if (.not. allocated(error)) call self%held%hold(speeds(1), low, error)
     if (allocated(error)) return
     call list_sources(machine, low, of_low)
