@@ -42,8 +42,8 @@ contains
     if (size(range) == 0) return
     if (size(range) == 1 .and. key == 'speed') return
     if (size(range) > 2) then
-      call raise(error, exit_input, input%location(group, key) // ': ' // to_text(size(range)) // ' speeds; allowed: one, or ' // &
-                 'the slowest and the fastest one')
+      call raise(error, exit_input, input%location(group, key) // ': ' // to_text(size(range)) // ' speeds; allowed: one, ' // &
+                 'or the slowest and the fastest one')
       return
     end if
     if (range(1) * range(2) > 0 .and. abs(range(1)) < abs(range(2))) return
