@@ -110,3 +110,29 @@ def test_a_mean_over_the_speed_acts_on_the_mean_rotation(nocdyn):
     text = text.replace("amplitudes = 500, 100, 300", "amplitudes = 300, 100, 500")
     state, _ = analysis(nocdyn, "equilibrium", text)
     assert "unstable" in [one["stability"] for one in state["steady_states"]]
+
+
+SHAKER = "&excitation name = 'h' body = 'e' amplitude = 20 frequency = 251.32741228718345 /\n"  # order 2 at 1200 rpm
+
+
+@pytest.mark.parametrize("speed", ["1200", "1200, 1200"])
+def test_one_speed_has_the_numbers_that_it_has_among_others(nocdyn, speed):
+    """An order and a frequency that are equal at this speed are still two lines, which may have any phase."""
+    text = ENGINE.replace("speed_rpm = 1200, 1500", "speed_rpm = {}") + FIRED.format(0, 600, 600) + SHAKER
+    analysis(nocdyn, "response", text.format("1200, 1500"))
+    among = {label: values[0] for label, values in columns(nocdyn, "response.csv").items()}
+    content, report = analysis(nocdyn, "response", text.format(speed))
+    assert "forced response at 1200 rpm of g, 2 orders" in report
+    table = columns(nocdyn, "response.csv")
+    assert {label: len(values) for label, values in table.items()} == dict.fromkeys(among, 1)
+    assert {label: values[0] for label, values in table.items()} == pytest.approx(among)
+    assert content["speed_rad_s"] == pytest.approx([1200 * RPM] * 2)
+    analysis(nocdyn, "campbell", text.format(speed))
+    assert columns(nocdyn, "campbell.csv")["frequency_1"] == pytest.approx([27.56644], rel=1e-6)
+
+
+def test_three_speeds_are_refused(nocdyn):
+    path = nocdyn.write("machine.nml", ENGINE.replace("1200, 1500", "1200, 1500, 1600") + FIRED.format(0, 600, 600))
+    outcome = nocdyn("response", path)
+    assert outcome.returncode == 2
+    assert "3 speeds; allowed: one, or the slowest and the fastest one" in outcome.stderr

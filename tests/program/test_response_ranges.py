@@ -14,7 +14,9 @@ DUFFING = """\
 &response body = 'hub' speed = 0.99, 1.01 count = 3 /
 &run t_end = 1 /
 """
-NOTE = re.compile(r"over the vibration of 'spring' at (\S+) rpm its stiffness is on average (\S+) % (above|below) that at its mean")
+NOTE = re.compile(
+    r"over the vibration of 'spring' at (\S+) rpm its stiffness is on average (\S+) % (above|below) that at its mean"
+)
 SAMPLES = 4000
 
 

@@ -1,4 +1,4 @@
-"""nocdyn response of machines whose stiffnesses differ by many orders of magnitude, against dense solutions with exact numbers."""
+"""nocdyn response of machines whose stiffnesses differ by many orders of magnitude, against solutions with exact numbers."""
 
 import json
 import os
@@ -48,7 +48,7 @@ def test_a_rigid_coupling_has_no_noise(nocdyn, stiffness):
 
 
 def tree(dice, bodies):
-    """Inertias, and couplings (first body, second body, stiffness, damping) of a random tree with a ring that is not all rigid."""
+    """Inertias, and couplings (first body, second body, stiffness, damping) of a random tree with a ring, not all of it rigid."""
     inertias = [10 ** dice.uniform(-1, 1) for _ in range(bodies)]
     pairs = [(dice.randrange(i), i) for i in range(1, bodies)]
     couplings = [(a, b, 10 ** dice.choice([4, 5, 6, 13, 16, 19]), 10 ** dice.uniform(0, 2)) for a, b in pairs]

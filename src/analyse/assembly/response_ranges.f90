@@ -3,7 +3,7 @@ module nocdyn_response_ranges
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_text, only: rounded_text
+  use nocdyn_text, only: rounded_text, to_text
   use nocdyn_units, only: from_si, unit_rpm
   use nocdyn_written_values, only: unit_of, written_key, written_number
   implicit none (type, external)
@@ -25,7 +25,7 @@ contains
     end associate
   end subroutine check_response_range
 
-  !> Two speeds are the lowest and the highest one, in the same direction.
+  !> Two speeds are the lowest and the highest one, in the same direction. Those of a response may be one.
   subroutine check_range(input, group, key, range, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: group
@@ -35,7 +35,14 @@ contains
     character(len=:), allocatable :: text
 
     if (size(range) == 0) return
+    if (size(range) == 1 .and. key == 'speed') return
+    if (size(range) > 2) then
+      call raise(error, exit_input, input%location(group, key) // ': ' // to_text(size(range)) // ' speeds; allowed: one, ' // &
+                 'or the slowest and the fastest one')
+      return
+    end if
     if (range(1) * range(2) > 0 .and. abs(range(1)) < abs(range(2))) return
+    if (key == 'speed' .and. .not. abs(range(1) - range(2)) > 0) return
     associate (written => input%groups(group))
       text = written_key(written, key) // ' = ' // written_number(written, key, range(1)) // ', ' // &
              written_number(written, key, range(2))

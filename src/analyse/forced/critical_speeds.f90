@@ -91,7 +91,8 @@ contains
       room = room - size(speeds)
       call response%add_points(speeds, .false., error, failed_speed)
       if (allocated(error)) return
-      call find_vertices(response, crossings, max(0, room / 3), speeds, unrefined)   ! the next rounds know better which ones matter
+      ! a third of the room: the next rounds know better which ones matter
+      call find_vertices(response, crossings, max(0, room / 3), speeds, unrefined)
     end do
   end subroutine refine_peaks
 

@@ -148,8 +148,8 @@ contains
     end do
   end subroutine choose_moments
 
-  !> The products of all pairs of ratios of each element; of an element whose moment is an unknown, its ratios in the column and in
-  !> the row of the moment, and the diagonal.
+  !> The products of all pairs of ratios of each element; of an element whose moment is an unknown, its ratios in the column and
+  !> in the row of the moment, and the diagonal.
   subroutine list_pairs(self, entries, products)
     type(dynamic_stiffness_t), intent(in) :: self
     type(entries_t), intent(out) :: entries   !! their rows and columns

@@ -57,19 +57,21 @@ contains
     type(error_t), allocatable, intent(out) :: error   !! a message of a steady state begins with its speed
     type(held_state_t) :: high, low
     type(source_t), allocatable :: of_high(:), of_low(:)
+    real(wp), parameter :: beside = 1.01_wp   ! a second speed, which tells orders from frequencies
+    real(wp), parameter :: unexcited = 1.0e100_wp   ! [rad/s]: no stiffness is large
     real(wp) :: lowest   ! frequency [rad/s]
 
     self%machine = machine
     call new_held_speeds(machine, reference, self%held, error)
     if (allocated(error)) return
     call gather_losses(self)
-    call self%held%hold(speeds(size(speeds)), high, error)
+    call self%held%hold(merge(speeds(size(speeds)), beside * speeds(1), size(speeds) > 1), high, error)
     if (.not. allocated(error)) call self%held%hold(speeds(1), low, error)
     if (allocated(error)) return
     call list_sources(machine, low, of_low)
     call list_sources(machine, high, of_high)
     call new_lines(of_low, of_high, self%lines)
-    lowest = minval([sqrt(huge(1.0_wp)), of_low%frequency], mask=[.true., of_low%frequency > 0])
+    lowest = minval([unexcited, of_low%frequency], mask=[.true., of_low%frequency > 0])
     call new_dynamic_stiffness(machine, self%held%balance%incidence, lowest, &
                                max(abs(low%stiffness) + lowest * abs(low%damping), &
                                    abs(high%stiffness) + lowest * abs(high%damping)), self%matrix, error)

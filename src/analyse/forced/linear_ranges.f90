@@ -2,7 +2,7 @@
 !>
 !> A law M(u, u') that oscillates by u = u_0 + a cos(theta) has the equivalent stiffness -1 / (pi a) times the integral of
 !> M cos(theta) over a turn: its first harmonic (describing function). It is compared with the tangent stiffness of the linear
-!> response. The same over u' is compared with the damping. As the amplitude a of several lines stands half the range of their sum.
+!> response. The same over u' is compared with the damping. The amplitude a of several lines is half the range of their sum.
 module nocdyn_linear_ranges
   use nocdyn_bank, only: bank_t, role_coupling, role_load, role_motor
   use nocdyn_forced_response, only: forced_response_t
@@ -89,29 +89,33 @@ contains
     type(forced_response_t), intent(in) :: response
     integer, intent(in) :: point
     type(machine_t), intent(inout) :: machine   !! with mean torques; its elements are work space
-    real(wp), intent(in) :: t(:), share
+    real(wp), contiguous, intent(in) :: t(:)
+    real(wp), intent(in) :: share
     type(excursion_t), intent(inout) :: excursions(:)   !! all of stiffness or all of damping
     real(wp), parameter :: rounding = 1.0e-7_wp         ! of the moment at the mean
+    real(wp), parameter :: negligible = 1.0e-6_wp       ! of another stiffness
     real(wp), dimension(size(excursions)) :: amplitude, equivalent, tangent
     real(wp) :: largest, moved, weight
-    integer :: k
+    integer :: element(size(excursions)), k
 
+    element = excursions%element
     associate (here => response%points(point), is_elastic => excursions(1)%is_elastic)
       do k = 1, size(excursions)
-        amplitude(k) = oscillation(response, here, excursions(k)%element, .not. is_elastic)
+        amplitude(k) = oscillation(response, here, element(k), .not. is_elastic)
       end do
       call set_mean(here, machine)
-      call find_equivalent(machine, t, excursions%element, is_elastic, amplitude, equivalent, tangent)
+      call find_equivalent(machine, t, element, is_elastic, amplitude, equivalent, tangent)
       largest = maxval([0.0_wp, here%half_range([(k, k=1, size(response%quantities))])])
       do k = 1, size(excursions)
         weight = 1.0_wp
-        if (here%state%factor > 0 .and. machine%banks(bank_number(machine, excursions(k)%element))%bank%role == role_motor) &
-          weight = here%state%factor
+        associate (bank => machine%banks(bank_number(machine, element(k)))%bank)
+          if (bank%role == role_motor .and. here%state%factor > 0) weight = here%state%factor
+        end associate
         moved = weight * abs(equivalent(k) - tangent(k)) * amplitude(k)
-        if (moved <= rounding * abs(here%state%mean(excursions(k)%element))) cycle
+        if (moved <= rounding * abs(here%state%mean(element(k)))) cycle
         if (is_elastic) then
           if (abs(equivalent(k) - tangent(k)) <= share * abs(tangent(k))) cycle
-          call keep_worst(abs(equivalent(k) - tangent(k)) / max(abs(tangent(k)), tiny(1.0_wp)))
+          call keep_worst(abs(equivalent(k) - tangent(k)) / (abs(tangent(k)) + negligible * abs(equivalent(k) - tangent(k))))
         else
           if (moved <= share * largest) cycle
           call keep_worst(moved)
@@ -183,7 +187,7 @@ contains
   !> The slopes of the laws at the mean, and those of the first harmonics over the oscillations.
   subroutine find_equivalent(machine, t, element, is_elastic, amplitude, equivalent, tangent)
     type(machine_t), intent(inout) :: machine   !! at its mean
-    real(wp), intent(in) :: t(:)
+    real(wp), contiguous, intent(in) :: t(:)
     integer, intent(in) :: element(:)
     logical, intent(in) :: is_elastic
     real(wp), intent(in) :: amplitude(:)
@@ -214,7 +218,7 @@ contains
     end do
     where (amplitude > tiny(1.0_wp))
       equivalent = 2.0_wp / samples * equivalent / amplitude
-    elsewhere
+    else where
       equivalent = tangent
     end where
   end subroutine find_equivalent

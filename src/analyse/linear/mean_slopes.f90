@@ -24,8 +24,9 @@ contains
     if (size(changing) == 0) return
     associate (steepest => slope(changing(maxloc(abs(slope(changing)), dim=1))))
       call append(notes, 'the mean torque of ' // joined(element_names(machine, changing), ', ', most_names) // &
-                         ' changes over the speed by up to ' // rounded_text(steepest, 3) // ' N m s/rad: it follows the mean ' // &
-                         'speed and does not damp oscillations here; nocdyn run takes it at the speed of the moment, where it does')
+                         ' changes over the speed by up to ' // rounded_text(steepest, 3) // ' N m s/rad: it follows the ' // &
+                         'mean speed and does not damp oscillations here; nocdyn run takes it at the speed of the moment, ' // &
+                         'where it does')
     end associate
   end subroutine note_mean_slopes
 

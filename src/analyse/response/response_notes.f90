@@ -192,11 +192,11 @@ contains
       associate (one => excursions(i))
         law = 'stiffness'
         if (.not. one%is_elastic) law = 'slope over the speed'
-        if (abs(one%tangent) > 0) then
+        if (abs(one%tangent) > 1.0e-6_wp * abs(one%equivalent)) then
           change = rounded_text(100.0_wp * abs(one%equivalent / one%tangent - 1.0_wp), 2) // ' % ' // &
                    trim(merge('above', 'below', one%equivalent / one%tangent > 1.0_wp)) // ' that at its mean'
         else
-          change = rounded_text(one%equivalent, 3) // ', and 0 at its mean'
+          change = rounded_text(one%equivalent, 3) // ', and about 0 at its mean'
         end if
         call append(notes, 'over the vibration of ' // quoted(response%machine%element_name(one%element)) // ' at ' // &
                            rounded_text(from_si(response%points(one%worst)%state%speed, unit_rpm), 6) // ' rpm its ' // law // &

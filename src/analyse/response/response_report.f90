@@ -25,6 +25,7 @@ contains
     type(response_analysis_t), intent(in) :: analysis
     type(response_summary_t), intent(in) :: summary
     character(len=:), allocatable :: text
+    character(len=:), allocatable :: range
     type(text_buffer_t) :: report
     integer :: i
 
@@ -32,8 +33,9 @@ contains
       call report%append_line(file // ': note: ' // analysis%notes(i)%text)
     end do
     associate (speeds => analysis%settings%speeds)
-      call report%append_line(file // ': forced response from ' // rpm(speeds(1)) // ' to ' // rpm(speeds(size(speeds))) // &
-                              ' rpm of ' // analysis%body_name // ', ' // &
+      range = 'at ' // rpm(speeds(1))
+      if (size(speeds) > 1) range = 'from ' // rpm(speeds(1)) // ' to ' // rpm(speeds(size(speeds)))
+      call report%append_line(file // ': forced response ' // range // ' rpm of ' // analysis%body_name // ', ' // &
                               counted(size(analysis%response%lines), 'order', 'orders'))
     end associate
     call put_criticals(analysis, summary, report)

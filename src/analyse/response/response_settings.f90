@@ -7,7 +7,7 @@ module nocdyn_response_settings
   use nocdyn_machine, only: machine_t
   use nocdyn_response_limits, only: read_limits, response_limit_t
   use nocdyn_response_quantities, only: list_quantities, response_quantity_t
-  use nocdyn_text, only: rounded_text, to_text
+  use nocdyn_text, only: counted, rounded_text
   use nocdyn_units, only: from_si, unit_rpm
   implicit none (type, external)
   private
@@ -51,8 +51,11 @@ contains
       count = group%whole_number('count')
       range = group%numbers('speed')
     end associate
-    settings%speeds = [(range(1) + (range(2) - range(1)) * (real(i, wp) / (count - 1)), i=0, count - 1)]
-    settings%speeds(count) = range(2)
+    associate (last => range(size(range)))
+      if (.not. abs(last - range(1)) > 0) count = 1
+      settings%speeds = [(range(1) + (last - range(1)) * (real(i, wp) / max(1, count - 1)), i=0, count - 1)]
+      settings%speeds(count) = last
+    end associate
   end subroutine read_response_settings
 
   !> Checks &response and &limit, if there are any.
@@ -72,8 +75,8 @@ contains
     call list_quantities(machine, settings%body, quantities)
     call read_limits(input, quantities, limits, error)
     associate (speeds => settings%speeds)
-      text = new_line('a') // '  response: ' // to_text(size(speeds)) // ' speeds of ' // machine%names(settings%body)%text // &
-             ' from ' // rounded_text(from_si(speeds(1), unit_rpm), 6) // ' to ' // &
+      text = new_line('a') // '  response: ' // counted(size(speeds), 'speed', 'speeds') // ' of ' // &
+             machine%names(settings%body)%text // ' from ' // rounded_text(from_si(speeds(1), unit_rpm), 6) // ' to ' // &
              rounded_text(from_si(speeds(size(speeds)), unit_rpm), 6) // ' rpm'
     end associate
   end subroutine check_response
