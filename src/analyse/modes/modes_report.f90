@@ -30,7 +30,7 @@ module nocdyn_modes_report
     type(machine_t) :: machine
     type(linearisation_t) :: linear               !! at the operating point
     type(mode_t), allocatable :: modes(:)
-    real(wp), allocatable :: shaft_errors(:)      !! relative, of frequencies by the nodes of shafts, [modes]; not allocated: no nodes
+    real(wp), allocatable :: shaft_errors(:)      !! relative, by the nodes of shafts, [modes]; not allocated without
     integer :: shapes = 0                         !! number of modes, from the first, whose shapes and shares are in the files
     type(string_t), allocatable :: body_names(:)      !! of the bodies of the input
     type(string_t), allocatable :: kinetic_names(:)   !! of the parts of the kinetic energy: these, and shafts with nodes
