@@ -12,7 +12,7 @@ module nocdyn_shaft_errors
   implicit none (type, external)
   private
 
-  public :: has_shaft_nodes, shaft_error, error_text
+  public :: has_shaft_nodes, shaft_error, describe_error
 
   real(wp), parameter, public :: noted_error = 1.0e-3_wp   !! relative, of a frequency; less is not mentioned
   real(wp), parameter :: vague = 0.03_wp                   ! a larger one is not known to first order
@@ -87,16 +87,16 @@ contains
     end associate
   end function work_of_differences
 
-  !> "about 0.6 %", "more than 3 %".
-  function error_text(error) result(text)
+  !> "about 0.6 %", "more than 3 %". (No function: threads call it, see `string_t`.)
+  subroutine describe_error(error, text)
     real(wp), intent(in) :: error   !! as of `shaft_error`
-    character(len=:), allocatable :: text
+    character(len=:), allocatable, intent(out) :: text
 
     if (error > vague) then
       text = 'more than ' // rounded_text(100.0_wp * vague, 2) // ' %'
     else
       text = 'about ' // rounded_text(100.0_wp * error, 1) // ' %'
     end if
-  end function error_text
+  end subroutine describe_error
 
 end module nocdyn_shaft_errors

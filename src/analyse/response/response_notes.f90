@@ -10,7 +10,7 @@ module nocdyn_response_notes
   use nocdyn_machine, only: machine_t
   use nocdyn_response_quantities, only: quantity_moment
   use nocdyn_response_settings, only: response_settings_t
-  use nocdyn_shaft_errors, only: error_text, has_shaft_nodes, noted_error, shaft_error
+  use nocdyn_shaft_errors, only: describe_error, has_shaft_nodes, noted_error, shaft_error
   use nocdyn_speed_modes, only: speed_modes_t
   use nocdyn_steady_losses, only: describe_losses
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
@@ -41,7 +41,7 @@ contains
     type(crossing_t), intent(in) :: crossings(:)
     logical, intent(in) :: lists_modes   !! whether modes are reported that no line crosses
     type(string_t), allocatable, intent(inout) :: notes(:)
-    character(len=:), allocatable :: text
+    character(len=:), allocatable :: size_text, text
     real(wp) :: errors(modes%modes)
     integer :: first, m
 
@@ -49,9 +49,10 @@ contains
     errors = [(shaft_error(machine, modes%shape(:, m), modes%natural(m, 1)), m=1, modes%modes)]
     if (.not. any(errors > noted_error)) return
     first = minloc(modes%natural(:, 1), dim=1, mask=errors > noted_error)
+    call describe_error(errors(first), size_text)
     text = 'the nodes of shafts resolve ' // to_text(count(errors <= noted_error)) // ' of the ' // to_text(modes%modes) // &
            ' modes: that at ' // rounded_text(from_si(modes%natural(first, 1), unit_hz), 6) // ' Hz has an error of ' // &
-           error_text(errors(first)) // ', higher ones a larger one'
+           size_text // ', higher ones a larger one'
     associate (crossed => count([(errors(crossings(m)%mode) > noted_error, m=1, size(crossings))]))
       if (crossed == 0 .and. .not. lists_modes) return
       if (crossed > 0) text = text // ', and with them ' // to_text(crossed) // ' of the ' // to_text(size(crossings)) // &

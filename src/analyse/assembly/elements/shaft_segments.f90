@@ -8,7 +8,8 @@ module nocdyn_shaft_segments
   implicit none (type, external)
   private
 
-  public :: are_resolved, check_shafts, choose_elements, has_inertia, has_own_nodes, segment_inertia, segment_stiffness, segments_of
+  public :: are_resolved, check_shafts, choose_elements, has_inertia, has_own_nodes, segments_of
+  public :: segment_inertia, segment_stiffness
 
   real(wp), parameter :: pi = acos(-1.0_wp)
   integer, parameter, public :: most_nodes = 1000   !! inside of a shaft

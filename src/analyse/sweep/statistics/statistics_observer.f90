@@ -275,8 +275,9 @@ contains
       case (statistic_min)
         if (minval(extremes) < 0 .or. value < minval(extremes)) value = minval(extremes)
       case (statistic_time_of_max)   ! the largest values, then their times
-        if (maxval(extremes(first + 1:first + points)) > 0) &
+        if (maxval(extremes(first + 1:first + points)) > 0) then
           value = extremes(first + points + maxloc(extremes(first + 1:first + points), dim=1))
+        end if
       case default
         value = maxval(extremes)
       end select
