@@ -26,7 +26,7 @@ module nocdyn_machine_parts
   use nocdyn_shaft_assembly, only: add_shafts, new_shaft_set, shaft_set_t
   use nocdyn_shaft_segments, only: check_shaft
   use nocdyn_start_speeds, only: fit_start_speeds
-  use nocdyn_text, only: joined, selected
+  use nocdyn_text, only: append, joined, selected
   use nocdyn_torque_assembly, only: add_engines, add_excitation_form, add_load_form, excitation_form, load_form
   use nocdyn_written_values, only: shared_unit
   implicit none (type, external)
@@ -47,6 +47,7 @@ contains
     type(body_index_t), target :: body_index
     type(shaft_set_t) :: shafts
     type(error_t), allocatable :: mistakes
+    integer :: i
 
     if (present(lanes)) machine%lanes = lanes
     call set_bodies(input, machine)
@@ -58,6 +59,9 @@ contains
     call add_elements(input, body_index, machine)
     call new_shaft_set(input, body_index, machine%constraints, shafts)
     call add_shafts(shafts, machine)
+    do i = 1, size(shafts%notes)
+      call append(machine%start_notes, shafts%notes(i)%text)
+    end do
     call add_cranks(new_element_groups(input, 'crank', machine%lanes, body_index), machine)
     call machine%number_elements()
     call analyse_machine_constraints(input, body_index, machine, error)

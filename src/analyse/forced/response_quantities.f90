@@ -105,13 +105,14 @@ contains
   subroutine add_shafts(bank, list)
     class(bank_t), intent(in) :: bank
     type(quantity_list_t), intent(inout) :: list
-    real(wp), allocatable :: modulus(:)
+    real(wp), allocatable :: moments(:, :), modulus(:)
     integer :: end, k, s
 
     select type (bank)
     type is (shafts_t)
       do s = 1, size(bank%shafts)
         modulus = bank%section_moduli(s, 1)
+        moments = bank%shafts(s)%all_moments()
         associate (shaft => bank%shafts(s), name => bank%names(bank%shafts(s)%first)%text)
           do end = 1, 3
             if (end == 1) call list%add(quantity_moment, name, 'moment_' // name // '_1', 'N m')
@@ -119,9 +120,9 @@ contains
             if (end == 3) call list%add(quantity_stress, name, 'stress_' // name, 'Pa')
             associate (one => list%list(list%count))
               one%element = [(bank%first + k - 1, k=shaft%first, shaft%last)]
-              if (end == 1) one%weight = -shaft%moments(:1, :)
-              if (end == 2) one%weight = -shaft%moments(size(modulus):, :)
-              if (end == 3) one%weight = -shaft%moments / spread(modulus, 2, size(one%element))
+              if (end == 1) one%weight = -moments(:1, :)
+              if (end == 2) one%weight = -moments(size(modulus):, :)
+              if (end == 3) one%weight = -moments / spread(modulus, 2, size(one%element))
             end associate
           end do
         end associate

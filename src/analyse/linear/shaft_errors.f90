@@ -1,8 +1,8 @@
 !> How far the modes of a machine are from those of its continuous shafts, whose nodes resolve the lower ones only.
 !>
-!> In each spectral element the continuous shaft that begins with the angle and moment of the mode ends with others. To first order
-!> the square of the frequency is wrong by the work of these differences, angle times moment, over the modal mass (Green's identity
-!> for the mode and that of the continuous shaft).
+!> In each spectral element the continuous shaft that begins with the angle and moment of the mode ends with others. To first
+!> order the square of the frequency is wrong by the work of these differences, angle times moment, over the modal mass (Green's
+!> identity for the mode and that of the continuous shaft).
 module nocdyn_shaft_errors
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -12,7 +12,7 @@ module nocdyn_shaft_errors
   implicit none (type, external)
   private
 
-  public :: has_shaft_nodes, shaft_error, error_text
+  public :: has_shaft_nodes, shaft_error, describe_error
 
   real(wp), parameter, public :: noted_error = 1.0e-3_wp   !! relative, of a frequency; less is not mentioned
   real(wp), parameter :: vague = 0.03_wp                   ! a larger one is not known to first order
@@ -87,16 +87,16 @@ contains
     end associate
   end function work_of_differences
 
-  !> "about 0.6 %", "more than 3 %".
-  function error_text(error) result(text)
+  !> "about 0.6 %", "more than 3 %". (No function: threads call it, see `string_t`.)
+  subroutine describe_error(error, text)
     real(wp), intent(in) :: error   !! as of `shaft_error`
-    character(len=:), allocatable :: text
+    character(len=:), allocatable, intent(out) :: text
 
     if (error > vague) then
       text = 'more than ' // rounded_text(100.0_wp * vague, 2) // ' %'
     else
       text = 'about ' // rounded_text(100.0_wp * error, 1) // ' %'
     end if
-  end function error_text
+  end subroutine describe_error
 
 end module nocdyn_shaft_errors

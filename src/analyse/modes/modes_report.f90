@@ -9,7 +9,7 @@ module nocdyn_modes_report
   use nocdyn_mean_slopes, only: note_mean_slopes
   use nocdyn_modes, only: find_modes, kind_names, mode_diverging, mode_internal, mode_oscillating, mode_overdamped, mode_rigid, &
     mode_t
-  use nocdyn_shaft_errors, only: error_text, has_shaft_nodes, noted_error, shaft_error
+  use nocdyn_shaft_errors, only: describe_error, has_shaft_nodes, noted_error, shaft_error
   use nocdyn_operating_point, only: operating_point_t
   use nocdyn_table_text, only: cell, cell_width, padded, text_width
   use nocdyn_text, only: append, rounded_text, string_t, to_text
@@ -31,7 +31,7 @@ module nocdyn_modes_report
     type(machine_t) :: machine
     type(linearisation_t) :: linear               !! at the operating point
     type(mode_t), allocatable :: modes(:)
-    real(wp), allocatable :: shaft_errors(:)      !! relative, of frequencies by the nodes of shafts, [modes]; not allocated: no nodes
+    real(wp), allocatable :: shaft_errors(:)      !! relative, by the nodes of shafts, [modes]; not allocated without
     integer :: shapes = 0                         !! number of modes, from the first, whose shapes and shares are in the files
     type(string_t), allocatable :: body_names(:)      !! of the bodies of the input
     type(string_t), allocatable :: kinetic_names(:)   !! of the parts of the kinetic energy: these, and shafts with nodes
@@ -213,7 +213,9 @@ contains
 
     text = ''
     if (.not. allocated(self%shaft_errors)) return
-    if (self%shaft_errors(i) > noted_error) text = '; nodes too few: error ' // error_text(self%shaft_errors(i))
+    if (self%shaft_errors(i) <= noted_error) return
+    call describe_error(self%shaft_errors(i), text)
+    text = '; nodes too few: error ' // text
   end function shaft_text
 
   !> "; mostly stator flux d of motor 'mains'".

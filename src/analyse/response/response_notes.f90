@@ -13,7 +13,7 @@ module nocdyn_response_notes
   use nocdyn_mean_slopes, only: note_mean_slopes
   use nocdyn_response_quantities, only: quantity_moment, quantity_reaction
   use nocdyn_response_settings, only: response_settings_t
-  use nocdyn_shaft_errors, only: error_text, has_shaft_nodes, noted_error, shaft_error
+  use nocdyn_shaft_errors, only: describe_error, has_shaft_nodes, noted_error, shaft_error
   use nocdyn_speed_modes, only: speed_modes_t
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
   use nocdyn_units, only: from_si, unit_hz, unit_rpm
@@ -44,7 +44,7 @@ contains
     type(crossing_t), intent(in) :: crossings(:)
     logical, intent(in) :: lists_modes   !! whether modes are reported that no line crosses
     type(string_t), allocatable, intent(inout) :: notes(:)
-    character(len=:), allocatable :: text
+    character(len=:), allocatable :: size_text, text
     real(wp) :: errors(modes%modes)
     integer :: first, m
 
@@ -52,9 +52,10 @@ contains
     errors = [(shaft_error(machine, modes%shape(:, m), modes%natural(m, 1)), m=1, modes%modes)]
     if (.not. any(errors > noted_error)) return
     first = minloc(modes%natural(:, 1), dim=1, mask=errors > noted_error)
+    call describe_error(errors(first), size_text)
     text = 'the nodes of shafts resolve ' // to_text(count(errors <= noted_error)) // ' of the ' // to_text(modes%modes) // &
            ' modes: that at ' // rounded_text(from_si(modes%natural(first, 1), unit_hz), 6) // ' Hz has an error of ' // &
-           error_text(errors(first)) // ', higher ones a larger one'
+           size_text // ', higher ones a larger one'
     associate (crossed => count([(errors(crossings(m)%mode) > noted_error, m=1, size(crossings))]))
       if (crossed == 0 .and. .not. lists_modes) return
       if (crossed > 0) text = text // ', and with them ' // to_text(crossed) // ' of the ' // to_text(size(crossings)) // &

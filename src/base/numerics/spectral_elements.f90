@@ -121,7 +121,7 @@ contains
   end function interpolation
 
   !> The least order at which the error of an element is at most `tolerance`; above highest_order if that does not suffice.
-  integer function least_order(b, tolerance) result(order)
+  pure integer function least_order(b, tolerance) result(order)
     real(wp), intent(in) :: b           !! highest frequency times the time that a wave takes through the bar [rad]
     real(wp), intent(in) :: tolerance   !! as of `error`
     type(spectral_element_t) :: element
@@ -135,7 +135,7 @@ contains
 
   !> The error of the relation between the states (angle, moment) at both ends, which is exactly cos b and sin b / b. They follow
   !> from the dynamic stiffness [b cot b, -b / sin b] of the bar without its internal nodes.
-  real(wp) function condensed_error(self, b) result(error)
+  pure real(wp) function condensed_error(self, b) result(error)
     class(spectral_element_t), intent(in) :: self
     real(wp), intent(in) :: b   !! frequency times the time that a wave takes through the bar [rad]
     real(wp), parameter :: near_pole = 0.1_wp

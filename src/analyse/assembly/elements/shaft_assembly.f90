@@ -10,11 +10,12 @@ module nocdyn_shaft_assembly
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_shaft_frequencies, only: highest_frequency
-  use nocdyn_shaft_segments, only: choose_elements, segments_of, segments_t
+  use nocdyn_shaft_frequencies, only: excited_frequency, highest_frequency
+  use nocdyn_shaft_segments, only: are_resolved, choose_elements, most_nodes, segments_of, segments_t
   use nocdyn_shafts, only: new_shafts, shaft_element_t, shaft_t
   use nocdyn_spectral_elements, only: new_spectral_element, spectral_element_t
-  use nocdyn_text, only: append, string_t, to_text
+  use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
+  use nocdyn_units, only: from_si, unit_hz
   implicit none (type, external)
   private
 
@@ -27,6 +28,7 @@ module nocdyn_shaft_assembly
   type, public :: shaft_set_t
     type(shaft_t), allocatable :: shafts(:)
     ! the nodes, numbered from the first body after those of the input:
+    type(string_t), allocatable :: notes(:)    !! on nodes that do not suffice
     type(string_t), allocatable :: names(:)
     integer, allocatable :: ends(:, :)         !! bodies at the ends of its shaft, [2, nodes]
     real(wp), allocatable :: share(:)          !! of the shaft's flexibility before the node, [nodes]
@@ -52,24 +54,41 @@ contains
     type(constraints_t), intent(in) :: constraints    !! between these
     type(shaft_set_t), intent(out) :: set
     integer, allocatable :: indices(:), order(:), segment(:)
-    real(wp) :: compliance, frequency
+    real(wp) :: compliance, excited, frequency
     integer :: i
 
+    allocate (set%notes(0))
     allocate (indices, source=input%groups_named('shaft'))
     allocate (set%shafts(0), set%names(0), set%ends(2, 0), set%share(0), set%bodies(0), set%inertia(0), set%slice_names(0))
     allocate (set%first(1), source=1)
     allocate (set%body(0), set%coefficient(0), set%stiffness(0), set%loss_factor(0), set%loss_damping(0))
     allocate (set%position(0), set%section_modulus(0))
     if (size(indices) == 0) return
-    frequency = highest_frequency(input, body_index, constraints)
+    excited = excited_frequency(input, body_index, constraints)
+    frequency = highest_frequency(input, excited)
     compliance = sum([(compliance_of(input%groups(indices(i))), i=1, size(indices))])
     do i = 1, size(indices)
       associate (group => input%groups(indices(i)))
         call choose_elements(group, frequency, tolerance * compliance, segment, order)
+        if (.not. are_resolved(group, segment, order, excited)) call note_nodes(group, sum(order) - 1, excited, set%notes)
         call add_shaft(group, bodies_of(group, 'bodies', body_index), size(body_index%names), segment, order, set)
       end associate
     end do
   end subroutine new_shaft_set
+
+  !> That the nodes of a shaft do not resolve what is excited.
+  subroutine note_nodes(group, nodes, excited, notes)
+    type(group_t), intent(in) :: group
+    integer, intent(in) :: nodes
+    real(wp), intent(in) :: excited   !! highest frequency [rad/s]
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    character(len=:), allocatable :: text
+
+    text = 'the ' // to_text(nodes) // ' nodes of shaft ' // quoted(group%name) // ' do not resolve the highest frequency ' // &
+           'that is excited, ' // rounded_text(from_si(excited, unit_hz), 4) // ' Hz'
+    if (.not. group%has_value('nodes')) text = text // ', which needs more than ' // to_text(most_nodes)
+    call append(notes, text)
+  end subroutine note_nodes
 
   !> [rad/(N m)].
   pure real(wp) function compliance_of(group) result(compliance)

@@ -22,12 +22,11 @@ module nocdyn_shaft_frequencies
 
 contains
 
-  !> The fourth lowest of the frequencies n pi / (time of a wave) of all shafts between fixed ends, or 1.2 times the highest frequency
-  !> that the input excites, if that is higher [rad/s].
-  real(wp) function highest_frequency(input, body_index, constraints) result(frequency)
+  !> The fourth lowest of the frequencies n pi / (time of a wave) of all shafts between fixed ends, or 1.2 times the highest
+  !> frequency that is excited, if that is higher [rad/s].
+  real(wp) function highest_frequency(input, excited) result(frequency)
     type(input_t), intent(in) :: input
-    type(body_index_t), intent(in) :: body_index
-    type(constraints_t), intent(in) :: constraints   !! between the bodies
+    real(wp), intent(in) :: excited   !! [rad/s]
     integer, allocatable :: indices(:)
     real(wp), allocatable :: frequencies(:)
     type(segments_t) :: segments
@@ -49,7 +48,7 @@ contains
       frequency = frequencies(n)
       frequencies(n) = huge(frequency)
     end do
-    frequency = max(frequency, reserve * excited_frequency(input, body_index, constraints))
+    frequency = max(frequency, reserve * excited)
   end function highest_frequency
 
   !> The highest frequency that an input excites [rad/s]. Steps, impacts and joints that lock have none.

@@ -3,15 +3,17 @@ module nocdyn_shaft_segments
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_spectral_elements, only: highest_order, least_order
+  use nocdyn_spectral_elements, only: highest_order, least_order, new_spectral_element, spectral_element_t
   use nocdyn_text, only: to_text
   implicit none (type, external)
   private
 
-  public :: check_shaft, choose_elements, has_inertia, has_own_nodes, segment_inertia, segment_stiffness, segments_of
+  public :: are_resolved, check_shaft, choose_elements, has_inertia, has_own_nodes, segments_of
+  public :: segment_inertia, segment_stiffness
 
   real(wp), parameter :: pi = acos(-1.0_wp)
   integer, parameter, public :: most_nodes = 1000   !! inside of a shaft
+  real(wp), parameter :: most_phase = 0.8_wp * most_nodes   ! of a wave along the whole shaft, for which so many nodes do [rad]
 
   !> Uniform segments, from the first end on.
   type, public :: segments_t
@@ -143,7 +145,7 @@ contains
   !> The spectral elements of a shaft, from its first end on. Without inertia it is one slice: there are none.
   subroutine choose_elements(group, frequency, tolerance, segment, order)
     type(group_t), intent(in) :: group
-    real(wp), intent(in) :: frequency   !! up to which they are as the continuous shaft [rad/s]
+    real(wp), intent(in) :: frequency   !! up to which they are as the continuous shaft, unless that needs too many nodes [rad/s]
     real(wp), intent(in) :: tolerance   !! error that is allowed [rad/(N m)]
     integer, allocatable, intent(out) :: segment(:)   !! of each element, equal elements of a segment one after the other
     integer, allocatable, intent(out) :: order(:)     !! of each element
@@ -164,7 +166,7 @@ contains
       return
     end if
     do i = 1, size(segments%length)
-      associate (b => frequency * segments%wave_time(i))
+      associate (b => min(frequency, most_phase / sum(segments%wave_time)) * segments%wave_time(i))
         do parts = max(1, int(b / highest_order)), most_nodes
           one = least_order(b / parts, tolerance / segments%flexibility(i))
           if (one <= highest_order) exit
@@ -175,6 +177,26 @@ contains
       end associate
     end do
   end subroutine choose_elements
+
+  !> Whether the elements of a shaft are about as the continuous shaft at a frequency.
+  pure logical function are_resolved(group, segment, order, frequency)
+    type(group_t), intent(in) :: group
+    integer, intent(in) :: segment(:), order(:)   !! as from `choose_elements`
+    real(wp), intent(in) :: frequency             !! [rad/s]
+    real(wp), parameter :: about = 1.0e-2_wp      ! of the states at the ends of the shaft
+    type(segments_t) :: segments
+    type(spectral_element_t) :: element
+    integer :: i
+
+    segments = segments_of(group)
+    are_resolved = .true.
+    do i = 1, size(order)
+      associate (parts => count(segment == segment(i)), share => segments%flexibility(segment(i)) / sum(segments%flexibility))
+        element = new_spectral_element(order(i))
+        are_resolved = are_resolved .and. element%error(frequency * segments%wave_time(segment(i)) / parts) * share <= about
+      end associate
+    end do
+  end function are_resolved
 
   !> The orders of the segments whose sum is given, the higher the longer they are.
   pure function given_orders(lengths, total) result(orders)

@@ -30,6 +30,8 @@ module nocdyn_shafts
     real(wp), allocatable :: moments(:, :)       !! moments at the points from those of the slices there, [most slices, points]
     integer, allocatable :: before(:)            !! slices of the shaft before these, [points]
     integer, allocatable :: slices(:)            !! their number, [points]
+  contains
+    procedure :: all_moments
   end type shaft_t
 
   type, extends(couplings_t), public :: shafts_t
@@ -45,6 +47,18 @@ module nocdyn_shafts
   integer, parameter :: twist = 1, moment_1 = 2, moment_2 = 3, largest_moment = 4, stress = 5
 
 contains
+
+  !> The moments at the points from those of all slices, [points, slices].
+  pure function all_moments(self) result(moments)
+    class(shaft_t), intent(in) :: self
+    real(wp), allocatable :: moments(:, :)
+    integer :: p
+
+    allocate (moments(size(self%before), self%last - self%first + 1), source=0.0_wp)
+    do p = 1, size(self%before)
+      moments(p, self%before(p) + 1:self%before(p) + self%slices(p)) = self%moments(:self%slices(p), p)
+    end do
+  end function all_moments
 
   !> A bank of shafts. All slices of a shaft have its name.
   function new_shafts(common, stiffness, shafts, position, section_modulus) result(bank)
