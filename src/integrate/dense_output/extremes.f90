@@ -125,7 +125,7 @@ contains
     type(dense_output_t), intent(inout) :: dense   !! of the lane
     real(wp), intent(in) :: t_end   !! end of the step [s]
     logical, intent(in) :: ends_at_crossing
-    real(wp) :: t_start
+    real(wp) :: t_start, values(0:max_degree)
     logical :: has_moved
     integer :: function, i, last
 
@@ -141,8 +141,8 @@ contains
         do i = 1, size(extremes%bending)
           function = extremes%bending(i)
           if (.not. extremes%replaced(function)) cycle
-          call pieces%replaces(function, rule, extremes%values(function, :last), extremes%scale(lane), &
-                               extremes%replaced(function))
+          values(:last - 1) = extremes%values(function, :last)
+          call pieces%replaces(function, rule, values, extremes%scale(lane), extremes%replaced(function))
         end do
         call widen_ranges(rule, extremes%values(:, :last), extremes%replaced, extremes%ranges(lane), pieces%begin, pieces%end)
         call tell_turns(observer, lane, rule, extremes%values(:, :last), extremes%replaced)

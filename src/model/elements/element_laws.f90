@@ -376,13 +376,15 @@ contains
   pure real(wp) function fastest_of_elements(self, lane, speed) result(fastest)
     class(element_law_t), intent(in) :: self
     integer, intent(in) :: lane
-    real(wp), intent(in) :: speed(self%law%elements, self%ports)   !! u' of the elements, and of their phases [rad/s]
+    real(wp), intent(in) :: speed(:)   !! u' of the elements, then of their phases [rad/s]
+    real(wp) :: one(at_phase)
     integer :: e
 
     fastest = 0.0_wp
     if (.not. self%has_waves) return
     do e = 1, self%law%elements
-      fastest = max(fastest, fastest_wave(self%law, self%law%slot(lane, e), speed(e, :)))
+      one = [speed(e), speed((self%ports - 1) * self%law%elements + e)]
+      fastest = max(fastest, fastest_wave(self%law, self%law%slot(lane, e), one))
     end do
   end function fastest_of_elements
 
