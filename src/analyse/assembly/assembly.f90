@@ -11,6 +11,7 @@ module nocdyn_assembly
   use nocdyn_machine_parts, only: build_machine, given_speeds
   use nocdyn_multiplier, only: new_multiplier
   use nocdyn_paper, only: new_paper
+  use nocdyn_pressure_notes, only: note_pressures
   use nocdyn_reduced, only: new_reduced
   use nocdyn_steady_joints, only: choose_overruns
   use nocdyn_steady_start, only: start_steadily
@@ -36,6 +37,7 @@ contains
     if (allocated(error) .or. input%takes_means) return
     call note_idle_elements(input, machine%start_notes)
     call note_rated_motors(input, machine%start_notes)
+    call note_pressures(input, machine%start_notes)
   end subroutine assemble_machine
 
   !> Builds the machine as it is in a steady state: with means over a turn, and with locked joints as constraint rows.
