@@ -91,10 +91,12 @@ contains
     character(len=*), intent(in) :: consequence   !! what the analysis does there
     type(string_t), allocatable, intent(inout) :: notes(:)
     character(len=:), allocatable :: text
+    real(wp) :: speed(size(list))
 
     if (size(list) > 0) then
+      speed = list%speed
       call describe_first(list, text)
-      call append(notes, 'the steady state is unstable at ' // speeds_text(list%speed) // ': ' // text // '; ' // consequence)
+      call append(notes, 'the steady state is unstable at ' // speeds_text(speed) // ': ' // text // '; ' // consequence)
     end if
     if (size(response%left_out) > 0) then
       call append(notes, 'there is no steady state at ' // speeds_text(response%left_out) // ', which are left out: ' // &

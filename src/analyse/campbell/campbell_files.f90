@@ -69,11 +69,15 @@ contains
     type(campbell_t), intent(in) :: self
     character(len=:), allocatable :: text
     type(json_t) :: json
+    real(wp), allocatable :: unstable(:)
     integer :: i
 
     call json%open_report(input%file, input%title())
     call json%put('notes', self%notes)
-    if (size(self%unstable) > 0) call json%put('unstable_speeds_rad_s', self%unstable%speed)
+    if (size(self%unstable) > 0) then
+      unstable = self%unstable%speed
+      call json%put('unstable_speeds_rad_s', unstable)
+    end if
     call json%put('body', body)
     call json%put('speed_rad_s', [self%speed(1), self%speed(size(self%speed))])
     if (size(self%settings%operating) > 0) then

@@ -243,13 +243,17 @@ contains
     type(response_summary_t), intent(in) :: summary
     character(len=:), allocatable :: text
     type(json_t) :: json
+    real(wp), allocatable :: unstable(:)
     integer :: i
 
     call json%open_report(input%file, input%title())
     call json%put('limits_exceeded', summary%limits_exceeded)
     call json%put('wall_time_s', analysis%wall_time)
     call json%put('notes', analysis%notes)
-    if (size(analysis%unstable) > 0) call json%put('unstable_speeds_rad_s', analysis%unstable%speed)
+    if (size(analysis%unstable) > 0) then
+      unstable = analysis%unstable%speed
+      call json%put('unstable_speeds_rad_s', unstable)
+    end if
     call json%put('body', analysis%body_name)
     call json%put('speed_rad_s', [analysis%settings%speeds(1), analysis%settings%speeds(size(analysis%settings%speeds))])
     if (size(analysis%settings%operating) > 0) then
