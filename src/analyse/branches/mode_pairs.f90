@@ -2,8 +2,8 @@
 !>
 !> They solve T(lambda) x = 0 with T(lambda) = sum of U_e^T D_e(lambda) U_e + lambda^2 M, where D_e(lambda) is the stiffness of
 !> the forced response at the frequency -i lambda: of motors with their currents, fluxes and governors too. Relative damping is
-!> that at the frequency of the mode. The eigenvalues of the first-order system are the start; each is refined by inverse iteration on
-!> the band matrix T, with the root of x^T T(lambda) x as the next value (T is symmetric, so that x is the left eigenvector too:
+!> that at the frequency of the mode. The eigenvalues of the first-order system are the start; each is refined by inverse iteration
+!> on the band matrix T, with the root of x^T T(lambda) x as the next value (T is symmetric, so that x is the left eigenvector too:
 !> K. Schreiber, Nonlinear Eigenvalue Problems, TU Berlin 2008, the two-sided Rayleigh functional).
 module nocdyn_mode_pairs
   use nocdyn_dynamic_stiffness, only: band_work_t, new_band_work
@@ -175,20 +175,21 @@ contains
   end subroutine find_start
 
   !> The growth of what does not oscillate, by a negative stiffness or a strong negative damping: of positive real eigenvalues
-  !> whose motion is mostly elastic. That of the whole machine is held.
+  !> whose motion has elastic energy. A motion of the whole machine is held.
   pure real(wp) function divergence_of(linear, pairs) result(divergence)
     type(linearisation_t), intent(in) :: linear
     type(eigenpairs_t), intent(in) :: pairs
+    real(wp), parameter :: least = 0.05_wp   ! of the kinetic energy
     integer :: m
     real(wp) :: elastic
 
     divergence = min(0.0_wp, minval(linear%natural))
     do m = 1, size(pairs%value)
       if (aimag(pairs%value(m)) > 0 .or. .not. real(pairs%value(m), wp) > 0 .or. pairs%internal(m) > 0) cycle
-      elastic = sum(abs(pairs%vector(linear%flexible, m))**2)
-      if (elastic > 0.5_wp * sum(abs(pairs%vector(:size(linear%natural), m))**2)) then
-        divergence = min(divergence, -real(pairs%value(m), wp))
-      end if
+      associate (n => size(linear%natural))
+        elastic = sum(abs(pairs%vector(n + 1:n + size(linear%flexible), m))**2)
+        if (elastic > least * sum(abs(pairs%vector(:n, m))**2)) divergence = min(divergence, -real(pairs%value(m), wp))
+      end associate
     end do
   end function divergence_of
 
