@@ -2,9 +2,9 @@
 !>
 !> They solve T(lambda) x = 0 with T(lambda) = sum of U_e^T D_e(lambda) U_e + lambda^2 M, where D_e(lambda) is the stiffness of
 !> the forced response at the frequency -i lambda: of motors with their currents, fluxes and governors too. Relative damping is
-!> that at the frequency of the mode. The eigenvalues of the first-order system are the start; each is refined by inverse iteration
-!> on the band matrix T, with the root of x^T T(lambda) x as the next value (T is symmetric, so that x is the left eigenvector too:
-!> K. Schreiber, Nonlinear Eigenvalue Problems, TU Berlin 2008, the two-sided Rayleigh functional).
+!> that at the frequency of the mode. The eigenvalues of the first-order system are the start; each is refined by inverse
+!> iteration on the band matrix T, with the root of x^T T(lambda) x as the next value: T is symmetric, so that x is the left
+!> eigenvector too, and x^T T(lambda) x a two-sided Rayleigh functional.
 module nocdyn_mode_pairs
   use nocdyn_dynamic_stiffness, only: band_work_t, new_band_work
   use nocdyn_eigenpairs, only: eigenpairs_t, find_eigenpairs
