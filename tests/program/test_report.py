@@ -532,3 +532,30 @@ def test_ratios_at_the_edge_of_the_drawing_are_whole(fresh, browser):
     assert fresh("m.nml", "--no-pdf").returncode == 0
     browser.open(fresh.page())
     assert faults(browser) == []
+
+
+def test_a_response_that_fails_is_a_finding(fresh, browser):
+    falling = (
+        "&load name = 'falling' body = 'engine' table_speed = 0, 10, 100 table_torque = 0, 9e5, 10 extrapolation = 'constant' /\n"
+    )
+    plant = without_notes(PLANT).replace("speed_rpm = 200, 900", "speed_rpm = 700, 900")
+    fresh.write("m.nml", plant + falling)
+    fresh("m.nml", "--no-pdf", "--quiet")
+    browser.open(fresh.page())
+    assert faults(browser) == []
+    assert "Forced response m.nml:" in browser.find("#summary").text
+    assert "the steady state is unstable" in browser.find("#summary").text
+
+
+def test_a_peak_beyond_its_limit_is_told_beside_a_larger_share_of_another(fresh, browser):
+    limit = "vibratory_moment = 1500.0"
+    assert limit in PLANT
+    fresh.write("m.nml", without_notes(PLANT).replace(limit, "vibratory_moment = 100.0 moment = 1000.0"))
+    assert fresh("m.nml", "--no-pdf", "--quiet").returncode == 0
+    report = json.loads((fresh.folder / "results/m/response.json").read_text())
+    (one,) = [one for one in report["largest"] if "ratio_to_limit" in one]
+    assert one["peak_ratio_to_limit"] == pytest.approx(one["peak"] / 1000.0, rel=1e-12)
+    assert 1 < one["peak_ratio_to_limit"] < one["ratio_to_limit"]
+    browser.open(fresh.page())
+    text = browser.find("#summary").text
+    assert "moment_tyre, its peak, reaches " in text and "moment_tyre reaches " in text

@@ -13,6 +13,7 @@ module nocdyn_assembly
   use nocdyn_motion_notes, only: note_motions
   use nocdyn_multiplier, only: new_multiplier
   use nocdyn_paper, only: new_paper
+  use nocdyn_pressure_notes, only: note_pressures
   use nocdyn_reduced, only: new_reduced
   use nocdyn_steady_joints, only: choose_overruns
   use nocdyn_steady_start, only: start_steadily
@@ -40,6 +41,7 @@ contains
     call note_rated_motors(input, machine%start_notes)
     call note_motions(input, machine%start_notes)
     call note_left_out_harmonics(input, machine%start_notes)
+    call note_pressures(input, machine%start_notes)
   end subroutine assemble_machine
 
   !> Builds the machine as it is in a steady state: with means over a turn, and, if it is asked for, with clutches and freewheels

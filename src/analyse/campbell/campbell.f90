@@ -11,10 +11,13 @@ module nocdyn_campbell
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: sort_ascending
   use nocdyn_machine, only: machine_t
+  use nocdyn_mode_branches, only: new_speed_modes
+  use nocdyn_mode_pairs, only: most_modes
   use nocdyn_response_notes, only: note_shaft_modes, note_simplifications, note_steady_states
   use nocdyn_response_settings, only: operating_distance, place_error, read_response_settings, response_settings_t
-  use nocdyn_speed_modes, only: most_coordinates, new_speed_modes, speed_modes_t
-  use nocdyn_text, only: string_t, to_text
+  use nocdyn_speed_modes, only: most_coordinates, speed_modes_t
+  use nocdyn_text, only: append, string_t, to_text
+  use nocdyn_unstable_speeds, only: find_unstable, note_speeds, unstable_speed_t
   implicit none (type, external)
   private
 
@@ -32,6 +35,7 @@ module nocdyn_campbell
     type(crossing_t), allocatable :: crossings(:)
     real(wp), allocatable :: distance(:)             !! of each crossing to the speeds in operation, as a share; 0 inside
     logical, allocatable :: is_too_near(:)           !! whether it is within the margin
+    type(unstable_speed_t), allocatable :: unstable(:)   !! speeds at which a mode grows
     type(string_t), allocatable :: notes(:)
   end type campbell_t
 
@@ -45,6 +49,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: failed_speed
     integer :: i
+    logical, allocatable :: is_unstable(:)
 
     call read_response_settings(input, machine, self%settings, error)
     if (allocated(error)) return
@@ -59,6 +64,13 @@ contains
       return
     end if
     call note_simplifications(machine, self%notes)
+    if (self%response%matrix%coordinates > self%modes%modes .and. self%modes%modes >= most_modes) then
+      call append(self%notes, 'the highest modes are left out: there are ' // to_text(self%modes%modes) // ', for ' // &
+                              to_text(self%response%matrix%coordinates) // ' degrees of freedom')
+    end if
+    allocate (is_unstable(size(self%speed)))
+    call find_unstable(self%speed, self%modes, self%unstable, is_unstable)
+    call note_speeds(self%response, self%unstable, 'nothing stays near the steady state there', self%notes)
     call note_steady_states(self%settings, self%response, self%notes)
     call note_shaft_modes(machine, self%modes, self%crossings, .true., self%notes)
     allocate (self%distance(size(self%crossings)), self%is_too_near(size(self%crossings)))

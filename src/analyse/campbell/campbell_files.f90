@@ -35,6 +35,9 @@ contains
     do m = 1, self%modes%modes
       call append(labels, 'damping_ratio_' // to_text(m) // ' [1]')
     end do
+    do m = 1, self%modes%modes
+      call append(labels, 'undamped_frequency_' // to_text(m) // ' [Hz]')
+    end do
     do l = 1, size(self%order)
       call append(labels, line_name(self, l) // ' [Hz]')
     end do
@@ -43,9 +46,8 @@ contains
     call write_header(file, labels)
     do i = 1, size(self%speed)
       row(1) = self%speed(i)
-      row(2:self%modes%modes + 1) = from_si(self%modes%natural(:, i), unit_hz)
-      row(self%modes%modes + 2:2 * self%modes%modes + 1) = self%modes%damping_ratio(:, i)
-      row(2 * self%modes%modes + 2:) = from_si(self%frequency(:, i), unit_hz)
+      row(2:) = [from_si(self%modes%frequency(:, i), unit_hz), self%modes%damping_ratio(:, i), &
+                 from_si(self%modes%undamped(:, i), unit_hz), from_si(self%frequency(:, i), unit_hz)]
       call write_row(file, from_si(row, unit))
     end do
   end subroutine put_campbell_csv
@@ -67,10 +69,15 @@ contains
     type(campbell_t), intent(in) :: self
     character(len=:), allocatable :: text
     type(json_t) :: json
+    real(wp), allocatable :: unstable(:)
     integer :: i
 
     call json%open_report(input%file, input%title())
     call json%put('notes', self%notes)
+    if (size(self%unstable) > 0) then
+      unstable = self%unstable%speed
+      call json%put('unstable_speeds_rad_s', unstable)
+    end if
     call json%put('body', body)
     call json%put('speed_rad_s', [self%speed(1), self%speed(size(self%speed))])
     if (size(self%settings%operating) > 0) then
@@ -102,6 +109,7 @@ contains
     associate (crossing => self%crossings(i))
       call json%open()
       call json%put('mode', crossing%mode)
+      call put_what(json, self, crossing%mode)
       if (self%is_order(crossing%line)) then
         call json%put('order', self%order(crossing%line))
       else
@@ -118,6 +126,17 @@ contains
     end associate
   end subroutine put_crossing
 
+  !> The internal state that a mode mostly is.
+  subroutine put_what(json, self, mode)
+    type(json_t), intent(inout) :: json
+    type(campbell_t), intent(in) :: self
+    integer, intent(in) :: mode
+
+    if (self%modes%internal(mode) > 0) then
+      call json%put('mostly', self%response%machine%internal_name(self%modes%internal(mode)))
+    end if
+  end subroutine put_what
+
   !> Frequencies at both ends of the range, and the shape at the lowest speed.
   subroutine put_mode(json, self, mode)
     type(json_t), intent(inout) :: json
@@ -126,7 +145,11 @@ contains
 
     call json%open()
     call json%put('mode', mode)
-    call json%put('frequency_Hz', from_si([self%modes%natural(mode, 1), self%modes%natural(mode, size(self%speed))], unit_hz))
+    call put_what(json, self, mode)
+    associate (ends => [1, size(self%speed)])
+      call json%put('frequency_Hz', from_si(self%modes%frequency(mode, ends), unit_hz))
+      call json%put('undamped_frequency_Hz', from_si(self%modes%undamped(mode, ends), unit_hz))
+    end associate
     call json%put('shape', self%modes%shape(:size(self%modes%shape, 1) - self%response%machine%nodes, mode))
     call json%close()
   end subroutine put_mode

@@ -30,13 +30,17 @@ contains
     call report%append_line(file // ': natural frequencies from ' // rpm(self%speed(1)) // ' to ' // rpm(self%speed(last)) // &
                             ' rpm of ' // body // ', ' // counted(size(self%order), 'order', 'orders'))
     call report%append_line('  mode' // cell(rpm(self%speed(1)) // ' rpm') // cell(rpm(self%speed(last)) // ' rpm') // &
-                            cell('lowest [Hz]') // cell('highest [Hz]') // cell('damping ratio') // cell('highest'))
+                            cell('lowest [Hz]') // cell('highest [Hz]') // cell('damping ratio') // cell('highest') &
+                            // cell('undamped [Hz]') // cell('highest'))
     do m = 1, min(self%modes%modes, most_modes)
-      associate (natural => from_si(self%modes%natural(m, :), unit_hz))
+      associate (natural => from_si(self%modes%frequency(m, :), unit_hz), exists => self%modes%exists(m, :), &
+                 undamped => from_si(self%modes%undamped(m, :), unit_hz))
         call report%append_line('  ' // repeat(' ', 4 - len(to_text(m))) // to_text(m) // cell(natural(1)) // &
-                                cell(natural(last)) // cell(minval(natural)) // cell(maxval(natural)) // &
-                                cell(rounded_text(minval(self%modes%damping_ratio(m, :)), 3)) // &
-                                cell(rounded_text(maxval(self%modes%damping_ratio(m, :)), 3)))
+                                cell(natural(last)) // cell(minval(natural, mask=exists)) // cell(maxval(natural)) // &
+                                cell(rounded_text(minval(self%modes%damping_ratio(m, :), mask=exists), 3)) // &
+                                cell(rounded_text(maxval(self%modes%damping_ratio(m, :), mask=exists), 3)) // &
+                                cell(minval(undamped, mask=exists)) // cell(maxval(undamped, mask=exists)) // &
+                                what_text(self, m))
       end associate
     end do
     if (self%modes%modes > most_modes) then
@@ -45,6 +49,18 @@ contains
     call put_crossings(self, report)
     text = report%text()
   end function campbell_text
+
+  !> "  mostly armature current of motor 'drive'".
+  function what_text(self, mode) result(text)
+    type(campbell_t), intent(in) :: self
+    integer, intent(in) :: mode
+    character(len=:), allocatable :: text
+
+    text = ''
+    if (self%modes%internal(mode) > 0) then
+      text = '  mostly ' // self%response%machine%internal_name(self%modes%internal(mode))
+    end if
+  end function what_text
 
   function rpm(speed) result(text)
     real(wp), intent(in) :: speed   !! [rad/s]
@@ -83,6 +99,7 @@ contains
             if (self%is_too_near(i)) line = line // ', too near'
           end if
         end if
+        line = line // what_text(self, crossing%mode)
         call report%append_line(line)
       end associate
     end do

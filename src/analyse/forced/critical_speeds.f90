@@ -1,7 +1,7 @@
 !> Critical speeds, where a line of excitation has a natural frequency, and the peaks of a response between the speeds of its
 !> grid.
 !>
-!> The speeds at which the lines cross the undamped natural frequencies are added to the speeds, so that no narrow peak is
+!> The speeds at which the lines cross the frequencies of the damped modes are added to the speeds, so that no narrow peak is
 !> missed. Then every maximum of an amplitude is refined: near a resonance 1 / |amplitude|^2 is a parabola over the speed, whose
 !> vertex is the next speed. Of more maxima than a table should have, those that promise most are refined.
 module nocdyn_critical_speeds
@@ -50,13 +50,14 @@ contains
     do m = 1, modes%modes
       do l = 1, size(frequency, 1)
         do i = 1, size(speed) - 1
-          before = frequency(l, i) - modes%natural(m, i)
-          after = frequency(l, i + 1) - modes%natural(m, i + 1)
+          if (.not. all(modes%exists(m, i:i + 1))) cycle
+          before = frequency(l, i) - modes%frequency(m, i)
+          after = frequency(l, i + 1) - modes%frequency(m, i + 1)
           if (before * after > 0 .or. (abs(after) <= 0 .and. i < size(speed) - 1)) cycle
           if (abs(before - after) <= 0) cycle
           share = before / (before - after)
           crossings = [crossings, crossing_t(m, l, between(speed(i), speed(i + 1), share), &
-                                             between(modes%natural(m, i), modes%natural(m, i + 1), share), &
+                                             between(modes%frequency(m, i), modes%frequency(m, i + 1), share), &
                                              between(modes%damping_ratio(m, i), modes%damping_ratio(m, i + 1), share))]
         end do
       end do

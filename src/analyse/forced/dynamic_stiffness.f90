@@ -40,7 +40,7 @@ module nocdyn_dynamic_stiffness
     type(products_t), private :: stiffness          !! U_e^T U_e of each element
     type(products_t), private :: mass               !! entries of the mass matrix, one "element" [kg m2]
   contains
-    procedure :: factor, add_forces, add_twist, solve, find_moment
+    procedure :: factor, factor_square, add_forces, add_twist, solve, find_moment
   end type dynamic_stiffness_t
 
   !> Work space of one thread.
@@ -207,7 +207,18 @@ contains
     type(band_work_t), intent(inout) :: work
     logical, intent(out) :: singular           !! an undamped resonance, exactly
 
-    call fill(self, size(work%band), frequency, stiffness, work%band, work%scale)
+    call self%factor_square(cmplx(frequency**2, kind=wp), stiffness, work, singular)
+  end subroutine factor
+
+  !> Sets and factors the matrix at a complex frequency.
+  pure subroutine factor_square(self, square, stiffness, work, singular)
+    class(dynamic_stiffness_t), intent(in) :: self
+    complex(wp), intent(in) :: square          !! Omega^2 [rad2/s2]
+    complex(wp), intent(in) :: stiffness(:)    !! D_e(Omega) [N m/rad], [elements]
+    type(band_work_t), intent(inout) :: work
+    logical, intent(out) :: singular           !! a natural frequency, exactly
+
+    call fill(self, size(work%band), square, stiffness, work%band, work%scale)
     if (self%width == 1) then
       associate (n => size(self%position))
         work%diagonals(:n - 1, 1) = work%band(4, :n - 1)
@@ -218,13 +229,13 @@ contains
     else
       call complex_band_factor(self%width, self%width, work%band, work%pivots, singular)
     end if
-  end subroutine factor
+  end subroutine factor_square
 
   !> Sets the matrix, as one array.
-  pure subroutine fill(self, n, frequency, stiffness, band, scale)
+  pure subroutine fill(self, n, square, stiffness, band, scale)
     type(dynamic_stiffness_t), intent(in) :: self
     integer, intent(in) :: n
-    real(wp), intent(in) :: frequency
+    complex(wp), intent(in) :: square   ! Omega^2
     complex(wp), intent(in) :: stiffness(:)
     complex(wp), intent(out) :: band(n)
     real(wp), intent(inout) :: scale(:)   !! of the moments that are unknowns
@@ -238,7 +249,7 @@ contains
       end do
     end do
     do k = 1, size(self%mass%place)
-      band(self%mass%place(k)) = band(self%mass%place(k)) - frequency**2 * self%mass%value(k)
+      band(self%mass%place(k)) = band(self%mass%place(k)) - square * self%mass%value(k)
     end do
     do e = 1, size(stiffness)
       if (self%unknown(e) == 0) cycle

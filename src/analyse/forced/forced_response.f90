@@ -11,7 +11,7 @@ module nocdyn_forced_response
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_complex, only: complex_solve
   use nocdyn_machine, only: machine_t
-  use nocdyn_response_points, only: merge_points, response_point_t
+  use nocdyn_response_points, only: keep_points, merge_points, response_point_t
   use nocdyn_response_quantities, only: list_quantities, response_quantity_t
   use nocdyn_synthesis, only: new_synthesis, synthesis_t
   use nocdyn_text, only: to_text
@@ -32,6 +32,8 @@ module nocdyn_forced_response
     type(synthesis_t) :: synthesis
     logical :: has_oscillations = .true.               !! whether these are computed, beside the steady states and frequencies
     type(response_point_t), allocatable :: points(:)   !! ascending by the size of the speed
+    real(wp), allocatable :: left_out(:)               !! speeds of the grid at which there is no steady state [rad/s]
+    character(len=:), allocatable :: left_out_message  !! why, at the first one
     real(wp), allocatable :: loss_factor(:)            !! [elements]
     real(wp), allocatable :: loss_damping(:)           !! damping that stands for it over the time [N m s/rad], [elements]
   contains
@@ -65,8 +67,12 @@ contains
     call new_held_speeds(machine, reference, self%held, error)
     if (allocated(error)) return
     call gather_losses(self)
-    call self%held%hold(merge(speeds(size(speeds)), beside * speeds(1), size(speeds) > 1), high, error)
-    if (.not. allocated(error)) call self%held%hold(speeds(1), low, error)
+    if (size(speeds) > 1) then
+      call hold_first(self%held, speeds(size(speeds):1:-1), high, error)
+    else
+      call self%held%hold(beside * speeds(1), high, error)
+    end if
+    if (.not. allocated(error)) call hold_first(self%held, speeds, low, error)
     if (allocated(error)) return
     call list_sources(machine, low, of_low)
     call list_sources(machine, high, of_high)
@@ -77,8 +83,27 @@ contains
                                    abs(high%stiffness) + lowest * abs(high%damping)), self%matrix, error)
     if (allocated(error)) return
     call list_quantities(machine, reference, self%quantities)
-    allocate (self%points(0))
+    allocate (self%points(0), self%left_out(0))
   end subroutine new_forced_response
+
+  !> The first of some speeds that has a steady state.
+  subroutine hold_first(held, speeds, state, error)
+    type(held_speeds_t), intent(inout) :: held
+    real(wp), intent(in) :: speeds(:)   !! [rad/s]
+    type(held_state_t), intent(out) :: state
+    type(error_t), allocatable, intent(out) :: error   !! of the first one, if none has
+    type(error_t), allocatable :: another
+    integer :: i
+
+    call held%hold(speeds(1), state, error)
+    if (.not. allocated(error)) return
+    do i = 2, size(speeds)
+      call held%hold(speeds(i), state, another)
+      if (allocated(another)) cycle
+      deallocate (error)
+      return
+    end do
+  end subroutine hold_first
 
   !> Collects the loss factors of the banks.
   subroutine gather_losses(self)
@@ -95,7 +120,8 @@ contains
     end do
   end subroutine gather_losses
 
-  !> Computes the response at more speeds, and puts it between the others.
+  !> Computes the response at more speeds, and puts it between the others. Speeds without a steady state are left out, unless all
+  !> are.
   subroutine add_points(self, speeds, are_of_grid, error, failed_speed)
     class(forced_response_t), intent(inout) :: self
     real(wp), intent(in) :: speeds(:)        !! of the reference body [rad/s]
@@ -104,6 +130,7 @@ contains
     real(wp), intent(out) :: failed_speed    !! at which there is no steady state; set with `error`
     type(response_point_t), allocatable :: new(:)
     integer :: i
+    logical :: has_state(size(speeds))
 
     failed_speed = 0.0_wp
     call refuse_too_many(self, size(speeds), are_of_grid, error)
@@ -113,12 +140,21 @@ contains
     end if
     allocate (new(size(speeds)))
     do i = 1, size(speeds)
-      failed_speed = speeds(i)
       new(i)%is_of_grid = are_of_grid
       allocate (new(i)%state)
       call self%held%hold(speeds(i), new(i)%state, error)
-      if (allocated(error)) return
+      has_state(i) = .not. allocated(error)
+      if (has_state(i)) cycle
+      if (.not. are_of_grid) cycle
+      if (size(self%left_out) == 0) self%left_out_message = error%message
+      self%left_out = [self%left_out, speeds(i)]
     end do
+    if (size(self%points) == 0 .and. .not. any(has_state)) then
+      failed_speed = speeds(1)
+      return
+    end if
+    if (allocated(error)) deallocate (error)
+    call keep_points(new, has_state)
     call solve_points(self, new)
     call merge_points(self%points, new)
   end subroutine add_points

@@ -1,14 +1,17 @@
 !> Steady states of a machine whose speed is held, and the machine linearised there.
 !>
 !> Mean torques at an arbitrary speed of the reference body need not balance. The drive is what holds the speed: the torques of
-!> all motors are multiplied by one factor if they drive at that speed, as by a throttle. If there are no such motors, a torque
-!> on the reference body holds the speed. Governors leave their throttles open while the speed is found; then they hold it.
+!> all motors are multiplied by one factor if they drive at that speed, as by a throttle. Induction motors have the slip that the
+!> load asks for by the frequency of their supply instead: a factor would leave them at the slip of that speed on the mains, where
+!> their torque falls with the slip and their field is no spring. If there are no such motors, a torque on the reference body
+!> holds the speed. Governors leave their throttles open while the speed is found; then they hold it.
 module nocdyn_held_speeds
   use nocdyn_bank, only: role_bearing, role_excitation, role_motor
   use nocdyn_equilibrium, only: t_infinity
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_finite, only: is_finite
   use nocdyn_formulation, only: formulation_t
+  use nocdyn_held_supplies, only: all_follow, idle_share, set_supplies
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_machine, only: machine_t
@@ -27,6 +30,7 @@ module nocdyn_held_speeds
   type, public :: held_state_t
     real(wp) :: speed = 0.0_wp    !! of the reference body [rad/s]
     real(wp) :: factor = 0.0_wp   !! on the torques of the motors that holds the speed; 0 if a torque does
+    real(wp) :: supply = 0.0_wp   !! share of the frequency of the supplies that holds it; 0 if they do not follow
     real(wp) :: torque = 0.0_wp   !! on the reference body that holds the speed [N m]; 0 if the motors do
     real(wp), allocatable :: omega(:)       !! speeds of the bodies [rad/s], [bodies]
     real(wp), allocatable :: phi(:)         !! angles of the bodies when that of the reference body is zero [rad], [bodies]
@@ -54,6 +58,8 @@ module nocdyn_held_speeds
     type(twist_solver_t), private :: twists
     real(wp), private :: last_speed = 0.0_wp         !! of these
     logical, private :: motors_hold = .false.        !! whether the motors hold the speed, else a torque
+    logical :: supply_holds = .false.                !! whether they do so by the frequency of their supply
+    real(wp), private :: slip = 0.0_wp               !! last share of the frequency beyond that without slip of the first motor
   contains
     procedure :: hold, has_drive
   end type held_speeds_t
@@ -93,6 +99,7 @@ contains
     allocate (self%q(self%balance%coordinates), source=0.0_wp)
     self%sources = sources_of(self%balance)
     self%follows_mean_speed = machine%follows_mean_speed()
+    self%supply_holds = all_follow(self%balance, self%sources)
     self%last_speed = sum(self%ratio * self%z(:size(self%ratio)))
   end subroutine new_held_speeds
 
@@ -141,6 +148,89 @@ contains
     end do
   end function sources_of
 
+  !> Solves for the frequency of the supplies, by Newton's method from the last slip, and from no slip if that fails: the torque
+  !> over the slip is concave up to the largest one.
+  subroutine balance_supplies(self, speed, z, share, is_found)
+    type(held_speeds_t), intent(inout) :: self
+    real(wp), intent(in) :: speed   !! [rad/s]
+    real(wp), intent(out) :: z(:)   !! rigid motions and internal states
+    real(wp), intent(out) :: share
+    logical, intent(out) :: is_found
+    integer :: attempt
+
+    do attempt = 1, 2
+      z = self%z
+      if (abs(self%last_speed) > 0) z(:size(self%ratio)) = z(:size(self%ratio)) * (speed / self%last_speed)
+      call impose(self, maxloc(abs(self%ratio), dim=1), speed, z)
+      call set_supplies(self%balance, 1.0_wp)
+      call self%balance%settle(z)
+      call self%balance%evaluate(z)
+      share = idle_share(self%balance, self%sources)
+      if (attempt == 1) share = share + self%slip
+      call iterate_supplies(self, speed, z, share, is_found)
+      if (is_found) exit
+    end do
+    if (is_found) then
+      self%slip = share - idle_share(self%balance, self%sources)
+    else
+      call set_supplies(self%balance, idle_share(self%balance, self%sources))
+      self%slip = 0.0_wp
+    end if
+  end subroutine balance_supplies
+
+  subroutine iterate_supplies(self, speed, z, share, is_found)
+    type(held_speeds_t), intent(inout) :: self
+    real(wp), intent(in) :: speed   !! [rad/s]
+    real(wp), intent(inout) :: z(:)
+    real(wp), intent(inout) :: share
+    logical, intent(out) :: is_found
+    integer, parameter :: most_steps = 50
+    real(wp), parameter :: tolerance = 1.0e-12_wp, difference = 1.0e-7_wp, most_slip = 0.5_wp
+    real(wp), dimension(size(self%ratio)) :: missing, moved, scale, sources
+    real(wp) :: matrix(size(missing), size(missing)), other(size(z))
+    integer :: i, k, pivot, pivots(size(missing))
+    logical :: is_singular
+
+    pivot = maxloc(abs(self%ratio), dim=1)
+    is_found = .false.
+    do i = 1, most_steps
+      do k = 1, size(missing)
+        other = z
+        if (k == pivot) then
+          call set_supplies(self%balance, share + difference)
+        else
+          call set_supplies(self%balance, share)
+          other(k) = other(k) + difference * abs(speed)
+          call impose(self, pivot, speed, other)
+        end if
+        call residuals(self, other, moved, sources, scale)
+        matrix(:, k) = moved + sources
+      end do
+      call set_supplies(self%balance, share)
+      call residuals(self, z, moved, sources, scale)
+      missing = -(moved + sources)
+      if (is_found .or. all(abs(missing) <= tolerance * scale)) then
+        is_found = .true.
+        return
+      end if
+      do k = 1, size(missing)
+        matrix(:, k) = (matrix(:, k) + missing) / merge(difference, difference * abs(speed), k == pivot)
+      end do
+      call lu_factor(matrix, pivots, is_singular)
+      if (is_singular) return
+      call lu_solve(matrix, pivots, missing)
+      share = share + missing(pivot)
+      is_found = abs(missing(pivot)) <= tolerance * abs(share)   ! the next state is the last one
+      missing(pivot) = 0.0_wp
+      z(:size(missing)) = z(:size(missing)) + missing
+      is_found = is_found .and. all(abs(missing) <= tolerance * abs(speed))
+      call impose(self, pivot, speed, z)
+      if (.not. all(is_finite([z, share]))) return
+      if (abs(share - idle_share(self%balance, self%sources)) > most_slip) return
+    end do
+    is_found = .false.
+  end subroutine iterate_supplies
+
   !> Finds the steady state at a speed of the reference body, and linearises the machine there.
   subroutine hold(self, speed, state, error)
     class(held_speeds_t), intent(inout) :: self
@@ -151,7 +241,13 @@ contains
     logical :: is_found
 
     self%motors_hold = size(self%sources) > 0
-    if (self%motors_hold) then
+    is_found = .false.
+    if (self%supply_holds) then
+      call balance_supplies(self, speed, z, state%supply, is_found)
+      self%motors_hold = is_found
+      held = 1.0_wp
+      if (.not. is_found) state%supply = 0.0_wp
+    else if (self%motors_hold) then
       call balance_speeds(self, speed, z, held, is_found)
       self%motors_hold = is_found .and. held >= 0 .and. source_power(self) > 0
     end if

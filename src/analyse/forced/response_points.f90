@@ -6,7 +6,7 @@ module nocdyn_response_points
   implicit none (type, external)
   private
 
-  public :: merge_points
+  public :: keep_points, merge_points
 
   !> The response at one speed. Amplitudes are those of amplitude exp(i Omega t), where the angle of the reference body is zero at
   !> t = 0 and its orders are sines of its angle.
@@ -69,6 +69,24 @@ contains
     end do
     call move_alloc(all, points)
   end subroutine merge_points
+
+  !> Drops points.
+  subroutine keep_points(points, is_kept)
+    type(response_point_t), allocatable, intent(inout) :: points(:)
+    logical, intent(in) :: is_kept(:)   !! [points]
+    type(response_point_t), allocatable :: kept(:)
+    integer :: i, n
+
+    if (all(is_kept)) return
+    allocate (kept(count(is_kept)))
+    n = 0
+    do i = 1, size(points)
+      if (.not. is_kept(i)) cycle
+      n = n + 1
+      call move_point(points(i), kept(n))
+    end do
+    call move_alloc(kept, points)
+  end subroutine keep_points
 
   !> Moves the arrays of a point.
   subroutine move_point(from, to)

@@ -14,6 +14,7 @@ module nocdyn_response_quantities
   integer, parameter, public :: quantity_moment = 1     !! of a coupling, with damping, on its first body; force of a mesh
   integer, parameter, public :: quantity_stress = 2     !! shear stress that this moment causes
   integer, parameter, public :: quantity_reaction = 3   !! of a constraint row
+  integer, parameter, public :: quantity_along = 4      !! the largest moment along a shaft, of all its sections
 
   !> A sum of moments of elements.
   type, public :: response_quantity_t
@@ -101,7 +102,7 @@ contains
     end associate
   end subroutine add_coupling
 
-  !> The moments at both ends of each shaft, and its largest stress.
+  !> The moments at both ends of each shaft, its largest stress and its largest moment.
   subroutine add_shafts(bank, list)
     class(bank_t), intent(in) :: bank
     type(quantity_list_t), intent(inout) :: list
@@ -114,15 +115,17 @@ contains
         modulus = bank%section_moduli(s, 1)
         moments = bank%shafts(s)%all_moments()
         associate (shaft => bank%shafts(s), name => bank%names(bank%shafts(s)%first)%text)
-          do end = 1, 3
+          do end = 1, 4
             if (end == 1) call list%add(quantity_moment, name, 'moment_' // name // '_1', 'N m')
             if (end == 2) call list%add(quantity_moment, name, 'moment_' // name // '_2', 'N m')
             if (end == 3) call list%add(quantity_stress, name, 'stress_' // name, 'Pa')
+            if (end == 4) call list%add(quantity_along, name, 'moment_' // name // '_max', 'N m')
             associate (one => list%list(list%count))
               one%element = [(bank%first + k - 1, k=shaft%first, shaft%last)]
               if (end == 1) one%weight = -moments(:1, :)
               if (end == 2) one%weight = -moments(size(modulus):, :)
               if (end == 3) one%weight = -moments / spread(modulus, 2, size(one%element))
+              if (end == 4) one%weight = -moments
             end associate
           end do
         end associate

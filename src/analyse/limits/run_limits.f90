@@ -6,11 +6,11 @@ module nocdyn_run_limits
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_labelled_columns, only: column_of, whole_moment_column
-  use nocdyn_text, only: rounded_text, string_t
+  use nocdyn_text, only: append, rounded_text, string_t
   implicit none (type, external)
   private
 
-  public :: check_run_limits, put_run_limits, run_limits_text
+  public :: check_run_limits, note_other_limits, put_run_limits, run_limits_text
 
   !> A limit and the largest magnitude of its column.
   type, public :: run_limit_t
@@ -55,6 +55,30 @@ contains
       end associate
     end do
   end subroutine check_run_limits
+
+  !> Adds a note on each limit that a run does not compare with anything.
+  subroutine note_other_limits(input, notes)
+    type(input_t), intent(in) :: input
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    character(len=*), parameter :: keys(*) = [character(len=16) :: 'vibratory_moment', 'vibratory_force', 'stress', &
+                                                                   'stress_transient', 'rule']
+    character(len=:), allocatable :: ignored
+    integer, allocatable :: groups(:)
+    integer :: i, k
+
+    allocate (groups, source=input%groups_named('limit'))
+    do i = 1, size(groups)
+      ignored = ''
+      do k = 1, size(keys)
+        if (.not. input%groups(groups(i))%has_value(trim(keys(k)))) cycle
+        if (ignored /= '') ignored = ignored // ' and '
+        ignored = ignored // trim(keys(k))
+      end do
+      if (ignored == '') cycle
+      call append(notes, input%location(groups(i)) // ': a run compares nothing with ' // ignored // &
+                         ', which is for steady oscillations: nocdyn response does')
+    end do
+  end subroutine note_other_limits
 
   !> Whether a group limits a peak.
   pure logical function has_peak(group)

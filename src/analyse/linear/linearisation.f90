@@ -12,6 +12,7 @@
 !> are not rigid; and the internal states. So |p|^2 and |e|^2 are twice the energies, and rigid rotation is not a state.
 module nocdyn_linearisation
   use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates
+  use nocdyn_elements, only: elements_t, internal_states_t
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_finite, only: is_finite
   use nocdyn_formulation, only: formulation_t
@@ -24,11 +25,20 @@ module nocdyn_linearisation
   implicit none (type, external)
   private
 
-  public :: linearise, mass_matrix, tangent_stiffness, undamped_modes
+  public :: fill_matrix, linearise, mass_matrix, tangent_stiffness, undamped_modes
 
   !> A mode is rigid if its natural frequency is below these shares of the highest one: the rounding of singular
   !> values and of eigenvalues, which are squares.
   real(wp), parameter :: rigid_share = 1.0e-12_wp, rigid_share_of_squares = 1.0e-13_wp
+
+  !> How the moments of the elements and the rates of their internal states change beside the stiffness.
+  type, public :: slopes_t
+    real(wp), allocatable :: damping(:)            !! minus the derivatives by the rates of twist [N m s/rad], [elements]
+    real(wp), allocatable :: mean_damping(:)       !! the same of torques that follow the mean speed, which only rigid motions change
+    real(wp), allocatable :: by_internal(:)        !! derivatives of the moments by internal states, [internal states]
+    real(wp), allocatable :: rate_speed(:)         !! derivatives of their rates by the speed of the element, the same
+    real(wp), allocatable :: rate_internal(:, :)   !! derivatives of the rates by the states of the element, [members, the same]
+  end type slopes_t
 
   !> The modes and the first-order matrix at one state.
   type, public :: linearisation_t
@@ -52,22 +62,22 @@ contains
     type(error_t), allocatable, intent(out) :: error   !! if a number is not finite, or LAPACK does not converge
     type(element_coordinates_t) :: incidence
     type(pattern_t) :: pattern
-    real(wp), allocatable :: slopes(:, :), stiffness(:)
+    type(slopes_t) :: slopes
+    real(wp), allocatable :: jacobian(:, :), stiffness(:)
     integer :: e
 
-    pattern = formulation%jacobian_pattern()
-    call differentiate(formulation, t, y, size(pattern%row), slopes)
+    call differentiate(formulation, t, y, pattern, jacobian)
     incidence = new_element_coordinates(formulation%machine%elements, formulation%machine%coordinates)
     stiffness = differentiated_stiffness(formulation%machine)
     call refuse_not_finite(formulation%machine, stiffness, error)
     if (.not. allocated(error)) call undamped_modes(formulation%machine, incidence, stiffness, self, error, &
                                                     held_elements(formulation))
     if (allocated(error)) return
-    call assemble(formulation, self)
-    if (formulation%internal > 0) call add_internal(formulation, pattern, slopes(1, :), self)
+    call copy_slopes(formulation%machine, slopes)
+    call fill_matrix(formulation%machine%elements%internal, slopes, self)
     associate (teeth => formulation%joints%teeth)
       if (teeth%count > 0 .and. .not. any([(carries_nothing(formulation, teeth%joint(e)), e=1, teeth%count)])) then
-        call follow_losses(formulation, pattern, slopes(1, :), self)
+        call follow_losses(formulation, pattern, jacobian(1, :), self)
       end if
     end associate
   end subroutine linearise
@@ -107,28 +117,28 @@ contains
     real(wp), allocatable, intent(out) :: stiffness(:) !! [N m/rad], [elements]
     real(wp), allocatable, intent(out) :: damping(:)   !! [N m s/rad], [elements]
     type(pattern_t) :: pattern
-    real(wp), allocatable :: slopes(:, :)
+    real(wp), allocatable :: jacobian(:, :)
 
-    pattern = formulation%jacobian_pattern()
-    call differentiate(formulation, t, y, size(pattern%row), slopes)
+    call differentiate(formulation, t, y, pattern, jacobian)
     stiffness = differentiated_stiffness(formulation%machine)
     damping = -formulation%machine%elements%applied_speed(1, :)
   end subroutine tangent_stiffness
 
   !> Differentiates the laws of all elements, and the equations of motion.
-  subroutine differentiate(formulation, t, y, entries, slopes)
+  subroutine differentiate(formulation, t, y, pattern, jacobian)
     class(formulation_t), intent(inout) :: formulation
     real(wp), intent(in) :: t                        !! [s]
     real(wp), contiguous, intent(in) :: y(:, :)      !! [1, states]
-    integer, intent(in) :: entries                   !! of the pattern of the Jacobian
-    real(wp), allocatable, intent(out) :: slopes(:, :)   !! Jacobian, [1, entries]
+    type(pattern_t), intent(out) :: pattern          !! positions of the Jacobian
+    real(wp), allocatable, intent(out) :: jacobian(:, :)   !! [1, positions]
     real(wp) :: dfdt(1, formulation%states)
     integer :: status(1)
 
-    allocate (slopes(1, entries))
+    pattern = formulation%jacobian_pattern()
+    allocate (jacobian(1, size(pattern%row)))
     status = 0
     call formulation%start_lane(1, t, reshape(y, [size(y)]))
-    call formulation%jacobian([t], y, slopes, dfdt, status)
+    call formulation%jacobian([t], y, jacobian, dfdt, status)
   end subroutine differentiate
 
   !> Of all elements [N m/rad].
@@ -282,26 +292,42 @@ contains
     end associate
   end function mass_matrix
 
-  !> Fills the matrix for p' = -C p - sign(natural) |natural| e and e' = |natural| p. C is not symmetric where a torque follows
-  !> the mean speed of a cycle: the rigid motions change it, and it acts on all modes.
-  subroutine assemble(formulation, self)
-    class(formulation_t), intent(in) :: formulation
-    type(linearisation_t), intent(inout) :: self
+  !> The slopes of all elements of a machine, in its first lane.
+  subroutine copy_slopes(machine, slopes)
+    type(machine_t), intent(in) :: machine   !! differentiated
+    type(slopes_t), intent(out) :: slopes
+
+    associate (elements => machine%elements, follows => machine%follows_mean_speed())
+      slopes%damping = merge(0.0_wp, -elements%applied_speed(1, :), follows)
+      slopes%mean_damping = merge(-elements%applied_speed(1, :), 0.0_wp, follows)
+      slopes%by_internal = elements%internal%applied(1, :)
+      slopes%rate_speed = elements%internal%rate_speed(1, :)
+      slopes%rate_internal = elements%internal%rate_internal(1, :, :)
+    end associate
+  end subroutine copy_slopes
+
+  !> Fills the matrix for p' = -C p - sign(natural) |natural| e + the moments of the internal states, e' = |natural| p, and the
+  !> rates of the internal states, which depend on the speeds and not on the angles of their elements. C is not symmetric where a
+  !> torque follows the mean speed of a cycle: the rigid motions change it, and it acts on all modes.
+  subroutine fill_matrix(internal, slopes, self)
+    type(internal_states_t), intent(in) :: internal   !! of the machine
+    type(slopes_t), intent(in) :: slopes
+    type(linearisation_t), intent(inout) :: self      !! with the undamped modes
     integer, allocatable :: damped(:)   ! elements with damping
     real(wp), allocatable :: rates(:, :)
-    integer :: e, i, n, states
+    integer :: before, e, i, n, s
 
     n = size(self%natural)
-    states = n + size(self%flexible) + formulation%internal
-    allocate (self%matrix(states, states), source=0.0_wp)
-    associate (damping => formulation%machine%elements%applied_speed(1, :))
-      damped = pack([(e, e=1, size(damping))], abs(damping) > 0.0_wp)
-      allocate (rates(size(damped), n))
-      do i = 1, n
-        rates(:, i) = damping(damped) * self%twists(damped, i)
-      end do
-    end associate
-    call leave_out_oscillations(formulation%machine, damped, self%flexible, rates)
+    before = n + size(self%flexible)
+    if (allocated(self%matrix)) deallocate (self%matrix)
+    allocate (self%matrix(before + internal%count, before + internal%count), source=0.0_wp)
+    damped = pack([(e, e=1, size(slopes%damping))], abs(slopes%damping) + abs(slopes%mean_damping) > 0.0_wp)
+    allocate (rates(size(damped), n))
+    do i = 1, n
+      rates(:, i) = -slopes%damping(damped)
+      if (.not. any(self%flexible == i)) rates(:, i) = rates(:, i) - slopes%mean_damping(damped)
+      rates(:, i) = rates(:, i) * self%twists(damped, i)
+    end do
     self%matrix(:n, :n) = matmul(transpose(self%twists(damped, :)), rates)
     do i = 1, size(self%flexible)
       associate (natural => self%natural(self%flexible(i)))
@@ -309,59 +335,14 @@ contains
         self%matrix(n + i, self%flexible(i)) = abs(natural)
       end associate
     end do
-  end subroutine assemble
-
-  !> Torques that follow the mean speed of a cycle change with the rigid motions only.
-  subroutine leave_out_oscillations(machine, elements, flexible, rates)
-    type(machine_t), intent(in) :: machine
-    integer, intent(in) :: elements(:)
-    integer, intent(in) :: flexible(:)         !! modes
-    real(wp), intent(inout) :: rates(:, :)     !! derivatives of the torques by the rates of the modes, [elements, modes]
-    logical :: follows(machine%elements%count)
-    integer :: i
-
-    follows = machine%follows_mean_speed()
-    do i = 1, size(flexible)
-      where (follows(elements)) rates(:, flexible(i)) = 0.0_wp
-    end do
-  end subroutine leave_out_oscillations
-
-  !> Fills the rows and columns of the internal states. No internal state depends on a rigid rotation.
-  subroutine add_internal(formulation, pattern, slopes, self)
-    class(formulation_t), intent(in) :: formulation
-    type(pattern_t), intent(in) :: pattern   !! positions of the Jacobian
-    real(wp), intent(in) :: slopes(:)        !! values at these positions
-    type(linearisation_t), intent(inout) :: self
-    real(wp), allocatable :: by_state(:, :), by_speed(:, :), by_angle(:, :)
-    integer :: before, f, i, n, p
-
-    f = formulation%machine%coordinates%freedoms
-    n = size(self%natural)
-    before = n + size(self%flexible)
-    associate (internal => formulation%internal)
-      allocate (by_state(f, internal), by_speed(internal, f), by_angle(internal, f), source=0.0_wp)
-    end associate
-    do p = 1, size(slopes)
-      associate (row => pattern%row(p), column => pattern%column(p))
-        if (row <= f .and. column > 2 * f) then
-          by_state(row, column - 2 * f) = slopes(p)
-        else if (row > 2 * f .and. column <= f) then
-          by_speed(row - 2 * f, column) = slopes(p)
-        else if (row > 2 * f .and. column <= 2 * f) then
-          by_angle(row - 2 * f, column - f) = slopes(p)
-        else if (row > 2 * f) then
-          self%matrix(before + row - 2 * f, before + column - 2 * f) = slopes(p)
-        end if
+    do s = 1, internal%count
+      associate (twists => self%twists(internal%element(s), :), first => internal%first(s), members => internal%members(s))
+        self%matrix(:n, before + s) = twists * slopes%by_internal(s)
+        self%matrix(before + s, :n) = twists * slopes%rate_speed(s)
+        self%matrix(before + s, before + first:before + first + members - 1) = slopes%rate_internal(:members, s)
       end associate
     end do
-    self%matrix(:n, before + 1:) = matmul(transpose(self%shapes), matmul(mass_matrix(formulation%machine), by_state))
-    self%matrix(before + 1:, :n) = matmul(by_speed, self%shapes)
-    do i = 1, size(self%flexible)
-      associate (mode => self%flexible(i))
-        self%matrix(before + 1:, n + i) = matmul(by_angle, self%shapes(:, mode)) / abs(self%natural(mode))
-      end associate
-    end do
-  end subroutine add_internal
+  end subroutine fill_matrix
 
   !> Replaces the accelerations by the speeds and twists by those with the losses of teeth.
   subroutine follow_losses(formulation, pattern, slopes, self)

@@ -1,9 +1,9 @@
 !> Modes of a linearised machine: eigenvalues, shapes and shares in the energies.
 module nocdyn_modes
-  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_eigenpairs, only: clear_rounding, eigenpairs_t, find_eigenpairs
+  use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lapack_eigen, only: eigenvectors
   use nocdyn_linearisation, only: linearisation_t
   implicit none (type, external)
   private
@@ -46,53 +46,28 @@ contains
     integer, intent(in) :: elastic(:)   !! elements whose shares in the potential energy are wanted
     type(mode_t), allocatable, intent(out) :: modes(:)
     type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
-    complex(wp), allocatable :: left(:, :), speeds(:, :), twists(:, :), values(:), vectors(:, :)
-    integer, allocatable :: kept(:)
-    integer :: i, states
-    logical :: has_failed
+    complex(wp), allocatable :: twists(:, :)
+    type(eigenpairs_t) :: pairs
+    integer :: i
 
-    states = size(linear%matrix, 1)
-    allocate (values(states), vectors(states, states))
-    if (states > size(linear%natural) + size(linear%flexible)) then   ! there are internal states
-      allocate (left(states, states))
-      call eigenvectors(linear%matrix, values, vectors, has_failed, left)
-    else
-      call eigenvectors(linear%matrix, values, vectors, has_failed)
-    end if
-    if (has_failed) then
-      call raise(error, exit_failed, 'the modes were not found: a number of the linearised machine is not finite, or ' // &
-                 'LAPACK did not converge')
-      return
-    end if
-    call clear_rounding(values)
-    kept = pack([(i, i=1, states)], aimag(values) >= 0.0_wp)
-    call expand_vectors(linear, elastic, vectors(:, kept), speeds, twists)
-    allocate (modes(size(kept)))
-    do i = 1, size(kept)
-      call fill_mode(linear, elastic, values(kept(i)), vectors(:, kept(i)), twists(:, i), modes(i))
-      if (allocated(left)) call find_internal(linear, left(:, kept(i)) * vectors(:, kept(i)), modes(i))
-      call fill_bodies(formulation, speeds(:, i), modes(i))
+    call find_eigenpairs(linear, pairs, error)
+    if (allocated(error)) return
+    call find_twists(linear, elastic, pairs%vector, twists)
+    allocate (modes(size(pairs%value)))
+    do i = 1, size(modes)
+      call fill_mode(linear, elastic, pairs%value(i), pairs%vector(:, i), twists(:, i), modes(i))
+      modes(i)%internal = pairs%internal(i)
+      if (modes(i)%internal > 0 .and. modes(i)%kind /= mode_oscillating) modes(i)%kind = mode_internal
+      call fill_bodies(formulation, pairs%speeds(:, i), modes(i))
     end do
     modes = modes(order_of(modes))
   end subroutine find_modes
 
-  !> Sets real and imaginary parts to zero that are rounding of the largest number.
-  pure subroutine clear_rounding(values)
-    complex(wp), intent(inout) :: values(:)
-    real(wp), parameter :: rounding = 1.0e-13_wp
-    real(wp) :: parts(size(values), 2)
-
-    parts = reshape([real(values, wp), aimag(values)], shape(parts))
-    where (abs(parts) <= rounding * maxval(abs(values))) parts = 0.0_wp
-    values = cmplx(parts(:, 1), parts(:, 2), wp)
-  end subroutine clear_rounding
-
-  !> Speeds of the coordinates and twists of the elastic elements, from the eigenvectors (p, e, internal states).
-  subroutine expand_vectors(linear, elastic, vectors, speeds, twists)
+  !> Twists of the elastic elements, from the eigenvectors (p, e, internal states).
+  subroutine find_twists(linear, elastic, vectors, twists)
     type(linearisation_t), intent(in) :: linear
     integer, intent(in) :: elastic(:)
     complex(wp), intent(in) :: vectors(:, :)                !! [first-order states, modes]
-    complex(wp), allocatable, intent(out) :: speeds(:, :)   !! [coordinates, modes]
     complex(wp), allocatable, intent(out) :: twists(:, :)   !! [elastic, modes]
     real(wp), allocatable :: angles(:, :)
     integer :: i, n
@@ -102,9 +77,8 @@ contains
     do i = 1, size(linear%flexible)
       angles(:, i) = linear%twists(elastic, linear%flexible(i)) / abs(linear%natural(linear%flexible(i)))
     end do
-    speeds = matmul(cmplx(linear%shapes, kind=wp), vectors(:n, :))
     twists = matmul(cmplx(angles, kind=wp), vectors(n + 1:n + size(linear%flexible), :))
-  end subroutine expand_vectors
+  end subroutine find_twists
 
   !> Sets the kind and the potential energies of a mode.
   subroutine fill_mode(linear, elastic, eigenvalue, vector, twist, mode)
@@ -133,20 +107,6 @@ contains
       mode%kind = mode_overdamped
     end if
   end subroutine fill_mode
-
-  !> Whether a mode is one of the internal states: they take part more than the motion does. With a real eigenvalue it is of a
-  !> kind of its own. Participation factors, products of left and right eigenvectors, compare states of different units.
-  subroutine find_internal(linear, participation, mode)
-    type(linearisation_t), intent(in) :: linear
-    complex(wp), intent(in) :: participation(:)   !! [first-order states]
-    type(mode_t), intent(inout) :: mode
-
-    associate (shares => abs(participation), mechanical => size(linear%natural) + size(linear%flexible))
-      if (sum(shares(mechanical + 1:)) <= sum(shares(:mechanical))) return
-      if (mode%kind /= mode_oscillating) mode%kind = mode_internal
-      mode%internal = maxloc(shares(mechanical + 1:), dim=1)
-    end associate
-  end subroutine find_internal
 
   !> Sets shape and kinetic energies of the bodies.
   subroutine fill_bodies(formulation, speeds, mode)

@@ -10,14 +10,17 @@ module nocdyn_response_analysis
   use nocdyn_kinds, only: wp
   use nocdyn_limit_edges, only: refine_edges
   use nocdyn_machine, only: machine_t
+  use nocdyn_mode_branches, only: new_speed_modes
   use nocdyn_response_fatigue, only: find_response_fatigue, response_fatigue_t
   use nocdyn_response_limits, only: read_limits, response_limit_t
+  use nocdyn_response_points, only: keep_points
   use nocdyn_response_notes, only: note_linear_ranges, note_overloads, note_rated_speeds, note_shaft_modes, note_separation, &
     note_simplifications, note_steady_states
   use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
-  use nocdyn_speed_modes, only: most_coordinates, new_speed_modes, speed_modes_t
+  use nocdyn_speed_modes, only: most_coordinates, speed_modes_t
   use nocdyn_synthesis, only: new_synthesis
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
+  use nocdyn_unstable_speeds, only: describe_first, find_unstable, mark_between, note_speeds, unstable_speed_t
   implicit none (type, external)
   private
 
@@ -29,6 +32,7 @@ module nocdyn_response_analysis
     type(forced_response_t) :: response
     type(speed_modes_t) :: modes                     !! at the speeds of the grid
     type(crossing_t), allocatable :: crossings(:)
+    type(unstable_speed_t), allocatable :: unstable(:)   !! speeds of the grid that are left out for it
     type(response_limit_t), allocatable :: limits(:)
     type(response_fatigue_t), allocatable :: fatigue(:)   !! after `add_fatigue`
     type(string_t), allocatable :: notes(:)
@@ -47,7 +51,7 @@ contains
     real(wp) :: failed_speed
 
     call system_clock(began, rate)
-    allocate (self%crossings(0))
+    allocate (self%crossings(0), self%unstable(0))
     call note_simplifications(machine, self%notes)
     call note_left_out_harmonics(input, self%notes)
     call read_response_settings(input, machine, self%settings, error)
@@ -65,6 +69,7 @@ contains
     end associate
     if (.not. allocated(error)) call find_peaks(self, error, failed_speed)
     if (.not. allocated(error)) then
+      call note_speeds(self%response, self%unstable, 'they are left out', self%notes)
       call note_steady_states(self%settings, self%response, self%notes)
       if (self%modes%modes > 0) call note_shaft_modes(machine, self%modes, self%crossings, .false., self%notes)
       call note_separation(self%response, self%notes)
@@ -153,6 +158,7 @@ contains
     real(wp), intent(inout) :: failed_speed
     integer :: i
     real(wp) :: unrefined
+    logical, allocatable :: is_unstable(:)
 
     if (self%response%matrix%coordinates > most_coordinates) then
       call append(self%notes, 'this machine has ' // to_text(self%response%matrix%coordinates) // ' degrees of freedom: ' // &
@@ -160,13 +166,8 @@ contains
                               ', and peaks are sought from the speeds of the grid')
     else
       call new_speed_modes(self%response, self%modes, error)
+      if (.not. allocated(error)) call leave_out_unstable(self, error, failed_speed)
       if (allocated(error)) return
-      do i = 1, size(self%response%points)
-        failed_speed = self%response%points(i)%state%speed
-        call refuse_unstable(self%modes%natural(:, i), self%modes%damping_ratio(:, i), error)
-        if (allocated(error)) return
-      end do
-      call find_crossings(self%response%speeds(), self%response%frequencies(), self%modes, self%crossings)
     end if
     call refine_peaks(self%response, self%crossings, unrefined, error, failed_speed)
     if (.not. allocated(error) .and. unrefined > 0) then
@@ -175,26 +176,49 @@ contains
                               'orders or a shorter range of speeds refine all')
     end if
     if (.not. allocated(error)) call refine_edges(self%response, self%limits, error, failed_speed)
+    if (size(self%unstable) == 0 .or. allocated(error)) return
+    allocate (is_unstable(size(self%response%points)))
+    call mark_between(self%response, is_unstable)
+    call keep_points(self%response%points, .not. is_unstable)
   end subroutine find_peaks
 
-  !> Refuses steady states that do not stay.
-  subroutine refuse_unstable(natural, damping_ratio, error)
-    real(wp), intent(in) :: natural(:), damping_ratio(:)   !! of one speed
-    type(error_t), allocatable, intent(out) :: error
-    real(wp), parameter :: rounding = 1.0e-12_wp
-    integer :: m
+  !> Finds the critical speeds, and leaves out the speeds at which the steady state does not stay.
+  subroutine leave_out_unstable(self, error, failed_speed)
+    type(response_analysis_t), intent(inout) :: self
+    type(error_t), allocatable, intent(out) :: error   !! if no speed is left
+    real(wp), intent(inout) :: failed_speed
+    character(len=:), allocatable :: text
+    integer :: i
+    logical :: is_unstable(size(self%response%points))
 
-    do m = 1, size(natural)
-      if (natural(m) < 0) then
-        call raise(error, exit_failed, 'the steady state is unstable: a stiffness is negative there, and a motion grows ' // &
-                   'e-fold in ' // rounded_text(-1.0_wp / natural(m), 4) // ' s')
-      else if (damping_ratio(m) < -rounding) then
-        call raise(error, exit_failed, 'the steady state is unstable: an oscillation with ' // &
-                   rounded_text(natural(m) / (2.0_wp * acos(-1.0_wp)), 6) // ' Hz has the negative damping ratio ' // &
-                   rounded_text(damping_ratio(m), 4) // ', for a torque grows with the speed')
-      end if
-      if (allocated(error)) return
-    end do
-  end subroutine refuse_unstable
+    call find_unstable(self%response%speeds(), self%modes, self%unstable, is_unstable)
+    if (all(is_unstable)) then
+      failed_speed = self%unstable(1)%speed
+      call describe_first(self%unstable(:1), text)
+      call raise(error, exit_failed, 'the steady state is unstable: ' // text)
+      return
+    end if
+    call find_crossings(self%response%speeds(), self%response%frequencies(), self%modes, self%crossings)
+    if (size(self%unstable) == 0) return
+    self%crossings = pack(self%crossings, [(.not. is_between(self%crossings(i)%speed), i=1, size(self%crossings))])
+    call keep_points(self%response%points, .not. is_unstable)
+
+  contains
+
+    !> Whether a speed is between two points one of which is unstable.
+    pure logical function is_between(speed)
+      real(wp), intent(in) :: speed
+      integer :: k
+
+      is_between = .false.
+      associate (points => self%response%points)
+        do k = 2, size(points)
+          if ((points(k - 1)%state%speed - speed) * (points(k)%state%speed - speed) > 0) cycle
+          is_between = is_between .or. is_unstable(k - 1) .or. is_unstable(k)
+        end do
+      end associate
+    end function is_between
+
+  end subroutine leave_out_unstable
 
 end module nocdyn_response_analysis

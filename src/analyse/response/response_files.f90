@@ -243,12 +243,17 @@ contains
     type(response_summary_t), intent(in) :: summary
     character(len=:), allocatable :: text
     type(json_t) :: json
+    real(wp), allocatable :: unstable(:)
     integer :: i
 
     call json%open_report(input%file, input%title())
     call json%put('limits_exceeded', summary%limits_exceeded)
     call json%put('wall_time_s', analysis%wall_time)
     call json%put('notes', analysis%notes)
+    if (size(analysis%unstable) > 0) then
+      unstable = analysis%unstable%speed
+      call json%put('unstable_speeds_rad_s', unstable)
+    end if
     call json%put('body', analysis%body_name)
     call json%put('speed_rad_s', [analysis%settings%speeds(1), analysis%settings%speeds(size(analysis%settings%speeds))])
     if (size(analysis%settings%operating) > 0) then
@@ -297,6 +302,9 @@ contains
 
     call json%open()
     call json%put('mode', critical%crossing%mode)
+    associate (internal => analysis%modes%internal(critical%crossing%mode))
+      if (internal > 0) call json%put('mostly', analysis%response%machine%internal_name(internal))
+    end associate
     call put_line(json, analysis, critical%crossing%line)
     call json%put('speed_rad_s', critical%crossing%speed)
     call json%put('frequency_Hz', critical%crossing%frequency / turn)
@@ -339,6 +347,7 @@ contains
           call json%put('ratio_to_limit', largest%ratio)
           call json%put('ratio_speed_rad_s', points(largest%ratio_point)%state%speed)
         end if
+        if (largest%peak_ratio > 0) call json%put('peak_ratio_to_limit', largest%peak_ratio)
         call json%close()
       end associate
     end do
@@ -361,6 +370,7 @@ contains
         call json%put('from_rad_s', range%from)
         call json%put('to_rad_s', range%to)
         call json%put('can_be_passed', range%can_be_passed)
+        call json%put('is_allowed', range%is_allowed)
         call json%close()
       end associate
     end do

@@ -3,12 +3,13 @@
 !> The rule 'iacs_m68' is IACS Unified Requirement M68, Dimensions of propulsion shafts and their permissible torsional vibration
 !> stresses: with lambda = speed / rated speed, the shear stress amplitude for continuous operation [N/mm2] is
 !>   tau_C = (sigma_B + 160) / 18 c_K c_D (3 - 2 lambda^2) for lambda < 0.9, ... 1.38 for 0.9 <= lambda < 1.05,
-!> with c_D = 0.35 + 0.93 d^(-0.2), d in mm; for passing through quickly it is tau_T = 1.7 tau_C / sqrt(c_K).
+!> with c_D = 0.35 + 0.93 d^(-0.2), d in mm; for passing through quickly it is tau_T = 1.7 tau_C / sqrt(c_K), for lambda < 0.8:
+!> from there on the rule accepts no restricted range of speeds in normal operation.
 module nocdyn_response_limits
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_response_quantities, only: quantity_moment, quantity_stress, response_quantity_t
+  use nocdyn_response_quantities, only: quantity_along, quantity_moment, quantity_stress, response_quantity_t
   use nocdyn_schema_text, only: suggestion
   use nocdyn_text, only: quoted, string_t
   implicit none (type, external)
@@ -30,7 +31,7 @@ module nocdyn_response_limits
     real(wp), private :: tensile_strength = 0.0_wp    !! sigma_B [Pa]
     real(wp), private :: c_k = 1.0_wp, diameter = 0.0_wp, rated = 0.0_wp   !! [1], [m], [rad/s]
   contains
-    procedure :: continuous_limit, transient_limit, peak_limit, ratio
+    procedure :: continuous_limit, transient_limit, peak_limit, ratio, allows_passing
   end type response_limit_t
 
 contains
@@ -104,7 +105,7 @@ contains
     has_name = any([(input%groups(i)%kind == kind .and. input%groups(i)%name == name, i=1, size(input%groups))])
   end function has_name
 
-  !> Limits of the moment of a coupling, of those of both ends of a shaft, or of the force of a mesh.
+  !> Limits of the moment of a coupling, of the largest one along a shaft, or of the force of a mesh.
   subroutine add_moment_limits(group, index, kind, quantities, limits)
     type(group_t), intent(in) :: group
     integer, intent(in) :: index   !! of the group
@@ -112,9 +113,10 @@ contains
     type(response_quantity_t), intent(in) :: quantities(:)
     type(response_limit_t), allocatable, intent(inout) :: limits(:)
     type(response_limit_t) :: limit
-    integer :: q
+    integer :: limited, q
 
     limit%group = index
+    limited = merge(quantity_along, quantity_moment, kind == 'shaft')
     if (kind == 'mesh') then
       limit%vibratory = group%number('vibratory_force', absent=no_limit)
       limit%peak = group%number('force', absent=no_limit)
@@ -124,7 +126,7 @@ contains
     end if
     if (min(limit%vibratory, limit%peak) >= no_limit) return
     do q = 1, size(quantities)
-      if (quantities(q)%kind /= quantity_moment .or. quantities(q)%name /= group%text(kind)) cycle
+      if (quantities(q)%kind /= limited .or. quantities(q)%name /= group%text(kind)) cycle
       limit%quantity = q
       limits = [limits, limit]
     end do
@@ -215,8 +217,23 @@ contains
     real(wp), intent(in) :: speed   !! [rad/s]
 
     limit = self%transient
-    if (self%has_rule) limit = min(limit, 1.7_wp * m68_stress(self, speed) / sqrt(self%c_k))
+    if (.not. self%has_rule) return
+    if (self%allows_passing(speed)) then
+      limit = min(limit, 1.7_wp * m68_stress(self, speed) / sqrt(self%c_k))
+    else
+      limit = min(limit, m68_stress(self, speed))
+    end if
   end function transient_limit
+
+  !> Whether a range of speeds may be barred there, and be passed.
+  elemental logical function allows_passing(self, speed)
+    class(response_limit_t), intent(in) :: self
+    real(wp), intent(in) :: speed   !! [rad/s]
+    real(wp), parameter :: share = 0.8_wp   ! of the rated speed
+
+    allows_passing = .true.
+    if (self%has_rule) allows_passing = abs(speed) < share * self%rated
+  end function allows_passing
 
   !> The limit of the largest magnitude, with the mean.
   elemental real(wp) function peak_limit(self) result(limit)

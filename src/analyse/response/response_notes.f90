@@ -98,6 +98,7 @@ contains
                          to_text(size(response%points)) // ' speeds: there a torque on the body of &response holds the ' // &
                          'speed, the column drive_torque')
     end if
+    call note_drive(response, notes)
     call note_range(settings, notes)
   end subroutine note_steady_states
 
@@ -114,6 +115,28 @@ contains
       end associate
     end do
   end function steepest_slopes
+
+  !> Drives that would have to be stronger than they are, and supplies that follow the speed.
+  subroutine note_drive(response, notes)
+    type(forced_response_t), intent(in) :: response
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    real(wp), parameter :: rounding = 1.0e-9_wp
+    real(wp) :: factor(size(response%points)), supply(size(response%points))
+    integer :: i
+
+    factor = [(response%points(i)%state%factor, i=1, size(factor))]
+    supply = [(response%points(i)%state%supply, i=1, size(supply))]
+    if (any(factor > 1.0_wp + rounding)) then
+      call append(notes, 'the drive of the input is too weak at ' // to_text(count(factor > 1.0_wp + rounding)) // ' of ' // &
+                         to_text(size(factor)) // ' speeds: the load there needs up to ' // rounded_text(maxval(factor), 4) // &
+                         ' times its torque, which is taken as given')
+    end if
+    if (any(supply > 0)) then
+      call append(notes, 'the supplies of the induction motors are taken to follow the speeds, with the flux of the mains: ' // &
+                         'from ' // rounded_text(minval(supply, mask=supply > 0), 4) // ' to ' // &
+                         rounded_text(maxval(supply), 4) // ' times their frequency')
+    end if
+  end subroutine note_drive
 
   !> Adds a note on each elastic element whose moment does not change with its twist at some speeds.
   subroutine note_open_gaps(response, notes)

@@ -117,6 +117,9 @@ contains
     if (has_stress) line = line // cell(stress)
     if (has_ratio) line = line // cell(ratio_text(critical%ratio))
     if (size(analysis%settings%operating) > 0) line = line // '  ' // margin_text(critical)
+    associate (internal => analysis%modes%internal(critical%crossing%mode))
+      if (internal > 0) line = line // '  mostly ' // analysis%response%machine%internal_name(internal)
+    end associate
     call report%append_line(trim(line))
   end subroutine put_critical
 
@@ -239,14 +242,21 @@ contains
       associate (range => summary%barred(i))
         line = '  barred by ' // analysis%response%quantities(analysis%limits(range%limit)%quantity)%label // ': ' // &
                rpm(range%from) // ' to ' // rpm(range%to) // ' rpm'
-        if (.not. range%can_be_passed) line = line // '; the limit for passing through is exceeded too'
+        if (.not. range%is_allowed) then
+          line = line // '; the rule allows no barred range from 0.8 of the rated speed on'
+        else if (.not. range%can_be_passed) then
+          line = line // '; the limit for passing through is exceeded too'
+        end if
         call report%append_line(line)
       end associate
     end do
     do q = 1, size(summary%largest)
-      if (summary%largest(q)%ratio <= 1.0_wp) cycle
-      if (any(analysis%limits(summary%barred%limit)%quantity == q)) cycle
-      call report%append_line('  ' // analysis%response%quantities(q)%label // ' exceeds its limit of the peak')
+      associate (largest => summary%largest(q))
+        if (largest%peak_ratio <= 1.0_wp) cycle
+        call report%append_line('  ' // analysis%response%quantities(q)%label // ' exceeds its limit of the peak: ' // &
+                                ratio_text(largest%peak_ratio) // ' at ' // &
+                                rpm(analysis%response%points(largest%peak_point)%state%speed) // ' rpm')
+      end associate
     end do
     if (size(analysis%limits) > 0 .and. .not. summary%limits_exceeded) call report%append_line('  all limits are kept')
   end subroutine put_barred

@@ -35,6 +35,7 @@ module nocdyn_response_summary
     real(wp) :: peak = 0.0_wp                   !! largest magnitude, with the mean
     real(wp) :: ratio = 0.0_wp                  !! largest ratio to the limits, 0 without limits
     integer :: ratio_point = 0
+    real(wp) :: peak_ratio = 0.0_wp             !! ratio of `peak` to its limit, 0 without one
   end type largest_t
 
   !> Speeds at which a limit for continuous operation is exceeded.
@@ -42,6 +43,7 @@ module nocdyn_response_summary
     integer :: limit = 0
     real(wp) :: from = 0.0_wp, to = 0.0_wp      !! [rad/s]
     logical :: can_be_passed = .true.           !! whether the limit for passing them quickly is kept
+    logical :: is_allowed = .true.              !! whether the rule of the limit accepts a barred range there
   end type barred_range_t
 
   type, public :: response_summary_t
@@ -129,7 +131,7 @@ contains
       energy = 0.0_wp
       do k = 1, size(analysis%response%quantities(q)%element)
         e = analysis%response%quantities(q)%element(k)
-        energy = energy + abs(analysis%response%points(1)%state%stiffness(e)) * analysis%modes%twists(e, mode)**2
+        energy = energy + abs(analysis%response%points(1)%state%stiffness(e)) * abs(analysis%modes%twists(e, mode))**2
       end do
       if (energy <= most) cycle
       coupling = q
@@ -164,6 +166,14 @@ contains
           end if
         end do
       end associate
+    end do
+    do q = 1, size(largest)
+      do i = 1, size(analysis%limits)
+        associate (limit => analysis%limits(i))
+          if (limit%quantity /= q .or. limit%peak_limit() >= no_limit) cycle
+          largest(q)%peak_ratio = max(largest(q)%peak_ratio, largest(q)%peak / limit%peak_limit())
+        end associate
+      end do
     end do
   end subroutine find_largest
 
@@ -203,7 +213,9 @@ contains
       if (excess(i) > 0) then
         range%from = edge(speed, excess, i, i - 1)
         range%can_be_passed = .true.
+        range%is_allowed = .true.
         do
+          range%is_allowed = range%is_allowed .and. limit%allows_passing(speed(i))
           range%can_be_passed = range%can_be_passed .and. half_range(i) <= limit%transient_limit(speed(i))
           range%to = edge(speed, excess, i, i + 1)
           i = i + 1

@@ -18,7 +18,7 @@ module nocdyn_transient
   use nocdyn_output_units, only: output_units
   use nocdyn_row_intervals, only: note_sparse_rows, wanted_rows
   use nocdyn_run_fatigue, only: new_run_fatigue, run_fatigue_t
-  use nocdyn_run_limits, only: check_run_limits
+  use nocdyn_run_limits, only: check_run_limits, note_other_limits
   use nocdyn_run_settings, only: check_size, choose_settings
   use nocdyn_run_summary, only: check_energy_balance, check_extremes, describe_machine, extremes_t, run_summary_t, &
     start_extremes, update_extremes, widen_extremes
@@ -122,6 +122,7 @@ contains
     summary%method = trim(settings%method)
     call describe_machine(formulation%machine, summary)
     if (output_note(input) /= '') call append(notes, output_note(input))
+    call note_other_limits(input, notes)
     do i = 1, size(notes)
       call append(summary%notes, notes(i)%text)
     end do

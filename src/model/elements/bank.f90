@@ -74,6 +74,7 @@ module nocdyn_bank
     procedure :: list_harmonics
     procedure :: has_ended
     procedure :: hold_speed
+    procedure :: follows_supply, set_supply, idle_supply
     procedure :: start_internal
     procedure :: steady_internal
     procedure :: knees
@@ -212,11 +213,35 @@ contains
     harmonic = harmonic_t(amplitude * cmplx(sin(phase), -cos(phase), wp), frequency, order, body)
   end function sine_harmonic
 
-  !> Prepares the elements for speeds that something outside of the machine holds: governors leave their throttles open. By
-  !> default there is nothing to do.
+  !> Prepares the elements for speeds that something outside of the machine holds: governors leave their throttles open, induction
+  !> motors may follow the frequency of a supply. By default there is nothing to do.
   subroutine hold_speed(self)
     class(bank_t), intent(inout) :: self
   end subroutine hold_speed
+
+  !> Whether its motors can have any speed by the frequency of their supply, after `hold_speed`. By default they cannot.
+  pure logical function follows_supply(self)
+    class(bank_t), intent(in) :: self
+
+    follows_supply = .false.
+  end function follows_supply
+
+  !> Gives the supply of the motors in the first lane a frequency: the slip of a motor is this share minus its speed over the
+  !> synchronous one. Its flux stays that of the mains, and so does the stator with its transients.
+  subroutine set_supply(self, share)
+    class(bank_t), intent(inout) :: self
+    real(wp), intent(in) :: share   !! of the frequency in the input
+
+  end subroutine set_supply
+
+  !> The frequency of the supply with which a motor of the first lane has no slip, as a share.
+  pure real(wp) function idle_supply(self, element, speed)
+    class(bank_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: speed    !! u' [rad/s]
+
+    idle_supply = 1.0_wp
+  end function idle_supply
 
   !> The internal states at the start, 0 by default.
   subroutine start_internal(self, speed, internal)

@@ -41,20 +41,38 @@ def limited(report: dict) -> list[dict]:
     return [one for one in report["largest"] if "ratio_to_limit" in one]
 
 
+def shares_of_limits(report: dict) -> list[tuple[str, float, float]]:
+    """Of each quantity with a limit the largest share, then that of its peak: what is shared, the share, the speed in rad/s."""
+    found = []
+    for one in limited(report):
+        found.append((one["quantity"], one["ratio_to_limit"], one["ratio_speed_rad_s"]))
+        peak = one.get("peak_ratio_to_limit", one["ratio_to_limit"])
+        if peak != one["ratio_to_limit"]:
+            found.append((f"{one['quantity']}, its peak,", peak, one["peak_speed_rad_s"]))
+    return found
+
+
+def passage(barred: dict) -> tuple[str, str]:
+    """What a barred range means, and its tone. A rule may accept none, however small the stress."""
+    if not barred.get("is_allowed", True):
+        return "not allowed from 0.8 of the rated speed on", "bad"
+    if barred["can_be_passed"]:
+        return "may be passed quickly", "warn"
+    return "limit for passing through exceeded too", "bad"
+
+
 def ratio_tone(ratio: float) -> tuple[str, str]:
     return ("limit exceeded", "bad") if ratio > 1 else ("within the limit", "good")
 
 
 def _limits(sources: Sources) -> list[Paragraph | Table]:
     report, unit = sources.response_report, sources.speed_unit
-    with_limit = limited(report)
-    if not with_limit:
+    if not limited(report):
         return [Paragraph("The input sets no limit for a quantity of the response.")]
     rows = []
-    for one in with_limit:
-        words, tone = ratio_tone(one["ratio_to_limit"])
-        speed = sources.speed(one["ratio_speed_rad_s"])
-        rows.append([text(one["quantity"]), share(one["ratio_to_limit"]), number(speed), text(words, tone)])
+    for name, ratio, speed in shares_of_limits(report):
+        words, tone = ratio_tone(ratio)
+        rows.append([text(name.rstrip(",")), share(ratio), number(sources.speed(speed)), text(words, tone)])
     columns = ["quantity", "largest share of its limit [%]", f"at [{unit}]", "assessment"]
     blocks: list[Paragraph | Table] = [Table("Limits", columns, rows)]
     barred = report["barred_speed_ranges"]
@@ -63,11 +81,7 @@ def _limits(sources: Sources) -> list[Paragraph | Table]:
     rows = []
     for one in barred:
         ends = sorted((sources.speed(one["from_rad_s"]), sources.speed(one["to_rad_s"])))
-        passing = (
-            text("may be passed quickly", "warn")
-            if one["can_be_passed"]
-            else text("limit for passing through exceeded too", "bad")
-        )
+        passing = text(*passage(one))
         rows.append([text(one["quantity"]), *map(number, ends), passing, text(one["limit_at"])])
     columns = ["limit of", f"from [{unit}]", f"to [{unit}]", "passage", "set at"]
     return [*blocks, Table("Barred ranges of speed", columns, rows, "No continuous operation within these speeds.")]

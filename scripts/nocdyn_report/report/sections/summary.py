@@ -5,7 +5,7 @@ from ..content import Cell, Section, Table, text
 from ..numbers import name_and_unit, number_text, percent
 from ..sources import Sources
 from .campbell import verdict
-from .response import limited, ratio_tone
+from .response import limited, passage, ratio_tone, shares_of_limits
 from .steady import stability_text
 
 MOST_NAMED = 6  # of one sort
@@ -30,8 +30,13 @@ def _listed(words: list[str], most: int = MOST_NAMED) -> str:
 
 
 def _failures(sources: Sources) -> list[list[Cell]]:
-    run = sources.results.of["run"]
-    return [_row("Run", "scope", run.message, "failed", "bad")] if run.state == "failed" else []
+    """Commands that the input asks for and that gave no result: nothing below tells of what they would have shown."""
+    rows = []
+    for command, subject in (("run", "Run"), ("response", "Forced response"), ("campbell", "Campbell diagram")):
+        one = sources.results.of[command]
+        if one.state in ("failed", "refused"):
+            rows.append(_row(subject, "scope", one.message, one.state, "bad"))
+    return rows
 
 
 def _steady(sources: Sources) -> list[list[Cell]]:
@@ -82,10 +87,9 @@ def _limits(sources: Sources) -> list[list[Cell]]:
     if not sources.has("response"):
         return []
     rows = []
-    for one in limited(sources.response_report):
-        at = f"{number_text(sources.speed(one['ratio_speed_rad_s']))} {sources.speed_unit}"
-        finding = f"{one['quantity']} reaches {percent(one['ratio_to_limit'])} of its limit at {at}."
-        rows.append(_row("Limit", "limits", finding, *ratio_tone(one["ratio_to_limit"])))
+    for name, ratio, speed in shares_of_limits(sources.response_report):
+        at = f"{number_text(sources.speed(speed))} {sources.speed_unit}"
+        rows.append(_row("Limit", "limits", f"{name} reaches {percent(ratio)} of its limit at {at}.", *ratio_tone(ratio)))
     return rows
 
 
@@ -99,8 +103,7 @@ def _barred(sources: Sources) -> list[list[Cell]]:
     for one in ranges:
         ends = sorted((sources.speed(one["from_rad_s"]), sources.speed(one["to_rad_s"])))
         finding = f"{number_text(ends[0])} to {number_text(ends[1])} {sources.speed_unit}, by {one['quantity']}."
-        words, tone = ("may be passed quickly", "warn") if one["can_be_passed"] else ("not to be passed", "bad")
-        rows.append(_row("Barred range", "limits", finding, words, tone))
+        rows.append(_row("Barred range", "limits", finding, *passage(one)))
     return rows
 
 

@@ -11,7 +11,7 @@ module nocdyn_variant_analysis
   use nocdyn_modes, only: find_modes, mode_oscillating, mode_t
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
   use nocdyn_response_analysis, only: analyse_response, response_analysis_t
-  use nocdyn_response_quantities, only: quantity_moment, quantity_stress, response_quantity_t
+  use nocdyn_response_quantities, only: quantity_along, quantity_moment, quantity_stress, response_quantity_t
   use nocdyn_response_settings, only: operating_distance
   use nocdyn_response_summary, only: worst_ratio
   use nocdyn_text, only: to_text
@@ -22,7 +22,7 @@ module nocdyn_variant_analysis
   public :: analyse_variant, matching_quantities, oscillating_modes
 
   integer, parameter, public :: recorded_kinds(*) = [quantity_moment]                  !! of an element, what its name records
-  integer, parameter, public :: limited_kinds(*) = [quantity_moment, quantity_stress]  !! and whose limits count
+  integer, parameter, public :: limited_kinds(*) = [quantity_moment, quantity_stress, quantity_along]  !! and whose limits count
 
 contains
 
@@ -115,13 +115,36 @@ contains
       case (analysis_peak_speed)
         value = speed
       case (analysis_margin)
-        call operating_distance(analysis%settings, speed, value, is_too_near)
+        call operating_distance(analysis%settings, critical_speed(analysis, line, speed), value, is_too_near)
       case default   ! analysis_ratio
         value = largest_ratio(analysis, line, &
                               matching_quantities(analysis%response%quantities, one%quantity, limited_kinds))
       end select
     end associate
   end subroutine find_response_value
+
+  !> The critical speed that a peak belongs to, as the table of the response has it; the speed of the peak if there is none near.
+  pure real(wp) function critical_speed(analysis, line, peak) result(speed)
+    type(response_analysis_t), intent(in) :: analysis
+    integer, intent(in) :: line     !! 0 stands for all
+    real(wp), intent(in) :: peak    !! [rad/s]
+    real(wp), parameter :: near = 0.02_wp   ! of the critical speed, without damping
+    integer :: i
+    real(wp) :: least
+
+    speed = peak
+    least = huge(1.0_wp)
+    do i = 1, size(analysis%crossings)
+      associate (crossing => analysis%crossings(i))
+        if (line > 0 .and. crossing%line /= line) cycle
+        associate (distance => abs(crossing%speed - peak) / abs(crossing%speed))
+          if (distance > near + 3.0_wp * crossing%damping_ratio .or. distance >= least) cycle
+          least = distance
+          speed = crossing%speed
+        end associate
+      end associate
+    end do
+  end function critical_speed
 
   !> The largest amplitude of some quantities at a speed.
   pure real(wp) function largest_amplitude(analysis, point, line, quantities) result(largest)

@@ -29,6 +29,7 @@ module nocdyn_flux_motors
     'voltage', 'frequency', 'stator_resistance', 'rotor_resistance', 'stator_leakage', 'rotor_leakage', 'mutual_inductance', &
     'stator_reactance', 'rotor_reactance', 'mutual_reactance']
 
+  character(len=*), parameter :: share_name = 'share of frequency'   ! of the supply, where a speed is held
   character(len=*), parameter :: supply = 'supply'   ! the scheduled share of the voltage; its flag: the motor is disconnected
   real(wp), parameter, public :: arc_time = 1.0e-3_wp   !! time constant of the currents in opening contacts [s]
   real(wp), parameter :: amplitude = sqrt(2.0_wp / 3.0_wp)   ! of a phase of the star, per rms voltage between lines
@@ -36,10 +37,12 @@ module nocdyn_flux_motors
   !> The internal states of a motor are the flux linkages d and q of its stator, then those of its rotor [V s].
   type, extends(bank_t), public :: flux_motors_t
     logical, private :: has_schedule = .false.   !! whether the supply follows the time
+    logical, private :: is_held = .false.        !! whether the supply may have another frequency, after `hold_speed`
   contains
     procedure :: describe
     procedure :: circuit
     procedure :: steady_internal
+    procedure :: hold_speed, follows_supply, set_supply, idle_supply
     procedure :: knees
     procedure :: quantities
     procedure :: observe
@@ -92,6 +95,7 @@ contains
     rotor_rate = self%parameter(tape, 'rotor_resistance') / determinant   ! of the flux, times an inductance [1/(H s)]
     pole_pairs = self%parameter(tape, 'direction') * self%parameter(tape, 'pole pairs')
     slip_frequency = frequency - pole_pairs * speed_of(tape)
+    if (self%is_held) slip_frequency = self%parameter(tape, share_name) * frequency - pole_pairs * speed_of(tape)
     circuit = stator_circuit(self, tape, [stator, rotor, mutual, determinant])
     own = circuit(1)
     drive = circuit(2)
@@ -173,16 +177,53 @@ contains
     type(induction_circuit_t) :: circuit
     complex(wp) :: flux(2)
     integer :: e
+    real(wp) :: slip
 
     associate (direction => self%parameters(self%number_of('direction'))%value)
       do e = 1, self%count
         circuit = self%circuit(1, e)
         if (self%has_schedule) circuit%voltage = circuit%voltage * value_at(self, supply, e, t)
-        flux = circuit%steady_flux(circuit%slip(direction(1, e) * speed(e)))
+        slip = circuit%slip(direction(1, e) * speed(e))
+        if (self%is_held) slip = self%parameters(self%number_of(share_name))%value(1, e) - self%idle_supply(e, speed(e))
+        flux = circuit%steady_flux(slip)
         internal(4 * e - 3:4 * e) = [real(flux(1), wp), aimag(flux(1)), real(flux(2), wp), aimag(flux(2))]
       end do
     end associate
   end subroutine steady_internal
+
+  !> Gives the motors a supply of any frequency.
+  subroutine hold_speed(self)
+    class(flux_motors_t), intent(inout) :: self
+
+    if (self%is_held) return
+    self%is_held = .true.
+    call self%add_parameter(share_name, spread(spread(1.0_wp, 1, self%lanes), 2, self%count), is_key=.false.)
+    call self%prepare_law()
+  end subroutine hold_speed
+
+  pure logical function follows_supply(self)
+    class(flux_motors_t), intent(in) :: self
+
+    follows_supply = self%is_held
+  end function follows_supply
+
+  subroutine set_supply(self, share)
+    class(flux_motors_t), intent(inout) :: self
+    real(wp), intent(in) :: share   !! of the frequency in the input
+
+    self%parameters(self%number_of(share_name))%value(1, :) = share
+    call self%refresh_lane(1)
+  end subroutine set_supply
+
+  pure real(wp) function idle_supply(self, element, speed)
+    class(flux_motors_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: speed    !! u' [rad/s]
+
+    associate (circuit => self%circuit(1, element))
+      idle_supply = 1.0_wp - circuit%slip(self%parameters(self%number_of('direction'))%value(1, element) * speed)
+    end associate
+  end function idle_supply
 
   !> The synchronous speed, and those of the largest steady torque as a motor and as a generator.
   function knees(self, element, t) result(speeds)

@@ -14,6 +14,8 @@ module nocdyn_motors
 
   public :: new_motors, new_table_motors, new_induction_motors
 
+  character(len=*), parameter :: share_name = 'share of frequency'   ! of the supply, where a speed is held
+
   !> M = law(omega), with a governor of the throttle y M = y law(omega) - drag omega.
   type, abstract, extends(governed_bank_t) :: speed_motors_t
   contains
@@ -46,8 +48,10 @@ module nocdyn_motors
 
   !> Kloss' formula 2 T_k / (s / s_k + s_k / s) with the slip s = 1 - omega / synchronous_speed, as 2 T_k s s_k / (s^2 + s_k^2).
   type, extends(speed_motors_t), public :: induction_motors_t
+    logical, private :: has_supply = .false.   !! whether the supply may have another frequency, after `hold_speed`
   contains
     procedure :: torque => induction_torque
+    procedure :: hold_speed, follows_supply, set_supply, idle_supply
     procedure :: knees => induction_knees
   end type induction_motors_t
 
@@ -162,8 +166,42 @@ contains
 
     s_k = self%parameter(tape, 'breakdown_slip')
     slip = 1.0_wp - speed_of(tape) / self%parameter(tape, 'synchronous_speed')
+    if (self%has_supply) slip = self%parameter(tape, share_name) - speed_of(tape) / self%parameter(tape, 'synchronous_speed')
     torque = 2.0_wp * self%parameter(tape, 'breakdown_torque') * s_k * slip / (slip * slip + s_k * s_k)
   end function induction_torque
+
+  !> Gives the motors a supply of any frequency, unless governors hold their speeds.
+  subroutine hold_speed(self)
+    class(induction_motors_t), intent(inout) :: self
+
+    call self%governed_bank_t%hold_speed()
+    if (self%has_supply .or. self%has_governor) return
+    self%has_supply = .true.
+    call self%add_parameter(share_name, spread(spread(1.0_wp, 1, self%lanes), 2, self%count), is_key=.false.)
+    call self%prepare_law()
+  end subroutine hold_speed
+
+  pure logical function follows_supply(self)
+    class(induction_motors_t), intent(in) :: self
+
+    follows_supply = self%has_supply
+  end function follows_supply
+
+  subroutine set_supply(self, share)
+    class(induction_motors_t), intent(inout) :: self
+    real(wp), intent(in) :: share   !! of the frequency in the input
+
+    self%parameters(self%number_of(share_name))%value(1, :) = share
+    call self%refresh_lane(1)
+  end subroutine set_supply
+
+  pure real(wp) function idle_supply(self, element, speed)
+    class(induction_motors_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: speed    !! u' [rad/s]
+
+    idle_supply = speed / self%parameters(self%number_of('synchronous_speed'))%value(1, element)
+  end function idle_supply
 
   !> The vertex, and the speeds without torque, where a, b and c are of sizes that belong together.
   function quadratic_knees(self, element, t) result(speeds)

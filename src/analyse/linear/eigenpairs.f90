@@ -1,0 +1,87 @@
+!> The eigenvalues of a linearised machine with their eigenvectors: the one routine by which modes, Campbell's diagram and the
+!> forced response find damped frequencies.
+module nocdyn_eigenpairs
+  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack_eigen, only: eigenvectors
+  use nocdyn_linearisation, only: linearisation_t
+  implicit none (type, external)
+  private
+
+  public :: find_eigenpairs, clear_rounding
+
+  !> One of each conjugate pair, and all real ones.
+  type, public :: eigenpairs_t
+    complex(wp), allocatable :: value(:)        !! imaginary part >= 0 [1/s], [pairs]
+    complex(wp), allocatable :: vector(:, :)    !! [first-order states, pairs]
+    integer, allocatable :: internal(:)         !! the internal state that takes part most, if they do more than the motion; or 0
+    complex(wp), allocatable :: speeds(:, :)    !! of the coordinates, [coordinates, pairs]
+  end type eigenpairs_t
+
+contains
+
+  !> Finds all.
+  subroutine find_eigenpairs(linear, self, error)
+    type(linearisation_t), intent(in) :: linear   !! with its matrix
+    type(eigenpairs_t), intent(out) :: self
+    type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
+    complex(wp), allocatable :: left(:, :), values(:), vectors(:, :)
+    integer, allocatable :: kept(:)
+    integer :: i, states
+    logical :: has_failed
+
+    states = size(linear%matrix, 1)
+    allocate (values(states), vectors(states, states))
+    if (has_internal(linear)) then
+      allocate (left(states, states))
+      call eigenvectors(linear%matrix, values, vectors, has_failed, left)
+    else
+      call eigenvectors(linear%matrix, values, vectors, has_failed)
+    end if
+    if (has_failed) then
+      call raise(error, exit_failed, 'the modes were not found: a number of the linearised machine is not finite, or ' // &
+                 'LAPACK did not converge')
+      return
+    end if
+    call clear_rounding(values)
+    kept = pack([(i, i=1, states)], aimag(values) >= 0.0_wp)
+    self%value = values(kept)
+    self%vector = vectors(:, kept)
+    self%speeds = matmul(cmplx(linear%shapes, kind=wp), self%vector(:size(linear%natural), :))
+    allocate (self%internal(size(kept)), source=0)
+    if (.not. allocated(left)) return
+    do i = 1, size(kept)
+      self%internal(i) = internal_of(linear, left(:, kept(i)) * vectors(:, kept(i)))
+    end do
+  end subroutine find_eigenpairs
+
+  pure logical function has_internal(linear)
+    type(linearisation_t), intent(in) :: linear
+
+    has_internal = size(linear%matrix, 1) > size(linear%natural) + size(linear%flexible)
+  end function has_internal
+
+  !> Which internal state a mode is, if they take part more than the motion does; else 0. Participation factors, products of left
+  !> and right eigenvectors, compare states of different units.
+  pure integer function internal_of(linear, participation) result(internal)
+    type(linearisation_t), intent(in) :: linear
+    complex(wp), intent(in) :: participation(:)   !! [first-order states]
+
+    internal = 0
+    associate (shares => abs(participation), mechanical => size(linear%natural) + size(linear%flexible))
+      if (sum(shares(mechanical + 1:)) > sum(shares(:mechanical))) internal = maxloc(shares(mechanical + 1:), dim=1)
+    end associate
+  end function internal_of
+
+  !> Sets real and imaginary parts to zero that are rounding of the largest number.
+  pure subroutine clear_rounding(values)
+    complex(wp), intent(inout) :: values(:)
+    real(wp), parameter :: rounding = 1.0e-13_wp
+    real(wp) :: parts(size(values), 2)
+
+    parts = reshape([real(values, wp), aimag(values)], shape(parts))
+    where (abs(parts) <= rounding * maxval(abs(values))) parts = 0.0_wp
+    values = cmplx(parts(:, 1), parts(:, 2), wp)
+  end subroutine clear_rounding
+
+end module nocdyn_eigenpairs
