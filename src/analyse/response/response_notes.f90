@@ -45,16 +45,20 @@ contains
     logical, intent(in) :: lists_modes   !! whether modes are reported that no line crosses
     type(string_t), allocatable, intent(inout) :: notes(:)
     character(len=:), allocatable :: size_text, text
-    real(wp) :: errors(modes%modes)
+    real(wp) :: errors(modes%modes), natural(modes%modes)
     integer :: first, m
 
     if (modes%modes == 0 .or. .not. has_shaft_nodes(machine)) return
-    errors = [(shaft_error(machine, modes%shape(:, m), modes%natural(m, 1)), m=1, modes%modes)]
+    do m = 1, modes%modes
+      natural(m) = modes%undamped(m, max(1, findloc(modes%exists(m, :), .true., dim=1)))
+      if (modes%internal(m) > 0) natural(m) = 0.0_wp   ! mostly a current, which no node resolves
+      errors(m) = shaft_error(machine, modes%shape(:, m), natural(m))
+    end do
     if (.not. any(errors > noted_error)) return
-    first = minloc(modes%natural(:, 1), dim=1, mask=errors > noted_error)
+    first = minloc(natural, dim=1, mask=errors > noted_error)
     call describe_error(errors(first), size_text)
     text = 'the nodes of shafts resolve ' // to_text(count(errors <= noted_error)) // ' of the ' // to_text(modes%modes) // &
-           ' modes: that at ' // rounded_text(from_si(modes%natural(first, 1), unit_hz), 6) // ' Hz has an error of ' // &
+           ' modes: that at ' // rounded_text(from_si(natural(first), unit_hz), 6) // ' Hz has an error of ' // &
            size_text // ', higher ones a larger one'
     associate (crossed => count([(errors(crossings(m)%mode) > noted_error, m=1, size(crossings))]))
       if (crossed == 0 .and. .not. lists_modes) return
