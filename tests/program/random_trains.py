@@ -19,7 +19,8 @@ def link(chance, name, pair):
         "dog clutch": f"&clutch {bodies} kind = 'dog' times = {chance.uniform(0.1, 1):.3f} levels = 1 /",
         "gear": f"&gear {bodies} {radii} /",
         "lossy gear": f"&gear {bodies} {radii} {losses} /",
-        "lossy mesh": f"&mesh {bodies} {radii} stiffness = {chance.choice([1e4, 1e5])} damping = {chance.choice([0, 50])} {losses} /",
+        "lossy mesh": f"&mesh {bodies} {radii} stiffness = {chance.choice([1e4, 1e5])} "
+        f"damping = {chance.choice([0, 50])} {losses} /",
         "cardan": f"&cardan {bodies} angle_deg = {chance.uniform(5, 35):.1f} phase = {chance.uniform(0, 3):.2f} /",
         "freewheel": f"&freewheel {bodies} direction = '{chance.choice(['forward', 'backward'])}' /",
     }

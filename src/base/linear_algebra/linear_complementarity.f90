@@ -18,7 +18,7 @@ contains
     real(wp), intent(in) :: q(:)             !! [n]
     real(wp), intent(out) :: z(:)            !! [n]
     logical, intent(out) :: is_basic(:)      !! whether it is w(i) that is zero, [n]
-    logical, intent(out) :: is_solved        !! false: z0 may grow for ever, which does not mean that there is no solution
+    logical, intent(out) :: is_solved        !! not where z0 may grow for ever; there may be a solution still
     integer :: basis(size(q)), change, entering, leaving, row
     real(wp), allocatable :: table(:, :)     ! of w, z, z0 and the constants, [n, 2 n + 2]
 

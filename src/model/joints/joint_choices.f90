@@ -151,7 +151,7 @@ contains
     end do
   end subroutine pivot
 
-  !> Tries all combinations of modes, where they are few.
+  !> Tries all combinations of modes, or the first ones where they are many.
   subroutine try_all(self, is_found)
     class(joint_choices_t), intent(inout) :: self
     logical, intent(out) :: is_found
@@ -165,8 +165,7 @@ contains
     where (self%is_at_rest .and. self%has_teeth) choices = 5
     where (self%holds_always()) choices = 1   ! that of a lock
     is_found = .false.
-    if (product(real(choices, wp)) > most_tried) return
-    do number = 0, product(choices) - 1
+    do number = 0, nint(min(real(most_tried, wp), product(real(choices, wp)))) - 1
       rest = number
       do i = 1, size(choices)
         if (self%is_at_rest(i)) then
