@@ -221,9 +221,8 @@ SAMPLED = 1e-4
 # Of the energy that is turned over, at these tolerances.
 BALANCE_ACCURACY = 1e-7
 
-# Of the largest moment of an order. The nodes that a shaft has by itself serve frequencies; moments beside them take some more.
+# Of the largest moment of an order.
 RESPONSE_ACCURACY = 1e-8
-MORE_NODES = ("--set", "shaft.intermediate.nodes=7", "--set", "shaft.tail.nodes=7")
 
 
 def input_of(name):
@@ -308,8 +307,7 @@ def test_the_torques_balance_at_the_steady_speed(nocdyn, name):
 
 def rows_of_orders(nocdyn, name):
     """By order and speed [rpm]: the row of response_orders.csv."""
-    words = MORE_NODES if name == "ice_propeller" else ()
-    outcome = nocdyn("response", input_of(name), "--out", "out", "-q", *words)
+    outcome = nocdyn("response", input_of(name), "--out", "out", "-q")
     assert outcome.returncode == 0, outcome.stderr
     with open(nocdyn.folder / "out/response_orders.csv", newline="") as file:
         rows = [{label.split(" [")[0]: float(value) for label, value in row.items()} for row in csv.DictReader(file)]

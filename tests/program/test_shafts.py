@@ -187,6 +187,17 @@ def test_excitations_of_every_kind_ask_for_nodes(nocdyn, kind):
     assert 30 < nodes < 90
 
 
+def test_nodes_that_do_not_resolve_what_is_excited_are_noted(nocdyn):
+    def report(keys, excitation):
+        return nocdyn("check", nocdyn.write("machine.nml", LONG.format(keys) + excitation)).stdout
+
+    sine = EXCITATIONS["sine"]
+    assert "the 5 nodes of shaft 'line' do not resolve the highest frequency that is excited, 24 Hz" in report("nodes = 5", sine)
+    for keys, excitation in [("nodes = 5", ""), ("", ""), ("", sine), ("nodes = 60", sine)]:
+        assert "do not resolve" not in report(keys, excitation)
+    assert "24000 Hz, which needs more than 1000" in report("", sine.replace(str(FAST), str(1000 * FAST)))
+
+
 def wave_stress(omega, j1=200.0, j2=10.0, torque=1e3, length=800.0, outer=0.78, bore=0.65):
     """The largest amplitude of the stress along the long shaft, by waves with a complex shear modulus."""
     modulus = 75e9 * (1 + 1j * 0.02 / (2 * pi))

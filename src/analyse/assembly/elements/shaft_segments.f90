@@ -188,8 +188,9 @@ contains
     type(spectral_element_t) :: element
     integer :: i
 
-    segments = segments_of(group)
     are_resolved = .true.
+    if (.not. frequency > 0) return
+    segments = segments_of(group)
     do i = 1, size(order)
       associate (parts => count(segment == segment(i)), share => segments%flexibility(segment(i)) / sum(segments%flexibility))
         element = new_spectral_element(order(i))
