@@ -156,7 +156,6 @@ contains
     type(response_analysis_t), intent(inout) :: self
     type(error_t), allocatable, intent(out) :: error
     real(wp), intent(inout) :: failed_speed
-    integer :: i
     real(wp) :: unrefined
     logical, allocatable :: is_unstable(:)
 
