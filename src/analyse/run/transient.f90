@@ -79,9 +79,6 @@ module nocdyn_transient
     type(run_fatigue_t) :: fatigue           !! of signals, which are tracked after the columns
     type(vibration_t) :: vibration           !! its energy in the rows
     real(wp) :: largest_moment = 0.0_wp      !! of the elements [N m]
-    real(wp) :: works(2) = 0.0_wp            !! in and out where the columns were evaluated last between the rows ...
-    real(wp) :: last_works(2) = 0.0_wp       !! ... and at the end of the last step [J]
-    real(wp) :: passed = 0.0_wp              !! what they have changed by, to and fro, in all steps [J]
     real(wp) :: atol = 0.0_wp                !! absolute tolerance [rad], [rad/s]
     real(wp) :: last_time = 0.0_wp           !! of the rows [s]
     real(wp), allocatable :: last_state(:)   !! at that time, [states + quadratures]
@@ -251,7 +248,7 @@ contains
     summary%fatigue = observer%fatigue
     call check_run_limits(input, summary%labels, summary%extremes%lowest, summary%extremes%highest, summary%limits)
     if (.not. allocated(error)) call check_extremes(summary%extremes, summary%labels, error)
-    call check_energy_balance(summary%extremes, observer%vibration%largest, observer%passed, &
+    call check_energy_balance(summary%extremes, observer%vibration%largest, &
                               observer%atol * observer%largest_moment, summary%notes)
     if (summary%extremes%rows > 0) then
       allocate (summary%energy_balance)
@@ -307,7 +304,6 @@ contains
     associate (columns => size(self%row))
       call self%table%fill(t, y, values(:columns))
       call self%fatigue%evaluate(self%table%columns%formulation%machine, values(:columns), values(columns + 1:))
-      self%works(:) = values(columns - 2:columns - 1)
     end associate
     self%has_ranges = .true.
   end subroutine tracked_values
@@ -321,8 +317,6 @@ contains
     if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
     call self%table%columns%find_pace(lane, fastest, scale)
     self%largest_moment = max(self%largest_moment, scale)
-    self%passed = self%passed + sum(abs(self%works - self%last_works))
-    self%last_works(:) = self%works
   end subroutine find_pace
 
   !> The next value of a signal.
