@@ -33,6 +33,8 @@ module nocdyn_transient
 
   public :: run_transient
 
+  real(wp), parameter :: rest = 1.0e-9_wp   ! a machine that turns less than this stands still, however loose the tolerance [rad]
+
   !> What a run needs of its caller while it is integrated: somewhere to write the rows, and whether to stop.
   type, abstract, public :: run_output_t
   contains
@@ -79,7 +81,7 @@ module nocdyn_transient
     type(run_fatigue_t) :: fatigue           !! of signals, which are tracked after the columns
     type(vibration_t) :: vibration           !! its energy in the rows
     real(wp) :: largest_moment = 0.0_wp      !! of the elements [N m]
-    real(wp) :: atol = 0.0_wp                !! absolute tolerance [rad], [rad/s]
+    real(wp) :: atol = 0.0_wp                !! absolute tolerance, at most `rest` [rad]
     real(wp) :: last_time = 0.0_wp           !! of the rows [s]
     real(wp), allocatable :: last_state(:)   !! at that time, [states + quadratures]
     real(wp), allocatable :: lowest(:), highest(:)   !! speeds of the bodies in the rows [rad/s]
@@ -121,7 +123,7 @@ contains
     call start_observer(observer, input, formulation, times, error)
     if (allocated(error)) return
     observer%output => output
-    observer%atol = settings%atol
+    observer%atol = min(settings%atol, rest)
     observer%table%columns%formulation%joints%leader => formulation%joints%mode
     call output%start(selected(observer%table%labels, observer%chosen), size(times), error)
     if (allocated(error)) return
