@@ -394,6 +394,7 @@ def test_a_motion_that_the_energy_balance_refutes_is_noted(nocdyn):
 &body name = 'a' inertia = 1.0 /
 &excitation name = 'x' body = 'a' amplitude = 1.0 frequency = 1000.0 /
 &run t_end = 1000.0 rtol = 1e-3 atol = 1e-2 /
+&output points = 1001 /
 """,
     )
     outcome = nocdyn("run", "coarse.nml", "--out", "out")

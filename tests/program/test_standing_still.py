@@ -294,9 +294,3 @@ AT_REST = """\
 def test_a_machine_at_rest_has_no_energy_that_is_wrong(nocdyn, text):
     stdout, _ = run(nocdyn, text)
     assert "energy balance error:" not in stdout and "tighten" not in stdout
-
-
-def test_work_that_passes_through_is_no_error_of_a_small_vibration(nocdyn):
-    text = VIBRATING.format(speed=0, excitation="amplitude = 10 frequency_hz = 50", interval=0.1)
-    stdout, _ = run(nocdyn, text, "--set", "run.t_end=30")
-    assert "tighten" not in stdout

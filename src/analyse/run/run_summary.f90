@@ -29,7 +29,6 @@ module nocdyn_run_summary
   !> trusted.
   real(wp), parameter :: energy_error_limit = 0.01_wp
   real(wp), parameter :: rounding_share = 1.0e-10_wp   !! of the largest energy or work: less may be rounding
-  real(wp), parameter :: work_share = 1.0e-4_wp        !! of the work to and fro: the error that its integral may have
 
   !> An extreme between the rows counts if it exceeds that of the rows by more than this share of the largest value. A smaller
   !> excess is rounding: a machine that starts at rest has its smallest energy at the start.
@@ -155,10 +154,9 @@ contains
   end subroutine describe_machine
 
   !> Adds a note on a large energy balance error. The last five columns are the energies and works; the last one is the error.
-  subroutine check_energy_balance(extremes, vibration, passed, negligible, notes)
+  subroutine check_energy_balance(extremes, vibration, negligible, notes)
     type(extremes_t), intent(in) :: extremes
     real(wp), intent(in) :: vibration    !! largest energy of the vibration [J]; 0 if nothing can vibrate
-    real(wp), intent(in) :: passed       !! work that elements have done, to and fro [J]
     real(wp), intent(in) :: negligible   !! energy of motions within the absolute tolerance [J]
     type(string_t), allocatable, intent(inout) :: notes(:)
     character(len=:), allocatable :: compared
@@ -170,7 +168,7 @@ contains
     largest = maxval(max(abs(extremes%lowest(columns - 4:columns - 1)), abs(extremes%highest(columns - 4:columns - 1))))
     if (.not. extremes%have_begun .or. residual <= negligible) return
     if (vibration > 0) then
-      if (residual <= max(energy_error_limit * vibration, rounding_share * largest, work_share * passed)) return
+      if (residual <= max(energy_error_limit * vibration, rounding_share * largest)) return
       compared = 'the vibration, as kinetic energy about the rigid motion and elastic energy, holds at most ' // &
         rounded_text(vibration, 3)
     else

@@ -35,6 +35,8 @@ module nocdyn_transient
 
   public :: run_transient
 
+  real(wp), parameter :: rest = 1.0e-9_wp   ! a machine that turns less than this stands still, however loose the tolerance [rad]
+
   !> What a run needs of its caller while it is integrated: somewhere to write the rows, and whether to stop.
   type, abstract, public :: run_output_t
   contains
@@ -83,10 +85,7 @@ module nocdyn_transient
     integer :: before_signals = 0            !! number of functions before the signals
     type(vibration_t) :: vibration           !! its energy in the rows
     real(wp) :: largest_moment = 0.0_wp      !! of the elements [N m]
-    real(wp) :: works(2) = 0.0_wp            !! in and out where the columns were evaluated last between the rows ...
-    real(wp) :: last_works(2) = 0.0_wp       !! ... and at the end of the last step [J]
-    real(wp) :: passed = 0.0_wp              !! what they have changed by, to and fro, in all steps [J]
-    real(wp) :: atol = 0.0_wp                !! absolute tolerance [rad], [rad/s]
+    real(wp) :: atol = 0.0_wp                !! absolute tolerance, at most `rest` [rad]
     real(wp) :: last_time = 0.0_wp           !! of the rows [s]
     real(wp), allocatable :: last_state(:)   !! at that time, [states + quadratures]
     real(wp), allocatable :: lowest(:), highest(:)   !! speeds of the bodies in the rows [rad/s]
@@ -129,7 +128,7 @@ contains
     call start_observer(observer, input, formulation, times, error)
     if (allocated(error)) return
     observer%output => output
-    observer%atol = settings%atol
+    observer%atol = min(settings%atol, rest)
     observer%table%columns%formulation%joints%leader => formulation%joints
     call output%start(selected(observer%table%labels, observer%chosen), size(times), error)
     if (allocated(error)) return
@@ -260,7 +259,7 @@ contains
     summary%fatigue = observer%fatigue
     call check_run_limits(input, summary%labels, summary%extremes%lowest, summary%extremes%highest, summary%limits)
     if (.not. allocated(error)) call check_extremes(summary%extremes, summary%labels, error)
-    call check_energy_balance(summary%extremes, observer%vibration%largest, observer%passed, &
+    call check_energy_balance(summary%extremes, observer%vibration%largest, &
                               observer%atol * observer%largest_moment, summary%notes)
     if (summary%extremes%rows > 0) then
       allocate (summary%energy_balance)
@@ -317,7 +316,6 @@ contains
       call self%table%fill(t, y, values(:columns))
       call self%along%evaluate(machine, values(columns + 1:self%before_signals))
       call self%fatigue%evaluate(machine, values(:columns), values(self%before_signals + 1:))
-      self%works(:) = values(columns - 2:columns - 1)
     end associate
     self%has_ranges = .true.
   end subroutine tracked_values
@@ -331,8 +329,6 @@ contains
     if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
     call self%table%columns%find_pace(lane, fastest, scale)
     self%largest_moment = max(self%largest_moment, scale)
-    self%passed = self%passed + sum(abs(self%works - self%last_works))
-    self%last_works(:) = self%works
   end subroutine find_pace
 
   !> The next value of a signal.

@@ -68,50 +68,53 @@ contains
     real(wp), intent(in) :: fastest   !! [rad/s]
     real(wp), intent(in) :: theta_end
     type(crossing_t), intent(out) :: first
-    real(wp), dimension(size(roots%g)) :: before, middle, after
+    real(wp) :: values(size(roots%g), 3)
     integer :: pair, pairs
 
     pairs = (parts_of(dense%degree) + 1) / 2
     pairs = max(pairs, ceiling(min(0.25_wp * huge(1), 0.5_wp * theta_end * dense%h * fastest / part_of_wave)))
-    before = roots%last(:, dense%lane)
+    values(:, 1) = roots%last(:, dense%lane)
     do pair = 1, pairs
       associate (a => theta_end * (2 * pair - 2) / (2 * pairs), m => theta_end * (2 * pair - 1) / (2 * pairs), &
                  b => theta_end * (2 * pair) / (2 * pairs))
-        call evaluate(roots, system, dense, m, middle)
-        call evaluate(roots, system, dense, b, after)
-        call search_pair(roots, system, observer, dense, [a, m, b], before, middle, after, most_halvings, first)
+        call evaluate(roots, system, dense, m, values(:, 2))
+        call evaluate(roots, system, dense, b, values(:, 3))
+        call search_pair(roots, system, observer, dense, [a, m, b], values, most_halvings, first)
       end associate
       if (first%function > 0) return
-      before = after
+      values(:, 1) = values(:, 3)
     end do
-    roots%last(:, dense%lane) = after
+    roots%last(:, dense%lane) = values(:, 3)
   end subroutine search_step
 
   !> Looks at two parts of a step of equal length, between three times.
-  recursive subroutine search_pair(roots, system, observer, dense, theta, before, middle, after, halvings, first)
+  recursive subroutine search_pair(roots, system, observer, dense, theta, values, halvings, first)
     type(root_functions_t), intent(inout) :: roots
     class(system_t), intent(inout) :: system
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense
     real(wp), intent(in) :: theta(3)
-    real(wp), intent(in), dimension(size(roots%g)) :: before, middle, after
-    integer, intent(in) :: halvings               !! that are left
+    real(wp), intent(in) :: values(size(roots%g), 3)   !! of the functions there
+    integer, intent(in) :: halvings                    !! that are left
     type(crossing_t), intent(inout) :: first
-    real(wp), dimension(size(roots%g)) :: between
-    real(wp) :: quarter
+    real(wp) :: halves(size(roots%g), 3), middle
+    integer :: part
 
-    if (halvings == 0 .or. all(is_settled(before, middle, after))) then
-      call cross_part(roots, system, observer, dense, theta(1), theta(2), before, middle, first)
-      if (first%function == 0) call cross_part(roots, system, observer, dense, theta(2), theta(3), middle, after, first)
+    if (halvings == 0 .or. all(is_settled(values(:, 1), values(:, 2), values(:, 3)))) then
+      do part = 1, 2
+        call cross_part(roots, system, observer, dense, theta(part:part + 1), values(:, part:part + 1), first)
+        if (first%function > 0) return
+      end do
       return
     end if
-    quarter = theta(1) + 0.5_wp * (theta(2) - theta(1))
-    call evaluate(roots, system, dense, quarter, between)
-    call search_pair(roots, system, observer, dense, [theta(1), quarter, theta(2)], before, between, middle, halvings - 1, first)
-    if (first%function > 0) return
-    quarter = theta(2) + 0.5_wp * (theta(3) - theta(2))
-    call evaluate(roots, system, dense, quarter, between)
-    call search_pair(roots, system, observer, dense, [theta(2), quarter, theta(3)], middle, between, after, halvings - 1, first)
+    do part = 1, 2
+      middle = theta(part) + 0.5_wp * (theta(part + 1) - theta(part))
+      halves(:, 1) = values(:, part)
+      halves(:, 3) = values(:, part + 1)
+      call evaluate(roots, system, dense, middle, halves(:, 2))
+      call search_pair(roots, system, observer, dense, [theta(part), middle, theta(part + 1)], halves, halvings - 1, first)
+      if (first%function > 0) return
+    end do
   end subroutine search_pair
 
   !> Whether three values of a function show where it crosses zero.
@@ -140,25 +143,26 @@ contains
 
   !> Finds the first function that falls through zero in a part of a step. A function that is zero at the start and then negative
   !> crosses at the start.
-  subroutine cross_part(roots, system, observer, dense, a, b, before, after, first)
+  subroutine cross_part(roots, system, observer, dense, theta, values, first)
     type(root_functions_t), intent(inout) :: roots
     class(system_t), intent(inout) :: system
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense
-    real(wp), intent(in) :: a, b                    !! theta of the ends
-    real(wp), intent(in) :: before(:), after(:)     !! values of the functions there
+    real(wp), intent(in) :: theta(2)         !! of the ends
+    real(wp), intent(in) :: values(:, :)     !! of the functions there, [functions, 2]
     type(crossing_t), intent(inout) :: first
     real(wp) :: root
     integer :: function
 
-    do function = 1, size(after)
-      associate (side => roots%side(dense%lane, function), g => after(function))
+    do function = 1, size(values, 1)
+      associate (side => roots%side(dense%lane, function), g => values(function, 2))
         if (.not. is_finite(g)) cycle
         if (side > 0 .and. g <= 0) then
-          call find_root(roots, system, observer, dense, bracket_t(function, a, b, before(function), g), root)
+          call find_root(roots, system, observer, dense, bracket_t(function, theta(1), theta(2), values(function, 1), g), &
+                         root)
           if (first%function == 0 .or. root < first%theta) first = crossing_t(function, root)
         else if (side == 0 .and. g < 0) then
-          if (first%function == 0 .or. a < first%theta) first = crossing_t(function, a)
+          if (first%function == 0 .or. theta(1) < first%theta) first = crossing_t(function, theta(1))
         end if
         side = sign_of(g)
       end associate
