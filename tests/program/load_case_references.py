@@ -603,11 +603,12 @@ def generator_response(m, order, speed):
 
 
 def compressor_response(m, order, speed):
-    """The same; the torque of the motor times the factor that holds the speed."""
+    """The same; the supply of the motor follows the speed: it has the slip on its mains that carries the load."""
     train, mean, _, gas = compressor_parts(m)
     motor, masses, bearing = InductionMotor(m.motor["mains"]), m.engine["masses"], m.load["bearings"]
     frequency, rotor, load = order * speed, train.index("rotor")[0], mean(speed)
-    factor = -load.sum() / motor.steady(speed)[2]
+    synchronous = motor.mains / motor.pairs
+    on_mains = brentq(lambda at: motor.steady(at)[2] + load.sum(), 0.98 * synchronous, synchronous, xtol=1e-14, rtol=1e-15)
     load[rotor] -= load.sum()
     angle = static_angles(train, load)
     force = np.zeros(len(train.names), complex)
@@ -623,7 +624,7 @@ def compressor_response(m, order, speed):
         return group["stiffness"] * (1 + 1j * loss) + 1j * frequency * group.get("damping", 0.0)
 
     matrix = train.summed(stiffness) - np.diag(train.inertia) * frequency**2
-    matrix[rotor, rotor] -= 1j * frequency * factor * motor.response(speed, frequency)
+    matrix[rotor, rotor] -= 1j * frequency * motor.response(on_mains, frequency)
     brake, scale = train.index(bearing["body"])[0], bearing["constant_speed"]
     matrix[brake, brake] += 1j * frequency * bearing["constant"] / scale / np.cosh(speed / scale) ** 2
     angle = np.linalg.solve(matrix, force)

@@ -31,32 +31,18 @@ contains
     type(law_t), intent(in) :: law
     integer, intent(in) :: slot            !! of the element, counted through all strips
     real(wp), intent(in) :: speed(:)       !! u' of the element, and of its phase if it has one [rad/s]
-    real(wp) :: rate(0:law%tape%count)     ! of the nodes [1/s]
     integer :: i
 
     fastest = 0.0_wp
-    rate = 0.0_wp
     do i = 1, law%tape%count
       associate (node => law%tape%node(i))
         if (node%is_constant) cycle
         select case (node%operation)
-        case (op_time)
-          rate(i) = 1.0_wp
-        case (op_angle)
-          rate(i) = speed(node%a)
-        case (op_add)
-          rate(i) = rate(node%a) + rate(node%b)
-        case (op_subtract)
-          rate(i) = rate(node%a) - rate(node%b)
-        case (op_shift)
-          rate(i) = rate(node%a)
-        case (op_scale)
-          rate(i) = rate(node%a) * law%constant(slot, law%column(node%b))
         case (op_wave, op_sine, op_cosine)
-          fastest = max(fastest, abs(rate(node%a)))
+          fastest = max(fastest, abs(rate_of(law, slot, speed, node%a)))
         case (op_harmonics)
           associate (last => node%first + (node%last - node%first + 1) / 3 - 1)   ! of the multiples
-            fastest = max(fastest, maxval(law%tape%list(node%first:last)) * abs(rate(node%a)))
+            fastest = max(fastest, maxval(law%tape%list(node%first:last)) * abs(rate_of(law, slot, speed, node%a)))
           end associate
         case default
           cycle
@@ -64,5 +50,35 @@ contains
       end associate
     end do
   end function fastest_wave
+
+  !> The rate of a node that is a sum of multiples of the time and of angles [1/s], 0 of others. Without a list of all nodes, which
+  !> would be allocated in every step.
+  pure recursive real(wp) function rate_of(law, slot, speed, i) result(rate)
+    type(law_t), intent(in) :: law
+    integer, intent(in) :: slot, i         !! i: the node; 0 has no rate
+    real(wp), intent(in) :: speed(:)
+
+    rate = 0.0_wp
+    if (i == 0) return
+    associate (node => law%tape%node(i))
+      if (node%is_constant) return
+      select case (node%operation)
+      case (op_time)
+        rate = 1.0_wp
+      case (op_angle)
+        rate = speed(node%a)
+      case (op_add)
+        rate = rate_of(law, slot, speed, node%a) + rate_of(law, slot, speed, node%b)
+      case (op_subtract)
+        rate = rate_of(law, slot, speed, node%a) - rate_of(law, slot, speed, node%b)
+      case (op_shift)
+        rate = rate_of(law, slot, speed, node%a)
+      case (op_scale)
+        rate = rate_of(law, slot, speed, node%a) * law%constant(slot, law%column(node%b))
+      case default
+        rate = 0.0_wp
+      end select
+    end associate
+  end function rate_of
 
 end module nocdyn_law_waves
