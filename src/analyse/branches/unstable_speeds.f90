@@ -90,29 +90,31 @@ contains
     type(unstable_speed_t), intent(in) :: list(:)
     character(len=*), intent(in) :: consequence   !! what the analysis does there
     type(string_t), allocatable, intent(inout) :: notes(:)
-    character(len=:), allocatable :: text
+    character(len=:), allocatable :: speeds, text
     real(wp) :: speed(size(list))
 
     if (size(list) > 0) then
       speed = list%speed
       call describe_first(list, text)
-      call append(notes, 'the steady state is unstable at ' // speeds_text(speed) // ': ' // text // '; ' // consequence)
+      call describe_speeds(speed, speeds)
+      call append(notes, 'the steady state is unstable at ' // speeds // ': ' // text // '; ' // consequence)
     end if
     if (size(response%left_out) > 0) then
-      call append(notes, 'there is no steady state at ' // speeds_text(response%left_out) // ', which are left out: ' // &
+      call describe_speeds(response%left_out, speeds)
+      call append(notes, 'there is no steady state at ' // speeds // ', which are left out: ' // &
                          response%left_out_message)
     end if
   end subroutine note_speeds
 
   !> "3 speeds from 100 to 120 rpm".
-  function speeds_text(speed) result(text)
+  subroutine describe_speeds(speed, text)
     real(wp), intent(in) :: speed(:)   !! [rad/s]
-    character(len=:), allocatable :: text
+    character(len=:), allocatable, intent(out) :: text
 
     text = rounded_text(from_si(minval(abs(speed)), unit_rpm), 6)
     if (size(speed) > 1) text = to_text(size(speed)) // ' speeds from ' // text // ' to ' // &
                                 rounded_text(from_si(maxval(abs(speed)), unit_rpm), 6)
     text = text // ' rpm'
-  end function speeds_text
+  end subroutine describe_speeds
 
 end module nocdyn_unstable_speeds

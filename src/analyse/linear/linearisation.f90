@@ -34,7 +34,7 @@ module nocdyn_linearisation
   !> How the moments of the elements and the rates of their internal states change beside the stiffness.
   type, public :: slopes_t
     real(wp), allocatable :: damping(:)            !! minus the derivatives by the rates of twist [N m s/rad], [elements]
-    real(wp), allocatable :: mean_damping(:)       !! the same of torques that follow the mean speed, which only rigid motions change
+    real(wp), allocatable :: mean_damping(:)       !! the same of torques that follow the mean speed: of rigid motions only
     real(wp), allocatable :: by_internal(:)        !! derivatives of the moments by internal states, [internal states]
     real(wp), allocatable :: rate_speed(:)         !! derivatives of their rates by the speed of the element, the same
     real(wp), allocatable :: rate_internal(:, :)   !! derivatives of the rates by the states of the element, [members, the same]

@@ -1,5 +1,5 @@
-!> The files that a run leaves: trajectory.csv or trajectory.nc, summary.json, input.nml, and cycles.csv with &fatigue. A run that fails
-!> leaves trajectory.partial and cycles.partial.csv.
+!> The files that a run leaves: trajectory.csv or trajectory.nc, summary.json, input.nml, and cycles.csv with &fatigue. A run that
+!> fails leaves trajectory.partial.csv and cycles.partial.csv.
 module nocdyn_run_files
   use nocdyn_console, only: new_status_line, status_line_t
   use nocdyn_disk_room, only: check_room

@@ -55,7 +55,7 @@ contains
   !> would be allocated in every step.
   pure recursive real(wp) function rate_of(law, slot, speed, i) result(rate)
     type(law_t), intent(in) :: law
-    integer, intent(in) :: slot, i         !! i: the node; 0 has no rate
+    integer, intent(in) :: slot, i         !! the element; the node, of which 0 has no rate
     real(wp), intent(in) :: speed(:)
 
     rate = 0.0_wp

@@ -123,8 +123,8 @@ contains
     real(wp) :: bend
 
     is_settled = .true.
-    if (min(before, middle, after) > far .or. max(before, middle, after) <= 0) return
     if (.not. (is_finite(before) .and. is_finite(middle) .and. is_finite(after))) return
+    if (max(abs(before), abs(middle), abs(after)) > far .or. max(before, middle, after) <= 0) return
     bend = safety * abs(0.25_wp * before - 0.5_wp * middle + 0.25_wp * after) * 4
     is_settled = is_settled_part(before, middle, bend) .and. is_settled_part(middle, after, bend)
   end function is_settled

@@ -276,11 +276,13 @@ contains
       case (statistic_max_abs)
         value = maxval(extremes)
       case (statistic_time_of_min)   ! the smallest values, then their times
-        if (minval(extremes(first + 1:first + points)) < 0) &
+        if (minval(extremes(first + 1:first + points)) < 0) then
           value = extremes(first + points + minloc(extremes(first + 1:first + points), dim=1))
+        end if
       case default   ! the largest values or magnitudes, then their times
-        if (maxval(extremes(first + 1:first + points)) > 0) &
+        if (maxval(extremes(first + 1:first + points)) > 0) then
           value = extremes(first + points + maxloc(extremes(first + 1:first + points), dim=1))
+        end if
       end select
     end associate
   end function value_along
