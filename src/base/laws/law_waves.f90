@@ -51,8 +51,8 @@ contains
     end do
   end function fastest_wave
 
-  !> The rate of a node that is a sum of multiples of the time and of angles [1/s], 0 of others. Without a list of all nodes, which
-  !> would be allocated in every step.
+  !> The rate of a node that is a sum of multiples of the time and of angles [1/s], 0 of others. A list of all nodes would be
+  !> allocated in every step.
   pure recursive real(wp) function rate_of(law, slot, speed, i) result(rate)
     type(law_t), intent(in) :: law
     integer, intent(in) :: slot, i         !! the element; the node, of which 0 has no rate

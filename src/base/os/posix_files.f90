@@ -8,8 +8,8 @@ module nocdyn_posix_files
   implicit none (type, external)
   private
 
-  public :: is_irregular, open_new, open_existing, file_size, read_at, read_whole, truncate_file, sync_file, sync_path, lock_file, &
-    disk_failure, free_bytes
+  public :: is_irregular, open_new, open_existing, file_size, read_at, read_whole, truncate_file, sync_file, sync_path, &
+    lock_file, disk_failure, free_bytes
 
   integer(c_int), parameter :: from_start = 0, from_end = 2      ! SEEK_SET, SEEK_END
   integer(c_int), parameter :: exclusive = 2, without_waiting = 4   ! LOCK_EX, LOCK_NB
