@@ -214,3 +214,12 @@ def test_names_that_are_not_utf_8_are_latin_1_in_all_tables(nocdyn):
     assert nocdyn("run", "latin.nml", "--out", "run").returncode == 0
     assert "torque_mühle [N m]" in nocdyn.table("run")[0]
     assert "mühle" in (nocdyn.folder / "run/summary.json").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("command", ["check", "run", "response", "modes"])
+def test_a_limit_of_an_element_that_there_is_not_is_refused_by_every_command(nocdyn, command):
+    text = "&body name='a' inertia=1 speed=1 /\n&coupling name='k' bodies='ground','a' stiffness=9 /\n&run t_end=1 /\n"
+    nocdyn.write("m.nml", text + "&response body='a' speed=1,2 orders=1 /\n&limit coupling='q' moment=1 /\n")
+    outcome = nocdyn(command, "m.nml")
+    assert outcome.returncode == 2
+    assert outcome.stderr.startswith("nocdyn: m.nml:5: &limit: there is no coupling 'q'")

@@ -14,6 +14,7 @@ module nocdyn_machine_parts
   use nocdyn_input, only: input_t
   use nocdyn_joint_assembly, only: add_bearings, add_clutch_form, add_freewheels, check_clutch, clutch_form
   use nocdyn_joint_simplifications, only: list_simplifications
+  use nocdyn_limit_groups, only: check_limit
   use nocdyn_loss_assembly, only: add_losses, check_loss
   use nocdyn_machine, only: machine_t
   use nocdyn_massless_motion, only: massless_bodies
@@ -114,6 +115,8 @@ contains
     case ('excitation')
       if (input%groups(g)%text('kind') == 'orders') call check_order_torques(input, g, error)
       if (input%groups(g)%text('kind') == 'fault') call check_fault(input, g, error)
+    case ('limit')
+      if (.not. allocated(input%load_case)) call check_limit(input, g, error)   ! a load case may lack the element
     case ('response')
       call check_response_range(input, g, error)
     case ('fatigue')

@@ -9,9 +9,9 @@ module nocdyn_response_limits
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
+  use nocdyn_limit_groups, only: check_limit, limited_kind
   use nocdyn_response_quantities, only: quantity_along, quantity_moment, quantity_stress, response_quantity_t
-  use nocdyn_schema_text, only: suggestion
-  use nocdyn_text, only: quoted, string_t
+  use nocdyn_text, only: quoted
   implicit none (type, external)
   private
 
@@ -43,16 +43,17 @@ contains
     type(response_limit_t), allocatable, intent(out) :: limits(:)
     type(error_t), allocatable, intent(out) :: error
     integer, allocatable :: groups(:)
-    character(len=:), allocatable :: kind
+    character(len=8) :: kind
     integer :: before, i
 
     allocate (groups, source=input%groups_named('limit'))
     allocate (limits(0))
     do i = 1, size(groups)
       before = size(limits)
-      call find_kind(input, groups(i), quantities, kind, error)
-      if (.not. allocated(error)) call add_moment_limits(input%groups(groups(i)), groups(i), kind, quantities, limits)
-      if (.not. allocated(error)) call add_stress_limits(input, groups(i), kind, quantities, limits, error)
+      kind = limited_kind(input%groups(groups(i)))
+      call check_limit(input, groups(i), error)
+      if (.not. allocated(error)) call add_moment_limits(input%groups(groups(i)), groups(i), trim(kind), quantities, limits)
+      if (.not. allocated(error)) call add_stress_limits(input, groups(i), trim(kind), quantities, limits, error)
       if (allocated(error)) return
       if (size(limits) > before) cycle
       if (kind == 'mesh') then
@@ -64,46 +65,6 @@ contains
       return
     end do
   end subroutine read_limits
-
-  !> Whether a group limits a coupling, a shaft or a mesh, which must exist.
-  subroutine find_kind(input, index, quantities, kind, error)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: index   !! of the group
-    type(response_quantity_t), intent(in) :: quantities(:)
-    character(len=:), allocatable, intent(out) :: kind   !! 'coupling', 'shaft' or 'mesh'
-    type(error_t), allocatable, intent(out) :: error
-    type(string_t), allocatable :: names(:)
-    character(len=*), parameter :: kinds(*) = [character(len=8) :: 'coupling', 'shaft', 'mesh']
-    integer, allocatable :: groups(:)
-    integer :: i
-
-    kind = 'coupling'
-    if (input%groups(index)%has_value('shaft')) kind = 'shaft'
-    if (input%groups(index)%has_value('mesh')) kind = 'mesh'
-    allocate (groups, source=input%groups_named(kind))
-    allocate (names(size(groups)))
-    do i = 1, size(groups)
-      names(i)%text = input%groups(groups(i))%name
-      if (names(i)%text == input%groups(index)%text(kind)) return
-    end do
-    do i = 1, size(kinds)
-      if (kinds(i) == kind .or. .not. has_name(input, trim(kinds(i)), input%groups(index)%text(kind))) cycle
-      call raise(error, exit_input, input%location(index, kind) // ': ' // quoted(input%groups(index)%text(kind)) // &
-                 ' is a ' // trim(kinds(i)) // '; needed: ' // trim(kinds(i)) // ' in place of ' // kind)
-      return
-    end do
-    call raise(error, exit_input, input%location(index, kind) // ': there is no ' // kind // ' ' // &
-               quoted(input%groups(index)%text(kind)) // suggestion(input%groups(index)%text(kind), names))
-  end subroutine find_kind
-
-  !> Whether a group of a kind has a name.
-  pure logical function has_name(input, kind, name)
-    type(input_t), intent(in) :: input
-    character(len=*), intent(in) :: kind, name
-    integer :: i
-
-    has_name = any([(input%groups(i)%kind == kind .and. input%groups(i)%name == name, i=1, size(input%groups))])
-  end function has_name
 
   !> Limits of the moment of a coupling, of the largest one along a shaft, or of the force of a mesh.
   subroutine add_moment_limits(group, index, kind, quantities, limits)

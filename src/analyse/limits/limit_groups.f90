@@ -1,0 +1,61 @@
+!> The elements that groups &limit are of.
+module nocdyn_limit_groups
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_schema_text, only: suggestion
+  use nocdyn_text, only: quoted, string_t
+  implicit none (type, external)
+  private
+
+  public :: check_limit, limited_kind
+
+contains
+
+  !> 'coupling', 'shaft' or 'mesh'.
+  pure function limited_kind(group) result(kind)
+    type(group_t), intent(in) :: group   !! &limit
+    character(len=8) :: kind
+
+    kind = 'coupling'
+    if (group%has_value('shaft')) kind = 'shaft'
+    if (group%has_value('mesh')) kind = 'mesh'
+  end function limited_kind
+
+  !> Refuses limits of elements that there are not.
+  subroutine check_limit(input, index, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    type(error_t), allocatable, intent(out) :: error   !! names file, line, group and key
+    character(len=*), parameter :: kinds(*) = [character(len=8) :: 'coupling', 'shaft', 'mesh']
+    character(len=8) :: kind
+    type(string_t), allocatable :: names(:)
+    integer, allocatable :: groups(:)
+    integer :: i
+
+    kind = limited_kind(input%groups(index))
+    allocate (groups, source=input%groups_named(trim(kind)))
+    allocate (names(size(groups)))
+    do i = 1, size(groups)
+      names(i)%text = input%groups(groups(i))%name
+      if (names(i)%text == input%groups(index)%text(trim(kind))) return
+    end do
+    do i = 1, size(kinds)
+      if (kinds(i) == kind .or. .not. has_name(input, trim(kinds(i)), input%groups(index)%text(trim(kind)))) cycle
+      call raise(error, exit_input, input%location(index, trim(kind)) // ': ' // quoted(input%groups(index)%text(trim(kind))) // &
+                 ' is a ' // trim(kinds(i)) // '; needed: ' // trim(kinds(i)) // ' in place of ' // trim(kind))
+      return
+    end do
+    call raise(error, exit_input, input%location(index, trim(kind)) // ': there is no ' // trim(kind) // ' ' // &
+               quoted(input%groups(index)%text(trim(kind))) // suggestion(input%groups(index)%text(trim(kind)), names))
+  end subroutine check_limit
+
+  !> Whether a group of a kind has a name.
+  pure logical function has_name(input, kind, name)
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: kind, name
+    integer :: i
+
+    has_name = any([(input%groups(i)%kind == kind .and. input%groups(i)%name == name, i=1, size(input%groups))])
+  end function has_name
+
+end module nocdyn_limit_groups
