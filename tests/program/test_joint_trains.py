@@ -7,10 +7,9 @@ import pytest
 from random_trains import random_train
 
 TRAINS = int(os.environ.get("NOCDYN_RANDOM_TRAINS", "20"))
-KNOWN = {2}  # trains whose run ends, though a motion exists
 
 
-@pytest.mark.parametrize("seed", [seed for seed in range(TRAINS) if seed not in KNOWN])
+@pytest.mark.parametrize("seed", range(TRAINS))
 def test_runs_of_random_trains_go_to_their_end(nocdyn, seed):
     outcome = nocdyn("run", nocdyn.write("train.nml", random_train(seed)), "--out", "out")
     assert outcome.returncode == 0, outcome.stderr

@@ -204,7 +204,7 @@ contains
         call decide_at(self, merge(by_state, which, is_struck), t, y, is_at_rest)
         if (which == by_state .or. .not. any(joints%is_jammed)) exit
       end do
-      call joints%teeth%shift_boundaries(self%machine%elements, joints%moment_errors())
+      call joints%teeth%shift_boundaries(self%machine%elements, joints%moment_errors(), joints%moment_shift)
       call self%hold(joints%motions%speed, y)
       do j = 1, joints%count
         if (is_at_rest(j) .and. joints%mode(j) /= locked) then   ! a drive may leave it a slip in the other direction

@@ -3,7 +3,7 @@
 !> The modes that agree with their moments (`nocdyn_joint_problem`) are sought as in a complementarity problem: from the present
 !> ones, first all wrong ones change together, then one at a time, that of least index (K. G. Murty, Linear Complementarity,
 !> Linear and Nonlinear Programming, 1988, chapter 4); else by the pivoting of Lemke (`nocdyn_joint_pivots`), also with the senses
-!> of the torques of turning teeth given; and at last all combinations are tried where there are few. Of several solutions, those
+!> of the torques of turning teeth given; and at last from all combinations, or the first ones of many. Of several solutions, those
 !> count that are limits of the motion of elastic teeth. Where none is left, turning teeth jam.
 module nocdyn_joint_choices
   use nocdyn_friction_joints, only: direction_of, driven_backwards, driven_forwards, locked, slips_backwards, slips_forwards
@@ -151,12 +151,12 @@ contains
     end do
   end subroutine pivot
 
-  !> Tries all combinations of modes, or the first ones where they are many.
+  !> Begins with all combinations of modes, or with the first ones where they are many, from which others are reached.
   subroutine try_all(self, is_found)
     class(joint_choices_t), intent(inout) :: self
     logical, intent(out) :: is_found
     integer, parameter :: at_rest(*) = [locked, slips_forwards, slips_backwards, driven_forwards, driven_backwards]
-    integer, parameter :: most_tried = 4000
+    integer, parameter :: most_tried = 4000, most_changes = 30   ! of each
     integer :: choices(size(self%mode)), i, number, rest
 
     choices = 1
@@ -177,7 +177,7 @@ contains
         end if
         rest = rest / choices(i)
       end do
-      call self%settle(1, is_found)
+      call self%settle(most_changes, is_found)
       if (is_found) return
     end do
   end subroutine try_all

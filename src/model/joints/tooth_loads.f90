@@ -192,16 +192,17 @@ contains
     self%load(:) = self%applied + matmul(self%by_joint, moment)
   end subroutine add_moments
 
-  !> Shifts the boundaries of T beyond its rounding errors.
-  pure subroutine shift_boundaries(self, elements, error)
+  !> Shifts the boundaries of T beyond its rounding errors, and beyond what the small slips that a decision ends do to it.
+  pure subroutine shift_boundaries(self, elements, error, least)
     class(tooth_loads_t), intent(inout) :: self
     type(elements_t), intent(in) :: elements
     real(wp), intent(in) :: error(:)          !! of the moments of the joints [N m], [joints]
+    real(wp), intent(in) :: least             !! that of the boundaries of all moments [N m]
     real(wp), parameter :: width = 1.0e-11_wp   ! relative to the terms of T
 
     if (self%count == 0) return
     self%shift(:) = width * matmul(abs(self%by_moment), abs(elements%restoring(1, :)) + abs(elements%applied(1, :)))
-    self%shift(:) = max(self%shift, mixed * maxval(self%shift), matmul(abs(self%by_joint), error), tiny(width))
+    self%shift(:) = max(self%shift, mixed * maxval(self%shift), matmul(abs(self%by_joint), error), least)
   end subroutine shift_boundaries
 
 end module nocdyn_tooth_loads
