@@ -156,7 +156,7 @@ contains
     class(joint_choices_t), intent(inout) :: self
     logical, intent(out) :: is_found
     integer, parameter :: at_rest(*) = [locked, slips_forwards, slips_backwards, driven_forwards, driven_backwards]
-    integer, parameter :: most_tried = 4000, most_changes = 30   ! of each
+    integer, parameter :: most_tried = 500, most_changes = 12   ! of each
     integer :: choices(size(self%mode)), i, number, rest
 
     choices = 1
