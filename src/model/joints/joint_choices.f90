@@ -3,7 +3,7 @@
 !> The modes that agree with their moments (`nocdyn_joint_problem`) are sought as in a complementarity problem: from the present
 !> ones, first all wrong ones change together, then one at a time, that of least index (K. G. Murty, Linear Complementarity,
 !> Linear and Nonlinear Programming, 1988, chapter 4); else by the pivoting of Lemke (`nocdyn_joint_pivots`), also with the senses
-!> of the torques of turning teeth given; and at last from all combinations, or the first ones of many. Of several solutions, those
+!> of the torques of turning teeth given; and at last from all combinations, or the first ones of many. Of several solutions those
 !> count that are limits of the motion of elastic teeth. Where none is left, turning teeth jam.
 module nocdyn_joint_choices
   use nocdyn_friction_joints, only: direction_of, driven_backwards, driven_forwards, locked, slips_backwards, slips_forwards
