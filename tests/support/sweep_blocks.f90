@@ -18,7 +18,7 @@ module nocdyn_test_sweep_blocks
   use nocdyn_statistics_observer, only: new_statistics_observer, statistics_observer_t
   use nocdyn_system, only: system_t
   use nocdyn_text, only: string_t
-  use nocdyn_trajectory_columns, only: column_t, list_columns
+  use nocdyn_signals, only: signal_source_t, list_columns
   use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
   implicit none (type, external)
   private
@@ -99,7 +99,7 @@ contains
     real(wp), intent(in) :: from   !! [s]
     real(wp), intent(in) :: band
     type(statistic_t), allocatable :: statistics(:)
-    type(column_t), allocatable :: columns(:)
+    type(signal_source_t), allocatable :: columns(:)
     type(string_t), allocatable :: labels(:)
     integer :: column, kind, next
 
@@ -119,7 +119,7 @@ contains
   integer function column_named(machine, name)
     type(machine_t), intent(in) :: machine
     character(len=*), intent(in) :: name
-    type(column_t), allocatable :: columns(:)
+    type(signal_source_t), allocatable :: columns(:)
     type(string_t), allocatable :: labels(:)
 
     call list_columns(machine, columns, labels)

@@ -8,7 +8,6 @@ module nocdyn_constraint_assembly
   use nocdyn_kinds, only: wp
   use nocdyn_motion_assembly, only: holds_still
   use nocdyn_text, only: string_t
-  use nocdyn_text_sort, only: argsort, sorted_position
   implicit none (type, external)
   private
 
@@ -82,7 +81,6 @@ contains
       call read_joint(input%groups(indices(i)), body_index, joints(i))
     end do
     call form_rows(input, indices, joints, size(body_index%names), lanes, constraints)
-    call refuse_equal_columns(input, indices, constraints, error)
   end subroutine assemble_constraints
 
   !> The row of one group.
@@ -234,29 +232,5 @@ contains
       end do
     end do
   end function member_torques
-
-  !> Refuses a column reaction_NAME_MEMBER that has the name of the column reaction_NAME of another constraint.
-  subroutine refuse_equal_columns(input, indices, constraints, error)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: indices(:)
-    type(constraints_t), intent(in) :: constraints
-    type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: column, name
-    integer, allocatable :: order(:)
-    integer :: m, other
-
-    if (size(constraints%members%row) == 0) return
-    call argsort(constraints%names, order)
-    do m = 1, size(constraints%members%row)
-      name = constraints%names(constraints%members%row(m))%text // '_' // constraints%members%names(m)%text
-      other = sorted_position(name, constraints%names, order)
-      if (other == 0) cycle
-      call constraints%name_column(other, column)
-      if (column /= 'reaction_' // name) cycle   ! it is that of a lock, a torque
-      call raise(error, exit_input, input%location(indices(constraints%members%row(m))) // ': its column reaction_' // name // &
-                 ' would have the name of that of ' // input%label(indices(other)) // '; allowed: another name')
-      return
-    end do
-  end subroutine refuse_equal_columns
 
 end module nocdyn_constraint_assembly

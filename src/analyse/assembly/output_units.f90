@@ -1,12 +1,13 @@
 !> Units of the field in results, by &output units: which columns they fit.
 module nocdyn_output_units
   use nocdyn_input, only: group_t, input_t
+  use nocdyn_signals, only: former_name, signal_t
   use nocdyn_text, only: string_t
   use nocdyn_units, only: unit_for, unit_index, units
   implicit none (type, external)
   private
 
-  public :: match_column, output_units, turn_labels, unit_of
+  public :: match_signal, output_units, turn_labels, turn_units, unit_of
 
 contains
 
@@ -39,6 +40,20 @@ contains
     end do
   end subroutine turn_labels
 
+  !> Gives signals the units that fit them.
+  pure subroutine turn_units(signals, wanted, unit)
+    type(signal_t), intent(inout) :: signals(:)            !! in SI
+    integer, intent(in) :: wanted(:)                       !! indices of `units`
+    integer, allocatable, intent(out) :: unit(:)           !! of each: index of `units`, 0: that of SI
+    integer :: i
+
+    allocate (unit(size(signals)))
+    do i = 1, size(signals)
+      unit(i) = unit_for(signals(i)%unit, wanted)
+      if (unit(i) > 0) signals(i)%unit = trim(units(unit(i))%name)
+    end do
+  end subroutine turn_units
+
   !> A label with the name of another unit.
   pure function label_in(label, unit) result(text)
     character(len=*), intent(in) :: label
@@ -48,25 +63,31 @@ contains
     text = label(:index(label, '[', back=.true.)) // trim(units(unit)%name) // ']'
   end function label_in
 
-  !> Whether a quantity is a column: its label without unit, in SI or in any unit that fits.
-  pure subroutine match_column(label, quantity, wanted, is_column, unit)
-    character(len=*), intent(in) :: label      !! in SI
-    character(len=*), intent(in) :: quantity   !! as a user writes it
-    integer, intent(in) :: wanted(:)           !! units of a quantity without one: indices of `units`
-    logical, intent(out) :: is_column
-    integer, intent(out) :: unit               !! of the quantity: index of `units`, 0: that of SI
+  !> Whether a text names a signal: by its name, or its former one, with or without a unit that fits.
+  pure subroutine match_signal(signal, text, wanted, matches, unit, is_former)
+    type(signal_t), intent(in) :: signal
+    character(len=*), intent(in) :: text   !! as a user writes it
+    integer, intent(in) :: wanted(:)       !! units of a quantity without one: indices of `units`
+    logical, intent(out) :: matches
+    integer, intent(out) :: unit           !! of the text: index of `units`, 0: that of SI
+    logical, intent(out) :: is_former      !! whether it is the former name
+    character(len=:), allocatable :: former
+    integer :: n
 
+    call former_name(signal, .false., former)
+    is_former = index(text // ' ', former // ' ') == 1 .and. former /= ''
+    n = merge(len(former), len(signal%name), is_former)
+    unit = unit_for(signal%unit, wanted)
+    matches = is_former .or. index(text // ' ', signal%name // ' ') == 1
+    if (.not. matches .or. len(text) == n) return
     unit = 0
-    is_column = quantity == label
-    if (is_column) return
-    unit = unit_for(unit_of(label), wanted)
-    is_column = quantity == label(:index(label, ' [', back=.true.) - 1)
-    if (is_column) return
+    matches = text(n + 1:) == ' [' // signal%unit // ']'
+    if (matches) return
     do unit = size(units), 1, -1
-      is_column = units(unit)%si == unit_of(label) .and. quantity == label_in(label, unit)
-      if (is_column) return
+      matches = units(unit)%si == signal%unit .and. text(n + 1:) == ' [' // trim(units(unit)%name) // ']'
+      if (matches) return
     end do
-  end subroutine match_column
+  end subroutine match_signal
 
   !> The text between the brackets at the end of a label, '' if there are none.
   pure function unit_of(label) result(text)

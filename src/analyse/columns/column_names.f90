@@ -1,61 +1,77 @@
-!> Names of columns of trajectory.csv as a person writes them: with or without the unit, and as patterns with *.
+!> Names of signals as a person writes them: with or without the unit, and as patterns with *.
 module nocdyn_column_names
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_errors, only: error_t, raise
   use nocdyn_input, only: input_t
   use nocdyn_machine, only: machine_t
-  use nocdyn_output_units, only: output_units, turn_labels
   use nocdyn_near_words, only: nearest_word
+  use nocdyn_output_units, only: output_units, turn_units
   use nocdyn_patterns, only: matches
+  use nocdyn_signals, only: former_name, label_signals, list_signals, signal_t
   use nocdyn_text, only: append, joined, quoted, string_t, to_text
-  use nocdyn_trajectory_columns, only: column_count, column_t, list_columns
   implicit none (type, external)
   private
 
-  public :: choose_columns, count_columns, explain_no_column, quantity_of
+  public :: choose_columns, count_columns, explain_no_signal, note_former_name
 
   integer, parameter :: most_names = 16   ! in a message
 
 contains
 
-  !> The columns that &output asks for, ascending: the time, and those of the patterns of `columns`; all if there are none.
-  subroutine choose_columns(input, labels, chosen, error)
+  !> The columns that &output asks for, ascending: the time, and those of the patterns of `columns`; all but those of inner nodes
+  !> if there are none.
+  subroutine choose_columns(input, signals, labels, chosen, notes, error)
     type(input_t), intent(in) :: input
-    type(string_t), intent(in) :: labels(:)                 !! of all columns, that of the time first
+    type(signal_t), intent(in) :: signals(:)                     !! the time first, in the units of the table
+    type(string_t), intent(in) :: labels(:)                      !! their labels
     integer, allocatable, intent(out) :: chosen(:)
-    type(error_t), allocatable, intent(out) :: error        !! patterns that match nothing
+    type(string_t), allocatable, intent(inout) :: notes(:)       !! on former names
+    type(error_t), allocatable, intent(out) :: error             !! patterns that match nothing
     type(diagnostics_t) :: diagnostics
     type(string_t), allocatable :: patterns(:)
-    character(len=:), allocatable :: pattern
-    logical :: is_chosen(size(labels)), is_found
+    character(len=:), allocatable :: former, hint, pattern
+    logical :: is_chosen(size(signals)), is_found, is_former
     integer :: c, i, output
 
     output = input%position('output')
     allocate (patterns, source=input%groups(output)%texts('columns'))
-    is_chosen = size(patterns) == 0 .and. .not. [(is_of_node(labels(c)%text), c=1, size(labels))]
+    is_chosen = size(patterns) == 0 .and. .not. signals%is_inner()
     is_chosen(1) = .true.
     do i = 1, size(patterns)
       pattern = trim(adjustl(patterns(i)%text))
       is_found = .false.
-      do c = 1, size(labels)
-        if (is_of_node(labels(c)%text) .and. index(pattern, '[') == 0) cycle
-        if (.not. (matches(pattern, labels(c)%text) .or. matches(pattern, without_unit(labels(c)%text)))) cycle
+      is_former = .false.
+      do c = 1, size(signals)
+        if (signals(c)%is_inner() .and. index(pattern, '[') == 0) cycle
+        if (.not. (matches(pattern, labels(c)%text) .or. matches(pattern, signals(c)%name))) then
+          call former_name(signals(c), .false., former)
+          if (former == '') cycle
+          if (.not. (matches(pattern, former) .or. matches(pattern, former // ' [' // signals(c)%unit // ']'))) cycle
+          if (.not. is_former) call note_former_name(input, output, 'columns', former, signals(c)%name, notes)
+          is_former = .true.
+        end if
         is_chosen(c) = .true.
         is_found = .true.
       end do
-      if (.not. is_found) call input%report(output, 'columns', 'columns(' // to_text(i) // ') = ' // quoted(pattern) // &
-                                            ' matches no column of trajectory.csv' // hint_for(pattern, labels), diagnostics)
+      if (is_found) cycle
+      call find_hint(pattern, signals, labels, hint)
+      call input%report(output, 'columns', 'columns(' // to_text(i) // ') = ' // quoted(pattern) // &
+                        ' matches no column of trajectory.csv' // hint, diagnostics)
     end do
     if (diagnostics%count > 0) call raise(error, diagnostics%worst_code(), input%diagnostics_text(diagnostics))
-    allocate (chosen, source=pack([(c, c=1, size(labels))], is_chosen))
+    allocate (chosen, source=pack([(c, c=1, size(signals))], is_chosen))
   end subroutine choose_columns
 
-  !> Whether a column is that of a node inside of a shaft, which only patterns with a bracket choose.
-  elemental logical function is_of_node(label)
-    character(len=*), intent(in) :: label
+  !> Notes that an input has a name which a signal had before.
+  subroutine note_former_name(input, group, key, former, name, notes)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: group   !! of the input
+    character(len=*), intent(in) :: key, former, name
+    type(string_t), allocatable, intent(inout) :: notes(:)
 
-    is_of_node = index(label, '] [') > 0
-  end function is_of_node
+    call append(notes, input%location(group, key) // ': ' // former // ' is called ' // name // &
+                       ' now; the next release will not know the former name')
+  end subroutine note_former_name
 
   !> The number of the columns that &output asks for.
   subroutine count_columns(input, machine, count, error)
@@ -63,38 +79,37 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(out) :: count
     type(error_t), allocatable, intent(out) :: error        !! patterns that match nothing
-    type(column_t), allocatable :: columns(:)
-    type(string_t), allocatable :: labels(:)
+    type(signal_t), allocatable :: signals(:)
+    type(string_t), allocatable :: labels(:), notes(:)
     integer, allocatable :: chosen(:), units(:)
 
-    count = column_count(machine) - 2 * machine%nodes
-    if (.not. input%groups(input%position('output'))%has_value('columns')) return
-    call list_columns(machine, columns, labels)
-    allocate (units(size(labels)))
-    call turn_labels(labels, output_units(input), units)
-    call choose_columns(input, labels, chosen, error)
+    call list_signals(machine, signals)
+    call turn_units(signals, output_units(input), units)
+    call label_signals(signals, labels)
+    allocate (notes(0))
+    call choose_columns(input, signals, labels, chosen, notes, error)
     count = size(chosen)
   end subroutine count_columns
 
   !> What to write instead of a pattern: the nearest name or pattern of names, else the patterns of all names.
-  function hint_for(pattern, labels) result(text)
+  subroutine find_hint(pattern, signals, labels, text)
     character(len=*), intent(in) :: pattern
-    type(string_t), intent(in) :: labels(:)   !! of the columns, that of the time first
-    character(len=:), allocatable :: quantity, text
-    type(string_t), allocatable :: of_quantities(:)                                 ! e.g. 'phi_*'
-    type(string_t) :: names(size(labels) - 1), of_elements(size(labels) - 1)        ! e.g. 'phi_motor', '*_motor'
+    type(signal_t), intent(in) :: signals(:)
+    type(string_t), intent(in) :: labels(:)
+    character(len=:), allocatable, intent(out) :: text
+    type(string_t), allocatable :: of_quantities(:)                                     ! e.g. 'phi_*'
+    type(string_t) :: names(size(signals) - 1), of_elements(size(signals) - 1)          ! e.g. 'phi_motor', '*_motor'
     integer :: i
 
     allocate (of_quantities(0))
     do i = 1, size(names)
-      names(i)%text = without_unit(labels(i + 1)%text)
-      of_elements(i)%text = names(i)%text
-      quantity = quantity_of(names(i)%text)
-      if (quantity /= names(i)%text) then
-        of_elements(i)%text = '*' // names(i)%text(len(quantity) + 1:)
-        quantity = quantity // '_*'
-      end if
-      call append_new(of_quantities, quantity)
+      associate (one => signals(i + 1))
+        names(i)%text = one%name
+        of_elements(i)%text = one%name
+        if (one%element /= '') of_elements(i)%text = '*' // one%name(len(one%symbol) + 1:)
+        if (one%element /= '') call append_new(of_quantities, one%symbol // '_*')
+        if (one%element == '') call append_new(of_quantities, one%symbol)
+      end associate
     end do
     text = near_match(pattern, of_quantities)
     if (text == '') text = near_match(pattern, names)
@@ -103,7 +118,7 @@ contains
     if (text == '') text = near_match('*_' // pattern, of_elements)
     if (text == '' .and. index(pattern, '[') > 0) text = near_match(pattern, labels)
     if (text == '') text = '; allowed: ' // joined(of_quantities, ', ', most_names)
-  end function hint_for
+  end subroutine find_hint
 
   !> Appends a text that is not yet in a list.
   pure subroutine append_new(list, text)
@@ -114,42 +129,22 @@ contains
     if (.not. any([(list(i)%text == text, i=1, size(list))])) call append(list, text)
   end subroutine append_new
 
-  !> Why a name that is no column may have been written, e.g. "; did you mean 'omega_motor'?".
-  pure subroutine explain_no_column(name, labels, text)
+  !> Why a name that is no signal may have been written, e.g. "; did you mean 'omega_motor'?".
+  subroutine explain_no_signal(name, signals, text)
     character(len=*), intent(in) :: name
-    type(string_t), intent(in) :: labels(:)   !! of the columns, with their units
+    type(signal_t), intent(in) :: signals(:)
     character(len=:), allocatable, intent(out) :: text
-    type(string_t) :: names(size(labels))   ! labels without units
+    type(string_t) :: labels(size(signals)), names(size(signals))
     integer :: i
 
-    do i = 1, size(labels)
-      names(i)%text = without_unit(labels(i)%text)
+    do i = 1, size(signals)
+      names(i)%text = signals(i)%name
+      labels(i)%text = signals(i)%name // ' [' // signals(i)%unit // ']'
     end do
-    if (index(name, '[') > 0) then
-      text = near_match(name, labels)
-    else
-      text = near_match(name, names)
-    end if
-    if (text == '') text = ', which has ' // related_names(name, names)
-  end subroutine explain_no_column
-
-  !> The label without its unit.
-  pure function without_unit(label) result(name)
-    character(len=*), intent(in) :: label
-    character(len=:), allocatable :: name
-
-    name = label(:index(label, ' [', back=.true.) - 1)
-  end function without_unit
-
-  !> The first part of a name, 'omega' of 'omega_motor'; the whole name of an energy and of the time.
-  pure function quantity_of(name) result(quantity)
-    character(len=*), intent(in) :: name   !! with or without its unit
-    character(len=:), allocatable :: quantity
-    character(len=*), parameter :: of_machine = '|t|kinetic_energy|elastic_energy|work_in|work_out|energy_residual|'
-
-    quantity = name(:index(name // ' [', ' [') - 1)
-    if (index(of_machine, '|' // quantity // '|') == 0) quantity = name(:index(name // '_', '_') - 1)
-  end function quantity_of
+    text = near_match(name, names)
+    if (index(name, '[') > 0) text = near_match(name, labels)
+    if (text == '') text = ', which has ' // related_names(name(:index(name // ' [', ' [') - 1), signals, names)
+  end subroutine explain_no_signal
 
   !> E.g. "; did you mean 'omega_motor'?", '' if no name is similar.
   pure function near_match(name, candidates) result(text)
@@ -163,21 +158,19 @@ contains
     if (nearest > 0) text = '; did you mean ' // quoted(candidates(nearest)%text) // '?'
   end function near_match
 
-  !> The columns of the element or of the kind that a quantity may mean; if there are none, the first ones of all columns.
-  pure function related_names(quantity, names) result(text)
-    character(len=*), intent(in) :: quantity
-    type(string_t), intent(in) :: names(:)   !! without units
+  !> The signals of the element or with the symbol that a name may mean; if there are none, the first ones of all.
+  pure function related_names(name, signals, names) result(text)
+    character(len=*), intent(in) :: name     !! without a unit
+    type(signal_t), intent(in) :: signals(:)
+    type(string_t), intent(in) :: names(:)   !! of the signals
     character(len=:), allocatable :: text
     type(string_t), allocatable :: related(:)
-    character(len=:), allocatable :: element, name
     integer :: i
 
-    name = quantity(:index(quantity // ' [', ' [') - 1)
-    element = name(index(name, '_') + 1:)
     allocate (related(0))
-    do i = 1, size(names)
-      if (index(names(i)%text // '|', '_' // element // '|') == 0 .and. index(names(i)%text, name // '_') /= 1) cycle
-      call append(related, names(i)%text)
+    do i = 1, size(signals)
+      if (index(name // '|', '_' // signals(i)%element // '|') > 0 .or. signals(i)%symbol == name .or. &
+          signals(i)%element == name) call append(related, names(i)%text)
     end do
     if (size(related) > 0) then
       text = joined(related, ', ', most_names)

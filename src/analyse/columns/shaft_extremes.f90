@@ -7,7 +7,7 @@ module nocdyn_shaft_extremes
   use nocdyn_machine, only: machine_t
   use nocdyn_observer, only: ranges_t
   use nocdyn_shafts, only: shafts_t
-  use nocdyn_trajectory_columns, only: column_element, column_t
+  use nocdyn_signals, only: signal_element, signal_source_t
   implicit none (type, external)
   private
 
@@ -33,14 +33,14 @@ contains
   !> Whether a column is the largest moment or stress along a shaft with inertia.
   logical function is_largest_along(machine, column, shaft, is_stress)
     type(machine_t), intent(in) :: machine
-    type(column_t), intent(in) :: column
+    type(signal_source_t), intent(in) :: column
     integer, intent(out) :: shaft        !! its number in the bank
     logical, intent(out) :: is_stress
 
     is_largest_along = .false.
     shaft = 0
     is_stress = .false.
-    if (column%kind /= column_element) return
+    if (column%kind /= signal_element) return
     select type (bank => machine%banks(column%bank)%bank)
     type is (shafts_t)
       is_stress = bank%is_stress(column%quantity)
@@ -54,7 +54,7 @@ contains
   !> Finds the columns of a table.
   function new_shaft_extremes(machine, columns) result(self)
     type(machine_t), intent(in) :: machine
-    type(column_t), intent(in) :: columns(:)
+    type(signal_source_t), intent(in) :: columns(:)
     type(shaft_extremes_t) :: self
     type(along_t) :: item
     integer :: c, k

@@ -10,7 +10,7 @@ module nocdyn_fatigue_groups
   implicit none (type, external)
   private
 
-  public :: check_fatigue, element_kind, quantity_of, read_curve
+  public :: check_fatigue, element_kind, fatigue_symbol, quantity_of, read_curve
 
   character(len=*), parameter :: kinds(*) = [character(len=8) :: 'coupling', 'shaft', 'mesh', 'gear']
   integer, parameter, public :: quantity_stress = 1, quantity_moment = 2   !! other ones: forces
@@ -40,6 +40,21 @@ contains
       if (group%has_value('table_' // trim(quantities(quantity)))) return
     end do
   end function quantity_of
+
+  !> The symbol of the signal whose cycles a group counts.
+  pure function fatigue_symbol(group) result(symbol)
+    type(group_t), intent(in) :: group
+    character(len=:), allocatable :: symbol
+
+    select case (quantity_of(group))
+    case (quantity_stress)
+      symbol = 'stress'
+    case (quantity_moment)
+      symbol = 'total_moment'
+    case default
+      symbol = trim(merge('reaction', 'force   ', element_kind(group) == 'gear'))
+    end select
+  end function fatigue_symbol
 
   !> Refuses elements that do not exist or have no such quantity, and values that do not fit together.
   subroutine check_fatigue(input, index, error)

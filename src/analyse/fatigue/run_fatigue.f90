@@ -1,13 +1,12 @@
 !> The fatigue of a run, by &fatigue: counts the cycles of moments, stresses and forces while the machine is integrated.
 module nocdyn_run_fatigue
   use nocdyn_damage_counters, only: damage_counter_t
-  use nocdyn_fatigue_groups, only: element_kind, quantity_moment, quantity_of, quantity_stress, quantity_units, read_curve
+  use nocdyn_fatigue_groups, only: element_kind, fatigue_symbol, quantity_of, quantity_stress, quantity_units, read_curve
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_labelled_columns, only: column_of, whole_moment_column
   use nocdyn_machine, only: machine_t
   use nocdyn_shafts, only: shafts_t
-  use nocdyn_text, only: string_t
+  use nocdyn_signals, only: find_signal, signal_t
   implicit none (type, external)
   private
 
@@ -34,17 +33,17 @@ module nocdyn_run_fatigue
 contains
 
   !> Finds the signals of all groups &fatigue.
-  subroutine new_run_fatigue(input, machine, labels, fatigue)
+  subroutine new_run_fatigue(input, machine, signals, fatigue)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
-    type(string_t), intent(in) :: labels(:)   !! columns of the table of the run, in SI
+    type(signal_t), intent(in) :: signals(:)   !! of the table of the run
     type(run_fatigue_t), intent(out) :: fatigue
     integer, allocatable :: groups(:)
-    integer :: i, signals
+    integer :: count, i
 
     allocate (groups, source=input%groups_named('fatigue'))
     allocate (fatigue%items(size(groups)))
-    signals = 0
+    count = 0
     do i = 1, size(groups)
       associate (group => input%groups(groups(i)), item => fatigue%items(i))
         item%name = group%name
@@ -52,40 +51,23 @@ contains
         item%unit = trim(quantity_units(quantity_of(group)))
         item%repeats = group%number('repeats')
         item%is_stress = quantity_of(group) == quantity_stress
-        item%first = signals + 1
+        item%first = count + 1
         item%last = item%first
         if (element_kind(group) == 'shaft') then
           call find_shaft(machine, item)
         else
-          call find_column(labels, trim(element_kind(group)), quantity_of(group), item)
+          item%column = find_signal(signals, trim(element_kind(group)), item%element, fatigue_symbol(group))
+          if (item%column == 0) error stop 'nocdyn_run_fatigue: a checked group has a signal'
         end if
-        signals = item%last
+        count = item%last
       end associate
     end do
-    allocate (fatigue%counters(signals))
-    allocate (fatigue%position(signals), source=0.0_wp)
+    allocate (fatigue%counters(count))
+    allocate (fatigue%position(count), source=0.0_wp)
     do i = 1, size(groups)
       call prepare_signals(input, groups(i), machine, fatigue, i)
     end do
   end subroutine new_run_fatigue
-
-  !> The column of a moment, a stress or a force.
-  pure subroutine find_column(labels, kind, quantity, item)
-    type(string_t), intent(in) :: labels(:)
-    character(len=*), intent(in) :: kind
-    integer, intent(in) :: quantity   !! quantity_...
-    type(fatigue_item_t), intent(inout) :: item
-
-    select case (quantity)
-    case (quantity_stress)
-      item%column = column_of(labels, 'stress_' // item%element // ' [Pa]')
-    case (quantity_moment)
-      item%column = whole_moment_column(labels, item%element)
-    case default
-      item%column = column_of(labels, trim(merge('reaction', 'force   ', kind == 'gear')) // '_' // item%element // ' [N]')
-    end select
-    if (item%column == 0) error stop 'nocdyn_run_fatigue: a checked group has a column'
-  end subroutine find_column
 
   !> The points of a shaft.
   pure subroutine find_shaft(machine, item)

@@ -12,7 +12,8 @@ module nocdyn_forced_response
   use nocdyn_lapack_complex, only: complex_solve
   use nocdyn_machine, only: machine_t
   use nocdyn_response_points, only: keep_points, merge_points, response_point_t
-  use nocdyn_response_quantities, only: list_quantities, response_quantity_t
+  use nocdyn_moment_forms, only: list_moment_forms, moment_form_t
+  use nocdyn_signals, only: list_signals, signal_angle, signal_t
   use nocdyn_synthesis, only: new_synthesis, synthesis_t
   use nocdyn_text, only: to_text
   implicit none (type, external)
@@ -28,7 +29,8 @@ module nocdyn_forced_response
     type(held_speeds_t) :: held
     type(dynamic_stiffness_t) :: matrix
     type(line_t), allocatable :: lines(:)
-    type(response_quantity_t), allocatable :: quantities(:)
+    type(moment_form_t), allocatable :: quantities(:)
+    type(signal_t), allocatable :: angles(:)           !! of the bodies, without nodes of shafts
     type(synthesis_t) :: synthesis
     logical :: has_oscillations = .true.               !! whether these are computed, beside the steady states and frequencies
     type(response_point_t), allocatable :: points(:)   !! ascending by the size of the speed
@@ -59,6 +61,7 @@ contains
     type(error_t), allocatable, intent(out) :: error   !! a message of a steady state begins with its speed
     type(held_state_t) :: high, low
     type(source_t), allocatable :: of_high(:), of_low(:)
+    type(signal_t), allocatable :: signals(:)
     real(wp), parameter :: beside = 1.01_wp   ! a second speed, which tells orders from frequencies
     real(wp), parameter :: unexcited = 1.0e100_wp   ! [rad/s]: no stiffness is large
     real(wp) :: lowest   ! frequency [rad/s]
@@ -82,7 +85,10 @@ contains
                                max(abs(low%stiffness) + lowest * abs(low%damping), &
                                    abs(high%stiffness) + lowest * abs(high%damping)), self%matrix, error)
     if (allocated(error)) return
-    call list_quantities(machine, reference, self%quantities)
+    call list_moment_forms(machine, reference, self%quantities)
+    call list_signals(machine, signals)
+    self%angles = pack(signals, signals%source%kind == signal_angle .and. &
+                       signals%source%index <= machine%bodies - machine%nodes)
     allocate (self%points(0), self%left_out(0))
   end subroutine new_forced_response
 
@@ -270,7 +276,7 @@ contains
         point%quantity(:, q) = amplitude
         point%lowest(q) = lowest
         point%highest(q) = highest
-        point%mean(q) = sum(one%weight(p, :) * point%state%mean(one%element)) + one%by_held_torque * point%state%torque
+        point%mean(q) = sum(one%weight(p, :) * point%state%mean(one%elements)) + one%by_held_torque * point%state%torque
       end do
     end associate
   end subroutine find_quantity

@@ -5,7 +5,8 @@ module nocdyn_run_limits
   use nocdyn_input, only: group_t, input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
-  use nocdyn_labelled_columns, only: column_of, whole_moment_column
+  use nocdyn_limit_groups, only: limited_kind
+  use nocdyn_signals, only: find_signal, signal_t
   use nocdyn_text, only: append, rounded_text, string_t
   implicit none (type, external)
   private
@@ -21,9 +22,10 @@ module nocdyn_run_limits
 contains
 
   !> Compares the columns of a run with the limits of its input.
-  subroutine check_run_limits(input, labels, lowest, highest, limits)
+  subroutine check_run_limits(input, signals, labels, lowest, highest, limits)
     type(input_t), intent(in) :: input
-    type(string_t), intent(in) :: labels(:)               !! of the columns
+    type(signal_t), intent(in) :: signals(:)              !! of the columns
+    type(string_t), intent(in) :: labels(:)               !! theirs
     real(wp), intent(in) :: lowest(:), highest(:)         !! [columns]
     type(run_limit_t), allocatable, intent(out) :: limits(:)
     integer, allocatable :: groups(:)
@@ -36,16 +38,15 @@ contains
       associate (group => input%groups(groups(i)))
         if (.not. has_peak(group)) cycle
         n = n + 1
-        if (group%has_value('mesh')) then
-          limits(n)%name = group%text('mesh')
-          column = column_of(labels, 'force_' // limits(n)%name // ' [N]')
-        else if (group%has_value('shaft')) then
-          limits(n)%name = group%text('shaft')
-          column = column_of(labels, 'moment_' // limits(n)%name // '_max [N m]')
-        else
-          limits(n)%name = group%text('coupling')
-          column = whole_moment_column(labels, limits(n)%name)
-        end if
+        limits(n)%name = group%text(trim(limited_kind(group)))
+        select case (limited_kind(group))
+        case ('mesh')
+          column = find_signal(signals, 'mesh', limits(n)%name, 'force')
+        case ('shaft')
+          column = find_signal(signals, 'shaft', limits(n)%name, 'total_moment', 'max')
+        case default
+          column = find_signal(signals, 'coupling', limits(n)%name, 'total_moment')
+        end select
         limits(n)%limit = group%number('moment', absent=0.0_wp)
         if (group%has_value('mesh')) limits(n)%limit = group%number('force')
         limits(n)%column = ''

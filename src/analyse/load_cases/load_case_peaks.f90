@@ -4,6 +4,7 @@ module nocdyn_load_case_peaks
   use nocdyn_kinds, only: wp
   use nocdyn_run_fatigue, only: run_fatigue_t
   use nocdyn_run_summary, only: run_summary_t
+  use nocdyn_signals, only: signal_t
   use nocdyn_text, only: append, string_t
   implicit none (type, external)
   private
@@ -18,7 +19,7 @@ module nocdyn_load_case_peaks
 
   !> The value of largest magnitude of one column, of all load cases that have it.
   type, public :: peak_t
-    character(len=:), allocatable :: label   !! of the column, with its unit
+    type(signal_t) :: signal                 !! of the column
     real(wp) :: largest = 0.0_wp             !! with its sign
     real(wp) :: time = 0.0_wp                !! [s]
     integer :: load_case = 0                 !! index of the run
@@ -44,11 +45,8 @@ contains
     integer :: c, i, k
     logical :: is_known
 
-    call list_columns(runs, labels)
+    call list_labels(runs, labels)
     allocate (peaks(size(labels)))
-    do i = 1, size(labels)
-      peaks(i)%label = labels(i)%text
-    end do
     do c = 1, size(runs)
       associate (summary => runs(c)%summary)
         if (.not. summary%extremes%have_begun) cycle
@@ -56,6 +54,7 @@ contains
         do k = 2, size(summary%chosen)
           call find_next(labels, summary%labels(summary%chosen(k))%text, i, is_known)
           associate (column => summary%chosen(k), extremes => summary%extremes)
+            peaks(i)%signal = summary%signals(column)
             call raise_peak(peaks(i), c, extremes%lowest(column), extremes%lowest_time(column))
             call raise_peak(peaks(i), c, extremes%highest(column), extremes%highest_time(column))
           end associate
@@ -76,7 +75,7 @@ contains
   end subroutine raise_peak
 
   !> The labels of the columns of all runs that have rows.
-  subroutine list_columns(runs, labels)
+  subroutine list_labels(runs, labels)
     type(case_run_t), intent(in) :: runs(:)
     type(string_t), allocatable, intent(out) :: labels(:)
     type(string_t), allocatable :: longer(:)
@@ -94,7 +93,7 @@ contains
       end do
       call move_alloc(longer, labels)
     end do
-  end subroutine list_columns
+  end subroutine list_labels
 
   !> The columns of a run that are not yet known.
   subroutine find_new(summary, labels, new)

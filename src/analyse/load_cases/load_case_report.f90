@@ -6,7 +6,6 @@ module nocdyn_load_case_report
   use nocdyn_kinds, only: wp
   use nocdyn_load_case_peaks, only: case_run_t, find_peaks, life_t, peak_t, sum_damage
   use nocdyn_output_file, only: output_file_t
-  use nocdyn_output_units, only: unit_of
   use nocdyn_run_table, only: columns_to_show
   use nocdyn_table_text, only: cell, padded, text_width
   use nocdyn_text, only: counted, quoted, rounded_text, string_t, strings
@@ -70,8 +69,8 @@ contains
     call json%open_list('peaks')
     do i = 1, size(peaks)
       call json%open()
-      call json%put('column', name_of(peaks(i)%label))
-      call json%put('unit', unit_of(peaks(i)%label))
+      call json%put('column', peaks(i)%signal%name)
+      call json%put('unit', peaks(i)%signal%unit)
       call json%put('largest', peaks(i)%largest)
       call json%put('time', peaks(i)%time)
       call json%put('load_case', runs(peaks(i)%load_case)%load_case%name)
@@ -79,14 +78,6 @@ contains
     end do
     call json%close_list()
   end subroutine put_peaks
-
-  !> A column without its unit.
-  pure function name_of(label) result(name)
-    character(len=*), intent(in) :: label
-    character(len=:), allocatable :: name
-
-    name = label(:index(label // ' [', ' [') - 1)
-  end function name_of
 
   subroutine put_lives(json, runs)
     type(json_t), intent(inout) :: json
@@ -150,14 +141,14 @@ contains
     call find_peaks(runs, peaks)
     allocate (labels(size(peaks)))
     do i = 1, size(peaks)
-      labels(i)%text = peaks(i)%label
+      labels(i)%text = peaks(i)%signal%name // ' [' // peaks(i)%signal%unit // ']'
     end do
-    allocate (shown, source=columns_to_show(labels, [(i, i=1, size(peaks))], abs(peaks%largest), most_lines))
+    allocate (shown, source=columns_to_show(peaks%signal%rank, [(i, i=1, size(peaks))], abs(peaks%largest), most_lines))
     width = maxval([text_width('largest of all load cases'), (text_width(labels(shown(i))%text), i=1, size(shown))])
     call report%append_line(padded('largest of all load cases', width) // cell('value') // cell('at t [s]') // '  load case')
     do i = 1, size(shown)
       associate (peak => peaks(shown(i)))
-        call report%append_line(padded(peak%label, width) // cell(peak%largest) // cell(peak%time) // '  ' // &
+        call report%append_line(padded(labels(shown(i))%text, width) // cell(peak%largest) // cell(peak%time) // '  ' // &
                                 runs(peak%load_case)%load_case%name)
       end associate
     end do

@@ -6,13 +6,12 @@ module nocdyn_response_fatigue
   use nocdyn_critical_speeds, only: keep_new
   use nocdyn_damage_counters, only: damage_counter_t
   use nocdyn_errors, only: error_t
-  use nocdyn_fatigue_groups, only: element_kind, quantity_of, quantity_stress, read_curve
+  use nocdyn_fatigue_groups, only: element_kind, fatigue_symbol, read_curve
   use nocdyn_forced_response, only: forced_response_t
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_response_points, only: response_point_t
-  use nocdyn_response_quantities, only: quantity_moment, quantity_reaction, stress_of_response => quantity_stress, &
-    response_quantity_t
+  use nocdyn_moment_forms, only: kind_moment, kind_reaction, kind_stress, moment_form_t
   use nocdyn_sn_curves, only: sn_curve_t
   use nocdyn_turning_points, only: list_turning_points
   implicit none (type, external)
@@ -77,27 +76,27 @@ contains
   subroutine read_item(input, index, quantities, item)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(response_quantity_t), intent(in) :: quantities(:)
+    type(moment_form_t), intent(in) :: quantities(:)
     type(response_fatigue_t), intent(inout) :: item
     integer :: kind, q
 
+    kind = kind_moment
     associate (group => input%groups(index))
       item%name = group%name
       item%element = group%text(trim(element_kind(group)))
       item%curve = read_curve(group)
       item%speeds = group%numbers('profile_speeds')
       item%hours = group%numbers('profile_hours')
-      kind = quantity_moment
-      if (quantity_of(group) == quantity_stress) kind = stress_of_response
-      if (element_kind(group) == 'gear') kind = quantity_reaction
+      if (fatigue_symbol(group) == 'stress') kind = kind_stress
+      if (fatigue_symbol(group) == 'reaction') kind = kind_reaction
     end associate
     allocate (item%quantities(0))
     do q = 1, size(quantities)
-      if (quantities(q)%kind == kind .and. quantities(q)%name == item%element) item%quantities = [item%quantities, q]
+      if (quantities(q)%kind == kind .and. quantities(q)%element == item%element) item%quantities = [item%quantities, q]
     end do
     if (size(item%quantities) == 0) error stop 'nocdyn_response_fatigue: a checked group has a quantity'
     associate (first => quantities(item%quantities(1)))
-      item%quantity = first%label // ' [' // first%unit // ']'
+      item%quantity = first%name // ' [' // first%unit // ']'
     end associate
   end subroutine read_item
 

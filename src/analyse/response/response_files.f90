@@ -1,22 +1,23 @@
-!> The files of a forced response: response.csv, response_orders.csv and response.json.
+!> The files of a forced response: response.csv, response_orders.csv, what their columns are, and response.json.
 module nocdyn_response_files
-  use nocdyn_column_labels, only: column_labels_t
+  use nocdyn_column_lists, only: column_list_t
   use nocdyn_csv, only: write_header, write_row
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_output_file, only: output_file_t
-  use nocdyn_output_units, only: turn_labels
   use nocdyn_response_analysis, only: response_analysis_t
   use nocdyn_response_limits, only: no_limit, response_limit_t
-  use nocdyn_response_quantities, only: quantity_moment, response_quantity_t
+  use nocdyn_moment_forms, only: kind_moment, moment_form_t
   use nocdyn_response_summary, only: critical_t, response_summary_t, worst_ratio
   use nocdyn_text, only: string_t
   use nocdyn_units, only: from_si
   implicit none (type, external)
   private
 
-  public :: put_response_csv, put_orders_csv, response_json
+  public :: put_response_csv, put_orders_csv, response_columns_json, response_json
+
+  character(len=*), parameter, public :: response_table = 'response.csv', orders_table = 'response_orders.csv'
 
   real(wp), parameter :: degree = acos(-1.0_wp) / 180.0_wp, turn = 2.0_wp * acos(-1.0_wp)
 
@@ -27,14 +28,15 @@ contains
     type(response_analysis_t), intent(in) :: analysis
     integer, intent(in) :: wanted(:)   !! units of speeds: indices of `units`
     type(output_file_t), intent(inout) :: file
+    type(column_list_t) :: list
     type(string_t), allocatable :: labels(:)
     integer, allocatable :: unit(:)
     real(wp), allocatable :: row(:)
     integer :: i
 
-    call list_labels(analysis, labels)
-    allocate (unit(size(labels)), row(size(labels)))
-    call turn_labels(labels, wanted, unit)
+    call list_columns(analysis, wanted, list)
+    call list%list_columns(labels, unit)
+    allocate (row(size(labels)))
     call write_header(file, labels)
     do i = 1, size(analysis%response%points)
       call fill_row(analysis, i, row)
@@ -43,50 +45,49 @@ contains
   end subroutine put_response_csv
 
   !> The columns of response.csv.
-  subroutine list_labels(analysis, labels)
+  subroutine list_columns(analysis, wanted, list)
     type(response_analysis_t), intent(in) :: analysis
-    type(string_t), allocatable, intent(out) :: labels(:)
-    type(column_labels_t) :: list
+    integer, intent(in) :: wanted(:)   !! units: indices of `units`
+    type(column_list_t), intent(out) :: list
     integer :: k, q
 
-    associate (quantities => analysis%response%quantities)
-      call list%add('omega_' // analysis%body_name // ' [rad/s]')
-      call list%add('drive [1]')
-      call list%add('drive_torque [N m]')
+    call list%start(response_table, wanted)
+    call list%add_named('omega', 'rad/s', 'speed that is held', 'body', analysis%body_name)
+    call list%add_named('drive', '1', 'share of the torques of the drives that holds the speed')
+    call list%add_named('drive_torque', 'N m', 'torque that holds the speed')
+    associate (quantities => analysis%response%quantities, limits => analysis%limits)
       do q = 1, size(quantities)
-        associate (one => quantities(q))
-          call list%add('mean_' // one%label // ' [' // one%unit // ']')
-          call list%add('half_range_' // one%label // ' [' // one%unit // ']')
-          call list%add('peak_' // one%label // ' [' // one%unit // ']')
-          if (has_heat(quantities, q)) call list%add('heat_' // one%name // ' [W]')
-          if (any(analysis%limits%quantity == q)) call list%add('ratio_' // one%label // ' [1]')
+        associate (signal => quantities(q)%signal_t)
+          call list%add(signal, 'mean')
+          call list%add(signal, 'half_range')
+          call list%add(signal, 'peak')
+          if (has_heat(quantities, q)) call list%add_named('heat', 'W', 'mean power lost by the oscillation', &
+                                                           signal%element_kind, signal%element)
+          if (any(limits%quantity == q)) call list%add(signal, 'ratio', '1')
         end associate
       end do
-      do k = 1, size(analysis%limits)
-        associate (one => quantities(analysis%limits(k)%quantity))
-          if (any(analysis%limits(:k - 1)%quantity == analysis%limits(k)%quantity)) cycle
-          if (has_continuous(analysis, one%label)) call list%add('limit_' // one%label // ' [' // one%unit // ']')
-          if (has_transient(analysis, one%label)) call list%add('transient_limit_' // one%label // ' [' // one%unit // ']')
-          if (has_peak(analysis%limits, analysis%limits(k)%quantity)) then
-            call list%add('peak_limit_' // one%label // ' [' // one%unit // ']')
-          end if
+      do k = 1, size(limits)
+        associate (signal => quantities(limits(k)%quantity)%signal_t)
+          if (any(limits(:k - 1)%quantity == limits(k)%quantity)) cycle
+          if (has_continuous(analysis, signal%name)) call list%add(signal, 'limit')
+          if (has_transient(analysis, signal%name)) call list%add(signal, 'transient_limit')
+          if (has_peak(limits, limits(k)%quantity)) call list%add(signal, 'peak_limit')
         end associate
-      end do
-      do k = 1, size(analysis%fatigue)
-        call list%add('damage_per_hour_' // analysis%fatigue(k)%name // ' [1/h]')
       end do
     end associate
-    call list%take(labels)
-  end subroutine list_labels
+    do k = 1, size(analysis%fatigue)
+      call list%add_named('damage_per_hour', '1/h', 'damage per hour', 'fatigue', analysis%fatigue(k)%name)
+    end do
+  end subroutine list_columns
 
   !> Whether the heat of a coupling stands beside a quantity: its moment, of a shaft that at the first end.
   pure logical function has_heat(quantities, q)
-    type(response_quantity_t), intent(in) :: quantities(:)
+    type(moment_form_t), intent(in) :: quantities(:)
     integer, intent(in) :: q
 
-    has_heat = quantities(q)%kind == quantity_moment
-    if (has_heat .and. q > 1) has_heat = .not. (quantities(q - 1)%kind == quantity_moment .and. &
-                                               quantities(q - 1)%name == quantities(q)%name)
+    has_heat = quantities(q)%kind == kind_moment
+    if (has_heat .and. q > 1) has_heat = .not. (quantities(q - 1)%kind == kind_moment .and. &
+                                               quantities(q - 1)%element == quantities(q)%element)
   end function has_heat
 
   !> Whether some limit of a quantity bounds its half range.
@@ -97,7 +98,7 @@ contains
 
     has_continuous = .false.
     do k = 1, size(analysis%limits)
-      if (analysis%response%quantities(analysis%limits(k)%quantity)%label /= label) cycle
+      if (analysis%response%quantities(analysis%limits(k)%quantity)%name /= label) cycle
       has_continuous = has_continuous .or. analysis%limits(k)%continuous_limit(analysis%settings%speeds(1)) < no_limit
     end do
   end function has_continuous
@@ -110,7 +111,7 @@ contains
 
     has_transient = .false.
     do k = 1, size(analysis%limits)
-      if (analysis%response%quantities(analysis%limits(k)%quantity)%label /= label) cycle
+      if (analysis%response%quantities(analysis%limits(k)%quantity)%name /= label) cycle
       has_transient = has_transient .or. analysis%limits(k)%transient_limit(analysis%settings%speeds(1)) < no_limit
     end do
   end function has_transient
@@ -139,15 +140,15 @@ contains
       do q = 1, size(quantities)
         row(n + 1:n + 3) = [point%mean(q), point%half_range(q), point%peak(q)]
         n = n + 3
-        if (has_heat(quantities, q)) call put(sum(point%heat(quantities(q)%element)))
+        if (has_heat(quantities, q)) call put(sum(point%heat(quantities(q)%elements)))
         if (any(limits%quantity == q)) call put(worst_ratio(limits, point, q))
       end do
       do k = 1, size(limits)
         if (any(limits(:k - 1)%quantity == limits(k)%quantity)) cycle
-        if (has_continuous(analysis, quantities(limits(k)%quantity)%label)) then
+        if (has_continuous(analysis, quantities(limits(k)%quantity)%name)) then
           call put(minval(limits%continuous_limit(speed), mask=limits%quantity == limits(k)%quantity))
         end if
-        if (has_transient(analysis, quantities(limits(k)%quantity)%label)) then
+        if (has_transient(analysis, quantities(limits(k)%quantity)%name)) then
           call put(minval(limits%transient_limit(speed), mask=limits%quantity == limits(k)%quantity))
         end if
         if (has_peak(limits, limits(k)%quantity)) then
@@ -175,6 +176,7 @@ contains
     type(response_analysis_t), intent(in) :: analysis
     integer, intent(in) :: wanted(:)   !! units of speeds and angles: indices of `units`
     type(output_file_t), intent(inout) :: file
+    type(column_list_t) :: list
     type(string_t), allocatable :: labels(:)
     integer, allocatable :: unit(:)
     real(wp), allocatable :: row(:)
@@ -182,9 +184,9 @@ contains
 
     associate (response => analysis%response)
       named = response%machine%bodies - response%machine%nodes
-      call list_order_labels(analysis, labels)
-      allocate (unit(size(labels)), row(size(labels)))
-      call turn_labels(labels, wanted, unit)
+      call list_order_columns(analysis, wanted, list)
+      call list%list_columns(labels, unit)
+      allocate (row(size(labels)))
       call write_header(file, labels)
       do i = 1, size(response%points)
         associate (point => response%points(i))
@@ -205,28 +207,49 @@ contains
   end subroutine put_orders_csv
 
   !> The columns of response_orders.csv.
-  subroutine list_order_labels(analysis, labels)
+  subroutine list_order_columns(analysis, wanted, list)
     type(response_analysis_t), intent(in) :: analysis
-    type(string_t), allocatable, intent(out) :: labels(:)
-    type(column_labels_t) :: list
-    integer :: b, q
+    integer, intent(in) :: wanted(:)   !! units: indices of `units`
+    type(column_list_t), intent(out) :: list
+    integer :: i
 
-    call list%add('omega_' // analysis%body_name // ' [rad/s]')
-    call list%add('order [1]')
-    call list%add('frequency [Hz]')
-    associate (response => analysis%response)
-      do q = 1, size(response%quantities)
-        call list%add(response%quantities(q)%label // ' [' // response%quantities(q)%unit // ']')
-        call list%add('phase_' // response%quantities(q)%label // ' [deg]')
-      end do
-      do b = 1, response%machine%bodies - response%machine%nodes
-        call list%add('phi_' // response%machine%names(b)%text // ' [rad]')
-        call list%add('phase_phi_' // response%machine%names(b)%text // ' [deg]')
-        call list%add('omega_amplitude_' // response%machine%names(b)%text // ' [rad/s]')
+    call list%start(orders_table, wanted)
+    call list%add_named('omega', 'rad/s', 'speed that is held', 'body', analysis%body_name)
+    call list%add_named('order', '1', 'oscillations per turn of the body')
+    call list%add_named('frequency', 'Hz', 'frequency')
+    do i = 1, size(analysis%response%quantities)
+      associate (signal => analysis%response%quantities(i)%signal_t)
+        call list%add(signal)
+        call list%add(signal, 'phase', 'deg')
+      end associate
+    end do
+    associate (signals => analysis%response%angles)
+      do i = 1, size(signals)
+        call list%add(signals(i))
+        call list%add(signals(i), 'phase', 'deg')
+        call list%add_named('omega_amplitude', 'rad/s', 'amplitude of the speed', 'body', signals(i)%element)
       end do
     end associate
-    call list%take(labels)
-  end subroutine list_order_labels
+  end subroutine list_order_columns
+
+  !> The text of the file that says what the columns of both tables are.
+  function response_columns_json(analysis, wanted) result(text)
+    type(response_analysis_t), intent(in) :: analysis
+    integer, intent(in) :: wanted(:)   !! units: indices of `units`
+    character(len=:), allocatable :: text
+    type(column_list_t) :: list, orders
+    type(json_t) :: json
+
+    call list_columns(analysis, wanted, list)
+    call list_order_columns(analysis, wanted, orders)
+    call json%open()
+    call json%open_list('columns')
+    call list%put(json)
+    call orders%put(json)
+    call json%close_list()
+    call json%close()
+    text = json%text()
+  end function response_columns_json
 
   !> The lead of an oscillation before cos(Omega t) [deg].
   elemental real(wp) function phase(amplitude)
@@ -310,7 +333,7 @@ contains
     call json%put('frequency_Hz', critical%crossing%frequency / turn)
     call json%put('damping_ratio', critical%crossing%damping_ratio)
     if (critical%quantity > 0) then
-      call json%put('coupling', analysis%response%quantities(critical%quantity)%name)
+      call json%put('coupling', analysis%response%quantities(critical%quantity)%element)
       if (.not. critical%is_unbounded) then
         call json%put('peak_speed_rad_s', critical%speed)
         call json%put('moment_N_m', critical%amplitude)
@@ -336,7 +359,7 @@ contains
     do q = 1, size(summary%largest)
       associate (largest => summary%largest(q), points => analysis%response%points, one => analysis%response%quantities(q))
         call json%open()
-        call json%put('quantity', one%label)
+        call json%put('quantity', one%name)
         call json%put('unit', one%unit)
         call json%put('half_range', largest%half_range)
         call json%put('half_range_speed_rad_s', points(largest%half_point)%state%speed)
@@ -365,7 +388,7 @@ contains
     do i = 1, size(summary%barred)
       associate (range => summary%barred(i), limit => analysis%limits(summary%barred(i)%limit))
         call json%open()
-        call json%put('quantity', analysis%response%quantities(limit%quantity)%label)
+        call json%put('quantity', analysis%response%quantities(limit%quantity)%name)
         call json%put('limit_at', input%location(limit%group))
         call json%put('from_rad_s', range%from)
         call json%put('to_rad_s', range%to)

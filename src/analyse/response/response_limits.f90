@@ -10,7 +10,7 @@ module nocdyn_response_limits
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_limit_groups, only: check_limit, limited_kind
-  use nocdyn_response_quantities, only: quantity_along, quantity_moment, quantity_stress, response_quantity_t
+  use nocdyn_moment_forms, only: kind_along, kind_moment, kind_stress, moment_form_t
   use nocdyn_text, only: quoted
   implicit none (type, external)
   private
@@ -39,7 +39,7 @@ contains
   !> Reads all groups &limit.
   subroutine read_limits(input, quantities, limits, error)
     type(input_t), intent(in) :: input
-    type(response_quantity_t), intent(in) :: quantities(:)
+    type(moment_form_t), intent(in) :: quantities(:)
     type(response_limit_t), allocatable, intent(out) :: limits(:)
     type(error_t), allocatable, intent(out) :: error
     integer, allocatable :: groups(:)
@@ -71,13 +71,13 @@ contains
     type(group_t), intent(in) :: group
     integer, intent(in) :: index   !! of the group
     character(len=*), intent(in) :: kind
-    type(response_quantity_t), intent(in) :: quantities(:)
+    type(moment_form_t), intent(in) :: quantities(:)
     type(response_limit_t), allocatable, intent(inout) :: limits(:)
     type(response_limit_t) :: limit
     integer :: limited, q
 
     limit%group = index
-    limited = merge(quantity_along, quantity_moment, kind == 'shaft')
+    limited = merge(kind_along, kind_moment, kind == 'shaft')
     if (kind == 'mesh') then
       limit%vibratory = group%number('vibratory_force', absent=no_limit)
       limit%peak = group%number('force', absent=no_limit)
@@ -87,7 +87,7 @@ contains
     end if
     if (min(limit%vibratory, limit%peak) >= no_limit) return
     do q = 1, size(quantities)
-      if (quantities(q)%kind /= limited .or. quantities(q)%name /= group%text(kind)) cycle
+      if (quantities(q)%kind /= limited .or. quantities(q)%element /= group%text(kind)) cycle
       limit%quantity = q
       limits = [limits, limit]
     end do
@@ -98,7 +98,7 @@ contains
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
     character(len=*), intent(in) :: kind
-    type(response_quantity_t), intent(in) :: quantities(:)
+    type(moment_form_t), intent(in) :: quantities(:)
     type(response_limit_t), allocatable, intent(inout) :: limits(:)
     type(error_t), allocatable, intent(out) :: error
     type(response_limit_t) :: limit
@@ -112,7 +112,7 @@ contains
       if (group%has_value('rule')) key = 'rule'
       if (key == '') return
       do q = 1, size(quantities)
-        if (quantities(q)%kind == quantity_stress .and. quantities(q)%name == group%text(kind)) limit%quantity = q
+        if (quantities(q)%kind == kind_stress .and. quantities(q)%element == group%text(kind)) limit%quantity = q
       end do
       if (limit%quantity == 0) then
         call raise(error, exit_input, input%location(index, key) // ': ' // key // ' limits a stress, but ' // &

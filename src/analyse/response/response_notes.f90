@@ -11,7 +11,7 @@ module nocdyn_response_notes
   use nocdyn_linear_ranges, only: excursion_t, find_excursions
   use nocdyn_machine, only: machine_t
   use nocdyn_mean_slopes, only: note_mean_slopes
-  use nocdyn_response_quantities, only: quantity_moment, quantity_reaction
+  use nocdyn_moment_forms, only: kind_moment, kind_reaction
   use nocdyn_response_settings, only: response_settings_t
   use nocdyn_shaft_errors, only: describe_error, has_shaft_nodes, noted_error, shaft_error
   use nocdyn_speed_modes, only: speed_modes_t
@@ -190,8 +190,8 @@ contains
 
     do q = 1, size(response%quantities)
       associate (one => response%quantities(q))
-        if (one%kind /= quantity_moment .or. size(one%element) /= 1) cycle
-        if (.not. has_gap(response, one%element(1))) cycle
+        if (one%kind /= kind_moment .or. size(one%elements) /= 1) cycle
+        if (.not. has_gap(response, one%elements(1))) cycle
         open = 0
         do i = 1, size(response%points)
           associate (point => response%points(i))
@@ -199,7 +199,7 @@ contains
           end associate
         end do
         if (open == 0) cycle
-        call append(notes, quoted(one%name) // ' oscillates by more than its mean at ' // to_text(open) // ' of ' // &
+        call append(notes, quoted(one%element) // ' oscillates by more than its mean at ' // to_text(open) // ' of ' // &
                            to_text(size(response%points)) // ' speeds and leaves contact: the linear response does not hold ' // &
                            'there; nocdyn run gives the motion')
       end associate
@@ -246,7 +246,7 @@ contains
     associate (constraints => response%machine%constraints, points => response%points)
       row = 0
       do q = 1, size(response%quantities)
-        if (response%quantities(q)%kind /= quantity_reaction) cycle
+        if (response%quantities(q)%kind /= kind_reaction) cycle
         row = row + 1
         slipping = 0
         worst = 1

@@ -88,7 +88,7 @@ contains
     character(len=:), allocatable :: name
 
     name = ''
-    if (critical%quantity > 0) name = analysis%response%quantities(critical%quantity)%name
+    if (critical%quantity > 0) name = analysis%response%quantities(critical%quantity)%element
   end function coupling_name
 
   subroutine put_critical(analysis, critical, width, has_stress, has_ratio, report)
@@ -175,7 +175,7 @@ contains
     associate (quantities => analysis%response%quantities)
       shown = min(size(quantities), most_quantities)
       if (shown == 0) return
-      width = maxval([(text_width(quantities(q)%label // ' [' // quantities(q)%unit // ']'), q=1, shown)])
+      width = maxval([(text_width(quantities(q)%name // ' [' // quantities(q)%unit // ']'), q=1, shown)])
       line = '  ' // padded('largest', width) // cell('half range') // cell('at [rpm]') // cell('peak') // cell('at [rpm]')
       if (any(summary%largest%ratio > 0)) line = line // cell('of limit') // cell('at [rpm]')
       call report%append_line(line // '  orders in the half range')
@@ -197,7 +197,7 @@ contains
     character(len=:), allocatable :: line
 
     associate (largest => summary%largest(q), points => analysis%response%points, one => analysis%response%quantities(q))
-      line = '  ' // padded(one%label // ' [' // one%unit // ']', width) // &
+      line = '  ' // padded(one%name // ' [' // one%unit // ']', width) // &
              cell(rounded_text(largest%half_range, 5)) // cell(rpm(points(largest%half_point)%state%speed)) // &
              cell(rounded_text(largest%peak, 5)) // cell(rpm(points(largest%peak_point)%state%speed))
       if (largest%ratio_point > 0) then
@@ -240,7 +240,7 @@ contains
 
     do i = 1, size(summary%barred)
       associate (range => summary%barred(i))
-        line = '  barred by ' // analysis%response%quantities(analysis%limits(range%limit)%quantity)%label // ': ' // &
+        line = '  barred by ' // analysis%response%quantities(analysis%limits(range%limit)%quantity)%name // ': ' // &
                rpm(range%from) // ' to ' // rpm(range%to) // ' rpm'
         if (.not. range%is_allowed) then
           line = line // '; the rule allows no barred range from 0.8 of the rated speed on'
@@ -253,7 +253,7 @@ contains
     do q = 1, size(summary%largest)
       associate (largest => summary%largest(q))
         if (largest%peak_ratio <= 1.0_wp) cycle
-        call report%append_line('  ' // analysis%response%quantities(q)%label // ' exceeds its limit of the peak: ' // &
+        call report%append_line('  ' // analysis%response%quantities(q)%name // ' exceeds its limit of the peak: ' // &
                                 ratio_text(largest%peak_ratio) // ' at ' // &
                                 rpm(analysis%response%points(largest%peak_point)%state%speed) // ' rpm')
       end associate

@@ -6,7 +6,7 @@ module nocdyn_response_settings
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_response_limits, only: read_limits, response_limit_t
-  use nocdyn_response_quantities, only: list_quantities, response_quantity_t
+  use nocdyn_moment_forms, only: list_moment_forms, moment_form_t
   use nocdyn_text, only: counted, rounded_text
   use nocdyn_units, only: from_si, unit_rpm
   implicit none (type, external)
@@ -65,14 +65,14 @@ contains
     character(len=:), allocatable, intent(out) :: text   !! a line of a report, after a line feed; '' without &response
     type(error_t), allocatable, intent(out) :: error
     type(response_settings_t) :: settings
-    type(response_quantity_t), allocatable :: quantities(:)
+    type(moment_form_t), allocatable :: quantities(:)
     type(response_limit_t), allocatable :: limits(:)
 
     text = ''
     if (.not. is_in_file(input, input%groups_named('response'))) return
     call read_response_settings(input, machine, settings, error)
     if (allocated(error)) return
-    call list_quantities(machine, settings%body, quantities)
+    call list_moment_forms(machine, settings%body, quantities)
     call read_limits(input, quantities, limits, error)
     associate (speeds => settings%speeds)
       text = new_line('a') // '  response: ' // counted(size(speeds), 'speed', 'speeds') // ' of ' // &

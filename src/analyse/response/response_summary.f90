@@ -7,7 +7,7 @@ module nocdyn_response_summary
   use nocdyn_response_analysis, only: response_analysis_t
   use nocdyn_response_limits, only: no_limit, response_limit_t
   use nocdyn_response_points, only: response_point_t
-  use nocdyn_response_quantities, only: quantity_moment, quantity_reaction, quantity_stress
+  use nocdyn_moment_forms, only: kind_moment, kind_reaction, kind_stress
   use nocdyn_response_settings, only: operating_distance
   implicit none (type, external)
   private
@@ -109,9 +109,9 @@ contains
       critical%half_range = points(i)%half_range(q)
       do k = 1, size(analysis%response%quantities)
         associate (one => analysis%response%quantities(k))
-          if (one%name /= analysis%response%quantities(q)%name .or. one%kind == quantity_reaction) cycle
+          if (one%element /= analysis%response%quantities(q)%element .or. one%kind == kind_reaction) cycle
           critical%ratio = max(critical%ratio, worst_ratio(analysis%limits, points(i), k))
-          if (one%kind == quantity_stress) critical%stress = abs(points(i)%quantity(line, k))
+          if (one%kind == kind_stress) critical%stress = abs(points(i)%quantity(line, k))
         end associate
       end do
     end associate
@@ -127,10 +127,10 @@ contains
     coupling = 0
     most = 0.0_wp
     do q = 1, size(analysis%response%quantities)
-      if (analysis%response%quantities(q)%kind /= quantity_moment) cycle
+      if (analysis%response%quantities(q)%kind /= kind_moment) cycle
       energy = 0.0_wp
-      do k = 1, size(analysis%response%quantities(q)%element)
-        e = analysis%response%quantities(q)%element(k)
+      do k = 1, size(analysis%response%quantities(q)%elements)
+        e = analysis%response%quantities(q)%elements(k)
         energy = energy + abs(analysis%response%points(1)%state%stiffness(e)) * abs(analysis%modes%twists(e, mode))**2
       end do
       if (energy <= most) cycle

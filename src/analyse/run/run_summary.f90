@@ -1,5 +1,6 @@
 !> The summary of a run, and its form as summary.json and as printed lines.
 module nocdyn_run_summary
+  use nocdyn_column_lists, only: column_list_t
   use nocdyn_energy_balance, only: energy_balance_t, put_energy_balance
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_fatigue_report, only: put_fatigue
@@ -15,6 +16,7 @@ module nocdyn_run_summary
   use nocdyn_solver_status, only: max_switch_times, solver_status_t
   use nocdyn_run_settings, only: put_settings
   use nocdyn_observer, only: ranges_t
+  use nocdyn_signals, only: signal_t
   use nocdyn_start_transient, only: start_transient_t
   use nocdyn_table_text, only: cell_digits
   use nocdyn_text, only: append, counted, longest_path, rounded_text, selected, shortened, string_t, strings, &
@@ -23,7 +25,7 @@ module nocdyn_run_summary
   private
 
   public :: start_extremes, update_extremes, widen_extremes, describe_machine, check_energy_balance, check_extremes
-  public :: summary_json, summary_line, method_line
+  public :: columns_json, summary_json, summary_line, method_line
 
   !> The summary notes an energy residual above this share of the largest energy of the vibration: such a motion is not to be
   !> trusted.
@@ -51,6 +53,7 @@ module nocdyn_run_summary
     integer :: bodies = 0, gears = 0, constraints = 0, freedoms = 0   !! of the machine
     type(string_t), allocatable :: coordinates(:)   !! names of the independent bodies
     type(string_t), allocatable :: notes(:)         !! on the machine and the run, one sentence each
+    type(signal_t), allocatable :: signals(:)       !! of the columns, in the units of the table
     type(string_t), allocatable :: labels(:)        !! of the columns
     integer, allocatable :: chosen(:)               !! columns that are written, ascending, the time first
     real(wp) :: t_start = 0.0_wp                    !! [s]
@@ -178,6 +181,35 @@ contains
     call append(notes, 'large energy balance error: energy_residual reaches ' // rounded_text(residual, 3) // ' J; ' // &
                        compared // ' J; tighten rtol and atol')
   end subroutine check_energy_balance
+
+  !> The text of columns.json: what the columns of the table are, and those that only the summary has.
+  function columns_json(summary, file) result(text)
+    type(run_summary_t), intent(in) :: summary
+    character(len=*), intent(in) :: file   !! name of the table
+    character(len=:), allocatable :: text
+    type(column_list_t) :: others, written
+    type(json_t) :: json
+    integer :: i, next
+
+    next = 1
+    call written%start(file, [integer ::])
+    call others%start('', [integer ::])
+    do i = 1, size(summary%signals)
+      if (summary%chosen(min(next, size(summary%chosen))) == i) then
+        call written%add(summary%signals(i))
+        next = next + 1
+      else
+        call others%add(summary%signals(i))
+      end if
+    end do
+    call json%open()
+    call json%open_list('columns')
+    call written%put(json)
+    call others%put(json)
+    call json%close_list()
+    call json%close()
+    text = json%text()
+  end function columns_json
 
   !> The text of summary.json.
   function summary_json(input, summary) result(text)

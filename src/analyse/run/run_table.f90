@@ -1,16 +1,15 @@
 !> The printed table of a run: what one looks for first, on one screen.
 module nocdyn_run_table
-  use nocdyn_column_names, only: quantity_of
   use nocdyn_energy_balance, only: append_energy_balance
   use nocdyn_fatigue_report, only: fatigue_text
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_run_limits, only: run_limits_text
+  use nocdyn_quantities, only: rank_force, rank_loss, rank_moment, rank_reaction, rank_speed, rank_stress, rank_torque
   use nocdyn_run_summary, only: run_summary_t
   use nocdyn_table_text, only: append_table, clear_rounding
   use nocdyn_text, only: counted, rounded_text, selected, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
-  use nocdyn_text_sort, only: argsort, sorted_position
   implicit none (type, external)
   private
 
@@ -57,7 +56,7 @@ contains
     if (summary%extremes%are_continuous) headings(0) = 'quantity'
     associate (extremes => summary%extremes)
       if (extremes%from > summary%t_start) headings(0) = trim(headings(0)) // ' from t = ' // to_text(extremes%from) // ' s'
-      allocate (shown, source=columns_to_show(summary%labels, summary%chosen(2:), &
+      allocate (shown, source=columns_to_show(summary%signals%rank, summary%chosen(2:), &
                                               max(abs(extremes%lowest), abs(extremes%highest)), most))
       allocate (values, source=reshape([extremes%last(shown), extremes%lowest(shown), extremes%highest(shown)], [size(shown), 3]))
       allocate (times, source=reshape([extremes%lowest_time(shown), extremes%highest_time(shown)], [size(shown), 2]))
@@ -82,19 +81,17 @@ contains
 
   !> The columns to print, by sorts and within each in the order of the table: of every sort its share of the lines at least, and
   !> of many columns those with the largest values.
-  function columns_to_show(labels, columns, sizes, most) result(shown)
-    type(string_t), intent(in) :: labels(:)   !! of all columns
+  function columns_to_show(ranks, columns, sizes, most) result(shown)
+    integer, intent(in) :: ranks(:)           !! rank_... of all columns
     integer, intent(in) :: columns(:)         !! that may be shown
     real(wp), intent(in) :: sizes(:)          !! largest magnitudes of all columns
     integer, intent(in) :: most               !! to show
     integer, allocatable :: shown(:)
-    integer, allocatable :: order(:)   ! of the labels
     integer :: available(sorts), lines(sorts), sort, sort_of_column(size(columns))
     integer :: i
     logical :: is_shown(size(columns))
 
-    call argsort(labels, order)
-    sort_of_column = [(sort_of(labels(columns(i))%text, labels, order), i=1, size(columns))]
+    sort_of_column = sort_of(ranks(columns))
     available = [(count(sort_of_column == sort), sort=1, sorts)]
     lines = min(available, [(most / (sorts - 1), i=2, sorts), 0])
     do sort = 1, sorts
@@ -110,23 +107,19 @@ contains
     end do
   end function columns_to_show
 
-  !> What one looks for first, 1, to last, 5: the moments in couplings; reactions; torques; speeds; all others, among them the
-  !> parts of a moment that has a column in whole.
-  integer function sort_of(label, labels, order) result(sort)
-    character(len=*), intent(in) :: label
-    type(string_t), intent(in) :: labels(:)   !! of all columns
-    integer, intent(in) :: order(:)           !! in which they are sorted
+  !> Moments in couplings 1; reactions, forces and stresses 2; torques 3; speeds 4; all others, among them the parts of a moment
+  !> that has a column in whole, 5.
+  elemental integer function sort_of(rank) result(sort)
+    integer, intent(in) :: rank   !! rank_...
 
-    select case (quantity_of(label))
-    case ('shaft')
+    select case (rank)
+    case (rank_moment)
       sort = 1
-    case ('moment')
-      sort = merge(5, 1, sorted_position('shaft' // label(len('moment') + 1:), labels, order) > 0)
-    case ('reaction')
+    case (rank_reaction, rank_force, rank_stress)
       sort = 2
-    case ('torque')
+    case (rank_torque, rank_loss)
       sort = 3
-    case ('omega')
+    case (rank_speed)
       sort = 4
     case default
       sort = 5

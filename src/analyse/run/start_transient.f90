@@ -5,13 +5,12 @@
 !> have decayed, but for some periods at least; where they decay too slowly, for these periods. A start in balance, as that of a
 !> steady state, has none.
 module nocdyn_start_transient
-  use nocdyn_column_names, only: quantity_of
   use nocdyn_errors, only: error_t
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: linearisation_t, linearise
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: new_reduced, reduced_t
-  use nocdyn_text, only: string_t
+  use nocdyn_signals, only: signal_t
   implicit none (type, external)
   private
 
@@ -32,19 +31,20 @@ module nocdyn_start_transient
 contains
 
   !> Finds the transient of a run and the extremes in it, of the columns that swing with the couplings.
-  subroutine find_start_transient(machine, span, labels, sizes, lowest_time, highest_time, transient)
+  subroutine find_start_transient(machine, span, signals, sizes, lowest_time, highest_time, transient)
     type(machine_t), intent(in) :: machine
     real(wp), intent(in) :: span(2)                                !! start and end of the run [s]
-    type(string_t), intent(in) :: labels(:)                        !! of the columns
+    type(signal_t), intent(in) :: signals(:)                       !! of the columns
     real(wp), intent(in) :: sizes(:)                               !! largest magnitudes of the columns
     real(wp), intent(in) :: lowest_time(:), highest_time(:)        !! of their extremes [s]
     type(start_transient_t), intent(out) :: transient
-    character(len=*), parameter :: swinging(5) = [character(len=8) :: 'twist', 'moment', 'damping', 'shaft', 'reaction']
-    logical :: is_moment(size(labels)), swings(size(labels))
+    character(len=*), parameter :: swinging(5) = [character(len=12) :: 'twist', 'moment', 'damping', 'total_moment', 'reaction']
+    logical :: is_moment(size(signals)), swings(size(signals))
     integer :: i
 
-    is_moment = [(quantity_of(labels(i)%text) == 'moment', i=1, size(labels))]
-    swings = [(any(swinging == quantity_of(labels(i)%text)), i=1, size(labels))]
+    is_moment = [(signals(i)%symbol == 'moment' .or. signals(i)%element_kind == 'shaft' .and. signals(i)%unit == 'N m', &
+                  i=1, size(signals))]
+    swings = [(any(swinging == signals(i)%symbol), i=1, size(signals))]
     transient%until = transient_end(machine, span(1), span(2), maxval(sizes, mask=is_moment))
     allocate (transient%has_lowest, source=swings .and. lowest_time > span(1) .and. lowest_time <= transient%until)
     allocate (transient%has_highest, source=swings .and. highest_time > span(1) .and. highest_time <= transient%until)

@@ -5,10 +5,10 @@ module nocdyn_trajectory_table
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_output_units, only: turn_labels
-  use nocdyn_recorded_columns, only: may_bend, new_recorded_columns, recorded_columns_t
+  use nocdyn_output_units, only: turn_units
+  use nocdyn_signal_values, only: may_bend, new_signal_values, signal_values_t
   use nocdyn_text, only: string_t
-  use nocdyn_trajectory_columns, only: column_t, list_columns
+  use nocdyn_signals, only: label_signals, list_signals, signal_t
   use nocdyn_units, only: from_si
   implicit none (type, external)
   private
@@ -17,9 +17,9 @@ module nocdyn_trajectory_table
 
   type, public :: trajectory_table_t
     type(string_t), allocatable :: labels(:)
-    type(column_t), allocatable :: list(:)         !! the columns
+    type(signal_t), allocatable :: signals(:)      !! of the columns, in the units of the table
     integer, allocatable, private :: unit(:)       !! of each column: index of `units`, 0: that of SI
-    type(recorded_columns_t) :: columns            !! with a copy of the formulation
+    type(signal_values_t) :: columns            !! with a copy of the formulation
     real(wp), private :: t(1) = 0.0_wp             !! [s]
     real(wp), allocatable, private :: y(:, :)      !! [1, states + quadratures]
     real(wp), private :: start_kinetic = 0.0_wp    !! [J]
@@ -35,14 +35,14 @@ contains
   type(trajectory_table_t) function new_trajectory_table(formulation, t_start, wanted) result(table)
     class(formulation_t), intent(in) :: formulation   !! of one lane, with work integrals
     real(wp), intent(in) :: t_start                   !! [s]
-    integer, intent(in), optional :: wanted(:)        !! units of columns: indices of `units`; absent: those of SI
+    integer, intent(in) :: wanted(:)                  !! units of columns: indices of `units`; else those of SI
     integer :: i
 
-    call list_columns(formulation%machine, table%list, table%labels)
-    table%columns = new_recorded_columns(formulation, table%list)
-    allocate (table%bends, source=[(may_bend(formulation%machine, table%list(i)), i=1, size(table%list))])
-    allocate (table%unit(size(table%list)), source=0)
-    if (present(wanted)) call turn_labels(table%labels, wanted, table%unit)
+    call list_signals(formulation%machine, table%signals)
+    table%columns = new_signal_values(formulation, table%signals%source)
+    allocate (table%bends, source=[(may_bend(formulation%machine, table%signals(i)%source), i=1, size(table%signals))])
+    call turn_units(table%signals, wanted, table%unit)
+    call label_signals(table%signals, table%labels)
     table%t(1) = t_start
     table%y = formulation%start()
     call table%columns%observe(table%t, table%y)

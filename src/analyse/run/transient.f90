@@ -125,13 +125,14 @@ contains
     do i = 1, size(notes)
       call append(summary%notes, notes(i)%text)
     end do
-    call start_observer(observer, input, formulation, times, error)
+    call start_observer(observer, input, formulation, times, summary%notes, error)
     if (allocated(error)) return
     observer%output => output
     observer%atol = min(settings%atol, rest)
     observer%table%columns%formulation%joints%leader => formulation%joints
     call output%start(selected(observer%table%labels, observer%chosen), size(times), error)
     if (allocated(error)) return
+    allocate (summary%signals, source=observer%table%signals)
     allocate (summary%labels, source=observer%table%labels)
     allocate (summary%chosen, source=observer%chosen)
     summary%t_start = times(1)
@@ -182,11 +183,12 @@ contains
     times = output_times(input, wanted)
   end subroutine choose_rows
 
-  subroutine start_observer(observer, input, formulation, times, error)
+  subroutine start_observer(observer, input, formulation, times, notes, error)
     type(run_observer_t), intent(inout) :: observer
     type(input_t), intent(in) :: input
     class(formulation_t), intent(in) :: formulation
     real(wp), intent(in) :: times(:)   !! of the rows [s]
+    type(string_t), allocatable, intent(inout) :: notes(:)
     type(error_t), allocatable, intent(out) :: error   !! columns are asked for that there are not
 
     observer%table = new_trajectory_table(formulation, times(1), output_units(input))
@@ -201,16 +203,16 @@ contains
     allocate (observer%lowest(formulation%machine%bodies), source=huge(0.0_wp))
     allocate (observer%highest(formulation%machine%bodies), source=-huge(0.0_wp))
     allocate (observer%last_state(formulation%states + formulation%quadratures), source=0.0_wp)
-    call new_run_fatigue(input, formulation%machine, observer%table%labels, observer%fatigue)
+    call new_run_fatigue(input, formulation%machine, observer%table%signals, observer%fatigue)
     observer%turning = size(observer%fatigue%counters)
-    observer%along = new_shaft_extremes(formulation%machine, observer%table%list)
+    observer%along = new_shaft_extremes(formulation%machine, observer%table%signals%source)
     observer%before_signals = size(observer%row) + observer%along%points
     observer%tracked = observer%before_signals + observer%turning
     allocate (observer%bends(observer%tracked), source=.true.)
     observer%bends(:size(observer%row)) = observer%table%bends
     observer%bends(size(observer%row) + 1:observer%before_signals) = .false.   ! moments of shafts are linear
     call start_extremes(observer%extremes, size(observer%row), observer%tracked_from)
-    call choose_columns(input, observer%table%labels, observer%chosen, error)
+    call choose_columns(input, observer%table%signals, observer%table%labels, observer%chosen, notes, error)
     if (.not. allocated(error)) allocate (observer%written(size(observer%chosen)))
   end subroutine start_observer
 
@@ -257,7 +259,8 @@ contains
     summary%extremes = observer%extremes
     call observer%fatigue%finish()
     summary%fatigue = observer%fatigue
-    call check_run_limits(input, summary%labels, summary%extremes%lowest, summary%extremes%highest, summary%limits)
+    call check_run_limits(input, summary%signals, summary%labels, summary%extremes%lowest, summary%extremes%highest, &
+                          summary%limits)
     if (.not. allocated(error)) call check_extremes(summary%extremes, summary%labels, error)
     call check_energy_balance(summary%extremes, observer%vibration%largest, &
                               observer%atol * observer%largest_moment, summary%notes)
@@ -268,7 +271,7 @@ contains
     if (.not. allocated(error)) then
       associate (extremes => summary%extremes)
         call find_start_transient(observer%table%columns%formulation%machine, [observer%t_start, observer%t_end], &
-                                  summary%labels, max(abs(extremes%lowest), abs(extremes%highest)), &
+                                  summary%signals, max(abs(extremes%lowest), abs(extremes%highest)), &
                                   extremes%lowest_time, extremes%highest_time, summary%transient)
       end associate
       return

@@ -8,7 +8,8 @@ module nocdyn_response_command
   use nocdyn_machine, only: machine_t
   use nocdyn_output_units, only: output_units
   use nocdyn_response_analysis, only: add_fatigue, analyse_response, response_analysis_t
-  use nocdyn_response_files, only: put_orders_csv, put_response_csv, response_json
+  use nocdyn_response_files, only: orders_table, put_orders_csv, put_response_csv, response_columns_json, response_json, &
+    response_table
   use nocdyn_response_report, only: response_text
   use nocdyn_response_summary, only: response_summary_t, summarise_response
   use nocdyn_result_files, only: result_files_t
@@ -18,7 +19,7 @@ module nocdyn_response_command
 
   public :: response_command
 
-  character(len=*), parameter :: table_name = 'response.csv', orders_name = 'response_orders.csv', report_name = 'response.json'
+  character(len=*), parameter :: columns_name = 'response_columns.json', report_name = 'response.json'
 
 contains
 
@@ -46,8 +47,8 @@ contains
     call write_files(input, analysis, summary, folder, error)
     if (allocated(error) .or. arguments%is_given('--quiet')) return
     call print_text(response_text(input%shown_file(), analysis, summary))
-    call print_text(input%shown_file() // ': ' // shown_path(folder) // ' has ' // table_name // ', ' // orders_name // &
-                    ' and ' // report_name)
+    call print_text(input%shown_file() // ': ' // shown_path(folder) // ' has ' // response_table // ', ' // orders_table // &
+                    ', ' // columns_name // ' and ' // report_name)
   end subroutine analyse_one
 
   subroutine write_files(input, analysis, summary, folder, error)
@@ -58,10 +59,11 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(result_files_t) :: files
 
-    call files%open(folder, [string_t(table_name), string_t(orders_name), string_t(report_name)])
+    call files%open(folder, [string_t(response_table), string_t(orders_table), string_t(columns_name), string_t(report_name)])
     call put_response_csv(analysis, output_units(input), files%files(1))
     call put_orders_csv(analysis, output_units(input), files%files(2))
-    call files%files(3)%put(response_json(input, analysis, summary))
+    call files%files(3)%put(response_columns_json(analysis, output_units(input)))
+    call files%files(4)%put(response_json(input, analysis, summary))
     call files%finish(error)
   end subroutine write_files
 

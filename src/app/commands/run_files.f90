@@ -1,7 +1,9 @@
-!> The files that a run leaves: trajectory.csv or trajectory.nc, summary.json, input.nml, and cycles.csv with &fatigue. A run that
-!> fails leaves trajectory.partial.csv and cycles.partial.csv.
+!> The files that a run leaves: trajectory.csv or trajectory.nc, columns.json, summary.json, input.nml, and cycles.csv with
+!> &fatigue. A run that fails leaves trajectory.partial.csv and cycles.partial.csv.
 module nocdyn_run_files
+  use nocdyn_column_lists, only: columns_file
   use nocdyn_console, only: new_status_line, status_line_t
+  use nocdyn_csv, only: table_bytes
   use nocdyn_disk_room, only: check_room
   use nocdyn_errors, only: error_t
   use nocdyn_fatigue_report, only: put_cycles_csv
@@ -11,10 +13,9 @@ module nocdyn_run_files
   use nocdyn_posix, only: is_interrupted, remove_file
   use nocdyn_posix_files, only: free_bytes
   use nocdyn_result_files, only: result_files_t
-  use nocdyn_run_summary, only: run_summary_t, summary_json
+  use nocdyn_run_summary, only: columns_json, run_summary_t, summary_json
   use nocdyn_sweep_plan, only: sweep_plan_t
   use nocdyn_text, only: append, counted, string_t, to_text
-  use nocdyn_trajectory_columns, only: table_bytes
   use nocdyn_trajectory_file, only: csv_trajectory_t, trajectory_file_t
   use nocdyn_transient, only: run_output_t, run_transient
   implicit none (type, external)
@@ -108,11 +109,13 @@ contains
     type(string_t), allocatable :: names(:)
 
     allocate (names, source=[string_t(input_file)])
+    call append(names, columns_file)
     if (size(summary%fatigue%items) > 0) call append(names, trim(cycles_names(state_of(summary))))
     call append(names, summary_file)
     call files%open(writer%folder, names)
     call files%files(1)%put(input_text(input))
-    if (size(names) == 3) call put_cycles_csv(summary%fatigue, files%files(2))
+    call files%files(2)%put(columns_json(summary, trim(trajectory_names(state_of(summary), writer%form))))
+    if (size(names) == 4) call put_cycles_csv(summary%fatigue, files%files(3))
     call files%files(size(names))%put(summary_json(input, summary))
     call writer%file%complete(trim(trajectory_names(1, writer%form)), error)
     if (.not. allocated(error)) call files%complete(error)

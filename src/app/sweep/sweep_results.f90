@@ -2,6 +2,7 @@
 module nocdyn_sweep_results
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_arguments, only: arguments_t
+  use nocdyn_column_lists, only: columns_file
   use nocdyn_console, only: print_text, report_error
   use nocdyn_errors, only: error_t, exit_done, exit_failed, exit_file, exit_input, raise
   use nocdyn_folders, only: folder_names, remove_empty_folder
@@ -19,7 +20,7 @@ module nocdyn_sweep_results
   use nocdyn_sweep_header, only: sweep_netcdf_name, sweep_header_t
   use nocdyn_sweep_journal, only: sweep_journal_t
   use nocdyn_sweep_plan, only: sweep_plan_t, without_sweep
-  use nocdyn_sweep_summary, only: sweep_json, sweep_line, sweep_note, sweep_summary_t, sweep_table
+  use nocdyn_sweep_summary, only: sweep_columns_json, sweep_json, sweep_line, sweep_note, sweep_summary_t, sweep_table
   use nocdyn_sweep_csv, only: sweep_csv_name, write_sweep_csv
   use nocdyn_targets, only: set_targets
   use nocdyn_text, only: shown_path, string_t, to_text
@@ -55,6 +56,7 @@ contains
     if (.not. allocated(error) .and. arguments%is_given('--csv')) call write_sweep_csv(folder, journals, error)
     if (.not. allocated(error)) call write_trajectories(plan, folder, journals, arguments, summary%without_trajectory, error)
     if (.not. allocated(error)) call write_file(folder, input_file, input_text(plan%input), error)
+    if (.not. allocated(error)) call write_file(folder, columns_file, sweep_columns_json(journals(1)%header), error)
     call system_clock(now)
     if (allocated(summary%effort)) summary%effort%writing_time = real(now - began, wp) / real(rate, wp)
     if (.not. allocated(error)) call write_file(folder, summary_file, sweep_json(plan%input, journals(1)%header, summary), error)
@@ -94,6 +96,7 @@ contains
     character(len=*), intent(in) :: folder
 
     call remove_file(folder // '/' // summary_file)
+    call remove_file(folder // '/' // columns_file)
     call remove_trajectories(folder, '')
   end subroutine remove_run
 

@@ -16,7 +16,7 @@ module nocdyn_log_file
   private
 
   character(len=*), parameter :: first_line = 'nocdyn sweep journal   ' // new_line('a')
-  integer(int32), parameter :: format_version = 1, byte_order = int(z'01020304', int32)
+  integer(int32), parameter :: format_version = 2, byte_order = int(z'01020304', int32)
   integer, parameter :: start_bytes = len(first_line) + 2 * integer_bytes
   integer, parameter :: initial_buffer = 65536
   real, parameter :: flush_interval = 5.0   ! [s]

@@ -1,6 +1,7 @@
 !> The description of a sweep in its files: input, program, and the names of parameters and results.
 module nocdyn_sweep_header
   use nocdyn_bytes, only: byte_reader_t, integer_bytes, put_integers, put_text
+  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -8,11 +9,18 @@ module nocdyn_sweep_header
 
   character(len=*), parameter, public :: sweep_netcdf_name = 'sweep.nc'
 
+  !> What is known of the signal that a result is of.
+  character(len=*), parameter, public :: fact_names(*) = [character(len=12) :: 'kind', 'statistic', 'element_kind', 'element', &
+                                                          'point', 'caption', 'positive']
+
   !> A target or a result.
   type, public :: quantity_t
     character(len=:), allocatable :: label       !! 'load.work.viscous', 'omega_motor_final'
     character(len=:), allocatable :: unit        !! '' if it has none
     character(len=:), allocatable :: long_name
+    type(string_t) :: facts(size(fact_names))    !! by `fact_names`; not allocated or '': none
+  contains
+    procedure :: fact
   end type quantity_t
 
   type, public :: sweep_header_t
@@ -52,16 +60,29 @@ contains
     bytes = bytes(:used)
   end subroutine pack_header
 
+  !> What is known of the signal, '' if nothing is.
+  pure function fact(self, k)
+    class(quantity_t), intent(in) :: self
+    integer, intent(in) :: k   !! of `fact_names`
+    character(len=:), allocatable :: fact
+
+    fact = ''
+    if (allocated(self%facts(k)%text)) fact = self%facts(k)%text
+  end function fact
+
   subroutine put_quantities(bytes, used, quantities)
     character(len=:), allocatable, intent(inout) :: bytes
     integer, intent(inout) :: used
     type(quantity_t), intent(in) :: quantities(:)
-    integer :: i
+    integer :: i, k
 
     do i = 1, size(quantities)
       call put_text(bytes, used, quantities(i)%label)
       call put_text(bytes, used, quantities(i)%unit)
       call put_text(bytes, used, quantities(i)%long_name)
+      do k = 1, size(fact_names)
+        call put_text(bytes, used, quantities(i)%fact(k))
+      end do
     end do
   end subroutine put_quantities
 
@@ -94,7 +115,7 @@ contains
     character(len=*), intent(in) :: bytes
     integer, intent(in) :: count
     type(quantity_t), allocatable, intent(out) :: quantities(:)
-    integer :: i
+    integer :: i, k
 
     ! damaged bytes can give any count: no more than they can hold
     allocate (quantities(max(0, min(count, len(bytes) / (3 * integer_bytes)))))
@@ -102,6 +123,9 @@ contains
       call reader%take_text(bytes, quantities(i)%label)
       call reader%take_text(bytes, quantities(i)%unit)
       call reader%take_text(bytes, quantities(i)%long_name)
+      do k = 1, size(fact_names)
+        call reader%take_text(bytes, quantities(i)%facts(k)%text)
+      end do
     end do
   end subroutine take_quantities
 

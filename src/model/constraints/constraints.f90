@@ -31,7 +31,7 @@ module nocdyn_constraints
   contains
     procedure :: rows
     procedure :: entries
-    procedure :: name_column
+    procedure :: is_of_teeth
     procedure :: pair_coefficients
     procedure :: subset
     procedure :: list_body_rows
@@ -81,19 +81,13 @@ contains
     rows = size(self%names)
   end function rows
 
-  !> The name of the column of a row's multiplier: a torque where it is that on the second body, as of clutches.
-  pure subroutine name_column(self, row, name)
+  !> Whether a row is one of gears, whose multiplier is a reaction; that of others, as of clutches, is a torque.
+  pure logical function is_of_teeth(self, row)
     class(constraints_t), intent(in) :: self
     integer, intent(in) :: row
-    character(len=:), allocatable, intent(out) :: name
 
-    select case (self%kinds(row)%text)
-    case ('gear', 'planetary', 'differential', 'constraint')
-      name = 'reaction_' // self%names(row)%text
-    case default
-      name = 'torque_' // self%names(row)%text
-    end select
-  end subroutine name_column
+    is_of_teeth = any(self%kinds(row)%text == [character(len=12) :: 'gear', 'planetary', 'differential', 'constraint'])
+  end function is_of_teeth
 
   !> Number of bodies in a row.
   pure integer function entries(self, row)

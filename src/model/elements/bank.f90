@@ -9,6 +9,7 @@ module nocdyn_bank
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
+  use nocdyn_quantities, only: form_total, new_quantity, quantity_t, rank_torque
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -32,14 +33,6 @@ module nocdyn_bank
   character(len=*), parameter, public :: role_names(*) = [character(len=10) :: 'coupling', 'load', 'motor', 'excitation', &
                                                           'coupling', 'clutch', 'freewheel', 'cardan', 'crank', 'relation', &
                                                           'drive', 'bearing', 'loss']
-
-  !> One quantity that a bank writes to the table of results.
-  type, public :: quantity_t
-    character(len=16) :: name            !! first part of the column's name, e.g. 'torque'
-    character(len=8) :: unit             !! e.g. 'N m'
-    integer, allocatable :: elements(:)  !! elements that have a column, numbered within the bank
-    character(len=8) :: suffix = ''      !! last part of the column's name
-  end type quantity_t
 
   !> One harmonic of the torque of an element that turns steadily, by the angle phi of `body`.
   type, public :: harmonic_t
@@ -273,19 +266,18 @@ contains
     allocate (speeds(0))
   end function knees
 
-  !> The columns of the bank in the table of results, by default the torque of each element.
-  function quantities(self) result(columns)
+  !> What the elements put out, by default the torque of each on its body.
+  function quantities(self) result(list)
     class(bank_t), intent(in) :: self
-    type(quantity_t), allocatable :: columns(:)
+    type(quantity_t), allocatable :: list(:)
     integer :: e
 
-    allocate (columns(1))
-    columns(1)%name = 'torque'
-    columns(1)%unit = 'N m'
-    columns(1)%elements = [(e, e=1, self%count)]
+    allocate (list(1))
+    list(1) = new_quantity('torque', 'N m', [(e, e=1, self%count)], 'torque on the body', 'with a positive speed', rank_torque, &
+                           form_total, 1.0_wp)
   end function quantities
 
-  !> Values of one quantity of all elements of the bank, after `evaluate`.
+  !> Values of a quantity without a form, of all elements of the bank, after `evaluate`. Banks that have one override this.
   pure subroutine observe(self, elements, quantity, lane, values)
     class(bank_t), intent(in) :: self
     type(elements_t), intent(in) :: elements   !! of the machine
@@ -293,8 +285,8 @@ contains
     integer, intent(in) :: lane
     real(wp), intent(out) :: values(:)   !! [elements of the bank], in the unit of the quantity
 
-    values = elements%restoring(lane, self%first:self%last()) + elements%applied(lane, self%first:self%last())
-    if (quantity /= 1) error stop 'nocdyn_bank: a bank with several quantities overrides observe'
+    values = elements%applied(lane, self%first:self%last())
+    if (quantity > 0) error stop 'nocdyn_bank: a bank with a quantity without a form overrides observe'
   end subroutine observe
 
   !> Number of the bank that holds an element.

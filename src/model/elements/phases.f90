@@ -1,7 +1,8 @@
 !> Elements that belong to those of the bank before: their phases or drivers, which have no columns and no names of their own.
 module nocdyn_phases
-  use nocdyn_bank, only: bank_t, quantity_t, role_phase
+  use nocdyn_bank, only: bank_t, role_phase
   use nocdyn_element_rows, only: rows_between
+  use nocdyn_quantities, only: quantity_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private

@@ -1,6 +1,7 @@
 !> Results of a variant that need no motion: of its modes and of its forced response.
 module nocdyn_analysis_results
   use nocdyn_kinds, only: wp
+  use nocdyn_signals, only: signal_t
   use nocdyn_text, only: to_text
   implicit none (type, external)
   private
@@ -24,6 +25,7 @@ module nocdyn_analysis_results
     integer :: result = 0                           !! its number among the results of a variant
     integer :: statistic = analysis_frequency       !! analysis_...
     integer :: mode = 0                             !! number of an oscillating mode; 0 for a result of the response
+    type(signal_t) :: signal                        !! of the response
     character(len=:), allocatable :: quantity       !! element, or column of response.csv without its unit
     real(wp) :: order = 0.0_wp                      !! 0 stands for all orders together
     character(len=:), allocatable :: label          !! e.g. 'moment_shaft_order_6_peak'

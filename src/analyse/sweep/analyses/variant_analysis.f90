@@ -11,9 +11,10 @@ module nocdyn_variant_analysis
   use nocdyn_modes, only: find_modes, mode_oscillating, mode_t
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
   use nocdyn_response_analysis, only: analyse_response, response_analysis_t
-  use nocdyn_response_quantities, only: quantity_along, quantity_moment, quantity_stress, response_quantity_t
+  use nocdyn_moment_forms, only: kind_along, kind_moment, kind_stress, moment_form_t
   use nocdyn_response_settings, only: operating_distance
   use nocdyn_response_summary, only: worst_ratio
+  use nocdyn_signals, only: former_name
   use nocdyn_text, only: to_text
   use nocdyn_units, only: from_si
   implicit none (type, external)
@@ -21,8 +22,8 @@ module nocdyn_variant_analysis
 
   public :: analyse_variant, matching_quantities, oscillating_modes
 
-  integer, parameter, public :: recorded_kinds(*) = [quantity_moment]                  !! of an element, what its name records
-  integer, parameter, public :: limited_kinds(*) = [quantity_moment, quantity_stress, quantity_along]  !! and whose limits count
+  integer, parameter, public :: recorded_kinds(*) = [kind_moment]                  !! of an element, what its name records
+  integer, parameter, public :: limited_kinds(*) = [kind_moment, kind_stress, kind_along]  !! and whose limits count
 
 contains
 
@@ -191,17 +192,18 @@ contains
 
   !> The quantities that a name stands for: a column, or those of some kinds of an element.
   pure function matching_quantities(quantities, name, kinds) result(matching)
-    type(response_quantity_t), intent(in) :: quantities(:)
+    type(moment_form_t), intent(in) :: quantities(:)
     character(len=*), intent(in) :: name
     integer, intent(in) :: kinds(:)   !! quantity_..., of an element
     integer, allocatable :: matching(:)
+    character(len=:), allocatable :: former
     integer :: q
 
     allocate (matching(0))
     do q = 1, size(quantities)
-      if (quantities(q)%label == name .or. any(quantities(q)%kind == kinds) .and. quantities(q)%name == name) then
-        matching = [matching, q]
-      end if
+      call former_name(quantities(q)%signal_t, .true., former)
+      if (quantities(q)%name == name .or. any(quantities(q)%kind == kinds) .and. quantities(q)%element == name .or. &
+          former == name .and. name /= '') matching = [matching, q]
     end do
   end function matching_quantities
 

@@ -3,7 +3,7 @@ module nocdyn_sweep_summary
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
-  use nocdyn_sweep_header, only: sweep_header_t
+  use nocdyn_sweep_header, only: fact_names, sweep_header_t, sweep_netcdf_name
   use nocdyn_order_statistics, only: order_statistics_t
   use nocdyn_run_settings, only: put_settings
   use nocdyn_table_text, only: append_table
@@ -12,7 +12,7 @@ module nocdyn_sweep_summary
   implicit none (type, external)
   private
 
-  public :: sweep_json, sweep_line, sweep_note, sweep_table
+  public :: sweep_columns_json, sweep_json, sweep_line, sweep_note, sweep_table
 
   !> What the computation took.
   type, public :: sweep_effort_t
@@ -119,6 +119,34 @@ contains
     end do
     call json%close()
   end subroutine put_statistics
+
+  !> The text of columns.json: what the results of the variants are.
+  function sweep_columns_json(header) result(text)
+    type(sweep_header_t), intent(in) :: header
+    character(len=:), allocatable :: text
+    type(json_t) :: json
+    integer :: i, k
+
+    call json%open()
+    call json%open_list('columns')
+    do i = 1, size(header%results)
+      associate (one => header%results(i))
+        call json%open()
+        call json%put('label', label(header, i))
+        call json%put('file', sweep_netcdf_name)
+        call json%put('name', one%label)
+        do k = 1, size(fact_names)
+          call json%put(trim(fact_names(k)), one%fact(k))
+        end do
+        call json%put('unit', one%unit)
+        call json%put('long_name', one%long_name)
+        call json%close()
+      end associate
+    end do
+    call json%close_list()
+    call json%close()
+    text = json%text()
+  end function sweep_columns_json
 
   !> The title, and the distribution of the results over the variants that are done.
   function sweep_table(header, summary) result(text)

@@ -13,7 +13,7 @@ module nocdyn_recorded_analyses
   use nocdyn_output_units, only: output_units
   use nocdyn_response_analysis, only: list_orders
   use nocdyn_response_limits, only: no_limit, read_limits, response_limit_t
-  use nocdyn_response_quantities, only: list_quantities, quantity_moment, response_quantity_t
+  use nocdyn_moment_forms, only: list_moment_forms, kind_moment, moment_form_t
   use nocdyn_response_settings, only: read_response_settings, response_settings_t
   use nocdyn_schema_text, only: suggestion
   use nocdyn_text, only: append, quoted, string_t, to_text
@@ -28,7 +28,7 @@ module nocdyn_recorded_analyses
   type, public :: analysis_reader_t
     integer, allocatable :: wanted_units(:)
     type(response_settings_t) :: settings
-    type(response_quantity_t), allocatable :: quantities(:)
+    type(moment_form_t), allocatable :: quantities(:)
     type(response_limit_t), allocatable :: limits(:)
     type(forced_response_t), allocatable :: response   !! with its lines, if the base machine has steady states
     integer :: oscillations = huge(1)                   !! number of its modes; unknown if it has no steady state
@@ -58,7 +58,7 @@ contains
     if (.not. asks_for(input, 'response')) return
     call read_response_settings(input, machine, self%settings, error)
     if (allocated(error)) return
-    call list_quantities(machine, self%settings%body, self%quantities)
+    call list_moment_forms(machine, self%settings%body, self%quantities)
     call read_limits(input, self%quantities, self%limits, error)
     if (allocated(error)) return
     allocate (response)
@@ -160,8 +160,8 @@ contains
       if (size(matching_quantities(self%quantities, group%text('response'), recorded_kinds)) == 0) then
         allocate (names(0))
         do q = 1, size(self%quantities)
-          if (self%quantities(q)%kind == quantity_moment) call append(names, self%quantities(q)%name)
-          call append(names, self%quantities(q)%label)
+          if (self%quantities(q)%kind == kind_moment) call append(names, self%quantities(q)%element)
+          call append(names, self%quantities(q)%name)
         end do
         call input%report(record, 'response', 'response = ' // quoted(group%text('response')) // ' is no coupling, shaft or ' // &
                           'mesh, and no column of response.csv' // suggestion(group%text('response'), names), diagnostics)
@@ -214,9 +214,10 @@ contains
     name = input%groups(record)%text('response')
     allocate (quantities, source=matching_quantities(self%quantities, name, recorded_kinds))
     associate (first => self%quantities(quantities(1)))
-      column = first%label
-      if (column /= name) column = column(:index(column, '_')) // name
+      column = first%name
+      if (first%element == name) column = first%symbol // '_' // name
       call new_response_result(name, column, first%unit, input%groups(record)%number('order', absent=0.0_wp), statistic, one)
+      one%signal = first%signal_t
     end associate
     if (statistic /= analysis_peak_speed) return
     one%in_unit = unit_for(one%unit, self%wanted_units)

@@ -1,10 +1,11 @@
 !> The damages and numbers of cycles of a sweep that the groups &record ask for.
 module nocdyn_recorded_fatigue
   use nocdyn_diagnostics, only: diagnostics_t
-  use nocdyn_fatigue_groups, only: element_kind, quantity_moment, quantity_of, quantity_stress
+  use nocdyn_fatigue_groups, only: element_kind, fatigue_symbol, quantity_of, quantity_units
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_schema_text, only: suggestion
+  use nocdyn_signals, only: signal_t
   use nocdyn_statistics, only: is_of_fatigue, new_fatigue_statistic, statistic_names, statistic_t
   use nocdyn_text, only: quoted, shortened, string_t
   implicit none (type, external)
@@ -74,26 +75,23 @@ contains
     type(input_t), intent(in) :: input
     integer, intent(in) :: fatigue, kind   !! index of the &fatigue; statistic_...
     real(wp), intent(in) :: t_start        !! [s]
-    character(len=:), allocatable :: element, quantity
+    type(signal_t) :: signal
     real(wp) :: from
 
     from = input%groups(input%position('output'))%number('extremes_from', absent=t_start)
     associate (group => input%groups(fatigue))
-      element = group%text(trim(element_kind(group)))
-      quantity = ''
-      select case (quantity_of(group))
-      case (quantity_stress)
-        quantity = 'stress_' // element // ' [Pa]'
-      case (quantity_moment)
-        quantity = 'shaft_' // element // ' [N m]'
-      case default
-        quantity = trim(merge('reaction', 'force   ', element_kind(group) == 'gear')) // '_' // element // ' [N]'
-      end select
-      statistic = new_fatigue_statistic(group%name, fatigue, quantity, kind, from)
+      signal%element_kind = trim(element_kind(group))
+      signal%element = group%text(signal%element_kind)
+      signal%symbol = fatigue_symbol(group)
+      signal%point = ''
+      signal%caption = 'signal whose cycles are counted'
+      signal%positive = ''
+      signal%name = signal%symbol // '_' // signal%element
+      signal%unit = trim(quantity_units(quantity_of(group)))
+      statistic = new_fatigue_statistic(group%name, fatigue, signal, kind, from)
       if (element_kind(group) /= 'shaft') return
-      statistic%quantity = ''
-      statistic%shaft = element
-      statistic%is_stress = quantity_of(group) == quantity_stress
+      statistic%shaft = signal%element
+      statistic%is_stress = signal%symbol == 'stress'
     end associate
   end function statistic_of
 

@@ -1,13 +1,14 @@
 !> The recorded quantities of a sweep: the statistics and trajectories that the groups &record ask for.
 module nocdyn_recorded_quantities
   use nocdyn_analysis_results, only: analysis_result_t
-  use nocdyn_column_names, only: explain_no_column
+  use nocdyn_column_names, only: explain_no_signal
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_diagnostics, only: diagnostics_t
-  use nocdyn_output_units, only: match_column, output_units
+  use nocdyn_output_units, only: match_signal, output_units
   use nocdyn_recorded_analyses, only: analysis_reader_t
   use nocdyn_recorded_fatigue, only: list_fatigue_statistics
+  use nocdyn_signals, only: signal_t
   use nocdyn_statistics, only: is_of_fatigue, new_statistic, statistic_names, statistic_t
   use nocdyn_text, only: quoted, string_t, to_text
   implicit none (type, external)
@@ -25,10 +26,10 @@ module nocdyn_recorded_quantities
 contains
 
   !> Reads what is recorded, in the order of the file.
-  subroutine read_recorded_quantities(input, reader, labels, span, variants, statistics, analyses, diagnostics)
+  subroutine read_recorded_quantities(input, reader, signals, span, variants, statistics, analyses, diagnostics)
     type(input_t), intent(in) :: input
     type(analysis_reader_t), intent(in) :: reader
-    type(string_t), intent(in) :: labels(:)   !! of the columns of trajectory.csv
+    type(signal_t), intent(in) :: signals(:)   !! of trajectory.csv
     type(time_span_t), intent(in) :: span
     integer, intent(in) :: variants           !! number of variants, huge if it is not known
     type(statistic_t), allocatable, intent(out) :: statistics(:)
@@ -41,7 +42,7 @@ contains
       do i = 1, size(records)
         associate (group => input%groups(records(i)))
           if (group%has_value('quantity')) then
-            call add_statistics(input, records(i), labels, span, size(analyses), statistics, diagnostics)
+            call add_statistics(input, records(i), signals, span, size(analyses), statistics, diagnostics)
           else if (group%has_value('fatigue')) then
             call add_fatigue(input, records(i), span, size(analyses), statistics, diagnostics)
           else if (group%has_value('mode') .or. group%has_value('response')) then
@@ -57,16 +58,16 @@ contains
   end subroutine read_recorded_quantities
 
   !> Checks the quantities only, as far as an input with errors has them.
-  subroutine check_quantities(input, labels, diagnostics)
+  subroutine check_quantities(input, signals, diagnostics)
     type(input_t), intent(in) :: input
-    type(string_t), intent(in) :: labels(:)   !! of the columns of trajectory.csv
+    type(signal_t), intent(in) :: signals(:)   !! of trajectory.csv
     type(diagnostics_t), intent(inout) :: diagnostics
     integer :: column, i
 
     associate (records => input%groups_named('record'))
       do i = 1, size(records)
         if (.not. input%groups(records(i))%has_value('quantity')) cycle
-        call find_column(input, records(i), labels, column, diagnostics)
+        call find_column(input, records(i), signals, column, diagnostics)
       end do
     end associate
   end subroutine check_quantities
@@ -91,10 +92,10 @@ contains
     end do
   end subroutine restrict_statistics
 
-  subroutine add_statistics(input, record, labels, span, others, statistics, diagnostics)
+  subroutine add_statistics(input, record, signals, span, others, statistics, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: record   !! index of the &record
-    type(string_t), intent(in) :: labels(:)
+    type(signal_t), intent(in) :: signals(:)
     type(time_span_t), intent(in) :: span
     integer, intent(in) :: others   !! results of a variant that are no statistics, so far
     type(statistic_t), allocatable, intent(inout) :: statistics(:)
@@ -105,7 +106,7 @@ contains
     integer :: column, i, k, unit
     logical :: of_magnitude   ! whether that is kept, and not the largest value
 
-    call find_column(input, record, labels, column, diagnostics, unit)
+    call find_column(input, record, signals, column, diagnostics, unit)
     call check_from(input, record, span, diagnostics)
     if (column == 0) return
     associate (group => input%groups(record))
@@ -121,7 +122,7 @@ contains
                             'needed: ' // trim(merge('fatigue         ', 'mode or response', k > 0)), diagnostics)
           cycle
         end if
-        statistic = new_statistic(labels, column, k, span%t_start, from, band, unit, of_magnitude)
+        statistic = new_statistic(signals, column, k, span%t_start, from, band, unit, of_magnitude)
         call append_statistic(input, record, others, statistic, statistics, diagnostics)
       end do
     end associate
@@ -145,28 +146,28 @@ contains
 
   !> The column of the quantity of a &record, with or without its unit; 0 if there is none. The unit may be one of the field;
   !> without one it is that of trajectory.csv.
-  subroutine find_column(input, record, labels, column, diagnostics, unit)
+  subroutine find_column(input, record, signals, column, diagnostics, unit)
     type(input_t), intent(in) :: input
     integer, intent(in) :: record
-    type(string_t), intent(in) :: labels(:)
+    type(signal_t), intent(in) :: signals(:)
     integer, intent(out) :: column
     type(diagnostics_t), intent(inout) :: diagnostics
     integer, intent(out), optional :: unit   !! of its statistics: index of `units`, 0: that of SI
     character(len=:), allocatable :: quantity, reason
     integer, allocatable :: wanted(:)
     integer :: quantity_unit
-    logical :: is_column
+    logical :: is_column, is_former
 
     allocate (wanted, source=output_units(input))
     quantity = trim(adjustl(input%groups(record)%text('quantity')))
-    do column = 1, size(labels)
-      call match_column(labels(column)%text, quantity, wanted, is_column, quantity_unit)
+    do column = 1, size(signals)
+      call match_signal(signals(column), quantity, wanted, is_column, quantity_unit, is_former)
       if (.not. is_column) cycle
       if (present(unit)) unit = quantity_unit
       return
     end do
     column = 0
-    call explain_no_column(quantity, labels, reason)
+    call explain_no_signal(quantity, signals, reason)
     call input%report(record, 'quantity', 'quantity = ' // quoted(quantity) // ' is no column of trajectory.csv' // reason, &
                       diagnostics)
   end subroutine find_column

@@ -1,8 +1,9 @@
 !> The plan of a sweep: targets, design and recorded quantities, as its input describes them. All errors in the groups of the
 !> sweep are reported at once.
 module nocdyn_sweep_plan
-  use nocdyn_analysis_results, only: analysis_result_t
+  use nocdyn_analysis_results, only: analysis_names, analysis_result_t
   use nocdyn_column_names, only: count_columns
+  use nocdyn_csv, only: table_bytes
   use nocdyn_designs, only: design_t
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
@@ -12,15 +13,15 @@ module nocdyn_sweep_plan
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_output_times, only: check_output_times, row_count
   use nocdyn_schema, only: first_key, has_word, key_rules
-  use nocdyn_statistics, only: statistic_t
+  use nocdyn_statistics, only: statistic_names, statistic_t
   use nocdyn_sweep_design, only: find_varied, read_design
   use nocdyn_sweep_header, only: quantity_t, sweep_header_t
   use nocdyn_recorded_analyses, only: analysis_reader_t, new_analysis_reader
   use nocdyn_recorded_quantities, only: check_quantities, read_recorded_quantities, time_span_t, wanted_trajectories
   use nocdyn_targets, only: target_t
-  use nocdyn_text, only: counted, string_t
-  use nocdyn_trajectory_columns, only: table_bytes
-  use nocdyn_variant_columns, only: label_columns
+  use nocdyn_text, only: counted, to_text
+  use nocdyn_signals, only: signal_t
+  use nocdyn_variant_columns, only: list_variant_signals
   use nocdyn_varied_numbers, only: varied_numbers_t
   use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
@@ -54,7 +55,7 @@ contains
     type(diagnostics_t) :: diagnostics
     type(error_t), allocatable :: failure
     type(analysis_reader_t) :: reader
-    type(string_t), allocatable :: labels(:)
+    type(signal_t), allocatable :: signals(:)
     integer, allocatable :: sweeps(:)
     integer :: variants
 
@@ -67,10 +68,10 @@ contains
     call read_design(input, sweeps(1), plan%numbers, plan%design, plan%list_checksum, diagnostics)
     variants = huge(variants)
     if (allocated(plan%design)) variants = plan%design%variants
-    call label_columns(input, plan%numbers%targets, plan%machine, labels, failure)
+    call list_variant_signals(input, plan%numbers%targets, plan%machine, signals, failure)
     if (.not. allocated(failure)) call new_analysis_reader(input, plan%machine, reader, failure)
     if (.not. allocated(failure)) then
-      call read_recorded_quantities(input, reader, labels, fixed_span(input, plan%numbers%targets), variants, plan%statistics, &
+      call read_recorded_quantities(input, reader, signals, fixed_span(input, plan%numbers%targets), variants, plan%statistics, &
                                     plan%analyses, diagnostics)
       allocate (plan%trajectories, source=wanted_trajectories(input))
       if (plan%results() == 0 .and. diagnostics%count == 0) call input%report(sweeps(1), 'design', &
@@ -89,7 +90,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(error_t), allocatable :: failure
     type(machine_t) :: machine
-    type(string_t), allocatable :: labels(:)
+    type(signal_t), allocatable :: signals(:)
     type(varied_numbers_t) :: numbers
     integer, allocatable :: varied(:)
     integer :: i
@@ -101,8 +102,8 @@ contains
     end do
     allocate (varied, source=input%groups_named('vary'))
     call find_varied(input, varied, numbers, diagnostics)
-    call label_columns(input, numbers%targets, machine, labels, failure)
-    if (size(varied) > 0 .and. .not. allocated(failure)) call check_quantities(input, labels, diagnostics)
+    call list_variant_signals(input, numbers%targets, machine, signals, failure)
+    if (size(varied) > 0 .and. .not. allocated(failure)) call check_quantities(input, signals, diagnostics)
     call merge_errors(input, diagnostics, failure, error)
   end subroutine add_plan_diagnostics
 
@@ -236,11 +237,20 @@ contains
     do i = 1, size(plan%statistics)
       associate (one => plan%statistics(i))
         call set_quantity(one%label, one%unit, one%long_name, header%results(one%result))
+        call set_facts(one%signal, trim(statistic_names(one%kind)), header%results(one%result))
       end associate
     end do
     do i = 1, size(plan%analyses)
       associate (one => plan%analyses(i))
         call set_quantity(one%label, one%unit, one%long_name, header%results(one%result))
+        if (one%mode == 0) then
+          call set_facts(one%signal, trim(analysis_names(one%statistic)), header%results(one%result))
+        else
+          header%results(one%result)%facts(1)%text = 'mode'
+          header%results(one%result)%facts(2)%text = trim(analysis_names(one%statistic))
+          header%results(one%result)%facts(3)%text = 'mode'
+          header%results(one%result)%facts(4)%text = to_text(one%mode)
+        end if
       end associate
     end do
   end subroutine name_quantities
@@ -253,6 +263,21 @@ contains
     quantity%unit = unit
     quantity%long_name = long_name
   end subroutine set_quantity
+
+  !> What is known of the signal of a result, in the order of `fact_names`.
+  subroutine set_facts(signal, statistic, quantity)
+    type(signal_t), intent(in) :: signal
+    character(len=*), intent(in) :: statistic
+    type(quantity_t), intent(inout) :: quantity
+
+    quantity%facts(1)%text = signal%symbol
+    quantity%facts(2)%text = statistic
+    quantity%facts(3)%text = signal%element_kind
+    quantity%facts(4)%text = signal%element
+    quantity%facts(5)%text = signal%point
+    quantity%facts(6)%text = signal%caption
+    quantity%facts(7)%text = signal%positive
+  end subroutine set_facts
 
   !> Whether an input has groups of a sweep.
   pure logical function has_sweep(input)

@@ -11,27 +11,26 @@ module nocdyn_variant_columns
   use nocdyn_machine, only: machine_t
   use nocdyn_run_settings, only: check_size
   use nocdyn_schema, only: has_word
+  use nocdyn_signals, only: label_signals, list_signals, signal_t
   use nocdyn_targets, only: set_targets, target_t
-  use nocdyn_text, only: append, string_t
+  use nocdyn_text, only: string_t
   use nocdyn_text_sort, only: argsort, sorted_position
-  use nocdyn_trajectory_columns, only: column_t, list_columns
   implicit none (type, external)
   private
 
-  public :: label_columns
+  public :: list_variant_signals
 
   real(wp), parameter :: nonzero_value = 1.0_wp   ! instead of 0 or of no value
 
 contains
 
-  !> Assembles the base machine and labels its columns, then those that exist only if targets which are 0 or not given are not 0.
-  subroutine label_columns(input, targets, machine, labels, error)
+  !> Assembles the base machine and lists its signals, then those that exist only if targets which are 0 or not given are not 0.
+  subroutine list_variant_signals(input, targets, machine, signals, error)
     type(input_t), intent(in) :: input
     type(target_t), intent(in) :: targets(:)
     type(machine_t), intent(out) :: machine
-    type(string_t), allocatable, intent(out) :: labels(:)
+    type(signal_t), allocatable, intent(out) :: signals(:)
     type(error_t), allocatable, intent(out) :: error
-    type(column_t), allocatable :: columns(:)
     type(target_t), allocatable :: hidden(:)
     logical :: is_valid
     integer :: i
@@ -40,15 +39,15 @@ contains
     if (.not. allocated(error)) call check_size(input, machine, error)
     if (.not. allocated(error)) call refuse_equal_labels(input, machine, error)
     if (allocated(error)) return
-    call list_columns(machine, columns, labels)
+    call list_signals(machine, signals)
     allocate (hidden, source=pack(targets, [(hides_column(input, targets(i)), i=1, size(targets))]))
     if (size(hidden) == 0) return
-    call add_columns(input, hidden, labels, is_valid)
+    call add_signals(input, hidden, signals, is_valid)
     if (is_valid) return
     do i = 1, size(hidden)
-      call add_columns(input, hidden(i:i), labels, is_valid)
+      call add_signals(input, hidden(i:i), signals, is_valid)
     end do
-  end subroutine label_columns
+  end subroutine list_variant_signals
 
   !> Whether a target is 0 or not given, and the columns of its element may depend on it.
   logical function hides_column(input, target)
@@ -63,17 +62,17 @@ contains
     end associate
   end function hides_column
 
-  !> Appends the labels of the columns of the machine in which some targets are not 0, as far as that is allowed.
-  subroutine add_columns(input, hidden, labels, is_valid)
+  !> Appends the signals of the machine in which some targets are not 0, as far as that is allowed.
+  subroutine add_signals(input, hidden, signals, is_valid)
     type(input_t), intent(in) :: input
     type(target_t), intent(in) :: hidden(:)
-    type(string_t), allocatable, intent(inout) :: labels(:)
+    type(signal_t), allocatable, intent(inout) :: signals(:)
     logical, intent(out) :: is_valid   !! whether such a machine is valid
     type(input_t) :: changed, before
     type(machine_t) :: machine
     type(error_t), allocatable :: error
-    type(column_t), allocatable :: columns(:)
-    type(string_t), allocatable :: others(:)
+    type(signal_t), allocatable :: others(:)
+    type(string_t), allocatable :: labels(:), other_labels(:)
     character(len=:), allocatable :: message
     integer, allocatable :: order(:)
     integer :: i
@@ -87,11 +86,11 @@ contains
     call assemble_machine(changed, machine, error)
     is_valid = .not. allocated(error)
     if (.not. is_valid) return
-    call list_columns(machine, columns, others)
+    call list_signals(machine, others)
+    call label_signals(signals, labels)
+    call label_signals(others, other_labels)
     call argsort(labels, order)
-    do i = 1, size(others)
-      if (sorted_position(others(i)%text, labels, order) == 0) call append(labels, others(i)%text)
-    end do
-  end subroutine add_columns
+    signals = [signals, pack(others, [(sorted_position(other_labels(i)%text, labels, order) == 0, i=1, size(others))])]
+  end subroutine add_signals
 
 end module nocdyn_variant_columns

@@ -6,14 +6,15 @@
 !> where x is the twist minus that at rest. The moment of a linear coupling with damping is x = k (u - rest) + d u', its stress
 !> that by the section modulus.
 module nocdyn_linear_columns
-  use nocdyn_bank, only: quantity_t
+  use nocdyn_bank, only: role_coupling
   use nocdyn_column_statistics, only: width
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_quantities, only: form_angle, form_elastic, form_total
   use nocdyn_reduced, only: reduced_t
-  use nocdyn_trajectory_columns, only: column_angle, column_element, column_speed, column_t
+  use nocdyn_signals, only: signal_angle, signal_element, signal_source_t, signal_speed
   implicit none (type, external)
   private
 
@@ -31,7 +32,7 @@ module nocdyn_linear_columns
     integer, allocatable, private :: element(:)     !! whose twist or moment the column is, 0 if it is none; [columns]
     logical, allocatable, private :: has_law(:)     !! whether it is an elastic moment; [columns]
     integer, allocatable, private :: bank(:)        !! of a whole moment or a stress, 0 of other columns; [columns]
-    logical, allocatable, private :: is_stress(:)   !! [columns]
+    integer, allocatable, private :: divisor(:)     !! parameter of the bank that divides a moment, 0: none; [columns]
     logical, allocatable, private :: is_rate(:)     !! whether a speed is multiplied, [entries]
     integer, allocatable, private :: body(:)        !! whose angle or speed the column is; [columns]
   contains
@@ -43,13 +44,13 @@ contains
   !> Whether a column is a linear function of the state or such a moment.
   logical function is_linear(block, column)
     class(formulation_t), intent(in) :: block
-    type(column_t), intent(in) :: column
+    type(signal_source_t), intent(in) :: column
 
     is_linear = .false.
     select type (block)
     class is (reduced_t)
-      is_linear = block%joints%count == 0 .and. any([column%kind == column_angle, column%kind == column_speed, &
-                       is_quantity(block%machine, column, 'twist'), has_law(block%machine, column)])
+      is_linear = block%joints%count == 0 .and. (any(column%kind == [signal_angle, signal_speed]) .or. &
+                                                 column%form == form_angle .or. has_law(block%machine, column))
     end select
   end function is_linear
 
@@ -57,59 +58,42 @@ contains
   !> lanes: a linear function of the state.
   logical function is_proportional(block, column)
     class(formulation_t), intent(in) :: block
-    type(column_t), intent(in) :: column
-    integer :: element
+    type(signal_source_t), intent(in) :: column
 
     is_proportional = .false.
-    if (column%kind /= column_element .or. block%joints%count > 0) return
+    if (column%kind /= signal_element .or. block%joints%count > 0) return
     associate (machine => block%machine, bank => block%machine%banks(column%bank)%bank)
       select type (block)
       class is (reduced_t)
-        is_proportional = bank%has_paper_law .and. bank%has_polynomial_potential .and. (is_quantity(machine, column, 'moment') &
-                          .or. is_quantity(machine, column, 'shaft') .or. is_quantity(machine, column, 'stress'))
+        is_proportional = bank%role == role_coupling .and. bank%has_paper_law .and. bank%has_polynomial_potential .and. &
+                          any(column%form == [form_elastic, form_total])
       end select
-      if (.not. is_proportional) return
-      element = bank%first - 1 + column%index
-      is_proportional = all(abs(machine%laws%cubic(:, element)) <= 0)
+      if (is_proportional) is_proportional = all(abs(machine%laws%cubic(:, bank%first - 1 + column%index)) <= 0)
     end associate
   end function is_proportional
 
   !> Whether a column is the elastic moment of a coupling with the law of eq. (3).
   logical function has_law(machine, column)
     type(machine_t), intent(in) :: machine
-    type(column_t), intent(in) :: column
+    type(signal_source_t), intent(in) :: column
 
-    has_law = is_quantity(machine, column, 'moment')
+    has_law = column%kind == signal_element .and. column%form == form_elastic
     if (has_law) has_law = machine%banks(column%bank)%bank%has_polynomial_potential
   end function has_law
-
-  !> Whether a column is a quantity of an element.
-  logical function is_quantity(machine, column, name)
-    type(machine_t), intent(in) :: machine
-    type(column_t), intent(in) :: column
-    character(len=*), intent(in) :: name   !! of the quantity
-    type(quantity_t), allocatable :: quantities(:)
-
-    is_quantity = .false.
-    if (column%kind /= column_element) return
-    if (machine%banks(column%bank)%bank%has_parts) return
-    quantities = machine%banks(column%bank)%bank%quantities()
-    is_quantity = quantities(column%quantity)%name == name
-  end function is_quantity
 
   !> The given columns, each `is_linear`. `copy_lane` sets the parameters of a lane.
   type(linear_columns_t) function new_linear_columns(block, columns) result(self)
     class(formulation_t), intent(in) :: block
-    type(column_t), intent(in) :: columns(:)
+    type(signal_source_t), intent(in) :: columns(:)
     integer :: i, strips
 
     self%count = size(columns)
     strips = strip_of(block%lanes)
     allocate (self%first(self%count + 1), source=1)
     allocate (self%component(0), self%ratio(0), self%coefficient(0), self%is_rate(0))
-    allocate (self%is_speed, source=columns%kind == column_speed)
-    allocate (self%has_law(self%count), self%is_stress(self%count), source=.false.)
-    allocate (self%element(self%count), self%body(self%count), self%bank(self%count), source=0)
+    allocate (self%is_speed, source=columns%kind == signal_speed)
+    allocate (self%has_law(self%count), source=.false.)
+    allocate (self%element(self%count), self%body(self%count), self%bank(self%count), self%divisor(self%count), source=0)
     do i = 1, self%count
       call set_column(self, i, block%machine, columns(i))
       call add_entries(self, i, block%machine)
@@ -121,15 +105,15 @@ contains
     type(linear_columns_t), intent(inout) :: self
     integer, intent(in) :: number
     type(machine_t), intent(in) :: machine
-    type(column_t), intent(in) :: column
+    type(signal_source_t), intent(in) :: column
 
     self%body(number) = column%index
-    if (column%kind /= column_element) return
+    if (column%kind /= signal_element) return
     self%element(number) = machine%banks(column%bank)%bank%first - 1 + column%index
     self%has_law(number) = has_law(machine, column)
-    if (self%has_law(number) .or. is_quantity(machine, column, 'twist')) return
+    if (self%has_law(number) .or. column%form == form_angle) return
     self%bank(number) = column%bank
-    self%is_stress(number) = is_quantity(machine, column, 'stress')
+    self%divisor(number) = column%divisor
   end subroutine set_column
 
   subroutine add_entries(self, number, machine)
@@ -214,9 +198,9 @@ contains
 
     stiffness = machine%laws%linear(lane, self%element(i))
     damping = -machine%laws%by_speed(lane, self%element(i))
-    if (self%is_stress(i)) then
+    if (self%divisor(i) > 0) then
       associate (bank => machine%banks(self%bank(i))%bank)
-        associate (modulus => bank%parameters(bank%number_of('section_modulus'))%value(lane, self%element(i) - bank%first + 1))
+        associate (modulus => bank%parameters(self%divisor(i))%value(lane, self%element(i) - bank%first + 1))
           stiffness = stiffness / modulus
           damping = damping / modulus
         end associate

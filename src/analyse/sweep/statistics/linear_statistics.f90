@@ -12,7 +12,7 @@ module nocdyn_linear_statistics
   use nocdyn_statistics, only: statistic_t
   use nocdyn_step_strips, only: add_integrals, expand, exclude_monotonic, fill_chord_gaps, strip_t, values_at
   use nocdyn_observer, only: step_block_t
-  use nocdyn_trajectory_columns, only: column_t
+  use nocdyn_signals, only: signal_source_t
   implicit none (type, external)
   private
 
@@ -32,7 +32,7 @@ contains
   !> Statistics of the variants that pass through the lanes of a block.
   type(linear_statistics_t) function new_linear_statistics(block, columns, statistics, t_start, t_end) result(self)
     class(formulation_t), intent(in) :: block
-    type(column_t), intent(in) :: columns(:)         !! of the trajectory table
+    type(signal_source_t), intent(in) :: columns(:)         !! of the trajectory table
     type(statistic_t), intent(in) :: statistics(:)   !! each of a column that `is_linear`; a moment has no time of extremes
     real(wp), intent(in) :: t_start, t_end           !! of every variant [s]
     integer, allocatable :: wanted(:)

@@ -11,17 +11,17 @@ module nocdyn_sampled_statistics
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_observer, only: step_block_t
-  use nocdyn_recorded_columns, only: may_bend, new_recorded_columns, recorded_columns_t
+  use nocdyn_signal_values, only: may_bend, new_signal_values, signal_values_t
   use nocdyn_statistics, only: statistic_t
   use nocdyn_step_pieces, only: new_step_pieces, step_pieces_t
-  use nocdyn_trajectory_columns, only: column_t
+  use nocdyn_signals, only: signal_source_t
   implicit none (type, external)
   private
 
   public :: new_sampled_statistics
 
   type, extends(column_statistics_t), public :: sampled_statistics_t
-    type(recorded_columns_t) :: recorded                    !! the columns with statistics
+    type(signal_values_t) :: recorded                    !! the columns with statistics
     real(wp), allocatable, private :: from(:)               !! the different ones of the accumulators [s]
     logical, private :: interpolates = .false., integrates = .false.   !! whether there are polynomials, integrals
     logical, allocatable, private :: active(:)              !! lanes whose step is sampled
@@ -43,7 +43,7 @@ contains
   !> Statistics of the variants that pass through the lanes of a formulation.
   type(sampled_statistics_t) function new_sampled_statistics(formulation, columns, statistics, t_start, t_end) result(self)
     class(formulation_t), intent(in) :: formulation
-    type(column_t), intent(in) :: columns(:)         !! of the trajectory table
+    type(signal_source_t), intent(in) :: columns(:)         !! of the trajectory table
     type(statistic_t), intent(in) :: statistics(:)   !! each of a column
     real(wp), intent(in) :: t_start, t_end           !! of every variant [s]
     integer, allocatable :: wanted(:)
@@ -51,7 +51,7 @@ contains
 
     if (size(statistics) == 0) return   ! without a copy of the formulation
     call self%set_statistics(statistics, formulation%lanes, t_start, t_end, wanted)
-    self%recorded = new_recorded_columns(formulation, columns(wanted))
+    self%recorded = new_signal_values(formulation, columns(wanted))
     allocate (self%from(0))
     do i = 1, size(self%accumulators)
       associate (acc => self%accumulators(i))

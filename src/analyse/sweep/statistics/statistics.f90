@@ -1,9 +1,9 @@
 !> Statistics of columns of trajectory.csv: their kinds, and the labels of the results of a sweep.
 module nocdyn_statistics
   use nocdyn_kinds, only: wp
-  use nocdyn_labelled_columns, only: column_of
   use nocdyn_sn_curves, only: sn_curve_t
-  use nocdyn_text, only: string_t, to_text
+  use nocdyn_signals, only: find_signal, signal_t
+  use nocdyn_text, only: to_text
   use nocdyn_units, only: units
   implicit none (type, external)
   private
@@ -37,14 +37,14 @@ module nocdyn_statistics
   !> |x - x_end| <= band |x(from) - x_end| from then on. Variants of another structure have other columns, in another order.
   type, public :: statistic_t
     integer :: result = 0                            !! its number among the results of a variant
-    character(len=:), allocatable :: quantity        !! label of the column, e.g. 'moment_shaft [N m]'
+    type(signal_t) :: signal                         !! of the column
     integer :: column = 0                            !! in the trajectory table of one machine, 0 if that has none
     integer :: kind = statistic_final                !! statistic_...
     real(wp) :: from = 0.0_wp                        !! [s]
     real(wp) :: band = default_band                  !! for settling_time only
     integer :: fatigue = 0                           !! index of the &fatigue in the input, 0: none
     type(sn_curve_t) :: curve                        !! of that
-    character(len=:), allocatable :: shaft           !! its shaft, all of whose points count; not allocated: `quantity` counts
+    character(len=:), allocatable :: shaft           !! its shaft, all of whose points count; not allocated: the signal counts
     logical :: is_stress = .false.                   !! whether that is its stress, not its moment
     character(len=:), allocatable :: label           !! e.g. 'moment_shaft_max_abs_from_2'
     character(len=:), allocatable :: unit            !! e.g. 'N m'
@@ -54,18 +54,17 @@ module nocdyn_statistics
 
 contains
 
-  !> The statistic of a column with a label such as 'moment_shaft [N m]'.
-  type(statistic_t) function new_statistic(labels, column, kind, t_start, from, band, unit, of_magnitude) result(self)
-    type(string_t), intent(in) :: labels(:)     !! of the trajectory table
+  !> The statistic of a signal.
+  type(statistic_t) function new_statistic(signals, column, kind, t_start, from, band, unit, of_magnitude) result(self)
+    type(signal_t), intent(in) :: signals(:)    !! of the trajectory table
     integer, intent(in) :: column, kind
     real(wp), intent(in) :: t_start             !! [s]
     real(wp), intent(in), optional :: from      !! [s]; t_start if absent
     real(wp), intent(in), optional :: band      !! of a settling time; `default_band` if absent
     integer, intent(in), optional :: unit       !! of its values: index of `units`; absent: that of SI
     logical, intent(in), optional :: of_magnitude   !! whether `time_of_max` is that of the largest magnitude; absent: it is not
-    integer :: bracket
 
-    self%quantity = labels(column)%text
+    self%signal = signals(column)
     self%column = column
     self%kind = kind
     if (present(of_magnitude) .and. kind == statistic_time_of_max) then
@@ -73,12 +72,9 @@ contains
     end if
     self%from = t_start
     if (present(band)) self%band = band
-    associate (text => labels(column)%text)
-      bracket = index(text, ' [', back=.true.)
-      self%label = text(:bracket - 1) // '_' // trim(statistic_names(kind))
-      self%unit = text(bracket + 2:len(text) - 1)
-      self%long_name = text(:bracket - 1) // ', ' // trim(descriptions(self%kind))
-    end associate
+    self%label = self%signal%name // '_' // trim(statistic_names(kind))
+    self%unit = self%signal%unit
+    self%long_name = self%signal%name // ', ' // trim(descriptions(self%kind))
     if (is_time_of_extreme(kind) .or. kind == statistic_settling_time) then
       self%unit = 's'
     else if (present(unit)) then
@@ -97,15 +93,15 @@ contains
   end function new_statistic
 
   !> The damage or the number of cycles of a &fatigue. The curve is that of a variant.
-  type(statistic_t) function new_fatigue_statistic(name, fatigue, quantity, kind, from) result(self)
+  type(statistic_t) function new_fatigue_statistic(name, fatigue, signal, kind, from) result(self)
     character(len=*), intent(in) :: name       !! of the &fatigue
     integer, intent(in) :: fatigue             !! its index in the input
-    character(len=*), intent(in) :: quantity   !! label of the column, '' for a shaft
+    type(signal_t), intent(in) :: signal       !! of the column, of any for a shaft
     integer, intent(in) :: kind                !! statistic_damage or statistic_cycles
     real(wp), intent(in) :: from               !! [s]
 
     self%fatigue = fatigue
-    self%quantity = quantity
+    self%signal = signal
     self%kind = kind
     self%from = from
     self%label = name // '_' // trim(statistic_names(kind))
@@ -127,23 +123,19 @@ contains
     is_time_of_extreme = any(kind == [statistic_time_of_max, statistic_time_of_min, statistic_time_of_max_abs])
   end function is_time_of_extreme
 
-  !> Finds the columns of statistics in the trajectory table of a machine. A coupling without damping has no column for the moment
-  !> in the shaft: that is its elastic moment.
-  subroutine find_columns(labels, statistics)
-    type(string_t), intent(in) :: labels(:)   !! of the machine's trajectory table
+  !> Finds the columns of statistics in the trajectory table of a machine.
+  subroutine find_columns(signals, statistics)
+    type(signal_t), intent(in) :: signals(:)   !! of the machine's trajectory table
     type(statistic_t), intent(inout) :: statistics(:)
     integer :: i
 
     do i = 1, size(statistics)
-      associate (statistic => statistics(i))
+      associate (statistic => statistics(i), wanted => statistics(i)%signal)
         if (allocated(statistic%shaft)) cycle
-        if (statistic%column >= 1 .and. statistic%column <= size(labels)) then
-          if (labels(statistic%column)%text == statistic%quantity) cycle
+        if (statistic%column >= 1 .and. statistic%column <= size(signals)) then
+          if (signals(statistic%column)%name == wanted%name) cycle
         end if
-        statistic%column = column_of(labels, statistic%quantity)
-        if (statistic%column == 0 .and. index(statistic%quantity, 'shaft_') == 1) then
-          statistic%column = column_of(labels, 'moment' // statistic%quantity(len('shaft_'):))
-        end if
+        statistic%column = find_signal(signals, wanted%element_kind, wanted%element, wanted%symbol, wanted%point)
       end associate
     end do
   end subroutine find_columns
@@ -152,7 +144,7 @@ contains
   pure logical function is_torque(statistic)
     type(statistic_t), intent(in) :: statistic
 
-    is_torque = index(statistic%quantity, ' [N m]') > 0
+    is_torque = statistic%signal%unit == 'N m'
   end function is_torque
 
   !> The statistic of a column that is 0 at all times.

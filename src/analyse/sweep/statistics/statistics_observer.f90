@@ -13,9 +13,8 @@ module nocdyn_statistics_observer
   use nocdyn_statistics, only: find_columns, is_of_fatigue, is_time_of_extreme, is_torque, statistic_max, statistic_max_abs, &
     statistic_min, statistic_settling_time, statistic_t, statistic_time_of_max, statistic_time_of_min, value_of_zero_column
   use nocdyn_observer, only: observer_t, step_block_t
-  use nocdyn_text, only: string_t
-  use nocdyn_trajectory_columns, only: column_point_moment, column_point_stress, column_t, column_work_in, energy_labels, &
-    list_columns, list_points
+  use nocdyn_signals, only: list_points, list_signals, signal_point_moment, signal_point_stress, signal_source_t, signal_t, &
+    signal_work_in
   implicit none (type, external)
   private
 
@@ -52,7 +51,7 @@ contains
     type(statistic_t), intent(in) :: statistics(:)
     integer :: i
 
-    needs_work_integrals = any([(any(energy_labels(column_work_in:) == statistics(i)%quantity), i=1, size(statistics))])
+    needs_work_integrals = any([(statistics(i)%signal%source%kind >= signal_work_in, i=1, size(statistics))])
   end function needs_work_integrals
 
   !> An observer of a block, which stays where it is. Only the reduced formulation may change the parameters of its lanes.
@@ -62,8 +61,8 @@ contains
     real(wp), intent(in) :: t_start, t_end                 !! of every variant [s]
     logical, intent(in) :: may_bend                        !! whether variants differ in cubic stiffnesses
     type(statistic_t), allocatable :: found(:), parts(:)
-    type(column_t), allocatable :: columns(:)
-    type(string_t), allocatable :: labels(:)
+    type(signal_source_t), allocatable :: columns(:)
+    type(signal_t), allocatable :: signals(:)
     integer :: i
 
     self%block => block
@@ -71,14 +70,15 @@ contains
     self%t_end = t_end
     self%wants_steps = .true.
     self%takes_shifts = .true.
-    call list_columns(block%machine, columns, labels)
+    call list_signals(block%machine, signals)
+    columns = signals%source
     allocate (found, source=statistics)
-    call find_columns(labels, found)
+    call find_columns(signals, found)
     call list_parts(self, found, columns, parts)
     self%missing = ''
     do i = size(found), 1, -1
       if (allocated(found(i)%shaft)) cycle
-      if (found(i)%column == 0 .and. .not. is_torque(found(i))) self%missing = found(i)%quantity
+      if (found(i)%column == 0 .and. .not. is_torque(found(i))) self%missing = found(i)%signal%name
     end do
     allocate (self%default_value, source=value_of_zero_column(statistics))
     allocate (self%kind(size(statistics)))
@@ -97,9 +97,9 @@ contains
   subroutine list_parts(self, statistics, columns, parts)
     type(statistics_observer_t), intent(inout) :: self
     type(statistic_t), intent(in) :: statistics(:)
-    type(column_t), allocatable, intent(inout) :: columns(:)
+    type(signal_source_t), allocatable, intent(inout) :: columns(:)
     type(statistic_t), allocatable, intent(out) :: parts(:)
-    type(column_t), allocatable :: points(:)
+    type(signal_source_t), allocatable :: points(:)
     integer, allocatable :: column(:), kind(:), owner(:)
     integer :: first, i, k
 
@@ -136,8 +136,8 @@ contains
 
   !> Adds the columns of the points of a shaft, unless they are there.
   pure subroutine add_columns(points, columns, first)
-    type(column_t), intent(in) :: points(:)
-    type(column_t), allocatable, intent(inout) :: columns(:)
+    type(signal_source_t), intent(in) :: points(:)
+    type(signal_source_t), allocatable, intent(inout) :: columns(:)
     integer, intent(out) :: first   !! column of the first point
     integer :: c
 
@@ -154,8 +154,8 @@ contains
   subroutine find_points(machine, statistic, columns, points, is_along)
     type(machine_t), intent(in) :: machine
     type(statistic_t), intent(in) :: statistic
-    type(column_t), intent(in) :: columns(:)
-    type(column_t), allocatable, intent(out) :: points(:)   !! columns; none if it is of no shaft
+    type(signal_source_t), intent(in) :: columns(:)
+    type(signal_source_t), allocatable, intent(out) :: points(:)   !! columns; none if it is of no shaft
     logical, intent(out) :: is_along                        !! whether it is such an extreme
     integer :: shaft
     logical :: is_stress
@@ -163,14 +163,14 @@ contains
     is_along = .false.
     is_stress = statistic%is_stress
     if (allocated(statistic%shaft)) then
-      call list_points(machine, statistic%shaft, merge(column_point_stress, column_point_moment, is_stress), points)
+      call list_points(machine, statistic%shaft, merge(signal_point_stress, signal_point_moment, is_stress), points)
       return
     end if
     if (statistic%column > 0 .and. any(extreme_of(statistic%kind) == [statistic_max, statistic_min, statistic_max_abs])) then
       associate (column => columns(statistic%column))
         is_along = is_largest_along(machine, column, shaft, is_stress)
         if (is_along) call list_points(machine, machine%banks(column%bank)%bank%names(column%index)%text, &
-                                       merge(column_point_stress, column_point_moment, is_stress), points)
+                                       merge(signal_point_stress, signal_point_moment, is_stress), points)
       end associate
     end if
     if (.not. is_along) allocate (points(0))
@@ -181,7 +181,7 @@ contains
   subroutine distribute(self, statistics, columns, may_bend)
     type(statistics_observer_t), intent(inout) :: self
     type(statistic_t), intent(in) :: statistics(:)
-    type(column_t), intent(in) :: columns(:)   !! of the trajectory table, and points of shafts
+    type(signal_source_t), intent(in) :: columns(:)   !! of the trajectory table, and points of shafts
     logical, intent(in) :: may_bend            !! as in `new_statistics_observer`
     logical, dimension(size(statistics)) :: is_of_linear, is_of_sampled
     logical :: is_multiple

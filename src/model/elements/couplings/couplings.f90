@@ -7,7 +7,7 @@
 !> Friction in parallel with the spring resists with friction tanh(u' / friction_speed), as a slipping clutch does. Damping and
 !> friction have one work integral.
 module nocdyn_couplings
-  use nocdyn_bank, only: bank_t, harmonic_t, quantity_t, role_coupling
+  use nocdyn_bank, only: bank_t, harmonic_t, role_coupling
   use nocdyn_element_rows, only: element_rows_t, rows_between
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
@@ -17,6 +17,8 @@ module nocdyn_couplings
   use nocdyn_law_tape, only: at_phase, law_tape_t
   use nocdyn_polynomial_laws, only: coefficient_by_speed, coefficient_cubic, coefficient_damping, coefficient_linear, &
     coefficient_rest
+  use nocdyn_quantities, only: form_angle, form_applied, form_elastic, form_total, new_quantity, quantity_t, rank_detail, &
+    rank_force, rank_moment, rank_stress, rank_twist
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -64,11 +66,9 @@ module nocdyn_couplings
     procedure :: twist_speed
     procedure :: friction
     procedure :: quantities
-    procedure :: observe
   end type couplings_t
 
   integer, parameter :: tooth_force = 2   ! of a mesh, after the deformation
-  integer, parameter :: twist = 1, moment = 2, damping_moment = 3, shaft_moment = 4, stress = 5   ! the order of `quantities`
 
 contains
 
@@ -292,49 +292,28 @@ contains
 
     if (self%is_mesh) then
       allocate (columns(2))
-      columns(twist) = quantity_t('deformation', 'm', [(e, e=1, self%count)])
-      columns(tooth_force) = quantity_t('force', 'N', [(e, e=1, self%count)])
+      columns(1) = new_quantity('deformation', 'm', [(e, e=1, self%count)], 'deformation of the teeth', 'if they are pressed', &
+                                rank_twist, form_angle, 1.0_wp)
+      columns(2) = new_quantity('force', 'N', [(e, e=1, self%count)], 'tooth force', &
+                                'if its torque on the first wheel is', rank_force, form_total, 1.0_wp)
       return
     end if
     allocate (columns(merge(5, 4, self%number_of('section_modulus') > 0)))
-    columns(twist) = quantity_t('twist', 'rad', [(e, e=1, self%count)])
-    columns(moment) = quantity_t('moment', 'N m', [(e, e=1, self%count)])
-    columns(damping_moment) = quantity_t('damping', 'N m', self%with_work)
-    columns(shaft_moment) = quantity_t('shaft', 'N m', self%with_work)
-    if (size(columns) < stress) return
+    columns(1) = new_quantity('twist', 'rad', [(e, e=1, self%count)], 'twist', 'if the second body is ahead', rank_twist, &
+                              form_angle, 1.0_wp)
+    columns(2) = new_quantity('moment', 'N m', [(e, e=1, self%count)], 'elastic moment', 'on the first body', rank_moment, &
+                              form_elastic, -1.0_wp)
+    columns(3) = new_quantity('damping', 'N m', self%with_work, 'moment of damping and friction', 'on the first body', &
+                              rank_detail, form_applied, -1.0_wp)
+    columns(4) = new_quantity('total_moment', 'N m', self%with_work, 'elastic and damping moment', 'on the first body', &
+                              rank_moment, form_total, -1.0_wp)
+    if (size(columns) < 5) return
     associate (modulus => self%parameters(self%number_of('section_modulus'))%value)
-      columns(stress) = quantity_t('stress', 'Pa', pack(columns(twist)%elements, any(modulus > 0, dim=1)))
+      columns(5) = new_quantity('stress', 'Pa', pack(columns(1)%elements, any(modulus > 0, dim=1)), &
+                                'shear stress of the elastic and damping moment', 'with this moment', rank_stress, form_total, &
+                                -1.0_wp)
+      columns(5)%divisor = self%number_of('section_modulus')
     end associate
   end function quantities
-
-  !> Twist [rad], and the moments on the first body [N m]: the elastic one, F1 of the paper, that of damping and friction, and
-  !> both together, the moment in the shaft; its shear stress [Pa]. Of a mesh the deformation [m] and the force [N], whose product
-  !> with the radius of a wheel is the torque on it.
-  pure subroutine observe(self, elements, quantity, lane, values)
-    class(couplings_t), intent(in) :: self
-    type(elements_t), intent(in) :: elements
-    integer, intent(in) :: quantity   !! twist, moment, damping_moment, shaft_moment or stress
-    integer, intent(in) :: lane
-    real(wp), intent(out) :: values(:)   !! [elements of the bank]
-
-    if (self%is_mesh .and. quantity == tooth_force) then
-      values = elements%restoring(lane, self%first:self%last()) + elements%applied(lane, self%first:self%last())
-      return
-    end if
-    select case (quantity)
-    case (twist)
-      values = elements%angle(lane, self%first:self%last())
-    case (moment)
-      values = 0.0_wp - elements%restoring(lane, self%first:self%last())   ! not -0 without any moment
-    case (damping_moment)
-      values = 0.0_wp - elements%applied(lane, self%first:self%last())
-    case default
-      values = 0.0_wp - (elements%restoring(lane, self%first:self%last()) + elements%applied(lane, self%first:self%last()))
-      if (quantity /= stress) return
-      associate (modulus => self%parameters(self%number_of('section_modulus'))%value(lane, :))
-        values = values / merge(modulus, 1.0_wp, modulus > 0)
-      end associate
-    end select
-  end subroutine observe
 
 end module nocdyn_couplings

@@ -3,11 +3,11 @@
 !> Each Gauss point of a segment is an element of the bank, a slice: its angle is the twist of the part of the shaft that it
 !> stands for, and its moment that of the shaft there. Between the Gauss points of a segment the moment is a polynomial.
 module nocdyn_shafts
-  use nocdyn_bank, only: quantity_t
   use nocdyn_couplings, only: coupling_common_t, couplings_t
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_polynomial_laws, only: coefficient_linear, coefficient_rest
+  use nocdyn_quantities, only: form_observed, new_quantity, quantity_t, rank_moment, rank_stress, rank_twist
   implicit none (type, external)
   private
 
@@ -91,21 +91,23 @@ contains
   function quantities(self) result(columns)
     class(shafts_t), intent(in) :: self
     type(quantity_t), allocatable :: columns(:)
-    integer :: q
+    character(len=*), parameter :: with = 'with the twist'
 
-    allocate (columns(stress))
-    do q = 1, stress
-      columns(q)%name = 'moment'
-      columns(q)%unit = 'N m'
-      columns(q)%elements = self%shafts%first
-    end do
-    columns(twist)%name = 'twist'
-    columns(twist)%unit = 'rad'
-    columns(moment_1)%suffix = '_1'
-    columns(moment_2)%suffix = '_2'
-    columns(largest_moment)%suffix = '_max'
-    columns(stress)%name = 'stress'
-    columns(stress)%unit = 'Pa'
+    allocate (columns(5))
+    associate (first => self%shafts%first)
+      columns(twist) = new_quantity('twist', 'rad', first, 'twist', 'if the second end is ahead', rank_twist, form_observed, 1.0_wp)
+      columns(moment_1) = new_quantity('total_moment', 'N m', first, 'moment at the first end', with, rank_moment, &
+                                       form_observed, 1.0_wp)
+      columns(moment_2) = new_quantity('total_moment', 'N m', first, 'moment at the second end', with, rank_moment, &
+                                       form_observed, 1.0_wp)
+      columns(largest_moment) = new_quantity('total_moment', 'N m', first, 'largest moment along the shaft', with, &
+                                             rank_moment, form_observed, 1.0_wp)
+      columns(stress) = new_quantity('stress', 'Pa', first, 'largest shear stress along the shaft', with, rank_stress, &
+                                     form_observed, 1.0_wp)
+    end associate
+    columns(moment_1)%point = '1'
+    columns(moment_2)%point = '2'
+    columns(largest_moment)%point = 'max'
   end function quantities
 
   !> Whether a quantity is the largest moment along a shaft.

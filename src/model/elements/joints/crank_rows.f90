@@ -6,11 +6,13 @@
 !> angle asin(p / l). Without one its mass is on its two ends; the part at the piston has one more row with the motion of the
 !> piston. The force of the first row is therefore that of the rod on the pin of the piston, however the rod is given.
 module nocdyn_crank_rows
-  use nocdyn_bank, only: quantity_t, role_crank
+  use nocdyn_bank, only: role_crank
   use nocdyn_element_rows, only: rows_between
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_moving_rows, only: moving_rows_t
+  use nocdyn_quantities, only: form_angle, form_applied, form_observed, form_speed, new_quantity, quantity_t, rank_force, &
+    rank_slip, rank_torque, rank_twist
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -165,10 +167,14 @@ contains
     type(quantity_t), allocatable :: columns(:)
 
     allocate (columns(4))
-    columns(1) = quantity_t('position', 'm', [part_piston])
-    columns(2) = quantity_t('velocity', 'm/s', [part_piston])
-    columns(3) = quantity_t('force', 'N', [part_piston])
-    columns(4) = quantity_t('torque', 'N m', [part_piston])
+    columns(1) = new_quantity('position', 'm', [part_piston], 'position of the piston from the axis of the crank', &
+                              'away from the crank', rank_twist, form_angle, 1.0_wp)
+    columns(2) = new_quantity('velocity', 'm/s', [part_piston], 'velocity of the piston', 'away from the crank', rank_slip, &
+                              form_speed, 1.0_wp)
+    columns(3) = new_quantity('force', 'N', [part_piston], 'force of the rod on the pin of the piston', 'away from the crank', &
+                              rank_force, form_applied, 1.0_wp)
+    columns(4) = new_quantity('torque', 'N m', [part_piston], 'torque of piston and rod on the crank', 'with a positive speed', &
+                              rank_torque, form_observed, 1.0_wp)
   end function columns_of_cranks
 
   pure subroutine observe_cranks(self, elements, quantity, lane, values)
@@ -178,19 +184,9 @@ contains
     integer, intent(in) :: lane
     real(wp), intent(out) :: values(:)   !! [elements of the bank]
 
-    associate (first => self%first, last => self%last())
-      select case (quantity)
-      case (1)
-        values = elements%angle(lane, first:last)
-      case (2)
-        values = elements%speed(lane, first:last)
-      case (3)
-        values = elements%applied(lane, first:last)
-      case default
-        values = 0.0_wp
-        values(part_piston) = sum(elements%applied(lane, last + 1:last + self%count))
-      end select
-    end associate
+    if (quantity /= 4) error stop 'nocdyn_crank_rows: the torque is the quantity without a form'
+    values = 0.0_wp
+    values(part_piston) = sum(elements%applied(lane, self%last() + 1:self%last() + self%count))
   end subroutine observe_cranks
 
   !> All rows have the name of the crank.

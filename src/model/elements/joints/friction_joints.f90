@@ -10,13 +10,14 @@
 !> The mode is a branch of the law that is not chosen by guards: which joints lock follows from all of them together
 !> (`nocdyn_joint_sets`).
 module nocdyn_friction_joints
-  use nocdyn_bank, only: bank_t, quantity_t, role_bearing
+  use nocdyn_bank, only: bank_t, role_bearing
   use nocdyn_curves, only: curve_t
   use nocdyn_element_rows, only: rows_between
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), pick, speed_of, time_of
   use nocdyn_law_tape, only: law_tape_t
+  use nocdyn_quantities, only: form_applied, form_speed, new_quantity, quantity_t, rank_loss, rank_slip, rank_torque
   use nocdyn_tables, only: add_table, curve_value, guard_picked_square, guard_segment, picked_value
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -49,7 +50,6 @@ module nocdyn_friction_joints
     procedure :: set_mode_by_slip
     procedure :: knees
     procedure :: quantities
-    procedure :: observe
   end type friction_joints_t
 
 contains
@@ -251,27 +251,15 @@ contains
 
     if (self%role == role_bearing) then   ! its slip is the speed of the body
       allocate (columns(1))
-      columns(1) = quantity_t('bearing', 'N m', [(e, e=1, self%count)])
+      columns(1) = new_quantity('bearing', 'N m', [(e, e=1, self%count)], 'friction moment of the bearing', 'on the body', &
+                                rank_loss, form_applied, 1.0_wp)
       return
     end if
     allocate (columns(2))
-    columns(1) = quantity_t('torque', 'N m', [(e, e=1, self%count)])
-    columns(2) = quantity_t('slip', 'rad/s', [(e, e=1, self%count)])
+    columns(1) = new_quantity('torque', 'N m', [(e, e=1, self%count)], 'torque', 'on the second body', rank_torque, &
+                              form_applied, 1.0_wp)
+    columns(2) = new_quantity('slip', 'rad/s', [(e, e=1, self%count)], 'slip', 'where the first body is faster', rank_slip, &
+                              form_speed, -1.0_wp)
   end function quantities
-
-  !> The torque on the second body, and the speed of the first body less that of the second.
-  pure subroutine observe(self, elements, quantity, lane, values)
-    class(friction_joints_t), intent(in) :: self
-    type(elements_t), intent(in) :: elements
-    integer, intent(in) :: quantity
-    integer, intent(in) :: lane
-    real(wp), intent(out) :: values(:)   !! [elements of the bank]
-
-    if (quantity == 1) then
-      values = elements%applied(lane, self%first:self%last())
-    else
-      values = 0.0_wp - elements%speed(lane, self%first:self%last())
-    end if
-  end subroutine observe
 
 end module nocdyn_friction_joints

@@ -4,9 +4,10 @@
 !> The moment of a row is a reaction. It acts on the element as M and on the driver as -g'(v) M, so that the joint itself has no
 !> power. `nocdyn_joint_sets` finds it. The drivers are elements of a bank of their own, which follows.
 module nocdyn_moving_rows
-  use nocdyn_bank, only: bank_t, quantity_t
+  use nocdyn_bank, only: bank_t
   use nocdyn_element_rows, only: element_rows_t
   use nocdyn_kinds, only: wp
+  use nocdyn_quantities, only: form_total, new_quantity, quantity_t, rank_torque
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -58,7 +59,9 @@ contains
     integer :: e
 
     allocate (columns(1))
-    columns(1) = quantity_t(merge('force ', 'torque', self%moment_unit == 'N'), self%moment_unit, [(e, e=1, self%count)])
+    columns(1) = new_quantity(trim(merge('force ', 'torque', self%moment_unit == 'N')), self%moment_unit, &
+                              [(e, e=1, self%count)], trim(merge('force ', 'torque', self%moment_unit == 'N')) // &
+                              ' of the row', 'on the moved body', rank_torque, form_total, 1.0_wp)
   end function torques_of_rows
 
 end module nocdyn_moving_rows

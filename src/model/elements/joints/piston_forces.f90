@@ -1,12 +1,13 @@
 !> Forces on pistons along their lines, by the angles of their cranks: a mean and harmonics. Each is a bank of its own, and its
 !> phase, the crank, another.
 module nocdyn_piston_forces
-  use nocdyn_bank, only: bank_t, quantity_t, role_crank
+  use nocdyn_bank, only: bank_t, role_crank
   use nocdyn_element_rows, only: rows_between
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), operator(+), phase_of
   use nocdyn_law_functions, only: harmonics
   use nocdyn_law_tape, only: at_phase, law_tape_t
+  use nocdyn_quantities, only: form_total, new_quantity, quantity_t, rank_force
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -91,7 +92,8 @@ contains
     integer :: e
 
     allocate (columns(1))
-    columns(1) = quantity_t('gas_force', 'N', [(e, e=1, self%count)])
+    columns(1) = new_quantity('gas_force', 'N', [(e, e=1, self%count)], 'force of the gas on the piston', 'away from the crank', &
+                              rank_force, form_total, 1.0_wp)
   end function quantities
 
   !> Its name is that of the crank.

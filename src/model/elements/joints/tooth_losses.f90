@@ -9,13 +9,14 @@
 !>
 !> M depends on all torques of the machine by way of T: it is found with those of the joints that hold (`nocdyn_tooth_loads`).
 module nocdyn_tooth_losses
-  use nocdyn_bank, only: quantity_t, role_loss
+  use nocdyn_bank, only: role_loss
   use nocdyn_curves, only: curve_t
   use nocdyn_elements, only: elements_t
   use nocdyn_friction_joints, only: friction_joints_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: literal, node_of
   use nocdyn_law_tape, only: law_tape_t
+  use nocdyn_quantities, only: form_applied, new_quantity, quantity_t, rank_loss
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -42,7 +43,6 @@ module nocdyn_tooth_losses
     procedure :: is_self_locking
     procedure :: knees
     procedure :: quantities
-    procedure :: observe
   end type tooth_losses_t
 
 contains
@@ -152,18 +152,8 @@ contains
     integer :: e
 
     allocate (columns(1))
-    columns(1) = quantity_t('loss', 'N m', [(e, e=1, self%count)])
+    columns(1) = new_quantity('loss', 'N m', [(e, e=1, self%count)], 'friction moment of the teeth', 'on the first wheel', &
+                              rank_loss, form_applied, 1.0_wp)
   end function quantities
-
-  pure subroutine observe(self, elements, quantity, lane, values)
-    class(tooth_losses_t), intent(in) :: self
-    type(elements_t), intent(in) :: elements
-    integer, intent(in) :: quantity
-    integer, intent(in) :: lane
-    real(wp), intent(out) :: values(:)   !! [elements of the bank]
-
-    values = elements%applied(lane, self%first:self%last())
-    if (quantity /= 1) error stop 'nocdyn_tooth_losses: there is one quantity'
-  end subroutine observe
 
 end module nocdyn_tooth_losses

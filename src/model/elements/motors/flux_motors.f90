@@ -11,12 +11,13 @@
 !> V may follow the time. While the motor is disconnected, no current flows in its stator, whose flux is (L_m / L_r) lambda_r, as
 !> the rotor alone makes it: lambda_s follows that by its rate, and what differs at the opening decays with `arc_time`.
 module nocdyn_flux_motors
-  use nocdyn_bank, only: bank_t, quantity_t, role_motor
+  use nocdyn_bank, only: bank_t, role_motor
   use nocdyn_elements, only: elements_t
   use nocdyn_induction_circuits, only: induction_circuit_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, node_of, operator(*), operator(+), operator(-), operator(/), speed_of, state_of
   use nocdyn_law_tape, only: law_tape_t
+  use nocdyn_quantities, only: form_applied, form_observed, new_quantity, quantity_t, rank_detail, rank_torque
   use nocdyn_schedules, only: add_schedule, guard_schedule, schedule_t, scheduled_flag, scheduled_value, value_at
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -247,8 +248,9 @@ contains
     integer :: e
 
     allocate (columns(2))
-    columns(1) = quantity_t('torque', 'N m', [(e, e=1, self%count)])
-    columns(2) = quantity_t('current', 'A', columns(1)%elements)
+    columns(1) = new_quantity('torque', 'N m', [(e, e=1, self%count)], 'torque on the body', 'with a positive speed', &
+                              rank_torque, form_applied, 1.0_wp)
+    columns(2) = new_quantity('current', 'A', columns(1)%elements, 'current of a line, rms', '', rank_detail, form_observed, 1.0_wp)
   end function quantities
 
   pure subroutine observe(self, elements, quantity, lane, values)
@@ -261,8 +263,7 @@ contains
     type(induction_circuit_t) :: circuit
     integer :: e
 
-    values = elements%applied(lane, self%first:self%last())
-    if (quantity == 1) return
+    if (quantity /= 2) error stop 'nocdyn_flux_motors: the current is the quantity without a form'
     do e = 1, size(values)
       z = elements%internal%value(lane, self%first_internal + 4 * (e - 1):self%first_internal + 4 * e - 1)
       circuit = self%circuit(lane, e)

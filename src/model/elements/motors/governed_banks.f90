@@ -5,7 +5,7 @@
 !> Stopping the integration there (clamping) would make the state slide along the limit when the governor leaves it.
 !> (K. J. Astrom, T. Hagglund, PID Controllers, 2nd ed. 1995, section 3.5: anti-windup by tracking, with the integral time.)
 module nocdyn_governed_banks
-  use nocdyn_bank, only: bank_t, quantity_t
+  use nocdyn_bank, only: bank_t
   use nocdyn_described_elements, only: boundary_width
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
@@ -13,6 +13,7 @@ module nocdyn_governed_banks
     pick, speed_of, state_of
   use nocdyn_law_functions, only: add_guard
   use nocdyn_law_tape, only: law_tape_t
+  use nocdyn_quantities, only: form_applied, form_observed, new_quantity, quantity_t, rank_detail, rank_torque
   use nocdyn_schedules, only: add_schedule, guard_schedule, schedule_t, scheduled_value, value_at
   implicit none (type, external)
   private
@@ -197,9 +198,12 @@ contains
     integer :: e
 
     allocate (columns(1 + self%states))
-    columns(1) = quantity_t('torque', 'N m', [(e, e=1, self%count)])
-    if (self%states > 0) columns(2) = quantity_t('current', 'A', columns(1)%elements)
-    if (self%has_governor) columns(1 + self%states) = quantity_t('throttle', '1', columns(1)%elements)
+    columns(1) = new_quantity('torque', 'N m', [(e, e=1, self%count)], 'torque on the body', 'with a positive speed', &
+                              rank_torque, form_applied, 1.0_wp)
+    if (self%states > 0) columns(2) = new_quantity('current', 'A', columns(1)%elements, 'current of the armature', &
+                                                    '', rank_detail, form_observed, 1.0_wp)
+    if (self%has_governor) columns(1 + self%states) = new_quantity('throttle', '1', columns(1)%elements, 'throttle, 1 if open', &
+                                                                   '', rank_detail, form_observed, 1.0_wp)
   end function quantities
 
   pure subroutine observe(self, elements, quantity, lane, values)
@@ -210,10 +214,9 @@ contains
     real(wp), intent(out) :: values(:)   !! [elements of the bank]
     integer :: e, s
 
-    values = elements%applied(lane, self%first:self%last())
     do e = 1, size(values)
       s = self%first_internal + self%states * e - 1   ! the last state
-      if (quantity == 2) values(e) = elements%internal%value(lane, s + 1 - self%states)
+      values(e) = elements%internal%value(lane, s + 1 - self%states)
       if (quantity == 1 + self%states .and. self%has_governor) then   ! y = z + time z'
         values(e) = elements%internal%value(lane, s) &
                     + self%parameters(self%number_of('governor_time'))%value(lane, e) * elements%internal%rate(lane, s)

@@ -1,29 +1,30 @@
-!> The values of columns of the trajectory table, for all lanes of a block.
-module nocdyn_recorded_columns
+!> The values of signals over the time, for all lanes of a block.
+module nocdyn_signal_values
   use nocdyn_bank, only: role_coupling
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_machine, only: machine_t
+  use nocdyn_quantities, only: form_angle, form_applied, form_elastic, form_speed, form_total
   use nocdyn_reduced, only: reduced_t
   use nocdyn_shafts, only: shafts_t
-  use nocdyn_trajectory_columns, only: column_angle, column_elastic, column_element, column_kinetic, column_member, &
-    column_point_moment, column_point_stress, column_reaction, column_residual, column_speed, column_t, column_time, &
-    column_work_in, column_work_out
+  use nocdyn_signals, only: signal_angle, signal_elastic, signal_element, signal_kinetic, signal_member, &
+    signal_point_moment, signal_point_stress, signal_reaction, signal_residual, signal_speed, signal_source_t, signal_time, &
+    signal_work_in, signal_work_out
   implicit none (type, external)
   private
 
-  public :: new_recorded_columns, may_bend
+  public :: new_signal_values, may_bend
 
-  !> Columns one after the other whose indices are consecutive.
-  type, extends(column_t) :: segment_t
-    integer :: first = 1, last = 1     !! columns; `index` is that of the first
+  !> Signals one after the other whose indices are consecutive.
+  type, extends(signal_source_t) :: segment_t
+    integer :: first = 1, last = 1     !! signals; `index` is that of the first
     logical :: has_new_values = .true. !! whether the segment before is of another bank or quantity
   end type segment_t
 
   !> Evaluates a copy of the formulation, because `observe` chooses branches: those of the integration must not change. After
   !> `copy_lane` it must not be moved in memory.
-  type, public :: recorded_columns_t
+  type, public :: signal_values_t
     class(formulation_t), allocatable :: formulation
     type(segment_t), allocatable, private :: segments(:)
     type(lane_parameters_t), private :: parameters       !! of `formulation`; empty before `copy_lane`
@@ -34,30 +35,30 @@ module nocdyn_recorded_columns
     real(wp), allocatable, private :: lambda(:)          !! multipliers of the constraint rows; work space
     integer, allocatable, private :: works_in(:)         !! indices of the works that count as put in, in the quadratures
     integer, allocatable, private :: works_out(:)        !! those of the others
-    real(wp), private :: energies(column_kinetic:column_residual) = 0.0_wp   !! of one row [J]; work space
+    real(wp), private :: energies(signal_kinetic:signal_residual) = 0.0_wp   !! of one row [J]; work space
     real(wp), allocatable, private :: start_energy(:)    !! [J], [lanes]
   contains
     procedure :: copy_lane, start_lane, move_origin, observe, fill_row, kinetic_energy, find_pace
-  end type recorded_columns_t
+  end type signal_values_t
 
 contains
 
   !> An evaluator of some columns.
-  type(recorded_columns_t) function new_recorded_columns(formulation, columns) result(self)
+  type(signal_values_t) function new_signal_values(formulation, columns) result(self)
     class(formulation_t), intent(in) :: formulation   !! with work integrals if a column needs them
-    type(column_t), intent(in) :: columns(:)
+    type(signal_source_t), intent(in) :: columns(:)
     logical, allocatable :: is_source(:)   ! [quadratures]
     integer :: i
 
-    if (any(columns%kind >= column_work_in) .and. .not. formulation%has_energy_balance) then
-      error stop 'nocdyn_recorded_columns: work columns need a formulation with an energy balance'
+    if (any(columns%kind >= signal_work_in) .and. .not. formulation%has_energy_balance) then
+      error stop 'nocdyn_signal_values: work columns need a formulation with an energy balance'
     end if
     allocate (self%formulation, source=formulation)
     allocate (self%segments, source=segments_of(columns))
-    self%have_reactions = any(columns%kind == column_reaction .or. columns%kind == column_member)
-    self%have_energies = any(columns%kind >= column_kinetic)
-    self%have_elastic = any(columns%kind == column_elastic .or. columns%kind == column_residual)
-    self%have_works = any(columns%kind >= column_work_in)
+    self%have_reactions = any(columns%kind == signal_reaction .or. columns%kind == signal_member)
+    self%have_energies = any(columns%kind >= signal_kinetic)
+    self%have_elastic = any(columns%kind == signal_elastic .or. columns%kind == signal_residual)
+    self%have_works = any(columns%kind >= signal_work_in)
     associate (banks => formulation%machine%banks)
       allocate (self%values(maxval([(banks(i)%bank%count, i=1, size(banks))])), source=0.0_wp)
       allocate (is_source, source=[(spread(banks(i)%bank%is_source(), 1, size(banks(i)%bank%with_work)), i=1, size(banks))])
@@ -66,11 +67,11 @@ contains
     allocate (self%works_out, source=pack([(i, i=1, size(is_source))], .not. is_source))
     allocate (self%lambda(formulation%machine%constraints%rows()), source=0.0_wp)
     allocate (self%start_energy(formulation%lanes), source=0.0_wp)
-  end function new_recorded_columns
+  end function new_signal_values
 
   !> The columns as few segments.
   pure function segments_of(columns) result(segments)
-    type(column_t), intent(in) :: columns(:)
+    type(signal_source_t), intent(in) :: columns(:)
     type(segment_t), allocatable :: segments(:)
     type(segment_t) :: all(0:size(columns))
     logical :: is_of_same
@@ -86,7 +87,10 @@ contains
         cycle
       end if
       n = n + 1
-      all(n) = segment_t(columns(i)%kind, columns(i)%bank, columns(i)%quantity, columns(i)%index, i, i, .not. is_of_same)
+      all(n)%signal_source_t = columns(i)
+      all(n)%first = i
+      all(n)%last = i
+      all(n)%has_new_values = .not. is_of_same
     end do
     segments = all(1:n)
   end function segments_of
@@ -95,10 +99,10 @@ contains
   !> proportion to twists and their rates.
   logical function may_bend(machine, column)
     type(machine_t), intent(in) :: machine
-    type(column_t), intent(in) :: column
+    type(signal_source_t), intent(in) :: column
 
-    may_bend = any(column%kind == [column_element, column_reaction, column_member, column_point_moment, column_point_stress])
-    if (column%kind /= column_element) return
+    may_bend = any(column%kind == [signal_element, signal_reaction, signal_member, signal_point_moment, signal_point_stress])
+    if (column%kind /= signal_element) return
     associate (bank => machine%banks(column%bank)%bank)
       if (bank%role == role_coupling .and. bank%has_paper_law .and. bank%has_polynomial_potential) then
         may_bend = any(abs(machine%laws%cubic(:, bank%first:bank%last())) > 0)
@@ -108,7 +112,7 @@ contains
 
   !> How fast the columns of a lane oscillate where they were observed last, and the size of its moments.
   subroutine find_pace(self, lane, fastest, scale)
-    class(recorded_columns_t), intent(in) :: self
+    class(signal_values_t), intent(in) :: self
     integer, intent(in) :: lane
     real(wp), intent(out) :: fastest   !! [rad/s]
     real(wp), intent(out) :: scale     !! [N m]
@@ -122,7 +126,7 @@ contains
 
   !> Copies the parameters of a lane from the formulation that is integrated.
   subroutine copy_lane(self, lane, parameters)
-    class(recorded_columns_t), target, intent(inout) :: self
+    class(signal_values_t), target, intent(inout) :: self
     integer, intent(in) :: lane
     type(lane_parameters_t), intent(in) :: parameters   !! of that formulation
 
@@ -136,7 +140,7 @@ contains
 
   !> Stores the energy of a lane at its start, after `observe` there.
   subroutine start_lane(self, lane)
-    class(recorded_columns_t), intent(inout) :: self
+    class(signal_values_t), intent(inout) :: self
     integer, intent(in) :: lane
 
     if (self%have_elastic) self%start_energy(lane) = self%kinetic_energy(lane) + &
@@ -145,7 +149,7 @@ contains
 
   !> Takes a shift of the state of a lane.
   subroutine move_origin(self, lane, shift)
-    class(recorded_columns_t), intent(inout) :: self
+    class(signal_values_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: shift(:)   !! [states + quadratures]
 
@@ -154,7 +158,7 @@ contains
 
   !> Evaluates the machine of all lanes at a time and state.
   subroutine observe(self, t, y)
-    class(recorded_columns_t), intent(inout) :: self
+    class(signal_values_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
     real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states + quadratures]
 
@@ -164,7 +168,7 @@ contains
 
   !> The values of a lane's columns, after `observe` at (t, y).
   subroutine fill_row(self, lane, t, y, row)
-    class(recorded_columns_t), intent(inout) :: self
+    class(signal_values_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
     real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states + quadratures]
@@ -178,32 +182,32 @@ contains
         associate (segment => self%segments(k), first => self%segments(k)%first, last => self%segments(k)%last, &
                    i => self%segments(k)%index, j => self%segments(k)%index + self%segments(k)%last - self%segments(k)%first)
           select case (segment%kind)
-          case (column_time)
+          case (signal_time)
             row(first) = t(lane)
-          case (column_angle)
+          case (signal_angle)
             row(first:last) = self%formulation%phi(lane, i:j)
-          case (column_speed)
+          case (signal_speed)
             row(first:last) = self%formulation%omega(lane, i:j)
-          case (column_element)
+          case (signal_element)
             if (segment%has_new_values) call observe_bank(machine, segment, lane, self%values)
             row(first:last) = self%values(i:j)
-          case (column_reaction)
+          case (signal_reaction)
             row(first:last) = self%lambda(i:j)
-          case (column_member)
+          case (signal_member)
             row(first:last) = members%factor(lane, i:j) * self%lambda(members%row(i:j))
-          case (column_point_moment, column_point_stress)
+          case (signal_point_moment, signal_point_stress)
             call fill_points(machine, segment, lane, row(first:last))
-          case (column_kinetic:column_residual)
+          case (signal_kinetic:signal_residual)
             row(first) = self%energies(segment%kind)
           case default
-            error stop 'nocdyn_recorded_columns: there is no such column'
+            error stop 'nocdyn_signal_values: there is no such column'
           end select
         end associate
       end do
     end associate
   end subroutine fill_row
 
-  !> The values of one quantity of a bank.
+  !> The values of one quantity of a bank. A sum with 0 makes no -0.
   subroutine observe_bank(machine, segment, lane, values)
     type(machine_t), intent(in) :: machine
     type(segment_t), intent(in) :: segment
@@ -211,7 +215,27 @@ contains
     real(wp), contiguous, intent(inout) :: values(:)   !! [elements of the bank at least]
 
     associate (bank => machine%banks(segment%bank)%bank)
-      call bank%observe(machine%elements, segment%quantity, lane, values(:bank%count))
+      associate (elements => machine%elements, first => bank%first, last => bank%last(), factor => segment%factor, &
+                 n => bank%count)
+        select case (segment%form)
+        case (form_angle)
+          values(:n) = 0.0_wp + factor * elements%angle(lane, first:last)
+        case (form_speed)
+          values(:n) = 0.0_wp + factor * elements%speed(lane, first:last)
+        case (form_elastic)
+          values(:n) = 0.0_wp + factor * elements%restoring(lane, first:last)
+        case (form_applied)
+          values(:n) = 0.0_wp + factor * elements%applied(lane, first:last)
+        case (form_total)
+          values(:n) = 0.0_wp + factor * (elements%restoring(lane, first:last) + elements%applied(lane, first:last))
+        case default
+          call bank%observe(elements, segment%quantity, lane, values(:n))
+        end select
+        if (segment%divisor == 0) return
+        associate (divisor => bank%parameters(segment%divisor)%value(lane, :))
+          values(:n) = values(:n) / merge(divisor, 1.0_wp, divisor > 0)
+        end associate
+      end associate
     end associate
   end subroutine observe_bank
 
@@ -229,36 +253,36 @@ contains
       do p = 1, size(values)
         values(p) = bank%moment_at(machine%elements, segment%quantity, segment%index + p - 1, lane)
       end do
-      if (segment%kind == column_point_stress) then
+      if (segment%kind == signal_point_stress) then
         moduli = bank%section_moduli(segment%quantity, lane)
         values(:) = values / moduli(segment%index:segment%index + size(values) - 1)
       end if
     class default
-      error stop 'nocdyn_recorded_columns: the points are of a shaft'
+      error stop 'nocdyn_signal_values: the points are of a shaft'
     end select
   end subroutine fill_points
 
   !> Energies and works of one lane, one number for each kind of column.
   subroutine find_energies(self, lane, y)
-    type(recorded_columns_t), intent(inout) :: self
+    type(signal_values_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states + quadratures]
 
     associate (energies => self%energies)
-      energies(column_kinetic) = self%kinetic_energy(lane)
-      if (self%have_elastic) energies(column_elastic) = sum(self%formulation%machine%elements%stored(lane, :))
+      energies(signal_kinetic) = self%kinetic_energy(lane)
+      if (self%have_elastic) energies(signal_elastic) = sum(self%formulation%machine%elements%stored(lane, :))
       if (.not. self%have_works) return
-      energies(column_work_in) = work(self%works_in, self%formulation%states, lane, y)
-      energies(column_work_out) = work(self%works_out, self%formulation%states, lane, y)
-      energies(column_residual) = (energies(column_kinetic) + energies(column_elastic) - self%start_energy(lane)) &
-                                  - (energies(column_work_in) + energies(column_work_out))
-      energies(column_work_out) = 0.0_wp - energies(column_work_out)   ! not -0 without any work
+      energies(signal_work_in) = work(self%works_in, self%formulation%states, lane, y)
+      energies(signal_work_out) = work(self%works_out, self%formulation%states, lane, y)
+      energies(signal_residual) = (energies(signal_kinetic) + energies(signal_elastic) - self%start_energy(lane)) &
+                                  - (energies(signal_work_in) + energies(signal_work_out))
+      energies(signal_work_out) = 0.0_wp - energies(signal_work_out)   ! not -0 without any work
     end associate
   end subroutine find_energies
 
   !> The kinetic energy of a lane after `observe` [J].
   pure real(wp) function kinetic_energy(self, lane)
-    class(recorded_columns_t), intent(in) :: self
+    class(signal_values_t), intent(in) :: self
     integer, intent(in) :: lane
 
     kinetic_energy = self%formulation%machine%kinetic_energy(lane, self%formulation%omega(lane, 1:))
@@ -278,4 +302,4 @@ contains
     end do
   end function work
 
-end module nocdyn_recorded_columns
+end module nocdyn_signal_values
