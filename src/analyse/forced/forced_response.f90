@@ -261,7 +261,7 @@ contains
     type(response_point_t), intent(inout) :: point
     type(work_t), intent(in) :: work
     complex(wp) :: amplitude(size(self%lines))
-    real(wp) :: highest, lowest
+    real(wp) :: highest, lowest, mean
     integer :: l, p
 
     associate (one => self%quantities(q))
@@ -269,6 +269,13 @@ contains
         do l = 1, size(amplitude)
           amplitude(l) = one%total(p, work%moment(:, l))
         end do
+        mean = sum(one%weight(p, :) * point%state%mean(one%elements)) + one%by_held_torque * point%state%torque
+        if (one%source%body > 0) then   ! a power, to the first order
+          associate (speed => point%state%omega(one%source%body), angle => point%angle(:, one%source%body))
+            amplitude = speed * amplitude + mean * (0.0_wp, 1.0_wp) * point%frequency * angle
+            mean = mean * speed
+          end associate
+        end if
         call self%synthesis%extremes(amplitude, lowest, highest)
         if (p > 1) then
           if (highest - lowest <= point%highest(q) - point%lowest(q)) cycle
@@ -276,7 +283,7 @@ contains
         point%quantity(:, q) = amplitude
         point%lowest(q) = lowest
         point%highest(q) = highest
-        point%mean(q) = sum(one%weight(p, :) * point%state%mean(one%elements)) + one%by_held_torque * point%state%torque
+        point%mean(q) = mean
       end do
     end associate
   end subroutine find_quantity

@@ -13,10 +13,12 @@ module nocdyn_run_limits
 
   public :: check_run_limits, note_other_limits, put_run_limits, run_limits_text
 
+  character(len=*), parameter :: peak_keys(*) = [character(len=7) :: 'moment', 'force', 'largest']   ! of the largest magnitude
+
   !> A limit and the largest magnitude of its column.
   type, public :: run_limit_t
     character(len=:), allocatable :: name, column   !! of the coupling or shaft; of the results
-    real(wp) :: limit = 0.0_wp, largest = 0.0_wp   !! [N m], or [N] of a mesh
+    real(wp) :: limit = 0.0_wp, largest = 0.0_wp   !! in the unit of the column
   end type run_limit_t
 
 contains
@@ -28,8 +30,9 @@ contains
     type(string_t), intent(in) :: labels(:)               !! theirs
     real(wp), intent(in) :: lowest(:), highest(:)         !! [columns]
     type(run_limit_t), allocatable, intent(out) :: limits(:)
+    character(len=:), allocatable :: kind
     integer, allocatable :: groups(:)
-    integer :: column, i, n
+    integer :: column, i, k, n
 
     allocate (groups, source=input%groups_named('limit'))
     allocate (limits(count([(has_peak(input%groups(groups(i))), i=1, size(groups))])))
@@ -39,16 +42,19 @@ contains
         if (.not. has_peak(group)) cycle
         n = n + 1
         limits(n)%name = group%text(trim(limited_kind(group)))
-        select case (limited_kind(group))
+        kind = trim(limited_kind(group))
+        select case (kind)
         case ('mesh')
-          column = find_signal(signals, 'mesh', limits(n)%name, 'force')
+          column = find_signal(signals, kind, limits(n)%name, 'force')
         case ('shaft')
-          column = find_signal(signals, 'shaft', limits(n)%name, 'total_moment', 'max')
+          column = find_signal(signals, kind, limits(n)%name, 'total_moment', 'max')
         case default
-          column = find_signal(signals, 'coupling', limits(n)%name, 'total_moment')
+          column = find_signal(signals, kind, limits(n)%name, 'total_moment')
         end select
-        limits(n)%limit = group%number('moment', absent=0.0_wp)
-        if (group%has_value('mesh')) limits(n)%limit = group%number('force')
+        if (group%has_value('quantity')) column = find_signal(signals, kind, limits(n)%name, group%text('quantity'))
+        do k = 1, size(peak_keys)
+          if (group%has_value(trim(peak_keys(k)))) limits(n)%limit = group%number(trim(peak_keys(k)))
+        end do
         limits(n)%column = ''
         if (column == 0) cycle
         limits(n)%column = labels(column)%text
@@ -61,8 +67,8 @@ contains
   subroutine note_other_limits(input, notes)
     type(input_t), intent(in) :: input
     type(string_t), allocatable, intent(inout) :: notes(:)
-    character(len=*), parameter :: keys(*) = [character(len=16) :: 'vibratory_moment', 'vibratory_force', 'stress', &
-                                                                   'stress_transient', 'rule']
+    character(len=*), parameter :: keys(*) = [character(len=16) :: 'vibratory_moment', 'vibratory_force', 'vibratory', &
+                                                                   'stress', 'stress_transient', 'rule']
     character(len=:), allocatable :: ignored
     integer, allocatable :: groups(:)
     integer :: i, k
@@ -84,8 +90,9 @@ contains
   !> Whether a group limits a peak.
   pure logical function has_peak(group)
     type(group_t), intent(in) :: group
+    integer :: k
 
-    has_peak = group%has_value('moment') .or. group%has_value('force')
+    has_peak = any([(group%has_value(trim(peak_keys(k))), k=1, size(peak_keys))])
   end function has_peak
 
   !> Writes whether a limit is exceeded, and all ratios; nothing without limits.

@@ -11,6 +11,7 @@ module nocdyn_response_limits
   use nocdyn_kinds, only: wp
   use nocdyn_limit_groups, only: check_limit, limited_kind
   use nocdyn_moment_forms, only: kind_along, kind_moment, kind_stress, moment_form_t
+  use nocdyn_signals, only: find_signal
   use nocdyn_text, only: quoted
   implicit none (type, external)
   private
@@ -53,9 +54,10 @@ contains
       kind = limited_kind(input%groups(groups(i)))
       call check_limit(input, groups(i), error)
       if (.not. allocated(error)) call add_moment_limits(input%groups(groups(i)), groups(i), trim(kind), quantities, limits)
+      if (.not. allocated(error)) call add_quantity_limit(input%groups(groups(i)), groups(i), trim(kind), quantities, limits)
       if (.not. allocated(error)) call add_stress_limits(input, groups(i), trim(kind), quantities, limits, error)
       if (allocated(error)) return
-      if (size(limits) > before) cycle
+      if (size(limits) > before .or. input%groups(groups(i))%has_value('quantity')) cycle
       if (kind == 'mesh') then
         call raise(error, exit_input, input%location(groups(i)) // ': nothing is limited; needed: vibratory_force or force')
       else
@@ -92,6 +94,23 @@ contains
       limits = [limits, limit]
     end do
   end subroutine add_moment_limits
+
+  !> A limit of any other quantity, if it is linear in the motion.
+  subroutine add_quantity_limit(group, index, kind, quantities, limits)
+    type(group_t), intent(in) :: group
+    integer, intent(in) :: index   !! of the group
+    character(len=*), intent(in) :: kind
+    type(moment_form_t), intent(in) :: quantities(:)
+    type(response_limit_t), allocatable, intent(inout) :: limits(:)
+    type(response_limit_t) :: limit
+
+    if (.not. group%has_value('quantity')) return
+    limit%group = index
+    limit%quantity = find_signal(quantities%signal_t, kind, group%text(kind), group%text('quantity'))
+    limit%vibratory = group%number('vibratory', absent=no_limit)
+    limit%peak = group%number('largest', absent=no_limit)
+    if (limit%quantity > 0) limits = [limits, limit]
+  end subroutine add_quantity_limit
 
   !> Limits of its stress.
   subroutine add_stress_limits(input, index, kind, quantities, limits, error)

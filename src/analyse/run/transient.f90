@@ -11,7 +11,7 @@ module nocdyn_transient
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_joint_events, only: describe_shared_joints, list_joint_events
   use nocdyn_kinds, only: wp
-  use nocdyn_label_checks, only: refuse_equal_labels
+  use nocdyn_signal_checks, only: check_signals
   use nocdyn_machine, only: machine_t
   use nocdyn_missed_states, only: note_missed_state
   use nocdyn_output_times, only: check_output_times, output_note, output_times, row_count
@@ -160,7 +160,7 @@ contains
 
     call assemble_machine(input, machine, error)
     if (.not. allocated(error)) call check_size(input, machine, error)
-    if (.not. allocated(error)) call refuse_equal_labels(input, machine, error)
+    if (.not. allocated(error)) call check_signals(input, machine, error)
     if (allocated(error)) return
     call new_asked_formulation(input, machine, formulation)
     call choose_settings(input, formulation, settings, notes, error)

@@ -10,7 +10,7 @@ module nocdyn_input_files
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_joint_simplifications, only: refuse_joints
-  use nocdyn_label_checks, only: refuse_equal_labels
+  use nocdyn_signal_checks, only: check_signals
   use nocdyn_load_case_checks, only: check_input, name_load_case
   use nocdyn_machine, only: machine_t
   use nocdyn_result_folders, only: out_folder, refuse_shared_folders, result_folder
@@ -69,7 +69,7 @@ contains
     do i = 1, size(readings)
       associate (reading => readings(i))
         if (.not. allocated(reading%error)) call assemble_for(arguments%command, reading%input, machine, reading%error)
-        if (.not. allocated(reading%error)) call refuse_equal_labels(reading%input, machine, reading%error)
+        if (.not. allocated(reading%error)) call check_signals(reading%input, machine, reading%error)
         if (.not. allocated(reading%error)) call analyse(arguments, reading%input, machine, folders(i)%text, reading%error)
         if (.not. allocated(reading%error)) call check_load_cases(arguments%command, reading)
         if (allocated(reading%error)) call report_error(reading%error, code)

@@ -267,15 +267,15 @@ contains
   end function knees
 
   !> What the elements put out, by default the torque of each on its body.
-  function quantities(self) result(list)
+  subroutine quantities(self, columns)
     class(bank_t), intent(in) :: self
-    type(quantity_t), allocatable :: list(:)
+    type(quantity_t), allocatable, intent(out) :: columns(:)
     integer :: e
 
-    allocate (list(1))
-    list(1) = new_quantity('torque', 'N m', [(e, e=1, self%count)], 'torque on the body', 'with a positive speed', rank_torque, &
+    allocate (columns(1))
+    columns(1) = new_quantity('torque', 'N m', [(e, e=1, self%count)], 'torque on the body', 'with a positive speed', rank_torque, &
                            form_total, 1.0_wp)
-  end function quantities
+  end subroutine quantities
 
   !> Values of a quantity without a form, of all elements of the bank, after `evaluate`. Banks that have one override this.
   pure subroutine observe(self, elements, quantity, lane, values)

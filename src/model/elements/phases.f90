@@ -41,12 +41,12 @@ contains
   end subroutine connect_phases
 
   !> There are none, as the columns are those of the bank before.
-  function quantities(self) result(columns)
+  subroutine quantities(self, columns)
     class(phases_t), intent(in) :: self
-    type(quantity_t), allocatable :: columns(:)
+    type(quantity_t), allocatable, intent(out) :: columns(:)
 
     allocate (columns(0))
-  end function quantities
+  end subroutine quantities
 
   !> None has a name of its own.
   pure integer function named_count(self)

@@ -30,6 +30,7 @@ module nocdyn_quantities
     integer :: form = form_observed        !! form_...
     real(wp) :: factor = 1.0_wp            !! 1 or -1
     integer :: divisor = 0                 !! parameter of the bank that divides the value, 0: none
+    integer, allocatable :: body(:)        !! whose speed multiplies the value, a power; [elements]; not allocated: none
   end type quantity_t
 
 contains

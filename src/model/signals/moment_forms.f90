@@ -18,8 +18,9 @@ module nocdyn_moment_forms
   integer, parameter, public :: kind_stress = 2     !! shear stress that this moment causes
   integer, parameter, public :: kind_reaction = 3   !! of a constraint row
   integer, parameter, public :: kind_along = 4      !! the largest moment along a shaft, of all its sections
+  integer, parameter, public :: kind_power = 5      !! such a moment times the speed of a body
 
-  !> A signal with its linear form.
+  !> A signal with its linear form. A power is the form times the speed of `source%body`.
   type, extends(signal_t), public :: moment_form_t
     integer :: kind = kind_moment
     integer, allocatable :: elements(:)      !! of the machine, [terms]
@@ -68,7 +69,7 @@ contains
     if (signal%source%kind /= signal_element) return
     associate (bank => machine%banks(signal%source%bank)%bank, source => signal%source)
       if (bank%role /= role_coupling) return
-      has_form = source%form == form_total .or. signal%symbol == 'total_moment' .or. signal%symbol == 'stress'
+      has_form = source%form == form_total .or. source%body > 0 .or. any(signal%symbol == ['total_moment', 'stress      '])
       if (source%form == form_elastic) has_form = all(bank%with_work /= source%index)
     end associate
   end function has_form
@@ -90,6 +91,7 @@ contains
     form%kind = kind_moment
     if (form%symbol == 'stress') form%kind = kind_stress
     if (form%point == 'max') form%kind = kind_along
+    if (form%source%body > 0) form%kind = kind_power
     associate (source => form%source)
       select type (bank => machine%banks(source%bank)%bank)
       type is (shafts_t)
@@ -99,6 +101,7 @@ contains
         if (form%kind == kind_stress) moments = moments / spread(bank%section_moduli(shaft, 1), 2, size(form%elements))
         if (form%point == '1') moments = moments(:1, :)
         if (form%point == '2') moments = moments(size(moments, 1):, :)
+        if (form%kind == kind_power) moments = -moments([merge(1, size(moments, 1), bank%shafts(shaft)%ends(1) > 0)], :)
         form%weight = -moments
       class default
         form%elements = [number_of(machine, form%signal_t)]

@@ -80,7 +80,7 @@ contains
     n = 0
     all(0)%kind = 0   ! of no column
     do i = 1, size(columns)
-      is_of_same = columns(i)%kind == all(n)%kind .and. columns(i)%bank == all(n)%bank .and. &
+      is_of_same = columns(i)%body == 0 .and. columns(i)%kind == all(n)%kind .and. columns(i)%bank == all(n)%bank .and. &
                    columns(i)%quantity == all(n)%quantity
       if (is_of_same .and. columns(i)%index == all(n)%index + i - all(n)%first) then
         all(n)%last = i
@@ -101,6 +101,8 @@ contains
     type(machine_t), intent(in) :: machine
     type(signal_source_t), intent(in) :: column
 
+    may_bend = column%body > 0
+    if (may_bend) return
     may_bend = any(column%kind == [signal_element, signal_reaction, signal_member, signal_point_moment, signal_point_stress])
     if (column%kind /= signal_element) return
     associate (bank => machine%banks(column%bank)%bank)
@@ -191,6 +193,7 @@ contains
           case (signal_element)
             if (segment%has_new_values) call observe_bank(machine, segment, lane, self%values)
             row(first:last) = self%values(i:j)
+            if (segment%body > 0) row(first) = row(first) * self%formulation%omega(lane, segment%body)
           case (signal_reaction)
             row(first:last) = self%lambda(i:j)
           case (signal_member)

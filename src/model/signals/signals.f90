@@ -42,6 +42,7 @@ module nocdyn_signals
     integer :: index = 0              !! of the body, of the element within its bank, of the row or of the member; the point
     integer :: form = form_observed   !! of a quantity, as are the following
     integer :: divisor = 0
+    integer :: body = 0
     real(wp) :: factor = 1.0_wp
   end type signal_source_t
 
@@ -165,7 +166,7 @@ contains
     integer, intent(inout) :: count
     type(quantity_t), allocatable :: quantities(:)
     character(len=:), allocatable :: kind
-    integer :: e, q, rank
+    integer :: body, e, q, rank
 
     kind = trim(role_names(bank%role))
     if (bank%role == role_bearing) kind = 'body'
@@ -174,13 +175,15 @@ contains
       if (bank%is_mesh) kind = 'mesh'
       if (bank%has_parts) kind = 'shaft'
     end select
-    allocate (quantities, source=bank%quantities())
+    call bank%quantities(quantities)
     do q = 1, size(quantities)
       do e = 1, size(quantities(q)%elements)
         associate (one => quantities(q), element => quantities(q)%elements(e))
           rank = one%rank
           if (one%symbol == 'moment' .and. any(bank%with_work == element)) rank = rank_detail
-          call add_signal(signals, count, signal_source_t(signal_element, number, q, element, one%form, one%divisor, &
+          body = 0
+          if (allocated(one%body)) body = one%body(e)
+          call add_signal(signals, count, signal_source_t(signal_element, number, q, element, one%form, one%divisor, body, &
                                                           one%factor), trim(one%symbol), kind, bank%names(element)%text, &
                           trim(one%point), trim(one%unit), trim(one%caption), trim(one%positive), rank)
         end associate
@@ -295,7 +298,7 @@ contains
 
   !> A signal of an element, 0 if there is none. The total moment of a coupling without damping is its elastic moment; the force of
   !> a gear is its reaction.
-  integer function find_signal(signals, element_kind, element, symbol, point) result(found)
+  recursive integer function find_signal(signals, element_kind, element, symbol, point) result(found)
     type(signal_t), intent(in) :: signals(:)
     character(len=*), intent(in) :: element_kind, element   !! the group of the input, and its name
     character(len=*), intent(in) :: symbol

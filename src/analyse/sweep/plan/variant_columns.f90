@@ -7,7 +7,7 @@ module nocdyn_variant_columns
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_label_checks, only: refuse_equal_labels
+  use nocdyn_signal_checks, only: check_signals
   use nocdyn_machine, only: machine_t
   use nocdyn_run_settings, only: check_size
   use nocdyn_schema, only: has_word
@@ -37,7 +37,7 @@ contains
 
     call assemble_machine(input, machine, error)
     if (.not. allocated(error)) call check_size(input, machine, error)
-    if (.not. allocated(error)) call refuse_equal_labels(input, machine, error)
+    if (.not. allocated(error)) call check_signals(input, machine, error)
     if (allocated(error)) return
     call list_signals(machine, signals)
     allocate (hidden, source=pack(targets, [(hides_column(input, targets(i)), i=1, size(targets))]))

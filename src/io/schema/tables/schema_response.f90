@@ -50,6 +50,12 @@ module nocdyn_schema_response
       'half range of the shear stress in continuous operation'), &
     key_rule_t('limit',      'stress_transient', a_number,      1, 'Pa',          unset,       positive, &
       'half range of the shear stress at speeds that are passed through quickly'), &
+    key_rule_t('limit',      'quantity',        a_text,         1, '',            unset,       anything, &
+      "another quantity of the element: a kind in columns.json, such as 'power' of a shaft"), &
+    key_rule_t('limit',      'largest',         a_number,       1, '',            unset,       positive, &
+      'largest magnitude of the quantity, in its SI unit'), &
+    key_rule_t('limit',      'vibratory',       a_number,       1, '',            unset,       positive, &
+      'half range of the quantity in continuous operation, in its SI unit'), &
     key_rule_t('limit',      'rule',            a_word,         1, '',            unset,       rules, &
       'stresses by a rule: iacs_m68 is IACS Unified Requirement M68 for propulsion shafts'), &
     key_rule_t('limit',      'tensile_strength', a_number,      1, 'Pa',          unset,       strengths, &
@@ -67,6 +73,10 @@ module nocdyn_schema_response
     relation_rule_t('limit', at_most_one, 'coupling', 'shaft'), &
     relation_rule_t('limit', requires, 'vibratory_force force', 'mesh'), &
     relation_rule_t('limit', requires, 'vibratory_moment moment stress stress_transient rule', 'coupling shaft'), &
+    relation_rule_t('limit', at_most_one, 'quantity', 'vibratory_force force vibratory_moment moment stress ' // &
+                                                      'stress_transient rule'), &
+    relation_rule_t('limit', requires, 'largest vibratory', 'quantity'), &
+    relation_rule_t('limit', requires, 'quantity', 'largest vibratory'), &
     relation_rule_t('limit', requires, 'rule', 'tensile_strength'), &
     relation_rule_t('limit', requires, 'rule', 'rated_speed'), &
     relation_rule_t('limit', requires, 'tensile_strength rated_speed c_k diameter', 'rule')]

@@ -285,9 +285,9 @@ contains
     list%is_twist = .true.
   end subroutine list_harmonics
 
-  function quantities(self) result(columns)
+  subroutine quantities(self, columns)
     class(couplings_t), intent(in) :: self
-    type(quantity_t), allocatable :: columns(:)
+    type(quantity_t), allocatable, intent(out) :: columns(:)
     integer :: e
 
     if (self%is_mesh) then
@@ -314,6 +314,6 @@ contains
                                 -1.0_wp)
       columns(5)%divisor = self%number_of('section_modulus')
     end associate
-  end function quantities
+  end subroutine quantities
 
 end module nocdyn_couplings

@@ -88,12 +88,12 @@ contains
   end function new_shafts
 
   !> Twist of each shaft, its moments at both ends, and the largest moment and stress along it.
-  function quantities(self) result(columns)
+  subroutine quantities(self, columns)
     class(shafts_t), intent(in) :: self
-    type(quantity_t), allocatable :: columns(:)
+    type(quantity_t), allocatable, intent(out) :: columns(:)
     character(len=*), parameter :: with = 'with the twist'
 
-    allocate (columns(5))
+    allocate (columns(stress))
     associate (first => self%shafts%first)
       columns(twist) = new_quantity('twist', 'rad', first, 'twist', 'if the second end is ahead', rank_twist, form_observed, 1.0_wp)
       columns(moment_1) = new_quantity('total_moment', 'N m', first, 'moment at the first end', with, rank_moment, &
@@ -108,7 +108,7 @@ contains
     columns(moment_1)%point = '1'
     columns(moment_2)%point = '2'
     columns(largest_moment)%point = 'max'
-  end function quantities
+  end subroutine quantities
 
   !> Whether a quantity is the largest moment along a shaft.
   pure logical function is_largest_moment(quantity)

@@ -162,9 +162,9 @@ contains
   end subroutine rod_motion
 
   !> Position, speed and force of the piston, and the torque of piston and rod on the crank.
-  function columns_of_cranks(self) result(columns)
+  subroutine columns_of_cranks(self, columns)
     class(crank_rows_t), intent(in) :: self
-    type(quantity_t), allocatable :: columns(:)
+    type(quantity_t), allocatable, intent(out) :: columns(:)
 
     allocate (columns(4))
     columns(1) = new_quantity('position', 'm', [part_piston], 'position of the piston from the axis of the crank', &
@@ -175,7 +175,7 @@ contains
                               rank_force, form_applied, 1.0_wp)
     columns(4) = new_quantity('torque', 'N m', [part_piston], 'torque of piston and rod on the crank', 'with a positive speed', &
                               rank_torque, form_observed, 1.0_wp)
-  end function columns_of_cranks
+  end subroutine columns_of_cranks
 
   pure subroutine observe_cranks(self, elements, quantity, lane, values)
     class(crank_rows_t), intent(in) :: self

@@ -244,9 +244,9 @@ contains
     if (allocated(self%over_slip)) speeds = [speeds, self%over_slip%knots(), -self%over_slip%knots()]
   end function knees
 
-  function quantities(self) result(columns)
+  subroutine quantities(self, columns)
     class(friction_joints_t), intent(in) :: self
-    type(quantity_t), allocatable :: columns(:)
+    type(quantity_t), allocatable, intent(out) :: columns(:)
     integer :: e
 
     if (self%role == role_bearing) then   ! its slip is the speed of the body
@@ -260,6 +260,6 @@ contains
                               form_applied, 1.0_wp)
     columns(2) = new_quantity('slip', 'rad/s', [(e, e=1, self%count)], 'slip', 'where the first body is faster', rank_slip, &
                               form_speed, -1.0_wp)
-  end function quantities
+  end subroutine quantities
 
 end module nocdyn_friction_joints

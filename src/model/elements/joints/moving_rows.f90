@@ -53,15 +53,15 @@ contains
   end subroutine connect_rows_only
 
   !> The moments on the elements.
-  function torques_of_rows(self) result(columns)
+  subroutine torques_of_rows(self, columns)
     class(moving_rows_t), intent(in) :: self
-    type(quantity_t), allocatable :: columns(:)
+    type(quantity_t), allocatable, intent(out) :: columns(:)
     integer :: e
 
     allocate (columns(1))
     columns(1) = new_quantity(trim(merge('force ', 'torque', self%moment_unit == 'N')), self%moment_unit, &
                               [(e, e=1, self%count)], trim(merge('force ', 'torque', self%moment_unit == 'N')) // &
                               ' of the row', 'on the moved body', rank_torque, form_total, 1.0_wp)
-  end function torques_of_rows
+  end subroutine torques_of_rows
 
 end module nocdyn_moving_rows

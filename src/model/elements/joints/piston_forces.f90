@@ -86,15 +86,15 @@ contains
     tape%phase_restoring = node_of(literal(tape, 0.0_wp))
   end subroutine describe
 
-  function quantities(self) result(columns)
+  subroutine quantities(self, columns)
     class(piston_forces_t), intent(in) :: self
-    type(quantity_t), allocatable :: columns(:)
+    type(quantity_t), allocatable, intent(out) :: columns(:)
     integer :: e
 
     allocate (columns(1))
     columns(1) = new_quantity('gas_force', 'N', [(e, e=1, self%count)], 'force of the gas on the piston', 'away from the crank', &
                               rank_force, form_total, 1.0_wp)
-  end function quantities
+  end subroutine quantities
 
   !> Its name is that of the crank.
   pure integer function named_count(self)

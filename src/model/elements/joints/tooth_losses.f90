@@ -146,14 +146,14 @@ contains
   end function knees
 
   !> The moment of the loss on the first wheel.
-  function quantities(self) result(columns)
+  subroutine quantities(self, columns)
     class(tooth_losses_t), intent(in) :: self
-    type(quantity_t), allocatable :: columns(:)
+    type(quantity_t), allocatable, intent(out) :: columns(:)
     integer :: e
 
     allocate (columns(1))
     columns(1) = new_quantity('loss', 'N m', [(e, e=1, self%count)], 'friction moment of the teeth', 'on the first wheel', &
                               rank_loss, form_applied, 1.0_wp)
-  end function quantities
+  end subroutine quantities
 
 end module nocdyn_tooth_losses

@@ -242,16 +242,16 @@ contains
   end function knees
 
   !> Torque, and the current of the stator.
-  function quantities(self) result(columns)
+  subroutine quantities(self, columns)
     class(flux_motors_t), intent(in) :: self
-    type(quantity_t), allocatable :: columns(:)
+    type(quantity_t), allocatable, intent(out) :: columns(:)
     integer :: e
 
     allocate (columns(2))
     columns(1) = new_quantity('torque', 'N m', [(e, e=1, self%count)], 'torque on the body', 'with a positive speed', &
                               rank_torque, form_applied, 1.0_wp)
     columns(2) = new_quantity('current', 'A', columns(1)%elements, 'current of a line, rms', '', rank_detail, form_observed, 1.0_wp)
-  end function quantities
+  end subroutine quantities
 
   pure subroutine observe(self, elements, quantity, lane, values)
     class(flux_motors_t), intent(in) :: self

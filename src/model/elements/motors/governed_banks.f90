@@ -192,9 +192,9 @@ contains
   end function knees
 
   !> Torque, armature current where that is a state, and throttle where there is a governor.
-  function quantities(self) result(columns)
+  subroutine quantities(self, columns)
     class(governed_bank_t), intent(in) :: self
-    type(quantity_t), allocatable :: columns(:)
+    type(quantity_t), allocatable, intent(out) :: columns(:)
     integer :: e
 
     allocate (columns(1 + self%states))
@@ -204,7 +204,7 @@ contains
                                                     '', rank_detail, form_observed, 1.0_wp)
     if (self%has_governor) columns(1 + self%states) = new_quantity('throttle', '1', columns(1)%elements, 'throttle, 1 if open', &
                                                                    '', rank_detail, form_observed, 1.0_wp)
-  end function quantities
+  end subroutine quantities
 
   pure subroutine observe(self, elements, quantity, lane, values)
     class(governed_bank_t), intent(in) :: self
