@@ -7,7 +7,7 @@ module nocdyn_shafts
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_polynomial_laws, only: coefficient_linear, coefficient_rest
-  use nocdyn_quantities, only: form_observed, new_quantity, quantity_t, rank_moment, rank_stress, rank_twist
+  use nocdyn_quantities, only: form_observed, new_quantity, quantity_t, rank_moment, rank_stress, rank_torque, rank_twist
   implicit none (type, external)
   private
 
@@ -44,7 +44,7 @@ module nocdyn_shafts
   end type shafts_t
 
   ! the order of `quantities`
-  integer, parameter :: twist = 1, moment_1 = 2, moment_2 = 3, largest_moment = 4, stress = 5
+  integer, parameter :: twist = 1, moment_1 = 2, moment_2 = 3, largest_moment = 4, stress = 5, power = 6
 
 contains
 
@@ -87,13 +87,14 @@ contains
     call bank%prepare_law()
   end function new_shafts
 
-  !> Twist of each shaft, its moments at both ends, and the largest moment and stress along it.
+  !> Twist of each shaft, its moments at both ends, the largest moment and stress along it, and the power through it.
   subroutine quantities(self, columns)
     class(shafts_t), intent(in) :: self
     type(quantity_t), allocatable, intent(out) :: columns(:)
     character(len=*), parameter :: with = 'with the twist'
+    integer :: s
 
-    allocate (columns(stress))
+    allocate (columns(power))
     associate (first => self%shafts%first)
       columns(twist) = new_quantity('twist', 'rad', first, 'twist', 'if the second end is ahead', rank_twist, form_observed, 1.0_wp)
       columns(moment_1) = new_quantity('total_moment', 'N m', first, 'moment at the first end', with, rank_moment, &
@@ -104,7 +105,13 @@ contains
                                              rank_moment, form_observed, 1.0_wp)
       columns(stress) = new_quantity('stress', 'Pa', first, 'largest shear stress along the shaft', with, rank_stress, &
                                      form_observed, 1.0_wp)
+      columns(power) = new_quantity('power', 'W', first, 'power through the shaft', 'from the first end to the second', &
+                                    rank_torque, form_observed, 1.0_wp)
     end associate
+    allocate (columns(power)%body(size(self%shafts)))
+    do s = 1, size(self%shafts)   ! at the second end if the first one is held
+      columns(power)%body(s) = merge(self%shafts(s)%ends(1), self%shafts(s)%ends(2), self%shafts(s)%ends(1) > 0)
+    end do
     columns(moment_1)%point = '1'
     columns(moment_2)%point = '2'
     columns(largest_moment)%point = 'max'
@@ -125,7 +132,7 @@ contains
   end function is_stress
 
   !> The twist of the second end against the first one [rad], the moment in the shaft [N m], elastic and of its damping, positive
-  !> with the twist, and the shear stress at the surface [Pa]. The values of a shaft are those of its first slice.
+  !> with the twist, the shear stress at the surface [Pa], and the moment that a speed multiplies to the power [N m]. The values of a shaft are those of its first slice.
   pure subroutine observe(self, elements, quantity, lane, values)
     class(shafts_t), intent(in) :: self
     type(elements_t), intent(in) :: elements
@@ -144,14 +151,24 @@ contains
           cycle
         end if
         do p = 1, size(shaft%moments, 2)
-          if (quantity == moment_1 .and. p > 1 .or. quantity == moment_2 .and. p < size(shaft%moments, 2)) cycle
+          if (any(quantity == [moment_1, moment_2, power]) .and. p /= end_point(shaft, quantity)) cycle
           found = self%moment_at(elements, s, p, lane)
+          if (quantity == power) found = -found
           if (quantity == stress) found = found / self%parameters(modulus)%value(lane, shaft%first_point + p - 1)
           if (abs(found) > abs(value)) value = found
         end do
       end associate
     end do
   end subroutine observe
+
+  !> The point of an end. The power is that at the first end, or at the second one if the first is held.
+  pure integer function end_point(shaft, quantity)
+    type(shaft_t), intent(in) :: shaft
+    integer, intent(in) :: quantity   !! moment_1, moment_2 or power
+
+    end_point = 1
+    if (quantity == moment_2 .or. quantity == power .and. shaft%ends(1) == 0) end_point = size(shaft%moments, 2)
+  end function end_point
 
   !> The moment at a point of a shaft, elastic and of its damping [N m], after `evaluate`.
   pure real(wp) function moment_at(self, elements, shaft, point, lane) result(moment)
