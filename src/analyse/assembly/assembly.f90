@@ -17,6 +17,7 @@ module nocdyn_assembly
   use nocdyn_reduced, only: new_reduced
   use nocdyn_steady_joints, only: choose_overruns
   use nocdyn_steady_start, only: start_steadily
+  use nocdyn_steady_views, only: steady_view_t
   use nocdyn_text, only: append
   implicit none (type, external)
   private
@@ -34,9 +35,9 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer, intent(in), optional :: lanes   !! 1 if absent
 
-    call build_machine(input, machine, error, lanes)
-    if (.not. allocated(error)) call start_machine(input, machine, error)
-    if (allocated(error) .or. input%takes_means) return
+    call build_machine(input, steady_view_t(), machine, error, lanes)
+    if (.not. allocated(error)) call start_machine(input, .false., machine, error)
+    if (allocated(error)) return
     call note_idle_elements(input, machine%start_notes)
     call note_rated_motors(input, machine%start_notes)
     call note_motions(input, machine%start_notes)
@@ -47,60 +48,59 @@ contains
   !> Builds the machine as it is in a steady state: with means over a turn, and, if it is asked for, with clutches and freewheels
   !> that are locked as constraint rows.
   recursive subroutine assemble_steady_machine(input, t, locks_joints, machine, error)
-    type(input_t), intent(inout) :: input   !! afterwards it says which joints are open
+    type(input_t), intent(in) :: input
     real(wp), intent(in) :: t               !! the time at which clutches are engaged or not [s]
     logical, intent(in) :: locks_joints     !! whether locked joints are rows
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
+    type(steady_view_t) :: view
     logical :: is_changed
     integer :: trials
 
-    input%takes_means = .true.
-    input%means_at = t
-    input%locks_joints = locks_joints
-    if (allocated(input%overruns)) deallocate (input%overruns)
-    allocate (input%overruns(size(input%groups)), source=.false.)
+    view%is_steady = .true.
+    view%at = t
+    view%locks_joints = locks_joints
+    allocate (view%overruns(size(input%groups)), source=.false.)
     do trials = 0, 2 * size(input%groups_named('freewheel'))
-      call build_machine(input, machine, error)
+      call build_machine(input, view, machine, error)
       if (allocated(error)) return
       if (machine%coordinates%freedoms == 0) then
         call raise(error, exit_failed, input%shown_file() // ': ' // machine%simplifications(1)%text // ', so that nothing moves')
         return
       end if
       is_changed = .false.
-      if (locks_joints) call choose_overruns(input, machine, is_changed)
+      if (locks_joints) call choose_overruns(input, view, machine, is_changed)
       if (.not. is_changed) exit
     end do
     if (is_changed) then
       call raise(error, exit_failed, input%shown_file() // ': no steady state was found in which each freewheel ' // &
                  'holds or overruns')
     else
-      call start_machine(input, machine, error)
+      call start_machine(input, .true., machine, error)
     end if
   end subroutine assemble_steady_machine
 
   !> Starts a machine in its steady state, if the input wants it.
-  recursive subroutine start_machine(input, machine, error)
+  recursive subroutine start_machine(input, is_steady, machine, error)
     type(input_t), intent(in) :: input
+    logical, intent(in) :: is_steady   !! whether the machine is one in a steady state
     type(machine_t), intent(inout) :: machine
     type(error_t), allocatable, intent(out) :: error
     type(machine_t), allocatable :: steady   ! of one lane
-    type(input_t) :: view
 
     associate (run => input%groups(input%position('run')))
       if (run%text('start') /= 'equilibrium') return
-      if (machine%lanes == 1 .and. (input%takes_means .or. .not. (has_joint_that_locks(input) .or. &
+      if (machine%lanes == 1 .and. (is_steady .or. .not. (has_joint_that_locks(input) .or. &
                                                                   has_joint_that_moves(input)))) then
         call start_steadily(machine, given_speeds(input, machine%nodes), run%number('t_start'), error)
         if (allocated(error)) error%message = input%location(input%position('run'), 'start') // ": start = 'equilibrium': " // &
           error%message // "; start = 'given' starts with the speeds of the bodies"
         return
       end if
-      call refuse_joints(input, "start = 'equilibrium'", error, knows_locks=.true.)
+      call refuse_joints(input, .false., "start = 'equilibrium'", error, knows_locks=.true.)
       if (allocated(error)) return
       allocate (steady)
-      view = input
-      call assemble_steady_machine(view, run%number('t_start'), .false., steady, error)
+      call assemble_steady_machine(input, run%number('t_start'), .false., steady, error)
       if (.not. allocated(error)) call start_as(steady, machine)
     end associate
   end subroutine start_machine

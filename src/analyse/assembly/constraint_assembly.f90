@@ -7,6 +7,7 @@ module nocdyn_constraint_assembly
   use nocdyn_joint_assembly, only: engagement_at, find_rest_range
   use nocdyn_kinds, only: wp
   use nocdyn_motion_assembly, only: holds_still
+  use nocdyn_steady_views, only: steady_view_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -24,17 +25,19 @@ module nocdyn_constraint_assembly
 contains
 
   !> Indices of the groups that are constraint rows, in the order of the file.
-  function constraint_groups(input) result(indices)
+  function constraint_groups(input, view) result(indices)
     type(input_t), intent(in) :: input
+    type(steady_view_t), intent(in) :: view
     integer, allocatable :: indices(:)
     integer :: i
 
-    indices = pack([(i, i=1, size(input%groups))], [(is_row(input, i), i=1, size(input%groups))])
+    indices = pack([(i, i=1, size(input%groups))], [(is_row(input, view, i), i=1, size(input%groups))])
   end function constraint_groups
 
   !> Whether a group is a constraint row. In a steady state joints are, but those that are open.
-  logical function is_row(input, index)
+  logical function is_row(input, view, index)
     type(input_t), intent(in) :: input
+    type(steady_view_t), intent(in) :: view
     integer, intent(in) :: index   !! of the group
 
     associate (group => input%groups(index))
@@ -42,12 +45,12 @@ contains
       case ('gear', 'planetary', 'differential', 'constraint')
         is_row = .true.
       case ('cardan', 'relation')
-        is_row = input%takes_means
+        is_row = view%is_steady
       case ('clutch', 'freewheel')
-        is_row = input%takes_means .and. input%locks_joints
-        if (is_row) is_row = .not. is_open_joint(input, index)
+        is_row = view%is_steady .and. view%locks_joints
+        if (is_row) is_row = .not. is_open_joint(input, view, index)
       case ('drive')
-        is_row = input%takes_means .and. holds_still(group)
+        is_row = view%is_steady .and. holds_still(group)
       case default
         is_row = .false.
       end select
@@ -55,18 +58,20 @@ contains
   end function is_row
 
   !> Whether a clutch or a freewheel is open in the steady state.
-  logical function is_open_joint(input, index)
+  logical function is_open_joint(input, view, index)
     type(input_t), intent(in) :: input
+    type(steady_view_t), intent(in) :: view
     integer, intent(in) :: index   !! of the group
 
     is_open_joint = .false.
-    if (allocated(input%overruns)) is_open_joint = input%overruns(index)
-    if (input%groups(index)%kind == 'clutch') is_open_joint = .not. engagement_at(input%groups(index), input%means_at) > 0
+    if (allocated(view%overruns)) is_open_joint = view%overruns(index)
+    if (input%groups(index)%kind == 'clutch') is_open_joint = .not. engagement_at(input%groups(index), view%at) > 0
   end function is_open_joint
 
   !> All rows in the order of the file. Two columns of the results with the same name are an error.
-  subroutine assemble_constraints(input, body_index, lanes, constraints, error)
+  subroutine assemble_constraints(input, view, body_index, lanes, constraints, error)
     type(input_t), intent(in) :: input
+    type(steady_view_t), intent(in) :: view
     type(body_index_t), intent(in) :: body_index
     integer, intent(in) :: lanes
     type(constraints_t), intent(out) :: constraints
@@ -75,12 +80,12 @@ contains
     integer, allocatable :: indices(:)
     integer :: i
 
-    allocate (indices, source=constraint_groups(input))
+    allocate (indices, source=constraint_groups(input, view))
     allocate (joints(size(indices)))
     do i = 1, size(indices)
       call read_joint(input%groups(indices(i)), body_index, joints(i))
     end do
-    call form_rows(input, indices, joints, size(body_index%names), lanes, constraints)
+    call form_rows(input, view, indices, joints, size(body_index%names), lanes, constraints)
   end subroutine assemble_constraints
 
   !> The row of one group.
@@ -163,8 +168,9 @@ contains
   end subroutine read_planetary
 
   !> Drops the ground, which has no speed, from the rows. Its torque may still have a column.
-  subroutine form_rows(input, indices, joints, bodies, lanes, constraints)
+  subroutine form_rows(input, view, indices, joints, bodies, lanes, constraints)
     type(input_t), intent(in) :: input
+    type(steady_view_t), intent(in) :: view
     integer, intent(in) :: indices(:)   !! groups of the rows
     type(joint_t), intent(in) :: joints(:)
     integer, intent(in) :: bodies, lanes
@@ -194,7 +200,7 @@ contains
     first(size(first)) = next
     constraints = new_constraints(bodies, names, units, first, body, coefficient, kinds, member_torques(joints, lanes))
     do i = 1, size(indices)
-      call limit_of_lock(input%groups(indices(i)), input%means_at, constraints%least(i), constraints%most(i))
+      call limit_of_lock(input%groups(indices(i)), view%at, constraints%least(i), constraints%most(i))
     end do
     constraints%may_stop = [(any(kinds(i)%text == [character(len=9) :: 'clutch', 'freewheel', 'drive']), i=1, size(kinds))]
   end subroutine form_rows

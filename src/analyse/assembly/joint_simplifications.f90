@@ -6,6 +6,7 @@ module nocdyn_joint_simplifications
   use nocdyn_input, only: group_t, input_t
   use nocdyn_loss_assembly, only: has_losses
   use nocdyn_motion_assembly, only: holds_still
+  use nocdyn_steady_views, only: steady_view_t
   use nocdyn_text, only: append, quoted, string_t
   implicit none (type, external)
   private
@@ -15,19 +16,20 @@ module nocdyn_joint_simplifications
 contains
 
   !> Refuses joints where it is not known which of them are locked, or where they are.
-  subroutine refuse_joints(input, what, error, knows_locks)
-    type(input_t), intent(in) :: input     !! joints that means stand for, and locks of a steady state, are allowed
+  subroutine refuse_joints(input, is_steady, what, error, knows_locks)
+    type(input_t), intent(in) :: input
+    logical, intent(in) :: is_steady       !! whether joints that means stand for, and locks of a steady state, are allowed
     character(len=*), intent(in) :: what   !! does not know it, e.g. 'nocdyn modes'
     type(error_t), allocatable, intent(out) :: error
-    logical, intent(in), optional :: knows_locks   !! whether it knows which joints are locked; absent: as in `takes_means`
+    logical, intent(in), optional :: knows_locks   !! whether it knows which joints are locked; absent: as `is_steady`
     character(len=:), allocatable :: reason
     integer :: i
     logical :: allows_locks
 
-    allows_locks = input%takes_means
+    allows_locks = is_steady
     if (present(knows_locks)) allows_locks = knows_locks
     do i = 1, size(input%groups)
-      call find_refusal(input%groups(i), input%takes_means, allows_locks, reason)
+      call find_refusal(input%groups(i), is_steady, allows_locks, reason)
       if (reason == '') cycle
       call raise(error, exit_input, input%location(i) // ': ' // what // ' ' // reason)
       return
@@ -35,10 +37,9 @@ contains
   end subroutine refuse_joints
 
   !> Why a group is refused, and what is allowed; '' if it is not.
-  subroutine find_refusal(group, takes_means, allows_locks, text)
+  subroutine find_refusal(group, is_steady, allows_locks, text)
     type(group_t), intent(in) :: group
-    logical, intent(in) :: takes_means    !! as in `input_t`
-    logical, intent(in) :: allows_locks   !! as `knows_locks` of `refuse_joints`
+    logical, intent(in) :: is_steady, allows_locks   !! as in `refuse_joints`, the latter as `knows_locks`
     character(len=:), allocatable, intent(out) :: text
 
     text = ''
@@ -49,34 +50,35 @@ contains
     case ('clutch', 'freewheel')
       if (.not. allows_locks) text = 'does not know which joints are locked; allowed: no clutches and freewheels'
     case ('cardan', 'crank', 'relation', 'drive')
-      if (takes_means .and. has_mean(group)) return
+      if (is_steady .and. has_mean(group)) return
       if (allows_locks .and. holds_still(group)) then
         if (.not. group%has_value('table_time')) return
       end if
       text = 'is for machines whose ratios are constant; allowed: no cardans, cranks, relations, drives'
-      if (takes_means) text = 'is for machines whose ratios are constant; allowed: no cams, no levers, and drives that hold still'
+      if (is_steady) text = 'is for machines whose ratios are constant; allowed: no cams, no levers, and drives that hold still'
     case default
       text = ''
     end select
   end subroutine find_refusal
 
   !> What an analysis about a steady state replaces, and which joints are locked there for good.
-  subroutine list_simplifications(input, notes)
+  subroutine list_simplifications(input, view, notes)
     type(input_t), intent(in) :: input
+    type(steady_view_t), intent(in) :: view
     type(string_t), allocatable, intent(out) :: notes(:)
     character(len=:), allocatable :: locked, means, open
     integer :: i
 
     allocate (notes(0))
-    if (.not. input%takes_means) return
+    if (.not. view%is_steady) return
     means = ''
     locked = ''
     open = ''
     do i = 1, size(input%groups)
       associate (group => input%groups(i))
         if (group%kind == 'clutch' .or. group%kind == 'freewheel') then
-          if (.not. input%locks_joints) cycle
-          if (is_open_joint(input, i)) then
+          if (.not. view%locks_joints) cycle
+          if (is_open_joint(input, view, i)) then
             call add_to(open, group)
           else
             call add_to(locked, group)

@@ -27,6 +27,7 @@ module nocdyn_machine_parts
   use nocdyn_shaft_assembly, only: add_shafts, new_shaft_set, shaft_set_t
   use nocdyn_shaft_segments, only: check_shaft
   use nocdyn_start_speeds, only: fit_start_speeds
+  use nocdyn_steady_views, only: steady_view_t
   use nocdyn_text, only: append, joined, selected
   use nocdyn_torque_assembly, only: add_engines, add_excitation_form, add_load_form, excitation_form, load_form
   use nocdyn_written_values, only: shared_unit
@@ -40,8 +41,9 @@ module nocdyn_machine_parts
 contains
 
   !> Builds the machine of a checked input, at the start that the input gives. Errors are those of `assemble_machine`.
-  subroutine build_machine(input, machine, error, lanes)
+  subroutine build_machine(input, view, machine, error, lanes)
     type(input_t), target, intent(in) :: input
+    type(steady_view_t), intent(in) :: view
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
     integer, intent(in), optional :: lanes   !! 1 if absent
@@ -51,21 +53,21 @@ contains
     integer :: i
 
     if (present(lanes)) machine%lanes = lanes
-    call set_bodies(input, machine)
+    call set_bodies(input, view, machine)
     body_index = new_body_index(machine%names)
-    call assemble_constraints(input, body_index, machine%lanes, machine%constraints, error)
+    call assemble_constraints(input, view, body_index, machine%lanes, machine%constraints, error)
     call check_groups(input, mistakes)
     call add_error(error, mistakes)
     if (allocated(error)) return
-    call add_elements(input, body_index, machine)
+    call add_elements(input, view, body_index, machine)
     call new_shaft_set(input, body_index, machine%constraints, shafts)
     call add_shafts(shafts, machine)
     do i = 1, size(shafts%notes)
       call append(machine%start_notes, shafts%notes(i)%text)
     end do
-    call add_cranks(new_element_groups(input, 'crank', machine%lanes, body_index), machine)
+    call add_cranks(new_element_groups(input, 'crank', machine%lanes, body_index), view%is_steady, machine)
     call machine%number_elements()
-    call analyse_machine_constraints(input, body_index, machine, error)
+    call analyse_machine_constraints(input, view, body_index, machine, error)
     if (allocated(error)) return
     call shafts%place_nodes(machine)
     call fit_moving_rows(input, machine, given_speeds(input, machine%nodes), error)
@@ -126,8 +128,9 @@ contains
   end subroutine check_group
 
   !> Adds the banks of all elements that join or turn bodies of the input.
-  subroutine add_elements(input, body_index, machine)
+  subroutine add_elements(input, view, body_index, machine)
     type(input_t), target, intent(in) :: input
+    type(steady_view_t), intent(in) :: view
     type(body_index_t), target, intent(in) :: body_index
     type(machine_t), intent(inout) :: machine
     integer, allocatable :: rows(:)   ! groups of the constraint rows
@@ -136,20 +139,20 @@ contains
     associate (n => machine%lanes)
       call add_banks(new_element_groups(input, 'coupling', n, body_index), coupling_form, add_coupling_form, machine%banks)
       call add_banks(new_element_groups(input, 'mesh', n, body_index), mesh_form, add_mesh_form, machine%banks)
-      if (.not. (input%takes_means .and. input%locks_joints)) then
+      if (.not. (view%is_steady .and. view%locks_joints)) then
         call add_banks(new_element_groups(input, 'clutch', n, body_index), clutch_form, add_clutch_form, machine%banks)
         call add_freewheels(new_element_groups(input, 'freewheel', n, body_index), machine%banks)
       end if
       call add_bearings(new_element_groups(input, 'body', n, body_index), machine%banks)
-      if (.not. input%takes_means) then
+      if (.not. view%is_steady) then
         call add_cardans(new_element_groups(input, 'cardan', n, body_index), machine%banks)
         call add_relations(new_element_groups(input, 'relation', n, body_index), machine%banks)
       end if
-      allocate (rows, source=constraint_groups(input))
+      allocate (rows, source=constraint_groups(input, view))
       call add_losses(new_element_groups(input, 'gear', n, body_index), rows, machine%banks)
       call add_losses(new_element_groups(input, 'planetary', n, body_index), rows, machine%banks)
       call add_losses(new_element_groups(input, 'mesh', n, body_index), rows, machine%banks)
-      if (.not. input%takes_means) then
+      if (.not. view%is_steady) then
         call add_banks(new_element_groups(input, 'drive', n, body_index), drive_form, add_drive_form, machine%banks)
       end if
       call add_banks(new_element_groups(input, 'motor', n, body_index), motor_form, add_motor_form, machine%banks)
@@ -159,8 +162,9 @@ contains
     end associate
   end subroutine add_elements
 
-  subroutine set_bodies(input, machine)
+  subroutine set_bodies(input, view, machine)
     type(input_t), target, intent(in) :: input
+    type(steady_view_t), intent(in) :: view
     type(machine_t), intent(inout) :: machine
     type(element_groups_t) :: bodies
 
@@ -171,13 +175,14 @@ contains
     machine%start_angle = bodies%values('angle')
     machine%start_speed = bodies%values('speed')
     allocate (machine%start_notes(0))
-    call list_simplifications(input, machine%simplifications)
+    call list_simplifications(input, view, machine%simplifications)
   end subroutine set_bodies
 
   !> Analyses the constraints, chooses the coordinates and makes the start speeds consistent. A message begins with file, line and
   !> group: those of a constraint row, or of `independent`.
-  subroutine analyse_machine_constraints(input, body_index, machine, error)
+  subroutine analyse_machine_constraints(input, view, body_index, machine, error)
     type(input_t), intent(in) :: input
+    type(steady_view_t), intent(in) :: view
     type(body_index_t), intent(in) :: body_index
     type(machine_t), intent(inout) :: machine
     type(error_t), allocatable, intent(out) :: error
@@ -196,7 +201,7 @@ contains
       if (.not. allocated(error)) then
         call fit_start_speeds(machine, given_speeds(input, machine%nodes), run%text('start') == 'projected', &
                               shared_unit(input, 'body', 'speed'), offending_row, error)
-        if (allocated(error) .and. input%takes_means) then   ! the speeds fit the ratios at the start, perhaps
+        if (allocated(error) .and. view%is_steady) then   ! the speeds fit the ratios at the start, perhaps
           deallocate (error)
           call fit_start_speeds(machine, given_speeds(input, machine%nodes), .true., 0, offending_row, error)
         end if
@@ -204,7 +209,7 @@ contains
     end associate
     if (.not. allocated(error)) return
     if (offending_row > 0) then
-      allocate (indices, source=constraint_groups(input))
+      allocate (indices, source=constraint_groups(input, view))
       error%message = input%location(indices(offending_row)) // ': ' // error%message
     else
       error%message = input%location(input%position('run'), 'independent') // ': independent ' // error%message

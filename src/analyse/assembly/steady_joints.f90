@@ -11,6 +11,7 @@ module nocdyn_steady_joints
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_steady_views, only: steady_view_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -22,8 +23,9 @@ module nocdyn_steady_joints
 contains
 
   !> Changes the state of one freewheel if the steady state contradicts it. A machine without a steady state stays as it is.
-  subroutine choose_overruns(input, machine, is_changed)
-    type(input_t), intent(inout) :: input
+  subroutine choose_overruns(input, view, machine, is_changed)
+    type(input_t), intent(in) :: input
+    type(steady_view_t), intent(inout) :: view
     type(machine_t), intent(in) :: machine   !! of this input
     logical, intent(out) :: is_changed       !! then the machine is another one
     class(formulation_t), allocatable :: formulation
@@ -34,26 +36,27 @@ contains
 
     is_changed = .false.
     if (size(input%groups_named('freewheel')) == 0) return
-    call find_equilibria(machine, input%means_at, formulation, equilibria, notes, error)
+    call find_equilibria(machine, view%at, formulation, equilibria, notes, error)
     if (allocated(error)) return
-    if (size(equilibria) > 1) call find_stability(formulation, input%means_at, equilibria)
-    call formulation%observe([input%means_at], equilibria(nearest_equilibrium(formulation, equilibria))%y)
-    freewheel = pulling_freewheel(input, formulation)
-    if (freewheel == 0) freewheel = overtaken_freewheel(input, formulation)
+    if (size(equilibria) > 1) call find_stability(formulation, view%at, equilibria)
+    call formulation%observe([view%at], equilibria(nearest_equilibrium(formulation, equilibria))%y)
+    freewheel = pulling_freewheel(input, view, formulation)
+    if (freewheel == 0) freewheel = overtaken_freewheel(input, view, formulation)
     is_changed = freewheel > 0
-    if (is_changed) input%overruns(freewheel) = .not. input%overruns(freewheel)
+    if (is_changed) view%overruns(freewheel) = .not. view%overruns(freewheel)
   end subroutine choose_overruns
 
   !> The group of the locked freewheel that pulls most, 0 if none does.
-  integer function pulling_freewheel(input, formulation) result(group)
+  integer function pulling_freewheel(input, view, formulation) result(group)
     type(input_t), intent(in) :: input
+    type(steady_view_t), intent(in) :: view
     class(formulation_t), intent(inout) :: formulation   !! after `observe`
     integer, allocatable :: indices(:)
     real(wp) :: lambda(formulation%machine%constraints%rows()), least, pull
     integer :: r
 
     group = 0
-    allocate (indices, source=constraint_groups(input))
+    allocate (indices, source=constraint_groups(input, view))
     call formulation%reactions(1, lambda)
     least = rounding * maxval([0.0_wp, abs(lambda)])
     do r = 1, size(lambda)
@@ -67,8 +70,9 @@ contains
   end function pulling_freewheel
 
   !> The group of the overrunning freewheel whose first body overtakes the second one most, 0 if none does.
-  integer function overtaken_freewheel(input, formulation) result(group)
+  integer function overtaken_freewheel(input, view, formulation) result(group)
     type(input_t), intent(in) :: input
+    type(steady_view_t), intent(in) :: view
     class(formulation_t), intent(in) :: formulation   !! after `observe`
     type(body_index_t) :: body_index
     integer, allocatable :: bodies(:)
@@ -79,7 +83,7 @@ contains
     body_index = new_body_index(formulation%machine%names)
     least = rounding * maxval(abs(formulation%omega(1, :)))
     do i = 1, size(input%groups)
-      if (.not. input%overruns(i)) cycle
+      if (.not. view%overruns(i)) cycle
       bodies = bodies_of(input%groups(i), 'bodies', body_index)
       slip = formulation%omega(1, bodies(1)) - formulation%omega(1, bodies(2))
       if (input%groups(i)%text('direction') == 'backward') slip = -slip

@@ -80,14 +80,15 @@ contains
   !> Builds the machine as a command looks at it: all but `check` and `matrices` look at a steady state.
   subroutine assemble_for(command, input, machine, error)
     character(len=*), intent(in) :: command
-    type(input_t), intent(inout) :: input
+    type(input_t), intent(in) :: input
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
+    logical :: is_steady
 
-    input%takes_means = all(command /= [character(len=8) :: 'check', 'matrices'])
-    if (command /= 'check') call refuse_joints(input, 'nocdyn ' // command, error)
+    is_steady = all(command /= [character(len=8) :: 'check', 'matrices'])
+    if (command /= 'check') call refuse_joints(input, is_steady, 'nocdyn ' // command, error)
     if (allocated(error)) return
-    if (input%takes_means) then
+    if (is_steady) then
       call assemble_steady_machine(input, t_infinity, all(command /= [character(len=11) :: 'equilibrium', 'modes']), machine, &
                                    error)
     else

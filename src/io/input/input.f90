@@ -27,12 +27,6 @@ module nocdyn_input
     type(load_case_t), allocatable :: load_case       !! that of this input; not allocated: the machine itself
     type(load_case_t), allocatable :: load_cases(:)   !! those of the file; of the machine itself
     type(group_t), allocatable :: groups(:)       !! single groups that the file does not have come last
-    logical :: takes_means = .false.              !! whether it is looked at in a steady state: means stand for ratios that
-                                                  !! depend on the position
-    logical :: locks_joints = .false.             !! whether clutches and freewheels are locked or open then
-    real(wp) :: means_at = huge(1.0_wp)           !! the time at which joints are so [s]; with it
-    logical, allocatable :: overruns(:)           !! which joints are open then beside those without engagement, [groups]; not
-                                                  !! allocated: none
   contains
     procedure :: groups_named   !! indices of the groups with a name, perhaps only those of one law
     procedure :: position       !! index of the group of a kind that occurs once

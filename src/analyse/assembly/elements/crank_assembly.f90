@@ -54,8 +54,9 @@ contains
   end subroutine check_crank
 
   !> Adds the pistons and rods and the banks of their rows and forces to a machine.
-  subroutine add_cranks(groups, machine)
+  subroutine add_cranks(groups, is_steady, machine)
     type(element_groups_t), intent(in) :: groups
+    logical, intent(in) :: is_steady   !! whether means over a turn stand for them
     type(machine_t), intent(inout) :: machine
     integer, allocatable :: body(:)
     integer :: i
@@ -63,7 +64,7 @@ contains
     if (size(groups%indices) == 0) return
     allocate (body, source=groups%bodies('body', 1))
     do i = 1, size(groups%indices)
-      if (groups%input%takes_means) then
+      if (is_steady) then
         call add_mean_crank(groups%input%groups(groups%indices(i)), groups%names(i), body(i), machine)
       else
         call add_crank(groups%input%groups(groups%indices(i)), groups%names(i), body(i), machine)
