@@ -24,6 +24,7 @@ module nocdyn_trajectory_table
     real(wp), allocatable, private :: y(:, :)      !! [1, states + quadratures]
     real(wp), private :: start_kinetic = 0.0_wp    !! [J]
     real(wp), allocatable, private :: start_stored(:)   !! of the elastic elements [J]
+    real(wp), allocatable, private :: start_kept(:)     !! of the elements with work [J]
     logical, allocatable :: bends(:)               !! columns that may bend more than the solution
   contains
     procedure :: fill, find_energy_balance
@@ -50,6 +51,7 @@ contains
     table%start_kinetic = table%columns%kinetic_energy(1)
     associate (machine => table%columns%formulation%machine)
       table%start_stored = machine%elements%stored(1, machine%elastic())
+      table%start_kept = machine%elements%kept(1, machine%with_work)
     end associate
   end function new_trajectory_table
 
@@ -84,7 +86,8 @@ contains
     associate (formulation => self%columns%formulation, machine => self%columns%formulation%machine)
       allocate (names, source=work_element_names(machine))
       allocate (balance%work_elements, source=whole_names(names))
-      allocate (balance%work, source=whole_sums(names, y(formulation%states + 1:)))
+      allocate (balance%work, source=whole_sums(names, y(formulation%states + 1:) + &
+                                                       machine%elements%kept(1, machine%with_work) - self%start_kept))
       deallocate (names)
       allocate (names, source=element_names(machine, machine%elastic()))
       allocate (balance%elastic_elements, source=whole_names(names))

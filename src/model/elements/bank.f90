@@ -71,6 +71,7 @@ module nocdyn_bank
     procedure :: start_internal
     procedure :: steady_internal
     procedure :: knees
+    procedure :: keep_energy
     generic :: connect => connect_bodies, connect_rows
     procedure, private :: connect_bodies, connect_rows
     procedure :: list_structure
@@ -265,6 +266,12 @@ contains
 
     allocate (speeds(0))
   end function knees
+
+  !> Sets the energies that internal states keep. By default they keep none.
+  pure subroutine keep_energy(self, elements)
+    class(bank_t), intent(in) :: self
+    type(elements_t), intent(inout) :: elements   !! of the machine
+  end subroutine keep_energy
 
   !> What the elements put out, by default the torque of each on its body.
   subroutine quantities(self, columns)

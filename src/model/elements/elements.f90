@@ -59,7 +59,8 @@ module nocdyn_elements
     real(wp), allocatable :: applied_speed(:, :)         !! derivative of `applied` by u'
     real(wp), allocatable :: applied_time(:, :)          !! derivative of `applied` by t
     ! by `evaluate_energies`:
-    real(wp), allocatable :: stored(:, :)          !! potential energy of `restoring` [J]
+    real(wp), allocatable :: stored(:, :)          !! potential energy of `restoring`, and what is kept [J]
+    real(wp), allocatable :: kept(:, :)            !! energy that internal states keep: a part of the work of `applied` [J]
     real(wp), allocatable :: secant(:, :)          !! secant stiffness K12 of eq. (3): -K12 u is a part of `restoring` [N m/rad]
     real(wp), allocatable :: damping(:, :)         !! viscous c: -c u' is a part of `applied` [N m s/rad]
     type(internal_states_t) :: internal
@@ -86,7 +87,7 @@ contains
     allocate (self%speed, self%restoring, self%applied, source=self%angle)
     allocate (self%restoring_angle, self%restoring_curvature, source=self%angle)
     allocate (self%applied_angle, self%applied_speed, self%applied_time, source=self%angle)
-    allocate (self%stored, self%secant, self%damping, source=self%angle)
+    allocate (self%stored, self%kept, self%secant, self%damping, source=self%angle)
     self%internal = new_internal_states(lanes, internal)
     self%cross = new_cross_slopes(lanes, [integer ::])
     if (present(phase)) self%cross = new_cross_slopes(lanes, phase)

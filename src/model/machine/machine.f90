@@ -374,6 +374,10 @@ contains
     do i = 1, size(self%general_banks)
       associate (bank => self%banks(self%general_banks(i))%bank)
         call bank%law%evaluate_energies(bank%first, self%elements)
+        if (bank%states == 0) cycle
+        call bank%keep_energy(self%elements)
+        self%elements%stored(:, bank%first:bank%last()) = self%elements%stored(:, bank%first:bank%last()) &
+                                                          + self%elements%kept(:, bank%first:bank%last())
       end associate
     end do
   end subroutine evaluate_energies

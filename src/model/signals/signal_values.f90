@@ -37,6 +37,7 @@ module nocdyn_signal_values
     integer, allocatable, private :: works_out(:)        !! those of the others
     real(wp), private :: energies(signal_kinetic:signal_residual) = 0.0_wp   !! of one row [J]; work space
     real(wp), allocatable, private :: start_energy(:)    !! [J], [lanes]
+    real(wp), allocatable, private :: start_kept(:)      !! of this what internal states keep
   contains
     procedure :: copy_lane, start_lane, move_origin, observe, fill_row, kinetic_energy, find_pace
   end type signal_values_t
@@ -57,7 +58,7 @@ contains
     allocate (self%segments, source=segments_of(columns))
     self%have_reactions = any(columns%kind == signal_reaction .or. columns%kind == signal_member)
     self%have_energies = any(columns%kind >= signal_kinetic)
-    self%have_elastic = any(columns%kind == signal_elastic .or. columns%kind == signal_residual)
+    self%have_elastic = any(columns%kind >= signal_elastic)
     self%have_works = any(columns%kind >= signal_work_in)
     associate (banks => formulation%machine%banks)
       allocate (self%values(maxval([(banks(i)%bank%count, i=1, size(banks))])), source=0.0_wp)
@@ -66,7 +67,7 @@ contains
     allocate (self%works_in, source=pack([(i, i=1, size(is_source))], is_source))
     allocate (self%works_out, source=pack([(i, i=1, size(is_source))], .not. is_source))
     allocate (self%lambda(formulation%machine%constraints%rows()), source=0.0_wp)
-    allocate (self%start_energy(formulation%lanes), source=0.0_wp)
+    allocate (self%start_energy(formulation%lanes), self%start_kept(formulation%lanes), source=0.0_wp)
   end function new_signal_values
 
   !> The columns as few segments.
@@ -145,8 +146,11 @@ contains
     class(signal_values_t), intent(inout) :: self
     integer, intent(in) :: lane
 
-    if (self%have_elastic) self%start_energy(lane) = self%kinetic_energy(lane) + &
-                                                     sum(self%formulation%machine%elements%stored(lane, :))
+    if (.not. self%have_elastic) return
+    associate (elements => self%formulation%machine%elements)
+      self%start_energy(lane) = self%kinetic_energy(lane) + sum(elements%stored(lane, :))
+      self%start_kept(lane) = sum(elements%kept(lane, :))
+    end associate
   end subroutine start_lane
 
   !> Takes a shift of the state of a lane.
@@ -276,7 +280,8 @@ contains
       if (self%have_elastic) energies(signal_elastic) = sum(self%formulation%machine%elements%stored(lane, :))
       if (.not. self%have_works) return
       energies(signal_work_in) = work(self%works_in, self%formulation%states, lane, y)
-      energies(signal_work_out) = work(self%works_out, self%formulation%states, lane, y)
+      energies(signal_work_out) = work(self%works_out, self%formulation%states, lane, y) &
+                                  + sum(self%formulation%machine%elements%kept(lane, :)) - self%start_kept(lane)
       energies(signal_residual) = (energies(signal_kinetic) + energies(signal_elastic) - self%start_energy(lane)) &
                                   - (energies(signal_work_in) + energies(signal_work_out))
       energies(signal_work_out) = 0.0_wp - energies(signal_work_out)   ! not -0 without any work

@@ -8,6 +8,7 @@ module nocdyn_coupling_assembly
   use nocdyn_gap_couplings, only: new_gap_couplings
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
+  use nocdyn_maxwell_couplings, only: new_maxwell_couplings
   use nocdyn_polynomial_couplings, only: elastic_coefficients, new_polynomial_couplings
   use nocdyn_saturated_couplings, only: new_saturated_couplings
   use nocdyn_table_couplings, only: new_table_couplings
@@ -17,8 +18,8 @@ module nocdyn_coupling_assembly
 
   public :: coupling_form, add_coupling_form, check_coupling
 
-  integer, parameter :: cubic = 1, slipping = 2, polynomial = 3, gap = 4, saturated = 5, table = 6   ! elastic forms
-  integer, parameter :: elastic_forms = 6   ! the same with relative damping follow
+  integer, parameter :: cubic = 1, slipping = 2, polynomial = 3, gap = 4, saturated = 5, table = 6, maxwell = 7   ! forms
+  integer, parameter :: elastic_forms = 7   ! the same with relative damping follow
 
 contains
 
@@ -106,6 +107,8 @@ contains
 
     if (group%has_value('table_twist')) then
       coupling_form = table
+    else if (group%has_value('maxwell_stiffness')) then
+      coupling_form = maxwell
     else if (group%has_value('saturation')) then
       coupling_form = saturated
     else if (group%number('gap', absent=0.0_wp) > 0) then
@@ -148,6 +151,10 @@ contains
                                                   groups%values('stiffness')))
     case (saturated)
       call append_bank(banks, new_saturated_couplings(shared, groups%values('stiffness'), groups%values('saturation')))
+    case (maxwell)
+      call append_bank(banks, new_maxwell_couplings(shared, groups%values('stiffness'), groups%values('cubic_stiffness'), &
+                                                    branches(groups, 'maxwell_stiffness', 0.0_wp), &
+                                                    branches(groups, 'maxwell_time', 1.0_wp)))
     case default
       call append_bank(banks, new_table_couplings(shared, groups%curves('table_twist', 'table_moment')))
     end select
@@ -159,6 +166,23 @@ contains
       bank%parameters%is_key = .false.   ! the damping depends on the stiffness
     end associate
   end subroutine add_coupling_form
+
+  !> The numbers of the Maxwell branches of all couplings, [lanes, couplings, branches].
+  function branches(groups, key, absent) result(values)
+    type(element_groups_t), intent(in) :: groups
+    character(len=*), intent(in) :: key
+    real(wp), intent(in) :: absent   !! of a coupling with fewer branches
+    real(wp), allocatable :: values(:, :, :)
+    integer :: i, most
+
+    most = maxval([(size(groups%input%groups(groups%indices(i))%numbers(key)), i=1, size(groups%indices))])
+    allocate (values(groups%lanes, size(groups%indices), most), source=absent)
+    do i = 1, size(groups%indices)
+      associate (one => groups%input%groups(groups%indices(i))%numbers(key))
+        values(:, i, :size(one)) = spread(one, 1, groups%lanes)
+      end associate
+    end do
+  end function branches
 
   !> The viscous damping that has the loss of relative damping at `damping_frequency` [N m s/rad], [lanes, couplings].
   function loss_damping(groups) result(damping)

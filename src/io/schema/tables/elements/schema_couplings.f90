@@ -43,6 +43,10 @@ module nocdyn_schema_couplings
       'moment of a slipping clutch: friction tanh(rate of twist / friction_speed)'), &
     key_rule_t('coupling',   'friction_speed',  a_number,       1, 'rad/s',       '0.01',      positive, &
       'rate of twist at which the friction has 76 % of its full moment'), &
+    key_rule_t('coupling',   'maxwell_stiffness', a_number,     any_number, 'N m/rad', unset,  positive, &
+      'stiffness of springs in series with dampers, parallel to the spring, as of rubber', fewest=1), &
+    key_rule_t('coupling',   'maxwell_time',    a_number,       any_number, 's',  unset,       positive, &
+      'relaxation time of each of them: damping / maxwell_stiffness', fewest=1), &
     key_rule_t('coupling',   'table_twist',     a_number,       any_number, 'rad', unset,      anything, &
       'twist - rest_twist of the points of a table, ascending', fewest=2, ascends=.true.), &
     key_rule_t('coupling',   'table_moment',    a_number,       any_number, 'N m', unset,      anything, &
@@ -59,6 +63,11 @@ module nocdyn_schema_couplings
     relation_rule_t('coupling', at_most_one, 'table_twist table_moment table_file', &
                     'stiffness cubic_stiffness polynomial gap saturation'), &
     relation_rule_t('coupling', at_most_one, 'saturation', 'cubic_stiffness polynomial gap'), &
+    relation_rule_t('coupling', at_most_one, 'maxwell_stiffness maxwell_time', &
+                    'polynomial gap saturation table_twist table_file relative_damping magnifier'), &
+    relation_rule_t('coupling', requires, 'maxwell_stiffness', 'maxwell_time'), &
+    relation_rule_t('coupling', requires, 'maxwell_time', 'maxwell_stiffness'), &
+    relation_rule_t('coupling', equal_lengths, 'maxwell_stiffness maxwell_time', ''), &
     relation_rule_t('coupling', requires, 'gap', 'stiffness cubic_stiffness polynomial'), &
     relation_rule_t('coupling', requires, 'saturation', 'stiffness'), &
     relation_rule_t('coupling', requires, 'friction_speed', 'friction'), &
