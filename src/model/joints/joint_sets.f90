@@ -6,7 +6,7 @@
 module nocdyn_joint_sets
   use nocdyn_bank, only: bank_slot_t
   use nocdyn_bounded_complementarity, only: at_upper, is_free, solve_bounded_complementarity, solve_scaled_complementarity
-  use nocdyn_friction_joints, only: direction_of, first_wheel_drives, friction_joints_t, idle, locked, slips_backwards, &
+  use nocdyn_friction_joints, only: direction_of, friction_joints_t, idle, locked, slips_backwards, &
     slips_forwards
   use nocdyn_held_rows, only: held_rows_t
   use nocdyn_joint_choices, only: joint_choices_t
@@ -398,18 +398,12 @@ contains
         g = direction_of(mode) * slip + self%shift(joint)
         if (mode == slips_forwards .and. is_unbounded(least)) g = -1.0_wp   ! there is no such slip
         if (mode == slips_backwards .and. is_unbounded(most)) g = -1.0_wp
-        if (self%has_teeth(joint)) g = min(g, power_of_driver(self, joint, mode) + self%teeth%shift(self%teeth%loss_of(joint)))
+        if (.not. self%has_teeth(joint)) return
+        associate (loss => self%teeth%loss_of(joint))
+          g = min(g, self%teeth%power_of_driver(loss, mode) + self%teeth%shift(loss))
+        end associate
       end if
     end associate
   end function indicator
-
-  !> Positive where that wheel of turning teeth drives that the mode says [N m].
-  pure real(wp) function power_of_driver(self, joint, mode)
-    class(joint_sets_t), intent(in) :: self
-    integer, intent(in) :: joint, mode
-
-    power_of_driver = direction_of(mode) * self%teeth%load(self%teeth%loss_of(joint))
-    if (first_wheel_drives(mode)) power_of_driver = -power_of_driver
-  end function power_of_driver
 
 end module nocdyn_joint_sets
