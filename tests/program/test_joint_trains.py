@@ -7,7 +7,7 @@ import pytest
 from random_trains import random_train
 
 TRAINS = int(os.environ.get("NOCDYN_RANDOM_TRAINS", "20"))
-HARD = [118, 653, 740]  # teeth without a load beside small slips
+HARD = [118, 653, 740] + [327]  # teeth without a load beside small slips; few of many combinations fit
 
 
 @pytest.mark.parametrize("seed", sorted({*range(TRAINS), *HARD}))
