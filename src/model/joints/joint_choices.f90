@@ -21,7 +21,6 @@ module nocdyn_joint_choices
   contains
     procedure :: choose
     procedure, private :: settle
-    procedure, private :: rest_where_unloaded
     procedure, private :: combine
     procedure, private :: pivot
     procedure, private :: find_jam
@@ -79,29 +78,6 @@ contains
       end if
     end do
   end subroutine settle
-
-  !> Locks the joints at rest that slip in modes which agree, but without any acceleration, if that agrees as well.
-  subroutine rest_where_unloaded(self)
-    class(joint_choices_t), intent(inout) :: self
-    integer :: mode(size(self%mode))
-    real(wp) :: acceleration(size(self%mode)), moment(size(self%mode))
-    integer :: i
-
-    mode = self%mode
-    moment = self%moment
-    acceleration = self%accelerations()
-    do i = 1, size(mode)
-      if (.not. self%is_at_rest(i) .or. self%least(i) >= self%most(i) .and. .not. self%has_teeth(i)) cycle
-      if (abs(acceleration(i)) <= 0) self%mode(i) = locked
-    end do
-    if (all(self%mode == mode)) return
-    call self%find_moments()
-    if (all(self%better_modes() == self%mode)) then
-      if (self%is_stable() .and. .not. self%is_contradicted()) return
-    end if
-    self%mode(:) = mode
-    self%moment(:) = moment
-  end subroutine rest_where_unloaded
 
   !> Seeks the modes from all combinations of those of teeth, or from the first ones where they are many.
   subroutine combine(self, is_found)
@@ -161,7 +137,6 @@ contains
     self%least(:) = least
     self%most(:) = most
     if (is_found) call self%settle(most_changes, is_found)
-    if (is_found) call self%rest_where_unloaded()
   end subroutine pivot
 
   !> Finds turning teeth whose second wheel brakes the first one more than its inertia allows where all joints at rest are locked:
