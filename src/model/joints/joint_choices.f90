@@ -11,6 +11,7 @@ module nocdyn_joint_choices
   use nocdyn_joint_problem, only: inconsistent, joint_problem_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pseudo_inverse
+  use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_semidefinite, only: null_tolerance
   implicit none (type, external)
   private
@@ -22,6 +23,7 @@ module nocdyn_joint_choices
     procedure :: choose
     procedure, private :: settle
     procedure, private :: combine
+    procedure, private :: take_combination
     procedure, private :: pivot
     procedure, private :: find_jam
     procedure, private :: is_against_rows
@@ -79,34 +81,47 @@ contains
     end do
   end subroutine settle
 
-  !> Seeks the modes from all combinations of those of teeth, or from the first ones where they are many.
+  !> Seeks the modes from all combinations of those of teeth.
   subroutine combine(self, is_found)
     class(joint_choices_t), intent(inout) :: self
     logical, intent(out) :: is_found
-    integer, parameter :: at_rest(*) = [locked, slips_forwards, slips_backwards, driven_forwards, driven_backwards]
-    integer, parameter :: most_tried = 3125
-    integer :: choices(size(self%mode)), i, number, rest
+    integer :: number
+    logical :: is_left
 
-    choices = 1
-    where (self%has_teeth) choices = merge(size(at_rest), 2, self%is_at_rest)
     is_found = .false.
-    do number = 0, nint(min(real(most_tried, wp), product(real(choices, wp)))) - 1
-      rest = number
-      do i = 1, size(choices)
-        if (.not. self%has_teeth(i)) cycle
-        if (self%is_at_rest(i)) then
-          self%mode(i) = at_rest(1 + modulo(rest, choices(i)))
-        else if (self%slip(i) > 0) then
-          self%mode(i) = merge(slips_forwards, driven_forwards, modulo(rest, 2) == 0)
-        else
-          self%mode(i) = merge(slips_backwards, driven_backwards, modulo(rest, 2) == 0)
-        end if
-        rest = rest / choices(i)
-      end do
+    number = 0
+    call self%take_combination(number, is_left)
+    do while (is_left)
       call self%pivot(is_found)
       if (is_found) return
+      number = number + 1
+      call self%take_combination(number, is_left)
     end do
   end subroutine combine
+
+  !> Gives teeth the modes of a combination.
+  pure subroutine take_combination(self, number, is_left)
+    class(joint_choices_t), intent(inout) :: self
+    integer, intent(in) :: number      !! from 0 on
+    logical, intent(out) :: is_left    !! whether there is this one; of many the first ones are enough
+    integer, parameter :: at_rest(*) = [locked, slips_forwards, slips_backwards, driven_forwards, driven_backwards]
+    integer, parameter :: forwards(*) = [slips_forwards, driven_forwards], backwards(*) = [slips_backwards, driven_backwards]
+    integer, parameter :: most_tried = 3125
+    integer :: i, rest
+
+    rest = number
+    do i = 1, size(self%mode)
+      if (.not. self%has_teeth(i)) cycle
+      if (self%is_at_rest(i)) then
+        self%mode(i) = at_rest(1 + modulo(rest, 5))
+        rest = rest / 5
+      else
+        self%mode(i) = merge(forwards(1 + modulo(rest, 2)), backwards(1 + modulo(rest, 2)), self%slip(i) > 0)
+        rest = rest / 2
+      end if
+    end do
+    is_left = rest == 0 .and. number < most_tried
+  end subroutine take_combination
 
   !> Seeks modes by pivoting, with those of teeth to begin with. Where friction that slips is less than at rest, the others are
   !> looked at again with it.
@@ -139,25 +154,39 @@ contains
     if (is_found) call self%settle(most_changes, is_found)
   end subroutine pivot
 
-  !> Finds turning teeth whose second wheel brakes the first one more than its inertia allows where all joints at rest are locked:
-  !> their 1 + s V is not positive, with what these joints do to T.
+  !> Finds turning teeth whose second wheel brakes the first one more than its inertia allows: their 1 + s V is not positive, with
+  !> what other joints do to T. First, all at rest are locked, then those only that hold always.
   subroutine find_jam(self)
     class(joint_choices_t), intent(inout) :: self
-    integer, allocatable :: rows(:)
-    integer :: i
-    real(wp) :: least_slope, slope
+    real(wp) :: matrix(size(self%mode), size(self%mode)), moment(size(self%mode)), steepest
+    integer :: i, mode(size(self%mode)), number, order(size(self%mode)), trial
+    logical :: is_left, is_singular
 
-    rows = pack([(i, i=1, size(self%mode))], self%is_at_rest .and. .not. self%has_teeth .and. self%least < self%most)
-    least_slope = 0.0_wp
-    associate (inverse => pseudo_inverse(self%w(rows, rows), null_tolerance))
-      do i = 1, size(self%mode)
-        if (.not. self%has_teeth(i) .or. self%is_at_rest(i)) cycle
-        slope = 1 + self%driven(i) * (self%v(i, i) - dot_product(self%v(i, rows), matmul(inverse, self%w(rows, i))))
-        if (slope > least_slope) cycle
-        least_slope = slope
-        self%jammed = i
+    mode = self%mode
+    do trial = 1, 2
+      steepest = -huge(1.0_wp)
+      number = 0
+      call self%take_combination(number, is_left)
+      do while (is_left)
+        where (self%is_at_rest .and. .not. self%has_teeth) self%mode = merge(locked, slips_forwards, self%holds_always() .or. &
+                                                                             trial == 1 .and. self%least < self%most)
+        call self%scaled_equations(matrix, moment)
+        call lu_factor(matrix, order, is_singular)
+        do i = 1, merge(0, size(mode), is_singular)
+          if (.not. self%has_teeth(i) .or. self%is_at_rest(i)) cycle
+          moment = 0.0_wp
+          moment(i) = 1.0_wp
+          call lu_solve(matrix, order, moment)   ! 1 / (1 + s V)
+          if (moment(i) >= 0 .or. moment(i) <= steepest) cycle
+          steepest = moment(i)
+          self%jammed = i
+        end do
+        number = number + 1
+        call self%take_combination(number, is_left)
       end do
-    end associate
+      if (self%jammed > 0) exit
+    end do
+    self%mode(:) = mode
   end subroutine find_jam
 
   !> Joints at rest that rows without bounds, such as drives, move in the direction in which they hold without a bound.
