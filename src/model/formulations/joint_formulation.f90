@@ -206,7 +206,7 @@ contains
       end do
       call self%hold(joints%motions%speed, y)
       call self%find_held_moments(t, y(:self%states))
-      call joints%teeth%shift_boundaries(self%machine%elements, joints%moment_errors(), joints%moment_shift, joints%mode)
+      call joints%shift_boundaries(self%machine%banks, self%machine%elements, t)
       do j = 1, joints%count
         if (is_at_rest(j) .and. joints%mode(j) /= locked) then   ! a drive may leave it a slip in the other direction
           joints%shift(j) = boundary_shift * speed + max(0.0_wp, -direction_of(joints%mode(j)) * self%joint_rate(j, y))

@@ -6,6 +6,7 @@
 module nocdyn_joint_sets
   use nocdyn_bank, only: bank_slot_t
   use nocdyn_bounded_complementarity, only: at_upper, is_free, solve_bounded_complementarity, solve_scaled_complementarity
+  use nocdyn_elements, only: elements_t
   use nocdyn_friction_joints, only: direction_of, friction_joints_t, idle, locked, slips_backwards, &
     slips_forwards
   use nocdyn_held_rows, only: held_rows_t
@@ -14,7 +15,7 @@ module nocdyn_joint_sets
   use nocdyn_kinds, only: wp
   use nocdyn_row_motions, only: new_row_motions
   use nocdyn_switches, only: switches_t
-  use nocdyn_tooth_loads, only: new_tooth_loads
+  use nocdyn_tooth_loads, only: new_tooth_loads, widened
   use nocdyn_tooth_losses, only: tooth_losses_t
   implicit none (type, external)
   private
@@ -40,6 +41,7 @@ module nocdyn_joint_sets
     procedure :: decide
     procedure :: find_impact
     procedure :: note
+    procedure :: shift_boundaries
     procedure :: indicator
     procedure :: follow
     procedure :: is_open
@@ -375,6 +377,25 @@ contains
 
     call self%log%add(joint_event_t(t, joint, from, self%mode(joint), 0.0_wp - slip, self%moment(joint), impulse))
   end subroutine note
+
+  !> Shifts the boundaries of moments, and of the torques of teeth, after a decision.
+  subroutine shift_boundaries(self, banks, elements, t)
+    class(joint_sets_t), intent(inout) :: self
+    type(bank_slot_t), intent(in) :: banks(:)
+    type(elements_t), intent(in) :: elements
+    real(wp), intent(in) :: t   !! [s]
+    integer :: j
+    real(wp) :: inside, least, most, sliding(2)
+
+    call self%teeth%shift_boundaries(elements, self%moment_errors(), self%moment_shift, self%mode)
+    inside = 0.0_wp
+    do j = 1, self%locking
+      if (self%mode(j) /= locked) cycle
+      call find_ranges(self, banks, j, t, least, most, sliding)
+      inside = min(inside, most - self%moment(j), self%moment(j) - least)
+    end do
+    self%moment_shift = widened(self%moment_shift, inside)
+  end subroutine shift_boundaries
 
   !> Positive in the present mode of a joint: its slip, or how far its moment is inside the range [N m]. Teeth that turn change
   !> their mode with the sign of their torque as well.

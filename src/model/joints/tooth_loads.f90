@@ -14,7 +14,7 @@ module nocdyn_tooth_loads
   implicit none (type, external)
   private
 
-  public :: new_tooth_loads
+  public :: new_tooth_loads, widened
 
   real(wp), parameter, public :: mixed = 1.0e-3_wp   !! of the largest terms of equations, in the rounding errors of all of them
 
@@ -202,8 +202,17 @@ contains
     if (first_wheel_drives(mode)) power_of_driver = -power_of_driver
   end function power_of_driver
 
-  !> Shifts the boundaries of T beyond its rounding errors, after a decision. Small slips that it takes for none may have brought
-  !> T across one: this is then shifted twice as far as T is, so that they leave the rest after few more decisions.
+  !> The shift of a boundary beyond rounding errors, or where a value is beyond it after a decision, which takes small slips for
+  !> none, twice as far: they leave the rest after few more decisions.
+  elemental real(wp) function widened(shift, inside)
+    real(wp), intent(in) :: shift    !! by rounding errors
+    real(wp), intent(in) :: inside   !! distance of the value from the boundary, negative beyond it
+    real(wp), parameter :: widest = 1.0e6_wp
+
+    widened = max(shift, min(widest * shift, -2 * inside))
+  end function widened
+
+  !> Shifts the boundaries of T, after a decision.
   pure subroutine shift_boundaries(self, elements, error, least, mode)
     class(tooth_loads_t), intent(inout) :: self
     type(elements_t), intent(in) :: elements
@@ -211,15 +220,12 @@ contains
     real(wp), intent(in) :: least             !! that of the boundaries of all moments [N m]
     integer, intent(in) :: mode(:)            !! of the joints
     real(wp), parameter :: width = 1.0e-11_wp   ! relative to the terms of T
-    real(wp), parameter :: widest = 1.0e6_wp    ! of that by small slips, relative to that by rounding errors
     integer :: i
 
     if (self%count == 0) return
     self%shift(:) = width * matmul(abs(self%by_moment), abs(elements%restoring(1, :)) + abs(elements%applied(1, :)))
     self%shift(:) = max(self%shift, mixed * maxval(self%shift), matmul(abs(self%by_joint), error), least)
-    do i = 1, self%count
-      self%shift(i) = max(self%shift(i), min(widest * self%shift(i), -2 * self%power_of_driver(i, mode(self%joint(i)))))
-    end do
+    self%shift(:) = widened(self%shift, [(self%power_of_driver(i, mode(self%joint(i))), i=1, self%count)])
   end subroutine shift_boundaries
 
 end module nocdyn_tooth_loads
