@@ -62,12 +62,18 @@ def columns(nocdyn, name="campbell.csv"):
     return dict(zip((label.split(" [")[0] for label in header), zip(*rows)))
 
 
-def test_all_commands_have_the_frequency_with_the_field_of_the_motor(nocdyn):
-    modes = result(nocdyn, "modes", COMPRESSOR)
+RELATIVE = COMPRESSOR.replace("damping=1000", "relative_damping=0.06 damping_frequency_hz=15").replace(
+    "damping=600", "relative_damping=0.8 damping_frequency_hz=15"
+)
+
+
+@pytest.mark.parametrize("text", [COMPRESSOR, RELATIVE, RELATIVE.replace("damping_frequency_hz=15", "")])
+def test_all_commands_have_the_frequency_with_the_field_of_the_motor(nocdyn, text):
+    modes = result(nocdyn, "modes", text)
     (wanted,) = [one for one in modes["modes"] if 8.5 < one.get("frequency_Hz", 0) < 12]
     ours = {}
     for command, key in (("campbell", "crossings"), ("response", "critical_speeds")):
-        report = result(nocdyn, command, COMPRESSOR)
+        report = result(nocdyn, command, text)
         (ours[command],) = [
             one for one in report[key] if round(one["order"], 9) == 1 and 500 < one["speed_rad_s"] * 30 / pi < 620
         ]
@@ -236,14 +242,15 @@ MOTORS = {
 }
 
 
+@pytest.mark.parametrize("damping", ["damping=2", "relative_damping=1.5", "relative_damping=1.5 damping_frequency=20"])
 @pytest.mark.parametrize("motor", MOTORS)
-def test_at_the_steady_state_campbell_has_the_modes(nocdyn, motor):
+def test_at_the_steady_state_campbell_has_the_modes(nocdyn, motor, damping):
     text = f"""\
 &body name='m' inertia=0.8 speed=100 /
 &body name='g' inertia=0.5 /
 &body name='f' inertia=6 /
 &coupling name='k' bodies='m','g' stiffness=3000 cubic_stiffness=1e5 damping=3 /
-&coupling name='n' bodies='g','f' stiffness=9000 damping=2 /
+&coupling name='n' bodies='g','f' stiffness=9000 {damping} /
 &motor name='d' body='m' {MOTORS[motor]} /
 &load name='l' body='f' quadratic=0.02 /
 &run t_end=1 /

@@ -5,6 +5,7 @@ module nocdyn_eigenpairs
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_eigen, only: eigenvectors
   use nocdyn_linearisation, only: linearisation_t
+  use nocdyn_relative_damping, only: settle
   implicit none (type, external)
   private
 
@@ -20,19 +21,22 @@ module nocdyn_eigenpairs
 
 contains
 
-  !> Finds all.
-  subroutine find_eigenpairs(linear, self, error)
+  !> Finds all, with the relative damping at the frequency of each oscillation if it is given.
+  subroutine find_eigenpairs(linear, self, error, loss)
     type(linearisation_t), intent(in) :: linear   !! with its matrix
     type(eigenpairs_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
+    real(wp), intent(in), optional :: loss(:)   !! that the matrix has by `add_loss`
     complex(wp), allocatable :: left(:, :), values(:), vectors(:, :)
     integer, allocatable :: kept(:)
     integer :: i, states
-    logical :: has_failed
+    logical :: has_failed, has_loss
 
     states = size(linear%matrix, 1)
     allocate (values(states), vectors(states, states))
-    if (has_internal(linear)) then
+    has_loss = .false.
+    if (present(loss)) has_loss = any(abs(loss) > 0)
+    if (has_internal(linear) .or. has_loss) then
       allocate (left(states, states))
       call eigenvectors(linear%matrix, values, vectors, has_failed, left)
     else
@@ -47,9 +51,10 @@ contains
     kept = pack([(i, i=1, states)], aimag(values) >= 0.0_wp)
     self%value = values(kept)
     self%vector = vectors(:, kept)
+    if (has_loss) call settle(linear, loss, values, vectors, left, kept, self%value, self%vector)
     self%speeds = matmul(cmplx(linear%shapes, kind=wp), self%vector(:size(linear%natural), :))
     allocate (self%internal(size(kept)), source=0)
-    if (.not. allocated(left)) return
+    if (.not. has_internal(linear)) return
     do i = 1, size(kept)
       self%internal(i) = internal_of(linear, left(:, kept(i)) * vectors(:, kept(i)))
     end do
