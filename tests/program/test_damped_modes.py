@@ -90,6 +90,24 @@ def columns_of_mode(nocdyn, mode):
     return columns(nocdyn)[f"undamped_frequency_{mode}"]
 
 
+def test_an_electrical_mode_has_no_margin_and_no_undamped_frequency(nocdyn):
+    text = COMPRESSOR.replace("orders=1,2 amplitudes=900,4200", "orders=1,2,5 amplitudes=900,4200,100")
+    for command, key in (("campbell", "crossings"), ("response", "critical_speeds")):
+        ours = [one for one in result(nocdyn, command, text)[key] if "mostly" in one]
+        assert [one["order"] for one in ours] == pytest.approx([5])
+        assert ours[0]["mostly"] == "stator flux d of motor 'mains'" and ours[0]["is_electrical"]
+        assert not {"is_too_near", "distance_to_operation"} & set(ours[0])
+        assert "  electrical mode  mostly stator flux d of motor 'mains'\n" in nocdyn(command, "machine.nml").stdout
+    numbers = {label[-1] for label in columns(nocdyn) if label.startswith("undamped_")}
+    assert numbers == {str(one["mode"]) for one in json.loads((nocdyn.folder / "out/campbell.json").read_text())["modes"]} - {
+        str(ours[0]["mode"])
+    }
+    modes = result(nocdyn, "modes", text)["modes"]
+    assert [("state" in one) for one in modes] == [("undamped_frequency_Hz" not in one) for one in modes]
+    rows = (nocdyn.folder / "out/modes.csv").read_text().splitlines()[1:]
+    assert [row.split(",")[3] == "" for row in rows] == [("state" in one) for one in modes]
+
+
 @pytest.mark.parametrize("count", [20, 190, 191])
 def test_branches_cross_without_changing_places(nocdyn, count):
     report = result(nocdyn, "campbell", CROSSING.format(count))

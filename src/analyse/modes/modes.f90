@@ -28,8 +28,8 @@ module nocdyn_modes
     integer :: kind = mode_oscillating
     integer :: internal = 0              !! the internal state that takes part most, if they do more than the motion
     complex(wp) :: eigenvalue = 0.0_wp   !! imaginary part >= 0 [1/s]
-    real(wp) :: undamped = 0.0_wp        !! frequency of the most similar undamped mode, negative if that
-                                                  !! diverges [Hz]
+    real(wp) :: undamped = 0.0_wp        !! frequency of the most similar undamped mode, negative if that diverges; of
+                                         !! no meaning for an internal state [Hz]
     complex(wp), allocatable :: shape(:)    !! motion of the bodies, scaled to 1 at the largest, [bodies]
     real(wp), allocatable :: kinetic(:)     !! share of each body in the kinetic energy, [bodies]
     real(wp), allocatable :: potential(:)   !! share of each elastic element in the potential energy, negative if its

@@ -51,7 +51,6 @@ contains
     if (modes%modes == 0 .or. .not. has_shaft_nodes(machine)) return
     do m = 1, modes%modes
       natural(m) = modes%undamped(m, max(1, findloc(modes%exists(m, :), .true., dim=1)))
-      if (modes%internal(m) > 0) natural(m) = 0.0_wp   ! mostly a current, which no node resolves
       errors(m) = shaft_error(machine, modes%shape(:, m), natural(m))
     end do
     if (.not. any(errors > noted_error)) return
