@@ -29,6 +29,7 @@ contains
     real(wp), intent(in), optional :: loss(:)   !! that the matrix has by `add_loss`
     complex(wp), allocatable :: left(:, :), values(:), vectors(:, :)
     integer, allocatable :: kept(:)
+    real(wp), parameter :: small = 1.0e-6_wp   ! of a value, or of the lowest natural frequency: more is no rounding
     integer :: i, states
     logical :: has_failed, has_loss
 
@@ -47,7 +48,7 @@ contains
                  'LAPACK did not converge')
       return
     end if
-    call clear_rounding(values)
+    call clear_rounding(values, small * max(abs(values), minval(abs(linear%natural(linear%flexible)))))
     kept = pack([(i, i=1, states)], aimag(values) >= 0.0_wp)
     self%value = values(kept)
     self%vector = vectors(:, kept)
@@ -79,13 +80,16 @@ contains
   end function internal_of
 
   !> Sets real and imaginary parts to zero that are rounding of the largest number.
-  pure subroutine clear_rounding(values)
+  pure subroutine clear_rounding(values, most)
     complex(wp), intent(inout) :: values(:)
+    real(wp), intent(in), optional :: most(:)   !! larger parts stay, [values]
     real(wp), parameter :: rounding = 1.0e-13_wp
-    real(wp) :: parts(size(values), 2)
+    real(wp) :: limit(size(values)), parts(size(values), 2)
 
     parts = reshape([real(values, wp), aimag(values)], shape(parts))
-    where (abs(parts) <= rounding * maxval(abs(values))) parts = 0.0_wp
+    limit = rounding * maxval(abs(values))
+    if (present(most)) limit = min(limit, most)
+    where (abs(parts) <= spread(limit, 2, 2)) parts = 0.0_wp
     values = cmplx(parts(:, 1), parts(:, 2), wp)
   end subroutine clear_rounding
 

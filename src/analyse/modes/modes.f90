@@ -164,7 +164,7 @@ contains
     class(mode_t), intent(in) :: self
 
     damping_ratio = 0.0_wp
-    if (abs(self%eigenvalue) > 0.0_wp) damping_ratio = -real(self%eigenvalue, wp) / abs(self%eigenvalue)
+    if (abs(self%eigenvalue) > 0.0_wp) damping_ratio = (0.0_wp - real(self%eigenvalue, wp)) / abs(self%eigenvalue)   ! not -0
   end function damping_ratio
 
   !> Time in which the mode decays by the factor e [s], negative if it grows; huge if it does neither.
