@@ -410,7 +410,9 @@ def test_names_that_spreadsheets_would_compute_are_texts_in_tables(nocdyn):
     assert {"'+case", "'-life", "'+1+1", "'@b", "'-k", "plain"} <= seen
 
 
-@pytest.mark.parametrize("cases", ["&load_case name='cut' without='k2' /", "&load_case name='cut' /\n&load_case name='k' with='k2' /"])
+@pytest.mark.parametrize(
+    "cases", ["&load_case name='cut' without='k2' /", "&load_case name='cut' /\n&load_case name='k' with='k2' /"]
+)
 def test_a_limit_belongs_to_the_machines_that_have_its_element(nocdyn, cases):
     nocdyn.write(
         "m.nml",

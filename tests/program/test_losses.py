@@ -396,9 +396,7 @@ def test_forced_vibrations_leave_losses_out_and_say_so(nocdyn):
     for command in ("response", "campbell"):
         outcome = nocdyn(command, path, "--out", "out")
         assert outcome.returncode == 0, outcome.stderr
-        (note,) = [
-            note for note in json.loads((nocdyn.folder / f"out/{command}.json").read_text())["notes"] if "losses" in note
-        ]
+        (note,) = [note for note in json.loads((nocdyn.folder / f"out/{command}.json").read_text())["notes"] if "losses" in note]
         assert f"note: {note}\n" in outcome.stdout
         torque = (2 * 10 + 1) * 0.5 * (1 / 0.9 - 1)  # at 20 rad/s: the load and the friction of the bearing
         words = f"up to {torque:.4g} N m on the first wheel of 'g' at 190.986 rpm"

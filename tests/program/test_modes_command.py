@@ -458,7 +458,9 @@ def test_a_stiffness_that_stands_for_a_rigid_coupling_takes_no_mode_from_the_oth
 """
     stiff = f"&coupling name = 'rigid' bodies = 'a', 'b' stiffness = {stiffness} /"
     for damping in [(0, 0)] + [(20, 3)] * (float(stiffness) < 1e31):
-        wanted = modes_of(nocdyn, text.format("&gear name = 'rigid' bodies = 'a', 'b' teeth = 1, 1 internal = .true. /", *damping))
+        wanted = modes_of(
+            nocdyn, text.format("&gear name = 'rigid' bodies = 'a', 'b' teeth = 1, 1 internal = .true. /", *damping)
+        )
         found = modes_of(nocdyn, text.format(stiff, *damping))
         assert "-0," not in re.sub(r"\s", "", (nocdyn.folder / "out/modes.json").read_text())
         assert [mode["kind"] for mode in found["modes"]] == ["rigid body"] + 3 * ["oscillating"]

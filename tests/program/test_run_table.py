@@ -385,8 +385,18 @@ SHAKEN = """\
     [
         (4, "", 1001, ""),
         (10, "", 5001, "5001 rows for excitation 'x' with 50 Hz, as &output gives no interval"),
-        (10, "&output points=1001 /", 1001, "the rows are 0.01 s apart and do not show the vibration by excitation 'x', up to 50 Hz"),
-        (10, "&output interval=0.02 /", 501, "the rows are 0.02 s apart and do not show the vibration by excitation 'x', up to 50 Hz"),
+        (
+            10,
+            "&output points=1001 /",
+            1001,
+            "the rows are 0.01 s apart and do not show the vibration by excitation 'x', up to 50 Hz",
+        ),
+        (
+            10,
+            "&output interval=0.02 /",
+            501,
+            "the rows are 0.02 s apart and do not show the vibration by excitation 'x', up to 50 Hz",
+        ),
         (10, "&output interval=0.002 /", 5001, ""),
     ],
 )

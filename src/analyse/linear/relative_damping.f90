@@ -54,8 +54,8 @@ contains
   end function undamped_loss
 
   !> Moves oscillations of the first-order matrix to where the relative damping is that at their own frequencies. With the right
-  !> and left eigenvectors v and u and the change D of the matrix, one is x = v_i + sum of v_j u_j^H D x / (value - value_j), of the
-  !> value value_i + u_i^H D x (the perturbation of Brillouin and Wigner). What does not settle stays as it is.
+  !> and left eigenvectors v and u and the change D of the matrix, one is x = v_i + sum of v_j u_j^H D x / (value - value_j), with
+  !> the value value_i + u_i^H D x (the perturbation of Brillouin and Wigner). What does not settle stays as it is.
   subroutine settle(linear, loss, values, vectors, left, chosen, value, vector)
     type(linearisation_t), intent(in) :: linear
     real(wp), intent(in) :: loss(:)                        !! that of `add_loss`

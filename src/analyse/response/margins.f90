@@ -1,5 +1,5 @@
-!> How far critical speeds are from the speeds in operation, and what their modes are. A mode that is mostly a current or a flux has
-!> no margin: no order excites it as it does a motion of the bodies.
+!> How far critical speeds are from the speeds in operation, and what their modes are. A mode that is mostly a current or a flux
+!> has no margin: no order excites it as it does a motion of the bodies.
 module nocdyn_margins
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
