@@ -68,7 +68,7 @@ contains
     complex(wp) :: next, part(size(values), size(chosen)), share(size(values), size(chosen))
     complex(wp) :: lefts(size(linear%natural), size(values)), motion(size(linear%natural), size(chosen))
     real(wp), allocatable :: at_one(:, :), start(:, :)   ! the loss of the modes at the frequency 1 and at theirs
-    real(wp) :: change(size(chosen))
+    real(wp), dimension(size(chosen)) :: change, frequency
     integer :: i, j, n, round
 
     n = size(linear%natural)
@@ -84,8 +84,8 @@ contains
     change = merge(1.0_wp, 0.0_wp, aimag(value) > 0)
     do round = 1, most_rounds
       motion = matmul(vectors(:n, :), share)
-      part = matmul(conjg(transpose(lefts)), matmul(start, motion) &
-                    - matmul(at_one, motion) / spread(max(aimag(value), tiny(same)), 1, n))
+      frequency = merge(aimag(value), 1.0_wp, aimag(value) > 0)
+      part = matmul(conjg(transpose(lefts)), matmul(start, motion) - matmul(at_one, motion) / spread(frequency, 1, n))
       do i = 1, size(chosen)
         if (change(i) <= accuracy) cycle
         next = values(chosen(i)) + part(chosen(i), i)
