@@ -285,3 +285,31 @@ def test_at_the_steady_state_campbell_has_the_modes(nocdyn, motor, damping):
     assert len(ours) >= 2
     for one, same in zip(ours, theirs, strict=True):
         assert one == pytest.approx(same, rel=1e-6)
+
+
+def lossy_machine(seed):
+    """A tree of springs with relative damping, up to such that hardly oscillates; some have two branches alike."""
+    dice = random.Random(seed)
+    bodies = dice.randint(2, 9)
+    text = "".join(f"&body name='b{i}' inertia={10 ** dice.uniform(-1, 1):.6g} /\n" for i in range(bodies))
+    largest = dice.choice([0.01, 0.3, 1.5])
+    for i in range(1, bodies):
+        other = i - 1 if dice.random() < 0.6 else dice.randrange(i)
+        text += f"&coupling name='k{i}' bodies='b{other}','b{i}' stiffness={10 ** dice.uniform(3, 5):.6g} "
+        is_lossy = dice.random() < 0.8
+        text += f"relative_damping={largest * dice.uniform(0.2, 4):.4g} /\n" if is_lossy else ""
+        text += "" if is_lossy else f"damping={10 ** dice.uniform(-1, 1.5):.4g} /\n"
+    for name in "pq" if dice.random() < 0.4 else "":
+        text += f"&body name='{name}' inertia=0.7 /\n"
+        text += f"&coupling name='t{name}' bodies='b0','{name}' stiffness=2e4 relative_damping={largest} /\n"
+    return text + "&response body='b0' speed=10,20 count=2 orders=1 /\n&run t_end=1 /\n"
+
+
+@pytest.mark.parametrize("seed", [24, 29, 103, 112, *range(MACHINES)])
+def test_modes_and_campbell_agree_on_relative_damping(nocdyn, seed):
+    modes = [one for one in result(nocdyn, "modes", lossy_machine(seed))["modes"] if one["kind"] == "oscillating"]
+    found = result(nocdyn, "campbell", lossy_machine(seed))["modes"]
+    table = columns(nocdyn)
+    ours = sorted((table[f"frequency_{one['mode']}"][0], table[f"damping_ratio_{one['mode']}"][0]) for one in found)
+    for one, same in zip(ours, sorted((one["frequency_Hz"], one["damping_ratio"]) for one in modes), strict=True):
+        assert one == pytest.approx(same, rel=1e-9)

@@ -159,7 +159,7 @@ contains
       slopes%rate_internal = state%rate_internal
       call fill_matrix(response%machine%elements%internal, slopes, linear)
       call add_loss(state%stiffness * response%loss_factor, linear)
-      call find_eigenpairs(linear, pairs, error)
+      call find_eigenpairs(linear, pairs, error, state%stiffness * response%loss_factor)
     end associate
   end subroutine find_start
 

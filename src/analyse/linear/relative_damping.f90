@@ -68,7 +68,7 @@ contains
     complex(wp) :: next, part(size(values), size(chosen)), share(size(values), size(chosen))
     complex(wp) :: lefts(size(linear%natural), size(values)), motion(size(linear%natural), size(chosen))
     real(wp), allocatable :: at_one(:, :), start(:, :)   ! the loss of the modes at the frequency 1 and at theirs
-    real(wp), dimension(size(chosen)) :: change, frequency
+    real(wp) :: change(size(chosen)), frequency(size(chosen)), pace
     integer :: i, j, n, round
 
     n = size(linear%natural)
@@ -86,6 +86,7 @@ contains
       motion = matmul(vectors(:n, :), share)
       frequency = merge(aimag(value), 1.0_wp, aimag(value) > 0)
       part = matmul(conjg(transpose(lefts)), matmul(start, motion) - matmul(at_one, motion) / spread(frequency, 1, n))
+      pace = merge(1.0_wp, 0.5_wp, round <= most_rounds / 5)   ! what swings to and fro settles at the lower one
       do i = 1, size(chosen)
         if (change(i) <= accuracy) cycle
         next = values(chosen(i)) + part(chosen(i), i)
@@ -93,8 +94,8 @@ contains
         value(i) = next
         do j = 1, size(values)
           if (j == chosen(i)) cycle
-          share(j, i) = 0.0_wp
-          if (abs(values(j) - next) > same * abs(next)) share(j, i) = part(j, i) / (next - values(j))
+          share(j, i) = (1.0_wp - pace) * share(j, i)
+          if (abs(values(j) - next) > same * abs(next)) share(j, i) = share(j, i) + pace * part(j, i) / (next - values(j))
         end do
       end do
       if (all(change <= accuracy)) exit
