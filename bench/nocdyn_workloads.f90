@@ -69,7 +69,7 @@ program nocdyn_workloads
   use nocdyn_machine, only: machine_t
   use nocdyn_methods, only: method_names
   use nocdyn_solver_status, only: failure_message, integration_done, solver_status_t
-  use nocdyn_output_times, only: output_times
+  use nocdyn_output_times, only: output_times, row_count
   use nocdyn_text, only: string_t
   implicit none (type, external)
 
@@ -98,7 +98,7 @@ contains
     if (allocated(error)) call give_up(error%message)
     run = input%single('run')
     call new_formulation(run%text('formulation'), machine, formulation, with_energy_balance=.false.)
-    times = output_times(input)
+    times = output_times(input, row_count(input))
     settings%method = text_argument(2)
     settings%rtol = number_argument(3)
     settings%atol = number_argument(4)

@@ -63,6 +63,7 @@ class Critical:
     frequency: float
     distance: float
     is_too_near: bool
+    is_electrical: bool = False
 
     @property
     def name(self) -> str:
@@ -271,7 +272,8 @@ def _critical(entry: dict) -> Critical:
     distance = entry.get("distance_to_operation", math.nan)
     line = Line(entry["order"], True) if "order" in entry else Line(entry["frequency_Hz"], False)
     speed = rpm(entry["speed_rad_s"])
-    return Critical(entry["mode"], line, speed, entry["frequency_Hz"], distance, entry.get("is_too_near", False))
+    judged = entry.get("is_too_near", False), entry.get("is_electrical", False)
+    return Critical(entry["mode"], line, speed, entry["frequency_Hz"], distance, *judged)
 
 
 def _barred(entry: dict) -> Barred:

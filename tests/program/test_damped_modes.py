@@ -62,12 +62,18 @@ def columns(nocdyn, name="campbell.csv"):
     return dict(zip((label.split(" [")[0] for label in header), zip(*rows)))
 
 
-def test_all_commands_have_the_frequency_with_the_field_of_the_motor(nocdyn):
-    modes = result(nocdyn, "modes", COMPRESSOR)
+RELATIVE = COMPRESSOR.replace("damping=1000", "relative_damping=0.06 damping_frequency_hz=15").replace(
+    "damping=600", "relative_damping=0.8 damping_frequency_hz=15"
+)
+
+
+@pytest.mark.parametrize("text", [COMPRESSOR, RELATIVE, RELATIVE.replace("damping_frequency_hz=15", "")])
+def test_all_commands_have_the_frequency_with_the_field_of_the_motor(nocdyn, text):
+    modes = result(nocdyn, "modes", text)
     (wanted,) = [one for one in modes["modes"] if 8.5 < one.get("frequency_Hz", 0) < 12]
     ours = {}
     for command, key in (("campbell", "crossings"), ("response", "critical_speeds")):
-        report = result(nocdyn, command, COMPRESSOR)
+        report = result(nocdyn, command, text)
         (ours[command],) = [
             one for one in report[key] if round(one["order"], 9) == 1 and 500 < one["speed_rad_s"] * 30 / pi < 620
         ]
@@ -82,6 +88,24 @@ def test_all_commands_have_the_frequency_with_the_field_of_the_motor(nocdyn):
 
 def columns_of_mode(nocdyn, mode):
     return columns(nocdyn)[f"undamped_frequency_{mode}"]
+
+
+def test_an_electrical_mode_has_no_margin_and_no_undamped_frequency(nocdyn):
+    text = COMPRESSOR.replace("orders=1,2 amplitudes=900,4200", "orders=1,2,5 amplitudes=900,4200,100")
+    for command, key in (("campbell", "crossings"), ("response", "critical_speeds")):
+        ours = [one for one in result(nocdyn, command, text)[key] if "mostly" in one]
+        assert [one["order"] for one in ours] == pytest.approx([5])
+        assert ours[0]["mostly"] == "stator flux d of motor 'mains'" and ours[0]["is_electrical"]
+        assert not {"is_too_near", "distance_to_operation"} & set(ours[0])
+        assert "  electrical mode  mostly stator flux d of motor 'mains'\n" in nocdyn(command, "machine.nml").stdout
+    numbers = {label[-1] for label in columns(nocdyn) if label.startswith("undamped_")}
+    assert numbers == {str(one["mode"]) for one in json.loads((nocdyn.folder / "out/campbell.json").read_text())["modes"]} - {
+        str(ours[0]["mode"])
+    }
+    modes = result(nocdyn, "modes", text)["modes"]
+    assert [("state" in one) for one in modes] == [("undamped_frequency_Hz" not in one) for one in modes]
+    rows = (nocdyn.folder / "out/modes.csv").read_text().splitlines()[1:]
+    assert [row.split(",")[3] == "" for row in rows] == [("state" in one) for one in modes]
 
 
 @pytest.mark.parametrize("count", [20, 190, 191])
@@ -236,14 +260,15 @@ MOTORS = {
 }
 
 
+@pytest.mark.parametrize("damping", ["damping=2", "relative_damping=1.5", "relative_damping=1.5 damping_frequency=20"])
 @pytest.mark.parametrize("motor", MOTORS)
-def test_at_the_steady_state_campbell_has_the_modes(nocdyn, motor):
+def test_at_the_steady_state_campbell_has_the_modes(nocdyn, motor, damping):
     text = f"""\
 &body name='m' inertia=0.8 speed=100 /
 &body name='g' inertia=0.5 /
 &body name='f' inertia=6 /
 &coupling name='k' bodies='m','g' stiffness=3000 cubic_stiffness=1e5 damping=3 /
-&coupling name='n' bodies='g','f' stiffness=9000 damping=2 /
+&coupling name='n' bodies='g','f' stiffness=9000 {damping} /
 &motor name='d' body='m' {MOTORS[motor]} /
 &load name='l' body='f' quadratic=0.02 /
 &run t_end=1 /
@@ -260,3 +285,31 @@ def test_at_the_steady_state_campbell_has_the_modes(nocdyn, motor):
     assert len(ours) >= 2
     for one, same in zip(ours, theirs, strict=True):
         assert one == pytest.approx(same, rel=1e-6)
+
+
+def lossy_machine(seed):
+    """A tree of springs with relative damping, up to such that hardly oscillates; some have two branches alike."""
+    dice = random.Random(seed)
+    bodies = dice.randint(2, 9)
+    text = "".join(f"&body name='b{i}' inertia={10 ** dice.uniform(-1, 1):.6g} /\n" for i in range(bodies))
+    largest = dice.choice([0.01, 0.3, 1.5])
+    for i in range(1, bodies):
+        other = i - 1 if dice.random() < 0.6 else dice.randrange(i)
+        text += f"&coupling name='k{i}' bodies='b{other}','b{i}' stiffness={10 ** dice.uniform(3, 5):.6g} "
+        is_lossy = dice.random() < 0.8
+        text += f"relative_damping={largest * dice.uniform(0.2, 4):.4g} /\n" if is_lossy else ""
+        text += "" if is_lossy else f"damping={10 ** dice.uniform(-1, 1.5):.4g} /\n"
+    for name in "pq" if dice.random() < 0.4 else "":
+        text += f"&body name='{name}' inertia=0.7 /\n"
+        text += f"&coupling name='t{name}' bodies='b0','{name}' stiffness=2e4 relative_damping={largest} /\n"
+    return text + "&response body='b0' speed=10,20 count=2 orders=1 /\n&run t_end=1 /\n"
+
+
+@pytest.mark.parametrize("seed", [24, 29, 103, 112, *range(MACHINES)])
+def test_modes_and_campbell_agree_on_relative_damping(nocdyn, seed):
+    modes = [one for one in result(nocdyn, "modes", lossy_machine(seed))["modes"] if one["kind"] == "oscillating"]
+    found = result(nocdyn, "campbell", lossy_machine(seed))["modes"]
+    table = columns(nocdyn)
+    ours = sorted((table[f"frequency_{one['mode']}"][0], table[f"damping_ratio_{one['mode']}"][0]) for one in found)
+    for one, same in zip(ours, sorted((one["frequency_Hz"], one["damping_ratio"]) for one in modes), strict=True):
+        assert one == pytest.approx(same, rel=1e-9)

@@ -7,9 +7,12 @@ import pytest
 from random_trains import random_train
 
 TRAINS = int(os.environ.get("NOCDYN_RANDOM_TRAINS", "20"))
+HARD = [118, 653, 740, 926]  # joints without a load beside small slips
+HARD += [327]  # few of many combinations of modes fit
+HARD += [889, 1158, 1369]  # teeth that jam by what others do
 
 
-@pytest.mark.parametrize("seed", range(TRAINS))
+@pytest.mark.parametrize("seed", sorted({*range(TRAINS), *HARD}))
 def test_runs_of_random_trains_go_to_their_end(nocdyn, seed):
     outcome = nocdyn("run", nocdyn.write("train.nml", random_train(seed)), "--out", "out")
     assert outcome.returncode == 0, outcome.stderr

@@ -408,3 +408,35 @@ def test_names_that_spreadsheets_would_compute_are_texts_in_tables(nocdyn):
                 assert cell[:1] not in ("=", "+", "@") and (cell[:1] != "-" or float(cell) <= 0), (path, cell)
                 seen.add(cell)
     assert {"'+case", "'-life", "'+1+1", "'@b", "'-k", "plain"} <= seen
+
+
+@pytest.mark.parametrize(
+    "cases", ["&load_case name='cut' without='k2' /", "&load_case name='cut' /\n&load_case name='k' with='k2' /"]
+)
+def test_a_limit_belongs_to_the_machines_that_have_its_element(nocdyn, cases):
+    nocdyn.write(
+        "m.nml",
+        f"""\
+&body name='a' inertia=1 speed=10 /
+&body name='b' inertia=2 speed=10 /
+&coupling name='k1' bodies='a','b' stiffness=1e4 damping=1 /
+&coupling name='k2' bodies='a','b' stiffness=1e4 damping=1 /
+&excitation name='x' body='a' kind='orders' orders=1 amplitudes=10 /
+&limit coupling='k2' moment=1e-3 /
+&response body='a' speed=5,50 count=10 /
+&run t_end=0.01 /
+{cases}
+""",
+    )
+    for command in ("check", "run", "modes", "response", "campbell", "equilibrium"):
+        for case in ((), ("--case", "cut")):
+            outcome = nocdyn(command, "m.nml", *case)
+            assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert nocdyn("run", "m.nml", "--out", "out").returncode == 0
+    limited = {folder.name: "limits" in nocdyn.summary(f"out/{folder.name}") for folder in (nocdyn.folder / "out").glob("*/")}
+    assert limited == {"cut": False} | ({"k": True} if "'k'" in cases else {})
+    text = (nocdyn.folder / "m.nml").read_text()
+    nocdyn.write("m.nml", text.replace("&limit coupling='k2'", "&limit coupling='k3'"))
+    for command in ("check", "run", "modes", "response"):
+        unknown = nocdyn(command, "m.nml", "--case", "cut")
+        assert (unknown.returncode, unknown.stderr.count("there is no coupling 'k3'")) == (2, 1)

@@ -442,3 +442,28 @@ def test_the_files_of_a_large_machine_have_the_shapes_of_its_first_modes(nocdyn)
     rows = list(csv.reader((nocdyn.folder / "out/modes.csv").read_text().splitlines()))
     assert {len(row) for row in rows} == {8 + 3 * count}
     assert rows[told][8] != "" and set(rows[told + 1][8:]) == {""}
+
+
+@pytest.mark.parametrize("stiffness", ["1e18", "1e26", "1e30", "1e40"])
+def test_a_stiffness_that_stands_for_a_rigid_coupling_takes_no_mode_from_the_others(nocdyn, stiffness):
+    text = """\
+&body name = 'a' inertia = 1 /
+&body name = 'b' inertia = 2 /
+&body name = 'c' inertia = 3 /
+&body name = 'd' inertia = 1 /
+{}
+&coupling name = 'k1' bodies = 'b', 'c' stiffness = 1e4 damping = {} /
+&coupling name = 'k2' bodies = 'c', 'd' stiffness = 2e3 damping = {} /
+&run t_end = 1 /
+"""
+    stiff = f"&coupling name = 'rigid' bodies = 'a', 'b' stiffness = {stiffness} /"
+    for damping in [(0, 0)] + [(20, 3)] * (float(stiffness) < 1e31):
+        wanted = modes_of(
+            nocdyn, text.format("&gear name = 'rigid' bodies = 'a', 'b' teeth = 1, 1 internal = .true. /", *damping)
+        )
+        found = modes_of(nocdyn, text.format(stiff, *damping))
+        assert "-0," not in re.sub(r"\s", "", (nocdyn.folder / "out/modes.json").read_text())
+        assert [mode["kind"] for mode in found["modes"]] == ["rigid body"] + 3 * ["oscillating"]
+        for one, same in zip(found["modes"][1:3], wanted["modes"][1:3]):
+            assert one["frequency_Hz"] == pytest.approx(same["frequency_Hz"], rel=1e-9 if damping == (0, 0) else 1e-3)
+            assert one["damping_ratio"] == pytest.approx(same["damping_ratio"], rel=1e-2)

@@ -368,3 +368,51 @@ def test_an_interval_beyond_the_end_is_noted(nocdyn):
     assert note.strip().removeprefix("note: ") in nocdyn.summary("out")["machine"]["notes"]
     assert f"  {note}" in nocdyn("check", CASE_2, *override).stdout
     assert "note" not in nocdyn("check", CASE_2, "--set", "output.interval=10").stdout
+
+
+SHAKEN = """\
+&body name='a' inertia=1 /
+&body name='b' inertia=1 /
+&coupling name='k' bodies='a','b' stiffness=1e5 damping=0.5 /
+&excitation name='x' body='a' amplitude=10 frequency_hz=50 /
+&run t_end={} /
+{}
+"""
+
+
+@pytest.mark.parametrize(
+    ("t_end", "output", "rows", "note"),
+    [
+        (4, "", 1001, ""),
+        (10, "", 5001, "5001 rows for excitation 'x' with 50 Hz, as &output gives no interval"),
+        (
+            10,
+            "&output points=1001 /",
+            1001,
+            "the rows are 0.01 s apart and do not show the vibration by excitation 'x', up to 50 Hz",
+        ),
+        (
+            10,
+            "&output interval=0.02 /",
+            501,
+            "the rows are 0.02 s apart and do not show the vibration by excitation 'x', up to 50 Hz",
+        ),
+        (10, "&output interval=0.002 /", 5001, ""),
+    ],
+)
+def test_rows_show_the_fastest_excitation_where_the_input_gives_none(nocdyn, t_end, output, rows, note):
+    assert nocdyn("run", nocdyn.write("m.nml", SHAKEN.format(t_end, output)), "--out", "out").returncode == 0
+    assert len(nocdyn.table("out")[1]) == rows
+    (found,) = [one for one in nocdyn.summary("out")["machine"]["notes"] if "rows" in one] or [""]
+    assert found.startswith(note) and bool(found) == bool(note)
+
+
+def test_check_predicts_the_size_of_the_rows_that_a_run_chooses(nocdyn):
+    more = "".join(f"&body name='c{i}' inertia=1 /\n&coupling name='d{i}' bodies='a','c{i}' stiffness=1e5 /\n" for i in range(20))
+
+    def size(output):
+        outcome = nocdyn("check", nocdyn.write("m.nml", more + SHAKEN.format(200, output)))
+        return [line for line in outcome.stdout.splitlines() if "trajectory" in line]
+
+    assert size("") == size("&output points=100001 /") and len(size("")) == 1
+    assert size("&output points=1001 /") == []

@@ -100,3 +100,40 @@ def test_notes_of_the_author_must_be_there_and_are_not_named_beside_the_results(
     copy = f90nml.read(nocdyn.folder / "results/a/input.nml")["case"]
     assert copy["author"] == "A. Smith"
     assert "notes_file" not in copy
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        b"-1.5 -2.5\n0.1 0.2\n10 3\n",
+        b"-1.5,-2.5\r\n0.1,0.2\r\n10,3\r\n",
+        b"-1.5\t-2.5\n0.1\t0.2\n10\t3",
+        b"-1.5;-2.5\n0.1;0.2\n10;3\n",
+        b"\xef\xbb\xbf-1,5;-2,5\r\n0,1;0,2\r\n10;3\r\n",
+        b"\xef\xbb\xbfsep=;\r\n-1,5;-2,5\r\n0,1;0,2\r\n10;3\r\n",
+        b"SEP=,\r\n-1.5,-2.5\r\n0.1,0.2\r\n10,3\r\n",
+        b"sep=\t\n-1,5\t-2,5\n0,1\t0,2\n10\t3\n",
+    ],
+)
+def test_tables_of_spreadsheets_are_read(nocdyn, table):
+    path = write(nocdyn, table)
+    assert nocdyn("run", path, "--out", "out").returncode == 0
+    load = f90nml.read(nocdyn.folder / "out/input.nml")["load"]
+    assert (load["table_speed"], load["table_torque"]) == ([-1.5, 0.1, 10.0], [-2.5, 0.2, 3.0])
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        (b"speed;torque\n-1;2\n0;1\n", ":1: column 1, 'speed', is not a number; a line with names of columns must begin with #"),
+        (b"-1,5,2\n0,1,3\n", ":1: 3 columns in '-1,5,2'; needed: 2, separated by blanks or a comma; with decimal commas by semi"),
+        (b"-1;2;\n0;1;\n", ":1: 3 columns in '-1;2;'; needed: 2, separated by semicolons as in other lines"),
+        (b"-1;2\n0,1\n", ":2: 1 column in '0,1'; needed: 2, separated by semicolons as in other lines"),
+        ("-1 2\n0 1\n".encode("utf-16"), ": not a text file"),
+        (b'"-1","2"\n"0","1"\n', ":1: column 1, '\"-1\"', is not a number"),
+    ],
+)
+def test_tables_of_another_format_have_one_clear_message(nocdyn, table, message):
+    outcome = nocdyn("check", write(nocdyn, table))
+    assert outcome.returncode == 2
+    assert f"/in/tables/load.csv{message}" in outcome.stderr.splitlines()[0]

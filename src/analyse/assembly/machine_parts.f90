@@ -118,7 +118,7 @@ contains
       if (input%groups(g)%text('kind') == 'orders') call check_order_torques(input, g, error)
       if (input%groups(g)%text('kind') == 'fault') call check_fault(input, g, error)
     case ('limit')
-      if (.not. allocated(input%load_case)) call check_limit(input, g, error)   ! a load case may lack the element
+      call check_limit(input, g, error)
     case ('response')
       call check_response_range(input, g, error)
     case ('fatigue')

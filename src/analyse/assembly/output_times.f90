@@ -87,9 +87,8 @@ contains
   end function output_note
 
   !> The number of the requested times.
-  pure integer function row_count(input, wanted)
-    type(input_t), intent(in) :: input          !! that `check_output_times` accepts
-    integer, intent(in), optional :: wanted     !! at least so many where the input asks for no number and no interval
+  pure integer function row_count(input)
+    type(input_t), intent(in) :: input   !! that `check_output_times` accepts
     type(group_t) :: output, run
     real(wp) :: rounding   ! of the times [s]
 
@@ -102,29 +101,26 @@ contains
       end associate
     else
       row_count = output%whole_number('points')
-      if (present(wanted) .and. .not. output%is_given('points')) row_count = max(row_count, wanted)
     end if
   end function row_count
 
   !> The requested times: a row at t_start, one every `interval`, and one at t_end; or `points` rows evenly spaced.
-  pure function output_times(input, wanted) result(times)
-    type(input_t), intent(in) :: input          !! that `check_output_times` accepts
-    integer, intent(in), optional :: wanted     !! as in `row_count`
+  pure function output_times(input, rows) result(times)
+    type(input_t), intent(in) :: input         !! that `check_output_times` accepts
+    integer, intent(in) :: rows                !! their number; an interval of the input has its own, that of `row_count`
     real(wp), allocatable :: times(:)
     type(group_t) :: output, run
-    integer :: i, intervals
+    integer :: i
 
     output = input%single('output')
     run = input%single('run')
     associate (t_start => run%number('t_start'), t_end => run%number('t_end'))
       if (output%has_value('interval')) then
         associate (interval => output%number('interval'))
-          intervals = row_count(input) - 1
-          times = [(t_start + i * interval, i=0, intervals)]
+          times = [(t_start + i * interval, i=0, rows - 1)]
         end associate
       else
-        intervals = row_count(input, wanted) - 1
-        times = [(t_start + (t_end - t_start) * i / intervals, i=0, intervals)]
+        times = [(t_start + (t_end - t_start) * i / (rows - 1), i=0, rows - 1)]
       end if
       times(size(times)) = t_end
     end associate

@@ -70,6 +70,7 @@ contains
       if (allocated(error)) return
     end if
     call set_modes(tracks, self)
+    self%is_electrical = [(response%machine%is_electrical(self%internal(m)), m=1, self%modes)]
   end subroutine new_speed_modes
 
   !> Connects the modes of two points, and finds those of all points between.
@@ -261,6 +262,7 @@ contains
     self%damping_ratio = -real(tracks%value(order, :), wp) / max(abs(tracks%value(order, :)), tiny(1.0_wp))
     self%undamped = tracks%undamped(order, :)
     self%internal = tracks%internal(order)
+    where (spread(self%internal, 2, size(self%undamped, 2)) > 0) self%undamped = 0.0_wp
     self%twists = tracks%twists(:, order)
     self%divergence = tracks%divergence
     allocate (self%shape(size(tracks%shape, 1), self%modes))

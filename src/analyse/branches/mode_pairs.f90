@@ -14,6 +14,7 @@ module nocdyn_mode_pairs
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_complex, only: complex_solve
   use nocdyn_linearisation, only: fill_matrix, linearisation_t, slopes_t, undamped_modes
+  use nocdyn_relative_damping, only: add_loss
   implicit none (type, external)
   private
 
@@ -142,16 +143,13 @@ contains
               self%twist(size(self%state%stiffness), modes), self%angle(response%machine%bodies, modes))
   end subroutine set_sizes
 
-  !> The eigenvalues of the first-order system. Its damping matrix has the relative damping of the undamped modes, and between two
-  !> of them that at the mean of their frequencies.
+  !> The eigenvalues of the first-order system.
   subroutine find_start(response, self, pairs, error)
     type(forced_response_t), intent(in) :: response
     type(mode_pairs_t), intent(inout) :: self
     type(eigenpairs_t), intent(out) :: pairs
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: loss(:), scaled(:, :)
     type(slopes_t) :: slopes
-    integer :: m
 
     associate (state => self%state, linear => self%linear)
       slopes%damping = state%damping - response%loss_damping
@@ -160,18 +158,8 @@ contains
       slopes%rate_speed = state%rate_speed
       slopes%rate_internal = state%rate_internal
       call fill_matrix(response%machine%elements%internal, slopes, linear)
-      loss = state%stiffness * response%loss_factor
-      if (any(abs(loss) > 0)) then
-        scaled = linear%twists
-        do m = 1, size(linear%natural)
-          scaled(:, m) = 0.0_wp
-          if (abs(linear%natural(m)) > 0) scaled(:, m) = linear%twists(:, m) / sqrt(abs(linear%natural(m)))
-        end do
-        associate (rates => linear%matrix(:size(linear%natural), :size(linear%natural)))
-          rates = rates - matmul(transpose(scaled), spread(loss, 2, size(linear%natural)) * scaled)
-        end associate
-      end if
-      call find_eigenpairs(linear, pairs, error)
+      call add_loss(state%stiffness * response%loss_factor, linear)
+      call find_eigenpairs(linear, pairs, error, state%stiffness * response%loss_factor)
     end associate
   end subroutine find_start
 

@@ -11,10 +11,11 @@ module nocdyn_campbell
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: sort_ascending
   use nocdyn_machine, only: machine_t
+  use nocdyn_margins, only: operating_distance
   use nocdyn_mode_branches, only: new_speed_modes
   use nocdyn_mode_pairs, only: most_modes
   use nocdyn_response_notes, only: note_shaft_modes, note_simplifications, note_steady_states
-  use nocdyn_response_settings, only: operating_distance, place_error, read_response_settings, response_settings_t
+  use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
   use nocdyn_speed_modes, only: most_coordinates, speed_modes_t
   use nocdyn_text, only: append, string_t, to_text
   use nocdyn_unstable_speeds, only: find_unstable, note_speeds, unstable_speed_t
@@ -34,7 +35,6 @@ module nocdyn_campbell
     real(wp), allocatable :: frequency(:, :)         !! [rad/s], [lines, points]
     type(crossing_t), allocatable :: crossings(:)
     real(wp), allocatable :: distance(:)             !! of each crossing to the speeds in operation, as a share; 0 inside
-    logical, allocatable :: is_too_near(:)           !! whether it is within the margin
     type(unstable_speed_t), allocatable :: unstable(:)   !! speeds at which a mode grows
     type(string_t), allocatable :: notes(:)
   end type campbell_t
@@ -73,10 +73,7 @@ contains
     call note_speeds(self%response, self%unstable, 'nothing stays near the steady state there', self%notes)
     call note_steady_states(self%settings, self%response, self%notes)
     call note_shaft_modes(machine, self%modes, self%crossings, .true., self%notes)
-    allocate (self%distance(size(self%crossings)), self%is_too_near(size(self%crossings)))
-    do i = 1, size(self%crossings)
-      call operating_distance(self%settings, self%crossings(i)%speed, self%distance(i), self%is_too_near(i))
-    end do
+    self%distance = [(operating_distance(self%settings, self%crossings(i)%speed), i=1, size(self%crossings))]
   end subroutine analyse_campbell
 
   !> The orders that the input names, excited or not; else the lines of the excitations.

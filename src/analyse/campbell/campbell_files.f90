@@ -5,6 +5,7 @@ module nocdyn_campbell_files
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
+  use nocdyn_margins, only: put_margin, put_mode
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: turn_labels
   use nocdyn_text, only: append, rounded_text, string_t, to_text
@@ -35,9 +36,11 @@ contains
     do m = 1, self%modes%modes
       call append(labels, 'damping_ratio_' // to_text(m) // ' [1]')
     end do
-    do m = 1, self%modes%modes
-      call append(labels, 'undamped_frequency_' // to_text(m) // ' [Hz]')
-    end do
+    associate (motions => pack([(m, m=1, self%modes%modes)], self%modes%internal == 0))
+      do m = 1, size(motions)
+        call append(labels, 'undamped_frequency_' // to_text(motions(m)) // ' [Hz]')
+      end do
+    end associate
     do l = 1, size(self%order)
       call append(labels, line_name(self, l) // ' [Hz]')
     end do
@@ -47,7 +50,8 @@ contains
     do i = 1, size(self%speed)
       row(1) = self%speed(i)
       row(2:) = [from_si(self%modes%frequency(:, i), unit_hz), self%modes%damping_ratio(:, i), &
-                 from_si(self%modes%undamped(:, i), unit_hz), from_si(self%frequency(:, i), unit_hz)]
+                 from_si(pack(self%modes%undamped(:, i), self%modes%internal == 0), unit_hz), &
+                 from_si(self%frequency(:, i), unit_hz)]
       call write_row(file, from_si(row, unit))
     end do
   end subroutine put_campbell_csv
@@ -89,7 +93,7 @@ contains
     end associate
     call json%open_list('modes')
     do i = 1, self%modes%modes
-      call put_mode(json, self, i)
+      call put_branch(json, self, i)
     end do
     call json%close_list()
     call json%open_list('crossings')
@@ -108,8 +112,7 @@ contains
 
     associate (crossing => self%crossings(i))
       call json%open()
-      call json%put('mode', crossing%mode)
-      call put_what(json, self, crossing%mode)
+      call put_mode(json, self%response%machine, self%modes, crossing%mode)
       if (self%is_order(crossing%line)) then
         call json%put('order', self%order(crossing%line))
       else
@@ -118,40 +121,27 @@ contains
       call json%put('speed_rad_s', crossing%speed)
       call json%put('frequency_Hz', from_si(crossing%frequency, unit_hz))
       call json%put('damping_ratio', crossing%damping_ratio)
-      if (size(self%settings%operating) > 0) then
-        call json%put('distance_to_operation', self%distance(i))
-        call json%put('is_too_near', self%is_too_near(i))
-      end if
+      call put_margin(json, self%settings, self%modes, crossing%mode, self%distance(i))
       call json%close()
     end associate
   end subroutine put_crossing
 
-  !> The internal state that a mode mostly is.
-  subroutine put_what(json, self, mode)
-    type(json_t), intent(inout) :: json
-    type(campbell_t), intent(in) :: self
-    integer, intent(in) :: mode
-
-    if (self%modes%internal(mode) > 0) then
-      call json%put('mostly', self%response%machine%internal_name(self%modes%internal(mode)))
-    end if
-  end subroutine put_what
-
   !> Frequencies at both ends of the range, and the shape at the lowest speed.
-  subroutine put_mode(json, self, mode)
+  subroutine put_branch(json, self, mode)
     type(json_t), intent(inout) :: json
     type(campbell_t), intent(in) :: self
     integer, intent(in) :: mode
 
     call json%open()
-    call json%put('mode', mode)
-    call put_what(json, self, mode)
+    call put_mode(json, self%response%machine, self%modes, mode)
     associate (ends => [1, size(self%speed)])
       call json%put('frequency_Hz', from_si(self%modes%frequency(mode, ends), unit_hz))
-      call json%put('undamped_frequency_Hz', from_si(self%modes%undamped(mode, ends), unit_hz))
+      if (self%modes%internal(mode) == 0) then
+        call json%put('undamped_frequency_Hz', from_si(self%modes%undamped(mode, ends), unit_hz))
+      end if
     end associate
     call json%put('shape', self%modes%shape(:size(self%modes%shape, 1) - self%response%machine%nodes, mode))
     call json%close()
-  end subroutine put_mode
+  end subroutine put_branch
 
 end module nocdyn_campbell_files

@@ -2,6 +2,7 @@
 module nocdyn_campbell_report
   use nocdyn_campbell, only: campbell_t
   use nocdyn_kinds, only: wp
+  use nocdyn_margins, only: margin_text, mode_text
   use nocdyn_table_text, only: cell
   use nocdyn_text, only: counted, rounded_text, to_text
   use nocdyn_text_buffer, only: text_buffer_t
@@ -33,14 +34,13 @@ contains
                             cell('lowest [Hz]') // cell('highest [Hz]') // cell('damping ratio') // cell('highest') &
                             // cell('undamped [Hz]') // cell('highest'))
     do m = 1, min(self%modes%modes, most_modes)
-      associate (natural => from_si(self%modes%frequency(m, :), unit_hz), exists => self%modes%exists(m, :), &
-                 undamped => from_si(self%modes%undamped(m, :), unit_hz))
+      associate (natural => from_si(self%modes%frequency(m, :), unit_hz), exists => self%modes%exists(m, :))
         call report%append_line('  ' // repeat(' ', 4 - len(to_text(m))) // to_text(m) // cell(natural(1)) // &
                                 cell(natural(last)) // cell(minval(natural, mask=exists)) // cell(maxval(natural)) // &
                                 cell(rounded_text(minval(self%modes%damping_ratio(m, :), mask=exists), 3)) // &
                                 cell(rounded_text(maxval(self%modes%damping_ratio(m, :), mask=exists), 3)) // &
-                                cell(minval(undamped, mask=exists)) // cell(maxval(undamped, mask=exists)) // &
-                                what_text(self, m))
+                                undamped_cells(self, m) // &
+                                mode_text(self%response%machine, self%modes, m))
       end associate
     end do
     if (self%modes%modes > most_modes) then
@@ -50,17 +50,18 @@ contains
     text = report%text()
   end function campbell_text
 
-  !> "  mostly armature current of motor 'drive'".
-  function what_text(self, mode) result(text)
+  !> The lowest and highest undamped frequency of a mode; empty for one that is mostly an internal state.
+  function undamped_cells(self, mode) result(text)
     type(campbell_t), intent(in) :: self
     integer, intent(in) :: mode
     character(len=:), allocatable :: text
 
-    text = ''
-    if (self%modes%internal(mode) > 0) then
-      text = '  mostly ' // self%response%machine%internal_name(self%modes%internal(mode))
-    end if
-  end function what_text
+    text = cell('') // cell('')
+    if (self%modes%internal(mode) > 0) return
+    associate (undamped => from_si(self%modes%undamped(mode, :), unit_hz), exists => self%modes%exists(mode, :))
+      text = cell(minval(undamped, mask=exists)) // cell(maxval(undamped, mask=exists))
+    end associate
+  end function undamped_cells
 
   function rpm(speed) result(text)
     real(wp), intent(in) :: speed   !! [rad/s]
@@ -91,15 +92,8 @@ contains
           line = line // cell(self%response%lines(crossing%line)%word())
         end if
         line = line // cell(rpm(crossing%speed)) // cell(from_si(crossing%frequency, unit_hz))
-        if (size(self%settings%operating) > 0) then
-          if (self%distance(i) <= 0) then
-            line = line // '  in operation'
-          else
-            line = line // '  ' // rounded_text(100.0_wp * self%distance(i), 3) // ' %'
-            if (self%is_too_near(i)) line = line // ', too near'
-          end if
-        end if
-        line = line // what_text(self, crossing%mode)
+        line = line // margin_text(self%settings, self%modes, crossing%mode, self%distance(i)) // &
+               mode_text(self%response%machine, self%modes, crossing%mode)
         call report%append_line(line)
       end associate
     end do

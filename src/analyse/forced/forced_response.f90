@@ -11,6 +11,7 @@ module nocdyn_forced_response
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_complex, only: complex_solve
   use nocdyn_machine, only: machine_t
+  use nocdyn_relative_damping, only: find_losses
   use nocdyn_response_points, only: keep_points, merge_points, response_point_t
   use nocdyn_moment_forms, only: list_moment_forms, moment_form_t
   use nocdyn_signals, only: list_signals, signal_angle, signal_t
@@ -69,7 +70,7 @@ contains
     self%machine = machine
     call new_held_speeds(machine, reference, self%held, error)
     if (allocated(error)) return
-    call gather_losses(self)
+    call find_losses(machine, self%loss_factor, self%loss_damping)
     if (size(speeds) > 1) then
       call hold_first(self%held, speeds(size(speeds):1:-1), high, error)
     else
@@ -110,21 +111,6 @@ contains
       return
     end do
   end subroutine hold_first
-
-  !> Collects the loss factors of the banks.
-  subroutine gather_losses(self)
-    type(forced_response_t), intent(inout) :: self
-    integer :: b
-
-    allocate (self%loss_factor(self%machine%elements%count), self%loss_damping(self%machine%elements%count), source=0.0_wp)
-    do b = 1, size(self%machine%banks)
-      associate (bank => self%machine%banks(b)%bank)
-        if (.not. allocated(bank%loss_factor)) cycle
-        self%loss_factor(bank%first:bank%last()) = bank%loss_factor
-        self%loss_damping(bank%first:bank%last()) = bank%loss_damping
-      end associate
-    end do
-  end subroutine gather_losses
 
   !> Computes the response at more speeds, and puts it between the others. Speeds without a steady state are left out, unless all
   !> are.

@@ -5,6 +5,7 @@ module nocdyn_eigenpairs
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_eigen, only: eigenvectors
   use nocdyn_linearisation, only: linearisation_t
+  use nocdyn_relative_damping, only: settle
   implicit none (type, external)
   private
 
@@ -20,19 +21,23 @@ module nocdyn_eigenpairs
 
 contains
 
-  !> Finds all.
-  subroutine find_eigenpairs(linear, self, error)
+  !> Finds all, with the relative damping at the frequency of each oscillation if it is given.
+  subroutine find_eigenpairs(linear, self, error, loss)
     type(linearisation_t), intent(in) :: linear   !! with its matrix
     type(eigenpairs_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
+    real(wp), intent(in), optional :: loss(:)   !! that the matrix has by `add_loss`
     complex(wp), allocatable :: left(:, :), values(:), vectors(:, :)
     integer, allocatable :: kept(:)
+    real(wp), parameter :: small = 1.0e-6_wp   ! of a value, or of the lowest natural frequency: more is no rounding
     integer :: i, states
-    logical :: has_failed
+    logical :: has_failed, has_loss
 
     states = size(linear%matrix, 1)
     allocate (values(states), vectors(states, states))
-    if (has_internal(linear)) then
+    has_loss = .false.
+    if (present(loss)) has_loss = any(abs(loss) > 0)
+    if (has_internal(linear) .or. has_loss) then
       allocate (left(states, states))
       call eigenvectors(linear%matrix, values, vectors, has_failed, left)
     else
@@ -43,13 +48,14 @@ contains
                  'LAPACK did not converge')
       return
     end if
-    call clear_rounding(values)
+    call clear_rounding(values, small * max(abs(values), minval(abs(linear%natural(linear%flexible)))))
     kept = pack([(i, i=1, states)], aimag(values) >= 0.0_wp)
     self%value = values(kept)
     self%vector = vectors(:, kept)
+    if (has_loss) call settle(linear, loss, values, vectors, left, kept, self%value, self%vector)
     self%speeds = matmul(cmplx(linear%shapes, kind=wp), self%vector(:size(linear%natural), :))
     allocate (self%internal(size(kept)), source=0)
-    if (.not. allocated(left)) return
+    if (.not. has_internal(linear)) return
     do i = 1, size(kept)
       self%internal(i) = internal_of(linear, left(:, kept(i)) * vectors(:, kept(i)))
     end do
@@ -74,13 +80,16 @@ contains
   end function internal_of
 
   !> Sets real and imaginary parts to zero that are rounding of the largest number.
-  pure subroutine clear_rounding(values)
+  pure subroutine clear_rounding(values, most)
     complex(wp), intent(inout) :: values(:)
+    real(wp), intent(in), optional :: most(:)   !! larger parts stay, [values]
     real(wp), parameter :: rounding = 1.0e-13_wp
-    real(wp) :: parts(size(values), 2)
+    real(wp) :: limit(size(values)), parts(size(values), 2)
 
     parts = reshape([real(values, wp), aimag(values)], shape(parts))
-    where (abs(parts) <= rounding * maxval(abs(values))) parts = 0.0_wp
+    limit = rounding * maxval(abs(values))
+    if (present(most)) limit = min(limit, most)
+    where (abs(parts) <= spread(limit, 2, 2)) parts = 0.0_wp
     values = cmplx(parts(:, 1), parts(:, 2), wp)
   end subroutine clear_rounding
 

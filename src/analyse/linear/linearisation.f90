@@ -18,6 +18,7 @@ module nocdyn_linearisation
   use nocdyn_formulation, only: formulation_t
   use nocdyn_friction_joints, only: locked
   use nocdyn_kinds, only: wp
+  use nocdyn_lapack, only: pivoted_rank
   use nocdyn_lapack_eigen, only: cholesky_factor, singular_vectors, solve_triangular, symmetric_eigenvectors
   use nocdyn_machine, only: machine_t
   use nocdyn_system, only: pattern_t
@@ -27,9 +28,8 @@ module nocdyn_linearisation
 
   public :: fill_matrix, linearise, mass_matrix, tangent_stiffness, undamped_modes
 
-  !> A mode is rigid if its natural frequency is below these shares of the highest one: the rounding of singular
-  !> values and of eigenvalues, which are squares.
-  real(wp), parameter :: rigid_share = 1.0e-12_wp, rigid_share_of_squares = 1.0e-13_wp
+  !> With negative stiffnesses, a mode is rigid if the square of its natural frequency is below this share of the highest one.
+  real(wp), parameter :: rigid_share_of_squares = 1.0e-13_wp
 
   !> How the moments of the elements and the rates of their internal states change beside the stiffness.
   type, public :: slopes_t
@@ -171,7 +171,8 @@ contains
     type(linearisation_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
     integer, intent(in), optional :: held(:)           !! elements that do not turn; absent: none
-    real(wp), allocatable :: factor(:, :), flexibility(:, :), free(:, :)
+    real(wp), allocatable :: factor(:, :), flexibility(:, :), free(:, :), rates(:, :)
+    integer, allocatable :: rows(:)   ! elements that keep a motion from being rigid
     logical :: has_failed
     integer :: e, i
 
@@ -184,16 +185,25 @@ contains
         call raise(error, exit_failed, 'rounding makes the mass matrix of this machine singular: its inertias differ too much')
         return
       end if
-      flexibility = scaled_rates(incidence, elastic, sqrt(abs(self%stiffness(elastic))), factor)
+      flexibility = scaled_rates(incidence, elastic, sqrt(abs(self%stiffness(elastic))), f)
+      if (size(elastic) > 0) call solve_triangular(factor, flexibility, from_right=.true.)
+      rows = elastic
       has_failed = .false.
       if (present(held)) then
-        if (size(held) > 0) call find_free(scaled_rates(incidence, held, spread(1.0_wp, 1, size(held)), factor), free, has_failed)
+        rows = [elastic, held]
+        if (size(held) > 0) then
+          rates = scaled_rates(incidence, held, spread(1.0_wp, 1, size(held)), f)
+          call solve_triangular(factor, rates, from_right=.true.)
+          call find_free(rates, free, has_failed)
+        end if
       end if
       if (allocated(free)) flexibility = matmul(flexibility, free)
       associate (modes => size(flexibility, 2))
         allocate (self%shapes(modes, modes), self%natural(modes), source=0.0_wp)
       end associate
-      if (.not. has_failed) call solve_undamped(flexibility, self%stiffness(elastic), self, has_failed)
+      if (.not. has_failed) call solve_undamped(flexibility, self%stiffness(elastic), &
+                                                f - rank_of(scaled_rates(incidence, rows, spread(1.0_wp, 1, size(rows)), f)), &
+                                                self, has_failed)
       if (has_failed) then
         call raise(error, exit_failed, 'the natural frequencies were not found: they are not finite, or LAPACK did not converge')
         return
@@ -209,13 +219,13 @@ contains
     end do
   end subroutine undamped_modes
 
-  !> The rates of elements by the coordinates x = R q, times a factor each, [elements, coordinates].
-  function scaled_rates(incidence, elements, scale, factor) result(rates)
+  !> The rates of elements by the coordinates, times a factor each, [elements, coordinates].
+  function scaled_rates(incidence, elements, scale, coordinates) result(rates)
     type(element_coordinates_t), intent(in) :: incidence
     integer, intent(in) :: elements(:)
     real(wp), intent(in) :: scale(:)                 !! [elements]
-    real(wp), contiguous, intent(in) :: factor(:, :) !! R, [coordinates, coordinates]
-    real(wp) :: rates(size(elements), size(factor, 1))
+    integer, intent(in) :: coordinates
+    real(wp) :: rates(size(elements), coordinates)
     integer :: e, i
 
     rates = 0.0_wp
@@ -224,8 +234,18 @@ contains
         rates(i, incidence%coordinate(e)) = incidence%ratio(1, e) * scale(i)
       end do
     end do
-    if (size(elements) > 0) call solve_triangular(factor, rates, from_right=.true.)
   end function scaled_rates
+
+  !> The number of independent rates.
+  integer function rank_of(rates) result(rank)
+    real(wp), intent(in) :: rates(:, :)             !! [elements, coordinates]
+    real(wp), parameter :: rounding = 1.0e-10_wp    ! relative
+    integer :: pivots(size(rates, 2))
+
+    rank = 0
+    if (size(rates) > 0) call pivoted_rank(rates / spread(max(norm2(rates, 2), tiny(1.0_wp)), 2, size(rates, 2)), rounding, &
+                                           rank, pivots)
+  end function rank_of
 
   !> Orthonormal motions that leave joints at rest, [coordinates, motions].
   subroutine find_free(rates, free, has_failed)
@@ -244,9 +264,10 @@ contains
   end subroutine find_free
 
   !> Natural frequencies, ascending, and orthonormal modes of B^T diag(sign of k) B.
-  subroutine solve_undamped(b, stiffness, self, has_failed)
+  subroutine solve_undamped(b, stiffness, rigid, self, has_failed)
     real(wp), contiguous, intent(in) :: b(:, :)   !! B = diag(sqrt(|k|)) U R^-1, [elastic elements, coordinates]
     real(wp), intent(in) :: stiffness(:)          !! k [N m/rad], [elastic elements]
+    integer, intent(in) :: rigid                  !! number of the motions without any twist
     type(linearisation_t), intent(inout) :: self
     logical, intent(out) :: has_failed   !! whether LAPACK did not converge
     logical :: is_rigid(size(self%natural))
@@ -260,7 +281,7 @@ contains
         call singular_vectors(b, natural, self%shapes, has_failed)
         natural = natural(n:1:-1)
         self%shapes = self%shapes(:, n:1:-1)
-        is_rigid = natural <= rigid_share * natural(n)
+        is_rigid = [(i <= rigid, i=1, n)] .or. natural <= 0
       else
         call symmetric_eigenvectors(matmul(transpose(b), spread(sign(1.0_wp, stiffness), 2, n) * b), natural, &
                                     self%shapes, has_failed)

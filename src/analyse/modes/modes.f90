@@ -5,6 +5,7 @@ module nocdyn_modes
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: linearisation_t
+  use nocdyn_relative_damping, only: add_loss, find_losses
   implicit none (type, external)
   private
 
@@ -27,8 +28,8 @@ module nocdyn_modes
     integer :: kind = mode_oscillating
     integer :: internal = 0              !! the internal state that takes part most, if they do more than the motion
     complex(wp) :: eigenvalue = 0.0_wp   !! imaginary part >= 0 [1/s]
-    real(wp) :: undamped = 0.0_wp        !! frequency of the most similar undamped mode, negative if that
-                                                  !! diverges [Hz]
+    real(wp) :: undamped = 0.0_wp        !! frequency of the most similar undamped mode, negative if that diverges; of
+                                         !! no meaning for an internal state [Hz]
     complex(wp), allocatable :: shape(:)    !! motion of the bodies, scaled to 1 at the largest, [bodies]
     real(wp), allocatable :: kinetic(:)     !! share of each body in the kinetic energy, [bodies]
     real(wp), allocatable :: potential(:)   !! share of each elastic element in the potential energy, negative if its
@@ -47,10 +48,19 @@ contains
     type(mode_t), allocatable, intent(out) :: modes(:)
     type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
     complex(wp), allocatable :: twists(:, :)
+    real(wp), allocatable :: damping(:), loss(:)
     type(eigenpairs_t) :: pairs
+    type(linearisation_t) :: lossy
     integer :: i
 
-    call find_eigenpairs(linear, pairs, error)
+    call find_losses(formulation%machine, loss, damping)
+    loss = linear%stiffness * loss
+    lossy = linear
+    associate (rates => lossy%matrix(:size(linear%natural), :size(linear%natural)))
+      rates = rates + matmul(transpose(linear%twists), spread(damping, 2, size(linear%natural)) * linear%twists)
+    end associate
+    call add_loss(loss, lossy)
+    call find_eigenpairs(lossy, pairs, error, loss)
     if (allocated(error)) return
     call find_twists(linear, elastic, pairs%vector, twists)
     allocate (modes(size(pairs%value)))
@@ -154,7 +164,7 @@ contains
     class(mode_t), intent(in) :: self
 
     damping_ratio = 0.0_wp
-    if (abs(self%eigenvalue) > 0.0_wp) damping_ratio = -real(self%eigenvalue, wp) / abs(self%eigenvalue)
+    if (abs(self%eigenvalue) > 0.0_wp) damping_ratio = (0.0_wp - real(self%eigenvalue, wp)) / abs(self%eigenvalue)   ! not -0
   end function damping_ratio
 
   !> Time in which the mode decays by the factor e [s], negative if it grows; huge if it does neither.

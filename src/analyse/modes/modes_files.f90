@@ -61,8 +61,9 @@ contains
     type(text_buffer_t), intent(inout) :: table
 
     if (mode%kind == mode_oscillating) call table%append(to_text(number))
-    call table%append(',' // trim(kind_names(mode%kind)) // ',' // to_text(mode%frequency()) // ',' // &
-                      to_text(mode%undamped) // ',' // to_text(mode%damping_ratio()) // ',')
+    call table%append(',' // trim(kind_names(mode%kind)) // ',' // to_text(mode%frequency()) // ',')
+    if (mode%internal == 0) call table%append(to_text(mode%undamped))
+    call table%append(',' // to_text(mode%damping_ratio()) // ',')
     if (mode%time_constant() < huge(1.0_wp)) call table%append(to_text(mode%time_constant()))
     call put_values([real(mode%eigenvalue, wp), aimag(mode%eigenvalue)], table)
     if (has_shape) then
@@ -196,7 +197,7 @@ contains
       call json%put('kind', trim(kind_names(mode%kind)))
       if (mode%internal > 0) call json%put('state', self%machine%internal_name(mode%internal))
       call json%put('frequency_Hz', mode%frequency())
-      call json%put('undamped_frequency_Hz', mode%undamped)
+      if (mode%internal == 0) call json%put('undamped_frequency_Hz', mode%undamped)
       if (allocated(self%shaft_errors) .and. mode%kind == mode_oscillating) then
         call json%put('error_by_shaft_nodes', self%shaft_errors(i))
       end if

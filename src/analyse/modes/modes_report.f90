@@ -104,7 +104,7 @@ contains
       end do
       allocate (self%shaft_errors(size(self%modes)), source=0.0_wp)
       do i = 1, size(self%modes)
-        if (self%modes(i)%kind /= mode_oscillating) cycle
+        if (self%modes(i)%kind /= mode_oscillating .or. self%modes(i)%internal > 0) cycle
         self%shaft_errors(i) = errors(minloc(abs(from_si(linear%natural, unit_hz) - self%modes(i)%undamped), dim=1))
       end do
     end associate
@@ -195,7 +195,7 @@ contains
       associate (mode => self%modes(chosen(i)))
         if (has_rpm) rpm = cell(from_si(in_si(mode%frequency(), unit_hz), unit_rpm))
         call report%append_line(repeat(' ', number_width - len(to_text(i))) // to_text(i) // cell(mode%frequency()) // rpm // &
-                                cell(mode%undamped) // cell(mode%damping_ratio()) // time_cell(mode) // '  ' // &
+                                undamped_cell(mode) // cell(mode%damping_ratio()) // time_cell(mode) // '  ' // &
                                 padded(shares_text(mode%kinetic, self%kinetic_names), width) // '  ' // &
                                 shares_text(mode%potential, self%elastic_names) // internal_text(self, mode) // &
                                 shaft_text(self, chosen(i)) // &
@@ -227,6 +227,14 @@ contains
     text = ''
     if (mode%internal > 0) text = '; mostly ' // self%machine%internal_name(mode%internal)
   end function internal_text
+
+  function undamped_cell(mode) result(text)
+    type(mode_t), intent(in) :: mode
+    character(len=cell_width) :: text
+
+    text = cell('')
+    if (mode%internal == 0) text = cell(mode%undamped)
+  end function undamped_cell
 
   function time_cell(mode) result(text)
     type(mode_t), intent(in) :: mode

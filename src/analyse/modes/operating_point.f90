@@ -10,7 +10,7 @@ module nocdyn_operating_point
   use nocdyn_literals, only: literal_ok, read_real
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: new_reduced
-  use nocdyn_run_settings, only: choose_settings, find_lossy_element
+  use nocdyn_run_settings, only: choose_settings
   use nocdyn_solve, only: solve
   use nocdyn_text, only: append, string_t, to_text
   implicit none (type, external)
@@ -39,7 +39,6 @@ contains
     type(operating_point_t), intent(out) :: point
     type(error_t), allocatable, intent(out) :: error
     type(group_t) :: run
-    character(len=:), allocatable :: lossy
     real(wp) :: time
 
     if (2 * machine%coordinates%freedoms > max_states) then
@@ -59,10 +58,6 @@ contains
       call read_time(input, run, at, time, error)
       if (.not. allocated(error)) call use_time(input, machine, time, point, error)
     end select
-    if (allocated(error)) return
-    call find_lossy_element(input, machine, lossy)
-    if (lossy /= '') call append(point%notes, 'relative damping without damping_frequency is no part of these modes; ' // &
-                                              'nocdyn campbell has it')
   end subroutine find_operating_point
 
   !> Reads a time of the run.

@@ -5,6 +5,7 @@ module nocdyn_response_files
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
+  use nocdyn_margins, only: put_margin, put_mode
   use nocdyn_output_file, only: output_file_t
   use nocdyn_response_analysis, only: response_analysis_t
   use nocdyn_response_limits, only: no_limit, response_limit_t
@@ -324,10 +325,7 @@ contains
     type(critical_t), intent(in) :: critical
 
     call json%open()
-    call json%put('mode', critical%crossing%mode)
-    associate (internal => analysis%modes%internal(critical%crossing%mode))
-      if (internal > 0) call json%put('mostly', analysis%response%machine%internal_name(internal))
-    end associate
+    call put_mode(json, analysis%response%machine, analysis%modes, critical%crossing%mode)
     call put_line(json, analysis, critical%crossing%line)
     call json%put('speed_rad_s', critical%crossing%speed)
     call json%put('frequency_Hz', critical%crossing%frequency / turn)
@@ -342,10 +340,7 @@ contains
         if (critical%ratio > 0) call json%put('ratio_to_limit', critical%ratio)
       end if
     end if
-    if (size(analysis%settings%operating) > 0) then
-      call json%put('distance_to_operation', critical%margin)
-      call json%put('is_too_near', critical%is_too_near)
-    end if
+    call put_margin(json, analysis%settings, analysis%modes, critical%crossing%mode, critical%margin)
     call json%close()
   end subroutine put_critical
 

@@ -9,7 +9,7 @@ module nocdyn_response_limits
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_limit_groups, only: check_limit, limited_kind
+  use nocdyn_limit_groups, only: limited_kind
   use nocdyn_moment_forms, only: kind_along, kind_moment, kind_stress, moment_form_t
   use nocdyn_signals, only: find_signal
   use nocdyn_text, only: quoted
@@ -52,10 +52,9 @@ contains
     do i = 1, size(groups)
       before = size(limits)
       kind = limited_kind(input%groups(groups(i)))
-      call check_limit(input, groups(i), error)
-      if (.not. allocated(error)) call add_moment_limits(input%groups(groups(i)), groups(i), trim(kind), quantities, limits)
-      if (.not. allocated(error)) call add_quantity_limit(input%groups(groups(i)), groups(i), trim(kind), quantities, limits)
-      if (.not. allocated(error)) call add_stress_limits(input, groups(i), trim(kind), quantities, limits, error)
+      call add_moment_limits(input%groups(groups(i)), groups(i), trim(kind), quantities, limits)
+      call add_quantity_limit(input%groups(groups(i)), groups(i), trim(kind), quantities, limits)
+      call add_stress_limits(input, groups(i), trim(kind), quantities, limits, error)
       if (allocated(error)) return
       if (size(limits) > before .or. input%groups(groups(i))%has_value('quantity')) cycle
       if (kind == 'mesh') then

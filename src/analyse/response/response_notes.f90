@@ -5,8 +5,9 @@ module nocdyn_response_notes
   use nocdyn_element_sets, only: element_names
   use nocdyn_forced_response, only: forced_response_t
   use nocdyn_gap_couplings, only: gap_couplings_t
+  use nocdyn_held_speeds, only: held_state_t
   use nocdyn_input, only: input_t
-  use nocdyn_joint_texts, only: describe_losses
+  use nocdyn_joint_texts, only: allowed_torques
   use nocdyn_kinds, only: wp
   use nocdyn_linear_ranges, only: excursion_t, find_excursions
   use nocdyn_machine, only: machine_t
@@ -15,7 +16,8 @@ module nocdyn_response_notes
   use nocdyn_response_settings, only: response_settings_t
   use nocdyn_shaft_errors, only: describe_error, has_shaft_nodes, noted_error, shaft_error
   use nocdyn_speed_modes, only: speed_modes_t
-  use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
+  use nocdyn_text, only: append, joined, quoted, rounded_text, string_t, to_text
+  use nocdyn_tooth_losses, only: tooth_losses_t
   use nocdyn_units, only: from_si, unit_hz, unit_rpm
   implicit none (type, external)
   private
@@ -29,11 +31,8 @@ contains
   subroutine note_simplifications(machine, notes)
     type(machine_t), intent(in) :: machine
     type(string_t), allocatable, intent(out) :: notes(:)
-    character(len=:), allocatable :: lossy
 
     allocate (notes, source=machine%simplifications)
-    call describe_losses(machine, lossy)
-    if (lossy /= '') call append(notes, 'the losses of ' // lossy // ' are left out')
     call note_ended_excitations(machine, notes)
   end subroutine note_simplifications
 
@@ -51,7 +50,6 @@ contains
     if (modes%modes == 0 .or. .not. has_shaft_nodes(machine)) return
     do m = 1, modes%modes
       natural(m) = modes%undamped(m, max(1, findloc(modes%exists(m, :), .true., dim=1)))
-      if (modes%internal(m) > 0) natural(m) = 0.0_wp   ! mostly a current, which no node resolves
       errors(m) = shaft_error(machine, modes%shape(:, m), natural(m))
     end do
     if (.not. any(errors > noted_error)) return
@@ -102,6 +100,7 @@ contains
                          to_text(size(response%points)) // ' speeds: there a torque on the body of &response holds the ' // &
                          'speed, the column drive_torque')
     end if
+    call note_losses(response, notes)
     call note_drive(response, notes)
     call note_range(settings, notes)
   end subroutine note_steady_states
@@ -119,6 +118,61 @@ contains
       end associate
     end do
   end function steepest_slopes
+
+  !> Teeth with losses, and the largest torque that these take from a first wheel at its mean torque.
+  subroutine note_losses(response, notes)
+    type(forced_response_t), intent(in) :: response
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    integer, parameter :: most_names = 5
+    integer :: b, e, i, worst, worst_point
+    real(wp) :: largest, lost
+    type(string_t), allocatable :: names(:)
+
+    allocate (names(0))
+    largest = -1.0_wp
+    do b = 1, size(response%machine%banks)
+      select type (bank => response%machine%banks(b)%bank)
+      class is (tooth_losses_t)
+        do e = 1, bank%count
+          call append(names, bank%names(e)%text)
+          do i = 1, size(response%points)
+            lost = lost_torque(response, bank, e, response%points(i)%state)
+            if (lost <= largest) cycle
+            largest = lost
+            worst = size(names)
+            worst_point = i
+          end do
+        end do
+      end select
+    end do
+    if (size(names) == 0) return
+    call append(notes, 'the losses of ' // joined(names, ', ', most_names) // ' are left out, at the mean torques up to ' // &
+                       rounded_text(largest, 4) // ' N m on the first wheel of ' // quoted(names(worst)%text) // ' at ' // &
+                       rounded_text(from_si(response%points(worst_point)%state%speed, unit_rpm), 6) // ' rpm')
+  end subroutine note_losses
+
+  !> The torque that teeth would take from their first wheel in a steady state [N m].
+  pure real(wp) function lost_torque(response, losses, element, state) result(lost)
+    type(forced_response_t), intent(in) :: response
+    type(tooth_losses_t), intent(in) :: losses
+    integer, intent(in) :: element              !! numbered within the bank
+    type(held_state_t), intent(in) :: state
+    integer :: q
+    real(wp) :: share, slope, torque
+
+    q = size(response%quantities) - response%machine%constraints%rows() + losses%row(element)
+    if (losses%row(element) == 0) then
+      do q = 1, size(response%quantities)
+        if (response%quantities(q)%kind == kind_moment .and. &
+            response%quantities(q)%element == losses%names(element)%text) exit
+      end do
+    end if
+    associate (one => response%quantities(q), speed => state%rate(losses%first - 1 + element))
+      torque = losses%factor(element) * (sum(one%weight(1, :) * state%mean(one%elements)) + one%by_held_torque * state%torque)
+      call losses%share(element, torque * speed < 0, speed, share, slope)
+    end associate
+    lost = abs(share * torque)
+  end function lost_torque
 
   !> Drives that would have to be stronger than they are, and supplies that follow the speed.
   subroutine note_drive(response, notes)
@@ -240,6 +294,7 @@ contains
     type(forced_response_t), intent(in) :: response
     type(string_t), allocatable, intent(inout) :: notes(:)
     real(wp), parameter :: rounding = 1.0e-9_wp
+    character(len=:), allocatable :: allowed
     integer :: i, q, row, slipping, worst
     real(wp) :: excess, most
 
@@ -261,11 +316,12 @@ contains
           worst = i
         end do
         if (slipping == 0) cycle
+        call allowed_torques(constraints%least(row), constraints%most(row), allowed)
         call append(notes, constraints%kinds(row)%text // ' ' // quoted(constraints%names(row)%text) // ' does not hold at ' // &
                            to_text(slipping) // ' of ' // to_text(size(points)) // ' speeds: locked it would carry up to ' // &
                            rounded_text(points(worst)%peak(q), 4) // ' N m at ' // &
-                           rounded_text(from_si(points(worst)%state%speed, unit_rpm), 6) // ' rpm, ' // &
-                           rounded_text(most, 4) // ' N m more than allowed; nocdyn run gives the motion')
+                           rounded_text(from_si(points(worst)%state%speed, unit_rpm), 6) // ' rpm; allowed: ' // &
+                           allowed // ' N m; nocdyn run gives the motion')
       end do
     end associate
   end subroutine note_overloads

@@ -1,6 +1,7 @@
 !> The printed report of a forced response: critical speeds, the largest synthesis of every coupling, barred ranges.
 module nocdyn_response_report
   use nocdyn_kinds, only: wp
+  use nocdyn_margins, only: margin_text, mode_text
   use nocdyn_response_analysis, only: response_analysis_t
   use nocdyn_response_points, only: response_point_t
   use nocdyn_response_summary, only: critical_t, response_summary_t
@@ -116,9 +117,9 @@ contains
     if (critical%stress > 0) stress = rounded_text(critical%stress / mega, 4)
     if (has_stress) line = line // cell(stress)
     if (has_ratio) line = line // cell(ratio_text(critical%ratio))
-    if (size(analysis%settings%operating) > 0) line = line // '  ' // margin_text(critical)
-    associate (internal => analysis%modes%internal(critical%crossing%mode))
-      if (internal > 0) line = line // '  mostly ' // analysis%response%machine%internal_name(internal)
+    associate (modes => analysis%modes, mode => critical%crossing%mode)
+      line = line // margin_text(analysis%settings, modes, mode, critical%margin) // &
+             mode_text(analysis%response%machine, modes, mode)
     end associate
     call report%append_line(trim(line))
   end subroutine put_critical
@@ -142,19 +143,6 @@ contains
     text = ''
     if (ratio > 0) text = rounded_text(100.0_wp * ratio, 3) // ' %'
   end function ratio_text
-
-  !> "12 %", "in operation".
-  function margin_text(critical) result(text)
-    type(critical_t), intent(in) :: critical
-    character(len=:), allocatable :: text
-
-    if (critical%margin <= 0) then
-      text = 'in operation'
-    else
-      text = rounded_text(100.0_wp * critical%margin, 3) // ' %'
-      if (critical%is_too_near) text = text // ', too near'
-    end if
-  end function margin_text
 
   pure function right(text, width)
     character(len=*), intent(in) :: text

@@ -12,7 +12,7 @@ module nocdyn_response_settings
   implicit none (type, external)
   private
 
-  public :: check_response, operating_distance, place_error, read_response_settings
+  public :: check_response, place_error, read_response_settings
 
   type, public :: response_settings_t
     integer :: group = 0                        !! &response in the input
@@ -88,22 +88,6 @@ contains
     is_in_file = size(groups) > 0
     if (is_in_file) is_in_file = input%groups(groups(1))%ordinal > 0
   end function is_in_file
-
-  !> Distance of a critical speed to the speeds in operation, as a share of the nearer one.
-  pure subroutine operating_distance(settings, speed, distance, is_too_near)
-    type(response_settings_t), intent(in) :: settings
-    real(wp), intent(in) :: speed          !! [rad/s]
-    real(wp), intent(out) :: distance      !! 0 between the speeds in operation, and if there are none
-    logical, intent(out) :: is_too_near    !! whether it is between them, or nearer than the margin
-
-    distance = 0.0_wp
-    is_too_near = .false.
-    associate (operating => abs(settings%operating))
-      if (size(operating) == 0) return
-      distance = max(0.0_wp, (operating(1) - abs(speed)) / operating(1), (abs(speed) - operating(2)) / operating(2))
-    end associate
-    is_too_near = distance < settings%margin .or. distance <= 0
-  end subroutine operating_distance
 
   !> Begins a message with the place in the input and, where a computation failed, with the speed.
   subroutine place_error(input, settings, speed, error)

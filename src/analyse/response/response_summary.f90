@@ -4,11 +4,11 @@ module nocdyn_response_summary
   use nocdyn_critical_speeds, only: crossing_t, undamped
   use nocdyn_forced_response, only: forced_response_t
   use nocdyn_kinds, only: wp
+  use nocdyn_margins, only: operating_distance
   use nocdyn_response_analysis, only: response_analysis_t
   use nocdyn_response_limits, only: no_limit, response_limit_t
   use nocdyn_response_points, only: response_point_t
   use nocdyn_moment_forms, only: kind_moment, kind_reaction, kind_stress
-  use nocdyn_response_settings, only: operating_distance
   implicit none (type, external)
   private
 
@@ -25,7 +25,6 @@ module nocdyn_response_summary
     real(wp) :: ratio = 0.0_wp         !! of the response of this quantity to its limits there, 0 without limits
     logical :: is_unbounded = .false.  !! without damping there is no finite response
     real(wp) :: margin = 0.0_wp        !! distance to the speeds in operation as a share of the nearest of them; 0 inside
-    logical :: is_too_near = .false.   !! whether this is less than the margin that is asked for
   end type critical_t
 
   !> Where a quantity has its largest half range and its largest peak.
@@ -64,9 +63,7 @@ contains
     do i = 1, size(self%criticals)
       self%criticals(i)%crossing = analysis%crossings(i)
       call find_peak(analysis, self%criticals(i))
-      associate (critical => self%criticals(i))
-        call operating_distance(analysis%settings, critical%crossing%speed, critical%margin, critical%is_too_near)
-      end associate
+      self%criticals(i)%margin = operating_distance(analysis%settings, analysis%crossings(i)%speed)
     end do
     call find_largest(analysis, self%largest)
     do i = 1, size(analysis%limits)

@@ -1,13 +1,15 @@
 !> How dense the rows of a run must be to show the vibration that its excitations cause.
 module nocdyn_row_intervals
   use nocdyn_bank, only: harmonic_t, role_load, role_names
+  use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_output_times, only: row_count
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
   implicit none (type, external)
   private
 
-  public :: note_sparse_rows, wanted_rows
+  public :: choose_row_count, note_sparse_rows
 
   real(wp), parameter :: sparse = 0.25_wp        ! of an oscillation between two rows: what they show is not its size
   real(wp), parameter :: dense = 0.1_wp          ! what is recommended
@@ -43,27 +45,31 @@ contains
     end associate
   end subroutine note_sparse_rows
 
-  !> The number of rows that show the fastest excitation at the speeds of the start, with a note on it; 0 where usual ones do.
-  subroutine wanted_rows(machine, span, usual, rows, notes)
+  !> The number of rows of a run. Where the input gives none they show the fastest excitation at the speeds of the start, and a
+  !> note says so if the usual ones do not.
+  subroutine choose_row_count(input, machine, rows, notes)
+    type(input_t), intent(in) :: input       !! that `check_output_times` accepts
     type(machine_t), intent(in) :: machine   !! one lane
-    real(wp), intent(in) :: span             !! of the times [s]
-    integer, intent(in) :: usual             !! rows
     integer, intent(out) :: rows
     type(string_t), allocatable, intent(inout) :: notes(:)
     type(oscillation_t) :: fastest
-    real(wp) :: oscillations
+    real(wp) :: oscillations, span
 
-    rows = 0
+    rows = row_count(input)
+    associate (output => input%groups(input%position('output')), run => input%groups(input%position('run')))
+      if (output%has_value('interval') .or. output%is_given('points')) return
+      span = run%number('t_end') - run%number('t_start')
+    end associate
     fastest = fastest_oscillation(machine, machine%start_speed(1, :), machine%start_speed(1, :))
     oscillations = fastest%rate / (2 * pi) * span
-    if (.not. oscillations > sparse * (usual - 1)) return
-    rows = 1 + ceiling(min(oscillations / dense, real(most_rows - 1, wp)))
+    if (.not. oscillations > sparse * (rows - 1)) return
+    rows = max(rows, 1 + ceiling(min(oscillations / dense, real(most_rows - 1, wp))))
     associate (bank => machine%banks(fastest%bank)%bank)
       call append(notes, to_text(rows) // ' rows for ' // trim(role_names(bank%role)) // ' ' // &
                   quoted(bank%names(fastest%element)%text) // ' with ' // rounded_text(fastest%rate / (2 * pi), 3) // &
                   ' Hz, as &output gives no interval')
     end associate
-  end subroutine wanted_rows
+  end subroutine choose_row_count
 
   !> The fastest oscillation of an excitation at any of the speeds, with an amplitude that counts among those of its element.
   type(oscillation_t) function fastest_oscillation(machine, lowest, highest) result(fastest)

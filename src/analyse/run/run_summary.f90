@@ -31,6 +31,7 @@ module nocdyn_run_summary
   !> trusted.
   real(wp), parameter :: energy_error_limit = 0.01_wp
   real(wp), parameter :: rounding_share = 1.0e-10_wp   !! of the largest energy or work: less may be rounding
+  real(wp), parameter :: passing_share = 1.0e-8_wp     !! of the work that passes through: less says nothing of the vibration
 
   !> An extreme between the rows counts if it exceeds that of the rows by more than this share of the largest value. A smaller
   !> excess is rounding: a machine that starts at rest has its smallest energy at the start.
@@ -171,7 +172,8 @@ contains
     largest = maxval(max(abs(extremes%lowest(columns - 4:columns - 1)), abs(extremes%highest(columns - 4:columns - 1))))
     if (.not. extremes%have_begun .or. residual <= negligible) return
     if (vibration > 0) then
-      if (residual <= max(energy_error_limit * vibration, rounding_share * largest)) return
+      if (residual <= max(energy_error_limit * vibration, rounding_share * largest, &
+                          passing_share * min(extremes%highest(columns - 2), extremes%highest(columns - 1)))) return
       compared = 'the vibration, as kinetic energy about the rigid motion and elastic energy, holds at most ' // &
         rounded_text(vibration, 3)
     else

@@ -14,9 +14,9 @@ module nocdyn_transient
   use nocdyn_signal_checks, only: check_signals
   use nocdyn_machine, only: machine_t
   use nocdyn_missed_states, only: note_missed_state
-  use nocdyn_output_times, only: check_output_times, output_note, output_times, row_count
+  use nocdyn_output_times, only: check_output_times, output_note, output_times
   use nocdyn_output_units, only: output_units
-  use nocdyn_row_intervals, only: note_sparse_rows, wanted_rows
+  use nocdyn_row_intervals, only: choose_row_count, note_sparse_rows
   use nocdyn_run_fatigue, only: new_run_fatigue, run_fatigue_t
   use nocdyn_run_limits, only: check_run_limits, note_other_limits
   use nocdyn_run_settings, only: check_size, choose_settings
@@ -112,12 +112,13 @@ contains
     type(integration_settings_t) :: settings
     type(string_t), allocatable :: notes(:)
     real(wp), allocatable :: times(:)
-    integer :: i
+    integer :: i, rows
 
     call check_output_times(input, error)
     if (.not. allocated(error)) call build_formulation(input, formulation, settings, notes, error)
     if (allocated(error)) return
-    call choose_rows(input, formulation%machine, times, notes)
+    call choose_row_count(input, formulation%machine, rows, notes)
+    times = output_times(input, rows)
     summary%method = trim(settings%method)
     call describe_machine(formulation%machine, summary)
     if (output_note(input) /= '') call append(notes, output_note(input))
@@ -165,23 +166,6 @@ contains
     call new_asked_formulation(input, machine, formulation)
     call choose_settings(input, formulation, settings, notes, error)
   end subroutine build_formulation
-
-  !> The times of the rows. Where the input gives no interval, the rows show the fastest excitation.
-  subroutine choose_rows(input, machine, times, notes)
-    type(input_t), intent(in) :: input
-    type(machine_t), intent(in) :: machine
-    real(wp), allocatable, intent(out) :: times(:)   !! [s]
-    type(string_t), allocatable, intent(inout) :: notes(:)
-    integer :: wanted
-
-    wanted = 0
-    associate (output => input%groups(input%position('output')), run => input%groups(input%position('run')))
-      if (.not. (output%has_value('interval') .or. output%is_given('points'))) then
-        call wanted_rows(machine, run%number('t_end') - run%number('t_start'), row_count(input), wanted, notes)
-      end if
-    end associate
-    times = output_times(input, wanted)
-  end subroutine choose_rows
 
   subroutine start_observer(observer, input, formulation, times, notes, error)
     type(run_observer_t), intent(inout) :: observer

@@ -7,15 +7,14 @@ module nocdyn_joint_texts
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_resting_joints, only: resting_joints_t
-  use nocdyn_text, only: append, joined, quoted, rounded_text, string_t
+  use nocdyn_text, only: append, quoted, rounded_text, string_t
   use nocdyn_tooth_losses, only: tooth_losses_t
   use nocdyn_torque_balance, only: torque_balance_t
   implicit none (type, external)
   private
 
-  public :: describe_joints, describe_losses, describe_overload
+  public :: allowed_torques, describe_joints, describe_overload
 
-  integer, parameter :: most_names = 5     ! in a message
   integer, parameter :: most_digits = 6
 
 contains
@@ -92,31 +91,21 @@ contains
         class is (tooth_losses_t)
           return
         class is (friction_joints_t)
-          allowed = rounded_text(resting%least, most_digits) // ' to ' // rounded_text(resting%most, most_digits)
-          if (resting%least <= -huge(1.0_wp)) allowed = 'at most ' // rounded_text(resting%most, most_digits)
-          if (resting%most >= huge(1.0_wp)) allowed = 'at least ' // rounded_text(resting%least, most_digits)
+          call allowed_torques(resting%least, resting%most, allowed)
         end select
       end associate
     end associate
     text = text // ': locked it would carry ' // rounded_text(resting%needed, most_digits) // ' N m; allowed: ' // allowed
   end subroutine describe_overload
 
-  !> "'worm', 'stage'": the teeth with losses; '' if there are none.
-  subroutine describe_losses(machine, text)
-    type(machine_t), intent(in) :: machine
+  !> "-20 to 20", "at most 20".
+  subroutine allowed_torques(least, most, text)
+    real(wp), intent(in) :: least, most   !! that a joint holds, huge without a bound [N m]
     character(len=:), allocatable, intent(out) :: text
-    type(string_t), allocatable :: names(:)
-    integer :: b
 
-    allocate (names(0))
-    do b = 1, size(machine%banks)
-      select type (losses => machine%banks(b)%bank)
-      class is (tooth_losses_t)
-        names = [names, losses%names]
-      end select
-    end do
-    text = ''
-    if (size(names) > 0) text = joined(names, ', ', most_names)
-  end subroutine describe_losses
+    text = rounded_text(least, most_digits) // ' to ' // rounded_text(most, most_digits)
+    if (least <= -huge(1.0_wp)) text = 'at most ' // rounded_text(most, most_digits)
+    if (most >= huge(1.0_wp)) text = 'at least ' // rounded_text(least, most_digits)
+  end subroutine allowed_torques
 
 end module nocdyn_joint_texts

@@ -415,6 +415,7 @@ contains
           matrix(r + x, column) = states%rate_internal(1, m, x)
         end do
         i = findloc(self%inelastic, states%element(x), dim=1)
+        if (i == 0) cycle   ! an elastic coupling, which does not turn
         do k = self%first(i), self%first(i + 1) - 1
           matrix(self%freedom(k), r + x) = matrix(self%freedom(k), r + x) + self%ratio(k) * states%applied(1, x)
           matrix(r + x, self%freedom(k)) = matrix(r + x, self%freedom(k)) + self%ratio(k) * states%rate_speed(1, x)
@@ -440,6 +441,7 @@ contains
       do x = 1, self%internal
         call join_components(r + states%first(x), r + x, block_of)
         i = findloc(self%inelastic, states%element(x), dim=1)
+        if (i == 0) cycle   ! an elastic coupling, which does not turn
         if (self%first(i) < self%first(i + 1)) call join_components(self%freedom(self%first(i)), r + x, block_of)
       end do
     end associate

@@ -13,8 +13,9 @@ module nocdyn_check_command
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: machine_report
   use nocdyn_output_file, only: write_file
-  use nocdyn_output_times, only: output_note, row_count
+  use nocdyn_output_times, only: output_note
   use nocdyn_result_folders, only: result_folder
+  use nocdyn_row_intervals, only: choose_row_count
   use nocdyn_run_files, only: check_rows, check_variants, trajectory_bytes, wants_netcdf
   use nocdyn_response_settings, only: check_response
   use nocdyn_run_settings, only: check_method, find_lossy_element
@@ -49,7 +50,8 @@ contains
     type(sweep_plan_t) :: plan
     character(len=:), allocatable :: note, response, sizes
     real(wp) :: bytes
-    integer :: columns
+    integer :: columns, rows
+    type(string_t), allocatable :: none(:)
 
     call check_response(input, machine, response, error)
     if (allocated(error)) return
@@ -67,10 +69,12 @@ contains
       if (allocated(error) .and. .not. has_load_cases(input)) return
       call add_sweep_lines(arguments, input, plan, sizes, error)
     else
-      bytes = trajectory_bytes(row_count(input), columns, wants_netcdf(input))
+      allocate (none(0))
+      call choose_row_count(input, machine, rows, none)
+      bytes = trajectory_bytes(rows, columns, wants_netcdf(input))
       if (bytes >= large) sizes = sizes // new_line('a') // '  trajectory.' // &
                                   trim(merge('nc ', 'csv', wants_netcdf(input))) // ': about ' // bytes_text(bytes)
-      call check_rows(input%location(input%position('output')), row_count(input), columns, wants_netcdf(input), &
+      call check_rows(input%location(input%position('output')), rows, columns, wants_netcdf(input), &
                       result_folder(arguments, input), error)
     end if
     call print_text(machine_report(input%shown_file(), machine) // speed_table(input, machine) // sizes)

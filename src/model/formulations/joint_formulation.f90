@@ -204,8 +204,9 @@ contains
         call decide_at(self, merge(by_state, which, is_struck), t, y, is_at_rest)
         if (which == by_state .or. .not. any(joints%is_jammed)) exit
       end do
-      call joints%teeth%shift_boundaries(self%machine%elements, joints%moment_errors(), joints%moment_shift)
       call self%hold(joints%motions%speed, y)
+      call self%find_held_moments(t, y(:self%states))
+      call joints%shift_boundaries(self%machine%banks, self%machine%elements, t)
       do j = 1, joints%count
         if (is_at_rest(j) .and. joints%mode(j) /= locked) then   ! a drive may leave it a slip in the other direction
           joints%shift(j) = boundary_shift * speed + max(0.0_wp, -direction_of(joints%mode(j)) * self%joint_rate(j, y))
@@ -320,7 +321,6 @@ contains
     before = self%joints%mode
     slip = [(self%joint_rate(j, y), j=1, self%joints%count)]
     call self%settle_joints(which, t, y)
-    call self%find_held_moments(t, y(:self%states))
     do j = 1, self%joints%locking
       if (self%joints%mode(j) == before(j)) cycle
       if (all([before(j), self%joints%mode(j)] /= locked)) then   ! another wheel drives, or others hold it at a bound

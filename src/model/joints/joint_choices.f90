@@ -2,15 +2,16 @@
 !>
 !> The modes that agree with their moments (`nocdyn_joint_problem`) are sought as in a complementarity problem: from the present
 !> ones, first all wrong ones change together, then one at a time, that of least index (K. G. Murty, Linear Complementarity,
-!> Linear and Nonlinear Programming, 1988, chapter 4); else by the pivoting of Lemke (`nocdyn_joint_pivots`), also with the senses
-!> of the torques of turning teeth given; and at last from all combinations, or the first ones of many. Of several solutions those
-!> count that are limits of the motion of elastic teeth. Where none is left, turning teeth jam.
+!> Linear and Nonlinear Programming, 1988, chapter 4); else from each combination of modes of teeth, or the first ones of many,
+!> with those of friction by pivoting (`nocdyn_joint_pivots`). Of several solutions those count that are limits of the motion of
+!> elastic teeth. Where none is left, turning teeth jam.
 module nocdyn_joint_choices
   use nocdyn_friction_joints, only: direction_of, driven_backwards, driven_forwards, locked, slips_backwards, slips_forwards
   use nocdyn_joint_pivots, only: pivot_modes
   use nocdyn_joint_problem, only: inconsistent, joint_problem_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pseudo_inverse
+  use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_semidefinite, only: null_tolerance
   implicit none (type, external)
   private
@@ -21,9 +22,9 @@ module nocdyn_joint_choices
   contains
     procedure :: choose
     procedure, private :: settle
-    procedure, private :: rest_where_unloaded
+    procedure, private :: combine
+    procedure, private :: take_combination
     procedure, private :: pivot
-    procedure, private :: try_all
     procedure, private :: find_jam
     procedure, private :: is_against_rows
   end type joint_choices_t
@@ -42,10 +43,7 @@ contains
     mode = self%mode
     call self%settle(10 + 10 * size(mode), is_found)
     if (is_found) return
-    self%mode(:) = mode
-    call self%pivot(is_found)
-    if (is_found) return
-    call self%try_all(is_found)
+    call self%combine(is_found)
     if (is_found) return
     self%mode(:) = mode
     call self%find_moments()
@@ -83,124 +81,112 @@ contains
     end do
   end subroutine settle
 
-  !> Locks the joints at rest that slip in modes which agree, but without any acceleration, if that agrees as well.
-  subroutine rest_where_unloaded(self)
+  !> Seeks the modes from all combinations of those of teeth.
+  subroutine combine(self, is_found)
     class(joint_choices_t), intent(inout) :: self
-    integer :: mode(size(self%mode))
-    real(wp) :: acceleration(size(self%mode)), moment(size(self%mode))
-    integer :: i
+    logical, intent(out) :: is_found
+    integer :: number
+    logical :: is_left
 
-    mode = self%mode
-    moment = self%moment
-    acceleration = self%accelerations()
-    do i = 1, size(mode)
-      if (.not. self%is_at_rest(i) .or. self%least(i) >= self%most(i) .and. .not. self%has_teeth(i)) cycle
-      if (abs(acceleration(i)) <= 0) self%mode(i) = locked
+    is_found = .false.
+    number = 0
+    call self%take_combination(number, is_left)
+    do while (is_left)
+      call self%pivot(is_found)
+      if (is_found) return
+      number = number + 1
+      call self%take_combination(number, is_left)
     end do
-    if (all(self%mode == mode)) return
-    call self%find_moments()
-    if (all(self%better_modes() == self%mode)) then
-      if (self%is_stable() .and. .not. self%is_contradicted()) return
-    end if
-    self%mode(:) = mode
-    self%moment(:) = moment
-  end subroutine rest_where_unloaded
+  end subroutine combine
 
-  !> Seeks modes by pivoting. Where friction that slips is less than at rest, the others are looked at again with it.
+  !> Gives teeth the modes of a combination.
+  pure subroutine take_combination(self, number, is_left)
+    class(joint_choices_t), intent(inout) :: self
+    integer, intent(in) :: number      !! from 0 on
+    logical, intent(out) :: is_left    !! whether there is this one; of many the first ones are enough
+    integer, parameter :: at_rest(*) = [locked, slips_forwards, slips_backwards, driven_forwards, driven_backwards]
+    integer, parameter :: forwards(*) = [slips_forwards, driven_forwards], backwards(*) = [slips_backwards, driven_backwards]
+    integer, parameter :: most_tried = 3125
+    integer :: i, rest
+
+    rest = number
+    do i = 1, size(self%mode)
+      if (.not. self%has_teeth(i)) cycle
+      if (self%is_at_rest(i)) then
+        self%mode(i) = at_rest(1 + modulo(rest, 5))
+        rest = rest / 5
+      else
+        self%mode(i) = merge(forwards(1 + modulo(rest, 2)), backwards(1 + modulo(rest, 2)), self%slip(i) > 0)
+        rest = rest / 2
+      end if
+    end do
+    is_left = rest == 0 .and. number < most_tried
+  end subroutine take_combination
+
+  !> Seeks modes by pivoting, with those of teeth to begin with. Where friction that slips is less than at rest, the others are
+  !> looked at again with it.
   subroutine pivot(self, is_found)
     class(joint_choices_t), intent(inout) :: self
     logical, intent(out) :: is_found
-    integer, parameter :: most_turning = 5
-    integer :: case, i, sense(size(self%mode)), turning(size(self%mode)), mode(size(self%mode))
+    integer, parameter :: most_changes = 10
+    integer :: i
     real(wp), dimension(size(self%mode)) :: least, most, slipping
     logical :: has_changed
 
-    is_found = .false.
-    mode = self%mode
     least = self%least
     most = self%most
-    associate (is_turning => self%has_teeth .and. .not. self%is_at_rest)
-      turning = unpack([(i, i=1, count(is_turning))], is_turning, 0)
-    end associate
-    do case = 0, 2**min(maxval(turning), most_turning)
-      sense = 0
-      if (case > 0) sense = merge(merge(1, -1, btest(case - 1, max(turning - 1, 0))), 0, turning > 0 &
-                                  .and. turning <= most_turning)
-      if (case > 0 .and. maxval(turning) == 0) exit
-      has_changed = .true.
-      do while (has_changed)
-        self%mode(:) = mode
-        call pivot_modes(self, sense, is_found)
-        if (.not. is_found) exit
-        slipping = [(self%sliding(merge(1, 2, direction_of(self%mode(i)) > 0), i), i=1, size(mode))]
-        associate (has_left => self%is_at_rest .and. .not. self%has_teeth .and. self%mode /= locked &
-                               .and. self%least < self%most)
-          has_changed = any(has_left .and. (abs(slipping - least) > 0 .and. direction_of(self%mode) > 0 &
-                                            .or. abs(slipping - most) > 0 .and. direction_of(self%mode) < 0))
-          where (has_left .and. has_changed)
-            self%least = slipping
-            self%most = slipping
-          end where
-        end associate
-      end do
-      self%least(:) = least
-      self%most(:) = most
-      if (is_found) call self%settle(10, is_found)
-      if (is_found) call self%rest_where_unloaded()
-      if (is_found) return
+    has_changed = .true.
+    do while (has_changed)
+      call pivot_modes(self, is_found)
+      if (.not. is_found) exit
+      slipping = [(self%sliding(merge(1, 2, direction_of(self%mode(i)) > 0), i), i=1, size(slipping))]
+      associate (has_left => self%is_at_rest .and. .not. self%has_teeth .and. self%mode /= locked .and. self%least < self%most)
+        has_changed = any(has_left .and. (abs(slipping - least) > 0 .and. direction_of(self%mode) > 0 &
+                                          .or. abs(slipping - most) > 0 .and. direction_of(self%mode) < 0))
+        where (has_left .and. has_changed)
+          self%least = slipping
+          self%most = slipping
+        end where
+      end associate
     end do
+    self%least(:) = least
+    self%most(:) = most
+    if (is_found) call self%settle(most_changes, is_found)
   end subroutine pivot
 
-  !> Begins with all combinations of modes, or with the first ones where they are many, from which others are reached.
-  subroutine try_all(self, is_found)
-    class(joint_choices_t), intent(inout) :: self
-    logical, intent(out) :: is_found
-    integer, parameter :: at_rest(*) = [locked, slips_forwards, slips_backwards, driven_forwards, driven_backwards]
-    integer, parameter :: most_tried = 500, most_changes = 12   ! of each
-    integer :: choices(size(self%mode)), i, number, rest
-
-    choices = 1
-    where (self%has_teeth) choices = 2
-    where (self%is_at_rest) choices = 3
-    where (self%is_at_rest .and. self%has_teeth) choices = 5
-    where (self%holds_always()) choices = 1   ! that of a lock
-    is_found = .false.
-    do number = 0, nint(min(real(most_tried, wp), product(real(choices, wp)))) - 1
-      rest = number
-      do i = 1, size(choices)
-        if (self%is_at_rest(i)) then
-          self%mode(i) = at_rest(1 + modulo(rest, choices(i)))
-        else if (self%has_teeth(i) .and. self%slip(i) > 0) then
-          self%mode(i) = merge(slips_forwards, driven_forwards, modulo(rest, 2) == 0)
-        else if (self%has_teeth(i)) then
-          self%mode(i) = merge(slips_backwards, driven_backwards, modulo(rest, 2) == 0)
-        end if
-        rest = rest / choices(i)
-      end do
-      call self%settle(most_changes, is_found)
-      if (is_found) return
-    end do
-  end subroutine try_all
-
-  !> Finds turning teeth whose second wheel brakes the first one more than its inertia allows where all joints at rest are locked:
-  !> their 1 + s V is not positive, with what these joints do to T.
+  !> Finds turning teeth whose second wheel brakes the first one more than its inertia allows: their 1 + s V is not positive, with
+  !> what other joints do to T. First, all at rest are locked, then those only that hold always.
   subroutine find_jam(self)
     class(joint_choices_t), intent(inout) :: self
-    integer, allocatable :: rows(:)
-    integer :: i
-    real(wp) :: least_slope, slope
+    real(wp) :: matrix(size(self%mode), size(self%mode)), moment(size(self%mode)), steepest
+    integer :: i, mode(size(self%mode)), number, order(size(self%mode)), trial
+    logical :: is_left, is_singular
 
-    rows = pack([(i, i=1, size(self%mode))], self%is_at_rest .and. .not. self%has_teeth .and. self%least < self%most)
-    least_slope = 0.0_wp
-    associate (inverse => pseudo_inverse(self%w(rows, rows), null_tolerance))
-      do i = 1, size(self%mode)
-        if (.not. self%has_teeth(i) .or. self%is_at_rest(i)) cycle
-        slope = 1 + self%driven(i) * (self%v(i, i) - dot_product(self%v(i, rows), matmul(inverse, self%w(rows, i))))
-        if (slope > least_slope) cycle
-        least_slope = slope
-        self%jammed = i
+    mode = self%mode
+    do trial = 1, 2
+      steepest = -huge(1.0_wp)
+      number = 0
+      call self%take_combination(number, is_left)
+      do while (is_left)
+        where (self%is_at_rest .and. .not. self%has_teeth) self%mode = merge(locked, slips_forwards, self%holds_always() .or. &
+                                                                             trial == 1 .and. self%least < self%most)
+        call self%scaled_equations(matrix, moment)
+        call lu_factor(matrix, order, is_singular)
+        do i = 1, merge(0, size(mode), is_singular)
+          if (.not. self%has_teeth(i) .or. self%is_at_rest(i)) cycle
+          moment = 0.0_wp
+          moment(i) = 1.0_wp
+          call lu_solve(matrix, order, moment)   ! 1 / (1 + s V)
+          if (moment(i) >= 0 .or. moment(i) <= steepest) cycle
+          steepest = moment(i)
+          self%jammed = i
+        end do
+        number = number + 1
+        call self%take_combination(number, is_left)
       end do
-    end associate
+      if (self%jammed > 0) exit
+    end do
+    self%mode(:) = mode
   end subroutine find_jam
 
   !> Joints at rest that rows without bounds, such as drives, move in the direction in which they hold without a bound.

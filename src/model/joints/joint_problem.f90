@@ -17,6 +17,7 @@ module nocdyn_joint_problem
 
   real(wp), parameter, public :: inconsistent = 1.0e-7_wp   !! acceleration of a lock that others do not allow, relative to its
                                                             !! terms
+  real(wp), parameter, public :: flexibility = 1.0e-9_wp    !! of locks that may be redundant, relative to the diagonal of W
 
   type, public :: joint_problem_t
     real(wp), allocatable :: w(:, :)           !! accelerations by the moments [1/(kg m2)], [joints, joints]
@@ -41,6 +42,7 @@ module nocdyn_joint_problem
     procedure :: holds_always
     procedure :: roots
     procedure :: share
+    procedure :: scaled_equations
     procedure, private :: equations
     procedure, private :: better_teeth
     procedure, private :: better_friction
@@ -97,6 +99,23 @@ contains
     end do
   end subroutine equations
 
+  !> The same in the unit of `roots`. Redundant locks have some flexibility here, by which they share their moment.
+  pure subroutine scaled_equations(self, matrix, wanted)
+    class(joint_problem_t), intent(in) :: self
+    real(wp), intent(out) :: matrix(:, :)   !! [joints, joints]
+    real(wp), intent(out) :: wanted(:)      !! [joints]
+    real(wp) :: root(size(self%mode))
+    integer :: i
+
+    call self%equations(matrix, wanted)
+    root = self%roots()
+    wanted = root * wanted
+    do i = 1, size(root)
+      matrix(i, :) = root(i) * matrix(i, :) / root
+      if (self%mode(i) == locked) matrix(i, i) = matrix(i, i) + flexibility
+    end do
+  end subroutine scaled_equations
+
   !> The moments with the present modes; those of joints that slip away are in the laws.
   subroutine find_moments(self)
     class(joint_problem_t), intent(inout) :: self
@@ -120,23 +139,17 @@ contains
 
   !> Whether the moments of the present modes are the limit of those of elastic teeth, whose deflection goes back to them: the
   !> determinant of the equations is positive. Where it is negative, 1 + s V of one pair of teeth, a deflection grows, away from
-  !> these moments. Redundant locks have some flexibility here, so that they do not make it zero.
+  !> these moments.
   logical function is_stable(self)
     class(joint_problem_t), intent(in) :: self
-    real(wp), parameter :: flexibility = 1.0e-9_wp   ! relative to the diagonal
-    real(wp) :: matrix(size(self%mode), size(self%mode)), wanted(size(self%mode)), root(size(self%mode))
+    real(wp) :: matrix(size(self%mode), size(self%mode)), wanted(size(self%mode))
     integer :: i, order(size(self%mode))
     logical :: is_singular
 
-    call self%equations(matrix, wanted)
-    root = self%roots()
-    do i = 1, size(root)
-      matrix(i, :) = root(i) * matrix(i, :) / root
-      if (self%mode(i) == locked) matrix(i, i) = matrix(i, i) + flexibility
-    end do
+    call self%scaled_equations(matrix, wanted)
     call lu_factor(matrix, order, is_singular)
     is_stable = .true.
-    do i = 1, size(root)
+    do i = 1, size(order)
       if ((matrix(i, i) < 0) .neqv. (order(i) /= i)) is_stable = .not. is_stable
     end do
     is_stable = is_stable .or. is_singular

@@ -6,7 +6,8 @@
 module nocdyn_joint_sets
   use nocdyn_bank, only: bank_slot_t
   use nocdyn_bounded_complementarity, only: at_upper, is_free, solve_bounded_complementarity, solve_scaled_complementarity
-  use nocdyn_friction_joints, only: direction_of, first_wheel_drives, friction_joints_t, idle, locked, slips_backwards, &
+  use nocdyn_elements, only: elements_t
+  use nocdyn_friction_joints, only: direction_of, friction_joints_t, idle, locked, slips_backwards, &
     slips_forwards
   use nocdyn_held_rows, only: held_rows_t
   use nocdyn_joint_choices, only: joint_choices_t
@@ -14,7 +15,7 @@ module nocdyn_joint_sets
   use nocdyn_kinds, only: wp
   use nocdyn_row_motions, only: new_row_motions
   use nocdyn_switches, only: switches_t
-  use nocdyn_tooth_loads, only: new_tooth_loads
+  use nocdyn_tooth_loads, only: new_tooth_loads, widened
   use nocdyn_tooth_losses, only: tooth_losses_t
   implicit none (type, external)
   private
@@ -40,6 +41,7 @@ module nocdyn_joint_sets
     procedure :: decide
     procedure :: find_impact
     procedure :: note
+    procedure :: shift_boundaries
     procedure :: indicator
     procedure :: follow
     procedure :: is_open
@@ -376,6 +378,25 @@ contains
     call self%log%add(joint_event_t(t, joint, from, self%mode(joint), 0.0_wp - slip, self%moment(joint), impulse))
   end subroutine note
 
+  !> Shifts the boundaries of moments, and of the torques of teeth, after a decision.
+  subroutine shift_boundaries(self, banks, elements, t)
+    class(joint_sets_t), intent(inout) :: self
+    type(bank_slot_t), intent(in) :: banks(:)
+    type(elements_t), intent(in) :: elements
+    real(wp), intent(in) :: t   !! [s]
+    integer :: j
+    real(wp) :: inside, least, most, sliding(2)
+
+    call self%teeth%shift_boundaries(elements, self%moment_errors(), self%moment_shift, self%mode)
+    inside = 0.0_wp
+    do j = 1, self%locking
+      if (self%mode(j) /= locked) cycle
+      call find_ranges(self, banks, j, t, least, most, sliding)
+      inside = min(inside, most - self%moment(j), self%moment(j) - least)
+    end do
+    self%moment_shift = widened(self%moment_shift, inside)
+  end subroutine shift_boundaries
+
   !> Positive in the present mode of a joint: its slip, or how far its moment is inside the range [N m]. Teeth that turn change
   !> their mode with the sign of their torque as well.
   real(wp) function indicator(self, banks, joint, t, slip) result(g)
@@ -398,18 +419,12 @@ contains
         g = direction_of(mode) * slip + self%shift(joint)
         if (mode == slips_forwards .and. is_unbounded(least)) g = -1.0_wp   ! there is no such slip
         if (mode == slips_backwards .and. is_unbounded(most)) g = -1.0_wp
-        if (self%has_teeth(joint)) g = min(g, power_of_driver(self, joint, mode) + self%teeth%shift(self%teeth%loss_of(joint)))
+        if (.not. self%has_teeth(joint)) return
+        associate (loss => self%teeth%loss_of(joint))
+          g = min(g, self%teeth%power_of_driver(loss, mode) + self%teeth%shift(loss))
+        end associate
       end if
     end associate
   end function indicator
-
-  !> Positive where that wheel of turning teeth drives that the mode says [N m].
-  pure real(wp) function power_of_driver(self, joint, mode)
-    class(joint_sets_t), intent(in) :: self
-    integer, intent(in) :: joint, mode
-
-    power_of_driver = direction_of(mode) * self%teeth%load(self%teeth%loss_of(joint))
-    if (first_wheel_drives(mode)) power_of_driver = -power_of_driver
-  end function power_of_driver
 
 end module nocdyn_joint_sets

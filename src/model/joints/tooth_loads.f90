@@ -7,14 +7,14 @@ module nocdyn_tooth_loads
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_element_rows, only: element_rows_t
   use nocdyn_elements, only: elements_t
-  use nocdyn_friction_joints, only: first_wheel_drives
+  use nocdyn_friction_joints, only: direction_of, first_wheel_drives
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t
   use nocdyn_tooth_losses, only: tooth_losses_t
   implicit none (type, external)
   private
 
-  public :: new_tooth_loads
+  public :: new_tooth_loads, widened
 
   real(wp), parameter, public :: mixed = 1.0e-3_wp   !! of the largest terms of equations, in the rounding errors of all of them
 
@@ -39,6 +39,7 @@ module nocdyn_tooth_loads
     procedure :: drag
     procedure :: add_moments
     procedure :: shift_boundaries
+    procedure :: power_of_driver
   end type tooth_loads_t
 
 contains
@@ -192,17 +193,39 @@ contains
     self%load(:) = self%applied + matmul(self%by_joint, moment)
   end subroutine add_moments
 
-  !> Shifts the boundaries of T beyond its rounding errors, and beyond what the small slips that a decision ends do to it.
-  pure subroutine shift_boundaries(self, elements, error, least)
+  !> Positive where that wheel of turning teeth drives that the mode says [N m].
+  pure real(wp) function power_of_driver(self, loss, mode)
+    class(tooth_loads_t), intent(in) :: self
+    integer, intent(in) :: loss, mode
+
+    power_of_driver = direction_of(mode) * self%load(loss)
+    if (first_wheel_drives(mode)) power_of_driver = -power_of_driver
+  end function power_of_driver
+
+  !> The shift of a boundary beyond rounding errors, or where a value is beyond it after a decision, which takes small slips for
+  !> none, twice as far: they leave the rest after few more decisions.
+  elemental real(wp) function widened(shift, inside)
+    real(wp), intent(in) :: shift    !! by rounding errors
+    real(wp), intent(in) :: inside   !! distance of the value from the boundary, negative beyond it
+    real(wp), parameter :: widest = 1.0e6_wp
+
+    widened = max(shift, min(widest * shift, -2 * inside))
+  end function widened
+
+  !> Shifts the boundaries of T, after a decision.
+  pure subroutine shift_boundaries(self, elements, error, least, mode)
     class(tooth_loads_t), intent(inout) :: self
     type(elements_t), intent(in) :: elements
     real(wp), intent(in) :: error(:)          !! of the moments of the joints [N m], [joints]
     real(wp), intent(in) :: least             !! that of the boundaries of all moments [N m]
+    integer, intent(in) :: mode(:)            !! of the joints
     real(wp), parameter :: width = 1.0e-11_wp   ! relative to the terms of T
+    integer :: i
 
     if (self%count == 0) return
     self%shift(:) = width * matmul(abs(self%by_moment), abs(elements%restoring(1, :)) + abs(elements%applied(1, :)))
     self%shift(:) = max(self%shift, mixed * maxval(self%shift), matmul(abs(self%by_joint), error), least)
+    self%shift(:) = widened(self%shift, [(self%power_of_driver(i, mode(self%joint(i))), i=1, self%count)])
   end subroutine shift_boundaries
 
 end module nocdyn_tooth_loads

@@ -58,6 +58,7 @@ module nocdyn_machine
     procedure :: start_twist
     procedure :: start_internal
     procedure :: internal_name
+    procedure :: is_electrical
     procedure :: choose_branches
     procedure :: settle_internal
     procedure :: evaluate
@@ -240,6 +241,15 @@ contains
     end do
     error stop 'nocdyn_machine: there are not so many inner states'
   end function internal_name
+
+  !> Whether an internal state is a current or a flux, and no part of a controller.
+  logical function is_electrical(self, state)
+    class(machine_t), intent(in) :: self
+    integer, intent(in) :: state   !! as `index` of `internal_name`, or 0
+
+    is_electrical = state > 0
+    if (is_electrical) is_electrical = index(self%internal_name(state), 'governor') /= 1
+  end function is_electrical
 
   !> Chooses the branches of the laws in all lanes, from the angles, speeds and internal states in `elements`.
   subroutine choose_branches(self, t)

@@ -41,6 +41,8 @@ def operation_bands(sources: Sources, report: object) -> list[dict]:
 
 def verdict(critical: Critical) -> tuple[str, str]:
     """A critical speed and operation, in words and a tone."""
+    if critical.is_electrical:
+        return "electrical mode", ""
     if critical.distance != critical.distance:
         return "", ""
     if critical.distance <= 0:

@@ -61,7 +61,7 @@ def _frequencies(oscillating: list[dict], modes: dict) -> Table:
                 number(mode["mode"]),
                 number(mode["frequency_Hz"]),
                 number(60.0 * mode["frequency_Hz"]),
-                number(mode["undamped_frequency_Hz"]),
+                number(mode.get("undamped_frequency_Hz")),
                 number(damping, 3, "bad" if damping < 0 else ""),
                 number(mode.get("time_constant_s"), 3),
                 text(_shares(mode.get("kinetic_share", []), _kinetic_names(modes, mode))),

@@ -6,13 +6,13 @@ module nocdyn_variant_analysis
   use nocdyn_excitation_lines, only: line_order
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
+  use nocdyn_margins, only: operating_distance
   use nocdyn_linearisation, only: linearisation_t, linearise
   use nocdyn_machine, only: machine_t
   use nocdyn_modes, only: find_modes, mode_oscillating, mode_t
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
   use nocdyn_response_analysis, only: analyse_response, response_analysis_t
   use nocdyn_moment_forms, only: kind_along, kind_moment, kind_stress, moment_form_t
-  use nocdyn_response_settings, only: operating_distance
   use nocdyn_response_summary, only: worst_ratio
   use nocdyn_signals, only: former_name
   use nocdyn_text, only: to_text
@@ -94,7 +94,6 @@ contains
     integer, allocatable :: quantities(:)
     real(wp) :: amplitude(size(analysis%response%points))
     integer :: i, line, peak
-    logical :: is_too_near
 
     value = 0.0_wp
     allocate (quantities, source=matching_quantities(analysis%response%quantities, one%quantity, recorded_kinds))
@@ -116,7 +115,7 @@ contains
       case (analysis_peak_speed)
         value = speed
       case (analysis_margin)
-        call operating_distance(analysis%settings, critical_speed(analysis, line, speed), value, is_too_near)
+        value = operating_distance(analysis%settings, critical_speed(analysis, line, speed))
       case default   ! analysis_ratio
         value = largest_ratio(analysis, line, &
                               matching_quantities(analysis%response%quantities, one%quantity, limited_kinds))
@@ -137,7 +136,7 @@ contains
     least = huge(1.0_wp)
     do i = 1, size(analysis%crossings)
       associate (crossing => analysis%crossings(i))
-        if (line > 0 .and. crossing%line /= line) cycle
+        if (line > 0 .and. crossing%line /= line .or. analysis%modes%is_electrical(crossing%mode)) cycle
         associate (distance => abs(crossing%speed - peak) / abs(crossing%speed))
           if (distance > near + 3.0_wp * crossing%damping_ratio .or. distance >= least) cycle
           least = distance

@@ -11,15 +11,16 @@ module nocdyn_sweep_plan
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_diagnostics, only: diagnostics_t
-  use nocdyn_output_times, only: check_output_times, row_count
+  use nocdyn_output_times, only: check_output_times
   use nocdyn_schema, only: first_key, has_word, key_rules
   use nocdyn_statistics, only: statistic_names, statistic_t
   use nocdyn_sweep_design, only: find_varied, read_design
   use nocdyn_sweep_header, only: quantity_t, sweep_header_t
   use nocdyn_recorded_analyses, only: analysis_reader_t, new_analysis_reader
   use nocdyn_recorded_quantities, only: check_quantities, read_recorded_quantities, time_span_t, wanted_trajectories
+  use nocdyn_row_intervals, only: choose_row_count
   use nocdyn_targets, only: target_t
-  use nocdyn_text, only: counted, to_text
+  use nocdyn_text, only: counted, string_t, to_text
   use nocdyn_signals, only: signal_t
   use nocdyn_variant_columns, only: list_variant_signals
   use nocdyn_varied_numbers, only: varied_numbers_t
@@ -157,13 +158,16 @@ contains
     integer, intent(in) :: variants      !! of the journal
     logical, intent(in) :: has_table     !! whether there is a sweep.csv
     real(wp), parameter :: of_number = 8.0_wp, of_status = 8.0_wp
-    integer :: columns
+    integer :: columns, rows
+    type(string_t), allocatable :: notes(:)
 
     columns = size(self%numbers%list) + self%results()
     file_bytes = 2 * real(variants, wp) * (of_number * columns + of_status)   ! journal and sweep.nc
     if (has_table) file_bytes = file_bytes + table_bytes(variants, columns + 2)
-    if (size(self%trajectories) > 0) file_bytes = file_bytes + size(self%trajectories) * &
-                                                  table_bytes(row_count(self%input), self%columns)
+    if (size(self%trajectories) == 0) return
+    allocate (notes(0))
+    call choose_row_count(self%input, self%machine, rows, notes)
+    file_bytes = file_bytes + size(self%trajectories) * table_bytes(rows, self%columns)
   end function file_bytes
 
   !> The time span of the base machine, as far as it does not vary.

@@ -81,19 +81,40 @@ contains
     allocate (load_case%overrides, source=group%texts('set'))
   end subroutine describe_case
 
-  !> Leaves out the groups &load_case, and every &run but one.
+  !> Leaves out the groups &load_case, every &run but one, and each &limit of an element that is left out.
   subroutine leave_frame(input, members, run, lacks)
     type(input_t), intent(in) :: input
     type(members_t), intent(in) :: members
     integer, intent(in) :: run   !! index of the group that stays; 0: the first one
     logical, intent(inout) :: lacks(:)   !! [groups]
     integer, allocatable :: runs(:)
+    integer :: i
 
     allocate (runs, source=input%groups_named('run'))
     lacks(members%groups) = .true.
     lacks(runs) = .true.
     lacks(merge(run, runs(1), run > 0)) = .false.
+    do i = 1, size(lacks)
+      if (lacks(i) .and. is_element(input%groups(i))) lacks = lacks .or. limits_of(input, input%groups(i))
+    end do
   end subroutine leave_frame
+
+  !> Which groups &limit are of an element.
+  pure function limits_of(input, element) result(are_limits)
+    type(input_t), intent(in) :: input
+    type(group_t), intent(in) :: element
+    logical :: are_limits(size(input%groups))
+    integer :: g
+
+    are_limits = .false.
+    if (all(element%kind /= [character(len=8) :: 'coupling', 'shaft', 'mesh'])) return
+    do g = 1, size(input%groups)
+      associate (group => input%groups(g))
+        if (group%kind /= 'limit' .or. group%rule == 0) cycle
+        if (group%has_value(trim(element%kind))) are_limits(g) = group%text(trim(element%kind)) == element%name
+      end associate
+    end do
+  end function limits_of
 
   !> The position of a name, 0 if it is not there.
   pure integer function position_of(name, names)

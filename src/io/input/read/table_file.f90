@@ -7,7 +7,7 @@ module nocdyn_table_file
   use nocdyn_kinds, only: wp
   use nocdyn_literals, only: number_problem, read_real
   use nocdyn_schema_rules, only: anything, size_limit
-  use nocdyn_text, only: append, counted, quoted, shortened, shown_path, string_t, to_text
+  use nocdyn_text, only: append, counted, lower_case, quoted, shortened, shown_path, string_t, to_text
   use nocdyn_text_file, only: first_position, read_text_file
   implicit none (type, external)
   private
@@ -261,7 +261,7 @@ contains
     end do
   end subroutine read_rows
 
-  !> Last position of a line without its comment, its trailing blanks and carriage returns.
+  !> Last position of a line without its comment, its trailing blanks and carriage returns. Excel's 'sep=;' is a comment.
   pure integer function content_end(text, first, last)
     character(len=*), intent(in) :: text
     integer, intent(in) :: first, last   !! positions of the line
@@ -271,6 +271,8 @@ contains
     content_end = last
     if (comment > 0) content_end = first + comment - 2
     content_end = first - 1 + verify(text(first:content_end), blanks // carriage_return, back=.true.)
+    if (content_end > first + 4 .or. content_end < first + 3) return
+    if (lower_case(text(first:first + 3)) == 'sep=') content_end = first - 1
   end function content_end
 
   !> Reads one line as the next row, or adds an error.

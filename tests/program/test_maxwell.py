@@ -1,0 +1,106 @@
+"""Couplings with Maxwell branches: springs in series with dampers, beside the spring."""
+
+import cmath
+import csv
+import json
+import math
+
+import numpy as np
+import pytest
+
+STIFFNESS, BRANCHES, TIMES = 100.0, (50.0, 30.0), (0.1, 0.01)
+INERTIA = (1.0, 2.0)
+MACHINE = """&body name = 'a' inertia = 1.0 {start} /
+&body name = 'b' inertia = 2.0 /
+&coupling name = 'k' bodies = 'a', 'b' stiffness = 100.0 maxwell_stiffness = 50.0, 30.0 maxwell_time = 0.1, 0.01 /
+&run t_end = 2.0 rtol = 1e-9 atol = 1e-11 /
+"""
+
+
+def motion() -> np.ndarray:
+    """The matrix of the angles, the speeds and the moments of the branches."""
+    matrix = np.zeros((6, 6))
+    matrix[0, 2] = matrix[1, 3] = 1.0
+    for body, sign in ((0, 1.0), (1, -1.0)):
+        matrix[2 + body, :2] = sign * STIFFNESS / INERTIA[body] * np.array([-1.0, 1.0])
+        matrix[2 + body, 4:] = sign / INERTIA[body]
+    for branch in (0, 1):
+        matrix[4 + branch, 2:4] = BRANCHES[branch] * np.array([-1.0, 1.0])
+        matrix[4 + branch, 4 + branch] = -1.0 / TIMES[branch]
+    return matrix
+
+
+def dynamic_stiffness(frequency: float) -> complex:
+    parts = (stiffness * 1j * frequency * time / (1 + 1j * frequency * time) for stiffness, time in zip(BRANCHES, TIMES))
+    return STIFFNESS + sum(parts)
+
+
+@pytest.mark.parametrize("method", ["auto", "rk45", "rodas5p", "taylor"])
+def test_a_run_follows_the_exact_motion_and_keeps_the_energy(nocdyn, method):
+    nocdyn.write("m.nml", MACHINE.format(start="angle = 0.1"))
+    assert nocdyn("run", "m.nml", "--quiet", "--set", f"run.method={method}").returncode == 0
+    values, vectors = np.linalg.eig(motion())
+    parts = np.linalg.solve(vectors, np.array([0.1, 0, 0, 0, 0, 0], dtype=complex))
+    with (nocdyn.folder / "results/m/trajectory.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    for row in rows[::100]:
+        state = (vectors @ (parts * np.exp(values * float(row["t [s]"])))).real
+        total = STIFFNESS * (state[1] - state[0]) + state[4] + state[5]
+        assert float(row["phi_a [rad]"]) == pytest.approx(state[0], abs=1e-8)
+        assert float(row["total_moment_k [N m]"]) == pytest.approx(total, abs=1e-5)
+        elastic = STIFFNESS * (state[1] - state[0]) ** 2 / 2 + sum(state[4:] ** 2 / (2 * np.array(BRANCHES)))
+        assert float(row["elastic_energy [J]"]) == pytest.approx(elastic, abs=1e-8)
+        assert abs(float(row["energy_residual [J]"])) < 1e-8
+    summary = json.loads((nocdyn.folder / "results/m/summary.json").read_text())
+    lost = [float(row["work_out [J]"]) for row in rows]
+    assert all(after >= before - 1e-9 for before, after in zip(lost, lost[1:]))   # the dampers only lose
+    assert summary["energy_account"]["work_in_J"]["coupling k"] == pytest.approx(-lost[-1], abs=1e-9)
+
+
+def test_modes_are_those_of_the_matrix(nocdyn):
+    nocdyn.write("m.nml", MACHINE.format(start=""))
+    assert nocdyn("modes", "m.nml", "--out", "out").returncode == 0
+    modes = json.loads((nocdyn.folder / "out/modes.json").read_text())["modes"]
+    value = max(np.linalg.eigvals(motion()), key=lambda one: one.imag)
+    (oscillating,) = (mode for mode in modes if mode["kind"] == "oscillating")
+    assert oscillating["frequency_Hz"] == pytest.approx(value.imag / (2 * math.pi), rel=1e-9)
+    assert oscillating["damping_ratio"] == pytest.approx(-value.real / abs(value), rel=1e-9)
+
+
+def test_a_response_has_the_stiffness_of_its_frequency(nocdyn):
+    nocdyn.write("m.nml", 
+        MACHINE.format(start="")
+        + "&excitation name = 'x' body = 'a' kind = 'orders' orders = 1 amplitudes = 10.0 /\n"
+        + "&response body = 'a' speed = 10.0, 30.0 count = 5 /\n"
+    )
+    assert nocdyn("response", "m.nml").returncode == 0
+    with (nocdyn.folder / "results/m/response.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    reduced = INERTIA[0] * INERTIA[1] / sum(INERTIA)
+    for row in rows:
+        speed = float(row["omega_a [rad/s]"])
+        stiffness = dynamic_stiffness(speed)
+        moment = 10.0 * reduced / INERTIA[0] * stiffness / (stiffness - speed**2 * reduced)
+        assert float(row["half_range_total_moment_k [N m]"]) == pytest.approx(abs(moment), rel=1e-9)
+        twist = moment / stiffness
+        heat = 0.5 * speed * abs(twist) ** 2 * stiffness.imag
+        assert float(row["heat_k [W]"]) == pytest.approx(heat, rel=1e-9)
+    assert cmath.isfinite(stiffness)
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ("maxwell_stiffness = 1.0", "maxwell_stiffness needs maxwell_time"),
+        ("maxwell_stiffness = 1.0, 2.0 maxwell_time = 0.1", "maxwell_time"),
+        ("maxwell_stiffness = 1.0 maxwell_time = 0.1 gap = 0.1", "gap"),
+        ("maxwell_stiffness = 1.0 maxwell_time = 0.0", "> 0"),
+    ],
+)
+def test_branches_that_cannot_be_are_refused(nocdyn, keys, message):
+    text = MACHINE.format(start="").replace("maxwell_stiffness = 50.0, 30.0 maxwell_time = 0.1, 0.01", keys)
+    nocdyn.write("m.nml", text)
+    result = nocdyn("check", "m.nml")
+    assert result.returncode == 2
+    assert "m.nml:3: &coupling 'k'" in result.stderr
+    assert message in result.stderr
