@@ -1,14 +1,9 @@
 !> The table of commands. A new command is a row here and a module with its procedure.
 module nocdyn_command_table
-  use nocdyn_campbell_command, only: campbell_command
-  use nocdyn_check_command, only: check_command
+  use nocdyn_analysis_command, only: analysis_command
   use nocdyn_commands, only: add_command, command_t
   use nocdyn_companion_command, only: companion_command
-  use nocdyn_equilibrium_command, only: equilibrium_command
-  use nocdyn_matrices_command, only: matrices_command
-  use nocdyn_modes_command, only: modes_command
   use nocdyn_new_command, only: new_command
-  use nocdyn_response_command, only: response_command
   use nocdyn_run_command, only: run_command
   implicit none (type, external)
   private
@@ -27,7 +22,7 @@ contains
     call list_torsional_analyses(commands)
     call add_command(commands, 'matrices', 'FILE', '--set --case', 'print the matrices of the method for a machine', &
       'Prints every matrix and vector of the method for the machine at its start, with its equation number.' // nl // nl // &
-      '  --case NAME        look at the machine of this &load_case', matrices_command)
+      '  --case NAME        look at the machine of this &load_case', analysis_command)
     call list_sweeps(commands)
     call add_command(commands, 'new', 'FILE', '', 'write a commented input to start from', &
                      'Writes a commented input file. A file that exists is not overwritten.', new_command)
@@ -57,7 +52,7 @@ contains
       'there are some.' // nl // nl // &
       '  --out DIR          write check.json to DIR, with several files to DIR/<name of the file>: inertias,' // nl // &
       '                     ratios, stiffnesses' // nl // &
-      '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR', check_command)
+      '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR', analysis_command)
     call add_command(commands, 'equilibrium', 'FILE...', '--out --set --case', &
       'steady states: speeds, torques, twists, powers, stability', &
       'Finds the steady states of the machines: constant speeds at which the mean torques balance, and the' // nl // &
@@ -65,7 +60,7 @@ contains
       'their stability. Excitations enter with their mean.' // nl // nl // &
       '  --out DIR          write equilibrium.json to DIR, with several files to DIR/<name of the file>' // nl // &
       '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR' // nl // nl // &
-      'Exit code 1: there is no steady state.', equilibrium_command)
+      'Exit code 1: there is no steady state.', analysis_command)
     call add_command(commands, 'modes', 'FILE...', '--out --set --case --at --holzer', &
       'natural frequencies, damping, shapes and energies of the modes', &
       'Linearises the machines and prints natural frequencies, damping ratios, time constants and the' // nl // &
@@ -75,7 +70,7 @@ contains
       '  --at TIME          at a time of the run [s], which is integrated up to there' // nl // &
       '  --holzer           print the table of Holzer of each undamped mode; with --out, write holzer.csv' // nl // &
       '  --out DIR          write modes.csv and modes.json to DIR, with several files to DIR/<name of the file>' // nl // &
-      '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR', modes_command)
+      '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR', analysis_command)
   end subroutine list_analyses
 
   subroutine list_torsional_analyses(commands)
@@ -92,7 +87,7 @@ contains
       '  --set PATH=VALUE   override a key: response.count=501' // nl // &
       '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR' // nl // &
       '  --quiet            print nothing but errors' // nl // nl // &
-      'A limit that is exceeded is no error: response.json says limits_exceeded.', response_command)
+      'A limit that is exceeded is no error: response.json says limits_exceeded.', analysis_command)
     call add_command(commands, 'campbell', 'FILE...', '--out --set --case --quiet', &
       'natural frequencies over a range of speeds, and where the orders meet them', &
       'Follows the natural frequencies of the machine, linearised about its steady states, over the speeds of' // nl // &
@@ -102,7 +97,7 @@ contains
       '                     default: &output directory, else results/<name of the file>' // nl // &
       '  --set PATH=VALUE   override a key: response.count=501' // nl // &
       '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR' // nl // &
-      '  --quiet            print nothing but errors', campbell_command)
+      '  --quiet            print nothing but errors', analysis_command)
   end subroutine list_torsional_analyses
 
   subroutine list_sweeps(commands)

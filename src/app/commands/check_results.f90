@@ -1,20 +1,17 @@
-!> nocdyn check: reads and analyses machines, integrates nothing.
-module nocdyn_check_command
-  use nocdyn_arguments, only: arguments_t
+!> The report of nocdyn check on a machine, as an analysis: check.json.
+module nocdyn_check_results
+  use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_check_file, only: check_json
   use nocdyn_column_names, only: count_columns
-  use nocdyn_console, only: print_text
   use nocdyn_disk_room, only: bytes_text
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
-  use nocdyn_input_files, only: analyse_files
   use nocdyn_input_speeds, only: given_speeds, named_speeds_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: machine_report
-  use nocdyn_output_file, only: write_file
+  use nocdyn_output_file, only: output_file_t
   use nocdyn_output_times, only: output_note
-  use nocdyn_result_folders, only: result_folder
   use nocdyn_row_intervals, only: choose_row_count
   use nocdyn_run_files, only: check_rows, check_variants, trajectory_bytes, wants_netcdf
   use nocdyn_response_settings, only: check_response
@@ -27,25 +24,21 @@ module nocdyn_check_command
   implicit none (type, external)
   private
 
-  public :: check_command
-
   real(wp), parameter :: large = 100.0e6_wp   ! files from this size on are told [bytes]
+
+  type, extends(analysis_t), public :: check_results_t
+    character(len=:), allocatable, private :: report, json
+  contains
+    procedure :: solve, list_files, put_file, text => printed
+  end type check_results_t
 
 contains
 
-  !> Prints a report on every file; with --out, writes check.json.
-  subroutine check_command(arguments, code)
-    type(arguments_t), intent(in) :: arguments
-    integer, intent(out) :: code   !! the highest exit code of all files
-
-    call analyse_files(arguments, check, code)
-  end subroutine check_command
-
-  subroutine check(arguments, input, machine, folder, error)
-    type(arguments_t), intent(in) :: arguments
+  subroutine solve(self, input, machine, options, error)
+    class(check_results_t), intent(inout) :: self
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
-    character(len=*), intent(in) :: folder   !! '': nothing is written
+    type(analysis_options_t), intent(in) :: options
     type(error_t), allocatable, intent(out) :: error
     type(sweep_plan_t) :: plan
     character(len=:), allocatable :: note, response, sizes
@@ -67,7 +60,7 @@ contains
     if (has_sweep(input)) then
       call make_plan(input, plan, error)
       if (allocated(error) .and. .not. has_load_cases(input)) return
-      call add_sweep_lines(arguments, input, plan, sizes, error)
+      call add_sweep_lines(options%folder, input, plan, sizes, error)
     else
       allocate (none(0))
       call choose_row_count(input, machine, rows, none)
@@ -75,15 +68,39 @@ contains
       if (bytes >= large) sizes = sizes // new_line('a') // '  trajectory.' // &
                                   trim(merge('nc ', 'csv', wants_netcdf(input))) // ': about ' // bytes_text(bytes)
       call check_rows(input%location(input%position('output')), rows, columns, wants_netcdf(input), &
-                      result_folder(arguments, input), error)
+                      options%folder, error)
     end if
-    call print_text(machine_report(input%shown_file(), machine) // speed_table(input, machine) // sizes)
-    if (folder /= '' .and. .not. allocated(error)) call write_file(folder, 'check.json', check_json(input, machine), error)
-  end subroutine check
+    self%report = machine_report(input%shown_file(), machine) // speed_table(input, machine) // sizes
+    if (.not. allocated(error)) self%json = check_json(input, machine)
+  end subroutine solve
+
+  subroutine list_files(self, names)
+    class(check_results_t), intent(in) :: self
+    type(string_t), allocatable, intent(out) :: names(:)
+
+    names = [string_t('check.json')]
+  end subroutine list_files
+
+  subroutine put_file(self, input, name, file)
+    class(check_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: name
+    type(output_file_t), intent(inout) :: file
+
+    call file%put(self%json)
+  end subroutine put_file
+
+  subroutine printed(self, input, text)
+    class(check_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    character(len=:), allocatable, intent(out) :: text
+
+    text = self%report
+  end subroutine printed
 
   !> What the sweep of a machine is. With load cases it may be that of another one.
-  subroutine add_sweep_lines(arguments, input, plan, lines, error)
-    type(arguments_t), intent(in) :: arguments
+  subroutine add_sweep_lines(folder, input, plan, lines, error)
+    character(len=*), intent(in) :: folder   !! of the results
     type(input_t), intent(in) :: input
     type(sweep_plan_t), intent(in) :: plan
     character(len=:), allocatable, intent(inout) :: lines
@@ -98,7 +115,7 @@ contains
     bytes = plan%file_bytes(plan%design%variants, has_table=.false.)
     lines = lines // new_line('a') // '  sweep: ' // plan%summary()
     if (bytes >= large) lines = lines // new_line('a') // '  files: about ' // bytes_text(bytes)
-    call check_variants(plan, plan%design%variants, .false., result_folder(arguments, input), 0.0_wp, error)
+    call check_variants(plan, plan%design%variants, .false., folder, 0.0_wp, error)
   end subroutine add_sweep_lines
 
   !> Whether a machine has load cases, or is one.
@@ -153,4 +170,4 @@ contains
     text = new_line('a') // text(:len(text) - 1)
   end function speed_table
 
-end module nocdyn_check_command
+end module nocdyn_check_results

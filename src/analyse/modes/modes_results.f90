@@ -1,0 +1,81 @@
+!> Natural frequencies and mode shapes, as an analysis: modes.csv, modes.json and holzer.csv.
+module nocdyn_modes_results
+  use nocdyn_analyses, only: analysis_options_t, analysis_t
+  use nocdyn_errors, only: error_t, exit_failed
+  use nocdyn_holzer_report, only: holzer_tables
+  use nocdyn_input, only: input_t
+  use nocdyn_machine, only: machine_t
+  use nocdyn_modes_files, only: modes_csv, modes_json
+  use nocdyn_modes_report, only: modes_report_t, modes_text, new_modes_report
+  use nocdyn_operating_point, only: find_operating_point, operating_point_t
+  use nocdyn_output_file, only: output_file_t
+  use nocdyn_output_units, only: output_units
+  use nocdyn_text, only: append, string_t
+  implicit none (type, external)
+  private
+
+  character(len=*), parameter :: holzer_name = 'holzer.csv', table_name = 'modes.csv', report_name = 'modes.json'
+
+  type, extends(analysis_t), public :: modes_results_t
+    type(modes_report_t), private :: report
+    character(len=:), allocatable, private :: holzer_text, holzer_csv   !! not allocated: not wanted
+  contains
+    procedure :: solve, list_files, put_file, text => printed
+  end type modes_results_t
+
+contains
+
+  subroutine solve(self, input, machine, options, error)
+    class(modes_results_t), intent(inout) :: self
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    type(analysis_options_t), intent(in) :: options
+    type(error_t), allocatable, intent(out) :: error
+    type(operating_point_t) :: point
+    logical :: is_of_holzer
+
+    if (options%at /= '') call find_operating_point(input, machine, options%at, point, error)
+    if (options%at == '') call find_operating_point(input, machine, 'equilibrium', point, error)
+    if (.not. allocated(error)) call new_modes_report(point, self%report, error)
+    is_of_holzer = .not. allocated(error) .and. options%has_holzer
+    if (is_of_holzer) call holzer_tables(self%report, self%holzer_text, self%holzer_csv, error)
+    if (.not. allocated(error)) return
+    if (is_of_holzer .or. error%code == exit_failed) error%message = input%shown_file() // ': ' // error%message
+  end subroutine solve
+
+  subroutine list_files(self, names)
+    class(modes_results_t), intent(in) :: self
+    type(string_t), allocatable, intent(out) :: names(:)
+
+    allocate (names(0))
+    if (allocated(self%holzer_csv)) call append(names, holzer_name)
+    call append(names, table_name)
+    call append(names, report_name)
+  end subroutine list_files
+
+  subroutine put_file(self, input, name, file)
+    class(modes_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: name
+    type(output_file_t), intent(inout) :: file
+
+    select case (name)
+    case (holzer_name)
+      call file%put(self%holzer_csv)
+    case (table_name)
+      call file%put(modes_csv(self%report))
+    case default
+      call file%put(modes_json(input, self%report))
+    end select
+  end subroutine put_file
+
+  subroutine printed(self, input, text)
+    class(modes_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    character(len=:), allocatable, intent(out) :: text
+
+    text = modes_text(input%shown_file(), self%report, output_units(input))
+    if (allocated(self%holzer_text)) text = text // new_line('a') // self%holzer_text
+  end subroutine printed
+
+end module nocdyn_modes_results

@@ -1,0 +1,74 @@
+!> The forced response by orders over the speed, as an analysis: response.csv, response_orders.csv and response.json.
+module nocdyn_response_results
+  use nocdyn_analyses, only: analysis_options_t, analysis_t
+  use nocdyn_errors, only: error_t
+  use nocdyn_input, only: input_t
+  use nocdyn_machine, only: machine_t
+  use nocdyn_output_file, only: output_file_t
+  use nocdyn_output_units, only: output_units
+  use nocdyn_response_analysis, only: add_fatigue, analyse_response, response_analysis_t
+  use nocdyn_response_files, only: orders_table, put_orders_csv, put_response_csv, response_columns_json, response_json, &
+    response_table
+  use nocdyn_response_report, only: response_text
+  use nocdyn_response_summary, only: response_summary_t, summarise_response
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  character(len=*), parameter :: columns_name = 'response_columns.json', report_name = 'response.json'
+
+  type, extends(analysis_t), public :: response_results_t
+    type(response_analysis_t), private :: analysis
+    type(response_summary_t), private :: summary
+  contains
+    procedure :: solve, list_files, put_file, text => printed
+  end type response_results_t
+
+contains
+
+  subroutine solve(self, input, machine, options, error)
+    class(response_results_t), intent(inout) :: self
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    type(analysis_options_t), intent(in) :: options
+    type(error_t), allocatable, intent(out) :: error
+
+    call analyse_response(input, machine, self%analysis, error)
+    if (.not. allocated(error)) call add_fatigue(input, self%analysis, error)
+    if (.not. allocated(error)) self%summary = summarise_response(self%analysis)
+  end subroutine solve
+
+  subroutine list_files(self, names)
+    class(response_results_t), intent(in) :: self
+    type(string_t), allocatable, intent(out) :: names(:)
+
+    names = [string_t(response_table), string_t(orders_table), string_t(columns_name), string_t(report_name)]
+  end subroutine list_files
+
+  subroutine put_file(self, input, name, file)
+    class(response_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: name
+    type(output_file_t), intent(inout) :: file
+
+    select case (name)
+    case (response_table)
+      call put_response_csv(self%analysis, output_units(input), file)
+    case (orders_table)
+      call put_orders_csv(self%analysis, output_units(input), file)
+    case (columns_name)
+      call file%put(response_columns_json(self%analysis, output_units(input)))
+    case default
+      call file%put(response_json(input, self%analysis, self%summary))
+    end select
+  end subroutine put_file
+
+  subroutine printed(self, input, text)
+    class(response_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    character(len=:), allocatable, intent(out) :: text
+
+    text = response_text(input%shown_file(), self%analysis, self%summary)
+  end subroutine printed
+
+end module nocdyn_response_results

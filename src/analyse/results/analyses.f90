@@ -1,0 +1,68 @@
+!> What an analysis of a machine is: a solver, the files and the text that it leaves. One driver runs them all; a new analysis is
+!> a type that extends `analysis_t` and a row in the table of commands.
+module nocdyn_analyses
+  use nocdyn_errors, only: error_t
+  use nocdyn_input, only: input_t
+  use nocdyn_machine, only: machine_t
+  use nocdyn_output_file, only: output_file_t
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  !> What the command line asks for beside the input.
+  type, public :: analysis_options_t
+    character(len=:), allocatable :: at       !! state about which the machine is linearised; '': that of the analysis
+    logical :: has_holzer = .false.           !! whether tables of Holzer are wanted
+    character(len=:), allocatable :: folder   !! of the results of a run of the input
+  end type analysis_options_t
+
+  type, abstract, public :: analysis_t
+    logical :: is_steady = .true.       !! whether it looks at the machine in a steady state, else over the time
+    logical :: locks_joints = .true.    !! whether clutches and freewheels are locked or open for good then
+    logical :: always_writes = .false.  !! whether it writes files without --out too
+  contains
+    procedure(solve_interface), deferred :: solve
+    procedure(list_files_interface), deferred :: list_files
+    procedure(put_file_interface), deferred :: put_file
+    procedure(text_interface), deferred :: text
+  end type analysis_t
+
+  abstract interface
+
+    !> Analyses the machine of an input.
+    subroutine solve_interface(self, input, machine, options, error)
+      import :: analysis_options_t, analysis_t, error_t, input_t, machine_t
+      class(analysis_t), intent(inout) :: self
+      type(input_t), intent(in) :: input
+      type(machine_t), intent(in) :: machine   !! as `is_steady` and `locks_joints` ask for
+      type(analysis_options_t), intent(in) :: options
+      type(error_t), allocatable, intent(out) :: error
+    end subroutine solve_interface
+
+    !> The names of its files, which appear together; the report comes last.
+    subroutine list_files_interface(self, names)
+      import :: analysis_t, string_t
+      class(analysis_t), intent(in) :: self
+      type(string_t), allocatable, intent(out) :: names(:)
+    end subroutine list_files_interface
+
+    !> Writes one of these files.
+    subroutine put_file_interface(self, input, name, file)
+      import :: analysis_t, input_t, output_file_t
+      class(analysis_t), intent(in) :: self
+      type(input_t), intent(in) :: input
+      character(len=*), intent(in) :: name
+      type(output_file_t), intent(inout) :: file
+    end subroutine put_file_interface
+
+    !> The printed report.
+    subroutine text_interface(self, input, text)
+      import :: analysis_t, input_t
+      class(analysis_t), intent(in) :: self
+      type(input_t), intent(in) :: input
+      character(len=:), allocatable, intent(out) :: text
+    end subroutine text_interface
+
+  end interface
+
+end module nocdyn_analyses

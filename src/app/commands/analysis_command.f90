@@ -1,0 +1,215 @@
+!> The commands that analyse machines without a run: one driver reads the files, solves, prints and writes.
+module nocdyn_analysis_command
+  use nocdyn_analyses, only: analysis_options_t, analysis_t
+  use nocdyn_arguments, only: arguments_t
+  use nocdyn_assembly, only: assemble_machine, assemble_steady_machine
+  use nocdyn_campbell_results, only: campbell_results_t
+  use nocdyn_case_choice, only: choose_case, wanted_case
+  use nocdyn_check_results, only: check_results_t
+  use nocdyn_console, only: print_text, report_error
+  use nocdyn_diagnostics, only: diagnostics_t
+  use nocdyn_equilibrium, only: t_infinity
+  use nocdyn_equilibrium_results, only: equilibrium_results_t
+  use nocdyn_errors, only: add_error, error_t, exit_done
+  use nocdyn_input, only: input_t
+  use nocdyn_input_reader, only: read_input
+  use nocdyn_joint_simplifications, only: refuse_joints
+  use nocdyn_signal_checks, only: check_signals
+  use nocdyn_load_case_checks, only: check_input, name_load_case
+  use nocdyn_machine, only: machine_t
+  use nocdyn_matrices_results, only: matrices_results_t
+  use nocdyn_modes_results, only: modes_results_t
+  use nocdyn_response_results, only: response_results_t
+  use nocdyn_result_files, only: result_files_t
+  use nocdyn_result_folders, only: out_folder, refuse_shared_folders, result_folder
+  use nocdyn_sweep_plan, only: add_plan_diagnostics, has_sweep, make_plan, sweep_plan_t
+  use nocdyn_text, only: listed, shown_path, string_t
+  implicit none (type, external)
+  private
+
+  public :: analysis_command
+
+  !> An input file that has been read.
+  type :: reading_t
+    type(input_t) :: input
+    type(input_t), allocatable :: load_cases(:)   !! of `check`
+    type(error_t), allocatable :: error
+  end type reading_t
+
+contains
+
+  !> Analyses the machines of all files of the command line.
+  subroutine analysis_command(arguments, code)
+    type(arguments_t), intent(in) :: arguments
+    integer, intent(out) :: code   !! the highest exit code of all files
+
+    select case (arguments%command)
+    case ('check')
+      call analyse_files(arguments, check_results_t(is_steady=.false., locks_joints=.false.), code)
+    case ('matrices')
+      call analyse_files(arguments, matrices_results_t(is_steady=.false., locks_joints=.false.), code)
+    case ('equilibrium')
+      call analyse_files(arguments, equilibrium_results_t(locks_joints=.false.), code)
+    case ('modes')
+      call analyse_files(arguments, modes_results_t(locks_joints=.false.), code)
+    case ('campbell')
+      call analyse_files(arguments, campbell_results_t(always_writes=.true.), code)
+    case ('response')
+      call analyse_files(arguments, response_results_t(always_writes=.true.), code)
+    case default
+      error stop 'nocdyn_analysis_command: the table of commands has an unknown analysis'
+    end select
+  end subroutine analysis_command
+
+  !> Analyses every file. Files with errors do not stop the others.
+  subroutine analyse_files(arguments, kind, code)
+    type(arguments_t), intent(in) :: arguments
+    class(analysis_t), intent(in) :: kind   !! the analysis, before its solution
+    integer, intent(out) :: code
+    type(reading_t), allocatable :: readings(:)
+    type(string_t), allocatable :: folders(:)
+    type(machine_t) :: machine
+    type(error_t), allocatable :: error
+    integer :: i
+
+    code = exit_done
+    allocate (readings(size(arguments%operands)), folders(size(arguments%operands)))
+    do i = 1, size(readings)
+      call read_one(arguments, i, kind%always_writes, readings(i), folders(i)%text)
+    end do
+    call refuse_shared_folders(arguments%operands, folders, error)
+    if (allocated(error)) then
+      call report_error(error, code)
+      return
+    end if
+    do i = 1, size(readings)
+      associate (reading => readings(i))
+        if (.not. allocated(reading%error)) call assemble_for(arguments%command, kind, reading%input, machine, reading%error)
+        if (.not. allocated(reading%error)) call check_signals(reading%input, machine, reading%error)
+        if (.not. allocated(reading%error)) call analyse_one(arguments, kind, reading%input, machine, folders(i)%text, &
+                                                             reading%error)
+        if (.not. allocated(reading%error)) call check_load_cases(arguments%command, kind, reading)
+        if (allocated(reading%error)) call report_error(reading%error, code)
+      end associate
+    end do
+  end subroutine analyse_files
+
+  !> Analyses one machine, prints the report, and writes the files.
+  subroutine analyse_one(arguments, kind, input, machine, folder, error)
+    type(arguments_t), intent(in) :: arguments
+    class(analysis_t), intent(in) :: kind
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    character(len=*), intent(in) :: folder   !! '': nothing is written
+    type(error_t), allocatable, intent(out) :: error
+    class(analysis_t), allocatable :: analysis
+    type(analysis_options_t) :: options
+    type(result_files_t) :: files
+    type(string_t), allocatable :: names(:)
+    character(len=:), allocatable :: text
+    integer :: i
+
+    options%at = ''
+    if (arguments%is_given('--at')) options%at = arguments%value('--at')
+    options%has_holzer = arguments%is_given('--holzer')
+    options%folder = result_folder(arguments, input)
+    allocate (analysis, source=kind)
+    call analysis%solve(input, machine, options, error)
+    if (allocated(error)) return
+    call analysis%list_files(names)
+    if (folder /= '' .and. size(names) > 0) then
+      call files%open(folder, names)
+      do i = 1, size(names)
+        call analysis%put_file(input, names(i)%text, files%files(i))
+      end do
+      call files%finish(error)
+      if (allocated(error)) return
+    end if
+    if (arguments%is_given('--quiet')) return
+    call analysis%text(input, text)
+    call print_text(text)
+    if (analysis%always_writes) call print_text(input%shown_file() // ': ' // shown_path(folder) // ' has ' // &
+                                                listed(names, ' and '))
+  end subroutine analyse_one
+
+  !> Builds the machine as an analysis looks at it.
+  subroutine assemble_for(command, kind, input, machine, error)
+    character(len=*), intent(in) :: command
+    class(analysis_t), intent(in) :: kind
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(out) :: machine
+    type(error_t), allocatable, intent(out) :: error
+
+    if (command /= 'check') call refuse_joints(input, kind%is_steady, 'nocdyn ' // command, error)
+    if (allocated(error)) return
+    if (kind%is_steady) then
+      call assemble_steady_machine(input, t_infinity, kind%locks_joints, machine, error)
+    else
+      call assemble_machine(input, machine, error)
+    end if
+  end subroutine assemble_for
+
+  !> Builds the machines of the load cases for `check`.
+  subroutine check_load_cases(command, kind, reading)
+    character(len=*), intent(in) :: command
+    class(analysis_t), intent(in) :: kind
+    type(reading_t), intent(inout) :: reading   !! gets the mistakes of all of them
+    type(machine_t) :: machine
+    type(error_t), allocatable :: own
+    integer :: c
+
+    if (command /= 'check') return
+    do c = 1, size(reading%load_cases)
+      call check_input(reading%load_cases(c), own)
+      if (.not. allocated(own)) then
+        call assemble_for(command, kind, reading%load_cases(c), machine, own)
+        if (allocated(own)) call name_load_case(reading%load_cases(c), own)
+      end if
+      call add_error(reading%error, own)
+    end do
+    if (.not. allocated(reading%error)) call check_sweep(reading)
+  end subroutine check_load_cases
+
+  !> Refuses a sweep that neither the machine nor one of its load cases can make.
+  subroutine check_sweep(reading)
+    type(reading_t), intent(inout) :: reading
+    type(error_t), allocatable :: error
+    type(sweep_plan_t) :: plan
+    integer :: c
+
+    if (.not. has_sweep(reading%input)) return
+    call make_plan(reading%input, plan, reading%error)
+    do c = 1, size(reading%load_cases)
+      if (.not. allocated(reading%error)) return
+      call make_plan(reading%load_cases(c), plan, error)
+      if (.not. allocated(error)) deallocate (reading%error)
+    end do
+  end subroutine check_sweep
+
+  !> Reads and checks a file, and finds the folder of its results.
+  subroutine read_one(arguments, number, always_writes, reading, folder)
+    type(arguments_t), intent(in) :: arguments
+    integer, intent(in) :: number         !! of the file
+    logical, intent(in) :: always_writes  !! as of `analysis_t`
+    type(reading_t), intent(inout) :: reading
+    character(len=:), allocatable, intent(out) :: folder
+    type(diagnostics_t) :: diagnostics
+    integer :: chosen
+
+    folder = out_folder(arguments, arguments%operands(number)%text)
+    call read_input(arguments%operands(number)%text, arguments%overrides, reading%input, reading%error, &
+                    diagnostics, reading%load_cases, wanted_case(arguments))
+    if (allocated(reading%error)) call add_plan_diagnostics(reading%input, diagnostics, reading%error)
+    if (.not. allocated(reading%error)) call choose_case(arguments, reading%input, chosen, reading%error)
+    if (allocated(reading%error)) return
+    if (always_writes) folder = result_folder(arguments, reading%input)
+    if (chosen > 0) then
+      if (folder /= '') folder = folder // '/' // reading%load_cases(chosen)%load_case%name
+      reading%input = reading%load_cases(chosen)
+      deallocate (reading%load_cases)   ! the others are not looked at
+      allocate (reading%load_cases(0))
+    end if
+    call check_input(reading%input, reading%error)
+  end subroutine read_one
+
+end module nocdyn_analysis_command
