@@ -222,7 +222,6 @@ contains
     type(segment_t), intent(in) :: segment
     integer, intent(in) :: lane
     real(wp), intent(inout) :: values(:)   !! [N m] or [Pa]
-    real(wp), allocatable :: moduli(:)
     integer :: p
 
     select type (bank => machine%banks(segment%bank)%bank)
@@ -231,8 +230,10 @@ contains
         values(p) = bank%moment_at(machine%elements, segment%quantity, segment%index + p - 1, lane)
       end do
       if (segment%kind == column_point_stress) then
-        moduli = bank%section_moduli(segment%quantity, lane)
-        values(:) = values / moduli(segment%index:segment%index + size(values) - 1)
+        associate (moduli => bank%parameters(bank%number_of('shaft_modulus'))%value, &
+                   first => bank%shafts(segment%quantity)%first_point + segment%index - 1)
+          values(:) = values / moduli(lane, first:first + size(values) - 1)
+        end associate
       end if
     class default
       error stop 'nocdyn_recorded_columns: the points are of a shaft'
