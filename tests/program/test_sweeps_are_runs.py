@@ -213,6 +213,16 @@ def test_variants_of_a_long_chain_may_end_at_other_times(nocdyn):
         )
 
 
+def test_columns_may_count_from_later_times_than_the_columns_after_them(nocdyn):
+    text = "&body name = 'a' inertia = 1 speed = 3 /\n&coupling name = 'c' bodies = 'ground', 'a' stiffness = 100 /\n"
+    text += "&run t_end = 1 /\n&sweep design = 'grid' /\n&vary target = 'body.a.inertia' low = 1 high = 2 count = 2 /\n"
+    text += "&record quantity = 'kinetic_energy' statistic = 'max' from = 0.9 /\n"
+    nocdyn.write("sweep.nml", text + "&record quantity = 'elastic_energy' statistic = 'max', 'mean' /\n")
+    for row, energy in zip(sweep(nocdyn, "out"), (4.5, 9.0)):
+        assert float(row["elastic_energy_max [J]"]) == pytest.approx(energy, rel=1e-6)
+        assert float(row["elastic_energy_mean [J]"]) == pytest.approx(energy / 2, rel=0.1)
+
+
 def test_the_extreme_of_a_run_after_a_jump_is_at_the_jump(nocdyn):
     text = "&body name = 'a' inertia = 1 /\n&excitation name = 'e' body = 'a' kind = 'step' amplitude = 5 time = 0.25 /\n"
     nocdyn.write("machine.nml", text + "&run t_end = 1 /\n&output interval = 0.3 /\n")

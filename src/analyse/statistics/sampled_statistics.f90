@@ -1,7 +1,7 @@
 !> Statistics of any columns of the trajectory table, from the polynomials that replace them in the steps (`nocdyn_extremes`).
 !>
-!> Integrals over a piece of a step are by as many Gauss nodes as the polynomial has coefficients: they are exact for it and for its
-!> square.
+!> Integrals over a piece of a step are by as many Gauss nodes as the polynomial has coefficients: they are exact for it and for
+!> its square.
 module nocdyn_sampled_statistics
   use nocdyn_chebyshev, only: interpolation_t, max_degree
   use nocdyn_column_statistics, only: accumulator_t, column_statistics_t, start_range, widen_range

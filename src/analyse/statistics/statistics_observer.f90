@@ -65,13 +65,14 @@ contains
   end function needs_work_integrals
 
   !> An observer of a block, which stays where it is. Only the reduced formulation may change the parameters of its lanes.
-  type(statistics_observer_t) function new_statistics_observer(block, statistics, t_start, t_end, may_bend, tracks_all) result(self)
+  function new_statistics_observer(block, statistics, t_start, t_end, may_bend, tracks_all) result(self)
     class(formulation_t), target, intent(inout) :: block   !! with work integrals if `needs_work_integrals`
     type(statistic_t), intent(in) :: statistics(:)         !! each with t_start <= from < t_end
     real(wp), intent(in) :: t_start, t_end                 !! of every variant [s]
     logical, intent(in) :: may_bend                        !! whether variants differ in cubic stiffnesses
-    logical, intent(in), optional :: tracks_all            !! whether the columns of the table and `points` are tracked, whose values
-                                                           !! an extension gives; absent: the columns that `sampled` needs are
+    logical, intent(in), optional :: tracks_all            !! whether an extension gives the values of all columns of the table
+                                                           !! and of `points`; absent: those that are needed are recorded
+    type(statistics_observer_t) :: self
     type(statistic_t), allocatable :: found(:), parts(:)
     type(column_t), allocatable :: columns(:)
     type(string_t), allocatable :: labels(:)

@@ -1,9 +1,9 @@
 !> Polynomials of functions of the solution, such as moments and reactions, in every step, and their extremes in continuous time.
 !>
-!> In every step of a lane each function is replaced by the polynomial through its values at Chebyshev-Lobatto nodes, as many as the
-!> dense output of the step has coefficients: a linear function of the state is represented exactly. Functions that bend more than
-!> the solution are replaced piece by piece (`nocdyn_step_pieces`). The extremes of the polynomial are found to machine precision
-!> wherever it can exceed those so far.
+!> In every step of a lane each function is replaced by the polynomial through its values at Chebyshev-Lobatto nodes, as many as
+!> the dense output of the step has coefficients: a linear function of the state is represented exactly. Functions that bend more
+!> than the solution are replaced piece by piece (`nocdyn_step_pieces`). The extremes of the polynomial are found to machine
+!> precision wherever it can exceed those so far.
 module nocdyn_extremes
   use nocdyn_chebyshev, only: interpolation_t, max_degree, new_interpolation, raise_to_maximum, time_at
   use nocdyn_kinds, only: wp
