@@ -93,15 +93,16 @@ contains
 
   !> Whether a column may bend more than the solution: torques, reactions and what follows from them, but not moments in
   !> proportion to twists and their rates.
-  logical function may_bend(machine, column)
+  logical function may_bend(machine, column, varies)
     type(machine_t), intent(in) :: machine
     type(column_t), intent(in) :: column
+    logical, intent(in) :: varies   !! whether cubic stiffnesses vary
 
-    may_bend = any(column%kind == [column_element, column_reaction, column_member, column_point_moment, column_point_stress])
+    may_bend = any(column%kind == [column_element, column_reaction, column_member])
     if (column%kind /= column_element) return
     associate (bank => machine%banks(column%bank)%bank)
       if (bank%role == role_coupling .and. bank%has_paper_law .and. bank%has_polynomial_potential) then
-        may_bend = any(abs(machine%laws%cubic(:, bank%first:bank%last())) > 0)
+        may_bend = varies .or. any(abs(machine%laws%cubic(:, bank%first:bank%last())) > 0)
       end if
     end associate
   end function may_bend
@@ -166,9 +167,9 @@ contains
   subroutine fill_row(self, lane, t, y, row)
     class(recorded_columns_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
-    real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states + quadratures]
-    real(wp), intent(inout) :: row(:)             !! [columns]
+    real(wp), intent(in) :: t                  !! [s]
+    real(wp), contiguous, intent(in) :: y(:)   !! of the lane, [states + quadratures]
+    real(wp), intent(inout) :: row(:)          !! [columns]
     integer :: k
 
     if (self%have_reactions) call self%formulation%reactions(lane, self%lambda)
@@ -179,7 +180,7 @@ contains
                    i => self%segments(k)%index, j => self%segments(k)%index + self%segments(k)%last - self%segments(k)%first)
           select case (segment%kind)
           case (column_time)
-            row(first) = t(lane)
+            row(first) = t
           case (column_angle)
             row(first:last) = self%formulation%phi(lane, i:j)
           case (column_speed)
@@ -221,7 +222,6 @@ contains
     type(segment_t), intent(in) :: segment
     integer, intent(in) :: lane
     real(wp), intent(inout) :: values(:)   !! [N m] or [Pa]
-    real(wp), allocatable :: moduli(:)
     integer :: p
 
     select type (bank => machine%banks(segment%bank)%bank)
@@ -230,8 +230,10 @@ contains
         values(p) = bank%moment_at(machine%elements, segment%quantity, segment%index + p - 1, lane)
       end do
       if (segment%kind == column_point_stress) then
-        moduli = bank%section_moduli(segment%quantity, lane)
-        values(:) = values / moduli(segment%index:segment%index + size(values) - 1)
+        associate (moduli => bank%parameters(bank%number_of('shaft_modulus'))%value, &
+                   first => bank%shafts(segment%quantity)%first_point + segment%index - 1)
+          values(:) = values / moduli(lane, first:first + size(values) - 1)
+        end associate
       end if
     class default
       error stop 'nocdyn_recorded_columns: the points are of a shaft'
@@ -242,14 +244,14 @@ contains
   subroutine find_energies(self, lane, y)
     type(recorded_columns_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states + quadratures]
+    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
 
     associate (energies => self%energies)
       energies(column_kinetic) = self%kinetic_energy(lane)
       if (self%have_elastic) energies(column_elastic) = sum(self%formulation%machine%elements%stored(lane, :))
       if (.not. self%have_works) return
-      energies(column_work_in) = work(self%works_in, self%formulation%states, lane, y)
-      energies(column_work_out) = work(self%works_out, self%formulation%states, lane, y)
+      energies(column_work_in) = work(self%works_in, self%formulation%states, y)
+      energies(column_work_out) = work(self%works_out, self%formulation%states, y)
       energies(column_residual) = (energies(column_kinetic) + energies(column_elastic) - self%start_energy(lane)) &
                                   - (energies(column_work_in) + energies(column_work_out))
       energies(column_work_out) = 0.0_wp - energies(column_work_out)   ! not -0 without any work
@@ -265,16 +267,15 @@ contains
   end function kinetic_energy
 
   !> The sum of some work integrals of a lane, positive into the machine [J].
-  pure real(wp) function work(works, states, lane, y)
+  pure real(wp) function work(works, states, y)
     integer, intent(in) :: works(:)   !! indices in the quadratures
     integer, intent(in) :: states     !! their number, before the quadratures
-    integer, intent(in) :: lane
-    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(in) :: y(:)
     integer :: i
 
     work = 0.0_wp
     do i = 1, size(works)
-      work = work + y(lane, states + works(i))
+      work = work + y(states + works(i))
     end do
   end function work
 

@@ -9,7 +9,7 @@ module nocdyn_trajectory_columns
   implicit none (type, external)
   private
 
-  public :: list_columns, list_points, column_count, table_bytes
+  public :: list_columns, list_points, is_largest_along, column_count, table_bytes
 
   integer, parameter, public :: column_time = 1
   integer, parameter, public :: column_angle = 2        !! of a body
@@ -103,6 +103,26 @@ contains
     end do
     allocate (columns(0))
   end subroutine list_points
+
+  !> Whether a column is the largest moment or stress along a shaft with inertia.
+  logical function is_largest_along(machine, column, is_stress)
+    type(machine_t), intent(in) :: machine
+    type(column_t), intent(in) :: column
+    logical, intent(out) :: is_stress
+    integer :: shaft
+
+    is_largest_along = .false.
+    is_stress = .false.
+    if (column%kind /= column_element) return
+    select type (bank => machine%banks(column%bank)%bank)
+    type is (shafts_t)
+      is_stress = bank%is_stress(column%quantity)
+      shaft = findloc(bank%shafts%first, column%index, dim=1)
+      is_largest_along = (is_stress .or. bank%is_largest_moment(column%quantity)) .and. size(bank%shafts(shaft)%elements) > 0
+    class default
+      return
+    end select
+  end function is_largest_along
 
   !> Whether a body moves along a line: pistons and rods of cranks, but not the angles of rods.
   logical function is_straight(machine, body)

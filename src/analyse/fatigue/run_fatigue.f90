@@ -1,13 +1,11 @@
-!> The fatigue of a run, by &fatigue: counts the cycles of moments, stresses and forces while the machine is integrated.
+!> The fatigue of a run, by &fatigue: the cycles of moments, stresses and forces.
 module nocdyn_run_fatigue
   use nocdyn_damage_counters, only: damage_counter_t
-  use nocdyn_fatigue_groups, only: element_kind, quantity_moment, quantity_of, quantity_stress, quantity_units, read_curve
+  use nocdyn_fatigue_groups, only: element_kind, quantity_of, quantity_units
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_labelled_columns, only: column_of, whole_moment_column
   use nocdyn_machine, only: machine_t
   use nocdyn_shafts, only: shafts_t
-  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -18,9 +16,7 @@ module nocdyn_run_fatigue
     character(len=:), allocatable :: name, element, unit
     real(wp) :: repeats = 1.0_wp
     integer :: first = 1, last = 0          !! signals
-    integer, private :: column = 0          !! in the table of the run; 0: a shaft
     integer, private :: bank = 0, shaft = 0 !! of a shaft
-    logical, private :: is_stress = .false.
   end type fatigue_item_t
 
   type, public :: run_fatigue_t
@@ -28,16 +24,15 @@ module nocdyn_run_fatigue
     type(damage_counter_t), allocatable :: counters(:)   !! of the signals
     real(wp), allocatable :: position(:)                 !! of a point along its shaft [m], [signals]
   contains
-    procedure :: evaluate, finish, worst
+    procedure :: worst
   end type run_fatigue_t
 
 contains
 
   !> Finds the signals of all groups &fatigue.
-  subroutine new_run_fatigue(input, machine, labels, fatigue)
+  subroutine new_run_fatigue(input, machine, fatigue)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
-    type(string_t), intent(in) :: labels(:)   !! columns of the table of the run, in SI
     type(run_fatigue_t), intent(out) :: fatigue
     integer, allocatable :: groups(:)
     integer :: i, signals
@@ -51,41 +46,26 @@ contains
         item%element = group%text(trim(element_kind(group)))
         item%unit = trim(quantity_units(quantity_of(group)))
         item%repeats = group%number('repeats')
-        item%is_stress = quantity_of(group) == quantity_stress
         item%first = signals + 1
         item%last = item%first
-        if (element_kind(group) == 'shaft') then
-          call find_shaft(machine, item)
-        else
-          call find_column(labels, trim(element_kind(group)), quantity_of(group), item)
-        end if
+        if (element_kind(group) == 'shaft') call find_shaft(machine, item)
         signals = item%last
       end associate
     end do
     allocate (fatigue%counters(signals))
     allocate (fatigue%position(signals), source=0.0_wp)
     do i = 1, size(groups)
-      call prepare_signals(input, groups(i), machine, fatigue, i)
+      associate (item => fatigue%items(i))
+        if (item%bank == 0) cycle
+        select type (bank => machine%banks(item%bank)%bank)
+        type is (shafts_t)
+          fatigue%position(item%first:item%last) = bank%positions(item%shaft, 1)
+        class default
+          error stop 'nocdyn_run_fatigue: the bank of a shaft is one of shafts'
+        end select
+      end associate
     end do
   end subroutine new_run_fatigue
-
-  !> The column of a moment, a stress or a force.
-  pure subroutine find_column(labels, kind, quantity, item)
-    type(string_t), intent(in) :: labels(:)
-    character(len=*), intent(in) :: kind
-    integer, intent(in) :: quantity   !! quantity_...
-    type(fatigue_item_t), intent(inout) :: item
-
-    select case (quantity)
-    case (quantity_stress)
-      item%column = column_of(labels, 'stress_' // item%element // ' [Pa]')
-    case (quantity_moment)
-      item%column = whole_moment_column(labels, item%element)
-    case default
-      item%column = column_of(labels, trim(merge('reaction', 'force   ', kind == 'gear')) // '_' // item%element // ' [N]')
-    end select
-    if (item%column == 0) error stop 'nocdyn_run_fatigue: a checked group has a column'
-  end subroutine find_column
 
   !> The points of a shaft.
   pure subroutine find_shaft(machine, item)
@@ -108,67 +88,6 @@ contains
     end do
     if (item%bank == 0) error stop 'nocdyn_run_fatigue: a checked group has a shaft'
   end subroutine find_shaft
-
-  subroutine prepare_signals(input, group, machine, fatigue, i)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: group, i   !! indices of the group and of its item
-    type(machine_t), intent(in) :: machine
-    type(run_fatigue_t), intent(inout) :: fatigue
-    integer :: k
-
-    associate (item => fatigue%items(i))
-      do k = item%first, item%last
-        fatigue%counters(k)%curve = read_curve(input%groups(group))
-        allocate (fatigue%counters(k)%classes)
-        call fatigue%counters(k)%start()
-      end do
-      if (item%bank == 0) return
-      select type (bank => machine%banks(item%bank)%bank)
-      type is (shafts_t)
-        fatigue%position(item%first:item%last) = bank%positions(item%shaft, 1)
-      class default
-        error stop 'nocdyn_run_fatigue: the bank of a shaft is one of shafts'
-      end select
-    end associate
-  end subroutine prepare_signals
-
-  !> The signals at a time, after the machine and its table have been evaluated there.
-  subroutine evaluate(self, machine, row, signals)
-    class(run_fatigue_t), intent(in) :: self
-    type(machine_t), intent(in) :: machine
-    real(wp), intent(in) :: row(:)           !! [columns]
-    real(wp), intent(inout) :: signals(:)    !! in the units of the items
-    integer :: i, p
-
-    do i = 1, size(self%items)
-      associate (item => self%items(i))
-        if (item%column > 0) then
-          signals(item%first) = row(item%column)
-          cycle
-        end if
-        select type (bank => machine%banks(item%bank)%bank)
-        type is (shafts_t)
-          do p = 1, item%last - item%first + 1
-            signals(item%first + p - 1) = bank%moment_at(machine%elements, item%shaft, p, 1)
-          end do
-          if (item%is_stress) signals(item%first:item%last) = signals(item%first:item%last) &
-                                                              / bank%section_moduli(item%shaft, 1)
-        class default
-          error stop 'nocdyn_run_fatigue: the bank of a shaft is one of shafts'
-        end select
-      end associate
-    end do
-  end subroutine evaluate
-
-  !> Counts what is left at the end of the run.
-  subroutine finish(self)
-    class(run_fatigue_t), intent(inout) :: self
-    integer :: k
-
-    do k = 1, size(self%counters)
-      call self%counters(k)%finish()
-    end do
-  end subroutine finish
 
   !> The signal of an item with the largest damage; without any damage, with the largest range.
   pure integer function worst(self, i)

@@ -6,7 +6,7 @@ module nocdyn_trajectory_table
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_output_units, only: turn_labels
-  use nocdyn_recorded_columns, only: may_bend, new_recorded_columns, recorded_columns_t
+  use nocdyn_recorded_columns, only: new_recorded_columns, recorded_columns_t
   use nocdyn_text, only: string_t
   use nocdyn_trajectory_columns, only: column_t, list_columns
   use nocdyn_units, only: from_si
@@ -17,14 +17,12 @@ module nocdyn_trajectory_table
 
   type, public :: trajectory_table_t
     type(string_t), allocatable :: labels(:)
-    type(column_t), allocatable :: list(:)         !! the columns
-    integer, allocatable, private :: unit(:)       !! of each column: index of `units`, 0: that of SI
+    integer, allocatable :: unit(:)                !! of each column: index of `units`, 0: that of SI
     type(recorded_columns_t) :: columns            !! with a copy of the formulation
     real(wp), private :: t(1) = 0.0_wp             !! [s]
     real(wp), allocatable, private :: y(:, :)      !! [1, states + quadratures]
     real(wp), private :: start_kinetic = 0.0_wp    !! [J]
     real(wp), allocatable, private :: start_stored(:)   !! of the elastic elements [J]
-    logical, allocatable :: bends(:)               !! columns that may bend more than the solution
   contains
     procedure :: fill, find_energy_balance
   end type trajectory_table_t
@@ -32,16 +30,17 @@ module nocdyn_trajectory_table
 contains
 
   !> A table for the columns of a machine. The energies of the start are those at `t_start`.
-  type(trajectory_table_t) function new_trajectory_table(formulation, t_start, wanted) result(table)
+  type(trajectory_table_t) function new_trajectory_table(formulation, t_start, wanted, others) result(table)
     class(formulation_t), intent(in) :: formulation   !! of one lane, with work integrals
     real(wp), intent(in) :: t_start                   !! [s]
     integer, intent(in), optional :: wanted(:)        !! units of columns: indices of `units`; absent: those of SI
-    integer :: i
+    type(column_t), intent(in), optional :: others(:) !! further columns of `columns`, which are not in the rows
+    type(column_t), allocatable :: list(:)
 
-    call list_columns(formulation%machine, table%list, table%labels)
-    table%columns = new_recorded_columns(formulation, table%list)
-    allocate (table%bends, source=[(may_bend(formulation%machine, table%list(i)), i=1, size(table%list))])
-    allocate (table%unit(size(table%list)), source=0)
+    call list_columns(formulation%machine, list, table%labels)
+    if (present(others)) list = [list, others]
+    table%columns = new_recorded_columns(formulation, list)
+    allocate (table%unit(size(list)), source=0)
     if (present(wanted)) call turn_labels(table%labels, wanted, table%unit)
     table%t(1) = t_start
     table%y = formulation%start()
@@ -58,13 +57,13 @@ contains
     class(trajectory_table_t), intent(inout) :: self
     real(wp), intent(in) :: t                  !! [s]
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
-    real(wp), intent(inout) :: row(:)          !! [labels]
+    real(wp), intent(inout) :: row(:)          !! [columns]
     integer :: i
 
     self%t(1) = t
     self%y(1, :) = y
     call self%columns%observe(self%t, self%y)
-    call self%columns%fill_row(1, self%t, self%y, row)
+    call self%columns%fill_row(1, t, y, row)
     do i = 1, size(row)   ! without memory for the whole row
       row(i) = from_si(row(i), self%unit(i))
     end do
