@@ -21,6 +21,10 @@ FORTRAN_FLAGS = re.search(r"^CMAKE_Fortran_FLAGS:STRING=(.*)$", BUILD_SETTINGS, 
 CASE_1 = SOURCE / "input/paper/case1.nml"
 CASE_2 = SOURCE / "input/paper/case2.nml"
 
+# By how much a row may lie outside of the extremes, which are those of the polynomials that replace columns in the steps:
+POLYNOMIALS = 1e-5  # of the range of the column
+BALANCE = 1e-8  # of the energy balance, a small difference of energies, which themselves are replaced [J]
+
 
 def first_case(path):
     """Options that choose the first load case of an input, if it has any."""

@@ -19,8 +19,8 @@ KERNEL = "kernel"
 
 # Procedures with more arguments, by file, and why.
 MANY_ARGUMENTS = {
-    "src/analyse/sweep/statistics/linear_statistics.f90": (KERNEL, "bound_excess"),
-    "src/analyse/sweep/statistics/step_strips.f90": (KERNEL, "add_integrals", "add_pair", "expand", "set_pair"),
+    "src/analyse/statistics/linear_statistics.f90": (KERNEL, "bound_excess"),
+    "src/analyse/statistics/step_strips.f90": (KERNEL, "add_integrals", "add_pair", "expand", "expand_single", "set_pair"),
     "src/base/numerics/sparse_products.f90": (
         KERNEL,
         "multiply_lanes",
@@ -30,6 +30,7 @@ MANY_ARGUMENTS = {
         "pair_of_toeplitz",
     ),
     "src/integrate/core/stage_sums.f90": (KERNEL, "sum_few_terms", "sum_many_terms"),
+    "src/integrate/dense_output/extremes.f90": (KERNEL, "find_states"),
     "src/model/constraints/coordinates.f90": (
         "constructor: what the analysis of the constraints has found, and the bodies that the user wants",
         "build_coordinates",

@@ -1,12 +1,11 @@
-!> The fatigue of a run, by &fatigue: counts the cycles of moments, stresses and forces while the machine is integrated.
+!> The fatigue of a run, by &fatigue: the cycles of moments, stresses and forces.
 module nocdyn_run_fatigue
   use nocdyn_damage_counters, only: damage_counter_t
-  use nocdyn_fatigue_groups, only: element_kind, fatigue_symbol, quantity_of, quantity_stress, quantity_units, read_curve
+  use nocdyn_fatigue_groups, only: element_kind, quantity_of, quantity_units
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_shafts, only: shafts_t
-  use nocdyn_signals, only: find_signal, signal_t
   implicit none (type, external)
   private
 
@@ -17,9 +16,7 @@ module nocdyn_run_fatigue
     character(len=:), allocatable :: name, element, unit
     real(wp) :: repeats = 1.0_wp
     integer :: first = 1, last = 0          !! signals
-    integer, private :: column = 0          !! in the table of the run; 0: a shaft
     integer, private :: bank = 0, shaft = 0 !! of a shaft
-    logical, private :: is_stress = .false.
   end type fatigue_item_t
 
   type, public :: run_fatigue_t
@@ -27,16 +24,15 @@ module nocdyn_run_fatigue
     type(damage_counter_t), allocatable :: counters(:)   !! of the signals
     real(wp), allocatable :: position(:)                 !! of a point along its shaft [m], [signals]
   contains
-    procedure :: evaluate, finish, worst
+    procedure :: worst
   end type run_fatigue_t
 
 contains
 
   !> Finds the signals of all groups &fatigue.
-  subroutine new_run_fatigue(input, machine, signals, fatigue)
+  subroutine new_run_fatigue(input, machine, fatigue)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
-    type(signal_t), intent(in) :: signals(:)   !! of the table of the run
     type(run_fatigue_t), intent(out) :: fatigue
     integer, allocatable :: groups(:)
     integer :: count, i
@@ -50,22 +46,24 @@ contains
         item%element = group%text(trim(element_kind(group)))
         item%unit = trim(quantity_units(quantity_of(group)))
         item%repeats = group%number('repeats')
-        item%is_stress = quantity_of(group) == quantity_stress
         item%first = count + 1
         item%last = item%first
-        if (element_kind(group) == 'shaft') then
-          call find_shaft(machine, item)
-        else
-          item%column = find_signal(signals, trim(element_kind(group)), item%element, fatigue_symbol(group))
-          if (item%column == 0) error stop 'nocdyn_run_fatigue: a checked group has a signal'
-        end if
+        if (element_kind(group) == 'shaft') call find_shaft(machine, item)
         count = item%last
       end associate
     end do
     allocate (fatigue%counters(count))
     allocate (fatigue%position(count), source=0.0_wp)
     do i = 1, size(groups)
-      call prepare_signals(input, groups(i), machine, fatigue, i)
+      associate (item => fatigue%items(i))
+        if (item%bank == 0) cycle
+        select type (bank => machine%banks(item%bank)%bank)
+        type is (shafts_t)
+          fatigue%position(item%first:item%last) = bank%positions(item%shaft, 1)
+        class default
+          error stop 'nocdyn_run_fatigue: the bank of a shaft is one of shafts'
+        end select
+      end associate
     end do
   end subroutine new_run_fatigue
 
@@ -90,67 +88,6 @@ contains
     end do
     if (item%bank == 0) error stop 'nocdyn_run_fatigue: a checked group has a shaft'
   end subroutine find_shaft
-
-  subroutine prepare_signals(input, group, machine, fatigue, i)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: group, i   !! indices of the group and of its item
-    type(machine_t), intent(in) :: machine
-    type(run_fatigue_t), intent(inout) :: fatigue
-    integer :: k
-
-    associate (item => fatigue%items(i))
-      do k = item%first, item%last
-        fatigue%counters(k)%curve = read_curve(input%groups(group))
-        allocate (fatigue%counters(k)%classes)
-        call fatigue%counters(k)%start()
-      end do
-      if (item%bank == 0) return
-      select type (bank => machine%banks(item%bank)%bank)
-      type is (shafts_t)
-        fatigue%position(item%first:item%last) = bank%positions(item%shaft, 1)
-      class default
-        error stop 'nocdyn_run_fatigue: the bank of a shaft is one of shafts'
-      end select
-    end associate
-  end subroutine prepare_signals
-
-  !> The signals at a time, after the machine and its table have been evaluated there.
-  subroutine evaluate(self, machine, row, signals)
-    class(run_fatigue_t), intent(in) :: self
-    type(machine_t), intent(in) :: machine
-    real(wp), intent(in) :: row(:)           !! [columns]
-    real(wp), intent(inout) :: signals(:)    !! in the units of the items
-    integer :: i, p
-
-    do i = 1, size(self%items)
-      associate (item => self%items(i))
-        if (item%column > 0) then
-          signals(item%first) = row(item%column)
-          cycle
-        end if
-        select type (bank => machine%banks(item%bank)%bank)
-        type is (shafts_t)
-          do p = 1, item%last - item%first + 1
-            signals(item%first + p - 1) = bank%moment_at(machine%elements, item%shaft, p, 1)
-          end do
-          if (item%is_stress) signals(item%first:item%last) = signals(item%first:item%last) &
-                                                              / bank%section_moduli(item%shaft, 1)
-        class default
-          error stop 'nocdyn_run_fatigue: the bank of a shaft is one of shafts'
-        end select
-      end associate
-    end do
-  end subroutine evaluate
-
-  !> Counts what is left at the end of the run.
-  subroutine finish(self)
-    class(run_fatigue_t), intent(inout) :: self
-    integer :: k
-
-    do k = 1, size(self%counters)
-      call self%counters(k)%finish()
-    end do
-  end subroutine finish
 
   !> The signal of an item with the largest damage; without any damage, with the largest range.
   pure integer function worst(self, i)

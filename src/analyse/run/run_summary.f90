@@ -15,7 +15,6 @@ module nocdyn_run_summary
   use nocdyn_run_limits, only: put_run_limits, run_limit_t
   use nocdyn_solver_status, only: max_switch_times, solver_status_t
   use nocdyn_run_settings, only: put_settings
-  use nocdyn_observer, only: ranges_t
   use nocdyn_signals, only: signal_t
   use nocdyn_start_transient, only: start_transient_t
   use nocdyn_table_text, only: cell_digits
@@ -24,7 +23,7 @@ module nocdyn_run_summary
   implicit none (type, external)
   private
 
-  public :: start_extremes, update_extremes, widen_extremes, describe_machine, check_energy_balance, check_extremes
+  public :: describe_machine, check_energy_balance, check_extremes
   public :: columns_json, summary_json, summary_line, method_line
 
   !> The summary notes an energy residual above this share of the largest energy of the vibration: such a motion is not to be
@@ -33,17 +32,12 @@ module nocdyn_run_summary
   real(wp), parameter :: rounding_share = 1.0e-10_wp   !! of the largest energy or work: less may be rounding
   real(wp), parameter :: passing_share = 1.0e-8_wp     !! of the work that passes through: less says nothing of the vibration
 
-  !> An extreme between the rows counts if it exceeds that of the rows by more than this share of the largest value. A smaller
-  !> excess is rounding: a machine that starts at rest has its smallest energy at the start.
-  real(wp), parameter :: rounding_limit = 16 * epsilon(1.0_wp)
-
-  !> Smallest and largest values of the columns from `from` on, with their times: of the rows; after `widen_extremes`, of the
-  !> motion.
+  !> Smallest and largest values of the columns from `from` on, with their times.
   type, public :: extremes_t
     integer :: rows = 0                   !! before `from` too
     real(wp) :: from = -huge(1.0_wp)      !! [s]
     logical :: have_begun = .false.       !! whether the run has come to `from`
-    logical :: are_continuous = .false.   !! whether the motion between the rows is included
+    logical :: are_continuous = .false.   !! whether they are those of the motion, not of the only row
     real(wp), allocatable :: lowest(:), lowest_time(:), highest(:), highest_time(:), last(:)   !! [columns]
   end type extremes_t
 
@@ -70,66 +64,6 @@ module nocdyn_run_summary
   end type run_summary_t
 
 contains
-
-  !> No rows yet; the first row sets everything.
-  subroutine start_extremes(extremes, columns, from)
-    type(extremes_t), intent(out) :: extremes
-    integer, intent(in) :: columns   !! their number
-    real(wp), intent(in) :: from     !! [s]
-
-    extremes%from = from
-    allocate (extremes%lowest(columns), source=huge(1.0_wp))
-    allocate (extremes%highest(columns), source=-huge(1.0_wp))
-    allocate (extremes%lowest_time(columns), extremes%highest_time(columns), extremes%last(columns), source=0.0_wp)
-  end subroutine start_extremes
-
-  !> Includes one row, whose first value is the time.
-  pure subroutine update_extremes(extremes, row)
-    type(extremes_t), intent(inout) :: extremes
-    real(wp), intent(in) :: row(:)   !! [columns]
-    integer :: i
-
-    extremes%last(:) = row
-    extremes%rows = extremes%rows + 1
-    if (row(1) < extremes%from) return
-    extremes%have_begun = .true.
-    do i = 1, size(row)
-      if (row(i) < extremes%lowest(i)) then
-        extremes%lowest(i) = row(i)
-        extremes%lowest_time(i) = row(1)
-      end if
-      if (row(i) > extremes%highest(i)) then
-        extremes%highest(i) = row(i)
-        extremes%highest_time(i) = row(1)
-      end if
-    end do
-  end subroutine update_extremes
-
-  !> Includes the extremes of the motion where they exceed those of the rows by more than rounding, or occur before them.
-  pure subroutine widen_extremes(extremes, ranges)
-    type(extremes_t), intent(inout) :: extremes
-    type(ranges_t), intent(in) :: ranges   !! of the columns
-    real(wp) :: rounding
-    integer :: i
-
-    do i = 1, size(extremes%last)
-      rounding = rounding_limit * max(abs(ranges%lowest(i)), abs(ranges%highest(i)))
-      if (ranges%lowest(i) < extremes%lowest(i) - rounding) then
-        extremes%lowest(i) = ranges%lowest(i)
-        extremes%lowest_time(i) = ranges%lowest_time(i)
-      else if (ranges%lowest(i) <= extremes%lowest(i) + rounding) then
-        extremes%lowest_time(i) = min(extremes%lowest_time(i), ranges%lowest_time(i))
-      end if
-      if (ranges%highest(i) > extremes%highest(i) + rounding) then
-        extremes%highest(i) = ranges%highest(i)
-        extremes%highest_time(i) = ranges%highest_time(i)
-      else if (ranges%highest(i) >= extremes%highest(i) - rounding) then
-        extremes%highest_time(i) = min(extremes%highest_time(i), ranges%highest_time(i))
-      end if
-    end do
-    extremes%are_continuous = .true.
-    extremes%have_begun = .true.
-  end subroutine widen_extremes
 
   !> Refuses extremes that are not finite: the motion between two rows can reach them.
   subroutine check_extremes(extremes, labels, error)

@@ -6,9 +6,9 @@ module nocdyn_trajectory_table
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_output_units, only: turn_units
-  use nocdyn_signal_values, only: may_bend, new_signal_values, signal_values_t
+  use nocdyn_signal_values, only: new_signal_values, signal_values_t
   use nocdyn_text, only: string_t
-  use nocdyn_signals, only: label_signals, list_signals, signal_t
+  use nocdyn_signals, only: label_signals, list_signals, signal_source_t, signal_t
   use nocdyn_units, only: from_si
   implicit none (type, external)
   private
@@ -18,14 +18,13 @@ module nocdyn_trajectory_table
   type, public :: trajectory_table_t
     type(string_t), allocatable :: labels(:)
     type(signal_t), allocatable :: signals(:)      !! of the columns, in the units of the table
-    integer, allocatable, private :: unit(:)       !! of each column: index of `units`, 0: that of SI
-    type(signal_values_t) :: columns            !! with a copy of the formulation
+    integer, allocatable :: unit(:)                !! of each column: index of `units`, 0: that of SI
+    type(signal_values_t) :: columns               !! with a copy of the formulation
     real(wp), private :: t(1) = 0.0_wp             !! [s]
     real(wp), allocatable, private :: y(:, :)      !! [1, states + quadratures]
     real(wp), private :: start_kinetic = 0.0_wp    !! [J]
     real(wp), allocatable, private :: start_stored(:)   !! of the elastic elements [J]
     real(wp), allocatable, private :: start_kept(:)     !! of the elements with work [J]
-    logical, allocatable :: bends(:)               !! columns that may bend more than the solution
   contains
     procedure :: fill, find_energy_balance
   end type trajectory_table_t
@@ -33,15 +32,17 @@ module nocdyn_trajectory_table
 contains
 
   !> A table for the columns of a machine. The energies of the start are those at `t_start`.
-  type(trajectory_table_t) function new_trajectory_table(formulation, t_start, wanted) result(table)
+  type(trajectory_table_t) function new_trajectory_table(formulation, t_start, wanted, others) result(table)
     class(formulation_t), intent(in) :: formulation   !! of one lane, with work integrals
     real(wp), intent(in) :: t_start                   !! [s]
     integer, intent(in) :: wanted(:)                  !! units of columns: indices of `units`; else those of SI
-    integer :: i
+    type(signal_source_t), intent(in), optional :: others(:)   !! further columns of `columns`, which are not in the rows
+    type(signal_source_t), allocatable :: list(:)
 
     call list_signals(formulation%machine, table%signals)
-    table%columns = new_signal_values(formulation, table%signals%source)
-    allocate (table%bends, source=[(may_bend(formulation%machine, table%signals(i)%source), i=1, size(table%signals))])
+    list = table%signals%source
+    if (present(others)) list = [list, others]
+    table%columns = new_signal_values(formulation, list)
     call turn_units(table%signals, wanted, table%unit)
     call label_signals(table%signals, table%labels)
     table%t(1) = t_start
@@ -60,13 +61,13 @@ contains
     class(trajectory_table_t), intent(inout) :: self
     real(wp), intent(in) :: t                  !! [s]
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
-    real(wp), intent(inout) :: row(:)          !! [labels]
+    real(wp), intent(inout) :: row(:)          !! [columns]
     integer :: i
 
     self%t(1) = t
     self%y(1, :) = y
     call self%columns%observe(self%t, self%y)
-    call self%columns%fill_row(1, self%t, self%y, row)
+    call self%columns%fill_row(1, t, y, row)
     do i = 1, size(row)   ! without memory for the whole row
       row(i) = from_si(row(i), self%unit(i))
     end do

@@ -17,15 +17,14 @@ module nocdyn_transient
   use nocdyn_output_times, only: check_output_times, output_note, output_times
   use nocdyn_output_units, only: output_units
   use nocdyn_row_intervals, only: choose_row_count, note_sparse_rows
-  use nocdyn_run_fatigue, only: new_run_fatigue, run_fatigue_t
   use nocdyn_run_limits, only: check_run_limits, note_other_limits
   use nocdyn_run_settings, only: check_size, choose_settings
-  use nocdyn_run_summary, only: check_energy_balance, check_extremes, describe_machine, extremes_t, run_summary_t, &
-    start_extremes, update_extremes, widen_extremes
-  use nocdyn_shaft_extremes, only: new_shaft_extremes, shaft_extremes_t
+  use nocdyn_run_statistics, only: find_extremes, list_statistics, take_fatigue
+  use nocdyn_run_summary, only: check_energy_balance, check_extremes, describe_machine, run_summary_t
+  use nocdyn_statistics, only: statistic_t
+  use nocdyn_statistics_observer, only: new_statistics_observer, statistics_observer_t
   use nocdyn_solver_status, only: failure_message, integration_done, integration_interrupted, integration_not_finite, &
     solver_status_t
-  use nocdyn_observer, only: observer_t, ranges_t
   use nocdyn_start_transient, only: find_start_transient
   use nocdyn_text, only: append, selected, string_t, to_text
   use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
@@ -73,29 +72,25 @@ module nocdyn_transient
 
   end interface
 
-  !> Hands out the rows, and keeps the extremes of their columns.
-  type, extends(observer_t) :: run_observer_t
-    type(trajectory_table_t) :: table
-    type(extremes_t) :: extremes
-    real(wp), allocatable :: row(:)          !! [columns]
+  !> Hands out the rows, and keeps the statistics of their columns.
+  type, extends(statistics_observer_t) :: run_observer_t
+    type(trajectory_table_t) :: table        !! with the points of shafts after its columns
+    real(wp), allocatable :: row(:)          !! [columns, points]
+    integer :: rows = 0
     integer, allocatable :: chosen(:)        !! columns that are written
     real(wp), allocatable :: written(:)      !! their values in the row
-    type(shaft_extremes_t) :: along          !! shafts, whose points are tracked after the columns
-    type(run_fatigue_t) :: fatigue           !! of signals, which are tracked after these
-    integer :: before_signals = 0            !! number of functions before the signals
     type(vibration_t) :: vibration           !! its energy in the rows
     real(wp) :: largest_moment = 0.0_wp      !! of the elements [N m]
     real(wp) :: atol = 0.0_wp                !! absolute tolerance, at most `rest` [rad]
     real(wp) :: last_time = 0.0_wp           !! of the rows [s]
     real(wp), allocatable :: last_state(:)   !! at that time, [states + quadratures]
     real(wp), allocatable :: lowest(:), highest(:)   !! speeds of the bodies in the rows [rad/s]
-    real(wp) :: t_start, t_end               !! [s]
+    real(wp) :: first_time, end_time         !! [s]
     integer :: not_finite = 0                !! column of the first row with a number that is not finite, which ends the run
     real(wp) :: failure_time = 0.0_wp        !! of that row [s]
-    logical :: has_ranges = .false.          !! whether the columns were evaluated between the rows
     class(run_output_t), pointer :: output => null()
   contains
-    procedure :: on_output, wants_stop, tracked_values, find_pace, on_extremes, on_turn, least_range, on_shift
+    procedure :: on_output, wants_stop, observe_lanes, tracked_values, find_pace, on_shift
   end type run_observer_t
 
 contains
@@ -108,7 +103,7 @@ contains
     type(run_summary_t), intent(out) :: summary
     type(error_t), allocatable, intent(out) :: error
     class(formulation_t), allocatable, target :: formulation
-    type(run_observer_t) :: observer
+    type(run_observer_t), target :: observer
     type(integration_settings_t) :: settings
     type(string_t), allocatable :: notes(:)
     real(wp), allocatable :: times(:)
@@ -170,32 +165,23 @@ contains
   subroutine start_observer(observer, input, formulation, times, notes, error)
     type(run_observer_t), intent(inout) :: observer
     type(input_t), intent(in) :: input
-    class(formulation_t), intent(in) :: formulation
+    class(formulation_t), target, intent(inout) :: formulation
     real(wp), intent(in) :: times(:)   !! of the rows [s]
     type(string_t), allocatable, intent(inout) :: notes(:)
     type(error_t), allocatable, intent(out) :: error   !! columns are asked for that there are not
+    type(statistic_t), allocatable :: statistics(:)
 
-    observer%table = new_trajectory_table(formulation, times(1), output_units(input))
+    observer%first_time = times(1)
+    observer%end_time = times(size(times))
+    call list_statistics(input, formulation%machine, times(1), statistics)
+    observer%statistics_observer_t = new_statistics_observer(formulation, statistics, times(1), times(size(times)), &
+                                                             may_bend=.false., tracks_all=.true.)
+    observer%table = new_trajectory_table(formulation, times(1), output_units(input), observer%points)
     observer%vibration = new_vibration(formulation%machine)
-    observer%takes_shifts = .true.
-    observer%t_start = times(1)
-    observer%t_end = times(size(times))
-    if (input%groups(input%position('output'))%has_value('extremes_from')) then
-      observer%tracked_from = input%groups(input%position('output'))%number('extremes_from')
-    end if
-    allocate (observer%row(size(observer%table%labels)))
+    allocate (observer%row(observer%tracked), source=0.0_wp)
     allocate (observer%lowest(formulation%machine%bodies), source=huge(0.0_wp))
     allocate (observer%highest(formulation%machine%bodies), source=-huge(0.0_wp))
     allocate (observer%last_state(formulation%states + formulation%quadratures), source=0.0_wp)
-    call new_run_fatigue(input, formulation%machine, observer%table%signals, observer%fatigue)
-    observer%turning = size(observer%fatigue%counters)
-    observer%along = new_shaft_extremes(formulation%machine, observer%table%signals%source)
-    observer%before_signals = size(observer%row) + observer%along%points
-    observer%tracked = observer%before_signals + observer%turning
-    allocate (observer%bends(observer%tracked), source=.true.)
-    observer%bends(:size(observer%row)) = observer%table%bends
-    observer%bends(size(observer%row) + 1:observer%before_signals) = .false.   ! moments of shafts are linear
-    call start_extremes(observer%extremes, size(observer%row), observer%tracked_from)
     call choose_columns(input, observer%table%signals, observer%table%labels, observer%chosen, notes, error)
     if (.not. allocated(error)) allocate (observer%written(size(observer%chosen)))
   end subroutine start_observer
@@ -240,9 +226,10 @@ contains
     type(error_t), allocatable, intent(inout) :: error   !! of the integration, or that a number of the summary is not finite
     type(run_summary_t), intent(inout) :: summary
 
-    summary%extremes = observer%extremes
-    call observer%fatigue%finish()
-    summary%fatigue = observer%fatigue
+    associate (table => observer%table)
+      call find_extremes(observer, input, table%unit, observer%row, observer%rows, summary%extremes)
+      call take_fatigue(observer, input, table%columns%formulation%machine, size(table%labels), summary%fatigue)
+    end associate
     call check_run_limits(input, summary%signals, summary%labels, summary%extremes%lowest, summary%extremes%highest, &
                           summary%limits)
     if (.not. allocated(error)) call check_extremes(summary%extremes, summary%labels, error)
@@ -254,7 +241,7 @@ contains
     end if
     if (.not. allocated(error)) then
       associate (extremes => summary%extremes)
-        call find_start_transient(observer%table%columns%formulation%machine, [observer%t_start, observer%t_end], &
+        call find_start_transient(observer%table%columns%formulation%machine, [observer%first_time, observer%end_time], &
                                   summary%signals, max(abs(extremes%lowest), abs(extremes%highest)), &
                                   extremes%lowest_time, extremes%highest_time, summary%transient)
       end associate
@@ -278,7 +265,7 @@ contains
     self%not_finite = findloc(is_finite(self%row), .false., dim=1)
     self%failure_time = t
     if (self%not_finite > 0) return
-    call update_extremes(self%extremes, self%row)
+    self%rows = self%rows + 1
     associate (formulation => self%table%columns%formulation)
       call self%vibration%include_energy(formulation%machine, formulation%omega(1, 1:))
       self%lowest(:) = min(self%lowest, formulation%omega(1, 1:))
@@ -290,21 +277,22 @@ contains
     self%last_state(:) = y
   end subroutine on_output
 
-  !> The columns of the table between its rows.
+  subroutine observe_lanes(self, t, y)
+    class(run_observer_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: t(:), y(:, :)   !! [s], [1, states + quadratures]
+
+    call self%table%columns%observe(t, y)
+  end subroutine observe_lanes
+
+  !> The columns of the table between its rows, in SI, and the points of shafts.
   subroutine tracked_values(self, lane, t, y, values)
     class(run_observer_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t                  !! [s]
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
-    real(wp), contiguous, intent(inout) :: values(:)   !! [columns + points of shafts + signals]
+    real(wp), contiguous, intent(inout) :: values(:)   !! [columns, points]
 
-    if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
-    associate (columns => size(self%row), machine => self%table%columns%formulation%machine)
-      call self%table%fill(t, y, values(:columns))
-      call self%along%evaluate(machine, values(columns + 1:self%before_signals))
-      call self%fatigue%evaluate(machine, values(:columns), values(self%before_signals + 1:))
-    end associate
-    self%has_ranges = .true.
+    call self%table%columns%fill_row(lane, t, y, values)
   end subroutine tracked_values
 
   !> How fast they oscillate where they were evaluated last.
@@ -313,58 +301,25 @@ contains
     integer, intent(in) :: lane
     real(wp), intent(out) :: fastest, scale   !! [rad/s], [N m]
 
-    if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
     call self%table%columns%find_pace(lane, fastest, scale)
     self%largest_moment = max(self%largest_moment, scale)
   end subroutine find_pace
-
-  !> The next value of a signal.
-  subroutine on_turn(self, lane, function, value)
-    class(run_observer_t), intent(inout) :: self
-    integer, intent(in) :: lane, function
-    real(wp), intent(in) :: value
-
-    if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
-    call self%fatigue%counters(function - self%before_signals)%add(value)
-  end subroutine on_turn
-
-  !> The ranges of a signal that do not count.
-  real(wp) function least_range(self, lane, function)
-    class(run_observer_t), intent(in) :: self
-    integer, intent(in) :: lane, function
-
-    if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
-    least_range = self%fatigue%counters(function - self%before_signals)%hysteresis()
-  end function least_range
 
   subroutine on_shift(self, lane, shift)
     class(run_observer_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: shift(:)
 
+    call self%statistics_observer_t%on_shift(lane, shift)
     call self%table%columns%move_origin(lane, shift)
   end subroutine on_shift
-
-  !> The extremes of the motion. A run that fails at its start has none.
-  subroutine on_extremes(self, lane, ranges)
-    class(run_observer_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    type(ranges_t), intent(in) :: ranges   !! of the tracked functions
-    type(ranges_t) :: corrected
-
-    if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
-    if (.not. self%has_ranges) return
-    corrected = ranges
-    call self%along%correct_ranges(self%table%columns%formulation%machine, size(self%row) + 1, corrected)
-    call widen_extremes(self%extremes, corrected)
-  end subroutine on_extremes
 
   !> Whether the caller wants the run to end.
   logical function wants_stop(self, t)
     class(run_observer_t), intent(inout) :: self
     real(wp), intent(in) :: t   !! time reached [s]
 
-    wants_stop = self%output%wants_stop((t - self%t_start) / (self%t_end - self%t_start)) .or. self%not_finite > 0
+    wants_stop = self%output%wants_stop((t - self%first_time) / (self%end_time - self%first_time)) .or. self%not_finite > 0
   end function wants_stop
 
 end module nocdyn_transient

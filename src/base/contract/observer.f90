@@ -1,5 +1,6 @@
 !> The contract between an integrator and the user of its solution: callbacks for output times, events, extremes and steps.
 module nocdyn_observer
+  use nocdyn_chebyshev, only: interpolation_t
   use nocdyn_kinds, only: wp
   implicit none (type, external)
   private
@@ -17,9 +18,9 @@ module nocdyn_observer
   type, public :: observer_t
     integer, allocatable :: directions(:)   !! event_... of each event function; not allocated: there are none
     integer :: tracked = 0                  !! number of tracked functions
-    integer :: turning = 0                  !! number of the last ones of them whose turning points `on_turn` receives
     logical, allocatable :: bends(:)        !! whether a tracked function may bend more than the solution; by default none does
-    real(wp) :: tracked_from = -huge(1.0_wp)   !! time from which their extremes are taken [s]
+    real(wp), allocatable :: tracked_from(:)   !! times from which they are tracked [s], ascending; not allocated: the start
+    logical :: takes_pieces = .false.       !! whether `on_piece` receives them, and `on_extremes` nothing
     logical :: wants_steps = .false.        !! whether `on_steps` is called
     logical :: takes_shifts = .false.       !! whether `on_shift` is overridden; a system shifts no states without
     integer :: first_read = 1               !! components whose polynomials `on_steps` reads; may change from variant to variant
@@ -30,9 +31,8 @@ module nocdyn_observer
     procedure :: wants_stop
     procedure :: event_values
     procedure :: on_event
-    procedure :: tracked_values, find_pace
-    procedure :: on_extremes
-    procedure :: on_turn, least_range
+    procedure :: observe_lanes, tracked_values, find_pace
+    procedure :: on_extremes, on_piece
     procedure :: on_steps
     procedure :: on_shift
   end type observer_t
@@ -50,7 +50,15 @@ module nocdyn_observer
     real(wp), allocatable :: t_new(:)       !! end [s]
   end type step_block_t
 
-  !> Smallest and largest values of the tracked functions from `tracked_from` on, with their times [s]; [functions].
+  !> A piece of a step, in which polynomials replace the tracked functions.
+  type, public :: piece_t
+    real(wp) :: begin = 0.0_wp, end = 0.0_wp            !! [s]
+    real(wp) :: from = 0.0_wp                           !! where the part of the step begins to which it belongs [s]
+    real(wp) :: step_start = 0.0_wp, step_end = 0.0_wp  !! [s]
+  end type piece_t
+
+  !> Smallest and largest values of the tracked functions from the first time in `tracked_from` on, with their times [s];
+  !> [functions].
   type, public :: ranges_t
     real(wp), allocatable :: lowest(:), lowest_time(:), highest(:), highest_time(:)
   end type ranges_t
@@ -106,6 +114,13 @@ contains
     is_terminal = .false.
   end subroutine on_event
 
+  !> All lanes at the times and states at which `tracked_values` is asked next; lanes without a step are where they start.
+  subroutine observe_lanes(self, t, y)
+    class(observer_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: t(:)      !! [lanes]
+    real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states + quadratures]
+  end subroutine observe_lanes
+
   !> The tracked functions of one lane.
   subroutine tracked_values(self, lane, t, y, values)
     class(observer_t), intent(inout) :: self
@@ -129,7 +144,7 @@ contains
     scale = 0.0_wp
   end subroutine find_pace
 
-  !> The ranges of the tracked functions when a lane has ended; not called if it has ended before `tracked_from`.
+  !> The ranges of the tracked functions when a lane has ended; not called if it has ended before they are tracked.
   subroutine on_extremes(self, lane, ranges)
     class(observer_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -138,24 +153,18 @@ contains
     error stop 'nocdyn_observer: an observer with tracked functions overrides on_extremes'
   end subroutine on_extremes
 
-  !> The next value of a tracked function, from `tracked_from` on: those at the start, at the ends of the steps, before and after
-  !> a jump, and all extremes between them, but not those of ranges below `least_range`.
-  subroutine on_turn(self, lane, function, value)
+  !> The tracked functions in a piece of a step of one lane; the pieces of a lane come in the order of the times. If there are
+  !> several times in `tracked_from`, the part of a step from each of them on comes too, with its own pieces.
+  subroutine on_piece(self, lane, piece, rule, values, replaced)
     class(observer_t), intent(inout) :: self
     integer, intent(in) :: lane
-    integer, intent(in) :: function   !! number among the tracked ones
-    real(wp), intent(in) :: value
+    type(piece_t), intent(in) :: piece
+    type(interpolation_t), intent(in) :: rule
+    real(wp), contiguous, intent(in) :: values(:, :)   !! at its nodes, [tracked, nodes]
+    logical, intent(in) :: replaced(:)                 !! functions that the polynomials replace here; others come in halves of it
 
-    error stop 'nocdyn_observer: an observer of turning points overrides on_turn'
-  end subroutine on_turn
-
-  !> The range of a tracked function that does not count, 0 by default.
-  real(wp) function least_range(self, lane, function)
-    class(observer_t), intent(in) :: self
-    integer, intent(in) :: lane, function
-
-    least_range = 0.0_wp
-  end function least_range
+    error stop 'nocdyn_observer: an observer that takes pieces overrides on_piece'
+  end subroutine on_piece
 
   !> The last steps of the lanes, after their output times and events: y + sum over p of c(:, :, p) (scale theta)^p.
   subroutine on_steps(self, steps, y, y_new, c)

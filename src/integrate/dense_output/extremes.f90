@@ -1,34 +1,39 @@
-!> Extremes in continuous time of functions of the solution, such as moments and reactions.
+!> Polynomials of functions of the solution, such as moments and reactions, in every step, and their extremes in continuous time.
 !>
-!> In every step each function is replaced by the polynomial through its values at Chebyshev-Lobatto nodes, as many as the dense
-!> output has coefficients: a linear function of the state is represented exactly. Functions that bend more than the solution are
-!> replaced piece by piece (`nocdyn_step_pieces`). The extremes of the polynomial are found to machine precision wherever it can
-!> exceed those so far.
+!> In every step of a lane each function is replaced by the polynomial through its values at Chebyshev-Lobatto nodes, as many as
+!> the dense output of the step has coefficients: a linear function of the state is represented exactly. Functions that bend more
+!> than the solution are replaced piece by piece (`nocdyn_step_pieces`). The extremes of the polynomial are found to machine
+!> precision wherever it can exceed those so far.
 module nocdyn_extremes
-  use nocdyn_chebyshev, only: interpolation_t, list_extremes, max_degree, new_interpolation, raise_to_maximum, time_at
-  use nocdyn_dense_output, only: dense_output_t, sample
+  use nocdyn_chebyshev, only: interpolation_t, max_degree, new_interpolation, raise_to_maximum, time_at
   use nocdyn_kinds, only: wp
-  use nocdyn_observer, only: observer_t, ranges_t
+  use nocdyn_observer, only: observer_t, piece_t, ranges_t, step_block_t
   use nocdyn_step_attempt, only: step_attempt_t
   use nocdyn_step_pieces, only: new_step_pieces, step_pieces_t
   implicit none (type, external)
   private
 
-  public :: allocate_extremes, start_extremes, restart_extremes, update_extremes
+  public :: allocate_extremes, start_extremes, restart_extremes, update_extremes, end_extremes
 
-  real(wp), parameter, public :: before_jump = 64.0_wp   !! spacings of the time between the last node and a jump
+  real(wp), parameter :: before_jump = 64.0_wp   ! spacings of the time between the last node and a jump
 
   type, public :: extremes_t
     type(ranges_t), allocatable :: ranges(:)               !! [lanes]
     logical, allocatable :: have_begun(:)                  !! whether a lane has come to the time from which they count, [lanes]
-    real(wp), allocatable, private :: last(:, :)           !! values at the ends of the last steps, [functions, lanes]
+    real(wp), allocatable, private :: from(:)              !! times from which functions are tracked [s]
     type(interpolation_t), allocatable, private :: rules(:)   !! of the degrees of the steps, [largest degree]
-    real(wp), allocatable, private :: values(:, :)         !! [functions, most nodes]
-    real(wp), allocatable, private :: y(:)                 !! [components]
+    integer, allocatable, private :: degree(:)             !! of the last steps, [lanes]
+    logical, allocatable, private :: is_known(:)           !! whether `last` has the values where the next step begins, [lanes]
+    real(wp), allocatable, private :: last(:, :)           !! values at the ends of the last pieces, [functions, lanes]
+    real(wp), allocatable, private :: values(:, :, :)      !! [functions, most nodes, lanes]
+    logical, allocatable, private :: active(:)             !! lanes whose step is sampled
+    real(wp), allocatable, private :: start(:)             !! of the part of the step [s], [lanes]
+    real(wp), allocatable, private :: t(:), theta(:)       !! of the sample, [lanes]
+    real(wp), allocatable, private :: y(:, :), y_lane(:)   !! [lanes, components], [components]
     type(step_pieces_t), allocatable, private :: pieces(:) !! of the steps of the lanes, [lanes]
     integer, allocatable, private :: bending(:)            !! functions that may bend more than the solution
     logical, allocatable, private :: replaced(:)           !! whose polynomials count in a piece, [functions]
-    real(wp), allocatable, private :: fastest(:), scale(:) !! waves [rad/s] and scale of these at the ends of the steps, [lanes]
+    real(wp), allocatable, private :: fastest(:), scale(:) !! waves [rad/s] and scale of these where pieces begin, [lanes]
   end type extremes_t
 
 contains
@@ -46,38 +51,119 @@ contains
       if (degrees(i) == 0) cycle
       extremes%rules(degrees(i)) = new_interpolation(degrees(i))
     end do
-    allocate (extremes%ranges(attempt%lanes))
-    allocate (extremes%have_begun(attempt%lanes), source=.false.)
-    do lane = 1, attempt%lanes
-      associate (ranges => extremes%ranges(lane), functions => observer%tracked)
-        allocate (ranges%lowest(functions), ranges%lowest_time(functions), ranges%highest(functions), &
-                  ranges%highest_time(functions), source=0.0_wp)
-      end associate
-    end do
-    allocate (extremes%last(observer%tracked, attempt%lanes), extremes%values(observer%tracked, maxval(degrees) + 1), &
-              extremes%y(attempt%components), extremes%fastest(attempt%lanes), extremes%scale(attempt%lanes), source=0.0_wp)
-    allocate (extremes%replaced(observer%tracked), source=.false.)
+    associate (functions => observer%tracked, lanes => attempt%lanes)
+      allocate (extremes%ranges(lanes), extremes%pieces(lanes))
+      do lane = 1, lanes
+        extremes%pieces(lane) = new_step_pieces(functions)
+        associate (ranges => extremes%ranges(lane))
+          allocate (ranges%lowest(functions), ranges%lowest_time(functions), ranges%highest(functions), &
+                    ranges%highest_time(functions), source=0.0_wp)
+        end associate
+      end do
+      allocate (extremes%have_begun(lanes), extremes%is_known(lanes), extremes%active(lanes), extremes%replaced(functions), &
+                source=.false.)
+      allocate (extremes%degree(lanes), source=1)
+      allocate (extremes%last(functions, lanes), extremes%values(functions, maxval(degrees) + 1, lanes), &
+                extremes%y(lanes, attempt%components), extremes%y_lane(attempt%components), source=0.0_wp)
+      allocate (extremes%start(lanes), extremes%t(lanes), extremes%theta(lanes), extremes%fastest(lanes), extremes%scale(lanes), &
+                source=0.0_wp)
+    end associate
+    allocate (extremes%from(1), source=-huge(1.0_wp))
+    if (allocated(observer%tracked_from)) extremes%from = observer%tracked_from
     allocate (extremes%bending(0))
     if (allocated(observer%bends)) extremes%bending = pack([(i, i=1, observer%tracked)], observer%bends)
-    allocate (extremes%pieces(attempt%lanes))
-    do lane = 1, attempt%lanes
-      extremes%pieces(lane) = new_step_pieces(observer%tracked)
-    end do
   end subroutine allocate_extremes
 
-  !> Sets the ranges of a lane at its start, if they count from there.
-  subroutine start_extremes(extremes, observer, attempt, lane)
+  !> Forgets the functions of a lane, which starts.
+  pure subroutine start_extremes(extremes, lane)
+    type(extremes_t), intent(inout) :: extremes
+    integer, intent(in) :: lane
+
+    extremes%have_begun(lane) = .false.
+    call extremes%pieces(lane)%restart()
+    call restart_extremes(extremes, lane)
+  end subroutine start_extremes
+
+  !> Forgets the present values of the functions of a lane, after a jump.
+  pure subroutine restart_extremes(extremes, lane)
+    type(extremes_t), intent(inout) :: extremes
+    integer, intent(in) :: lane
+
+    extremes%is_known(lane) = .false.
+  end subroutine restart_extremes
+
+  !> Follows the functions through the last steps of the lanes, in the parts of them from each time in `tracked_from` on.
+  subroutine update_extremes(extremes, observer, steps, attempt, c)
+    type(extremes_t), intent(inout) :: extremes
+    class(observer_t), intent(inout) :: observer
+    type(step_block_t), intent(in) :: steps
+    type(step_attempt_t), intent(in) :: attempt
+    real(wp), contiguous, intent(in) :: c(:, :, :)   !! coefficients of the dense output, [lanes, padded columns, degree]
+    integer :: i
+
+    extremes%degree(:) = attempt%degree
+    do i = 1, size(extremes%from)
+      extremes%active(:) = steps%taken .and. steps%t_new > extremes%from(i)
+      if (i > 1) extremes%active(:) = extremes%active .and. steps%t < extremes%from(i)   ! else it is the part of the first
+      if (.not. any(extremes%active)) cycle
+      extremes%start(:) = max(steps%t, extremes%from(i))
+      call begin_parts(extremes, observer, steps, attempt, c)
+      do while (any(extremes%active))
+        call sample_pieces(extremes, observer, steps, attempt, c)
+        call take_pieces(extremes, observer, steps)
+      end do
+    end do
+  end subroutine update_extremes
+
+  !> Takes the functions after a jump at the end of a lane: constants in a piece without a length.
+  subroutine end_extremes(extremes, observer, attempt, lane)
     type(extremes_t), intent(inout) :: extremes
     class(observer_t), intent(inout) :: observer
     type(step_attempt_t), intent(in) :: attempt
     integer, intent(in) :: lane
+    integer :: i
 
-    extremes%have_begun(lane) = attempt%t(lane) >= observer%tracked_from
-    call extremes%pieces(lane)%restart()
     if (.not. extremes%have_begun(lane)) return
-    call restart_extremes(extremes, observer, attempt, lane)
-    call start_ranges(extremes%ranges(lane), extremes%last(:, lane), attempt%t(lane))
-  end subroutine start_extremes
+    extremes%t(:) = attempt%t
+    extremes%y(:, :) = attempt%y(:, :attempt%components)
+    call observer%observe_lanes(extremes%t, extremes%y)
+    extremes%y_lane(:) = extremes%y(lane, :)
+    call observer%tracked_values(lane, extremes%t(lane), extremes%y_lane, extremes%last(:, lane))
+    do i = 2, extremes%degree(lane) + 1
+      extremes%values(:, i, lane) = extremes%last(:, lane)
+    end do
+    extremes%replaced(:) = .true.
+    call take_piece(extremes, observer, lane, piece_t(attempt%t(lane), attempt%t(lane), attempt%t(lane), attempt%t(lane), &
+                                                      attempt%t(lane)))
+  end subroutine end_extremes
+
+  !> Begins the parts of the steps of the active lanes with their first pieces.
+  subroutine begin_parts(extremes, observer, steps, attempt, c)
+    type(extremes_t), intent(inout) :: extremes
+    class(observer_t), intent(inout) :: observer
+    type(step_block_t), intent(in) :: steps
+    type(step_attempt_t), intent(in) :: attempt
+    real(wp), contiguous, intent(in) :: c(:, :, :)
+    integer :: lane
+
+    where (extremes%active .and. extremes%start > steps%t) extremes%is_known = .false.
+    if (any(extremes%active .and. .not. extremes%is_known)) then
+      extremes%t(:) = extremes%start
+      call observe(extremes, observer, steps, attempt, c)
+    end if
+    do lane = 1, size(extremes%active)
+      if (.not. extremes%active(lane)) cycle
+      if (.not. extremes%is_known(lane)) then
+        extremes%y_lane(:) = extremes%y(lane, :)
+        call observer%tracked_values(lane, extremes%t(lane), extremes%y_lane, extremes%last(:, lane))
+        call observer%find_pace(lane, extremes%fastest(lane), extremes%scale(lane))
+      end if
+      if (.not. extremes%have_begun(lane)) call start_ranges(extremes%ranges(lane), extremes%last(:, lane), extremes%start(lane))
+      extremes%have_begun(lane) = .true.
+      call extremes%pieces(lane)%start_step(extremes%start(lane), steps%t_new(lane), extremes%fastest(lane), &
+                                            extremes%degree(lane))
+    end do
+  end subroutine begin_parts
 
   !> Sets the ranges to the values of a single time.
   pure subroutine start_ranges(ranges, values, t)
@@ -91,125 +177,156 @@ contains
     ranges%highest_time(:) = t
   end subroutine start_ranges
 
-  !> Evaluates the tracked functions at the present state of a lane, after a jump.
-  subroutine restart_extremes(extremes, observer, attempt, lane)
+  !> Brings the active lanes to the times `t`, the other lanes to where their steps start.
+  subroutine observe(extremes, observer, steps, attempt, c)
     type(extremes_t), intent(inout) :: extremes
     class(observer_t), intent(inout) :: observer
+    type(step_block_t), intent(in) :: steps
     type(step_attempt_t), intent(in) :: attempt
-    integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: c(:, :, :)
 
-    if (.not. extremes%have_begun(lane)) return
-    extremes%y(:) = attempt%y(lane, :attempt%components)
-    call observer%tracked_values(lane, attempt%t(lane), extremes%y, extremes%last(:, lane))
-    call observer%find_pace(lane, extremes%fastest(lane), extremes%scale(lane))
-    call tell_values(observer, lane, extremes%last(:, lane))
-  end subroutine restart_extremes
+    extremes%theta(:) = 0.0_wp
+    where (extremes%active) extremes%theta = min(1.0_wp, (extremes%t - steps%t) / steps%h)
+    if (attempt%lanes == 1) then
+      call find_state(size(attempt%y, 2), attempt%components, extremes%degree(1), extremes%theta(1), attempt%y, c, extremes%y)
+    else
+      call find_states(attempt%lanes, size(attempt%y, 2), attempt%components, maxval(extremes%degree), extremes%theta, &
+                       extremes%active, attempt%y, c, extremes%y)
+    end if
+    call observer%observe_lanes(extremes%t, extremes%y)
+  end subroutine observe
 
-  !> Tells the present values of the functions whose turning points are wanted.
-  subroutine tell_values(observer, lane, values)
-    class(observer_t), intent(inout) :: observer
-    integer, intent(in) :: lane
-    real(wp), contiguous, intent(in) :: values(:)   !! [functions]
-    integer :: function
+  !> The state of a single lane at t + theta h, as `find_states`: with components in vectors.
+  pure subroutine find_state(columns, components, degree, theta, start, c, y)
+    integer, intent(in) :: columns, components, degree
+    real(wp), intent(in) :: theta, start(columns), c(columns, degree)
+    real(wp), intent(inout) :: y(components)
+    integer :: p
 
-    do function = observer%tracked - observer%turning + 1, observer%tracked
-      call observer%on_turn(lane, function, values(function))
+    y = c(:components, degree)
+    do p = degree - 1, 1, -1
+      y = c(:components, p) + theta * y
     end do
-  end subroutine tell_values
+    y = start(:components) + theta * y
+  end subroutine find_state
 
-  !> Widens the ranges of a lane by its last step, from `tracked_from` up to t_end. If the step ends at a crossing, the last node
-  !> is just before it: a function may jump there, which would spoil the polynomial.
-  subroutine update_extremes(extremes, observer, dense, t_end, ends_at_crossing)
+  !> The states of the lanes at t + theta h, the start where a lane is not active.
+  pure subroutine find_states(lanes, columns, components, degree, theta, active, start, c, y)
+    integer, intent(in) :: lanes, columns, components, degree
+    real(wp), intent(in) :: theta(lanes), start(lanes, columns), c(lanes, columns, degree)
+    logical, intent(in) :: active(lanes)
+    real(wp), intent(inout) :: y(lanes, components)
+    integer :: i, p
+
+    do i = 1, components
+      y(:, i) = c(:, i, degree)
+      do p = degree - 1, 1, -1
+        y(:, i) = c(:, i, p) + theta * y(:, i)
+      end do
+      y(:, i) = merge(start(:, i) + theta * y(:, i), start(:, i), active)
+    end do
+  end subroutine find_states
+
+  !> Evaluates the functions at the nodes of the pieces of the active lanes; at the first one they are known.
+  subroutine sample_pieces(extremes, observer, steps, attempt, c)
     type(extremes_t), intent(inout) :: extremes
     class(observer_t), intent(inout) :: observer
-    type(dense_output_t), intent(inout) :: dense   !! of the lane
-    real(wp), intent(in) :: t_end   !! end of the step [s]
-    logical, intent(in) :: ends_at_crossing
-    real(wp) :: t_start, values(0:max_degree)
+    type(step_block_t), intent(in) :: steps
+    type(step_attempt_t), intent(in) :: attempt
+    real(wp), contiguous, intent(in) :: c(:, :, :)
+    integer :: i, lane
+
+    do i = 1, maxval(extremes%degree, mask=extremes%active)
+      extremes%t(:) = steps%t
+      do lane = 1, attempt%lanes
+        if (.not. extremes%active(lane)) cycle
+        associate (piece => extremes%pieces(lane), degree => extremes%degree(lane))
+          extremes%t(lane) = time_of_node(piece%begin, piece%end, extremes%rules(degree)%nodes(min(i, degree)), &
+                                          steps%crosses(lane), steps%t_new(lane))
+        end associate
+      end do
+      call observe(extremes, observer, steps, attempt, c)
+      do lane = 1, attempt%lanes
+        if (.not. extremes%active(lane) .or. i > extremes%degree(lane)) cycle
+        extremes%y_lane(:) = extremes%y(lane, :)
+        call observer%tracked_values(lane, extremes%t(lane), extremes%y_lane, extremes%values(:, i + 1, lane))
+      end do
+    end do
+  end subroutine sample_pieces
+
+  !> The time of a node in a piece [s]. If the step ends at a crossing, it is before that: a function may jump there, which would
+  !> spoil the polynomial.
+  pure real(wp) function time_of_node(begin, end, node, crosses, t_new) result(t)
+    real(wp), intent(in) :: begin, end   !! of the piece [s]
+    real(wp), intent(in) :: node         !! -1 to 1
+    logical, intent(in) :: crosses       !! whether the step ends at a crossing
+    real(wp), intent(in) :: t_new        !! end of the step [s]
+    real(wp) :: half
+
+    half = 0.5_wp * (end - begin)
+    t = begin + half + node * half
+    if (crosses .and. end >= t_new) t = max(begin, min(t, t_new - before_jump * spacing(t_new)))
+  end function time_of_node
+
+  !> Takes the polynomials in the pieces that have been sampled, and goes on to the next pieces.
+  subroutine take_pieces(extremes, observer, steps)
+    type(extremes_t), intent(inout) :: extremes
+    class(observer_t), intent(inout) :: observer
+    type(step_block_t), intent(in) :: steps
     logical :: has_moved
-    integer :: function, i, last
+    integer :: lane
 
-    if (t_end <= observer%tracked_from) return
-    t_start = max(dense%t, observer%tracked_from)
-    if (.not. extremes%have_begun(dense%lane)) call begin(extremes, observer, dense, t_start)
-    last = dense%degree + 1
-    associate (lane => dense%lane, pieces => extremes%pieces(dense%lane), rule => extremes%rules(dense%degree))
-      call pieces%start_step(t_start, t_end, extremes%fastest(lane), dense%degree)
-      do while (.not. pieces%is_done)
-        call sample_piece(extremes, observer, dense, pieces%begin, pieces%end, ends_at_crossing .and. pieces%end >= t_end)
-        extremes%replaced(:) = pieces%is_open(:, pieces%depth)
-        do i = 1, size(extremes%bending)
-          function = extremes%bending(i)
-          if (.not. extremes%replaced(function)) cycle
-          values(:last - 1) = extremes%values(function, :last)
-          call pieces%replaces(function, rule, values, extremes%scale(lane), extremes%replaced(function))
-        end do
-        call widen_ranges(rule, extremes%values(:, :last), extremes%replaced, extremes%ranges(lane), pieces%begin, pieces%end)
-        call tell_turns(observer, lane, rule, extremes%values(:, :last), extremes%replaced)
+    do lane = 1, size(extremes%active)
+      if (.not. extremes%active(lane)) cycle
+      associate (pieces => extremes%pieces(lane))
+        call find_replaced(extremes, lane)
+        call take_piece(extremes, observer, lane, piece_t(pieces%begin, pieces%end, extremes%start(lane), steps%t(lane), &
+                                                          steps%t_new(lane)))
         call pieces%advance(has_moved)
-        if (has_moved) extremes%last(:, lane) = extremes%values(:, last)
-      end do
-      call observer%find_pace(lane, extremes%fastest(lane), extremes%scale(lane))
-    end associate
-  end subroutine update_extremes
-
-  !> Evaluates the functions at the nodes in a piece of a step; at the first one they are known.
-  subroutine sample_piece(extremes, observer, dense, t_start, t_end, ends_at_crossing)
-    type(extremes_t), intent(inout) :: extremes
-    class(observer_t), intent(inout) :: observer
-    type(dense_output_t), intent(inout) :: dense   !! of the lane
-    real(wp), intent(in) :: t_start, t_end         !! of the piece [s]
-    logical, intent(in) :: ends_at_crossing
-    real(wp) :: t, half, middle
-    integer :: i, last
-
-    last = dense%degree + 1
-    half = 0.5_wp * (t_end - t_start)
-    middle = t_start + half
-    extremes%values(:, 1) = extremes%last(:, dense%lane)
-    do i = 2, last
-      t = middle + extremes%rules(dense%degree)%nodes(i - 1) * half
-      if (i == last .and. ends_at_crossing) t = max(t_start, t_end - before_jump * spacing(t_end))
-      call sample(dense, min(1.0_wp, (t - dense%t) / dense%h), extremes%y)
-      call observer%tracked_values(dense%lane, t, extremes%y, extremes%values(:, i))
+        if (has_moved) extremes%last(:, lane) = extremes%values(:, extremes%degree(lane) + 1, lane)
+        if (.not. pieces%is_done) cycle
+        extremes%active(lane) = .false.
+        extremes%is_known(lane) = .true.
+        call observer%find_pace(lane, extremes%fastest(lane), extremes%scale(lane))
+      end associate
     end do
-  end subroutine sample_piece
+  end subroutine take_pieces
 
-  !> Tells the extremes inside of a piece of a step and the values at its end.
-  subroutine tell_turns(observer, lane, rule, values_of, replaced)
+  !> Gives the polynomials in a piece to the observer, or widens the ranges of a lane by them.
+  subroutine take_piece(extremes, observer, lane, piece)
+    type(extremes_t), intent(inout) :: extremes
     class(observer_t), intent(inout) :: observer
     integer, intent(in) :: lane
-    type(interpolation_t), intent(in) :: rule
-    real(wp), contiguous, intent(in) :: values_of(:, :)   !! [functions, nodes]
-    logical, intent(in) :: replaced(:)                    !! functions that count
-    real(wp) :: turns(max_degree), values(0:max_degree)
-    integer :: function, i, turn_count
+    type(piece_t), intent(in) :: piece
 
-    do function = observer%tracked - observer%turning + 1, observer%tracked
-      if (.not. replaced(function)) cycle
-      values(:rule%degree) = values_of(function, :)
-      call list_extremes(rule, values, observer%least_range(lane, function), turns, turn_count)
-      do i = 1, turn_count
-        call observer%on_turn(lane, function, turns(i))
-      end do
-      call observer%on_turn(lane, function, values(rule%degree))
-    end do
-  end subroutine tell_turns
+    associate (rule => extremes%rules(extremes%degree(lane)), values => extremes%values(:, :extremes%degree(lane) + 1, lane))
+      values(:, 1) = extremes%last(:, lane)
+      if (observer%takes_pieces) then
+        call observer%on_piece(lane, piece, rule, values, extremes%replaced)
+      else
+        call widen_ranges(rule, values, extremes%replaced, extremes%ranges(lane), piece%begin, piece%end)
+      end if
+    end associate
+  end subroutine take_piece
 
-  !> Sets the ranges of a lane to the values at a time in its last step.
-  subroutine begin(extremes, observer, dense, t)
+  !> Finds the functions whose polynomials count in the present piece of a lane.
+  pure subroutine find_replaced(extremes, lane)
     type(extremes_t), intent(inout) :: extremes
-    class(observer_t), intent(inout) :: observer
-    type(dense_output_t), intent(inout) :: dense   !! of the lane
-    real(wp), intent(in) :: t                      !! [s]
+    integer, intent(in) :: lane
+    real(wp) :: values(0:max_degree)
+    integer :: function, i
 
-    call sample(dense, (t - dense%t) / dense%h, extremes%y)
-    call observer%tracked_values(dense%lane, t, extremes%y, extremes%last(:, dense%lane))
-    call observer%find_pace(dense%lane, extremes%fastest(dense%lane), extremes%scale(dense%lane))
-    call start_ranges(extremes%ranges(dense%lane), extremes%last(:, dense%lane), t)
-    call tell_values(observer, dense%lane, extremes%last(:, dense%lane))
-    extremes%have_begun(dense%lane) = .true.
-  end subroutine begin
+    associate (pieces => extremes%pieces(lane), degree => extremes%degree(lane))
+      extremes%replaced(:) = pieces%is_open(:, pieces%depth)
+      do i = 1, size(extremes%bending)
+        function = extremes%bending(i)
+        if (.not. extremes%replaced(function)) cycle
+        values(0) = extremes%last(function, lane)
+        values(1:degree) = extremes%values(function, 2:degree + 1, lane)
+        call pieces%replaces(function, extremes%rules(degree), values, extremes%scale(lane), extremes%replaced(function))
+      end do
+    end associate
+  end subroutine find_replaced
 
   !> Widens the ranges by the extremes of the polynomials through `values_of`, over the times from t_start to t_end.
   pure subroutine widen_ranges(rule, values_of, replaced, ranges, t_start, t_end)

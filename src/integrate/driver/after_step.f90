@@ -1,8 +1,8 @@
-!> Processing of accepted steps: output times, events, extremes, changes of branches, and the observer of whole steps.
+!> Processing of accepted steps: output times, events, extremes, and changes of branches.
 module nocdyn_after_step
   use nocdyn_dense_output, only: batch, load_lane, sample, sample_batch
   use nocdyn_events, only: find_events
-  use nocdyn_extremes, only: restart_extremes, update_extremes
+  use nocdyn_extremes, only: end_extremes, restart_extremes, update_extremes
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: all_true, any_true
   use nocdyn_observer, only: observer_t
@@ -16,7 +16,7 @@ module nocdyn_after_step
   implicit none (type, external)
   private
 
-  public :: process_steps, observe_steps, change_branches
+  public :: process_steps, change_branches
 
   real(wp), parameter :: same_time = 16.0_wp   ! spacings of the time by which a row may be before a crossing that it is at
 
@@ -36,7 +36,10 @@ contains
     associate (steps => integrator%steps)
       steps%theta_end(:) = 1.0_wp
       steps%crosses(:) = .false.
-      if (.not. integrator%inspects) return
+      if (.not. integrator%inspects) then
+        call describe_steps(integrator)
+        return
+      end if
       if (integrator%has_switches .and. any_true(integrator%attempt%lanes, integrator%accepted)) then
         call scan_for_crossings(integrator%switching, system, integrator%attempt, integrator%coefficients, integrator%accepted)
       end if
@@ -57,10 +60,11 @@ contains
         if (integrator%next_time(lane) <= integrator%t_new(lane)) then
           call output_until(integrator, lane, integrator%t_new(lane), times, observer)
         end if
-        if (integrator%has_extremes) then
-          call update_extremes(integrator%extremes, observer, integrator%dense, integrator%t_new(lane), steps%crosses(lane))
-        end if
       end do
+      call describe_steps(integrator)
+      if (integrator%has_extremes) then
+        call update_extremes(integrator%extremes, observer, steps, integrator%attempt, integrator%coefficients)
+      end if
     end associate
   end subroutine process_steps
 
@@ -69,15 +73,12 @@ contains
     type(integrator_t), intent(in) :: integrator
     integer, intent(in) :: lane
 
-    is_sampled = integrator%has_events .or. integrator%has_extremes .or. &
-                 integrator%next_time(lane) < integrator%t_new(lane)
+    is_sampled = integrator%has_events .or. integrator%next_time(lane) < integrator%t_new(lane)
   end function is_sampled
 
-  !> Passes the steps of the whole block to an observer that wants them, after `process_steps`.
-  subroutine observe_steps(integrator, stepper, observer)
+  !> Describes the steps of the whole block.
+  subroutine describe_steps(integrator)
     type(integrator_t), intent(inout) :: integrator
-    class(stepper_t), intent(in) :: stepper
-    class(observer_t), intent(inout) :: observer
 
     associate (steps => integrator%steps, attempt => integrator%attempt)
       steps%taken(:) = integrator%accepted
@@ -86,9 +87,8 @@ contains
       steps%t(:) = attempt%t
       steps%h(:) = attempt%h
       steps%t_new(:) = integrator%t_new
-      call stepper%pass_steps(steps, attempt, integrator%coefficients, observer)
     end associate
-  end subroutine observe_steps
+  end subroutine describe_steps
 
   !> Cuts the step of a lane at the boundary of its branch.
   subroutine end_at_crossing(integrator, system, observer, lane, solver_status, theta_end)
@@ -222,18 +222,16 @@ contains
         if (starting(lane)) then
           call cross_boundaries(integrator%switching, system, attempt, lane, solver_status)
           call resume_control(integrator%control, lane, solver_status%h(lane))
+          if (integrator%has_extremes) call restart_extremes(integrator%extremes, lane)
         else if (solver_status%code(lane) == integration_done .and. integrator%has_jumps) then
           call cross_boundaries(integrator%switching, system, attempt, lane, solver_status)
+          if (integrator%has_extremes) call end_extremes(integrator%extremes, observer, attempt, lane)
         end if
         if (integrator%has_jumps .and. integrator%steps%crosses(lane)) call output_at_crossing(integrator, lane, times, observer)
       end do
       if (.not. any(starting)) return
       call evaluate_starts(integrator, system, solver_status)
       call stepper%resume(attempt, starting)
-      if (.not. integrator%has_extremes) return
-      do lane = 1, attempt%lanes
-        if (starting(lane)) call restart_extremes(integrator%extremes, observer, attempt, lane)
-      end do
     end associate
   end subroutine change_branches
 

@@ -1,6 +1,6 @@
 !> Integration of a block of lanes from the first to the last output time.
 module nocdyn_integration
-  use nocdyn_after_step, only: change_branches, observe_steps, process_steps
+  use nocdyn_after_step, only: change_branches, process_steps
   use nocdyn_ensemble, only: ensemble_t, initial_states, initial_states_t
   use nocdyn_error_test, only: test_errors
   use nocdyn_errors, only: error_t
@@ -86,7 +86,9 @@ contains
         if (integrator%inspects .or. integrator%wants_steps) then
           call process_steps(integrator, system, times, observer, solver_status)
         end if
-        if (integrator%wants_steps) call observe_steps(integrator, stepper, observer)
+        if (integrator%wants_steps) then
+          call stepper%pass_steps(integrator%steps, integrator%attempt, integrator%coefficients, observer)
+        end if
         call advance_lanes(integrator, times)
         if (system%projects) call project_states(integrator, system)
         if (integrator%may_shift) call shift_states(integrator, system, observer)

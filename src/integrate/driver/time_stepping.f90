@@ -202,9 +202,9 @@ contains
         integrator%sample(:) = attempt%y(lane, :attempt%components)
         if (times(integrator%next(lane) - 1) >= attempt%t(lane)) call observer%on_output(lane, attempt%t(lane), integrator%sample)
         integrator%control%h(lane) = integrator%first_step
+        if (integrator%has_extremes) call start_extremes(integrator%extremes, lane)
         if (.not. attempt%active(lane)) cycle
         if (integrator%has_events) call start_root_functions(integrator%events%roots, system, observer, attempt, lane)
-        if (integrator%has_extremes) call start_extremes(integrator%extremes, observer, attempt, lane)
       end do
       if (integrator%first_step > 0 .or. .not. stepper%estimates_errors) return
       call guess_first_steps(integrator%control, stepper%order, system, attempt)
@@ -342,7 +342,7 @@ contains
       solver_status%evaluations(lane) = integrator%attempt%evaluations(lane)
       solver_status%jacobians(lane) = integrator%attempt%jacobians(lane)
       solver_status%factorisations(lane) = integrator%attempt%factorisations(lane)
-      if (integrator%has_extremes .and. solver_status%steps(lane) > 0) then
+      if (integrator%has_extremes .and. .not. observer%takes_pieces) then
         if (integrator%extremes%have_begun(lane)) call observer%on_extremes(lane, integrator%extremes%ranges(lane))
       end if
       integrator%sample(:) = integrator%attempt%y(lane, :integrator%attempt%components)

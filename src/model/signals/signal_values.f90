@@ -98,17 +98,16 @@ contains
 
   !> Whether a column may bend more than the solution: torques, reactions and what follows from them, but not moments in
   !> proportion to twists and their rates.
-  logical function may_bend(machine, column)
+  logical function may_bend(machine, column, varies)
     type(machine_t), intent(in) :: machine
     type(signal_source_t), intent(in) :: column
+    logical, intent(in) :: varies   !! whether cubic stiffnesses vary
 
-    may_bend = column%body > 0
-    if (may_bend) return
-    may_bend = any(column%kind == [signal_element, signal_reaction, signal_member, signal_point_moment, signal_point_stress])
-    if (column%kind /= signal_element) return
+    may_bend = any(column%kind == [signal_element, signal_reaction, signal_member])
+    if (column%kind /= signal_element .or. column%body > 0) return
     associate (bank => machine%banks(column%bank)%bank)
       if (bank%role == role_coupling .and. bank%has_paper_law .and. bank%has_polynomial_potential) then
-        may_bend = any(abs(machine%laws%cubic(:, bank%first:bank%last())) > 0)
+        may_bend = varies .or. any(abs(machine%laws%cubic(:, bank%first:bank%last())) > 0)
       end if
     end associate
   end function may_bend
@@ -176,9 +175,9 @@ contains
   subroutine fill_row(self, lane, t, y, row)
     class(signal_values_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
-    real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states + quadratures]
-    real(wp), intent(inout) :: row(:)             !! [columns]
+    real(wp), intent(in) :: t                  !! [s]
+    real(wp), contiguous, intent(in) :: y(:)   !! of the lane, [states + quadratures]
+    real(wp), intent(inout) :: row(:)          !! [columns]
     integer :: k
 
     if (self%have_reactions) call self%formulation%reactions(lane, self%lambda)
@@ -189,7 +188,7 @@ contains
                    i => self%segments(k)%index, j => self%segments(k)%index + self%segments(k)%last - self%segments(k)%first)
           select case (segment%kind)
           case (signal_time)
-            row(first) = t(lane)
+            row(first) = t
           case (signal_angle)
             row(first:last) = self%formulation%phi(lane, i:j)
           case (signal_speed)
@@ -252,7 +251,6 @@ contains
     type(segment_t), intent(in) :: segment
     integer, intent(in) :: lane
     real(wp), intent(inout) :: values(:)   !! [N m] or [Pa]
-    real(wp), allocatable :: moduli(:)
     integer :: p
 
     select type (bank => machine%banks(segment%bank)%bank)
@@ -261,8 +259,10 @@ contains
         values(p) = bank%moment_at(machine%elements, segment%quantity, segment%index + p - 1, lane)
       end do
       if (segment%kind == signal_point_stress) then
-        moduli = bank%section_moduli(segment%quantity, lane)
-        values(:) = values / moduli(segment%index:segment%index + size(values) - 1)
+        associate (moduli => bank%parameters(bank%number_of('shaft_modulus'))%value, &
+                   first => bank%shafts(segment%quantity)%first_point + segment%index - 1)
+          values(:) = values / moduli(lane, first:first + size(values) - 1)
+        end associate
       end if
     class default
       error stop 'nocdyn_signal_values: the points are of a shaft'
@@ -273,15 +273,14 @@ contains
   subroutine find_energies(self, lane, y)
     type(signal_values_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states + quadratures]
+    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
 
     associate (energies => self%energies)
       energies(signal_kinetic) = self%kinetic_energy(lane)
       if (self%have_elastic) energies(signal_elastic) = sum(self%formulation%machine%elements%stored(lane, :))
       if (.not. self%have_works) return
-      energies(signal_work_in) = work(self%works_in, self%formulation%states, lane, y)
-      energies(signal_work_out) = work(self%works_out, self%formulation%states, lane, y) &
-                                  + sum(self%formulation%machine%elements%kept(lane, :)) - self%start_kept(lane)
+      energies(signal_work_in) = work(self%works_in, self%formulation%states, y)
+      energies(signal_work_out) = work(self%works_out, self%formulation%states, y)
       energies(signal_residual) = (energies(signal_kinetic) + energies(signal_elastic) - self%start_energy(lane)) &
                                   - (energies(signal_work_in) + energies(signal_work_out))
       energies(signal_work_out) = 0.0_wp - energies(signal_work_out)   ! not -0 without any work
@@ -297,16 +296,15 @@ contains
   end function kinetic_energy
 
   !> The sum of some work integrals of a lane, positive into the machine [J].
-  pure real(wp) function work(works, states, lane, y)
+  pure real(wp) function work(works, states, y)
     integer, intent(in) :: works(:)   !! indices in the quadratures
     integer, intent(in) :: states     !! their number, before the quadratures
-    integer, intent(in) :: lane
-    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(in) :: y(:)
     integer :: i
 
     work = 0.0_wp
     do i = 1, size(works)
-      work = work + y(lane, states + works(i))
+      work = work + y(states + works(i))
     end do
   end function work
 

@@ -13,7 +13,7 @@ module nocdyn_signals
   implicit none (type, external)
   private
 
-  public :: find_signal, former_name, label_signals, list_points, list_signals
+  public :: find_signal, former_name, is_largest_along, label_signals, list_points, list_signals
 
   integer, parameter, public :: signal_time = 1
   integer, parameter, public :: signal_angle = 2         !! of a body
@@ -342,5 +342,25 @@ contains
     end do
     allocate (points(0))
   end subroutine list_points
+
+  !> Whether a column is the largest moment or stress along a shaft with inertia.
+  logical function is_largest_along(machine, column, is_stress)
+    type(machine_t), intent(in) :: machine
+    type(signal_source_t), intent(in) :: column
+    logical, intent(out) :: is_stress
+    integer :: shaft
+
+    is_largest_along = .false.
+    is_stress = .false.
+    if (column%kind /= signal_element) return
+    select type (bank => machine%banks(column%bank)%bank)
+    type is (shafts_t)
+      is_stress = bank%is_stress(column%quantity)
+      shaft = findloc(bank%shafts%first, column%index, dim=1)
+      is_largest_along = (is_stress .or. bank%is_largest_moment(column%quantity)) .and. size(bank%shafts(shaft)%elements) > 0
+    class default
+      return
+    end select
+  end function is_largest_along
 
 end module nocdyn_signals

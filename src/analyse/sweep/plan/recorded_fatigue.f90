@@ -1,12 +1,11 @@
 !> The damages and numbers of cycles of a sweep that the groups &record ask for.
 module nocdyn_recorded_fatigue
   use nocdyn_diagnostics, only: diagnostics_t
-  use nocdyn_fatigue_groups, only: element_kind, fatigue_symbol, quantity_of, quantity_units
+  use nocdyn_fatigue_statistics, only: fatigue_statistic
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_schema_text, only: suggestion
-  use nocdyn_signals, only: signal_t
-  use nocdyn_statistics, only: is_of_fatigue, new_fatigue_statistic, statistic_names, statistic_t
+  use nocdyn_statistics, only: is_of_fatigue, statistic_names, statistic_t
   use nocdyn_text, only: quoted, shortened, string_t
   implicit none (type, external)
   private
@@ -36,7 +35,7 @@ contains
       associate (kind => findloc(statistic_names == words(i)%text, .true., dim=1))
         if (is_of_fatigue(kind)) then
           k = k + 1
-          list(k) = statistic_of(input, fatigue, kind, t_start)
+          list(k) = fatigue_statistic(input, fatigue, kind, t_start)
         else
           call input%report(record, 'statistic', 'statistic = ' // quoted(words(i)%text) // ' does not belong to fatigue; ' // &
                             "allowed: 'damage', 'cycles'", diagnostics)
@@ -69,30 +68,5 @@ contains
                         suggestion(name, names), diagnostics)
     end associate
   end subroutine find_fatigue
-
-  !> A statistic of a &fatigue. It begins where its cycles are counted in a run.
-  type(statistic_t) function statistic_of(input, fatigue, kind, t_start) result(statistic)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: fatigue, kind   !! index of the &fatigue; statistic_...
-    real(wp), intent(in) :: t_start        !! [s]
-    type(signal_t) :: signal
-    real(wp) :: from
-
-    from = input%groups(input%position('output'))%number('extremes_from', absent=t_start)
-    associate (group => input%groups(fatigue))
-      signal%element_kind = trim(element_kind(group))
-      signal%element = group%text(signal%element_kind)
-      signal%symbol = fatigue_symbol(group)
-      signal%point = ''
-      signal%caption = 'signal whose cycles are counted'
-      signal%positive = ''
-      signal%name = signal%symbol // '_' // signal%element
-      signal%unit = trim(quantity_units(quantity_of(group)))
-      statistic = new_fatigue_statistic(group%name, fatigue, signal, kind, from)
-      if (element_kind(group) /= 'shaft') return
-      statistic%shaft = signal%element
-      statistic%is_stress = signal%symbol == 'stress'
-    end associate
-  end function statistic_of
 
 end module nocdyn_recorded_fatigue

@@ -20,15 +20,18 @@ module nocdyn_damage_sums
 contains
 
   !> Makes room for the lanes.
-  subroutine allocate_lanes(self, lanes, curve)
+  subroutine allocate_lanes(self, lanes, curve, keeps_classes)
     class(damage_sum_t), intent(inout) :: self
     integer, intent(in) :: lanes
     type(sn_curve_t), intent(in) :: curve
+    logical, intent(in) :: keeps_classes   !! whether the cycles are sorted into classes
     integer :: lane
 
     allocate (self%counters(lanes))
     do lane = 1, lanes
       self%counters(lane)%curve = curve
+      if (keeps_classes) allocate (self%counters(lane)%classes)
+      call self%counters(lane)%start()
     end do
   end subroutine allocate_lanes
 

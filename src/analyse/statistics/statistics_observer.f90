@@ -1,20 +1,23 @@
-!> Computes the statistics of a sweep while its variants are integrated in the lanes of a block.
+!> Computes statistics of columns while variants, or the machine of a run, are integrated in the lanes of a block.
 module nocdyn_statistics_observer
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+  use nocdyn_chebyshev, only: interpolation_t
+  use nocdyn_damage_counters, only: damage_counter_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_linear_columns, only: has_law, is_linear, is_proportional
   use nocdyn_linear_statistics, only: linear_statistics_t, new_linear_statistics
   use nocdyn_machine, only: machine_t
+  use nocdyn_signal_values, only: new_signal_values, signal_values_t
   use nocdyn_reduced, only: reduced_t
   use nocdyn_sampled_statistics, only: new_sampled_statistics, sampled_statistics_t
-  use nocdyn_shaft_extremes, only: is_largest_along
-  use nocdyn_statistics, only: find_columns, is_of_fatigue, is_time_of_extreme, is_torque, statistic_max, statistic_max_abs, &
-    statistic_min, statistic_settling_time, statistic_t, statistic_time_of_max, statistic_time_of_min, value_of_zero_column
-  use nocdyn_observer, only: observer_t, step_block_t
-  use nocdyn_signals, only: list_points, list_signals, signal_point_moment, signal_point_stress, signal_source_t, signal_t, &
-    signal_work_in
+  use nocdyn_statistics, only: find_columns, is_of_fatigue, is_time_of_extreme, is_torque, statistic_final, statistic_max, &
+    statistic_max_abs, statistic_min, statistic_settling_time, statistic_t, statistic_time_of_max, statistic_time_of_min, &
+    value_of_zero_column
+  use nocdyn_observer, only: observer_t, piece_t, step_block_t
+  use nocdyn_signals, only: is_largest_along, list_points, list_signals, signal_point_moment, signal_point_stress, &
+    signal_source_t, signal_t, signal_work_in
   implicit none (type, external)
   private
 
@@ -22,6 +25,8 @@ module nocdyn_statistics_observer
 
   !> The requested times must be, or contain, the start and the end of the variants. After the first `on_start` the observer must
   !> stay where it is.
+  !>
+  !> The values of the tracked columns are those of `recorded`, if an extension does not override what gives them.
   !>
   !> A statistic is computed by `linear` if its column allows it, else by `sampled`. A torque that the machine of the block does
   !> not have is 0 at all times. A statistic of a whole shaft has a part for each of its points, of which the worst one counts.
@@ -38,10 +43,14 @@ module nocdyn_statistics_observer
     real(wp), allocatable, private :: default_value(:)        !! where a statistic has no column, [statistics]
     integer, allocatable, private :: kind(:)                  !! statistic_..., [statistics]
     logical, allocatable, private :: is_along(:)              !! extremes of the largest moment or stress along a shaft
-    logical, private :: uses_sampled = .false.                !! whether `sampled` has statistics
+    type(signal_source_t), allocatable :: points(:)                  !! of shafts: columns after those of the table
+    type(signal_values_t), private :: recorded             !! the tracked columns
+    logical, private :: has_recorded = .false.                !! whether it has any
+    real(wp), allocatable, private :: t(:), y(:, :)   !! where lanes start and end, [lanes], [lanes, components]
     logical, allocatable, private :: is_complete(:)           !! lanes that have reached the end
   contains
-    procedure :: results, on_start, on_output, on_steps, on_shift
+    procedure :: results, value_of, has_begun, take_counters, on_start, on_output, on_steps, on_shift
+    procedure :: observe_lanes, tracked_values, find_pace, on_piece
   end type statistics_observer_t
 
 contains
@@ -55,15 +64,18 @@ contains
   end function needs_work_integrals
 
   !> An observer of a block, which stays where it is. Only the reduced formulation may change the parameters of its lanes.
-  type(statistics_observer_t) function new_statistics_observer(block, statistics, t_start, t_end, may_bend) result(self)
+  function new_statistics_observer(block, statistics, t_start, t_end, may_bend, tracks_all) result(self)
     class(formulation_t), target, intent(inout) :: block   !! with work integrals if `needs_work_integrals`
     type(statistic_t), intent(in) :: statistics(:)         !! each with t_start <= from < t_end
     real(wp), intent(in) :: t_start, t_end                 !! of every variant [s]
     logical, intent(in) :: may_bend                        !! whether variants differ in cubic stiffnesses
+    logical, intent(in), optional :: tracks_all            !! whether an extension gives the values of all columns of the table
+                                                           !! and of `points`; absent: those that are needed are recorded
+    type(statistics_observer_t) :: self
     type(statistic_t), allocatable :: found(:), parts(:)
     type(signal_source_t), allocatable :: columns(:)
     type(signal_t), allocatable :: signals(:)
-    integer :: i
+    integer :: i, tracked
 
     self%block => block
     self%t_start = t_start
@@ -75,6 +87,7 @@ contains
     allocate (found, source=statistics)
     call find_columns(signals, found)
     call list_parts(self, found, columns, parts)
+    self%points = columns(size(signals) + 1:)
     self%missing = ''
     do i = size(found), 1, -1
       if (allocated(found(i)%shaft)) cycle
@@ -83,14 +96,30 @@ contains
     allocate (self%default_value, source=value_of_zero_column(statistics))
     allocate (self%kind(size(statistics)))
     self%kind(:) = statistics%kind
-    call distribute(self, parts, columns, may_bend)
-    if (allocated(self%sampled%recorded%formulation)) self%sampled%recorded%formulation%joints%leader => block%joints
+    tracked = 0
+    if (present(tracks_all)) tracked = merge(size(columns), 0, tracks_all)
+    call distribute(self, parts, columns, may_bend, tracked)
+    if (tracked == 0) call record_columns(self, columns(self%sampled%columns))
     allocate (self%is_complete(block%lanes), source=.false.)
     select type (block)
     class is (reduced_t)
       if (block%is_block) call block%list_parameters(self%parameters)
     end select
   end function new_statistics_observer
+
+  !> Evaluates the tracked columns by a copy of the formulation.
+  subroutine record_columns(self, columns)
+    type(statistics_observer_t), intent(inout) :: self
+    type(signal_source_t), intent(in) :: columns(:)
+
+    self%has_recorded = size(columns) > 0
+    if (.not. self%has_recorded) return
+    self%recorded = new_signal_values(self%block, columns)
+    self%recorded%formulation%joints%leader => self%block%joints
+    associate (lanes => self%block%lanes)
+      allocate (self%t(lanes), self%y(lanes, self%block%states + self%block%quadratures), source=0.0_wp)
+    end associate
+  end subroutine record_columns
 
   !> The parts of all statistics. The points of shafts become columns after those of the table. An extreme of the largest moment
   !> or stress along a shaft has its column as the first part, then the extremes at the points, and the times of these.
@@ -100,39 +129,58 @@ contains
     type(signal_source_t), allocatable, intent(inout) :: columns(:)
     type(statistic_t), allocatable, intent(out) :: parts(:)
     type(signal_source_t), allocatable :: points(:)
-    integer, allocatable :: column(:), kind(:), owner(:)
-    integer :: first, i, k
+    integer :: count, first, i, k
 
-    allocate (owner(0), column(0), kind(0))
-    allocate (self%first_part(size(statistics) + 1), source=1)
-    allocate (self%is_along(size(statistics)), source=.false.)
+    allocate (parts(size(statistics)), self%first_part(size(statistics) + 1), self%is_along(size(statistics)))
+    count = 0
     do i = 1, size(statistics)
+      self%first_part(i) = count + 1
       associate (statistic => statistics(i))
         call find_points(self%block%machine, statistic, columns, points, self%is_along(i))
         if (self%is_along(i) .or. size(points) == 0 .and. .not. allocated(statistic%shaft)) then
-          owner = [owner, i]
-          column = [column, statistic%column]
-          kind = [kind, statistic%kind]
+          call add_part(statistic, statistic%column, statistic%kind, parts, count)
         end if
         call add_columns(points, columns, first)
         if (self%is_along(i) .and. is_time_of_extreme(statistic%kind)) then
-          owner = [owner, (i, k=1, size(points))]
-          column = [column, (first - 1 + k, k=1, size(points))]
-          kind = [kind, spread(extreme_of(statistic%kind), 1, size(points))]
+          do k = first, first + size(points) - 1
+            call add_part(statistic, k, extreme_of(statistic%kind), parts, count)
+          end do
         end if
-        owner = [owner, (i, k=1, size(points))]
-        column = [column, (first - 1 + k, k=1, size(points))]
-        kind = [kind, spread(statistic%kind, 1, size(points))]
+        do k = first, first + size(points) - 1
+          call add_part(statistic, k, statistic%kind, parts, count)
+        end do
       end associate
-      self%first_part(i + 1) = size(owner) + 1
     end do
-    allocate (parts(size(owner)))
-    do i = 1, size(parts)
-      parts(i) = statistics(owner(i))
-      parts(i)%column = column(i)
-      parts(i)%kind = kind(i)
-    end do
+    self%first_part(size(statistics) + 1) = count + 1
+    call resize(parts, count)
   end subroutine list_parts
+
+  !> Adds a part of a statistic.
+  subroutine add_part(statistic, column, kind, parts, count)
+    type(statistic_t), intent(in) :: statistic
+    integer, intent(in) :: column, kind
+    type(statistic_t), allocatable, intent(inout) :: parts(:)
+    integer, intent(inout) :: count   !! of the parts so far
+
+    if (count == size(parts)) call resize(parts, 2 * count)
+    count = count + 1
+    parts(count) = statistic
+    parts(count)%column = column
+    parts(count)%kind = kind
+  end subroutine add_part
+
+  subroutine resize(parts, count)
+    type(statistic_t), allocatable, intent(inout) :: parts(:)
+    integer, intent(in) :: count
+    type(statistic_t) :: none
+    type(statistic_t), allocatable :: resized(:)
+    integer :: kept
+
+    kept = min(count, size(parts))
+    allocate (resized(count), source=none)
+    resized(:kept) = parts(:kept)
+    call move_alloc(resized, parts)
+  end subroutine resize
 
   !> Adds the columns of the points of a shaft, unless they are there.
   pure subroutine add_columns(points, columns, first)
@@ -157,7 +205,6 @@ contains
     type(signal_source_t), intent(in) :: columns(:)
     type(signal_source_t), allocatable, intent(out) :: points(:)   !! columns; none if it is of no shaft
     logical, intent(out) :: is_along                        !! whether it is such an extreme
-    integer :: shaft
     logical :: is_stress
 
     is_along = .false.
@@ -168,7 +215,7 @@ contains
     end if
     if (statistic%column > 0 .and. any(extreme_of(statistic%kind) == [statistic_max, statistic_min, statistic_max_abs])) then
       associate (column => columns(statistic%column))
-        is_along = is_largest_along(machine, column, shaft, is_stress)
+        is_along = is_largest_along(machine, column, is_stress)
         if (is_along) call list_points(machine, machine%banks(column%bank)%bank%names(column%index)%text, &
                                        merge(signal_point_stress, signal_point_moment, is_stress), points)
       end associate
@@ -177,12 +224,13 @@ contains
   end subroutine find_points
 
   !> Chooses how each statistic is computed. The time of the largest moment is not that of the largest twist in a coupling that
-  !> softens.
-  subroutine distribute(self, statistics, columns, may_bend)
+  !> softens. A value at the end is that of the row of a run, to the last bit.
+  subroutine distribute(self, statistics, columns, may_bend, tracked)
     type(statistics_observer_t), intent(inout) :: self
     type(statistic_t), intent(in) :: statistics(:)
     type(signal_source_t), intent(in) :: columns(:)   !! of the trajectory table, and points of shafts
     logical, intent(in) :: may_bend            !! as in `new_statistics_observer`
+    integer, intent(in) :: tracked             !! number of columns that are tracked in any case; 0: those that are needed
     logical, dimension(size(statistics)) :: is_of_linear, is_of_sampled
     logical :: is_multiple
     integer :: i
@@ -192,29 +240,32 @@ contains
       if (statistics(i)%column == 0 .or. statistics(i)%kind == statistic_settling_time) cycle
       associate (column => columns(statistics(i)%column))
         is_multiple = is_proportional(self%block, column) .and. .not. may_bend
-        is_of_linear(i) = is_linear(self%block, column) .or. is_multiple
+        is_of_linear(i) = is_linear(self%block, column) .or. is_multiple .and. statistics(i)%kind /= statistic_final
         if (has_law(self%block%machine, column)) then
-          if (is_time_of_extreme(statistics(i)%kind)) is_of_linear(i) = .false.
-          if (is_of_fatigue(statistics(i)%kind)) is_of_linear(i) = is_multiple
+          if (is_time_of_extreme(statistics(i)%kind) .or. is_of_fatigue(statistics(i)%kind)) is_of_linear(i) = is_multiple
         end if
       end associate
     end do
     is_of_sampled = statistics%column > 0 .and. .not. is_of_linear
-    self%uses_sampled = any(is_of_sampled)
     allocate (self%linear_index, source=indices_among(is_of_linear))
     allocate (self%sampled_index, source=indices_among(is_of_sampled))
     self%linear = new_linear_statistics(self%block, columns, pack(statistics, is_of_linear), self%t_start, self%t_end)
-    self%sampled = new_sampled_statistics(self%block, columns, pack(statistics, is_of_sampled), self%t_start, self%t_end)
-    if (.not. self%uses_sampled) call self%linear%read_components(self%first_read, self%last_read)
+    self%sampled = new_sampled_statistics(self%block%lanes, pack(statistics, is_of_sampled), self%t_start, self%t_end, tracked)
+    call self%sampled%track(self%block%machine, columns, may_bend, self)
+    if (self%tracked == 0) call self%linear%read_components(self%first_read, self%last_read)
   end subroutine distribute
 
   !> Numbers the true elements of a mask from 1 on; 0 for the others.
   pure function indices_among(mask) result(indices)
     logical, intent(in) :: mask(:)
     integer :: indices(size(mask))
-    integer :: i
+    integer :: count, i
 
-    indices = [(merge(count(mask(:i)), 0, mask(i)), i=1, size(mask))]
+    count = 0
+    do i = 1, size(mask)
+      if (mask(i)) count = count + 1
+      indices(i) = merge(count, 0, mask(i))
+    end do
   end function indices_among
 
   !> Starts the statistics of a variant that starts in a lane of the block.
@@ -226,35 +277,84 @@ contains
 
     self%is_complete(lane) = .false.
     call self%linear%start_lane(self%block, lane, y)
-    if (.not. self%uses_sampled) return
-    if (self%parameters%arrays > 0) call self%sampled%recorded%copy_lane(lane, self%parameters)
-    call self%sampled%start_lane(lane, t, y)
+    call self%sampled%start_accumulators(lane)
+    if (.not. self%has_recorded) return
+    if (self%parameters%arrays > 0) call self%recorded%copy_lane(lane, self%parameters)
+    call observe_lane(self, lane, t, y)
+    call self%recorded%start_lane(lane)
   end subroutine on_start
+
+  !> Brings one lane to a time and state; the others stay where they started or ended.
+  subroutine observe_lane(self, lane, t, y)
+    class(statistics_observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)
+
+    self%t(lane) = t
+    self%y(lane, :) = y
+    call self%recorded%observe(self%t, self%y)
+  end subroutine observe_lane
 
   !> The statistics of the last variant in a lane; NaN if it has not reached its end. After the last step, once.
   subroutine results(self, lane, values)
     class(statistics_observer_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(out) :: values(:)   !! [statistics]
-    integer :: i, part
+    integer :: i
 
     values(:) = ieee_value(1.0_wp, ieee_quiet_nan)
     if (.not. self%is_complete(lane)) return
     call self%linear%finish_damages(lane)
-    if (self%uses_sampled) call self%sampled%finish_damages(lane)
+    call self%sampled%finish_damages(lane)
     do i = 1, size(values)
-      if (self%is_along(i)) then
-        values(i) = value_along(self, i, lane)
-        cycle
-      end if
-      part = worst_part(self, i, lane)
-      values(i) = self%default_value(i)
-      if (self%linear_index(part) > 0) values(i) = self%linear%value(self%linear_index(part), lane)
-      if (self%sampled_index(part) > 0) values(i) = self%sampled%value(self%sampled_index(part), lane)
+      values(i) = self%value_of(i, lane)
     end do
   end subroutine results
 
-  !> An extreme of the largest moment or stress along a shaft: as in a run, that of the points; where all of these have one sign,
+  !> Whether a lane has come to the time from which on the first statistic is taken that is not linear.
+  pure logical function has_begun(self, lane)
+    class(statistics_observer_t), intent(in) :: self
+    integer, intent(in) :: lane
+
+    has_begun = self%sampled%accumulators(1)%bound(lane) <= 0
+  end function has_begun
+
+  !> A statistic of the variant in a lane, up to the last step.
+  real(wp) function value_of(self, statistic, lane) result(value)
+    class(statistics_observer_t), intent(in) :: self
+    integer, intent(in) :: statistic, lane
+    integer :: part
+
+    if (self%is_along(statistic)) then
+      value = value_along(self, statistic, lane)
+      return
+    end if
+    part = worst_part(self, statistic, lane)
+    value = self%default_value(statistic)
+    if (self%linear_index(part) > 0) value = self%linear%value(self%linear_index(part), lane)
+    if (self%sampled_index(part) > 0) value = self%sampled%value(self%sampled_index(part), lane)
+  end function value_of
+
+  !> Ends the counting of the cycles of a statistic of a &fatigue, and takes its counters.
+  subroutine take_counters(self, statistic, lane, counters)
+    class(statistics_observer_t), intent(in) :: self
+    integer, intent(in) :: statistic, lane
+    type(damage_counter_t), intent(inout) :: counters(:)   !! [parts]
+    integer :: i
+
+    do i = 1, size(counters)
+      associate (part => self%first_part(statistic) - 1 + i)
+        if (self%linear_index(part) > 0) counters(i) = self%linear%counter(self%linear_index(part), lane)
+        if (self%sampled_index(part) > 0) counters(i) = self%sampled%counter(self%sampled_index(part), lane)
+      end associate
+      call counters(i)%finish()
+    end do
+  end subroutine take_counters
+
+  !> An extreme of the largest moment or stress along a shaft. Its value of largest magnitude jumps from one section to another,
+  !> often between a positive and a negative one, and so is no polynomial in a step; those at the points of the shaft are. The
+  !> extreme is that of the points; where all of these have one sign,
   !> the smaller end of the range is that of the column itself, which does not jump then.
   real(wp) function value_along(self, statistic, lane) result(value)
     class(statistics_observer_t), intent(in) :: self
@@ -330,7 +430,9 @@ contains
     if (t < self%t_end) return
     self%is_complete(lane) = .true.
     call self%linear%finish_lane(lane, y)
-    if (self%uses_sampled) call self%sampled%finish_lane(lane, t, y)
+    if (.not. self%has_recorded) return
+    call observe_lane(self, lane, t, y)
+    call self%recorded%fill_row(lane, t, y, self%sampled%x_end(lane, :))
   end subroutine on_output
 
   !> Takes the shift that `block` has made of the state of a lane.
@@ -340,7 +442,7 @@ contains
     real(wp), contiguous, intent(in) :: shift(:)
 
     call self%linear%columns%copy_lane(self%block, lane)
-    if (self%uses_sampled) call self%sampled%recorded%move_origin(lane, shift)
+    if (self%has_recorded) call self%recorded%move_origin(lane, shift)
   end subroutine on_shift
 
   subroutine on_steps(self, steps, y, y_new, c)
@@ -349,7 +451,42 @@ contains
     real(wp), contiguous, intent(in) :: y(:, :), y_new(:, :), c(:, :, :)
 
     call self%linear%add_steps(steps, y, y_new, c)
-    if (self%uses_sampled) call self%sampled%add_steps(steps, y, c)
   end subroutine on_steps
+
+  subroutine observe_lanes(self, t, y)
+    class(statistics_observer_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: t(:), y(:, :)
+
+    call self%recorded%observe(t, y)
+  end subroutine observe_lanes
+
+  subroutine tracked_values(self, lane, t, y, values)
+    class(statistics_observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)
+    real(wp), contiguous, intent(inout) :: values(:)
+
+    call self%recorded%fill_row(lane, t, y, values)
+  end subroutine tracked_values
+
+  subroutine find_pace(self, lane, fastest, scale)
+    class(statistics_observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(out) :: fastest, scale   !! [rad/s], [N m]
+
+    call self%recorded%find_pace(lane, fastest, scale)
+  end subroutine find_pace
+
+  subroutine on_piece(self, lane, piece, rule, values, replaced)
+    class(statistics_observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    type(piece_t), intent(in) :: piece
+    type(interpolation_t), intent(in) :: rule
+    real(wp), contiguous, intent(in) :: values(:, :)   !! [tracked, nodes]
+    logical, intent(in) :: replaced(:)
+
+    call self%sampled%add_piece(lane, piece, rule, values, replaced)
+  end subroutine on_piece
 
 end module nocdyn_statistics_observer

@@ -3,10 +3,10 @@
 !> Each column is a function (linear + cubic x^2) x of an x, whose range is accumulated. As x is continuous, the largest value of
 !> the column is that of the function between the smallest and the largest x.
 module nocdyn_column_statistics
-  use nocdyn_chebyshev, only: interpolation_t, max_degree, new_interpolation, raise_to_maximum, time_at
+  use nocdyn_chebyshev, only: interpolation_t, max_degree, raise_to_maximum, time_at
+  use nocdyn_damage_counters, only: damage_counter_t
   use nocdyn_damage_sums, only: damage_sum_t
   use nocdyn_kinds, only: wp
-  use nocdyn_quadrature, only: gauss_legendre_rule
   use nocdyn_settling_time, only: settling_history_t
   use nocdyn_statistics, only: is_of_fatigue, is_time_of_extreme, statistic_damage, statistic_final, statistic_max, &
     statistic_max_abs, statistic_mean, statistic_min, statistic_rms, statistic_settling_time, statistic_t, &
@@ -18,6 +18,10 @@ module nocdyn_column_statistics
 
   integer, parameter, public :: width = 8   !! lanes of a strip, which are evaluated together
 
+  !> An extreme counts if it exceeds the value at the start of the range by more than this share of the largest value. A smaller
+  !> excess is rounding: a machine that starts at rest has its smallest energy at the start.
+  real(wp), parameter :: rounding_limit = 16 * epsilon(1.0_wp)
+
   !> The extremes, integrals and history of one x from a time on. The shape of all arrays is [whole strips of lanes].
   type, public :: accumulator_t
     integer :: column = 0                    !! number among the columns
@@ -25,6 +29,7 @@ module nocdyn_column_statistics
     logical :: has_max = .false., has_min = .false., has_max_abs = .false., has_time = .false.   !! extremes that are needed
     logical :: has_sums = .false.            !! whether integrals are needed
     logical :: has_history = .false.         !! whether the settling time is needed
+    real(wp), allocatable :: first(:)        !! x where its range begins
     real(wp), allocatable :: highest(:), lowest(:), highest_time(:), lowest_time(:)   !! of x; times [s]
     real(wp), allocatable :: no_highest(:), no_lowest(:)   !! huge where it is not needed, or for `max_abs` only; else -huge
     real(wp), allocatable :: bound(:)                      !! huge before `from`: x is not of interest; -huge after it
@@ -37,8 +42,7 @@ module nocdyn_column_statistics
   type, abstract, public :: column_statistics_t
     type(accumulator_t), allocatable :: accumulators(:)       !! in the order of the columns
     type(damage_sum_t), allocatable :: damages(:)             !! the same
-    type(interpolation_t) :: rule                             !! of the solution inside the steps
-    real(wp), allocatable :: gauss(:), weights(:)             !! nodes, -1 to 1: exact for that and for its square
+    type(interpolation_t) :: rules(max_degree)                !! of the degrees of the steps that there have been
     real(wp), allocatable :: linear(:, :), cubic(:, :)        !! of the functions of x, [whole strips of lanes, columns]
     real(wp), allocatable :: x_end(:, :)                      !! [lanes, columns]
     real(wp) :: t_start = 0.0_wp, t_end = 0.0_wp              !! of every variant [s]
@@ -47,7 +51,7 @@ module nocdyn_column_statistics
     integer, allocatable, private :: acc(:)                   !! number of the accumulator, or of the damage; 0 for values at the
                                                               !! end; [statistics]
   contains
-    procedure :: set_statistics, prepare, start_accumulators, finish_damages, value, severity
+    procedure :: set_statistics, start_accumulators, finish_damages, value, severity, counter
   end type column_statistics_t
 
 contains
@@ -62,20 +66,27 @@ contains
   !> Sets what is to be accumulated. x is the column itself, unless an extension sets `linear` and `cubic`.
   subroutine set_statistics(self, statistics, lanes, t_start, t_end, wanted)
     class(column_statistics_t), intent(inout) :: self
-    type(statistic_t), intent(in) :: statistics(:)     !! each of a column
+    type(statistic_t), intent(in) :: statistics(:)       !! each of a column
     integer, intent(in) :: lanes
-    real(wp), intent(in) :: t_start, t_end             !! [s]
-    integer, allocatable, intent(out) :: wanted(:)     !! the columns that have statistics, ascending
+    real(wp), intent(in) :: t_start, t_end               !! [s]
+    integer, allocatable, intent(inout) :: wanted(:)     !! columns, ascending; not allocated: those that have statistics
+    integer, allocatable :: number(:)   ! of each column among them, 0: none
     integer :: i
 
     self%t_start = t_start
     self%t_end = t_end
     allocate (self%statistics, source=statistics)
-    allocate (wanted(0))
-    if (size(statistics) > 0) then
-      wanted = pack([(i, i=1, maxval(statistics%column))], [(any(statistics%column == i), i=1, maxval(statistics%column))])
-    end if
-    allocate (self%column, source=[(findloc(wanted, statistics(i)%column, dim=1), i=1, size(statistics))])
+    allocate (number(maxval([0, statistics%column])), source=0)
+    do i = 1, size(statistics)
+      number(statistics(i)%column) = 1
+    end do
+    if (.not. allocated(wanted)) wanted = pack([(i, i=1, size(number))], number > 0)
+    number(:) = 0
+    do i = 1, size(wanted)
+      if (wanted(i) <= size(number)) number(wanted(i)) = i
+    end do
+    allocate (self%column(size(statistics)))
+    self%column(:) = number(statistics%column)
     allocate (self%x_end(lanes, size(wanted)), source=0.0_wp)
     associate (padded => width * ((lanes + width - 1) / width))
       allocate (self%linear(padded, size(wanted)), source=1.0_wp)
@@ -85,60 +96,74 @@ contains
         call allocate_accumulator(self%accumulators(i), padded)
       end do
     end associate
-    call add_damages(self, size(wanted), lanes)
+    call add_damages(self, lanes)
   end subroutine set_statistics
 
   !> One accumulator for each column and `from`.
   subroutine add_accumulators(self, columns)
     class(column_statistics_t), intent(inout) :: self
     integer, intent(in) :: columns
-    integer :: c, i, k
+    type(accumulator_t), allocatable :: found(:)
+    integer, allocatable :: first(:), next(:)   ! statistics of each column
+    integer :: c, count, i, k, of_column
 
-    allocate (self%accumulators(0))
+    allocate (found(size(self%statistics)), next(size(self%statistics)))
+    allocate (first(columns), source=0)
+    do i = size(self%statistics), 1, -1
+      next(i) = first(self%column(i))
+      first(self%column(i)) = i
+    end do
     allocate (self%acc(size(self%statistics)), source=0)
+    count = 0
     do c = 1, columns
-      do i = 1, size(self%statistics)
+      of_column = count
+      i = first(c)
+      do while (i > 0)
         associate (statistic => self%statistics(i))
-          if (self%column(i) /= c .or. statistic%kind == statistic_final .or. is_of_fatigue(statistic%kind)) cycle
-          do k = 1, size(self%accumulators)
-            if (self%accumulators(k)%column == c .and. abs(self%accumulators(k)%from - statistic%from) <= 0) exit
-          end do
-          if (k > size(self%accumulators)) then
-            self%accumulators = [self%accumulators, accumulator_t(column=c, from=statistic%from)]
+          if (statistic%kind /= statistic_final .and. .not. is_of_fatigue(statistic%kind)) then
+            do k = of_column + 1, count
+              if (abs(found(k)%from - statistic%from) <= 0) exit
+            end do
+            count = max(count, k)
+            found(k)%column = c
+            found(k)%from = statistic%from
+            self%acc(i) = k
+            call add_need(found(k), statistic%kind)
           end if
-          self%acc(i) = k
-          call add_need(self%accumulators(k), statistic%kind)
         end associate
+        i = next(i)
       end do
     end do
+    allocate (self%accumulators, source=found(:count))
   end subroutine add_accumulators
 
   !> One damage for each column and &fatigue.
-  subroutine add_damages(self, columns, lanes)
+  subroutine add_damages(self, lanes)
     class(column_statistics_t), intent(inout) :: self
-    integer, intent(in) :: columns, lanes
-    type(damage_sum_t), allocatable :: longer(:)
-    integer :: c, i, k
+    integer, intent(in) :: lanes
+    integer :: first(size(self%statistics))   ! statistics, of different columns or of different &fatigue
+    integer :: count, i, k
 
-    allocate (self%damages(0))
-    do c = 1, columns
-      do i = 1, size(self%statistics)
-        associate (statistic => self%statistics(i))
-          if (self%column(i) /= c .or. .not. is_of_fatigue(statistic%kind)) cycle
-          do k = 1, size(self%damages)
-            if (self%damages(k)%column == c .and. self%damages(k)%fatigue == statistic%fatigue) exit
-          end do
-          self%acc(i) = k
-          if (k <= size(self%damages)) cycle
-          allocate (longer(k))
-          longer(:k - 1) = self%damages
-          longer(k)%column = c
-          longer(k)%fatigue = statistic%fatigue
-          longer(k)%from = statistic%from
-          call longer(k)%allocate_lanes(lanes, statistic%curve)
-          call move_alloc(longer, self%damages)
-        end associate
-      end do
+    count = 0
+    do i = 1, size(self%statistics)
+      associate (statistic => self%statistics(i))
+        if (.not. is_of_fatigue(statistic%kind)) cycle
+        do k = 1, count
+          if (self%column(first(k)) == self%column(i) .and. self%statistics(first(k))%fatigue == statistic%fatigue) exit
+        end do
+        self%acc(i) = k
+        if (k > count) first(k) = i
+        count = max(count, k)
+      end associate
+    end do
+    allocate (self%damages(count))
+    do k = 1, count
+      associate (statistic => self%statistics(first(k)), damage => self%damages(k))
+        damage%column = self%column(first(k))
+        damage%fatigue = statistic%fatigue
+        damage%from = statistic%from
+        call damage%allocate_lanes(lanes, statistic%curve, statistic%keeps_classes)
+      end associate
     end do
   end subroutine add_damages
 
@@ -159,24 +184,11 @@ contains
     integer, intent(in) :: lanes
 
     allocate (acc%highest(lanes), source=0.0_wp)
-    allocate (acc%lowest, acc%highest_time, acc%lowest_time, acc%integral, acc%square, source=acc%highest)
+    allocate (acc%first, acc%lowest, acc%highest_time, acc%lowest_time, acc%integral, acc%square, source=acc%highest)
     allocate (acc%bound(lanes), source=-huge(0.0_wp))
     allocate (acc%no_highest, acc%no_lowest, source=acc%bound)
     allocate (acc%history(lanes))
   end subroutine allocate_accumulator
-
-  !> Sets the nodes for a degree of the solution inside the steps.
-  subroutine prepare(self, degree)
-    class(column_statistics_t), intent(inout) :: self
-    integer, intent(in) :: degree
-
-    if (self%rule%degree == degree) return
-    if (self%rule%degree > 0) error stop 'nocdyn_column_statistics: the method must remain the same'
-    self%rule = new_interpolation(degree)
-    allocate (self%gauss(degree + 1), self%weights(degree + 1))
-    call gauss_legendre_rule(degree + 1, self%gauss, self%weights)
-    self%gauss(:) = 2 * self%gauss - 1
-  end subroutine prepare
 
   !> Starts a variant in a lane, of which `linear` and `cubic` have been set.
   pure subroutine start_accumulators(self, lane)
@@ -222,6 +234,7 @@ contains
     real(wp), intent(in) :: x, t
 
     acc%bound(lane) = -huge(0.0_wp)
+    acc%first(lane) = x
     acc%highest(lane) = x
     acc%lowest(lane) = x
     acc%highest_time(lane) = t
@@ -262,10 +275,9 @@ contains
     integer, intent(in) :: number   !! of the statistic
     integer, intent(in) :: lane
 
-    associate (statistic => self%statistics(number), x_end => self%x_end(lane, self%column(number)), &
-               linear => self%linear(lane, self%column(number)), cubic => self%cubic(lane, self%column(number)))
+    associate (statistic => self%statistics(number), x_end => self%x_end(lane, self%column(number)))
       if (statistic%kind == statistic_final) then
-        value = column_at(linear, cubic, x_end)
+        value = column_at(self%linear(lane, self%column(number)), self%cubic(lane, self%column(number)), x_end)
         return
       else if (is_of_fatigue(statistic%kind)) then
         associate (counter => self%damages(self%acc(number))%counters(lane))
@@ -275,32 +287,67 @@ contains
       end if
       associate (acc => self%accumulators(self%acc(number)), duration => self%t_end - statistic%from)
         select case (statistic%kind)
-        case (statistic_max)
-          value = largest(linear, cubic, acc%lowest(lane), acc%highest(lane))
-        case (statistic_min)
-          value = -largest(linear, cubic, -acc%highest(lane), -acc%lowest(lane))
-        case (statistic_max_abs)
-          value = max(largest(linear, cubic, acc%lowest(lane), acc%highest(lane)), &
-                      largest(linear, cubic, -acc%highest(lane), -acc%lowest(lane)))
-        case (statistic_time_of_max)
-          value = acc%highest_time(lane)
-        case (statistic_time_of_min)
-          value = acc%lowest_time(lane)
-        case (statistic_time_of_max_abs)
-          value = merge(acc%highest_time(lane), acc%lowest_time(lane), acc%highest(lane) >= -acc%lowest(lane))
-          if (.not. abs(acc%highest(lane) + acc%lowest(lane)) > 0) value = min(value, acc%lowest_time(lane))
         case (statistic_mean)
           value = acc%integral(lane) / duration
         case (statistic_rms)
           value = sqrt(acc%square(lane) / duration)
         case (statistic_settling_time)
-          value = acc%history(lane)%last_exit(self%rule, x_end, statistic%band) - statistic%from
+          value = acc%history(lane)%last_exit(self%rules, x_end, statistic%band) - statistic%from
         case default
-          error stop 'nocdyn_column_statistics: there is no such statistic'
+          value = extreme(acc, statistic, lane, self%linear(lane, acc%column), self%cubic(lane, acc%column))
         end select
       end associate
     end associate
   end function value
+
+  !> An extreme, or its time, in a lane.
+  pure real(wp) function extreme(acc, statistic, lane, linear, cubic) result(value)
+    type(accumulator_t), intent(in) :: acc
+    type(statistic_t), intent(in) :: statistic
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: linear, cubic   !! of the column
+    real(wp) :: high, high_time, low, low_time, rounding
+
+    high = acc%highest(lane)
+    low = acc%lowest(lane)
+    high_time = acc%highest_time(lane)
+    low_time = acc%lowest_time(lane)
+    rounding = rounding_limit * max(abs(low), abs(high))
+    if (high <= acc%first(lane) + rounding .or. abs(linear) + abs(cubic) <= 0) then
+      high = acc%first(lane)
+      high_time = statistic%from
+    end if
+    if (low >= acc%first(lane) - rounding .or. abs(linear) + abs(cubic) <= 0) then
+      low = acc%first(lane)
+      low_time = statistic%from
+    end if
+    select case (statistic%kind)
+    case (statistic_max)
+      value = largest(linear, cubic, low, high)
+    case (statistic_min)
+      value = -largest(linear, cubic, -high, -low)
+    case (statistic_max_abs)
+      value = max(largest(linear, cubic, low, high), largest(linear, cubic, -high, -low))
+    case (statistic_time_of_max)
+      value = high_time
+    case (statistic_time_of_min)
+      value = low_time
+    case (statistic_time_of_max_abs)
+      value = merge(high_time, low_time, high >= -low)
+      if (.not. abs(high + low) > 0) value = min(value, low_time)
+    case default
+      error stop 'nocdyn_column_statistics: there is no such statistic'
+    end select
+  end function extreme
+
+  !> The counter of a statistic of a &fatigue in a lane.
+  type(damage_counter_t) function counter(self, number, lane)
+    class(column_statistics_t), intent(in) :: self
+    integer, intent(in) :: number   !! of the statistic
+    integer, intent(in) :: lane
+
+    counter = self%damages(self%acc(number))%counters(lane)
+  end function counter
 
   !> By what the worst of several statistics of a &fatigue is found: the damage, and the largest range.
   pure function severity(self, number, lane)

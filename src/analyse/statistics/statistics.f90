@@ -44,6 +44,7 @@ module nocdyn_statistics
     real(wp) :: band = default_band                  !! for settling_time only
     integer :: fatigue = 0                           !! index of the &fatigue in the input, 0: none
     type(sn_curve_t) :: curve                        !! of that
+    logical :: keeps_classes = .false.               !! whether its cycles are sorted into classes
     character(len=:), allocatable :: shaft           !! its shaft, all of whose points count; not allocated: the signal counts
     logical :: is_stress = .false.                   !! whether that is its stress, not its moment
     character(len=:), allocatable :: label           !! e.g. 'moment_shaft_max_abs_from_2'

@@ -3,15 +3,17 @@
 !> Bounds on x, computed from its coefficients in vector loops over the lanes, tell in which steps x may exceed the extremes so
 !> far; only in these steps it is evaluated at the nodes of the interpolation.
 module nocdyn_linear_statistics
-  use nocdyn_chebyshev, only: max_degree
+  use nocdyn_chebyshev, only: max_degree, new_interpolation
   use nocdyn_column_statistics, only: accumulator_t, column_statistics_t, start_range, widen_range, width
   use nocdyn_damage_sums, only: damage_sum_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_linear_columns, only: linear_columns_t, new_linear_columns, strip_of
   use nocdyn_statistics, only: statistic_t
-  use nocdyn_step_strips, only: add_integrals, expand, exclude_monotonic, fill_chord_gaps, strip_t, values_at
+  use nocdyn_step_strips, only: add_integrals, bound_excursions, expand, expand_single, exclude_monotonic, &
+    fill_chord_gaps, strip_t, values_at
   use nocdyn_observer, only: step_block_t
+  use nocdyn_quadrature, only: gauss_legendre_rule
   use nocdyn_signals, only: signal_source_t
   implicit none (type, external)
   private
@@ -20,6 +22,7 @@ module nocdyn_linear_statistics
 
   type, extends(column_statistics_t), public :: linear_statistics_t
     type(linear_columns_t) :: columns
+    real(wp), allocatable, private :: gauss(:), weights(:)   !! nodes, -1 to 1: exact for x and for its square
     real(wp), allocatable, private :: chord_gap(:)   !! largest value of s - s^p for s from 0 to 1, p = 1 to degree
     real(wp), allocatable, private :: y_last(:, :), y_new_last(:, :), c_last(:, :, :)   !! of an incomplete last strip, padded
     type(strip_t), private :: strip
@@ -35,7 +38,7 @@ contains
     type(signal_source_t), intent(in) :: columns(:)         !! of the trajectory table
     type(statistic_t), intent(in) :: statistics(:)   !! each of a column that `is_linear`; a moment has no time of extremes
     real(wp), intent(in) :: t_start, t_end           !! of every variant [s]
-    integer, allocatable :: wanted(:)
+    integer, allocatable :: wanted(:)   ! not allocated: those that have statistics
 
     call self%set_statistics(statistics, block%lanes, t_start, t_end, wanted)
     self%columns = new_linear_columns(block, columns(wanted))
@@ -105,6 +108,10 @@ contains
 
     if (size(self%accumulators) + size(self%damages) == 0) return
     if (.not. allocated(self%chord_gap)) call allocate_work(self, size(c, 2), size(c, 3))
+    if (size(c, 1) == 1) then
+      call add_single_step(self, steps, y, y_new, c)
+      return
+    end if
     do number = 1, strip_of(size(c, 1))
       call load_strip(self, number, steps, y, y_new, c)
       column = 0
@@ -127,13 +134,103 @@ contains
     end do
   end subroutine add_steps
 
+  !> Adds the last step of a block of one lane: its columns are put side by side in strips, instead of lanes.
+  subroutine add_single_step(self, steps, y, y_new, c)
+    class(linear_statistics_t), intent(inout) :: self
+    type(step_block_t), intent(in) :: steps
+    real(wp), contiguous, intent(in) :: y(:, :), y_new(:, :), c(:, :, :)
+    integer :: before, i, place
+
+    self%strip%before = 0
+    self%strip%t_end(:) = steps%t_new(1)
+    self%strip%scale(:) = steps%scale(1)
+    do before = 0, size(self%accumulators) - 1, width
+      do place = 1, min(width, size(self%accumulators) - before)
+        call place_column(self, self%accumulators(before + place)%column, place, y, y_new, c)
+      end do
+      call widen_side_by_side(self, before, steps, size(c, 3))
+    end do
+    self%strip%lanes = 1
+    do i = 1, size(self%accumulators)
+      if (.not. self%accumulators(i)%has_sums) cycle
+      call place_column(self, self%accumulators(i)%column, 1, y, y_new, c)
+      call integrate_strip(self, self%accumulators(i), steps, size(c, 3))
+    end do
+    do i = 1, size(self%damages)
+      call place_column(self, self%damages(i)%column, 1, y, y_new, c)
+      call count_strip(self, self%damages(i), steps, size(c, 3))
+    end do
+  end subroutine add_single_step
+
+  !> Computes x of a column of a single lane in its last step, in a place of the strip.
+  subroutine place_column(self, column, place, y, y_new, c)
+    class(linear_statistics_t), intent(inout) :: self
+    integer, intent(in) :: column, place
+    real(wp), contiguous, intent(in) :: y(:, :), y_new(:, :), c(:, :, :)
+
+    associate (columns => self%columns, first => self%columns%first(column))
+      call expand_single(size(c, 2), size(c, 3), columns%first(column + 1) - first, columns%component(first), &
+                         columns%factor(1, first, 1), columns%offset(1, column, 1), y, y_new, c, place, self%strip)
+    end associate
+  end subroutine place_column
+
+  !> Widens the ranges of some accumulators of a single lane, whose columns are in the strip.
+  subroutine widen_side_by_side(self, before, steps, degree)
+    class(linear_statistics_t), intent(inout) :: self
+    integer, intent(in) :: before   !! accumulators before these
+    type(step_block_t), intent(in) :: steps
+    integer, intent(in) :: degree
+    real(wp), dimension(width) :: bound, highest, lowest, highest_time, lowest_time, no_highest, no_lowest, rise, fall
+    integer :: count, i
+
+    count = min(width, size(self%accumulators) - before)
+    associate (strip => self%strip, chosen => self%accumulators(before + 1:before + count))
+      call bound_excursions(degree, self%chord_gap, strip%scale, strip%c, strip%above, strip%below)
+      bound = huge(0.0_wp)   ! in places without a column
+      highest = 0.0_wp
+      lowest = 0.0_wp
+      do i = 1, count
+        bound(i) = chosen(i)%bound(1)
+        highest(i) = chosen(i)%highest(1)
+        lowest(i) = chosen(i)%lowest(1)
+        highest_time(i) = chosen(i)%highest_time(1)
+        lowest_time(i) = chosen(i)%lowest_time(1)
+      end do
+      call widen_by_ends(.true., strip%t_end, strip%x_end, bound, highest, lowest, highest_time, lowest_time)
+      no_highest = huge(0.0_wp)
+      no_lowest = huge(0.0_wp)
+      do i = 1, count
+        chosen(i)%highest(1) = highest(i)
+        chosen(i)%lowest(1) = lowest(i)
+        chosen(i)%highest_time(1) = highest_time(i)
+        chosen(i)%lowest_time(1) = lowest_time(i)
+        if (.not. chosen(i)%has_range()) cycle
+        no_highest(i) = min(chosen(i)%no_highest(1), merge(-lowest(i), huge(0.0_wp), chosen(i)%has_max_abs))
+        no_lowest(i) = min(chosen(i)%no_lowest(1), merge(highest(i), huge(0.0_wp), chosen(i)%has_max_abs))
+      end do
+      call bound_excess(.false., strip, bound, highest, lowest, no_highest, no_lowest, rise, fall)
+      if (any_positive(rise, fall)) call exclude_monotonic(degree, self%chord_gap, strip%scale, strip%c, rise, fall)
+      do i = 1, count
+        if (steps%theta_end(1) < 1 .or. chosen(i)%bound(1) > 0) then   ! the bounds are not valid
+          rise(i) = 1.0_wp
+          fall(i) = 1.0_wp
+        end if
+        if (max(rise(i), fall(i)) <= 0 .or. strip%t_end(i) <= chosen(i)%from .or. .not. chosen(i)%has_range()) cycle
+        call look_inside(self, chosen(i), i, 1, steps, degree, rise(i) > 0, fall(i) > 0)
+      end do
+    end associate
+  end subroutine widen_side_by_side
+
   !> Work space for a degree of the solution inside the steps.
   subroutine allocate_work(self, columns, degree)
     class(linear_statistics_t), intent(inout) :: self
     integer, intent(in) :: columns   !! padded components of the state
     integer, intent(in) :: degree
 
-    call self%prepare(degree)
+    self%rules(degree) = new_interpolation(degree)
+    allocate (self%gauss(degree + 1), self%weights(degree + 1))
+    call gauss_legendre_rule(degree + 1, self%gauss, self%weights)
+    self%gauss(:) = 2 * self%gauss - 1
     allocate (self%chord_gap(degree))
     call fill_chord_gaps(self%chord_gap)
     allocate (self%y_last(width, columns), self%y_new_last(width, columns), self%c_last(width, columns, degree), source=0.0_wp)
@@ -219,7 +316,7 @@ contains
           end if
           if (max(rise(i), fall(i)) <= 0) cycle
           if (.not. steps%taken(lane) .or. strip%t_end(i) <= acc%from) cycle
-          call look_inside(self, acc, i, steps, degree, rise(i) > 0, fall(i) > 0)
+          call look_inside(self, acc, i, lane, steps, degree, rise(i) > 0, fall(i) > 0)
         end associate
       end do
     end associate
@@ -280,37 +377,32 @@ contains
   end function any_positive
 
   !> Widens the range of x by its extremes in the part of a step after `from` and before its end.
-  subroutine look_inside(self, acc, i, steps, degree, rises, falls)
+  subroutine look_inside(self, acc, i, lane, steps, degree, rises, falls)
     class(linear_statistics_t), intent(in) :: self
     type(accumulator_t), intent(inout) :: acc
-    integer, intent(in) :: i   !! lane in the strip
+    integer, intent(in) :: i, lane   !! place in the strip, lane in the block
     type(step_block_t), intent(in) :: steps
     integer, intent(in) :: degree
     logical, intent(in) :: rises, falls   !! whether x, or -x, may exceed the extremes so far
     real(wp) :: begin, end, t_start, values(max_degree + 1)
 
-    associate (lane => self%strip%before + i)
-      call find_part(self%strip, i, acc%from, steps, begin, end, t_start)
-      call values_at(self%strip, i, degree, self%rule%nodes, begin, end, values)
-      values(degree + 1) = self%strip%x_end(i)   ! to the last bit: it is the start of the next step
-      if (acc%bound(lane) > 0) call start_range(acc, lane, values(1), t_start)
-      call widen_range(acc, self%rule, lane, values, t_start, steps%t_new(lane), rises, falls)
-    end associate
+    call find_part(lane, acc%from, steps, begin, end, t_start)
+    call values_at(self%strip, i, degree, self%rules(degree)%nodes, begin, end, values)
+    values(degree + 1) = self%strip%x_end(i)   ! to the last bit: it is the start of the next step
+    if (acc%bound(lane) > 0) call start_range(acc, lane, values(1), t_start)
+    call widen_range(acc, self%rules(degree), lane, values, t_start, steps%t_new(lane), rises, falls)
   end subroutine look_inside
 
   !> The part of a step after `from` and before its end: scale s at its ends, and when it starts [s].
-  pure subroutine find_part(strip, i, from, steps, begin, end, t_start)
-    type(strip_t), intent(in) :: strip
-    integer, intent(in) :: i         !! lane in the strip
+  pure subroutine find_part(lane, from, steps, begin, end, t_start)
+    integer, intent(in) :: lane
     real(wp), intent(in) :: from     !! [s]
     type(step_block_t), intent(in) :: steps
     real(wp), intent(out) :: begin, end, t_start
 
-    associate (lane => strip%before + i)
-      t_start = max(steps%t(lane), from)
-      begin = strip%scale(i) * ((t_start - steps%t(lane)) / steps%h(lane))
-      end = strip%scale(i) * steps%theta_end(lane)
-    end associate
+    t_start = max(steps%t(lane), from)
+    begin = steps%scale(lane) * ((t_start - steps%t(lane)) / steps%h(lane))
+    end = steps%scale(lane) * steps%theta_end(lane)
   end subroutine find_part
 
   !> Counts the cycles of a column, a multiple of x, in the steps of the strip. Where x is monotonic, only its ends count.
@@ -330,11 +422,11 @@ contains
       associate (lane => self%strip%before + i, linear => self%linear(self%strip%before + i, sum%column))
         if (.not. steps%taken(lane) .or. self%strip%t_end(i) <= sum%from) cycle
         if (turns(i) > 0 .or. .not. sum%counters(lane)%has_begun) then
-          call find_part(self%strip, i, sum%from, steps, begin, end, t_start)
-          call values_at(self%strip, i, degree, self%rule%nodes, begin, end, values)
+          call find_part(lane, sum%from, steps, begin, end, t_start)
+          call values_at(self%strip, i, degree, self%rules(degree)%nodes, begin, end, values)
           values(degree + 1) = self%strip%x_end(i)
           values(:degree + 1) = linear * values(:degree + 1)
-          call sum%add_polynomial(self%rule, lane, values)
+          call sum%add_polynomial(self%rules(degree), lane, values)
         else
           call sum%add_value(lane, linear * self%strip%x_start(i))
           call sum%add_value(lane, linear * self%strip%x_end(i))
@@ -360,7 +452,7 @@ contains
       do i = 1, strip%lanes
         associate (lane => strip%before + i)
           if (.not. steps%taken(lane) .or. steps%t_new(lane) <= acc%from) cycle
-          call find_part(strip, i, acc%from, steps, begin(i), end(i), t_start)
+          call find_part(lane, acc%from, steps, begin(i), end(i), t_start)
           duration(i) = steps%t_new(lane) - t_start
         end associate
       end do

@@ -6,7 +6,7 @@ module nocdyn_step_strips
   implicit none (type, external)
   private
 
-  public :: fill_chord_gaps, expand, exclude_monotonic, values_at, add_integrals
+  public :: fill_chord_gaps, expand, expand_single, bound_excursions, exclude_monotonic, values_at, add_integrals
 
   !> The last steps of the lanes of a strip, and x in them.
   type, public :: strip_t
@@ -56,6 +56,31 @@ contains
     end do
     call bound_excursions(degree, chord_gap, strip%scale, strip%c, strip%above, strip%below)
   end subroutine expand
+
+  !> The same, without the bounds, for a column of a block of one lane, with the same bits. The strip has a column in each place.
+  pure subroutine expand_single(states, degree, entries, component, factor, offset, y, y_new, c, place, strip)
+    integer, intent(in) :: states, degree
+    integer, intent(in) :: entries   !! even
+    integer, intent(in) :: component(entries)
+    real(wp), intent(in) :: factor(width, entries), offset   !! those of the first lane
+    real(wp), intent(in) :: y(states), y_new(states), c(states, degree)
+    integer, intent(in) :: place
+    type(strip_t), intent(inout) :: strip
+    real(wp) :: x(max_degree)
+    integer :: k
+
+    strip%x_start(place) = offset
+    strip%x_end(place) = offset
+    do k = 1, entries
+      strip%x_start(place) = strip%x_start(place) + factor(1, k) * y(component(k))
+      strip%x_end(place) = strip%x_end(place) + factor(1, k) * y_new(component(k))
+    end do
+    x(:degree) = factor(1, 1) * c(component(1), :) + factor(1, 2) * c(component(2), :)
+    do k = 3, entries, 2
+      x(:degree) = x(:degree) + (factor(1, k) * c(component(k), :) + factor(1, k + 1) * c(component(k + 1), :))
+    end do
+    strip%c(place, :degree) = x(:degree)
+  end subroutine expand_single
 
   pure subroutine set_pair(lanes, states, degree, at, j, k, factor_j, factor_k, c, x)
     integer, intent(in) :: lanes, states, degree, at, j, k
