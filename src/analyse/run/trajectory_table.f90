@@ -68,7 +68,7 @@ contains
     self%y(1, :) = y
     call self%columns%observe(self%t, self%y)
     call self%columns%fill_row(1, t, y, row)
-    do i = 1, size(row)   ! without memory for the whole row
+    do i = 1, size(self%unit)   ! without memory for the whole row
       row(i) = from_si(row(i), self%unit(i))
     end do
   end subroutine fill

@@ -280,7 +280,8 @@ contains
       if (self%have_elastic) energies(signal_elastic) = sum(self%formulation%machine%elements%stored(lane, :))
       if (.not. self%have_works) return
       energies(signal_work_in) = work(self%works_in, self%formulation%states, y)
-      energies(signal_work_out) = work(self%works_out, self%formulation%states, y)
+      energies(signal_work_out) = work(self%works_out, self%formulation%states, y) &
+                                  + sum(self%formulation%machine%elements%kept(lane, :)) - self%start_kept(lane)
       energies(signal_residual) = (energies(signal_kinetic) + energies(signal_elastic) - self%start_energy(lane)) &
                                   - (energies(signal_work_in) + energies(signal_work_out))
       energies(signal_work_out) = 0.0_wp - energies(signal_work_out)   ! not -0 without any work
