@@ -56,7 +56,7 @@ contains
         if (element_kind(group) == 'shaft') then
           call find_shaft(machine, item)
         else
-          item%column = find_signal(signals, trim(element_kind(group)), item%element, fatigue_symbol(group))
+          item%column = find_signal(signals, trim(element_kind(group)), item%element, trim(fatigue_symbol(group)))
           if (item%column == 0) error stop 'nocdyn_run_fatigue: a checked group has a signal'
         end if
         count = item%last

@@ -3,7 +3,6 @@
 module nocdyn_sweep_plan
   use nocdyn_analysis_results, only: analysis_names, analysis_result_t
   use nocdyn_column_names, only: count_columns
-  use nocdyn_csv, only: table_bytes
   use nocdyn_designs, only: design_t
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
@@ -11,7 +10,7 @@ module nocdyn_sweep_plan
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_diagnostics, only: diagnostics_t
-  use nocdyn_output_times, only: check_output_times, row_count
+  use nocdyn_output_times, only: check_output_times, row_count, table_bytes
   use nocdyn_schema, only: first_key, has_word, key_rules
   use nocdyn_statistics, only: statistic_names, statistic_t
   use nocdyn_sweep_design, only: find_varied, read_design
@@ -258,10 +257,14 @@ contains
   subroutine set_quantity(label, unit, long_name, quantity)
     character(len=*), intent(in) :: label, unit, long_name
     type(quantity_t), intent(out) :: quantity
+    integer :: k
 
     quantity%label = label
     quantity%unit = unit
     quantity%long_name = long_name
+    do k = 1, size(quantity%facts)
+      quantity%facts(k)%text = ''
+    end do
   end subroutine set_quantity
 
   !> What is known of the signal of a result, in the order of `fact_names`.
