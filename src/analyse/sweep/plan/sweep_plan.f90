@@ -16,9 +16,10 @@ module nocdyn_sweep_plan
   use nocdyn_sweep_design, only: find_varied, read_design
   use nocdyn_sweep_header, only: quantity_t, sweep_header_t
   use nocdyn_recorded_analyses, only: analysis_reader_t, new_analysis_reader
-  use nocdyn_recorded_quantities, only: check_quantities, read_recorded_quantities, time_span_t, wanted_trajectories
+  use nocdyn_recorded_quantities, only: check_quantities, note_former_records, read_recorded_quantities, time_span_t, &
+    wanted_trajectories
   use nocdyn_targets, only: target_t
-  use nocdyn_text, only: counted, to_text
+  use nocdyn_text, only: counted, string_t, to_text
   use nocdyn_signals, only: signal_t
   use nocdyn_variant_columns, only: list_variant_signals
   use nocdyn_varied_numbers, only: varied_numbers_t
@@ -39,6 +40,7 @@ module nocdyn_sweep_plan
     type(analysis_result_t), allocatable :: analyses(:)   !! results of modes and of the response
     integer, allocatable :: trajectories(:)           !! variants whose trajectories are written, ascending
     integer :: columns = 0                            !! of each trajectory
+    type(string_t), allocatable :: notes(:)           !! for the user
     character(len=:), allocatable :: list_checksum    !! of the file of a list, '' if there is none
   contains
     procedure :: values, results, varies_key, summary, file_bytes
@@ -73,10 +75,12 @@ contains
       call read_recorded_quantities(input, reader, signals, fixed_span(input, plan%numbers%targets), variants, plan%statistics, &
                                     plan%analyses, diagnostics)
       allocate (plan%trajectories, source=wanted_trajectories(input))
+      allocate (plan%notes(0))
+      call note_former_records(input, reader, signals, plan%notes)
       if (plan%results() == 0 .and. diagnostics%count == 0) call input%report(sweeps(1), 'design', &
         'no number of the variants is kept; needed: a &record with quantity, fatigue, mode or response', diagnostics)
       if (size(plan%trajectories) > 0) call check_output_times(input, failure)
-      if (.not. allocated(failure)) call count_columns(input, plan%machine, plan%columns, failure)
+      if (.not. allocated(failure)) call count_columns(input, plan%machine, plan%columns, plan%notes, failure)
     end if
     call merge_errors(input, diagnostics, failure, error)
   end subroutine make_plan
