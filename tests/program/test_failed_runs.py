@@ -8,8 +8,8 @@ import time
 import pytest
 from conftest import CASE_1, CASE_2, ENDLESS, TRAPS_EXCEPTIONS, wait_for
 
-RESULTS = ["input.nml", "summary.json", "trajectory.csv"]
-PARTIAL = ["input.nml", "summary.json", "trajectory.partial.csv"]
+RESULTS = ["columns.json", "input.nml", "summary.json", "trajectory.csv"]
+PARTIAL = ["columns.json", "input.nml", "summary.json", "trajectory.partial.csv"]
 
 # The cubic part wins beyond 0.32 rad, and the disc has the speed to get there.
 EXPLODING = """\
