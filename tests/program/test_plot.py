@@ -122,6 +122,30 @@ def test_throttle_and_current_are_drawn(tmp_path, monkeypatch):
     assert "throttle opening [1]" in text and "armature current [A]" in text
 
 
+def test_a_tooth_force_is_called_a_tooth_force_and_shares_no_axis_with_a_moment(tmp_path, monkeypatch):
+    results = run_input(
+        tmp_path,
+        """
+&body name = 'motor' inertia = 1.0 /
+&body name = 'pinion' inertia = 0.1 /
+&body name = 'wheel' inertia = 2.0 /
+&coupling name = 'line' bodies = 'motor', 'pinion' stiffness = 1e3 damping = 1.0 /
+&mesh name = 'teeth' bodies = 'pinion', 'wheel' radii = 0.1, 0.2 stiffness = 1e8 damping = 1e3 /
+&motor name = 'drive' body = 'motor' kind = 'constant' torque = 10.0 /
+&run t_end = 0.1 /
+""",
+    )
+    read = read_results(results)
+    figure = run_figures.draw_over_time(read, "torques", run_figures.default_labels(read.header)["torques"])["torques"]
+    panels = {axes.get_ylabel(): [text.get_text() for text in axes.get_legend().get_texts()] for axes in figure.axes}
+    assert panels == {
+        "elastic and damping moment [N m]": ["line"],
+        "tooth force [N]": ["teeth"],
+        "torque on the body [N m]": ["drive"],
+    }
+    style.pyplot.close("all")
+
+
 def test_speeds_are_drawn_in_rpm_if_asked_for(tmp_path, monkeypatch):
     results = turning(tmp_path / "results")
     call(monkeypatch, "run_figures", results, "--columns", "omega_*", "--rpm", "--format", "svg")
