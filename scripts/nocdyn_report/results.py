@@ -130,7 +130,9 @@ def read_results(folder: Path, choose: Callable[[Header], Iterable[str]] | None 
     if TIME not in labels:
         raise ResultsError(f"{file}: not a trajectory of nocdyn: there is no column '{TIME}'")
     summary, machine = _read_summary(folder), folder / "input.nml"
-    header = Header(folder, _columns(folder, labels), _ranges(summary), f90nml.read(machine) if machine.is_file() else f90nml.Namelist())
+    header = Header(
+        folder, _columns(folder, labels), _ranges(summary), f90nml.read(machine) if machine.is_file() else f90nml.Namelist()
+    )
     table = read_columns(file, {TIME, *choose(header)} if choose else set(labels))
     if len(table) < 2:
         raise ResultsError(f"{file}: nothing to draw: the trajectory has {len(table)} row(s)")

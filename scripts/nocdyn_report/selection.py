@@ -13,9 +13,12 @@ def matching(header: Header, patterns: Iterable[str]) -> list[str]:
     chosen: set[str] = set()
     for pattern in patterns:
         expression = re.compile(re.escape(pattern).replace(r"\*", ".*").replace(r"\?", "."), re.IGNORECASE | re.DOTALL)
-        found = [one.label for one in header.columns.values() if expression.fullmatch(one.name) or expression.fullmatch(one.label)]
+        found = [
+            one.label for one in header.columns.values() if expression.fullmatch(one.name) or expression.fullmatch(one.label)
+        ]
         if not found:
-            raise ResultsError(f"{header.folder}: no column matches '{pattern}'{_nearest(pattern, header.columns.values())}")
+            hint = _nearest(pattern, header.columns.values())
+            raise ResultsError(f"{header.folder}: no column matches '{pattern}'{hint}")
         chosen.update(found)
     return [label for label in header.columns if label in chosen]
 

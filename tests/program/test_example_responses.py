@@ -89,7 +89,8 @@ def test_response_is_the_settled_transient(nocdyn, path):
     outcome = nocdyn("run", nocdyn.write("run.nml", text), "--out", "run", "-q")
     assert outcome.returncode == 0, outcome.stderr
     motion = {label: values[-50 * turns :] for label, values in columns(nocdyn, "run", "trajectory.csv").items()}
-    quantities = [label for label in response if label.startswith(("moment_", "total_moment_", "reaction_")) and f"phase_{label}" in response]
+    kinds = ("moment_", "total_moment_", "reaction_")
+    quantities = [label for label in response if label.startswith(kinds) and f"phase_{label}" in response]
     assert quantities
     found, settled = [], []
     for label in quantities:

@@ -8,7 +8,8 @@ MACHINE = """\
 &body name = 'b' inertia = 2.0 /
 &body name = 'c' inertia = 1.5 /
 &coupling name = 'k' bodies = 'a', 'b' stiffness = 100.0 damping = 1.0 /
-&shaft name = 's' bodies = 'b', 'c' lengths = 1.0 diameters = 0.05 shear_modulus = 8e10 density = 7850 damping_ratio = 0.01 damping_frequency = 9 /
+&shaft name = 's' bodies = 'b', 'c' lengths = 1.0 diameters = 0.05 shear_modulus = 8e10 density = 7850
+  damping_ratio = 0.01 damping_frequency = 9 /
 &motor name = 'm' body = 'a' kind = 'constant' torque = 1.0 /
 &load name = 'l' body = 'c' viscous = 0.1 /
 &excitation name = 'x' body = 'c' kind = 'orders' orders = 2 amplitudes = 1.0 /

@@ -623,7 +623,7 @@ def test_analyses_about_a_steady_state_refuse_what_has_no_mean_ratio(nocdyn, com
 
 
 def without_notes(nocdyn, folder, name):
-    """A file of results but for its notes and what its columns are, and for the reaction of a gear as the torque on its second wheel."""
+    """Results but for notes and what columns are, and for the reaction of a gear as the torque on its second wheel."""
     text = (nocdyn.folder / folder / name).read_text()
     if not name.endswith(".json"):
         return text

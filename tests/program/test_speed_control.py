@@ -214,7 +214,8 @@ def test_governors_take_part_in_forced_oscillations(nocdyn, kind):
     run(nocdyn, text + RUN, command="response")
     header, rows = nocdyn.table("out", "response.csv")
     speeds, found = (
-        np.array([row[header.index(label)] for row in rows]) for label in ("omega_fly [rad/s]", "half_range_total_moment_rubber [N m]")
+        np.array([row[header.index(label)] for row in rows])
+        for label in ("omega_fly [rad/s]", "half_range_total_moment_rubber [N m]")
     )
     for omega, half_range in zip(speeds, found):
         if kind == "dc":

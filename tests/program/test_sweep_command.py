@@ -196,7 +196,16 @@ def test_trajectories_of_an_earlier_sweep_and_a_run_do_not_stay_beside_new_resul
         assert nocdyn("sweep", "discs.nml", "--out", "out").returncode == 0
         for own in ("variant-3/own.txt", "variant-/input.nml", "variant-1a/input.nml"):
             nocdyn.write(f"out/{own}", "of the user")
-    assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", "sweep.nc", "variant-", "variant-1a", "variant-2", "variant-3"]
+    assert nocdyn.files("out") == [
+        "columns.json",
+        "input.nml",
+        "summary.json",
+        "sweep.nc",
+        "variant-",
+        "variant-1a",
+        "variant-2",
+        "variant-3",
+    ]
     assert nocdyn.files("out/variant-") == nocdyn.files("out/variant-1a") == ["input.nml"]
     assert nocdyn.files("out/variant-3") == ["own.txt"]
     assert nocdyn.files("out/variant-2") == ["columns.json", "input.nml", "summary.json", "trajectory.csv"]
@@ -236,7 +245,15 @@ def test_a_reader_of_the_output_who_is_gone_costs_no_results(nocdyn, discs):
 def test_trajectories_of_chosen_variants_are_those_of_runs(nocdyn, discs):
     nocdyn.write("discs.nml", TWO_DISCS + SWEEP + "&record trajectories = 2, 17 /\n")
     nocdyn("sweep", "discs.nml", "--out", "out", "--csv")
-    assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", "sweep.csv", "sweep.nc", "variant-17", "variant-2"]
+    assert nocdyn.files("out") == [
+        "columns.json",
+        "input.nml",
+        "summary.json",
+        "sweep.csv",
+        "sweep.nc",
+        "variant-17",
+        "variant-2",
+    ]
     assert nocdyn.files("out/variant-17") == ["columns.json", "input.nml", "summary.json", "trajectory.csv"]
     row = table(nocdyn, "out")[16]
     header, rows = nocdyn.table("out/variant-17")

@@ -37,7 +37,7 @@ contains
     end do
   end subroutine refuse_equal_labels
 
-  !> The group of the input that a signal belongs to. Engines and cranks have elements of their own, whose names begin with theirs.
+  !> The group of the input that a signal belongs to. Engines and cranks have elements whose names begin with theirs.
   integer function owner(input, signal) result(group)
     type(input_t), intent(in) :: input
     type(signal_t), intent(in) :: signal

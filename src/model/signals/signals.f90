@@ -313,8 +313,7 @@ contains
     end do
   end subroutine label_signals
 
-  !> A signal of an element, 0 if there is none. The total moment of a coupling without damping is its elastic moment; the force of
-  !> a gear is its reaction.
+  !> A signal of an element, 0 if there is none. The total moment of a coupling without damping is its elastic moment.
   integer function find_signal(signals, element_kind, element, symbol, point) result(found)
     type(signal_t), intent(in) :: signals(:)
     character(len=*), intent(in) :: element_kind, element   !! the group of the input, and its name

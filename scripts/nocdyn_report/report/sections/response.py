@@ -178,7 +178,7 @@ def _figure(sources: Sources, quantity: Quantity) -> Figure:
     }
     at = number_text(float(speed[np.nanargmax(quantity.half_range)]))
     return Figure(
-        f"{quantity.label}, {quantity.column.caption}: half range over the speed, and its largest orders. Triangles: critical speeds",
+        f"{quantity.label}, {quantity.column.caption}: half range over the speed, largest orders. Triangles: critical speeds",
         f"Half range of {quantity.label} over the speed of {response.body}; the largest is {number_text(top)} {quantity.unit} "
         f"at {at} {sources.speed_unit}.",
         spec,
