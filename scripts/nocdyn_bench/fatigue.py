@@ -22,7 +22,7 @@ STARTS = """&body name = 'motor' inertia = 2.0 /
 &sweep design = 'random' samples = 10000 seed = 3 /
 &vary target = 'coupling.c.stiffness' low = 4.0e3 high = 9.0e3 /
 &vary target = 'coupling.c.damping' low = 4.0 high = 9.0 /
-&record quantity = 'shaft_c' statistic = 'max_abs' /
+&record quantity = 'total_moment_c' statistic = 'max_abs' /
 &record quantity = 'omega_fan' statistic = 'final' /
 """
 DAMAGE = "&record fatigue = 'life' statistic = 'damage', 'cycles' /\n"

@@ -73,7 +73,8 @@ def read_response(machine: Machine, folder: Path) -> Response:
         phases = rows[:, :, [names.index(f"phase_{column}") for column in columns]]
         return (sizes * np.exp(1j * np.radians(phases))).transpose(0, 2, 1)
 
-    moments = amplitudes([f"moment_shaft_{i}" for i in range(1, len(machine.shafts) + 1)])
+    shafts = [f"moment_shaft_{i}" for i in range(1, len(machine.shafts) + 1)]
+    moments = amplitudes([f"total_{name}" if f"total_{name}" in names else name for name in shafts])  # with damping
     return Response(speeds, np.array(machine.orders), moments, amplitudes([f"phi_{body}" for body in machine.bodies]))
 
 

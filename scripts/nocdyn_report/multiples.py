@@ -5,7 +5,7 @@ from matplotlib import pyplot
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from .results import Column
+from .results import Series
 from .style import COLOURS, plain
 from .thinning import thin
 
@@ -17,7 +17,7 @@ LONGEST_NAME = 30  # characters that fit above a panel
 COMPARABLE = 0.2  # ratio of ranges from which on series share a scale
 
 
-def draw_multiples(time: np.ndarray, columns: list[Column], caption: str) -> Figure:
+def draw_multiples(time: np.ndarray, columns: list[Series], caption: str) -> Figure:
     """Series over time, on one scale if their ranges are comparable."""
     down = -(-len(columns) // ACROSS)
     ranges = [np.ptp(column.values) for column in columns]
@@ -27,7 +27,7 @@ def draw_multiples(time: np.ndarray, columns: list[Column], caption: str) -> Fig
     )
     for axes, column in zip(grid.flat, columns):
         axes.plot(*thin(time, column.values, PIXELS), color=COLOURS[0], linewidth=0.8)
-        axes.set_title(plain(_shortened(column.element)), fontsize=9, pad=3)
+        axes.set_title(plain(_shortened(column.name)), fontsize=9, pad=3)
         axes.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
         axes.tick_params(labelsize=8)
         axes.yaxis.get_offset_text().set_fontsize(8)
@@ -38,7 +38,7 @@ def draw_multiples(time: np.ndarray, columns: list[Column], caption: str) -> Fig
     grid[0, 0].set_xlim(time[0], time[-1])
     grid[0, 0].xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
     figure.supxlabel("time [s]", fontsize=10)
-    figure.supylabel(f"{caption} [{columns[0].unit}]".replace("\n", " "), fontsize=10)
+    figure.supylabel(f"{caption} [{columns[0].unit}]", fontsize=10)
     return figure
 
 

@@ -20,7 +20,7 @@ MEDIA = ROOT / "docs" / "media"
 def draw_elastic_moments(results: Results) -> Figure:
     """F1 and F2 = -F1 over time, with their steady values."""
     figure, axes = pyplot.subplots(figsize=(WIDTH, 4.2))
-    moment = results.columns("moment")[0].values
+    moment = results.values(results.columns("moment")[0].label)
     steady = steady_state(results).moment
     axes.axhline(steady, label="uniform\nmotion", **REFERENCE)
     axes.axhline(-steady, **REFERENCE)

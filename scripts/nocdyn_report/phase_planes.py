@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from .results import Column, Results, quantity_of
+from .results import Results, Series
 from .style import COLOURS, WIDTH, plain
 from .thinning import thin_curve
 
@@ -25,13 +25,13 @@ class Plane:
     angle_label: str
     rate_label: str
     colour: str
-    angle: Column
-    rate: Column
+    angle: Series
+    rate: Series
 
 
 def draw_phase_planes(results: Results, labels: Sequence[str] | None = None) -> Figure | None:
     """A panel for each plane, with where it starts and where it ends; of all angles and twists, or of those among the labels."""
-    panels = list(_planes(results, results.table if labels is None else labels))
+    panels = list(_planes(results, results.header.columns if labels is None else labels))
     if not panels:
         return None
     across = math.ceil(math.sqrt(len(panels)))
@@ -47,15 +47,13 @@ def draw_phase_planes(results: Results, labels: Sequence[str] | None = None) -> 
 
 def _planes(results: Results, labels: Iterable[str]) -> Iterator[Plane]:
     """Bodies and couplings whose speeds the trajectory has."""
-    for label in sorted(labels, key=lambda label: quantity_of(label) == "twist"):
-        if quantity_of(label) == "phi":
-            angle = results.column(label)
-            if speed := results.speed(angle.element):
-                yield Plane("body", "angle φ", "speed ω", COLOURS[0], angle, speed)
-        elif quantity_of(label) == "twist":
-            twist = results.column(label)
-            if rate := results.twist_rate(twist.element):
-                yield Plane("twist of", "twist Δφ", "rate of twist Δω", COLOURS[1], twist, rate)
+    columns = [column for column in results.columns("phi", "twist") if column.label in set(labels)]
+    for column in sorted(columns, key=lambda one: one.kind == "twist"):
+        if column.kind == "phi":
+            if speed := results.speed(column.title):
+                yield Plane("body", "angle φ", "speed ω", COLOURS[0], results.series(column.label), speed)
+        elif rate := results.twist_rate(column):
+            yield Plane("twist of", "twist Δφ", "rate of twist Δω", COLOURS[1], results.series(column.label), rate)
 
 
 def _draw_plane(axes: Axes, plane: Plane) -> None:
@@ -64,7 +62,7 @@ def _draw_plane(axes: Axes, plane: Plane) -> None:
     axes.plot(angle, rate, color=plane.colour, linewidth=width, rasterized=len(angle) > LONGEST_PATH)
     axes.plot(angle[0], rate[0], "o", color="black", markerfacecolor="white", label="start")
     axes.plot(angle[-1], rate[-1], "o", color="black", label="end")
-    axes.set_title(plain(f"{plane.noun} {plane.angle.element}"))
+    axes.set_title(plain(f"{plane.noun} {plane.angle.name}"))
     axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
     axes.set_xlabel(f"{plane.angle_label} [{plane.angle.unit}]")
     axes.set_ylabel(f"{plane.rate_label} [{plane.rate.unit}]")

@@ -2,6 +2,7 @@
 
 import argparse
 import re
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -15,6 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from .columns import by_sort
 from .response_marks import BARRED, draw_barred, mark_criticals
 from .results import ResultsError
 from .speed_panels import (
@@ -42,6 +44,7 @@ AXES_SHARE = 0.84  # of a panel that its axes have, about
 NAMED = 4  # orders of a panel
 SMALLEST = 0.02  # of the largest half range that a named order has
 FAR = 2.5  # times what is drawn: limits above are not in the picture
+LONGEST = 34  # characters of a line beside a panel
 HEADROOM = 1.3  # for the names of critical speeds
 MOST_OF, AT_END = 0.5, 0.9  # of the half range that an order has whose name stands above it; at the ends of the speeds
 MOST_PEAKS = 3  # of a curve that may bear its name
@@ -114,10 +117,10 @@ def draw_quantity(axes: Axes, response: Response, quantity: Quantity, look: Look
     far = _set_scale(axes, response, quantity, look)
     for values, style in _limits(quantity, look):
         axes.plot(*thin(response.speed, values, PIXELS), zorder=5, **style)
-    title = plain(quantity.element) + (f"   (limit, from {far:.4g} {quantity.unit} on, is above)" if far else "")
+    title = plain(quantity.column.title) + (f"   (limit, from {far:.4g} {quantity.unit} on, is above)" if far else "")
     bars = [barred for barred in response.barred if barred.quantity == quantity.label]
     axes.set_title(title, loc="left", pad=16 if bars else 6)
-    axes.set_ylabel(f"{quantity.kind} [{quantity.unit}]")
+    axes.set_ylabel(textwrap.fill(f"{quantity.column.caption} [{quantity.unit}]", LONGEST))
     if quantity.stress:
         _add_stress(axes, quantity.stress)
 
@@ -258,12 +261,12 @@ def figures_of(folder: Path, arguments: argparse.Namespace) -> Figures:
     look = Look(window_of(folder, response.speed, arguments), arguments.orders or (), arguments.peak, arguments.log)
     quantities = chosen(response, arguments.columns)
     styles = styles_of(response, quantities, look)
-    kinds: dict[tuple[str, str], list[Quantity]] = {}
-    for quantity in quantities:
-        kinds.setdefault((quantity.kind, quantity.unit), []).append(quantity)
+    of_columns = {quantity.column.label: quantity for quantity in quantities}
     pages: dict[str, int] = {}
-    for (kind, _), members in kinds.items():
+    for columns in by_sort(quantity.column for quantity in quantities):
+        members = [of_columns[column.label] for column in columns]
         for first in range(0, len(members), MOST_PANELS):
+            kind = columns[0].kind
             pages[kind] = pages.get(kind, 0) + 1
             name = kind if pages[kind] == 1 else f"{kind}_{pages[kind]}"
             yield name, draw_page(response, members[first : first + MOST_PANELS], look, styles)
@@ -279,7 +282,7 @@ def main() -> None:
         "--columns",
         nargs="+",
         metavar="PATTERN",
-        help="draws these quantities only, e.g. 'moment_*' reaction_pinion; '*' stands for any text, '?' for a character",
+        help="draws these quantities only, e.g. 'total_moment_*' reaction_pinion; '*' stands for any text, '?' for a character",
     )
     parser.add_argument(
         "--orders",

@@ -2,32 +2,27 @@
 
 import json
 import math
-import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import f90nml
 import numpy as np
 import pandas as pd
 
+from .columns import COLUMNS, Column, read_column_list
 from .trajectory_files import ResultsError, labels_of, read_columns
 
-COLUMN = re.compile(
-    r"(?P<quantity>phi|omega|twist|moment|damping|shaft|torque|throttle|current|reaction)_(?P<element>.+) "
-    r"\[(?P<unit>[^]]+)\]"
-)
 TIME = "t [s]"
 FILES = ("trajectory.csv", "trajectory.nc", "trajectory.partial.csv", "trajectory.partial.nc")
 RPM = {"rad/s": 30.0 / math.pi, "Hz": 60.0}
 
 
 @dataclass(frozen=True)
-class Column:
-    """A quantity over time: of one element of the machine, or an energy of all."""
+class Series:
+    """The values of a column over time."""
 
-    quantity: str
-    element: str
+    name: str  # in a legend
     unit: str
     values: np.ndarray
 
@@ -37,17 +32,18 @@ class Header:
     """The columns of a trajectory, before their values are read."""
 
     folder: Path
-    labels: list[str]
-    ranges: dict[str, float]  # largest less smallest value of the labels, as far as summary.json has them
-    machine: f90nml.Namelist  # input.nml
+    columns: dict[str, Column]  # by their labels, all but the time
+    ranges: dict[str, float] = field(default_factory=dict)  # largest less smallest value, as far as summary.json has them
+    machine: f90nml.Namelist = field(default_factory=f90nml.Namelist)  # input.nml
 
-    def of(self, quantity: str) -> list[str]:
-        return [label for label in self.labels if quantity_of(label) == quantity]
+    def of(self, *kinds: str) -> list[str]:
+        """Labels."""
+        return [label for label, column in self.columns.items() if column.kind in kinds]
 
     def speeds_about(self, twist: str) -> list[str]:
-        """Of the bodies of the coupling with this twist."""
-        names = {body.lower() for body in bodies_of(self.machine, COLUMN.fullmatch(twist)["element"])}
-        return [label for label in self.of("omega") if COLUMN.fullmatch(label)["element"].lower() in names]
+        """Of the bodies of the coupling or shaft with this twist."""
+        names = {body.lower() for body in bodies_of(self.machine, self.columns[twist])}
+        return [label for label in self.of("omega") if self.columns[label].title.lower() in names]
 
 
 @dataclass(frozen=True)
@@ -72,23 +68,21 @@ class Results:
             raise ResultsError(f"{self.folder}: the trajectory has no column '{label}'")
         return self.table[label].to_numpy()
 
-    def column(self, label: str) -> Column:
-        match = COLUMN.fullmatch(label)
-        unit = label.rsplit(" [", 1)[-1].removesuffix("]")
-        others = "residual" if "residual" in label else "energy"
-        quantity, element = (match["quantity"], match["element"]) if match else (others, name_of(label))
-        if self.rpm and quantity == "omega" and unit in RPM:
-            return Column(quantity, element, "rpm", self.values(label) * RPM[unit])
-        return Column(quantity, element, unit, self.values(label))
+    def series(self, label: str) -> Series:
+        column = self.header.columns[label]
+        if self.rpm and column.unit in RPM:
+            return Series(column.title, "rpm", self.values(label) * RPM[column.unit])
+        return Series(column.title, column.unit, self.values(label))
 
-    def columns(self, quantity: str) -> list[Column]:
-        """All columns of a quantity ('omega', 'twist', ...), in the order of the file."""
-        return [self.column(label) for label in self.table if quantity_of(label) == quantity]
+    def columns(self, *kinds: str) -> list[Column]:
+        """Those that were read of some kinds ('omega', 'twist', ...), in the order of the file."""
+        return [self.header.columns[label] for label in self.header.of(*kinds) if label in self.table]
 
-    def speed(self, body: str) -> Column | None:
+    def speed(self, body: str) -> Series | None:
         """The speed of a body by its name in any case; None if the trajectory does not have it."""
-        labels = (label for label in self.table if quantity_of(label) == "omega")
-        return next((self.column(label) for label in labels if name_of(label).lower() == f"omega_{body.lower()}"), None)
+        found = (one.label for one in self.columns("omega") if one.title.lower() == body.lower())
+        label = next(found, None)
+        return None if label is None else self.series(label)
 
     def between(self, start: float, end: float) -> "Results":
         """The rows from one time to another."""
@@ -104,24 +98,14 @@ class Results:
         """All groups of a kind ('body', 'coupling', ...) of the input."""
         return groups_of(self.header.machine, kind)
 
-    def twist_rate(self, coupling: str) -> Column | None:
-        """Speed of the second body of a coupling less that of its first; None if the trajectory has not both."""
-        bodies = bodies_of(self.header.machine, coupling)
+    def twist_rate(self, twist: Column) -> Series | None:
+        """Speed of the second body of a coupling or shaft less that of its first; None if the trajectory has not both."""
+        bodies = bodies_of(self.header.machine, twist)
         speeds = {body: self.speed(body) for body in bodies if body.lower() != "ground"}
-        if None in speeds.values():
+        if not speeds or None in speeds.values():
             return None
         first, second = (speeds[body].values if body in speeds else 0.0 for body in bodies)
-        return Column("", coupling, next(iter(speeds.values())).unit, second - first)
-
-
-def name_of(label: str) -> str:
-    """The name without the unit."""
-    return label.rsplit(" [", 1)[0]
-
-
-def quantity_of(label: str) -> str:
-    match = COLUMN.fullmatch(label)
-    return match["quantity"] if match else ""
+        return Series(twist.title, next(iter(speeds.values())).unit, second - first)
 
 
 def groups_of(machine: f90nml.Namelist, kind: str) -> list[f90nml.Namelist]:
@@ -129,9 +113,10 @@ def groups_of(machine: f90nml.Namelist, kind: str) -> list[f90nml.Namelist]:
     return groups if isinstance(groups, list) else [groups]
 
 
-def bodies_of(machine: f90nml.Namelist, coupling: str) -> list[str]:
-    couplings = groups_of(machine, "coupling")
-    return next((group["bodies"] for group in couplings if group["name"].lower() == coupling.lower()), [])
+def bodies_of(machine: f90nml.Namelist, column: Column) -> list[str]:
+    """Those that the element of a column joins."""
+    groups = groups_of(machine, column.element_kind)
+    return next((group["bodies"] for group in groups if group["name"].lower() == column.element.lower()), [])
 
 
 def read_results(folder: Path, choose: Callable[[Header], Iterable[str]] | None = None, rpm: bool = False) -> Results:
@@ -145,13 +130,23 @@ def read_results(folder: Path, choose: Callable[[Header], Iterable[str]] | None 
     if TIME not in labels:
         raise ResultsError(f"{file}: not a trajectory of nocdyn: there is no column '{TIME}'")
     summary, machine = _read_summary(folder), folder / "input.nml"
-    header = Header(folder, labels, _ranges(summary), f90nml.read(machine) if machine.is_file() else f90nml.Namelist())
+    header = Header(
+        folder, _columns(folder, labels), _ranges(summary), f90nml.read(machine) if machine.is_file() else f90nml.Namelist()
+    )
     table = read_columns(file, {TIME, *choose(header)} if choose else set(labels))
     if len(table) < 2:
         raise ResultsError(f"{file}: nothing to draw: the trajectory has {len(table)} row(s)")
     if not machine.is_file():
         raise ResultsError(f"{machine}: missing; the figures need the input of the run beside its trajectory")
     return Results(folder, header, table, _shortfall(summary, table) if ".partial" in file.suffixes else "", rpm)
+
+
+def _columns(folder: Path, labels: list[str]) -> dict[str, Column]:
+    known = {column.label: column for column in read_column_list(folder)}
+    for label in labels:
+        if label not in known:
+            raise ResultsError(f"{folder / COLUMNS}: has no column '{label}'; it must be of the same run as the trajectory")
+    return {label: known[label] for label in labels if label != TIME}
 
 
 def _ranges(summary: dict) -> dict[str, float]:

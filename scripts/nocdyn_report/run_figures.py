@@ -3,6 +3,7 @@
 import argparse
 import math
 import sys
+import textwrap
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -11,36 +12,18 @@ from matplotlib import pyplot
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from .columns import CURRENT, FORCE, LOSS, MOMENT, REACTION, SLIP, SPEED, STRESS, TORQUE, TWIST, Column, by_sort
 from .multiples import MOST_PANELS, draw_multiples
 from .phase_planes import MOST_PLANES, draw_phase_planes
-from .results import Column, Header, Results, ResultsError, read_results
+from .results import Header, Results, ResultsError, read_results
 from .selection import matching, widest
 from .style import COLOURS, PIXELS, WIDTH, add_format_option, add_title, draw_lines, save, saved
 from .thinning import thin
 
-CAPTIONS = {
-    "phi": "angle",
-    "omega": "speed",
-    "twist": "twist",
-    "torque": "motors, loads,\nexcitations",
-    "shaft": "shaft moment\non the first body",
-    "moment": "elastic moment\non the first body",
-    "damping": "damping moment\non the first body",
-    "throttle": "throttle",
-    "current": "current",
-    "reaction": "reaction of\ngears, joints",
-    "energy": "energy",
-    "residual": "energy residual",
-}
-MOTION = ("omega", "twist")
-TORQUES = ("torque", "shaft", "moment", "damping", "throttle", "current", "reaction")
-ENERGIES = {
-    "kinetic_energy [J]": "kinetic",
-    "elastic_energy [J]": "elastic",
-    "work_in [J]": "work put in",
-    "work_out [J]": "work taken out",
-}
-RESIDUAL = "energy_residual [J]"
+MOTION = (SPEED, SLIP, TWIST)
+TORQUES = (MOMENT, REACTION, FORCE, STRESS, TORQUE, LOSS, CURRENT)
+RESIDUAL = "energy_residual"
+LONGEST = 32  # characters of a line beside a panel
 SMOOTH_ROWS = 12  # of an oscillation, with which its phase plane looks round
 FEWEST_TURNS = 20  # turning points that make an oscillation
 
@@ -48,25 +31,17 @@ Figures = dict[str, Figure]
 
 
 def draw_over_time(results: Results, name: str, labels: Sequence[str]) -> Figures:
-    """A figure with a panel for each quantity and unit, and figures with a panel for each column where these are many."""
-    groups = _by_quantity([results.column(label) for label in labels])
-    few = [columns for columns in groups if len(columns) <= len(COLOURS)]
+    """A figure with a panel for each sort of columns, and figures with a panel for each column where these are many."""
+    sorts = by_sort(results.header.columns[label] for label in labels)
+    few = [columns for columns in sorts if len(columns) <= len(COLOURS)]
     figures = {name: _draw_panels(results, few)} if few else {}
-    for columns in groups:
+    for columns in sorts:
         for start in range(0, len(columns) if columns not in few else 0, MOST_PANELS):
             page = columns[start : start + MOST_PANELS]
-            figure = draw_multiples(results.time, page, CAPTIONS[page[0].quantity])
-            _add_title(figure, results, _left_out(results.header, len(columns), page[0].quantity))
-            figures[_unused(page[0].quantity, figures)] = figure
+            figure = draw_multiples(results.time, [results.series(column.label) for column in page], page[0].caption)
+            _add_title(figure, results, _left_out(results.header, len(columns), page[0]))
+            figures[_unused(page[0].kind, figures)] = figure
     return figures
-
-
-def _by_quantity(columns: list[Column]) -> list[list[Column]]:
-    """By the unit too: tooth forces [N] and gear moments [N m] do not share an axis."""
-    groups: dict[tuple[str, str], list[Column]] = {}
-    for column in columns:
-        groups.setdefault((column.quantity, column.unit), []).append(column)
-    return list(groups.values())
 
 
 def _unused(name: str, figures: Figures) -> str:
@@ -75,11 +50,12 @@ def _unused(name: str, figures: Figures) -> str:
     return f"{name}_{pages + 1}" if pages else name
 
 
-def _draw_panels(results: Results, groups: list[list[Column]]) -> Figure:
-    figure, grid = pyplot.subplots(len(groups), 1, squeeze=False, sharex=True, figsize=(WIDTH, 2.4 * len(groups) + 0.8))
-    for axes, columns in zip(grid.flat, groups):
-        draw_lines(axes, [column.element for column in columns], [(results.time, column.values) for column in columns])
-        axes.set_ylabel(f"{CAPTIONS[columns[0].quantity]} [{columns[0].unit}]")
+def _draw_panels(results: Results, sorts: list[list[Column]]) -> Figure:
+    figure, grid = pyplot.subplots(len(sorts), 1, squeeze=False, sharex=True, figsize=(WIDTH, 2.4 * len(sorts) + 0.8))
+    for axes, columns in zip(grid.flat, sorts):
+        series = [results.series(column.label) for column in columns]
+        draw_lines(axes, [one.name for one in series], [(results.time, one.values) for one in series])
+        axes.set_ylabel(textwrap.fill(f"{columns[0].caption} [{series[0].unit}]", LONGEST))
     _finish_time_axis(grid.flat[-1], results)
     _add_title(figure, results)
     return figure
@@ -87,22 +63,28 @@ def _draw_panels(results: Results, groups: list[list[Column]]) -> Figure:
 
 def draw_energy(results: Results) -> Figure | None:
     """Energies and works, and below them the energy balance error; what the trajectory has of them."""
-    panels = [[label for label in labels if label in results.table] for labels in (ENERGIES, [RESIDUAL])]
-    panels = [labels for labels in panels if labels]
+    there = results.columns(*(column.kind for column in _energies(results.header)))
+    panels = [[one for one in there if (one.kind == RESIDUAL) == is_residual] for is_residual in (False, True)]
+    panels = [columns for columns in panels if columns]
     if not panels:
         return None
-    heights = [1 if RESIDUAL in labels else 2 for labels in panels]
+    heights = [1 if columns[0].kind == RESIDUAL else 2 for columns in panels]
     size = (WIDTH, 1.7 * sum(heights) + 0.9)
     figure, grid = pyplot.subplots(len(panels), 1, squeeze=False, sharex=True, figsize=size, height_ratios=heights)
-    for axes, labels in zip(grid.flat, panels):
-        if RESIDUAL in labels:
-            axes.plot(*thin(results.time, results.values(RESIDUAL), PIXELS), color=COLOURS[-1], linewidth=0.8)
+    for axes, columns in zip(grid.flat, panels):
+        one = columns[0]
+        if one.kind == RESIDUAL:
+            axes.plot(*thin(results.time, results.values(one.label), PIXELS), color=COLOURS[-1], linewidth=0.8)
         else:
-            draw_lines(axes, [ENERGIES[label] for label in labels], [(results.time, results.values(label)) for label in labels])
-        axes.set_ylabel("energy residual [J]" if RESIDUAL in labels else "energy [J]")
+            draw_lines(axes, [one.caption for one in columns], [(results.time, results.values(one.label)) for one in columns])
+        axes.set_ylabel(textwrap.fill(f"{one.caption if one.kind == RESIDUAL else 'energy'} [{one.unit}]", LONGEST))
     _finish_time_axis(grid.flat[-1], results)
     _add_title(figure, results)
     return figure
+
+
+def _energies(header: Header) -> list[Column]:
+    return [column for column in header.columns.values() if column.unit == "J" and not column.element]
 
 
 def _finish_time_axis(axes: Axes, results: Results) -> None:
@@ -114,21 +96,27 @@ def _add_title(figure: Figure, results: Results, *remarks: str) -> None:
     add_title(figure, results.title, results.shortfall, *remarks)
 
 
-def _left_out(header: Header, shown: int, quantity: str) -> str:
-    """What says that not all columns of a quantity are drawn."""
-    total = len(header.of(quantity))
+def _left_out(header: Header, shown: int, column: Column) -> str:
+    """What says that not all columns of a sort are drawn."""
+    total = sum(1 for other in header.columns.values() if other.sort == column.sort)
     return f"{shown} of {total}: {'those that vary most' if header.ranges else 'the first'}" if shown < total else ""
 
 
+def _sorts(header: Header, *ranks: int) -> list[list[str]]:
+    """Labels, by their sorts."""
+    return [[one.label for one in columns] for columns in by_sort(one for one in header.columns.values() if one.rank in ranks)]
+
+
 def default_labels(header: Header) -> dict[str, list[str]]:
-    """The columns of each figure: of quantities that many elements have, those that vary most."""
+    """The columns of each figure: of sorts that many elements have, those that vary most."""
 
-    def shown(quantities: Sequence[str]) -> list[str]:
-        return [label for quantity in quantities for label in widest(header, header.of(quantity), MOST_PANELS)]
+    def shown(sorts: list[list[str]]) -> list[str]:
+        return [label for labels in sorts for label in widest(header, labels, MOST_PANELS)]
 
-    energies = [label for label in (*ENERGIES, RESIDUAL) if label in header.labels]
-    motion = shown(MOTION if header.of("omega") else ("phi", "twist"))
-    return {"motion": motion, "phase_planes": _plane_labels(header), "torques": shown(TORQUES), "energy": energies}
+    angles = [] if header.of("omega") else [header.of("phi")]
+    motion, torques = shown(angles + _sorts(header, *MOTION)), shown(_sorts(header, *TORQUES))
+    energies = [column.label for column in _energies(header)]
+    return {"motion": motion, "phase_planes": _plane_labels(header), "torques": torques, "energy": energies}
 
 
 def _plane_labels(header: Header) -> list[str]:
@@ -146,9 +134,9 @@ def default_figures(results: Results) -> Figures:
     labels = default_labels(results.header)
     figures = draw_over_time(results, "motion", labels["motion"])
     if planes := draw_phase_planes(results, labels["phase_planes"]):
-        quantity = "twist" if results.header.of("twist") else "phi"
-        shown = len([label for label in labels["phase_planes"] if label in results.header.of(quantity)])
-        _add_title(planes, results, _left_out(results.header, shown, quantity))
+        kind = "twist" if results.header.of("twist") else "phi"
+        drawn = [label for label in labels["phase_planes"] if label in results.header.of(kind)]
+        _add_title(planes, results, _left_out(results.header, len(drawn), results.header.columns[drawn[0]]))
         figures["phase_planes"] = planes
     figures |= draw_over_time(results, "torques", labels["torques"])
     if energy := draw_energy(results):
@@ -158,7 +146,7 @@ def default_figures(results: Results) -> Figures:
 
 def coarsest(results: Results) -> tuple[str, float]:
     """The twist with the fewest rows for each of its oscillations, and how many; infinity without oscillations."""
-    rows = [(column.element, _rows_per_oscillation(column.values)) for column in results.columns("twist")]
+    rows = [(column.title, _rows_per_oscillation(results.values(column.label))) for column in results.columns("twist")]
     return min(rows, key=lambda pair: pair[1], default=("", np.inf))
 
 
@@ -187,7 +175,7 @@ def _parser() -> argparse.ArgumentParser:
         "--columns",
         nargs="+",
         metavar="PATTERN",
-        help="draws these columns only, e.g. 'moment_*' omega_motor; '*' stands for any text, '?' for a character",
+        help="draws these columns only, e.g. 'total_moment_*' omega_motor; '*' stands for any text, '?' for a character",
     )
     parser.add_argument("--from", dest="start", type=_time, default=-math.inf, metavar="T", help="first time [s]")
     parser.add_argument("--to", dest="end", type=_time, default=math.inf, metavar="T", help="last time [s]")
@@ -198,8 +186,9 @@ def _parser() -> argparse.ArgumentParser:
 
 def _hint(header: Header, patterns: Sequence[str] | None) -> str:
     """What draws the columns that are left out, '' if all are drawn."""
-    left_out = [quantity for quantity in (*MOTION, *TORQUES) if len(header.of(quantity)) > MOST_PANELS]
-    return "" if patterns or not left_out else "others: --columns " + " ".join(f"'{quantity}_*'" for quantity in left_out)
+    many = [labels[0] for labels in _sorts(header, *MOTION, *TORQUES) if len(labels) > MOST_PANELS]
+    kinds = dict.fromkeys(header.columns[label].kind for label in many)
+    return "" if patterns or not kinds else "others: --columns " + " ".join(f"'{kind}_*'" for kind in kinds)
 
 
 def _time(text: str) -> float:

@@ -2,27 +2,30 @@
 
 import difflib
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
-from .results import TIME, Header, ResultsError, name_of, quantity_of
+from .columns import Column
+from .results import Header, ResultsError
 
 
 def matching(header: Header, patterns: Iterable[str]) -> list[str]:
     """Labels of the columns that a pattern matches, in the order of the file; '*' stands for any text, '?' for a character."""
-    labels = [label for label in header.labels if label != TIME]
     chosen: set[str] = set()
     for pattern in patterns:
         expression = re.compile(re.escape(pattern).replace(r"\*", ".*").replace(r"\?", "."), re.IGNORECASE | re.DOTALL)
-        found = [label for label in labels if expression.fullmatch(name_of(label)) or expression.fullmatch(label)]
+        found = [
+            one.label for one in header.columns.values() if expression.fullmatch(one.name) or expression.fullmatch(one.label)
+        ]
         if not found:
-            raise ResultsError(f"{header.folder}: no column matches '{pattern}'{_nearest(pattern, labels)}")
+            hint = _nearest(pattern, header.columns.values())
+            raise ResultsError(f"{header.folder}: no column matches '{pattern}'{hint}")
         chosen.update(found)
-    return [label for label in labels if label in chosen]
+    return [label for label in header.columns if label in chosen]
 
 
-def _nearest(pattern: str, labels: Sequence[str]) -> str:
-    kinds = dict.fromkeys(f"{quantity_of(label)}_*" for label in labels if quantity_of(label))
-    nearest = difflib.get_close_matches(pattern.lower(), [*kinds, *map(name_of, labels)], 3, 0.75)
+def _nearest(pattern: str, columns: Collection[Column]) -> str:
+    kinds = dict.fromkeys(f"{column.kind}_*" for column in columns if column.element)
+    nearest = difflib.get_close_matches(pattern.lower(), [*kinds, *(column.name for column in columns)], 3, 0.75)
     choices = nearest or list(kinds)[:8]
     return f"; {'nearest' if nearest else 'there are'}: {', '.join(choices)}" if choices else ""
 

@@ -9,14 +9,15 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from .columns import MOMENT, RESPONSE_COLUMNS, STRESS, Column, read_column_list
 from .results import RPM
 from .trajectory_files import ResultsError, labels_of, read_columns
 
 SPEED = re.compile(r"omega_(?P<body>.+) \[(?P<unit>rad/s|rpm|Hz)\]")
-HALF_RANGE = re.compile(r"half_range_(?P<label>.+) \[(?P<unit>[^]]+)\]")
 FREQUENCY = re.compile(r"frequency_(?P<mode>\d+) \[Hz\]")
 LINE = re.compile(r"(?P<kind>order|line)_(?P<name>.+) \[Hz\]")
-STRESS = "Pa"
+TABLE, ORDERS = "response.csv", "response_orders.csv"
+STATISTICS = ("half_range", "mean", "peak", "limit", "transient_limit", "peak_limit")
 FIXED = 1e-9  # relative range of a frequency that does not change with the speed
 
 
@@ -85,7 +86,7 @@ class Barred:
 class Quantity:
     """A moment, force or reaction over the speed; what the file does not have is None."""
 
-    label: str
+    column: Column
     unit: str
     half_range: np.ndarray  # [points]
     mean: np.ndarray | None
@@ -97,19 +98,22 @@ class Quantity:
     stress: float | None  # per unit of the quantity [Pa]
 
     @property
-    def kind(self) -> str:
-        return self.label.split("_", 1)[0]
+    def label(self) -> str:
+        """Its name, by which response.json has it."""
+        return self.column.name
 
-    @property
-    def element(self) -> str:
-        return self.label.split("_", 1)[-1]
+    def sorted_by(self, rows: np.ndarray) -> "Quantity":
+        """Its points in another order."""
+        return replace(self, **{name: values[rows] for name, values in self._values().items()})
+
+    def _values(self) -> dict[str, np.ndarray]:
+        return {name: getattr(self, name) for name in (*STATISTICS, "orders") if getattr(self, name) is not None}
 
     def in_short(self) -> "Quantity":
         """In kN m or MN m, if the numbers are large."""
         largest = np.nanmax(self.half_range, initial=0.0)
         factor, prefix = next(((f, p) for f, p in ((1e6, "M"), (1e3, "k")) if 1e1 * f <= largest < np.inf), (1.0, ""))
-        names = ("half_range", "mean", "peak", "limit", "transient_limit", "peak_limit", "orders")
-        scaled = {name: getattr(self, name) / factor for name in names if getattr(self, name) is not None}
+        scaled = {name: values / factor for name, values in self._values().items()}
         return replace(self, unit=prefix + self.unit, stress=self.stress and self.stress * factor, **scaled)
 
 
@@ -119,6 +123,7 @@ class Response:
     title: str
     body: str
     speed: np.ndarray  # rising [rpm]
+    columns: list[Column]
     lines: list[Line]
     quantities: list[Quantity]
     criticals: list[Critical]
@@ -148,28 +153,30 @@ def roman(number: int) -> str:
 
 
 def read_response(folder: Path) -> Response:
-    report = _read_report(folder, "response", ("response.csv", "response_orders.csv"), ("body", "critical_speeds"))
-    table, speed, rising = _read_table(folder / "response.csv")
-    file = folder / "response_orders.csv"
-    order_table, order_speed, _ = _read_table(file, rises=False)
-    missing = [label for label in ("order [1]", "frequency [Hz]") if label not in order_table]
-    if missing:
-        raise ResultsError(f"{file}: not the orders of a response: there is no column '{missing[0]}'")
+    report = _read_report(folder, "response", (TABLE, ORDERS), ("body", "critical_speeds"))
+    columns = read_column_list(folder, RESPONSE_COLUMNS)
+    table, speed, rising = _read_table(folder / TABLE)
+    order_table, order_speed, _ = _read_table(folder / ORDERS, rises=False)
+    for file, there in ((TABLE, table), (ORDERS, order_table)):
+        missing = [column.label for column in columns if column.file == file and column.label not in there]
+        if missing:
+            raise ResultsError(f"{folder / file}: there is no column '{missing[0]}', which {RESPONSE_COLUMNS} has")
     count = len(order_table) // len(table)
     if count == 0 or len(order_table) != count * len(table) or (speed != order_speed.reshape(-1, count).T).any():
-        raise ResultsError(f"{file}: its speeds are not those of response.csv; both must be of the same run")
+        raise ResultsError(f"{folder / ORDERS}: its speeds are not those of response.csv; both must be of the same run")
     shape = (len(table), count)
-    orders, frequencies = (order_table[label].to_numpy().reshape(shape) for label in ("order [1]", "frequency [Hz]"))
-    matches = [match for label in table if (match := HALF_RANGE.fullmatch(label))]
-    quantities = [_quantity(table, order_table, match, shape, rising) for match in matches if not _is_stress(match, table)]
+    by_kind = {column.kind: column.label for column in columns if column.file == ORDERS and not column.element}
+    orders, frequencies = (order_table[by_kind[kind]].to_numpy().reshape(shape) for kind in ("order", "frequency"))
+    quantities = [one.sorted_by(rising) for one in _quantities(table, order_table, columns, shape)]
     if not quantities:
-        raise ResultsError(f"{folder / 'response.csv'}: nothing to draw: there is no column 'half_range_...'")
+        raise ResultsError(f"{folder / TABLE}: nothing to draw: there is no half range")
     lines = [_line(*line) for line in zip(orders.T, frequencies.T)]
     return Response(
         folder,
         _title(report, folder),
         report["body"],
         speed[rising],
+        columns,
         lines,
         quantities,
         [_critical(entry) for entry in report["critical_speeds"]],
@@ -232,35 +239,25 @@ def _read_table(file: Path, rises: bool = True) -> tuple[pd.DataFrame, np.ndarra
     return table, speed, np.argsort(speed, kind="stable")
 
 
-def _is_stress(match: re.Match, table: pd.DataFrame) -> bool:
-    """Whether a column is the stress of a moment, which is drawn as its second scale."""
-    moment = match["label"].replace("stress_", "half_range_moment_", 1)
-    return match["unit"] == STRESS and f"{moment} [N m]" in table
-
-
-def _quantity(table: pd.DataFrame, orders: pd.DataFrame, match: re.Match, shape: tuple[int, int], rising: np.ndarray) -> Quantity:
-    column = f"{match['label']} [{match['unit']}]"
-
-    def values(prefix: str) -> np.ndarray | None:
-        return table[f"{prefix}_{column}"].to_numpy()[rising] if f"{prefix}_{column}" in table else None
-
-    half_range = values("half_range")
-    stresses = f"half_range_stress_{match['label'].removeprefix('moment_')} [{STRESS}]"
-    stress = None
-    if stresses in table and match["label"].startswith("moment_") and half_range.max() > 0:
-        stress = table[stresses].max() / half_range.max()
-    return Quantity(
-        match["label"],
-        match["unit"],
-        half_range,
-        values("mean"),
-        values("peak"),
-        values("limit"),
-        values("transient_limit"),
-        values("peak_limit"),
-        orders[column].to_numpy().reshape(shape)[rising] if column in orders else None,
-        stress,
-    )
+def _quantities(table: pd.DataFrame, orders: pd.DataFrame, columns: list[Column], shape: tuple[int, int]) -> list[Quantity]:
+    """Those of a half range; the stress of a moment is a second scale of this."""
+    signals = [column for column in columns if column.file == TABLE and column.statistic == "half_range"]
+    of_orders = {column.name: column.label for column in columns if column.file == ORDERS and not column.statistic}
+    stresses = {(one.element_kind, one.element): one for one in signals if one.rank == STRESS}
+    found = []
+    for signal in signals:
+        moments = [one for one in signals if one.rank == MOMENT and not one.point and one.is_of(signal)]
+        if signal.rank == STRESS and moments:
+            continue
+        labels = {one.statistic: one.label for one in columns if one.file == TABLE and one.name == signal.name}
+        values = {name: table[labels[name]].to_numpy() if name in labels else None for name in STATISTICS}
+        stress = stresses.get((signal.element_kind, signal.element)) if signal in moments else None
+        ratio = None
+        if stress and values["half_range"].max() > 0:
+            ratio = table[stress.label].max() / values["half_range"].max()
+        amplitudes = orders[of_orders[signal.name]].to_numpy().reshape(shape) if signal.name in of_orders else None
+        found.append(Quantity(signal, signal.unit, **values, orders=amplitudes, stress=ratio))
+    return found
 
 
 def _line(orders: np.ndarray, frequencies: np.ndarray) -> Line:

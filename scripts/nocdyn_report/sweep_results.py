@@ -9,6 +9,7 @@ import h5netcdf
 import numpy as np
 import pandas as pd
 
+from .columns import Column, read_column_list
 from .trajectory_files import ResultsError, text_of
 
 DONE, REFUSED, FAILED = 0, 1, 2
@@ -25,6 +26,7 @@ class Variable:
     unit: str
     long_name: str
     values: np.ndarray
+    statistic: str = ""  # of a result
 
     @property
     def label(self) -> str:
@@ -42,7 +44,7 @@ class Variable:
     @property
     def is_minimum(self) -> bool:
         """Of a result: whether it is the smallest value of something."""
-        return re.search(r"_min(_from_[^_]+)?$", self.name) is not None
+        return self.statistic == "min"
 
 
 @dataclass(frozen=True)
@@ -118,7 +120,7 @@ def _read_netcdf(file: Path) -> Sweep:
                 title=text_of(content.attrs.get("title", "")) or file.resolve().parent.name,
                 design=text_of(content.attrs["design"]),
                 varied=_variables(content, "parameter"),
-                results=_variables(content, "result"),
+                results=_with_statistics(_variables(content, "result"), read_column_list(file.parent)),
                 status=status,
             )
     except KeyError as error:
@@ -146,7 +148,7 @@ def _read_table(file: Path) -> Sweep:
     try:
         table = pd.read_csv(file, index_col=False)
         labels = list(table)
-        columns = [_column(table, label) for label in labels[labels.index("variant") + 1 : labels.index("status")]]
+        variables = [_variable(table, label) for label in labels[labels.index("variant") + 1 : labels.index("status")]]
         status = np.array([STATUS_WORDS[word] for word in table["status"]], dtype=int)
     except KeyError as error:
         raise ResultsError(
@@ -155,17 +157,23 @@ def _read_table(file: Path) -> Sweep:
     except (ValueError, OSError) as error:  # pandas' own parser errors are ValueErrors
         raise ResultsError(f"{file}: not the table of a sweep: {' '.join(str(error).split())}") from None
     machine = _read_input(file.with_name("input.nml"))
-    varied = [column for column in columns if column.name.split(".")[0] in machine]  # paths begin with a group of the input
+    columns = read_column_list(file.parent)
+    results = {column.label for column in columns}
     return Sweep(
         title=machine.get("case", {}).get("title") or file.resolve().parent.name,
         design=machine["sweep"]["design"],
-        varied=varied,
-        results=columns[len(varied) :],
+        varied=[variable for variable in variables if variable.label not in results],
+        results=_with_statistics([variable for variable in variables if variable.label in results], columns),
         status=status,
     )
 
 
-def _column(table: pd.DataFrame, label: str) -> Variable:
+def _with_statistics(results: list[Variable], columns: list[Column]) -> list[Variable]:
+    known = {column.label: column.statistic for column in columns}
+    return [replace(result, statistic=known.get(result.label, "")) for result in results]
+
+
+def _variable(table: pd.DataFrame, label: str) -> Variable:
     match = LABEL.fullmatch(label)
     return Variable(match["name"], match["unit"] or "", match["name"], table[label].to_numpy(dtype=float))
 

@@ -76,6 +76,10 @@ class Program:
     def summary(self, folder):
         return json.loads((self.folder / folder / "summary.json").read_text())
 
+    def columns(self, folder, name="columns.json"):
+        """What the columns of a table of results are."""
+        return json.loads((self.folder / folder / name).read_text())["columns"]
+
 
 def wait_for(condition, seconds=30):
     end = time.monotonic() + seconds

@@ -2,6 +2,7 @@
 
 import importlib
 import importlib.util
+import json
 import os
 import subprocess
 import sys
@@ -25,6 +26,41 @@ def run_input(folder: Path, text: str, *options: str) -> Path:
     file.write_text(text, encoding="utf-8")
     subprocess.run([NOCDYN, "run", "--quiet", "--out", folder / "results", *options, file], capture_output=True)
     return folder / "results"
+
+
+# Of the kinds of columns in results that tests write: caption and rank. Names begin with one of them.
+KINDS = {
+    "t": ("time", 11),
+    "phi": ("angle", 11),
+    "omega": ("speed", 7),
+    "twist": ("twist", 9),
+    "moment": ("elastic moment", 1),
+    "total_moment": ("elastic and damping moment", 1),
+    "damping": ("moment of damping and friction", 11),
+    "force": ("tooth force", 3),
+    "stress": ("shear stress", 4),
+    "reaction": ("reaction", 2),
+    "order": ("oscillations per turn of the body", 11),
+    "frequency": ("frequency", 11),
+    "drive": ("factor of the drive", 11),
+}
+ELEMENT_KINDS = {"phi": "body", "omega": "body", "force": "mesh", "reaction": "gear"}
+
+
+def column(label: str, statistic: str = "", file: str = "trajectory.csv") -> dict:
+    """An entry of columns.json for a label such as 'half_range_moment_shaft [N m]'."""
+    name, unit = label.removesuffix("]").split(" [")
+    name = name.removeprefix(f"{statistic}_")
+    kind = next(kind for kind in KINDS if name == kind or name.startswith(f"{kind}_"))
+    caption, rank = KINDS[kind]
+    entry = {"label": label, "file": file, "name": name, "kind": kind} | ({"statistic": statistic} if statistic else {})
+    entry |= {"element_kind": ELEMENT_KINDS.get(kind, "coupling" if name != kind else "")}
+    entry |= {"element": name.removeprefix(kind).removeprefix("_"), "point": "", "unit": unit}
+    return entry | {"caption": caption, "positive": "", "rank": rank}
+
+
+def write_columns(folder: Path, columns: list[dict], name: str = "columns.json") -> None:
+    (folder / name).write_text(json.dumps({"columns": columns}), encoding="utf-8")
 
 
 def call(monkeypatch, module: str, *arguments: object) -> None:

@@ -283,13 +283,13 @@ def reciprocating_compressor(with_damage=True):
         "phi_rotor [rad]": y[0],
         "omega_rotor [rad/s]": y[n],
         "omega_throw_4 [rad/s]": y[2 * n - 1],
-        "shaft_rubber [N m]": train.moment("rubber", y[:n], y[n : 2 * n]),
-        "shaft_crank_2 [N m]": train.moment("crank_2", y[:n], y[n : 2 * n]),
+        "total_moment_rubber [N m]": train.moment("rubber", y[:n], y[n : 2 * n]),
+        "total_moment_crank_2 [N m]": train.moment("crank_2", y[:n], y[n : 2 * n]),
         "torque_mains [N m]": electric(m.end(), y),
         "max torque_mains [N m]": motion.largest(electric),
-        "min shaft_rubber [N m]": motion.largest(moment("rubber"), sign=-1),
-        "max shaft_rubber [N m]": motion.largest(moment("rubber")),
-        "min shaft_crank_2 [N m]": motion.largest(moment("crank_2"), sign=-1),
+        "min total_moment_rubber [N m]": motion.largest(moment("rubber"), sign=-1),
+        "max total_moment_rubber [N m]": motion.largest(moment("rubber")),
+        "min total_moment_crank_2 [N m]": motion.largest(moment("crank_2"), sign=-1),
     }
     return result | (damages_of_couplings(m, train, motion, 1e-5) if with_damage else {})
 
@@ -379,12 +379,12 @@ def generator_set(with_damage=True):
         "omega_cylinder_1 [rad/s]": y[n + 2],
         "omega_rotor [rad/s]": y[n + rotor],
         "omega_exciter [rad/s]": y[2 * n - 1],
-        "shaft_rubber [N m]": train.moment("rubber", y[:n], y[n : 2 * n]),
+        "total_moment_rubber [N m]": train.moment("rubber", y[:n], y[n : 2 * n]),
         "torque_fuel [N m]": fuel["torque"] * min(max(throttle(y), 0), 1),
-        "min shaft_rubber [N m]": largest("rubber", -1),
-        "max shaft_rubber [N m]": largest("rubber", 1),
-        "min shaft_tail [N m]": largest("tail", -1),
-        "min shaft_crank_6 [N m]": largest("crank_6", -1),
+        "min total_moment_rubber [N m]": largest("rubber", -1),
+        "max total_moment_rubber [N m]": largest("rubber", 1),
+        "min total_moment_tail [N m]": largest("tail", -1),
+        "min total_moment_crank_6 [N m]": largest("crank_6", -1),
         f"min torque_{case} [N m]": motion.largest(lambda t, y, mode: fault_torque(t - fault["time"]), sign=-1, since=m.since()),
     }
     return result | (damages_of_couplings(m, train, motion, 1e-5) if with_damage else {})
@@ -599,7 +599,7 @@ def generator_response(m, order, speed):
     flywheel, fuel = train.index("flywheel")[0], m.motor["fuel"]
     matrix[flywheel, flywheel] += 1j * frequency * m.load["friction"]["viscous"] + speed_control(fuel, fuel["torque"], frequency)
     angle = np.linalg.solve(matrix, force)
-    return {f"moment_{name}": abs(stiffness(group) * (train.row[name] @ angle)) for name, group in m.coupling.items()}
+    return {f"total_moment_{name}": abs(stiffness(group) * (train.row[name] @ angle)) for name, group in m.coupling.items()}
 
 
 def compressor_response(m, order, speed):
@@ -628,7 +628,7 @@ def compressor_response(m, order, speed):
     brake, scale = train.index(bearing["body"])[0], bearing["constant_speed"]
     matrix[brake, brake] += 1j * frequency * bearing["constant"] / scale / np.cosh(speed / scale) ** 2
     angle = np.linalg.solve(matrix, force)
-    return {f"moment_{name}": abs(stiffness(group) * (train.row[name] @ angle)) for name, group in m.coupling.items()}
+    return {f"total_moment_{name}": abs(stiffness(group) * (train.row[name] @ angle)) for name, group in m.coupling.items()}
 
 
 def propeller_response(m, order, speed):
@@ -643,7 +643,7 @@ def propeller_response(m, order, speed):
     result = {}
     for i, (name, shaft) in enumerate(zip(("intermediate", "tail"), propeller_shafts(m, 1))):
         ends = abs(shaft.exact(frequency) @ angle[i : i + 2])
-        result |= {f"moment_{name}_1": ends[0], f"moment_{name}_2": ends[1]}
+        result |= {f"total_moment_{name}_1": ends[0], f"total_moment_{name}_2": ends[1]}
     return result
 
 

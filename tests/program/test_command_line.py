@@ -172,7 +172,7 @@ def test_new_writes_an_input_that_runs(nocdyn):
     assert (outcome.returncode, outcome.stderr) == (0, "")
     assert "nocdyn run mine.nml" in outcome.stdout
     assert nocdyn("run", "mine.nml", "-q").returncode == 0
-    assert nocdyn.files("results/mine") == ["input.nml", "summary.json", "trajectory.csv"]
+    assert nocdyn.files("results/mine") == ["columns.json", "input.nml", "summary.json", "trajectory.csv"]
 
 
 def test_new_explains_every_key(nocdyn):
@@ -222,7 +222,7 @@ def test_a_file_whose_name_looks_like_an_option_comes_after_two_dashes(nocdyn, s
 def test_an_input_may_come_through_a_pipe(nocdyn):
     outcome = nocdyn("run", "/dev/stdin", input=CASE_2.read_text())
     assert (outcome.returncode, outcome.stderr) == (0, "")
-    assert nocdyn.files("results/stdin") == ["input.nml", "summary.json", "trajectory.csv"]
+    assert nocdyn.files("results/stdin") == ["columns.json", "input.nml", "summary.json", "trajectory.csv"]
 
 
 def test_a_chain_of_ten_thousand_bodies_is_checked(nocdyn):

@@ -89,13 +89,13 @@ def test_response_is_the_settled_transient(nocdyn, path):
     outcome = nocdyn("run", nocdyn.write("run.nml", text), "--out", "run", "-q")
     assert outcome.returncode == 0, outcome.stderr
     motion = {label: values[-50 * turns :] for label, values in columns(nocdyn, "run", "trajectory.csv").items()}
-    quantities = [label for label in response if label.startswith(("moment_", "reaction_")) and f"phase_{label}" in response]
+    kinds = ("moment_", "total_moment_", "reaction_")
+    quantities = [label for label in response if label.startswith(kinds) and f"phase_{label}" in response]
     assert quantities
     found, settled = [], []
     for label in quantities:
-        column = label.replace("moment_", "shaft_") if label.replace("moment_", "shaft_") in motion else label
         found.append([response[label][i] * cmath.exp(1j * radians(response[f"phase_{label}"][i])) for i in lines])
-        settled.append(settled_amplitudes(motion["t"], motion[column], frequencies))
+        settled.append(settled_amplitudes(motion["t"], motion[label], frequencies))
     found, settled = np.array(found), np.array(settled)
     for k in range(len(lines)):
         largest = np.argmax(abs(settled[:, k]))

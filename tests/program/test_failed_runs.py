@@ -8,8 +8,8 @@ import time
 import pytest
 from conftest import CASE_1, CASE_2, ENDLESS, TRAPS_EXCEPTIONS, wait_for
 
-RESULTS = ["input.nml", "summary.json", "trajectory.csv"]
-PARTIAL = ["input.nml", "summary.json", "trajectory.partial.csv"]
+RESULTS = ["columns.json", "input.nml", "summary.json", "trajectory.csv"]
+PARTIAL = ["columns.json", "input.nml", "summary.json", "trajectory.partial.csv"]
 
 # The cubic part wins beyond 0.32 rad, and the disc has the speed to get there.
 EXPLODING = """\
@@ -194,11 +194,11 @@ def test_a_full_disk_is_exit_code_3_and_leaves_nothing(nocdyn, size):
     assert nocdyn.files("out") == []
 
 
-def test_a_disk_with_no_room_for_the_summary_leaves_nothing(nocdyn, spinner):
-    # more than trajectory and input need, less than the summary does
+def test_a_disk_with_no_room_for_the_columns_leaves_nothing(nocdyn, spinner):
+    # more than trajectory and input need, less than columns.json does
     outcome = nocdyn("run", spinner, "--out", "out", "--set", "output.points=2", preexec_fn=limited_to(1200))
     assert (outcome.returncode, outcome.stdout) == (3, "")
-    assert outcome.stderr == "nocdyn: cannot write 'out/summary.json': File too large\n"
+    assert outcome.stderr == "nocdyn: cannot write 'out/columns.json': File too large\n"
     assert nocdyn.files("out") == []
 
 

@@ -157,10 +157,10 @@ def test_without_the_group_there_is_no_file(nocdyn):
 
 def test_cycles_of_a_run_that_fails_are_named_partial(nocdyn):
     nocdyn.write("machine.nml", RELEASED.format(t_end=PERIOD) + f"&fatigue name='life' coupling='c' {CURVE} /\n")
-    whole = ["cycles.csv", "input.nml", "summary.json", "trajectory.csv"]
+    whole = ["columns.json", "cycles.csv", "input.nml", "summary.json", "trajectory.csv"]
     for steps, code, files in (
         (100, 0, whole),
-        (2, 1, ["cycles.partial.csv", "input.nml", "summary.json", "trajectory.partial.csv"]),
+        (2, 1, ["columns.json", "cycles.partial.csv", "input.nml", "summary.json", "trajectory.partial.csv"]),
     ) * 2:
         assert nocdyn("run", "machine.nml", "--set", f"run.max_steps={steps}").returncode == code
         assert nocdyn.files("results/machine") == files

@@ -121,7 +121,10 @@ def test_joints_of_all_kinds_share_one_name_space(nocdyn):
 def test_two_columns_of_one_name_are_refused(nocdyn):
     planetary = "&planetary name = 'p' sun = 'a' ring = 'b' carrier = 'c' teeth = 20, 70 /\n"
     message = refusal(nocdyn, "check", planetary + "&gear name = 'p_ring' bodies = 'a', 'b' teeth = 1, 2 /\n" + THREE)
-    assert message.startswith("nocdyn: pair.nml:1: &planetary 'p': its column reaction_p_ring would have the name of that of ")
+    assert message == (
+        "nocdyn: pair.nml:2: &gear 'p_ring': its column 'reaction_p_ring [N m]' would have the label of one of "
+        "&planetary 'p'; allowed: another name\n"
+    )
 
 
 @pytest.mark.parametrize("command", ["run", "check"])

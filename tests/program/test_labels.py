@@ -51,10 +51,10 @@ def test_a_label_of_two_columns_is_refused_by_every_command(nocdyn, command):
     text = BODIES + ELEMENTS["shaft"].format("s") + "\n" + ELEMENTS["coupling"].format("s_1") + "\n"
     text = text.replace("bearing_friction = 1e-3", "")
     text += "&sweep design = 'grid' /\n&vary target = 'body.a.inertia' low = 1 high = 2 count = 2 /\n"
-    nocdyn.write("m.nml", text + "&record quantity = 'moment_s_1' statistic = 'final' /\n")
+    nocdyn.write("m.nml", text + "&record quantity = 'total_moment_s_1' statistic = 'final' /\n")
     outcome = nocdyn(command, "m.nml", "--out", "out") if command != "matrices" else nocdyn(command, "m.nml")
     assert outcome.returncode == 2
     assert outcome.stderr == (
-        "nocdyn: m.nml:11: &coupling 's_1': its column 'moment_s_1 [N m]' would have the label of one of &shaft 's'; "
+        "nocdyn: m.nml:11: &coupling 's_1': its column 'total_moment_s_1 [N m]' would have the label of one of &shaft 's'; "
         "allowed: another name\n"
     )

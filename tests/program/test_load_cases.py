@@ -89,8 +89,8 @@ def test_peaks_are_the_largest_values_of_all_cases(nocdyn):
     assert "torque_fault [N m]" in found
     lines = outcome.stdout.splitlines()
     assert lines[0].startswith("m.nml: load case 'start': done at t = 0.5 s, ")
-    peak = next(peak for peak in result["peaks"] if peak["column"] == "shaft_shaft")
-    line = next(line for line in lines if line.startswith("shaft_shaft [N m]"))
+    peak = next(peak for peak in result["peaks"] if peak["column"] == "total_moment_shaft")
+    line = next(line for line in lines if line.startswith("total_moment_shaft [N m]"))
     assert line.split()[-1] == peak["load_case"] and float(line.split()[3]) == pytest.approx(peak["largest"], rel=1e-6)
     with open(nocdyn.folder / "out/cases.csv", newline="") as file:
         table = list(csv.DictReader(file))
@@ -373,7 +373,7 @@ def test_limits_that_a_case_exceeds_are_told_with_its_name(nocdyn):
     nocdyn.write("m.nml", MACHINE + FAULT + RUN + limit + CASES)
     lines = [line for line in nocdyn("run", "m.nml", "--out", "out").stdout.splitlines() if "limit exceeded" in line]
     assert len(lines) == 1
-    assert lines[0].startswith("m.nml: load case 'fault': limit exceeded: shaft_shaft [N m] has reached ")
+    assert lines[0].startswith("m.nml: load case 'fault': limit exceeded: total_moment_shaft [N m] has reached ")
 
 
 @pytest.mark.parametrize("mistake", ["coupling.k.stifness=3", "output.extremes_from=5"])

@@ -3,7 +3,7 @@
 import pytest
 from conftest import CASE_1, CASE_2, SPINNER
 
-RESULTS = ["input.nml", "summary.json", "trajectory.csv"]
+RESULTS = ["columns.json", "input.nml", "summary.json", "trajectory.csv"]
 BAD = SPINNER.replace("inertia", "inertai")
 EXPLODING = """\
 &body name = 'disc' inertia = 1.0 speed = 1.0 /

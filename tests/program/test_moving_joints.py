@@ -623,12 +623,12 @@ def test_analyses_about_a_steady_state_refuse_what_has_no_mean_ratio(nocdyn, com
 
 
 def without_notes(nocdyn, folder, name):
-    """A file of results but for its notes, and for the reaction of a gear as the torque on its second wheel."""
+    """Results but for notes and what columns are, and for the reaction of a gear as the torque on its second wheel."""
     text = (nocdyn.folder / folder / name).read_text()
     if not name.endswith(".json"):
         return text
     results = json.loads(text)
-    del results["notes"]
+    del results["notes"], results["columns"]
     for state in results["steady_states"]:
         if "reaction_j [N m]" in state["values"]:
             state["values"]["torque_j [N m]"] = -state["values"].pop("reaction_j [N m]")
@@ -678,7 +678,7 @@ def test_the_response_of_a_compressor_is_that_of_its_settled_motion(nocdyn):
     outcome = nocdyn("response", nocdyn.write("machine.nml", text + asked), "--out", "response")
     assert outcome.returncode == 0, outcome.stderr
     header, rows = nocdyn.table("response", "response.csv")
-    half = next(i for i, name in enumerate(header) if name.startswith("half_range_moment_shaft"))
+    half = next(i for i, name in enumerate(header) if name.startswith("half_range_total_moment_shaft"))
     assert rows[1][half] == pytest.approx(np.ptp(moment) / 2, rel=1e-2)
 
 
@@ -727,7 +727,7 @@ def test_a_lock_against_a_drive_ends_the_run_with_both_names(nocdyn, drive, join
     outcome = nocdyn("run", nocdyn.write("machine.nml", text), "--out", "out")
     assert outcome.returncode == 1
     assert f"t = {time} s: {names}, or does not differ" in outcome.stderr
-    assert nocdyn.files("out") == ["input.nml", "summary.json", "trajectory.partial.csv"]
+    assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", "trajectory.partial.csv"]
 
 
 @pytest.mark.parametrize("efficiency", ["", "efficiency = 0.9"])

@@ -14,7 +14,7 @@ from sweep_inputs import SWEEP, TWO_DISCS, needs_sweeps
 pytestmark = needs_sweeps
 
 NETCDF = ("--set", "output.format=netcdf")
-RESULTS = ["input.nml", "summary.json", "trajectory.nc"]
+RESULTS = ["columns.json", "input.nml", "summary.json", "trajectory.nc"]
 
 
 def open_results(nocdyn, path="out/trajectory.nc"):
@@ -85,7 +85,7 @@ def test_a_run_that_fails_leaves_its_rows(nocdyn):
     outcome = nocdyn("run", CASE_2, "--out", "out", *NETCDF, "--set", "run.max_steps=100")
     assert (outcome.returncode, outcome.stdout) == (1, "")
     assert outcome.stderr.endswith("; the rows up to t = 1.24 s are in out/trajectory.partial.nc\n")
-    assert nocdyn.files("out") == ["input.nml", "summary.json", "trajectory.partial.nc"]
+    assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", "trajectory.partial.nc"]
     assert list(open_results(nocdyn, "out/trajectory.partial.nc")["t"].values) == [i * 0.01 for i in range(125)]
 
 
@@ -95,7 +95,7 @@ def test_an_interrupted_run_leaves_its_rows(nocdyn):
     process.send_signal(signal.SIGINT)
     _, complaint = process.communicate(timeout=30)
     assert process.returncode == 1 and "out/trajectory.partial.nc" in complaint
-    assert nocdyn.files("out") == ["input.nml", "summary.json", "trajectory.partial.nc"]
+    assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", "trajectory.partial.nc"]
     assert nocdyn.summary("out")["counts"]["rows"] == open_results(nocdyn, "out/trajectory.partial.nc").sizes["t"]
 
 
@@ -110,7 +110,7 @@ def test_no_trajectory_of_an_earlier_run_stays(nocdyn):
     ]
     for words, name in runs:
         nocdyn("run", CASE_2, "--out", "out", "-q", *words)
-        assert nocdyn.files("out") == ["input.nml", "summary.json", name]
+        assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", name]
 
 
 @pytest.mark.parametrize("size", [0, 50_000, 150_000])
@@ -138,7 +138,7 @@ def test_files_of_both_formats_and_wrong_ones_are_each_treated_once(nocdyn):
     assert outcome.returncode == 2
     assert outcome.stderr == "nocdyn: bad.nml:1: &body 'a': inertia = -1.0 is out of range; allowed: >= 0 [kg m2]\n"
     assert [line.split(":")[0] for line in outcome.stdout.splitlines()] == [str(CASE_2), "netcdf.nml"]
-    assert nocdyn.files("out/case2") == ["input.nml", "summary.json", "trajectory.csv"]
+    assert nocdyn.files("out/case2") == ["columns.json", "input.nml", "summary.json", "trajectory.csv"]
     assert nocdyn.files("out/netcdf") == RESULTS
 
 
@@ -184,4 +184,4 @@ def test_trajectories_of_a_sweep_have_the_format_too(nocdyn):
     assert nocdyn.files("out/variant-2") == RESULTS
     assert open_results(nocdyn, "out/variant-2/trajectory.nc").sizes["t"] == 11
     assert nocdyn("sweep", "discs.nml", "--out", "out").returncode == 0
-    assert nocdyn.files("out/variant-2") == ["input.nml", "summary.json", "trajectory.csv"]
+    assert nocdyn.files("out/variant-2") == ["columns.json", "input.nml", "summary.json", "trajectory.csv"]

@@ -87,7 +87,7 @@ def test_a_row_that_is_not_finite_fails_the_run(nocdyn):
     outcome = nocdyn("run", "stored.nml", "--out", "out")
     assert (outcome.returncode, outcome.stdout) == (1, "")
     assert outcome.stderr.startswith("nocdyn: stored.nml: elastic_energy [J] is not a finite number at t = 0 s")
-    assert nocdyn.files("out") == ["input.nml", "summary.json", "trajectory.partial.csv"]
+    assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", "trajectory.partial.csv"]
     assert nocdyn.summary("out")["status"] == "failed"
     assert nocdyn.table("out", "trajectory.partial.csv")[1] == []
 
@@ -152,7 +152,7 @@ def test_a_trajectory_with_too_many_rows_does_not_end_a_sweep(nocdyn):
     nocdyn.write("variants.csv", "run.t_end\n1\n1e7\n")
     outcome = nocdyn("sweep", "m.nml", "--out", "out", "-q")
     assert (nocdyn.folder / "out/sweep.nc").exists(), outcome.stderr
-    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc", "variant-1"]
+    assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", "sweep.nc", "variant-1"]
 
 
 @needs_sweeps

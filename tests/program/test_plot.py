@@ -10,9 +10,9 @@ import h5netcdf
 import numpy as np
 import pandas as pd
 import pytest
-from figure_files import SCRIPTS, assert_figures, call, chain, refusal, run_input
+from figure_files import SCRIPTS, assert_figures, call, chain, column, refusal, run_input, write_columns
 from nocdyn_report import multiples, run_figures, style
-from nocdyn_report.results import Column, read_results
+from nocdyn_report.results import Series, read_results
 from nocdyn_report.thinning import thin, thin_curve
 
 pytestmark = pytest.mark.filterwarnings("error::UserWarning")  # as Matplotlib's of a layout that does not fit
@@ -27,6 +27,7 @@ def write_results(folder, columns, input_text="&case title = 'By hand' /\n"):
     folder.mkdir()
     pd.DataFrame(columns).to_csv(folder / "trajectory.csv", index=False)
     (folder / "input.nml").write_text(input_text, encoding="utf-8")
+    write_columns(folder, [column(label) for label in columns])
     return folder
 
 
@@ -53,7 +54,7 @@ def turning(folder, speed="rad/s", angle="rad", rows=11):
             f"twist_mount [{angle}]": -t,
             "moment_shaft [N m]": t,
             "damping_shaft [N m]": t**2,
-            "shaft_shaft [N m]": t + t**2,
+            "total_moment_shaft [N m]": t + t**2,
         },
         TURNING,
     )
@@ -86,7 +87,7 @@ def test_partial_trajectory_of_many_bodies_is_drawn_and_called_partial(tmp_path,
     results = run_input(tmp_path, chain(10, "t_end = 1000.0"), "--set", "run.max_steps=200", "--set", "output.points=10001")
     assert (results / "trajectory.partial.csv").is_file()
     call(monkeypatch, "run_figures", results, "--format", "svg")
-    names = ("omega", "twist", "phase_planes", "torques", "moment", "damping", "shaft", "energy")
+    names = ("omega", "twist", "phase_planes", "torques", "total_moment", "energy")
     assert_figures(results / "figures", *names, formats=("svg",))
     assert "the trajectory is partial: failed, ends at t = " in capsys.readouterr().err
     assert all("failed, ends at t = " in text_of(results / "figures", name) for name in names)
@@ -118,7 +119,31 @@ def test_throttle_and_current_are_drawn(tmp_path, monkeypatch):
     )
     call(monkeypatch, "run_figures", results, "--columns", "*_drive", "--format", "svg")
     text = (results / "figures" / "columns.svg").read_text(encoding="utf-8")
-    assert "throttle [1]" in text and "current [A]" in text
+    assert "throttle opening [1]" in text and "armature current [A]" in text
+
+
+def test_a_tooth_force_is_called_a_tooth_force_and_shares_no_axis_with_a_moment(tmp_path, monkeypatch):
+    results = run_input(
+        tmp_path,
+        """
+&body name = 'motor' inertia = 1.0 /
+&body name = 'pinion' inertia = 0.1 /
+&body name = 'wheel' inertia = 2.0 /
+&coupling name = 'line' bodies = 'motor', 'pinion' stiffness = 1e3 damping = 1.0 /
+&mesh name = 'teeth' bodies = 'pinion', 'wheel' radii = 0.1, 0.2 stiffness = 1e8 damping = 1e3 /
+&motor name = 'drive' body = 'motor' kind = 'constant' torque = 10.0 /
+&run t_end = 0.1 /
+""",
+    )
+    read = read_results(results)
+    figure = run_figures.draw_over_time(read, "torques", run_figures.default_labels(read.header)["torques"])["torques"]
+    panels = {axes.get_ylabel(): [text.get_text() for text in axes.get_legend().get_texts()] for axes in figure.axes}
+    assert panels == {
+        "elastic and damping moment [N m]": ["line"],
+        "tooth force [N]": ["teeth"],
+        "torque on the body [N m]": ["drive"],
+    }
+    style.pyplot.close("all")
 
 
 def test_speeds_are_drawn_in_rpm_if_asked_for(tmp_path, monkeypatch):
@@ -127,8 +152,8 @@ def test_speeds_are_drawn_in_rpm_if_asked_for(tmp_path, monkeypatch):
     assert "speed [rpm]" in text_of(results / "figures", "columns")
     rpm = read_results(results, rpm=True)
     assert rpm.speed("motor").values == pytest.approx(10.0 * 30.0 / np.pi) and rpm.speed("motor").unit == "rpm"
-    assert rpm.twist_rate("shaft").values == pytest.approx(10.0 * 30.0 / np.pi)
-    assert rpm.twist_rate("mount").values == pytest.approx(-20.0 * 30.0 / np.pi)
+    assert rpm.twist_rate(rpm.header.columns["twist_shaft [rad]"]).values == pytest.approx(10.0 * 30.0 / np.pi)
+    assert rpm.twist_rate(rpm.header.columns["twist_mount [rad]"]).values == pytest.approx(-20.0 * 30.0 / np.pi)
 
 
 def test_speeds_in_hertz_become_rpm_too(tmp_path):
@@ -152,7 +177,7 @@ def test_units_of_the_file_are_those_of_the_axes(options, tmp_path, monkeypatch)
     motion, planes, torques = (text_of(results / "figures", name) for name in ("motion", "phase_planes", "torques"))
     assert "speed [rpm]" in motion and "twist [deg]" in motion and "rad" not in motion
     assert "angle φ [deg]" in planes and "speed ω [rpm]" in planes and "rate of twist Δω [rpm]" in planes
-    assert "shaft moment" in torques and "damping moment" in torques
+    assert "elastic and damping" in torques and "friction" not in torques
     assert read_results(results, rpm=True).speed("fan").values == pytest.approx(20.0)
 
 
@@ -183,7 +208,8 @@ def as_netcdf(results):
 
 def test_a_trajectory_in_netcdf_is_drawn_too(tmp_path, monkeypatch):
     results = turning(tmp_path / "größe")
-    (results / "trajectory.csv").write_text((results / "trajectory.csv").read_text().replace("fan", "Lüfter"))
+    for name in ("trajectory.csv", "columns.json"):
+        (results / name).write_text((results / name).read_text().replace("fan", "Lüfter"))
     tables = [read_results(results).table, read_results(as_netcdf(results)).table]
     assert (tables[0] == tables[1][list(tables[0])]).all(axis=None)
     assert list(read_results(results, lambda header: header.of("twist")[:1]).table) == ["t [s]", "twist_shaft [rad]"]
@@ -201,16 +227,16 @@ def test_only_the_columns_that_are_drawn_are_read(tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--columns", "omega_*", "momnt_shaft"], "no column matches 'momnt_shaft'; nearest: moment_shaft"),
+        (["--columns", "omega_*", "momnt_shaft"], "no column matches 'momnt_shaft'; nearest: moment_shaft, total_mo"),
         (["--columns", "[omega]_*"], "no column matches '[omega]_*'; nearest: omega_*"),
-        (["--columns", "zzz"], "no column matches 'zzz'; there are: phi_*, omega_*, twist_*, moment_*, damping_*, shaft_*"),
+        (["--columns", "zzz"], "no column matches 'zzz'; there are: phi_*, omega_*, twist_*, moment_*, dam"),
         (["--from", "1.5"], "nothing to draw: 0 row(s) in the chosen time; the trajectory goes from 0 to 1 s"),
         (["--from", "0.45", "--to", "0.55"], "nothing to draw: 1 row(s) in the chosen time; the trajectory goes from 0 to 1 s"),
     ],
 )
 def test_choices_of_nothing_are_refused(options, message, tmp_path, monkeypatch):
     results = turning(tmp_path / "results")
-    assert refusal(monkeypatch, "run_figures", results, *options) == f"scripts/plot: {results}: {message}"
+    assert refusal(monkeypatch, "run_figures", results, *options).startswith(f"scripts/plot: {results}: {message}")
     assert not (results / "figures").exists()
 
 
@@ -247,7 +273,7 @@ def test_more_than_eight_series_have_small_panels(tmp_path, monkeypatch):
         call(monkeypatch, "run_figures", results, "--columns", "*", "--format", "svg")
         assert_figures(results / "figures", name, formats=("svg",))
     text = text_of(results / "figures", "moment")
-    assert all(f">s{i}<" in text for i in range(1, 10)) and "elastic moment on the first body [N m]" in text
+    assert all(f">s{i}<" in text for i in range(1, 10)) and "elastic moment [N m]" in text
     figure = run_figures.draw_over_time(read_results(results), "x", [f"moment_s{i} [N m]" for i in range(1, 10)])["moment"]
     panels = [axes for axes in figure.axes if axes.get_visible()]
     assert len(panels) == 9 and all(len(axes.lines) == 1 for axes in panels)
@@ -256,7 +282,7 @@ def test_more_than_eight_series_have_small_panels(tmp_path, monkeypatch):
 
 def test_series_of_like_ranges_share_a_scale():
     t = np.linspace(0.0, 1.0, 20)
-    columns = [Column("moment", f"s{i}", "N m", (5 + i) * t) for i in range(9)]
+    columns = [Series(f"s{i}", "N m", (5 + i) * t) for i in range(9)]
     figure = multiples.draw_multiples(t, columns, "moment")
     assert len({axes.get_ylim() for axes in figure.axes}) == 1
     style.pyplot.close(figure)
@@ -302,7 +328,7 @@ def test_a_curve_keeps_its_ends_and_every_pixel_that_it_crosses():
 
 def test_a_picture_of_a_hundred_thousand_rows_takes_less_than_three_seconds(tmp_path):
     t = np.linspace(0.0, 100.0, 100_000)
-    columns = [Column("moment", f"s{i}", "N m", np.sin((100.0 + i) * t)) for i in range(multiples.MOST_PANELS)]
+    columns = [Series(f"s{i}", "N m", np.sin((100.0 + i) * t)) for i in range(multiples.MOST_PANELS)]
     begin = time.process_time()
     style.save(multiples.draw_multiples(t, columns, "moment"), tmp_path, "moment", ["png"])
     assert time.process_time() - begin < 3.0
@@ -315,18 +341,27 @@ def test_powers_of_ten_stand_above_the_axis(tmp_path):
     assert ">\N{MULTIPLICATION SIGN}10⁶<" in text_of(tmp_path, "powers")
 
 
+PHI_A = json.dumps({"columns": [column("t [s]"), column("phi_a [rad]")]})
+
+
 @pytest.mark.parametrize(
     ("files", "message"),
     [
         (None, "there is no such results folder"),
         ({}, "no trajectory.csv here"),
         ({"trajectory.csv": ""}, "not a table of numbers"),
-        ({"trajectory.csv": "t [s],phi_a [rad]\n0,one\n"}, "not a table of numbers"),
+        ({"trajectory.csv": "t [s],phi_a [rad]\n0,one\n", "columns.json": PHI_A}, "not a table of numbers"),
         ({"trajectory.csv": "a,b\n0,1\n2,3\n"}, "there is no column 't [s]'"),
-        ({"trajectory.csv": "t [s],phi_a [rad]\n0,1\n"}, "nothing to draw: the trajectory has 1 row(s)"),
-        ({"trajectory.partial.csv": "t [s],phi_a [rad]\n"}, "nothing to draw: the trajectory has 0 row(s)"),
-        ({"trajectory.csv": "t [s],phi_a [rad]\n0,1\n1,1\n"}, "input.nml: missing"),
-        ({"trajectory.csv": "t [s]\n0\n1\n", "input.nml": ""}, "nothing to draw: the trajectory has the time only"),
+        ({"trajectory.csv": "t [s],phi_a [rad]\n0,1\n"}, "no columns.json here, as results of older releases have none; compute"),
+        ({"trajectory.csv": "t [s],phi_a [rad]\n0,1\n", "columns.json": "{}"}, "columns.json: cannot be read"),
+        ({"trajectory.csv": "t [s],phi_b [rad]\n0,1\n", "columns.json": PHI_A}, "columns.json: has no column 'phi_b [rad]'"),
+        ({"trajectory.csv": "t [s],phi_a [rad]\n0,1\n", "columns.json": PHI_A}, "nothing to draw: the trajectory has 1 row"),
+        ({"trajectory.partial.csv": "t [s],phi_a [rad]\n", "columns.json": PHI_A}, "nothing to draw: the trajectory has 0 row"),
+        ({"trajectory.csv": "t [s],phi_a [rad]\n0,1\n1,1\n", "columns.json": PHI_A}, "input.nml: missing"),
+        (
+            {"trajectory.csv": "t [s]\n0\n1\n", "columns.json": PHI_A, "input.nml": ""},
+            "nothing to draw: the trajectory has the time only",
+        ),
     ],
 )
 def test_unusable_results_are_one_clear_line(files, message, tmp_path, monkeypatch):

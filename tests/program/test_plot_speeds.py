@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from figure_files import NOCDYN, SCRIPTS, assert_figures, call, refusal
+from figure_files import NOCDYN, SCRIPTS, assert_figures, call, column, refusal, write_columns
 from nocdyn_report import campbell_figures, mode_figures, response_figures, speed_panels, style
 from nocdyn_report.speed_results import Operation, read_campbell, read_response, roman
 from nocdyn_report.train_layout import GROUND, lay_out
@@ -74,6 +74,13 @@ def response(folder, elements=1, unit="rpm", **changes):
     table["peak_limit_moment_s1 [N m]"] = 1600.0 + 0.0 * speed
     write(folder, "response.csv", table)
     write(folder, "response_orders.csv", orders)
+    statistics = ("half_range", "mean", "peak_limit", "peak", "limit", "transient_limit", "phase")
+    columns = [
+        column(one, next((word for word in statistics if one.startswith(f"{word}_")), ""), file)
+        for file, labels in (("response.csv", table), ("response_orders.csv", orders))
+        for one in labels
+    ]
+    write_columns(folder, columns, "response_columns.json")
     return write(folder, "response.json", report(**changes))
 
 
@@ -115,7 +122,7 @@ def test_a_panel_has_the_curves_of_the_tables_over_rising_rpm(tmp_path, unit):
         assert line_of(axes, amplitude(order, SPEEDS)).get_xdata() == pytest.approx(SPEEDS)
     assert line_of(axes, 500.0 - 0.1 * SPEEDS).get_linestyle() == "-"
     assert line_of(axes, 900.0 - 0.1 * SPEEDS).get_linestyle() == "--"
-    assert axes.get_xlim() == pytest.approx((100.0, 500.0)) and axes.get_ylabel() == "moment [N m]"
+    assert axes.get_xlim() == pytest.approx((100.0, 500.0)) and axes.get_ylabel() == "elastic moment [N m]"
 
 
 def test_the_largest_orders_are_named_and_the_others_are_thin(tmp_path):
@@ -153,7 +160,7 @@ def test_the_stress_of_a_moment_is_a_second_scale_and_another_one_a_panel(tmp_pa
     assert scale.get_ylabel() == "stress [MPa]"
     panels["s1"].figure.canvas.draw()
     assert scale.get_ylim()[1] == pytest.approx(0.02 * panels["s1"].get_ylim()[1])
-    assert panels["shaft_end"].get_ylabel() == "stress [MPa]" and panels["mesh"].get_ylabel() == "force [N]"
+    assert panels["shaft_end"].get_ylabel() == "shear stress [MPa]" and panels["mesh"].get_ylabel() == "tooth force [N]"
 
 
 def test_means_and_largest_magnitudes_are_drawn_if_asked_for(tmp_path):
@@ -234,8 +241,9 @@ def test_options_that_are_wrong_are_usage_errors(module, options, message, monke
         ("response.csv", "t [s]\n1\n2\n", "response.csv: the first column must be a speed, as 'omega_motor [rad/s]'"),
         ("response.csv", "omega_a [rpm]\n1\n", "response.csv: nothing to draw: the table has 1 row(s)"),
         ("response.csv", "omega_a [rpm]\n1\nx\n", "response.csv: not a table of numbers: "),
-        ("response_orders.csv", "omega_a [rpm],order [1]\n1,1\n", "there is no column 'frequency [Hz]'"),
-        ("response_orders.csv", "omega_a [rpm],order [1],frequency [Hz]\n1,1,1\n", "its speeds are not those of response.csv"),
+        ("response_columns.json", None, ": no response_columns.json here, as results of older releases have none; compute "),
+        ("response_columns.json", "{}", "response_columns.json: cannot be read: "),
+        ("response_orders.csv", "omega_prop $ [rpm]\n1\n", "there is no column 'order [1]', which response_columns.json has"),
     ],
 )
 def test_a_folder_that_is_no_response_is_refused(name, content, message, tmp_path, monkeypatch):
@@ -245,11 +253,17 @@ def test_a_folder_that_is_no_response_is_refused(name, content, message, tmp_pat
     assert said.startswith(f"scripts/plot_response: {results}") and message in said and "\n" not in said
 
 
+def test_orders_at_other_speeds_are_refused(tmp_path, monkeypatch):
+    results = response(tmp_path / "r")
+    pd.read_csv(results / "response_orders.csv").iloc[:-1].to_csv(results / "response_orders.csv", index=False)
+    assert "its speeds are not those of response.csv" in refusal(monkeypatch, "response_figures", results)
+
+
 def test_a_response_without_half_ranges_is_refused(tmp_path, monkeypatch):
     results = response(tmp_path / "r")
-    table = pd.read_csv(results / "response.csv").iloc[:, :2]
-    table.to_csv(results / "response.csv", index=False)
-    assert "nothing to draw: there is no column 'half_range_...'" in refusal(monkeypatch, "response_figures", results)
+    columns = json.loads((results / "response_columns.json").read_text(encoding="utf-8"))["columns"]
+    write_columns(results, [one for one in columns if one.get("statistic") != "half_range"], "response_columns.json")
+    assert "nothing to draw: there is no half range" in refusal(monkeypatch, "response_figures", results)
     assert "there is no such results folder" in refusal(monkeypatch, "response_figures", tmp_path / "missing")
 
 
@@ -358,11 +372,11 @@ def test_what_the_program_writes_is_drawn(tmp_path, monkeypatch):
     for command in ("response", "campbell"):
         subprocess.run([NOCDYN, command, tmp_path / "machine.nml", "--out", tmp_path], check=True, capture_output=True)
         call(monkeypatch, f"{command}_figures", tmp_path, "--format", "png,svg")
-    assert_figures(tmp_path / "figures", "moment", "reaction", "campbell", formats=("png", "svg"))
+    assert_figures(tmp_path / "figures", "total_moment", "reaction", "campbell", formats=("png", "svg"))
     found, diagram = read_response(tmp_path), read_campbell(tmp_path)
     assert (np.diff(found.speed) >= 0).all() and found.speed[[0, -1]] == pytest.approx([-900.0, -20.0])
     assert [line.name for line in found.lines] == [line.name for line, _ in diagram.lines] and "20 Hz" in found.lines[-1].name
-    assert [quantity.label for quantity in found.quantities] == ["moment_fast", "moment_slow", "reaction_g"]
+    assert [quantity.label for quantity in found.quantities] == ["total_moment_fast", "total_moment_slow", "reaction_g"]
     assert found.quantities[0].limit == pytest.approx(40.0) and found.quantities[0].peak_limit == pytest.approx(90.0)
     assert found.quantities[0].stress == pytest.approx(16.0 / (math.pi * 0.03**3))
     assert found.operation.spans == [

@@ -2,6 +2,7 @@
 
 import importlib
 import importlib.util
+import json
 import os
 import sys
 from pathlib import Path
@@ -30,7 +31,7 @@ def python_packages() -> None:
 
 
 def unit_of(name: str) -> str:
-    if "." in name:
+    if "." in name and not name.endswith("_final"):
         return UNITS[name.rsplit(".", 1)[-1]]
     return "s" if name.endswith("time_of_max") else "N m" if name.startswith("moment") else "rad/s"
 
@@ -51,7 +52,27 @@ def write_sweep(folder: Path, design: str, varied: dict, results: dict, status=N
                 variable = file.create_variable(name, ("variant",), data=np.where(known, values, np.nan))
                 variable.attrs.update(units=unit_of(name), label=name, role=role, long_name=name)
         file.create_variable("status", ("variant",), data=status)
+    write_columns(folder, results)
     return folder
+
+
+def write_columns(folder: Path, names) -> None:
+    """columns.json, as far as the figures need it."""
+    entries = [
+        {
+            "label": f"{name} [{unit_of(name)}]",
+            "name": name,
+            "kind": "",
+            "statistic": "min" if "_min" in name else "final",
+            "element_kind": "",
+            "element": "",
+            "point": "",
+            "unit": unit_of(name),
+            "caption": "",
+        }
+        for name in names
+    ]
+    (folder / "columns.json").write_text(json.dumps({"columns": entries}), encoding="utf-8")
 
 
 def draw(monkeypatch, capsys, folder: Path, formats: tuple[str, ...] = ("svg",)) -> list[str]:
@@ -326,6 +347,7 @@ def test_table_is_drawn_where_there_is_no_netcdf_file(tmp_path, monkeypatch, cap
         f"variant,{LOAD} [N m s/rad],body.rotor.teeth,{MOMENT} [N m],omega_a.b_final [rad/s],status,steps,reason\n"
         '1,50.0,20,3.5,1.0,done,100,\n2,60.0,21,,,failed,90,"too, many steps"\n3,70.0,22,4.5,2.0,done,95,\n'
     )
+    write_columns(tmp_path, [MOMENT, "omega_a.b_final"])
     assert draw(monkeypatch, capsys, tmp_path) == ["histograms", "influence", "scatter", "map"]
     text = text_of(tmp_path, "scatter")
     assert "From a table" in text and "list design, 3 variants, 1 failed" in text and "body.rotor.teeth<" in text
@@ -369,6 +391,13 @@ def test_only_the_formats_that_are_asked_for_are_written(tmp_path, monkeypatch, 
     assert leaving.value.code == 2 and "'tiff' is none of png, svg, pdf" in capsys.readouterr().err
 
 
+D = {
+    "columns.json": json.dumps(
+        {"columns": [dict.fromkeys(("name", "kind", "element_kind", "element", "point", "unit", "caption"), "") | {"label": "d"}]}
+    )
+}
+
+
 @pytest.mark.parametrize(
     ("files", "message"),
     [
@@ -389,15 +418,19 @@ def test_only_the_formats_that_are_asked_for_are_written(tmp_path, monkeypatch, 
             "input.nml: this is not the input of a sweep",
         ),
         (
-            {"sweep.csv": "variant,a.b.c,d,status\n1,1,,failed\n", "input.nml": "&a b = 1 /\n&sweep design = 'random' /\n"},
+            {"sweep.csv": "variant,a.b.c,d,status\n1,1,1,done\n", "input.nml": "&a b = 1 /\n&sweep design = 'random' /\n"},
+            "no columns.json here, as results of older releases have none; compute the results again",
+        ),
+        (
+            {"sweep.csv": "variant,a.b.c,d,status\n1,1,,failed\n", "input.nml": "&a b = 1 /\n&sweep design = 'random' /\n"} | D,
             "nothing to draw: none of the 1 variants was done",
         ),
         (
-            {"sweep.csv": "variant,a.b.c,d,status\n1,1,,done\n", "input.nml": "&a b = 1 /\n&sweep design = 'random' /\n"},
+            {"sweep.csv": "variant,a.b.c,d,status\n1,1,,done\n", "input.nml": "&a b = 1 /\n&sweep design = 'random' /\n"} | D,
             "nothing to draw: no variant has any of the results",
         ),
         (
-            {"sweep.csv": "variant,a.b.c,status\n1,1,done\n", "input.nml": "&a b = 1 /\n&sweep design = 'random' /\n"},
+            {"sweep.csv": "variant,a.b.c,status\n1,1,done\n", "input.nml": "&a b = 1 /\n&sweep design = 'random' /\n"} | D,
             "nothing to draw: the sweep has 1 varied numbers and 0 results",
         ),
     ],

@@ -164,7 +164,7 @@ def test_findings_are_those_of_the_files(reports, opened):
     for peak in cases["peaks"]:
         if peak["column"] in peaks:
             assert plain(peaks[peak["column"]]) == pytest.approx(peak["largest"], rel=1e-4)
-    assert "shaft_tyre" in peaks and "omega_pump" in peaks
+    assert "total_moment_tyre" in peaks and "omega_pump" in peaks
     assert plain(column(opened, "Damage of all load cases", "damage of all")[0]) == pytest.approx(
         cases["fatigue"][0]["damage"], rel=1e-3
     )
@@ -203,7 +203,7 @@ def chart(browser, words):
 
 
 def test_curves_show_their_values_under_the_pointer(reports, opened):
-    number, picture = chart(opened, "moment_tyre: half range")
+    number, picture = chart(opened, "total_moment_tyre, elastic and damping moment: half range")
     table = pd.read_csv(reports.folder / "results/m/response.csv").sort_values("omega_engine [rpm]")
     row = table.iloc[(table["omega_engine [rpm]"] - 400).abs().argmin()]
     at = opened.ask("return report.charts[arguments[0]].x(arguments[1])", number, float(row["omega_engine [rpm]"]))
@@ -215,7 +215,7 @@ def test_curves_show_their_values_under_the_pointer(reports, opened):
     assert plain(speed.split()[0]) == pytest.approx(row["omega_engine [rpm]"], abs=3)  # pixels are 1 rpm wide
     row = table.iloc[(table["omega_engine [rpm]"] - plain(speed.split()[0])).abs().argmin()]
     total = next(line for line in lines if "all orders" in line)
-    assert plain(total.split(": ")[1].removesuffix(" N m")) == pytest.approx(row["half_range_moment_tyre [N m]"], rel=1e-4)
+    assert plain(total.split(": ")[1].removesuffix(" N m")) == pytest.approx(row["half_range_total_moment_tyre [N m]"], rel=1e-4)
     limit = next(line for line in lines if "limit" in line)
     assert plain(limit.split(": ")[1].removesuffix(" N m")) == pytest.approx(1500.0)
     ActionChains(opened.driver).move_to_element(opened.find("h1")).perform()
@@ -223,7 +223,7 @@ def test_curves_show_their_values_under_the_pointer(reports, opened):
 
 
 def test_figures_zoom_by_mouse_and_return(opened):
-    number, picture = chart(opened, "moment_tyre: half range")
+    number, picture = chart(opened, "total_moment_tyre, elastic and damping moment: half range")
     window = "return report.charts[arguments[0]].window.x"
     whole = opened.ask(window, number)
     ActionChains(opened.driver).move_to_element_with_offset(picture, -100, 0).click_and_hold().move_by_offset(
@@ -558,4 +558,19 @@ def test_a_peak_beyond_its_limit_is_told_beside_a_larger_share_of_another(fresh,
     assert 1 < one["peak_ratio_to_limit"] < one["ratio_to_limit"]
     browser.open(fresh.page())
     text = browser.find("#summary").text
-    assert "moment_tyre, its peak, reaches " in text and "moment_tyre reaches " in text
+    assert "total_moment_tyre, its peak, reaches " in text and "total_moment_tyre reaches " in text
+
+
+def test_a_tooth_force_is_called_so(fresh, browser):
+    """In findings, tables and figures."""
+    text = "&body name = 'a' inertia = 1 /\n&body name = 'b' inertia = 2 /\n&load name = 'l' body = 'b' viscous = 1 /\n"
+    text += "&mesh name = 'teeth' bodies = 'a', 'b' radii = 0.1, 0.2 stiffness = 1e6 damping = 1e2 /\n"
+    text += "&motor name = 'm' body = 'a' a = 10 b = 1 c = 0 /\n&run t_end = 1 /\n"
+    fresh.write("m.nml", text)
+    assert fresh("m.nml", "--no-pdf", "--quiet").returncode == 0
+    browser.open(fresh.page())
+    assert "Peak: tooth force" in browser.find("#summary").text
+    motion = browser.find("#motion").text
+    assert "Tooth force over the time" in motion and "force_teeth" in motion
+    heads = browser.find("#steady").text
+    assert "tooth force" in heads and "deformation of the teeth" in heads

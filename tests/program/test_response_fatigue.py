@@ -63,12 +63,12 @@ def test_one_order_has_one_cycle_in_each_of_its_periods(nocdyn):
     rows, _, (item,), text = respond(nocdyn, MACHINE + ORDER + MOMENT)
     for row in rows:
         per_hour = 3600 * 2 * row["omega_engine [rad/s]"] / (2 * math.pi)
-        expected = per_hour * (row["half_range_moment_c [N m]"] / 500) ** 5 / 1.0e6
+        expected = per_hour * (row["half_range_total_moment_c [N m]"] / 500) ** 5 / 1.0e6
         assert row["damage_per_hour_life [1/h]"] == pytest.approx(expected, rel=1e-9)
     worst = max(rows, key=lambda row: row["damage_per_hour_life [1/h]"])
     assert item["largest_damage_per_hour"] == worst["damage_per_hour_life [1/h]"] > 0
     assert item["speed_rad_s"] == worst["omega_engine [rad/s]"]
-    assert item["quantity"] == "moment_c [N m]"
+    assert item["quantity"] == "total_moment_c [N m]"
     assert "damage_of_profile" not in item
     assert f"fatigue 'life': damage per hour up to {item['largest_damage_per_hour']:.4g}" in text
 
@@ -80,7 +80,7 @@ def test_several_orders_have_the_cycles_of_their_synthesis(nocdyn, mean_stress):
     modulus = math.pi * 0.06**3 / 16
     for row in rows[::4]:
         speed = row["omega_engine [rad/s]"]
-        mean = row["mean_moment_c [N m]"] / modulus
+        mean = row["mean_total_moment_c [N m]"] / modulus
         values = synthesis(orders, "stress_c [Pa]", speed, mean, turns=2, samples=20000)
         damage = damage_of(values, 5.0e6, strength=2.0e7 if mean_stress else math.inf)
         expected = damage * 3600 * speed / (2 * 2 * math.pi)
@@ -94,7 +94,7 @@ def test_lines_without_a_common_period(nocdyn):
     for row in rows[::6]:
         speed = row["omega_engine [rad/s]"]
         turns = 500
-        values = synthesis(orders, "moment_c [N m]", speed, row["mean_moment_c [N m]"], turns, samples=256 * turns)
+        values = synthesis(orders, "total_moment_c [N m]", speed, row["mean_total_moment_c [N m]"], turns, samples=256 * turns)
         expected = damage_of(values, 500, slope=3) * 3600 * speed / (turns * 2 * math.pi)
         assert row["damage_per_hour_life [1/h]"] == pytest.approx(expected, rel=0.01)
 
@@ -138,10 +138,10 @@ def test_the_signals_of_shafts_meshes_and_gears(nocdyn):
         fatigue += STRESS.replace("coupling", "shaft") + MOMENT.replace("coupling", "shaft").replace("life", "moment")
         machine = wheel.replace("'fan' inertia = 5.0 speed = 100", "'fan' inertia = 5.0") + shaft + group + fatigue
         rows, _, items, _ = respond(nocdyn, machine)
-        assert [item["quantity"] for item in items] == [column, "stress_c [Pa]", "moment_c_1 [N m]"]
+        assert [item["quantity"] for item in items] == [column, "stress_c [Pa]", "total_moment_c_1 [N m]"]
         for row in rows:
             per_hour = 3600 * 2 * row["omega_engine [rad/s]"] / (2 * math.pi) / 1.0e6
-            moment = max(row["half_range_moment_c_1 [N m]"], row["half_range_moment_c_2 [N m]"])
+            moment = max(row["half_range_total_moment_c_1 [N m]"], row["half_range_total_moment_c_2 [N m]"])
             half_ranges = [row[f"half_range_{column}"] / 9.0e3, row["half_range_stress_c [Pa]"] / 5.0e6, moment / 500]
             for name, ratio in zip(["teeth", "life", "moment"], half_ranges):
                 assert row[f"damage_per_hour_{name} [1/h]"] == pytest.approx(per_hour * ratio**5, rel=1e-9)

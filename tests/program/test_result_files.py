@@ -32,7 +32,7 @@ FULL_HEADER = [
     *(f"twist_{coupling} [rad]" for coupling in ("shaft", "belt", "anchor")),
     *(f"moment_{coupling} [N m]" for coupling in ("shaft", "belt", "anchor")),
     *(f"damping_{coupling} [N m]" for coupling in ("shaft", "anchor")),
-    *(f"shaft_{coupling} [N m]" for coupling in ("shaft", "anchor")),
+    *(f"total_moment_{coupling} [N m]" for coupling in ("shaft", "anchor")),
     *(f"torque_{motor} [N m]" for motor in ("drive", "booster")),
     "torque_fan [N m]",
     *(f"torque_{excitation} [N m]" for excitation in ("engine", "gust")),

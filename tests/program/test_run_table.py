@@ -1,5 +1,6 @@
 """What a person reads of a run: chosen columns, the printed table, extremes from a time, the transient of the start."""
 
+import bisect
 import math
 import re
 
@@ -107,13 +108,13 @@ def test_trajectories_of_a_sweep_have_the_chosen_columns(nocdyn):
         "&sweep design = 'grid' /\n&vary target = 'motor.drive.torque' low = 10.0 high = 30.0 count = 2 /\n"
         "&record quantity = 'omega_driver' statistic = 'final' trajectories = 2 /\n"
     )
-    nocdyn.write("discs.nml", DISCS.format(driver="", run="", output="columns = 'shaft_*'") + sweep)
+    nocdyn.write("discs.nml", DISCS.format(driver="", run="", output="columns = 'total_*'") + sweep)
     if SWEEP_PROGRAM.exists():
         assert nocdyn("sweep", "discs.nml", "--out", "out").returncode == 0
-        assert nocdyn.table("out/variant-2")[0] == ["t [s]", "shaft_line [N m]"]
-    outcome = nocdyn("check", "discs.nml", "--set", "output.columns=shaft")
+        assert nocdyn.table("out/variant-2")[0] == ["t [s]", "total_moment_line [N m]"]
+    outcome = nocdyn("check", "discs.nml", "--set", "output.columns=total_moment")
     assert (outcome.returncode, outcome.stdout) == (2, "")
-    assert "columns(1) = 'shaft' matches no column of trajectory.csv; did you mean 'shaft_*'?" in outcome.stderr
+    assert "columns(1) = 'total_moment' matches no column of trajectory.csv; did you mean 'total_moment_*'?" in outcome.stderr
 
 
 # extremes from a time
@@ -183,10 +184,10 @@ def test_the_first_swings_of_a_start_out_of_balance_are_told(nocdyn):
     transient = summary["start_transient"]
     assert transient["until"] == pytest.approx(3 * 2 * HALF_PERIOD, rel=1e-6)
     # the moments are largest, 0, at the start itself
-    swinging = ["twist_line [rad]", "moment_line [N m]", "damping_line [N m]", "shaft_line [N m]"]
+    swinging = ["twist_line [rad]", "moment_line [N m]", "damping_line [N m]", "total_moment_line [N m]"]
     assert (transient["has_min_of"], transient["has_max_of"]) == (swinging, ["damping_line [N m]"])
-    (shaft,) = (line for line in lines if line.startswith("shaft_line [N m]"))
-    assert re.fullmatch(r"shaft_line \[N m\] .* [0-9.]+\* +0 +0", shaft)
+    (shaft,) = (line for line in lines if line.startswith("total_moment_line [N m]"))
+    assert re.fullmatch(r"total_moment_line \[N m\] .* [0-9.]+\* +0 +0", shaft)
     assert "* in the first fast transient of a start out of balance, up to t = 0.419 s; " in "\n".join(lines)
     assert not any("*" in line for line in lines if line.startswith(("omega", "torque", "phi")))
 
@@ -261,13 +262,12 @@ def test_the_printed_summary_of_every_shipped_input_fits_a_screen(nocdyn, path):
     lines = [line for line in printed.splitlines() if ": note: " not in line]
     assert outcome.returncode == 0 and len(lines) <= 32
     names = columns_of(printed)
-    first = [re.split("_", name)[0] for name in names]
-    ranks = [{"shaft": 0, "reaction": 1, "torque": 2, "omega": 3}.get(quantity, 4) for quantity in first]
-    damped = {name.removeprefix("shaft_") for name in names if name.startswith("shaft_")}
-    ranks = [0 if name.startswith("moment_") and name.removeprefix("moment_") not in damped else rank
-             for name, rank in zip(names, ranks, strict=True)]  # fmt: skip
-    assert ranks == sorted(ranks)
-    columns = nocdyn.summary("/".join(("out", *case[1:])))["columns"]
+    folder = "/".join(("out", *case[1:]))
+    rank = {column["name"]: column["rank"] for column in nocdyn.columns(folder)}
+    # moments, then reactions, forces and stresses, torques and losses, speeds, the others
+    sorts = [bisect.bisect([2, 5, 7, 8], rank[name]) for name in names]
+    assert sorts == sorted(sorts)
+    columns = nocdyn.summary(folder)["columns"]
     all_names = [name for name in columns if "] [" not in name]  # of rods only on request
     if len(names) < len(all_names):
         rest = len(all_names) - len(names)
@@ -284,9 +284,9 @@ def test_many_columns_leave_lines_to_every_sort_and_to_the_largest(nocdyn):
     names = columns_of(outcome.stdout)
     assert [name for name in names if name.startswith("torque")] == ["torque_drive"]
     assert len([name for name in names if name.startswith("omega")]) >= 4
-    shown = [name for name in names if name.startswith("shaft")]
+    shown = [name for name in names if name.startswith("total_moment")]
     columns = nocdyn.summary("out")["columns"]
-    shafts = [f"shaft_s{i}" for i in range(40)]
+    shafts = [f"total_moment_s{i}" for i in range(40)]
     by_size = sorted(shafts, key=lambda name: max(abs(columns[f"{name} [N m]"][key]) for key in ("min", "max")))
     assert shown == sorted(by_size[-len(shown) :], key=shafts.index)
 
@@ -330,22 +330,22 @@ def test_the_moment_in_the_shaft_is_the_elastic_one_and_that_of_damping(nocdyn):
     assert discs(nocdyn).returncode == 0
     header, rows = nocdyn.table("out")
     at = {name.split(" ")[0]: i for i, name in enumerate(header)}
-    # of the second disc, which only the shaft moves: J omega' = -shaft
+    # of the second disc, which only the shaft moves: J omega' = -moment
     for row in rows:
         elastic, damping = row[at["moment_line"]], row[at["damping_line"]]
-        assert row[at["shaft_line"]] == pytest.approx(elastic + damping, abs=1e-12)
+        assert row[at["total_moment_line"]] == pytest.approx(elastic + damping, abs=1e-12)
     step = rows[1][0]
     for before, row, after in zip(rows[:-2], rows[1:-1], rows[2:], strict=True):
         slope = (after[at["omega_driven"]] - before[at["omega_driven"]]) / (2 * step)
-        assert -row[at["shaft_line"]] == pytest.approx(slope, abs=0.3)  # omega''' h^2 / 6
-    found = nocdyn.summary("out")["columns"]["shaft_line [N m]"]
-    assert found["min"] <= min(row[at["shaft_line"]] for row in rows) < found["min"] + 0.5
+        assert -row[at["total_moment_line"]] == pytest.approx(slope, abs=0.3)  # omega''' h^2 / 6
+    found = nocdyn.summary("out")["columns"]["total_moment_line [N m]"]
+    assert found["min"] <= min(row[at["total_moment_line"]] for row in rows) < found["min"] + 0.5
 
 
 def test_only_couplings_with_damping_have_a_moment_in_the_shaft_of_their_own(nocdyn):
     for damping, has_one in ((0, False), (0.45, True)):
         discs(nocdyn, "", "", "", "--set", f"coupling.line.damping={damping}")
-        assert ("shaft_line [N m]" in nocdyn.table("out")[0]) == has_one
+        assert ("total_moment_line [N m]" in nocdyn.table("out")[0]) == has_one
 
 
 # notes

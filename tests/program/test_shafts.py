@@ -113,7 +113,7 @@ def test_a_steady_moment_gives_twist_and_the_largest_stress(nocdyn):
         "&motor name = 'jack' body = 'b' kind = 'constant' torque = 700.0 /\n"
     )
     table = run(nocdyn, text, "--set", "run.start=equilibrium")
-    for name in ("moment_line_1 [N m]", "moment_line_2 [N m]", "moment_line_max [N m]"):
+    for name in ("total_moment_line_1 [N m]", "total_moment_line_2 [N m]", "total_moment_line_max [N m]"):
         assert table[name] == pytest.approx([700.0] * 11, rel=STATIC)
     assert table["twist_line [rad]"][-1] == pytest.approx(700 * sum(1 / k for k in stiffnesses(STEPPED)), rel=STATIC)
     modulus = pi / 16 * (0.25**4 - 0.2**4) / 0.25
@@ -142,7 +142,7 @@ def test_nodes_have_columns_on_request_only(nocdyn):
 
 def test_a_sweep_of_a_dimension_is_its_variants_alone(nocdyn):
     sweep = "&sweep design = 'grid' /\n&vary target = 'shaft.line.shear_modulus' low = 7.5e10 high = 8.5e10 count = 3 /\n"
-    sweep += "&record quantity = 'moment_line_max' statistic = 'max' /\n"
+    sweep += "&record quantity = 'total_moment_line_max' statistic = 'max' /\n"
     outcome = nocdyn("sweep", nocdyn.write("sweep.nml", machine() + sweep), "--out", "all", "--csv")
     assert outcome.returncode == 0, outcome.stderr
     with open(nocdyn.folder / "all/sweep.csv") as file:
@@ -151,8 +151,8 @@ def test_a_sweep_of_a_dimension_is_its_variants_alone(nocdyn):
         modulus = next(value for name, value in row.items() if "shear_modulus" in name)
         run(nocdyn, machine(), "--set", f"shaft.line.shear_modulus={modulus}")
         summary = json.loads((nocdyn.folder / "out/summary.json").read_text())
-        largest = next(float(value) for name, value in row.items() if "moment_line_max" in name)
-        assert largest == pytest.approx(summary["columns"]["moment_line_max [N m]"]["max"], rel=1e-6)
+        largest = next(float(value) for name, value in row.items() if "total_moment_line_max" in name)
+        assert largest == pytest.approx(summary["columns"]["total_moment_line_max [N m]"]["max"], rel=1e-6)
 
 
 # At which speed or frequency each of them excites 24 Hz, or a little more: twelve waves on the shaft.
@@ -232,7 +232,7 @@ def test_a_sweep_has_the_largest_stress_of_its_variants(nocdyn):
         "&vary target = 'excitation.x.frequency' low = 36 high = 50 count = 2 /\n"
     )
 
-    for quantity in ("stress_line", "moment_line_max"):
+    for quantity in ("stress_line", "total_moment_line_max"):
         text += f"&record quantity = '{quantity}' statistic = 'max', 'min', 'max_abs', 'time_of_max' /\n"
     outcome = nocdyn("sweep", nocdyn.write("sweep.nml", text), "--out", "all", "--csv")
     assert outcome.returncode == 0, outcome.stderr
@@ -242,7 +242,7 @@ def test_a_sweep_has_the_largest_stress_of_its_variants(nocdyn):
         run(nocdyn, text, "--set", f"excitation.x.frequency={row['excitation.x.frequency [rad/s]']}")
         for label, column in nocdyn.summary("out")["columns"].items():
             quantity = label.split(" ")[0]
-            if quantity not in ("stress_line", "moment_line_max"):
+            if quantity not in ("stress_line", "total_moment_line_max"):
                 continue
             values = {key.split(" ")[0]: float(value) for key, value in row.items() if key.startswith(quantity)}
             largest = max(abs(column["max"]), abs(column["min"]))

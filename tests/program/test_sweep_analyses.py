@@ -93,7 +93,7 @@ def test_motion_modes_and_responses_are_recorded_together_in_the_order_of_the_fi
     alone = [sweep(nocdyn, machine + GRID + record) for record in (MODES, motion, RESPONSES)]
     together = sweep(nocdyn, machine + GRID + MODES + motion + RESPONSES)
     labels = list(together[0])
-    order = ["mode_1_frequency [Hz]", "omega_two_final [rad/s]", "moment_shaft_order_2_peak [N m]", "stress_shaft_ratio"]
+    order = ["mode_1_frequency [Hz]", "omega_two_final [rad/s]", "total_moment_shaft_order_2_peak [N m]", "stress_shaft_ratio"]
     assert sorted(order, key=labels.index) == order
     for i, row in enumerate(together):
         for part in alone:
@@ -133,7 +133,7 @@ def test_a_variant_without_the_mode_or_a_steady_state_fails_with_its_reason(nocd
     unstable, stable = sweep(nocdyn, machine + falling + vary + RESPONSES)
     assert (unstable["status"], stable["status"]) == ("failed", "done")
     assert "the steady state is unstable" in unstable["reason"]
-    assert unstable["moment_shaft_order_2_peak [N m]"] in ("", "nan", "NaN")
+    assert unstable["total_moment_shaft_order_2_peak [N m]"] in ("", "nan", "NaN")
 
 
 CHAIN = """\
@@ -245,7 +245,7 @@ def test_trajectories_of_tied_variants_are_those_of_the_variants(nocdyn):
         ),
         (
             "&record response = 'shaft' statistic = 'peak' /\n&record response = 'shaft' statistic = 'peak' /",
-            "machine.nml:10: &record: 'moment_shaft_peak' is recorded already; allowed: once",
+            "machine.nml:10: &record: 'total_moment_shaft_peak' is recorded already; allowed: once",
         ),
     ],
 )

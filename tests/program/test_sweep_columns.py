@@ -85,7 +85,7 @@ def compare(row, run, quantities):
     energy = run["kinetic_energy [J]"][1]
     for quantity in quantities:
         name, unit = quantity.removesuffix("]").split(" [")
-        final, largest = run.get(quantity, run.get(quantity.replace("shaft_", "moment_", 1), (0.0, 0.0)))
+        final, largest = run.get(quantity, run.get(quantity.removeprefix("total_"), (0.0, 0.0)))
         tolerance = TOLERANCE * (energy if unit == "J" else max(largest, 1e-3))
         assert float(row[f"{name}_final [{unit}]"]) == pytest.approx(final, abs=tolerance), quantity
         assert float(row[f"{name}_max_abs [{unit}]"]) == pytest.approx(largest, abs=tolerance), quantity
@@ -139,12 +139,12 @@ def test_torques_that_are_not_there_are_0_and_at_their_largest_from_the_start(no
 def test_the_moment_in_a_shaft_without_damping_is_the_elastic_one(nocdyn, quantities_of):
     nocdyn.write("machine.nml", MACHINE)
     values = [0, 0.2]
-    rows = sweep(nocdyn, ["coupling.shaft.damping"], [[value] for value in values], ["shaft_shaft", "moment_shaft"])
+    rows = sweep(nocdyn, ["coupling.shaft.damping"], [[value] for value in values], ["total_moment_shaft", "moment_shaft"])
     runs = [quantities_of(f"--set=coupling.shaft.damping={value}") for value in values]
-    assert "shaft_shaft [N m]" not in runs[0]
-    assert rows[0]["shaft_shaft_max_abs [N m]"] == rows[0]["moment_shaft_max_abs [N m]"]
-    assert rows[1]["shaft_shaft_max_abs [N m]"] != rows[1]["moment_shaft_max_abs [N m]"]
-    compare(rows[1], runs[1], ["shaft_shaft [N m]", "moment_shaft [N m]"])
+    assert "total_moment_shaft [N m]" not in runs[0]
+    assert rows[0]["total_moment_shaft_max_abs [N m]"] == rows[0]["moment_shaft_max_abs [N m]"]
+    assert rows[1]["total_moment_shaft_max_abs [N m]"] != rows[1]["moment_shaft_max_abs [N m]"]
+    compare(rows[1], runs[1], ["total_moment_shaft [N m]", "moment_shaft [N m]"])
 
 
 @pytest.mark.parametrize("values", [(0, 0.2), (0.2, 0)])
@@ -152,7 +152,7 @@ def test_a_variant_without_a_quantity_that_is_no_torque_is_refused(nocdyn, value
     nocdyn.write("machine.nml", MACHINE)
     rows = sweep(nocdyn, ["motor.drive.inductance"], [[value] for value in values], ["current_drive"])
     for row, value in zip(rows, values, strict=True):
-        reason = "" if value else "current_drive [A] is recorded, but this machine has no such column"
+        reason = "" if value else "current_drive is recorded, but this machine has no such column"
         assert (row["status"], row["reason"]) == ("done" if value else "refused", reason)
 
 

@@ -44,7 +44,7 @@ def table(nocdyn, folder):
 def test_a_sweep_leaves_its_files_and_no_journal(nocdyn, discs):
     outcome = nocdyn("sweep", discs, "--out", "out", "--csv", "--threads", 2)
     assert (outcome.returncode, outcome.stderr) == (0, "")
-    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.csv", "sweep.nc"]
+    assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", "sweep.csv", "sweep.nc"]
     title, header, *rows, end = outcome.stdout.splitlines()
     assert title == "Two discs"
     assert header.split() == [
@@ -179,14 +179,14 @@ def test_a_sweep_without_a_variant_that_is_done_fails(nocdyn, discs):
         == f"nocdyn: {discs}: no variant can be computed; reason of the first one: {reason}; all reasons are in out/sweep.nc\n"
     )
     assert nocdyn.summary("out")["status"] == "failed"
-    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc"]
+    assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", "sweep.nc"]
 
 
 def test_a_table_of_an_earlier_sweep_does_not_stay_beside_new_results(nocdyn, discs):
     nocdyn("sweep", discs, "--out", "out", "--csv")
     assert "sweep.csv" in nocdyn.files("out")
     nocdyn("sweep", discs, "--out", "out", "--set", "sweep.seed=4")
-    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc"]
+    assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", "sweep.nc"]
 
 
 def test_trajectories_of_an_earlier_sweep_and_a_run_do_not_stay_beside_new_results(nocdyn, discs):
@@ -196,10 +196,19 @@ def test_trajectories_of_an_earlier_sweep_and_a_run_do_not_stay_beside_new_resul
         assert nocdyn("sweep", "discs.nml", "--out", "out").returncode == 0
         for own in ("variant-3/own.txt", "variant-/input.nml", "variant-1a/input.nml"):
             nocdyn.write(f"out/{own}", "of the user")
-    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc", "variant-", "variant-1a", "variant-2", "variant-3"]
+    assert nocdyn.files("out") == [
+        "columns.json",
+        "input.nml",
+        "summary.json",
+        "sweep.nc",
+        "variant-",
+        "variant-1a",
+        "variant-2",
+        "variant-3",
+    ]
     assert nocdyn.files("out/variant-") == nocdyn.files("out/variant-1a") == ["input.nml"]
     assert nocdyn.files("out/variant-3") == ["own.txt"]
-    assert nocdyn.files("out/variant-2") == ["input.nml", "summary.json", "trajectory.csv"]
+    assert nocdyn.files("out/variant-2") == ["columns.json", "input.nml", "summary.json", "trajectory.csv"]
 
 
 def test_a_run_does_not_go_to_the_folder_of_a_sweep(nocdyn, discs, spinner):
@@ -211,7 +220,7 @@ def test_a_run_does_not_go_to_the_folder_of_a_sweep(nocdyn, discs, spinner):
         f"nocdyn: {discs}: out/discs holds the results of a sweep; choose another folder with --out, or remove sweep.nc\n"
     )
     assert {name: (nocdyn.folder / "out/discs" / name).read_bytes() for name in nocdyn.files("out/discs")} == before
-    assert nocdyn.files("out/spinner") == ["input.nml", "summary.json", "trajectory.csv"]
+    assert nocdyn.files("out/spinner") == ["columns.json", "input.nml", "summary.json", "trajectory.csv"]
 
 
 @pytest.mark.parametrize("name", ["sweep.journal", "sweep.1-of-2.journal"])
@@ -230,14 +239,22 @@ def test_a_reader_of_the_output_who_is_gone_costs_no_results(nocdyn, discs):
     os.close(reading)
     nocdyn.start("sweep", discs, "--out", "out", stdout=writing).wait(timeout=60)
     os.close(writing)
-    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc"]
+    assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", "sweep.nc"]
 
 
 def test_trajectories_of_chosen_variants_are_those_of_runs(nocdyn, discs):
     nocdyn.write("discs.nml", TWO_DISCS + SWEEP + "&record trajectories = 2, 17 /\n")
     nocdyn("sweep", "discs.nml", "--out", "out", "--csv")
-    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.csv", "sweep.nc", "variant-17", "variant-2"]
-    assert nocdyn.files("out/variant-17") == ["input.nml", "summary.json", "trajectory.csv"]
+    assert nocdyn.files("out") == [
+        "columns.json",
+        "input.nml",
+        "summary.json",
+        "sweep.csv",
+        "sweep.nc",
+        "variant-17",
+        "variant-2",
+    ]
+    assert nocdyn.files("out/variant-17") == ["columns.json", "input.nml", "summary.json", "trajectory.csv"]
     row = table(nocdyn, "out")[16]
     header, rows = nocdyn.table("out/variant-17")
     speed = rows[-1][header.index("omega_wheel [rad/s]")]
@@ -276,7 +293,7 @@ def test_shards_are_merged(nocdyn, discs):
         assert (nocdyn.folder / "out" / name).read_bytes() == (nocdyn.folder / "whole" / name).read_bytes()
     assert nocdyn("merge", "out").returncode == 0
     journals = [f"sweep.{part}-of-3.journal" for part in (1, 2, 3)]
-    assert nocdyn.files("out") == ["input.nml", "summary.json", *journals, "sweep.nc"]
+    assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", *journals, "sweep.nc"]
 
 
 def test_parts_of_a_list_are_merged_without_its_file(nocdyn):

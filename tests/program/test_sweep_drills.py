@@ -59,7 +59,7 @@ def journal(nocdyn, name="sweep.journal"):
 
 
 def assert_ends_as(nocdyn, whole):
-    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc"]
+    assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", "sweep.nc"]
     assert (nocdyn.folder / "out/sweep.nc").read_bytes() == whole
 
 
@@ -225,7 +225,7 @@ def test_journals_of_ranks_are_merged(nocdyn, discs, whole):
     process = start_ranks(nocdyn, "sweep", discs, "--out", "out", "--resume", *LONG, limit=SAMPLES * 45 // 512)
     assert "nocdyn: cannot write 'out/sweep.nc'" in process.communicate(timeout=60)[1]
     assert nocdyn("merge", "out").returncode == 0
-    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.journal", "sweep.nc", *RANK_JOURNALS]
+    assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", "sweep.journal", "sweep.nc", *RANK_JOURNALS]
     assert (nocdyn.folder / "out/sweep.nc").read_bytes() == whole
 
 

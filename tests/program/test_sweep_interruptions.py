@@ -64,7 +64,7 @@ def test_a_sweep_that_is_killed_twenty_times_ends_as_one_that_is_not(nocdyn, dis
         kills += 1
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume", *LONG)
     assert (outcome.returncode, outcome.stderr) == (0, "")
-    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc"]
+    assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", "sweep.nc"]
     assert (nocdyn.folder / "out/sweep.nc").read_bytes() == (nocdyn.folder / "whole/sweep.nc").read_bytes()
 
 
@@ -316,7 +316,7 @@ def test_a_journal_without_a_byte_holds_nothing_up(nocdyn, discs, words):
     nocdyn.write("out/sweep.journal", "")
     outcome = nocdyn("sweep", discs, "--out", "out", *words)
     assert (outcome.returncode, outcome.stderr) == (0, "")
-    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc"]
+    assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", "sweep.nc"]
 
 
 def test_a_part_that_waits_for_the_others_is_not_called_unfinished(nocdyn, discs):

@@ -192,7 +192,7 @@ def test_trajectories_of_refused_variants_are_said_to_be_missing(nocdyn):
     assert f"\n{path}: note: no trajectory of variant 2: refused, or with more rows than allowed\n" in outcome.stdout
     outcome = nocdyn("sweep", path, "--out", "out", "--set", "record(2).trajectories=2,1,3")
     assert f"\n{path}: note: no trajectory of variants 2, 3: refused, or with more rows than allowed\n" in outcome.stdout
-    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc", "variant-1"]
+    assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", "sweep.nc", "variant-1"]
     assert "note" not in nocdyn("sweep", path, "--out", "out", "--set", "record(2).trajectories=1").stdout
     assert nocdyn("sweep", path, "--out", "out", "-q").stdout == ""
 

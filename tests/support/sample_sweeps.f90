@@ -40,10 +40,14 @@ contains
   subroutine name_quantity(quantity, label, unit, long_name)
     type(quantity_t), intent(inout) :: quantity
     character(len=*), intent(in) :: label, unit, long_name
+    integer :: k
 
     quantity%label = label
     quantity%unit = unit
     quantity%long_name = long_name
+    do k = 1, size(quantity%facts)
+      quantity%facts(k)%text = label(:k)
+    end do
   end subroutine name_quantity
 
   !> Result `k` of a variant, of either sign and of very different sizes.

@@ -17,8 +17,7 @@ module nocdyn_test_sweep_blocks
     statistic_time_of_min
   use nocdyn_statistics_observer, only: new_statistics_observer, statistics_observer_t
   use nocdyn_system, only: system_t
-  use nocdyn_text, only: string_t
-  use nocdyn_signals, only: signal_source_t, list_columns
+  use nocdyn_signals, only: list_signals, signal_t
   use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
   implicit none (type, external)
   private
@@ -99,32 +98,30 @@ contains
     real(wp), intent(in) :: from   !! [s]
     real(wp), intent(in) :: band
     type(statistic_t), allocatable :: statistics(:)
-    type(signal_source_t), allocatable :: columns(:)
-    type(string_t), allocatable :: labels(:)
+    type(signal_t), allocatable :: signals(:)
     integer :: column, kind, next
 
-    call list_columns(machine, columns, labels)
-    allocate (statistics(2 * (size(labels) - 1) * statistic_settling_time))
+    call list_signals(machine, signals)
+    allocate (statistics(2 * (size(signals) - 1) * statistic_settling_time))
     next = 0
-    do column = 2, size(labels)
+    do column = 2, size(signals)
       do kind = 1, statistic_settling_time
-        statistics(next + 1) = new_statistic(labels, column, kind, 0.0_wp, band=band)
-        statistics(next + 2) = new_statistic(labels, column, kind, 0.0_wp, from, band)
+        statistics(next + 1) = new_statistic(signals, column, kind, 0.0_wp, band=band)
+        statistics(next + 2) = new_statistic(signals, column, kind, 0.0_wp, from, band)
         next = next + 2
       end do
     end do
   end function all_statistics
 
-  !> The number of the column whose label begins with a name, 0 if there is none.
+  !> The number of the column with a name, 0 if there is none.
   integer function column_named(machine, name)
     type(machine_t), intent(in) :: machine
     character(len=*), intent(in) :: name
-    type(signal_source_t), allocatable :: columns(:)
-    type(string_t), allocatable :: labels(:)
+    type(signal_t), allocatable :: signals(:)
 
-    call list_columns(machine, columns, labels)
-    do column_named = size(labels), 1, -1
-      if (index(labels(column_named)%text, name // ' [') == 1) return
+    call list_signals(machine, signals)
+    do column_named = size(signals), 1, -1
+      if (signals(column_named)%name == name) return
     end do
   end function column_named
 
@@ -178,7 +175,7 @@ contains
     integer :: i
 
     call new_formulation('reduced', machine, formulation)
-    table = new_trajectory_table(formulation, times(1))
+    table = new_trajectory_table(formulation, times(1), [integer ::])
     records = recorder(formulation, size(times))
     y = formulation%start()
     call integrate(formulation, settings_of(method, tolerance), times, y, records, solver_status, error)

@@ -9,6 +9,7 @@ from pathlib import Path
 import f90nml
 import pandas as pd
 
+from ..columns import DETAIL, Column, columns_of, read_column_list
 from ..results import RPM
 from ..speed_results import Campbell, Response, read_campbell, read_response
 from ..trajectory_files import ResultsError, labels_of, read_columns
@@ -78,6 +79,11 @@ class Sources:
     @cached_property
     def equilibrium(self) -> dict:
         return self.read_json("equilibrium.json")
+
+    @cached_property
+    def steady_columns(self) -> dict[str, Column]:
+        """What the values of steady states are, by their labels."""
+        return {column.label: column for column in columns_of(self.equilibrium["columns"])}
 
     @cached_property
     def modes(self) -> dict:
@@ -168,8 +174,16 @@ class Run:
         names = ("trajectory.csv", "trajectory.nc", "trajectory.partial.csv", "trajectory.partial.nc")
         return next((self.folder / name for name in names if (self.folder / name).is_file()), None)
 
-    def labels(self) -> list[str]:
-        return _told(labels_of, self.file) if self.file else []
+    @cached_property
+    def column_list(self) -> dict[str, Column]:
+        """What the columns are, by their labels; what one looks for first, first."""
+        columns = _told(read_column_list, self.folder)
+        return {column.label: column for column in sorted(columns, key=lambda one: one.rank)}
+
+    def drawn(self) -> list[Column]:
+        """The columns of the trajectory that figures show."""
+        labels = set(_told(labels_of, self.file)) if self.file else set()
+        return [one for one in self.column_list.values() if one.label in labels and one.rank < DETAIL and not one.is_inner]
 
     def values(self, labels: list[str]) -> pd.DataFrame:
         return _told(read_columns, self.file, labels)

@@ -7,7 +7,7 @@ module nocdyn_output_times
   implicit none (type, external)
   private
 
-  public :: check_output_times, output_note, output_times, row_count
+  public :: check_output_times, output_note, output_times, row_count, table_bytes
 
   integer, parameter :: most_rows = 10000000   ! some gigabytes of text
 
@@ -103,6 +103,14 @@ contains
       row_count = output%whole_number('points')
     end if
   end function row_count
+
+  !> About the size of a table of numbers as text [bytes].
+  pure real(wp) function table_bytes(rows, columns)
+    integer, intent(in) :: rows, columns
+    real(wp), parameter :: of_number = 19.0_wp   ! 17 digits, point and comma; signs and exponents make up for shorter numbers
+
+    table_bytes = of_number * rows * columns
+  end function table_bytes
 
   !> The requested times: a row at t_start, one every `interval`, and one at t_end; or `points` rows evenly spaced.
   pure function output_times(input, rows) result(times)

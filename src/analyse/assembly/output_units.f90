@@ -7,7 +7,7 @@ module nocdyn_output_units
   implicit none (type, external)
   private
 
-  public :: match_signal, output_units, turn_labels, turn_units, unit_of
+  public :: match_signal, output_units, turn_units, unit_of
 
 contains
 
@@ -27,19 +27,6 @@ contains
     end do
   end function output_units
 
-  !> Writes labels such as 'omega_motor [rad/s]' with the units that fit them.
-  pure subroutine turn_labels(labels, wanted, unit)
-    type(string_t), intent(inout) :: labels(:)   !! of columns in SI units
-    integer, intent(in) :: wanted(:)             !! indices of `units`
-    integer, intent(out) :: unit(:)              !! of each column: index of `units`, 0: that of SI, [labels]
-    integer :: i
-
-    do i = 1, size(labels)
-      unit(i) = unit_for(unit_of(labels(i)%text), wanted)
-      if (unit(i) > 0) labels(i)%text = label_in(labels(i)%text, unit(i))
-    end do
-  end subroutine turn_labels
-
   !> Gives signals the units that fit them.
   pure subroutine turn_units(signals, wanted, unit)
     type(signal_t), intent(inout) :: signals(:)            !! in SI
@@ -53,15 +40,6 @@ contains
       if (unit(i) > 0) signals(i)%unit = trim(units(unit(i))%name)
     end do
   end subroutine turn_units
-
-  !> A label with the name of another unit.
-  pure function label_in(label, unit) result(text)
-    character(len=*), intent(in) :: label
-    integer, intent(in) :: unit   !! index of `units`
-    character(len=:), allocatable :: text
-
-    text = label(:index(label, '[', back=.true.)) // trim(units(unit)%name) // ']'
-  end function label_in
 
   !> Whether a text names a signal: by its name, or its former one, with or without a unit that fits.
   pure subroutine match_signal(signal, text, wanted, matches, unit, is_former)

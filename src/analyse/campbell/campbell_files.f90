@@ -1,14 +1,14 @@
 !> The files of Campbell's diagram: campbell.csv and campbell.json.
 module nocdyn_campbell_files
   use nocdyn_campbell, only: campbell_t
+  use nocdyn_column_lists, only: column_list_t
   use nocdyn_csv, only: write_header, write_row
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_margins, only: put_margin, put_mode
   use nocdyn_output_file, only: output_file_t
-  use nocdyn_output_units, only: turn_labels
-  use nocdyn_text, only: append, rounded_text, string_t, to_text
+  use nocdyn_text, only: rounded_text, string_t, to_text
   use nocdyn_units, only: from_si, unit_hz
   implicit none (type, external)
   private
@@ -23,29 +23,28 @@ contains
     character(len=*), intent(in) :: body   !! whose speed is held
     integer, intent(in) :: wanted(:)       !! units of speeds: indices of `units`
     type(output_file_t), intent(inout) :: file
+    type(column_list_t) :: list
     type(string_t), allocatable :: labels(:)
     integer, allocatable :: unit(:)
     real(wp), allocatable :: row(:)
     integer :: i, l, m
 
-    allocate (labels(0))
-    call append(labels, 'omega_' // body // ' [rad/s]')
+    call list%start('campbell.csv', wanted)
+    call list%add_named('omega', 'rad/s', 'speed that is held', 'body', body)
     do m = 1, self%modes%modes
-      call append(labels, 'frequency_' // to_text(m) // ' [Hz]')
+      call list%add_named('frequency_' // to_text(m), 'Hz', 'damped natural frequency')
     end do
     do m = 1, self%modes%modes
-      call append(labels, 'damping_ratio_' // to_text(m) // ' [1]')
+      call list%add_named('damping_ratio_' // to_text(m), '1', 'damping ratio')
     end do
-    associate (motions => pack([(m, m=1, self%modes%modes)], self%modes%internal == 0))
-      do m = 1, size(motions)
-        call append(labels, 'undamped_frequency_' // to_text(motions(m)) // ' [Hz]')
-      end do
-    end associate
+    do m = 1, self%modes%modes
+      if (self%modes%internal(m) == 0) call list%add_named('undamped_frequency_' // to_text(m), 'Hz', 'undamped natural frequency')
+    end do
     do l = 1, size(self%order)
-      call append(labels, line_name(self, l) // ' [Hz]')
+      call list%add_named(line_name(self, l), 'Hz', 'frequency of the line')
     end do
-    allocate (unit(size(labels)), row(size(labels)))
-    call turn_labels(labels, wanted, unit)
+    call list%list_columns(labels, unit)
+    allocate (row(size(labels)))
     call write_header(file, labels)
     do i = 1, size(self%speed)
       row(1) = self%speed(i)

@@ -74,19 +74,19 @@ contains
   end subroutine note_former_name
 
   !> The number of the columns that &output asks for.
-  subroutine count_columns(input, machine, count, error)
+  subroutine count_columns(input, machine, count, notes, error)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
     integer, intent(out) :: count
+    type(string_t), allocatable, intent(inout) :: notes(:)  !! on former names
     type(error_t), allocatable, intent(out) :: error        !! patterns that match nothing
     type(signal_t), allocatable :: signals(:)
-    type(string_t), allocatable :: labels(:), notes(:)
+    type(string_t), allocatable :: labels(:)
     integer, allocatable :: chosen(:), units(:)
 
     call list_signals(machine, signals)
     call turn_units(signals, output_units(input), units)
     call label_signals(signals, labels)
-    allocate (notes(0))
     call choose_columns(input, signals, labels, chosen, notes, error)
     count = size(chosen)
   end subroutine count_columns

@@ -1,6 +1,7 @@
 !> The reports on the steady states of a machine: printed and equilibrium.json.
 module nocdyn_equilibrium_report
   use nocdyn_bank, only: role_coupling
+  use nocdyn_column_lists, only: column_list_t
   use nocdyn_energy_balance, only: work_element_names
   use nocdyn_equilibrium, only: equilibrium_t, t_infinity
   use nocdyn_errors, only: error_t, exit_failed, raise
@@ -11,7 +12,10 @@ module nocdyn_equilibrium_report
   use nocdyn_kinds, only: wp
   use nocdyn_machine_report, only: named_coordinates
   use nocdyn_machine, only: machine_t
+  use nocdyn_quantities, only: form_angle
   use nocdyn_reduced, only: new_reduced
+  use nocdyn_signals, only: signal_angle, signal_element, signal_residual, signal_t, signal_time, signal_work_in, &
+    signal_work_out
   use nocdyn_table_text, only: append_table, cell, cell_digits, clear_rounding, padded, rounding
   use nocdyn_text, only: rounded_text, selected, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
@@ -21,12 +25,11 @@ module nocdyn_equilibrium_report
 
   public :: equilibrium_json, equilibrium_text, new_equilibrium_report
 
-  integer, parameter :: trailing = 3        ! last columns: works and their residual, of which a steady state has none
-
   !> The contents of the printed report and of equilibrium.json.
   type, public :: equilibrium_report_t
     type(equilibrium_t), allocatable :: equilibria(:)
     type(string_t), allocatable :: notes(:)
+    type(column_list_t) :: columns                 !! what the values are
     type(string_t), allocatable :: labels(:)       !! as in trajectory.csv: speeds, twists, moments, torques, reactions, energies
     real(wp), allocatable :: values(:, :)          !! [labels, equilibria]
     type(string_t), allocatable :: work_elements(:)      !! names of the elements with power, with their role
@@ -55,7 +58,12 @@ contains
       allocate (self%coordinates, source=selected(machine%names, named_coordinates(machine)))
     end associate
     table = new_trajectory_table(new_reduced(formulation%machine, .true.), t_infinity, wanted)
-    reported = steady_columns(table, formulation%machine)
+    reported = pack([(i, i=1, size(table%signals))], &
+                    [(is_steady(table%signals(i), formulation%machine), i=1, size(table%signals))])
+    call self%columns%start('', [integer ::])
+    do i = 1, size(reported)
+      call self%columns%add(table%signals(reported(i)))
+    end do
     allocate (self%labels, source=selected(table%labels, reported))
     allocate (self%work_elements, source=work_element_names(formulation%machine))
     allocate (self%values(size(self%labels), size(equilibria)), self%power(size(self%work_elements), size(equilibria)))
@@ -87,28 +95,21 @@ contains
     end if
   end function label_of
 
-  !> The columns that are constant in a steady state: no angles, and no twists of couplings that slip.
-  function steady_columns(table, machine) result(columns)
-    type(trajectory_table_t), intent(in) :: table
+  !> Whether a signal is constant in a steady state: no angles and works, and no twists of couplings that slip; inner nodes of
+  !> shafts are left out.
+  logical function is_steady(signal, machine)
+    type(signal_t), intent(in) :: signal
     type(machine_t), intent(in) :: machine
-    integer, allocatable :: columns(:)
-    logical :: is_steady(size(table%labels))
-    integer :: b, c, e
 
-    is_steady = [(index(table%labels(c)%text, '] [') == 0, c=1, size(is_steady))]   ! not those of nodes inside of shafts
-    is_steady(:1 + machine%bodies) = .false.
-    is_steady(size(is_steady) - trailing + 1:) = .false.
-    do b = 1, size(machine%banks)
-      associate (bank => machine%banks(b)%bank)
-        do e = 1, merge(size(bank%names), 0, bank%role == role_coupling)
-          if (any(bank%elastic == e)) cycle
-          is_steady = is_steady .and. [(index(table%labels(c)%text, 'twist_' // bank%names(e)%text // ' [') /= 1, &
-                                        c=1, size(is_steady))]
-        end do
+    associate (source => signal%source)
+      is_steady = .not. (signal%is_inner() .or. any(source%kind == [signal_time, signal_angle, signal_work_in, signal_work_out, &
+                                                                    signal_residual]))
+      if (.not. is_steady .or. source%kind /= signal_element .or. source%form /= form_angle) return
+      associate (bank => machine%banks(source%bank)%bank)
+        if (bank%role == role_coupling) is_steady = any(bank%elastic == source%index)
       end associate
-    end do
-    columns = pack([(c, c=1, size(is_steady))], is_steady)
-  end function steady_columns
+    end associate
+  end function is_steady
 
   !> The printed report: a table for every steady state.
   function equilibrium_text(file, self) result(text)
@@ -189,6 +190,9 @@ contains
     call json%open_report(input%file, input%title())
     call json%put('independent', self%coordinates)
     call json%put('notes', self%notes)
+    call json%open_list('columns')
+    call self%columns%put(json)
+    call json%close_list()
     call json%open_list('steady_states')
     do k = 1, size(self%equilibria)
       call json%open()

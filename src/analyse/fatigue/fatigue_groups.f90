@@ -44,7 +44,7 @@ contains
   !> The symbol of the signal whose cycles a group counts.
   pure function fatigue_symbol(group) result(symbol)
     type(group_t), intent(in) :: group
-    character(len=:), allocatable :: symbol
+    character(len=12) :: symbol
 
     select case (quantity_of(group))
     case (quantity_stress)
@@ -52,7 +52,7 @@ contains
     case (quantity_moment)
       symbol = 'total_moment'
     case default
-      symbol = trim(merge('reaction', 'force   ', element_kind(group) == 'gear'))
+      symbol = merge('reaction', 'force   ', element_kind(group) == 'gear')
     end select
   end function fatigue_symbol
 

@@ -24,7 +24,7 @@ contains
     associate (group => input%groups(fatigue))
       signal%element_kind = trim(element_kind(group))
       signal%element = group%text(signal%element_kind)
-      signal%symbol = fatigue_symbol(group)
+      signal%symbol = trim(fatigue_symbol(group))
       signal%point = ''
       signal%caption = 'signal whose cycles are counted'
       signal%positive = ''

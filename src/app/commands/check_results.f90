@@ -42,16 +42,18 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(sweep_plan_t) :: plan
     character(len=:), allocatable :: note, response, sizes
+    type(string_t), allocatable :: notes(:)
     real(wp) :: bytes
-    integer :: columns, rows
+    integer :: columns, i, rows
     type(string_t), allocatable :: none(:)
 
+    allocate (notes(0))
     call check_response(input, machine, response, error)
     if (allocated(error)) return
     call find_lossy_element(input, machine, note)
     if (response == '') note = ''   ! check_method refuses what has a meaning for a response only
     if (note == '') call check_method(input, machine, error)
-    if (.not. allocated(error)) call count_columns(input, machine, columns, error)
+    if (.not. allocated(error)) call count_columns(input, machine, columns, notes, error)
     if (allocated(error)) return
     sizes = response
     if (note /= '') sizes = sizes // new_line('a') // '  note: nocdyn run refuses it: ' // note
@@ -60,6 +62,7 @@ contains
     if (has_sweep(input)) then
       call make_plan(input, plan, error)
       if (allocated(error) .and. .not. has_load_cases(input)) return
+      if (.not. allocated(error)) call move_alloc(plan%notes, notes)   ! those on columns too
       call add_sweep_lines(options%folder, input, plan, sizes, error)
     else
       allocate (none(0))
@@ -70,6 +73,9 @@ contains
       call check_rows(input%location(input%position('output')), rows, columns, wants_netcdf(input), &
                       options%folder, error)
     end if
+    do i = 1, size(notes)
+      sizes = sizes // new_line('a') // '  note: ' // notes(i)%text
+    end do
     self%report = machine_report(input%shown_file(), machine) // speed_table(input, machine) // sizes
     if (.not. allocated(error)) self%json = check_json(input, machine)
   end subroutine solve

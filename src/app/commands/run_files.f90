@@ -3,7 +3,6 @@
 module nocdyn_run_files
   use nocdyn_column_lists, only: columns_file
   use nocdyn_console, only: new_status_line, status_line_t
-  use nocdyn_csv, only: table_bytes
   use nocdyn_disk_room, only: check_room
   use nocdyn_errors, only: error_t
   use nocdyn_fatigue_report, only: put_cycles_csv
@@ -12,6 +11,7 @@ module nocdyn_run_files
   use nocdyn_kinds, only: wp
   use nocdyn_posix, only: is_interrupted, remove_file
   use nocdyn_posix_files, only: free_bytes
+  use nocdyn_output_times, only: table_bytes
   use nocdyn_result_files, only: result_files_t
   use nocdyn_run_summary, only: columns_json, run_summary_t, summary_json
   use nocdyn_sweep_plan, only: sweep_plan_t

@@ -60,6 +60,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(input_t) :: input
     type(sweep_header_t) :: header
+    integer :: i
 
     if (arguments%shards > 1 .and. arguments%is_given('--csv')) then
       call raise(error, exit_input, '--csv and --shard: a part of a sweep has no table; ' // &
@@ -79,6 +80,9 @@ contains
     header = new_sweep_header(job%plan, max(1, arguments%shard), max(1, arguments%shards))
     call prepare_journal(job, header, error)
     if (allocated(error) .or. job%is_done) return
+    do i = 1, merge(0, size(job%plan%notes), arguments%is_given('--quiet'))
+      call print_text(job%plan%input%shown_file() // ': note: ' // job%plan%notes(i)%text)
+    end do
     job%progress%title = job%plan%input%shown_file()
     job%progress%line = new_status_line(arguments%is_given('--quiet'), shows_in_logs=.true.)
   end subroutine start_job

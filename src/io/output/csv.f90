@@ -7,7 +7,7 @@ module nocdyn_csv
   implicit none (type, external)
   private
 
-  public :: table_bytes, text_cell, write_header, write_row, write_numbers
+  public :: text_cell, write_header, write_row, write_numbers
 
 contains
 
@@ -57,13 +57,5 @@ contains
       call file%put(number(:length))
     end do
   end subroutine write_numbers
-
-  !> About the size of a table of numbers as text [bytes].
-  pure real(wp) function table_bytes(rows, columns)
-    integer, intent(in) :: rows, columns
-    real(wp), parameter :: of_number = 19.0_wp   ! 17 digits, point and comma; signs and exponents make up for shorter numbers
-
-    table_bytes = of_number * rows * columns
-  end function table_bytes
 
 end module nocdyn_csv

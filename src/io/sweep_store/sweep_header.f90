@@ -18,9 +18,7 @@ module nocdyn_sweep_header
     character(len=:), allocatable :: label       !! 'load.work.viscous', 'omega_motor_final'
     character(len=:), allocatable :: unit        !! '' if it has none
     character(len=:), allocatable :: long_name
-    type(string_t) :: facts(size(fact_names))    !! by `fact_names`; not allocated or '': none
-  contains
-    procedure :: fact
+    type(string_t) :: facts(size(fact_names))    !! by `fact_names`; '': none
   end type quantity_t
 
   type, public :: sweep_header_t
@@ -60,16 +58,6 @@ contains
     bytes = bytes(:used)
   end subroutine pack_header
 
-  !> What is known of the signal, '' if nothing is.
-  pure function fact(self, k)
-    class(quantity_t), intent(in) :: self
-    integer, intent(in) :: k   !! of `fact_names`
-    character(len=:), allocatable :: fact
-
-    fact = ''
-    if (allocated(self%facts(k)%text)) fact = self%facts(k)%text
-  end function fact
-
   subroutine put_quantities(bytes, used, quantities)
     character(len=:), allocatable, intent(inout) :: bytes
     integer, intent(inout) :: used
@@ -81,7 +69,7 @@ contains
       call put_text(bytes, used, quantities(i)%unit)
       call put_text(bytes, used, quantities(i)%long_name)
       do k = 1, size(fact_names)
-        call put_text(bytes, used, quantities(i)%fact(k))
+        call put_text(bytes, used, quantities(i)%facts(k)%text)
       end do
     end do
   end subroutine put_quantities

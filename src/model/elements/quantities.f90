@@ -16,7 +16,7 @@ module nocdyn_quantities
 
   !> What one looks for first in a table, first; `rank_detail` is left out of short tables.
   integer, parameter, public :: rank_moment = 1, rank_reaction = 2, rank_force = 3, rank_stress = 4, rank_torque = 5, &
-    rank_loss = 6, rank_speed = 7, rank_slip = 8, rank_twist = 9, rank_detail = 10
+    rank_loss = 6, rank_speed = 7, rank_slip = 8, rank_twist = 9, rank_current = 10, rank_detail = 11
 
   !> One quantity of some elements of a bank.
   type, public :: quantity_t
@@ -40,7 +40,7 @@ contains
     character(len=*), intent(in) :: symbol, unit, caption, positive
     integer, intent(in) :: elements(:)   !! numbered within the bank
     integer, intent(in) :: rank, form    !! rank_..., form_...
-    real(wp), intent(in) :: factor
+    real(wp), intent(in) :: factor       !! 1 or -1
     type(quantity_t) :: self
 
     self%symbol = symbol

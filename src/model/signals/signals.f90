@@ -3,7 +3,7 @@
 !> A signal has one definition, one name, one unit and one caption in every command. Columns, statistics, limits, damages and
 !> responses choose signals by element and symbol; labels are printed and never taken apart.
 module nocdyn_signals
-  use nocdyn_bank, only: bank_t, role_bearing, role_crank, role_names
+  use nocdyn_bank, only: bank_t, role_bearing, role_crank, role_loss, role_names
   use nocdyn_couplings, only: couplings_t
   use nocdyn_machine, only: machine_t
   use nocdyn_kinds, only: wp
@@ -70,7 +70,8 @@ contains
 
     allocate (signals(3 * machine%bodies + size(energy_names) + 8))
     count = 0
-    call add_signal(signals, count, signal_source_t(signal_time), 't', '', '', '', 's', 'time', '', rank_detail)
+    call add_signal(signals, count, signal_source_t(signal_time), &
+                    quantity_t(symbol='t', unit='s', caption='time', rank=rank_detail), '', '', '')
     do b = 1, machine%bodies
       call add_body(machine, b, signal_angle, signals, count)
     end do
@@ -78,12 +79,12 @@ contains
       call add_body(machine, b, signal_speed, signals, count)
     end do
     do b = 1, size(machine%banks)
-      call add_bank(machine%banks(b)%bank, b, signals, count)
+      call add_bank(machine, b, signals, count)
     end do
     call add_reactions(machine, signals, count)
     do kind = signal_kinetic, signal_residual
-      call add_signal(signals, count, signal_source_t(kind), trim(energy_names(kind)), '', '', '', 'J', &
-                      trim(energy_captions(kind)), '', rank_detail)
+      call add_signal(signals, count, signal_source_t(kind), quantity_t(symbol=energy_names(kind), unit='J', &
+                      caption=energy_captions(kind), rank=rank_detail), '', '', '')
     end do
     call resize(signals, count, count)
   end subroutine list_signals
@@ -95,15 +96,15 @@ contains
     integer, intent(in) :: body, kind   !! of the machine; signal_angle or signal_speed
     type(signal_t), allocatable, intent(inout) :: signals(:)
     integer, intent(inout) :: count
-    character(len=:), allocatable :: element_kind
+    character(len=:), allocatable :: kind_of_element
     integer :: bracket, rank
 
     associate (name => machine%names(body)%text)
       bracket = index(name // '[', '[')
-      element_kind = 'body'
+      kind_of_element = 'body'
       if (bracket <= len(name)) then
-        element_kind = 'shaft'
-        if (is_part_of_crank(machine, name(:bracket - 1))) element_kind = 'crank'
+        kind_of_element = 'shaft'
+        if (is_part_of_crank(machine, name(:bracket - 1))) kind_of_element = 'crank'
       end if
       rank = merge(rank_speed, rank_detail, kind == signal_speed)
       if (is_straight(machine, body)) then
@@ -121,8 +122,9 @@ contains
       character(len=*), intent(in) :: symbol, unit, caption
 
       associate (name => machine%names(body)%text)
-        call add_signal(signals, count, signal_source_t(kind, index=body), symbol, element_kind, name(:bracket - 1), &
-                        name(bracket:), unit, caption, '', rank)
+        call add_signal(signals, count, signal_source_t(kind, index=body), &
+                        quantity_t(symbol=symbol, unit=unit, caption=caption, rank=rank), kind_of_element, name(:bracket - 1), &
+                        name(bracket:))
       end associate
     end subroutine add
 
@@ -159,37 +161,55 @@ contains
   end function is_straight
 
   !> The quantities of the elements of a bank. An elastic moment is a detail where a total moment has it as a part.
-  subroutine add_bank(bank, number, signals, count)
-    class(bank_t), intent(in) :: bank
+  subroutine add_bank(machine, number, signals, count)
+    type(machine_t), intent(in) :: machine
     integer, intent(in) :: number   !! of the bank
     type(signal_t), allocatable, intent(inout) :: signals(:)
     integer, intent(inout) :: count
     type(quantity_t), allocatable :: quantities(:)
-    character(len=:), allocatable :: kind
-    integer :: body, e, q, rank
+    type(quantity_t) :: one
+    integer :: body, e, q
 
-    kind = trim(role_names(bank%role))
+    associate (bank => machine%banks(number)%bank)
+      call bank%quantities(quantities)
+      do q = 1, size(quantities)
+        one = quantities(q)
+        do e = 1, size(one%elements)
+          associate (element => one%elements(e))
+            one%rank = quantities(q)%rank
+            if (one%symbol == 'moment' .and. any(bank%with_work == element)) one%rank = rank_detail
+            body = 0
+            if (allocated(one%body)) body = one%body(e)
+            call add_signal(signals, count, signal_source_t(signal_element, number, q, element, one%form, one%divisor, &
+                                                            body, one%factor), one, group_kind(machine, bank, element), &
+                            bank%names(element)%text, trim(one%point))
+          end associate
+        end do
+      end do
+    end associate
+  end subroutine add_bank
+
+  !> The group of the input that an element is of. Losses are those of a gear or a similar row, else of a mesh.
+  function group_kind(machine, bank, element) result(kind)
+    type(machine_t), intent(in) :: machine
+    class(bank_t), intent(in) :: bank
+    integer, intent(in) :: element   !! numbered within the bank
+    character(len=16) :: kind
+    integer :: row
+
+    kind = role_names(bank%role)
     if (bank%role == role_bearing) kind = 'body'
     select type (bank)
     class is (couplings_t)
       if (bank%is_mesh) kind = 'mesh'
       if (bank%has_parts) kind = 'shaft'
     end select
-    call bank%quantities(quantities)
-    do q = 1, size(quantities)
-      do e = 1, size(quantities(q)%elements)
-        associate (one => quantities(q), element => quantities(q)%elements(e))
-          rank = one%rank
-          if (one%symbol == 'moment' .and. any(bank%with_work == element)) rank = rank_detail
-          body = 0
-          if (allocated(one%body)) body = one%body(e)
-          call add_signal(signals, count, signal_source_t(signal_element, number, q, element, one%form, one%divisor, body, &
-                                                          one%factor), trim(one%symbol), kind, bank%names(element)%text, &
-                          trim(one%point), trim(one%unit), trim(one%caption), trim(one%positive), rank)
-        end associate
-      end do
+    if (bank%role /= role_loss) return
+    kind = 'mesh'
+    do row = 1, machine%constraints%rows()
+      if (machine%constraints%names(row)%text == bank%names(element)%text) kind = machine%constraints%kinds(row)%text
     end do
-  end subroutine add_bank
+  end function group_kind
 
   !> The multiplier of each row, followed by the torques on those of its members that have a signal. The multiplier of a row that
   !> holds a joint, as that of a clutch, is its torque on the second body.
@@ -197,51 +217,51 @@ contains
     type(machine_t), intent(in) :: machine
     type(signal_t), allocatable, intent(inout) :: signals(:)
     integer, intent(inout) :: count
+    type(quantity_t) :: one
     integer :: member, row
 
     member = 1
     associate (rows => machine%constraints, members => machine%constraints%members)
       do row = 1, rows%rows()
-        if (rows%is_of_teeth(row)) then
-          call add_signal(signals, count, signal_source_t(signal_reaction, index=row), 'reaction', rows%kinds(row)%text, &
-                          rows%names(row)%text, '', rows%units(row)%text, 'reaction', 'in the positive direction of both', &
-                          rank_reaction)
-        else
-          call add_signal(signals, count, signal_source_t(signal_reaction, index=row), 'torque', rows%kinds(row)%text, &
-                          rows%names(row)%text, '', rows%units(row)%text, 'torque', 'on the second body', rank_torque)
-        end if
+        one = quantity_t(symbol='torque', unit=rows%units(row)%text, caption='torque', positive='on the second body', &
+                         rank=rank_torque)
+        if (rows%is_of_teeth(row)) one = quantity_t(symbol='reaction', unit=rows%units(row)%text, caption='reaction', &
+                                                    positive='in the positive direction of both', rank=rank_reaction)
+        call add_signal(signals, count, signal_source_t(signal_reaction, index=row), one, rows%kinds(row)%text, &
+                        rows%names(row)%text, '')
         do while (member <= size(members%row))
           if (members%row(member) /= row) exit
-          call add_signal(signals, count, signal_source_t(signal_member, index=member), 'reaction', rows%kinds(row)%text, &
-                          rows%names(row)%text, members%names(member)%text, 'N m', 'torque on a member', &
-                          'with a positive speed', rank_reaction)
+          one = quantity_t(symbol='reaction', unit='N m', caption='torque on a member', positive='with a positive speed', &
+                           rank=rank_reaction)
+          call add_signal(signals, count, signal_source_t(signal_member, index=member), one, rows%kinds(row)%text, &
+                          rows%names(row)%text, members%names(member)%text)
           member = member + 1
         end do
       end do
     end associate
   end subroutine add_reactions
 
-  !> Appends a signal.
-  pure subroutine add_signal(signals, count, source, symbol, element_kind, element, point, unit, caption, positive, rank)
+  !> Appends a signal of an element; what it is, `quantity` says.
+  pure subroutine add_signal(signals, count, source, quantity, element_kind, element, point)
     type(signal_t), allocatable, intent(inout) :: signals(:)
     integer, intent(inout) :: count
     type(signal_source_t), intent(in) :: source
-    character(len=*), intent(in) :: symbol, element_kind, element, point, unit, caption, positive
-    integer, intent(in) :: rank
+    type(quantity_t), intent(in) :: quantity   !! but for its point
+    character(len=*), intent(in) :: element_kind, element, point
 
     if (count == size(signals)) call resize(signals, count, 2 * count)
     count = count + 1
     associate (one => signals(count))
       one%source = source
-      one%symbol = symbol
-      one%element_kind = element_kind
+      one%symbol = trim(quantity%symbol)
+      one%element_kind = trim(element_kind)
       one%element = element
       one%point = point
-      one%unit = unit
-      one%caption = caption
-      one%positive = positive
-      one%rank = rank
-      one%name = symbol
+      one%unit = trim(quantity%unit)
+      one%caption = trim(quantity%caption)
+      one%positive = trim(quantity%positive)
+      one%rank = quantity%rank
+      one%name = one%symbol
       if (element /= '') one%name = one%name // '_' // element
       if (point /= '' .and. index(point, '[') /= 1) one%name = one%name // '_'
       one%name = one%name // point
@@ -296,8 +316,7 @@ contains
     end do
   end subroutine label_signals
 
-  !> A signal of an element, 0 if there is none. The total moment of a coupling without damping is its elastic moment; the force of
-  !> a gear is its reaction.
+  !> A signal of an element, 0 if there is none. The total moment of a coupling without damping is its elastic moment.
   recursive integer function find_signal(signals, element_kind, element, symbol, point) result(found)
     type(signal_t), intent(in) :: signals(:)
     character(len=*), intent(in) :: element_kind, element   !! the group of the input, and its name

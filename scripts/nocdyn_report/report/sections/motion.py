@@ -1,45 +1,16 @@
 """Runs over the time: peaks with their times, the load cases, curves."""
 
-import re
-
+from ...columns import DETAIL, LOSS, TWIST, Column, by_sort
 from ..content import Cell, Figure, Heading, Paragraph, Section, Table, first, number, rounded, share, text
-from ..numbers import name_and_unit, number_text, unit_text
+from ..numbers import number_text, unit_text
 from ..sources import Run, Sources
 from .response import ratio_tone
 
 TIME = "t [s]"
-FIGURES = {  # quantities that get a figure of their own, in this order, with what the axis says
-    "omega": "speed",
-    "shaft": "moment of the shaft, elastic and damping",
-    "moment": "elastic moment",
-    "reaction": "reaction",
-    "force": "force",
-    "stress": "stress",
-    "torque": "torque",
-    "slip": "slip",
-    "current": "current",
-}
-RANKS = [
-    "shaft",
-    "moment",
-    "reaction",
-    "force",
-    "stress",
-    "torque",
-    "loss",
-    "bearing",
-    "omega",
-    "slip",
-    "twist",
-    "deformation",
-    "damping",
-]
+NO_FIGURE = (LOSS, TWIST)  # only their extremes are told
 MOST_CURVES = 10  # of a figure
 SHOWN_CURVES = 5  # at first
 MOST_ROWS = 200
-INNER = re.compile(r"\[\d+\]$")  # of the names of inner nodes of shafts
-WHOLE = "_max"  # of the largest moment along a shaft
-LEFT_OUT = re.compile(r"(phi|damping|work)_|.*_energy$|energy_residual$")  # of the tables of peaks
 
 
 def motion_section(sources: Sources) -> Section | None:
@@ -91,8 +62,9 @@ def _cases(sources: Sources) -> Table:
 
 def _peaks(sources: Sources) -> Table:
     rows = []
-    peaks = [peak for peak in sources.cases["peaks"] if not INNER.search(peak["column"]) and not LEFT_OUT.match(peak["column"])]
-    for peak in sorted(peaks, key=lambda one: rank(one["column"])):
+    columns = {column.name: column for run in sources.runs for column in run.column_list.values()}
+    peaks = [peak for peak in sources.cases["peaks"] if _is_shown(columns[peak["column"]])]
+    for peak in sorted(peaks, key=lambda one: columns[one["column"]].rank):
         values = [text(peak["column"]), number(peak["largest"]), text(unit_text(peak["unit"])), number(peak["time"])]
         rows.append([*values, text(peak["load_case"], "", f"#{anchor(peak['load_case'])}")])
     rows, more = first(rows, MOST_ROWS, "cases.csv")
@@ -105,10 +77,9 @@ def anchor(case: str) -> str:
     return "case-" + "-".join(case.split())
 
 
-def rank(name: str) -> int:
-    """What one looks for first comes first."""
-    kind = name.split("_", 1)[0]
-    return RANKS.index(kind) if kind in RANKS else len(RANKS)
+def _is_shown(column: Column) -> bool:
+    """Whether a table of peaks has it."""
+    return column.rank < DETAIL and not column.is_inner
 
 
 def _limits(run: Run) -> Table:
@@ -122,10 +93,10 @@ def _limits(run: Run) -> Table:
 def _extremes(run: Run) -> Table:
     transient = run.summary.get("start_transient", {})
     rows: list[list[Cell]] = []
-    for label in sorted(run.columns, key=rank):
-        column = run.columns[label]
-        name, unit = name_and_unit(label)
-        if "min" not in column or INNER.search(name) or LEFT_OUT.match(name):
+    for label, signal in run.column_list.items():
+        column = run.columns.get(label, {})
+        name, unit = signal.name, signal.unit
+        if "min" not in column or not _is_shown(signal):
             continue
         star = "*" if label in [*transient.get("has_min_of", []), *transient.get("has_max_of", [])] else ""
         shown = rounded({key: column[key] for key in ("min", "max", "last")}, dict.fromkeys(("min", "max", "last"), unit))
@@ -141,7 +112,7 @@ def _extremes(run: Run) -> Table:
     notes = [f"The extremes are those {run.summary.get('extremes', 'of the motion')}."]
     if "extremes_from" in run.summary:
         notes.append(f"They are taken from {number_text(run.summary['extremes_from'])} s on.")
-    notes.append("Angles, damping moments, energies and inner nodes of shafts are in summary.json.")
+    notes.append("Angles, parts of moments, energies and inner nodes of shafts are in summary.json.")
     if transient:
         notes.append(f"* In the first fast transient of a start out of balance, up to {number_text(transient['until'])} s.")
     columns = ["quantity", "unit", "smallest", "at t [s]", "largest", "largest at t [s]", "last"]
@@ -163,50 +134,42 @@ def _events(run: Run) -> Table:
 
 
 def _figures(sources: Sources, run: Run) -> list[Figure]:
-    chosen: dict[tuple[str, str], list[str]] = {}
-    labels = run.labels()
-    shafts = {name_and_unit(label)[0].split("_", 1)[-1] for label in labels if label.startswith("shaft_")}
-    for label in labels:
-        name, unit = name_and_unit(label)
-        kind, _, element = name.partition("_")
-        is_told = (kind == "moment" and (element in shafts or element.endswith(WHOLE))) or INNER.search(name)
-        if kind in FIGURES and not is_told:
-            chosen.setdefault((kind, unit), []).append(label)
+    """A figure for each sort of columns, with those that vary most."""
     ranges = {label: column["max"] - column["min"] for label, column in run.columns.items() if "max" in column}
-    counts = {key: len(members) for key, members in chosen.items()}
-    for key, members in chosen.items():
-        kept = set(sorted(members, key=lambda label: -ranges.get(label, 0.0))[:MOST_CURVES])
-        chosen[key] = [label for label in members if label in kept]
-    keys = sorted(chosen, key=lambda key: list(FIGURES).index(key[0]))
-    needed = list(dict.fromkeys(label for key in keys for label in chosen[key]))
+    sorts = by_sort(column for column in run.drawn() if column.rank not in NO_FIGURE)
+    chosen = [first_by_range(columns, ranges, MOST_CURVES) for columns in sorts]
+    needed = [column.label for columns in chosen for column in columns]
     if not needed:
         return []
     table = run.values([TIME, *needed])
     if len(table) < 2:
         return []
-    return [_figure(sources, run, table, key, chosen[key], counts[key], ranges) for key in keys]
+    return [_figure(sources, run, table, columns, len(all_of), ranges) for columns, all_of in zip(chosen, sorts)]
 
 
-def _figure(
-    sources: Sources, run: Run, table: object, key: tuple, labels: list[str], count: int, ranges: dict[str, float]
-) -> Figure:
-    kind, unit = key
-    time = table[TIME].to_numpy()
-    shown = set(sorted(labels, key=lambda label: -ranges.get(label, 0.0))[:SHOWN_CURVES])
-    curves = []
-    for label in labels:
-        name = name_and_unit(label)[0].split("_", 1)[-1]
-        curves.append(sources.arrays.curve(name, time, table[label].to_numpy(), shown=label in shown))
+def first_by_range(columns: list[Column], ranges: dict[str, float], most: int) -> list[Column]:
+    """Those that vary most, in their order."""
+    kept = sorted(columns, key=lambda column: -ranges.get(column.label, 0.0))[:most]
+    return [column for column in columns if column in kept]
+
+
+def _figure(sources: Sources, run: Run, table: object, columns: list[Column], count: int, ranges: dict[str, float]) -> Figure:
+    time, one = table[TIME].to_numpy(), columns[0]
+    shown = first_by_range(columns, ranges, SHOWN_CURVES)
+    curves = [
+        sources.arrays.curve(column.title, time, table[column.label].to_numpy(), shown=column in shown) for column in columns
+    ]
     spec = {
         "x": {"label": "time", "unit": "s"},
-        "y": {"label": FIGURES[kind], "unit": unit},
+        "y": {"label": one.caption, "unit": one.unit},
         "curves": curves,
-        "name": kind,
+        "name": one.kind,
     }
-    some = f", the {len(labels)} of {count} that vary most" if len(labels) < count else ""
-    told = "; ".join(_range(label, run.columns[label], unit) for label in labels if "max" in run.columns.get(label, {}))
-    return Figure(f"{FIGURES[kind].capitalize()}{_of(run)} over the time{some}", f"Curves over the time: {told}.", spec)
+    some = f", the {len(columns)} of {count} that vary most" if len(columns) < count else ""
+    told = "; ".join(_range(column, run.columns[column.label]) for column in columns if column.label in ranges)
+    caption = one.caption[0].upper() + one.caption[1:]
+    return Figure(f"{caption}{_of(run)} over the time{some}", f"Curves over the time: {told}.", spec)
 
 
-def _range(label: str, column: dict, unit: str) -> str:
-    return f"{name_and_unit(label)[0]} from {number_text(column['min'])} to {number_text(column['max'])} {unit}"
+def _range(column: Column, found: dict) -> str:
+    return f"{column.name} from {number_text(found['min'])} to {number_text(found['max'])} {column.unit}"

@@ -178,7 +178,7 @@ def _figure(sources: Sources, quantity: Quantity) -> Figure:
     }
     at = number_text(float(speed[np.nanargmax(quantity.half_range)]))
     return Figure(
-        f"{quantity.label}: half range over the speed, and its largest orders. Triangles: critical speeds",
+        f"{quantity.label}, {quantity.column.caption}: half range over the speed, largest orders. Triangles: critical speeds",
         f"Half range of {quantity.label} over the speed of {response.body}; the largest is {number_text(top)} {quantity.unit} "
         f"at {at} {sources.speed_unit}.",
         spec,
@@ -196,9 +196,10 @@ def _orders(sources: Sources, quantity: Quantity, speed: np.ndarray) -> list[dic
 
 
 def _barred(sources: Sources, quantity: Quantity) -> list[dict]:
-    shafts = {shaft["name"] for shaft in sources.check["shafts"]}
-    element = next((name for name in shafts if quantity.element in (f"{name}_1", f"{name}_2")), quantity.element)
-    own = {quantity.label, f"stress_{element}", f"moment_{element}"}
+    """Those of its own limits, and of limits of the whole element, as of a stress."""
+    column = quantity.column
+    whole = {one.name for one in sources.response.columns if one.point in ("", "max") and one.is_of(column)}
+    own = {quantity.label, *whole}
     bands = []
     for one in sources.response.barred:
         if one.quantity in own:

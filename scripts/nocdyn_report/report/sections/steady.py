@@ -2,17 +2,14 @@
 
 from collections.abc import Iterable
 
+from ...columns import SLIP, SPEED, Column
 from ..content import Heading, Section, Table, first, number, rounded, text
-from ..numbers import name_and_unit, number_text, unit_text
+from ..numbers import number_text, unit_text
 from ..sources import Sources
 
 MOST_ROWS = 160
-GROUPS = {  # tables, and the quantities that are columns of each
-    "Speeds": ("omega", "phi", "slip"),
-    "Couplings and shafts": ("twist", "deformation", "moment", "force", "damping", "shaft", "stress"),
-    "Torques and reactions": ("torque", "throttle", "current", "reaction", "loss", "bearing"),
-}
-ENDS = ("_1", "_2", "_max")  # of a shaft: its moments
+ELASTIC = ("coupling", "shaft", "mesh")
+TORQUES = ("Couplings and shafts", "Torques and reactions")
 
 
 def steady_section(sources: Sources) -> Section | None:
@@ -20,12 +17,11 @@ def steady_section(sources: Sources) -> Section | None:
         return None
     section = Section("steady", "Steady state")
     states = sources.equilibrium["steady_states"]
-    elastic = {one["name"] for one in sources.check["couplings"]}
     for i, state in enumerate(states, start=1):
         which = f" {i} of {len(states)}" if len(states) > 1 else ""
         if which:
             section.add(Heading(f"State{which}", f"state-{i}"))
-        section.add(*_values(state, which, elastic), _powers(state, which))
+        section.add(*_values(state, which, sources.steady_columns), _powers(state, which))
     return section
 
 
@@ -39,29 +35,25 @@ def stability_text(state: dict) -> str:
     return f"Stability: {state['stability']}."
 
 
-def _values(state: dict, which: str, elastic: set[str]) -> Iterable[Table]:
+def _values(state: dict, which: str, columns: dict[str, Column]) -> Iterable[Table]:
     """A table for each group of quantities: a row for each element, a column for each quantity of it."""
-    values = rounded(state["values"], {label: name_and_unit(label)[1] for label in state["values"]})
-    tables: dict[str, dict[str, dict[str, float]]] = {title: {} for title in GROUPS}
+    values = rounded(state["values"], {label: columns[label].unit for label in state["values"]})
+    tables: dict[str, dict[str, dict[str, float]]] = {title: {} for title in ("Speeds", *TORQUES)}
     others = []
     for label, value in values.items():
-        name, unit = name_and_unit(label)
-        quantity, _, element = name.partition("_")
-        title = next((title for title, kinds in GROUPS.items() if quantity in kinds), None)
-        if title is None:
-            others.append([text(name.replace("_", " ")), number(value), text(unit_text(unit))])
+        one = columns[label]
+        if not one.element:
+            others.append([text(one.caption), number(value), text(unit_text(one.unit))])
             continue
-        end = next((end for end in ENDS if element.removesuffix(end) in elastic and element.endswith(end)), "")
-        column = (
-            f"{'speed' if quantity == 'omega' else 'angle' if quantity == 'phi' else quantity}{end.replace('_', ' ')} [{unit}]"
-        )
-        tables[title].setdefault(element.removesuffix(end), {})[column] = value
+        title = "Speeds" if one.rank in (SPEED, SLIP) else TORQUES[one.element_kind not in ELASTIC]
+        head = f"{one.caption} {one.point}".rstrip() + f" [{one.unit}]"
+        tables[title].setdefault(one.element, {})[head] = value
     for title, rows in tables.items():
         if rows:
-            columns = list(dict.fromkeys(column for row in rows.values() for column in row))
-            shown = [[text(element), *(number(row.get(column)) for column in columns)] for element, row in rows.items()]
+            heads = list(dict.fromkeys(head for row in rows.values() for head in row))
+            shown = [[text(element), *(number(row.get(head)) for head in heads)] for element, row in rows.items()]
             shown, more = first(shown, MOST_ROWS, "equilibrium.json")
-            yield Table(f"Steady state{which}: {title.lower()}", ["element", *columns], shown, more)
+            yield Table(f"Steady state{which}: {title.lower()}", ["element", *heads], shown, more)
     yield Table(f"Steady state{which}: energies", ["quantity", "value", "unit"], others, stability_text(state), is_sorted=False)
 
 

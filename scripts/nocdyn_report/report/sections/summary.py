@@ -1,8 +1,9 @@
 """The findings, first of all."""
 
+from ...columns import LOADS
 from ...speed_results import roman
 from ..content import Cell, Section, Table, text
-from ..numbers import name_and_unit, number_text, percent
+from ..numbers import number_text, percent
 from ..sources import Sources
 from .campbell import verdict
 from .response import limited, passage, ratio_tone, shares_of_limits
@@ -10,7 +11,6 @@ from .steady import stability_text
 
 MOST_NAMED = 6  # of one sort
 MOST_PEAKS = 2  # of a kind
-PEAK_KINDS = ("shaft", "moment", "reaction", "force", "stress")
 
 
 def summary_section(sources: Sources) -> Section:
@@ -118,29 +118,25 @@ def _run_limits(sources: Sources) -> list[list[Cell]]:
 
 
 def _peaks(sources: Sources) -> list[list[Cell]]:
-    """The largest values of the kinds that one looks for."""
-    found: dict[str, dict[str, tuple[float, str]]] = {}  # by kind and unit, of each quantity
+    """The largest values of the sorts that one looks for."""
+    found: dict[tuple, dict[str, tuple[float, str]]] = {}  # by rank and sort, of each quantity
     for run in sources.runs:
         early = run.summary.get("start_transient", {})
-        for label, column in run.columns.items():
-            name, unit = name_and_unit(label)
-            kind = name.split("_", 1)[0]
-            if kind not in PEAK_KINDS or "max" not in column:
+        for label, one in run.column_list.items():
+            column = run.columns.get(label, {})
+            if one.rank not in LOADS or "max" not in column:
                 continue
             end = "max" if abs(column["max"]) >= abs(column["min"]) else "min"
             which = f", {run.name}" if run.name else ""
             start = ", in the start transient" if label in early.get(f"has_{end}_of", []) else ""
             value, time = number_text(column[end]), number_text(column[f"time_of_{end}"])
-            finding = f"{name} {value} {unit} at {time} s{which}{start}"
-            largest = found.setdefault(f"{kind} {unit}", {})
-            largest[name] = max(largest.get(name, (0.0, "")), (abs(column[end]), finding))
-    if any(key.startswith("shaft ") for key in found):
-        found = {key: values for key, values in found.items() if not key.startswith("moment ")}
+            finding = f"{one.name} {value} {one.unit} at {time} s{which}{start}"
+            largest = found.setdefault((one.rank, one.sort), {})
+            largest[one.name] = max(largest.get(one.name, (0.0, "")), (abs(column[end]), finding))
     rows = []
-    for key, values in found.items():
-        kind = {"shaft": "moment"}.get(key.split()[0], key.split()[0])
+    for (_, (_, caption, _)), values in sorted(found.items(), key=lambda item: item[0][0]):
         largest = [finding for _, finding in sorted(values.values(), reverse=True)[:MOST_PEAKS]]
-        rows.append(_row(f"Largest {kind}", "motion", "; ".join(largest) + "."))
+        rows.append(_row(f"Peak: {caption}", "motion", "; ".join(largest) + "."))
     return rows
 
 

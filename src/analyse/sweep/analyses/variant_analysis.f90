@@ -189,7 +189,7 @@ contains
     end do
   end function largest_ratio
 
-  !> The quantities that a name stands for: a column, or those of some kinds of an element.
+  !> The quantities that a name stands for: a column, or those of some kinds of an element; else a column that had this name.
   pure function matching_quantities(quantities, name, kinds) result(matching)
     type(moment_form_t), intent(in) :: quantities(:)
     character(len=*), intent(in) :: name
@@ -198,11 +198,12 @@ contains
     character(len=:), allocatable :: former
     integer :: q
 
-    allocate (matching(0))
+    matching = pack([(q, q=1, size(quantities))], [(quantities(q)%name == name .or. any(quantities(q)%kind == kinds) .and. &
+                                                    quantities(q)%element == name, q=1, size(quantities))])
+    if (size(matching) > 0 .or. name == '') return
     do q = 1, size(quantities)
       call former_name(quantities(q)%signal_t, .true., former)
-      if (quantities(q)%name == name .or. any(quantities(q)%kind == kinds) .and. quantities(q)%element == name .or. &
-          former == name .and. name /= '') matching = [matching, q]
+      if (former == name) matching = [q]
     end do
   end function matching_quantities
 

@@ -136,7 +136,7 @@ contains
         call json%put('file', sweep_netcdf_name)
         call json%put('name', one%label)
         do k = 1, size(fact_names)
-          call json%put(trim(fact_names(k)), one%fact(k))
+          call json%put(trim(fact_names(k)), one%facts(k)%text)
         end do
         call json%put('unit', one%unit)
         call json%put('long_name', one%long_name)

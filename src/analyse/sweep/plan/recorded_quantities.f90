@@ -1,20 +1,21 @@
 !> The recorded quantities of a sweep: the statistics and trajectories that the groups &record ask for.
 module nocdyn_recorded_quantities
   use nocdyn_analysis_results, only: analysis_result_t
-  use nocdyn_column_names, only: explain_no_signal
+  use nocdyn_column_names, only: explain_no_signal, note_former_name
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_output_units, only: match_signal, output_units
   use nocdyn_recorded_analyses, only: analysis_reader_t
   use nocdyn_recorded_fatigue, only: list_fatigue_statistics
-  use nocdyn_signals, only: signal_t
+  use nocdyn_signals, only: former_name, signal_t
   use nocdyn_statistics, only: is_of_fatigue, new_statistic, statistic_names, statistic_t
   use nocdyn_text, only: quoted, string_t, to_text
+  use nocdyn_variant_analysis, only: matching_quantities, recorded_kinds
   implicit none (type, external)
   private
 
-  public :: read_recorded_quantities, check_quantities, restrict_statistics, wanted_trajectories
+  public :: read_recorded_quantities, check_quantities, note_former_records, restrict_statistics, wanted_trajectories
 
   real(wp), parameter :: unknown_start = -huge(1.0_wp)   ! stands for `from` if t_start varies and `from` is not given
 
@@ -154,23 +155,71 @@ contains
     type(diagnostics_t), intent(inout) :: diagnostics
     integer, intent(out), optional :: unit   !! of its statistics: index of `units`, 0: that of SI
     character(len=:), allocatable :: quantity, reason
-    integer, allocatable :: wanted(:)
     integer :: quantity_unit
-    logical :: is_column, is_former
 
-    allocate (wanted, source=output_units(input))
     quantity = trim(adjustl(input%groups(record)%text('quantity')))
-    do column = 1, size(signals)
-      call match_signal(signals(column), quantity, wanted, is_column, quantity_unit, is_former)
-      if (.not. is_column) cycle
-      if (present(unit)) unit = quantity_unit
-      return
-    end do
-    column = 0
+    call match_column(quantity, signals, output_units(input), column, quantity_unit)
+    if (present(unit)) unit = quantity_unit
+    if (column > 0) return
     call explain_no_signal(quantity, signals, reason)
     call input%report(record, 'quantity', 'quantity = ' // quoted(quantity) // ' is no column of trajectory.csv' // reason, &
                       diagnostics)
   end subroutine find_column
+
+  !> The column that a quantity names; a name of today goes before a former one.
+  subroutine match_column(quantity, signals, wanted, column, unit, is_former)
+    character(len=*), intent(in) :: quantity
+    type(signal_t), intent(in) :: signals(:)
+    integer, intent(in) :: wanted(:)         !! units of a quantity without one: indices of `units`
+    integer, intent(out) :: column, unit     !! 0 if there is none; index of `units`, 0: that of SI
+    logical, intent(out), optional :: is_former
+    integer :: i, other_unit
+    logical :: has_former, matches
+
+    column = 0
+    unit = 0
+    if (present(is_former)) is_former = .false.
+    do i = 1, size(signals)
+      call match_signal(signals(i), quantity, wanted, matches, other_unit, has_former)
+      if (.not. matches .or. (has_former .and. column > 0)) cycle
+      column = i
+      unit = other_unit
+      if (present(is_former)) is_former = has_former
+      if (.not. has_former) return
+    end do
+  end subroutine match_column
+
+  !> Notes on groups &record that name signals as they were called before.
+  subroutine note_former_records(input, reader, signals, notes)
+    type(input_t), intent(in) :: input
+    type(analysis_reader_t), intent(in) :: reader
+    type(signal_t), intent(in) :: signals(:)   !! of trajectory.csv
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    character(len=:), allocatable :: former, name
+    integer, allocatable :: found(:), records(:)
+    integer :: column, i, unit
+    logical :: is_former
+
+    allocate (records, source=input%groups_named('record'))
+    do i = 1, size(records)
+      associate (group => input%groups(records(i)))
+        if (group%has_value('quantity')) then
+          call match_column(trim(adjustl(group%text('quantity'))), signals, output_units(input), column, unit, is_former)
+          if (.not. is_former) cycle
+          call former_name(signals(column), .false., former)
+          call note_former_name(input, records(i), 'quantity', former, signals(column)%name, notes)
+        else if (group%has_value('response')) then
+          name = group%text('response')
+          found = matching_quantities(reader%quantities, name, recorded_kinds)
+          if (size(found) /= 1) cycle
+          associate (one => reader%quantities(found(1)))
+            if (one%name /= name .and. one%element /= name) call note_former_name(input, records(i), 'response', name, one%name, &
+                                                                                  notes)
+          end associate
+        end if
+      end associate
+    end do
+  end subroutine note_former_records
 
   subroutine check_from(input, record, span, diagnostics)
     type(input_t), intent(in) :: input

@@ -3,7 +3,6 @@
 module nocdyn_sweep_plan
   use nocdyn_analysis_results, only: analysis_names, analysis_result_t
   use nocdyn_column_names, only: count_columns
-  use nocdyn_csv, only: table_bytes
   use nocdyn_designs, only: design_t
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
@@ -11,13 +10,14 @@ module nocdyn_sweep_plan
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_diagnostics, only: diagnostics_t
-  use nocdyn_output_times, only: check_output_times
+  use nocdyn_output_times, only: check_output_times, table_bytes
   use nocdyn_schema, only: first_key, has_word, key_rules
   use nocdyn_statistics, only: statistic_names, statistic_t
   use nocdyn_sweep_design, only: find_varied, read_design
   use nocdyn_sweep_header, only: quantity_t, sweep_header_t
   use nocdyn_recorded_analyses, only: analysis_reader_t, new_analysis_reader
-  use nocdyn_recorded_quantities, only: check_quantities, read_recorded_quantities, time_span_t, wanted_trajectories
+  use nocdyn_recorded_quantities, only: check_quantities, note_former_records, read_recorded_quantities, time_span_t, &
+    wanted_trajectories
   use nocdyn_row_intervals, only: choose_row_count
   use nocdyn_targets, only: target_t
   use nocdyn_text, only: counted, string_t, to_text
@@ -41,6 +41,7 @@ module nocdyn_sweep_plan
     type(analysis_result_t), allocatable :: analyses(:)   !! results of modes and of the response
     integer, allocatable :: trajectories(:)           !! variants whose trajectories are written, ascending
     integer :: columns = 0                            !! of each trajectory
+    type(string_t), allocatable :: notes(:)           !! for the user
     character(len=:), allocatable :: list_checksum    !! of the file of a list, '' if there is none
   contains
     procedure :: values, results, varies_key, summary, file_bytes
@@ -75,10 +76,12 @@ contains
       call read_recorded_quantities(input, reader, signals, fixed_span(input, plan%numbers%targets), variants, plan%statistics, &
                                     plan%analyses, diagnostics)
       allocate (plan%trajectories, source=wanted_trajectories(input))
+      allocate (plan%notes(0))
+      call note_former_records(input, reader, signals, plan%notes)
       if (plan%results() == 0 .and. diagnostics%count == 0) call input%report(sweeps(1), 'design', &
         'no number of the variants is kept; needed: a &record with quantity, fatigue, mode or response', diagnostics)
       if (size(plan%trajectories) > 0) call check_output_times(input, failure)
-      if (.not. allocated(failure)) call count_columns(input, plan%machine, plan%columns, failure)
+      if (.not. allocated(failure)) call count_columns(input, plan%machine, plan%columns, plan%notes, failure)
     end if
     call merge_errors(input, diagnostics, failure, error)
   end subroutine make_plan
@@ -262,10 +265,14 @@ contains
   subroutine set_quantity(label, unit, long_name, quantity)
     character(len=*), intent(in) :: label, unit, long_name
     type(quantity_t), intent(out) :: quantity
+    integer :: k
 
     quantity%label = label
     quantity%unit = unit
     quantity%long_name = long_name
+    do k = 1, size(quantity%facts)
+      quantity%facts(k)%text = ''
+    end do
   end subroutine set_quantity
 
   !> What is known of the signal of a result, in the order of `fact_names`.

@@ -113,7 +113,7 @@ module nocdyn_schema
     key_rule_t('output',     'points',          an_integer,     1, '',            '1001',      from_2, &
       'number of rows; with neither interval nor points more where an excitation is fast'), &
     key_rule_t('output',     'columns',         a_text,         any_number, '',   unset,       anything, &
-      "columns that are written: names, or patterns with *, e.g. 'moment_*'; all if not given", fewest=1), &
+      "columns that are written: names, or patterns with *, e.g. 'total_moment_*'; all if not given", fewest=1), &
     key_rule_t('output',     'format',          a_word,         1, '',            "'csv'",     formats, &
       'trajectory.csv, or trajectory.nc, which nocdyn-sweep writes'), &
     key_rule_t('output',     'extremes_from',   a_number,       1, 's',           unset,       anything, &

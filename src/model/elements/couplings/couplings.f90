@@ -310,7 +310,7 @@ contains
     if (size(columns) < 5) return
     associate (modulus => self%parameters(self%number_of('section_modulus'))%value)
       columns(5) = new_quantity('stress', 'Pa', pack(columns(1)%elements, any(modulus > 0, dim=1)), &
-                                'shear stress of the elastic and damping moment', 'with this moment', rank_stress, form_total, &
+                                'shear stress', 'with the elastic and damping moment', rank_stress, form_total, &
                                 -1.0_wp)
       columns(5)%divisor = self%number_of('section_modulus')
     end associate

@@ -91,15 +91,16 @@ contains
   subroutine quantities(self, columns)
     class(shafts_t), intent(in) :: self
     type(quantity_t), allocatable, intent(out) :: columns(:)
-    character(len=*), parameter :: with = 'with the twist'
+    character(len=*), parameter :: at_end = 'moment at an end of the shaft', with = 'with the twist'
     integer :: s
 
     allocate (columns(power))
     associate (first => self%shafts%first)
-      columns(twist) = new_quantity('twist', 'rad', first, 'twist', 'if the second end is ahead', rank_twist, form_observed, 1.0_wp)
-      columns(moment_1) = new_quantity('total_moment', 'N m', first, 'moment at the first end', with, rank_moment, &
+      columns(twist) = new_quantity('twist', 'rad', first, 'twist', 'if the second end is ahead', rank_twist, form_observed, &
+                                    1.0_wp)
+      columns(moment_1) = new_quantity('total_moment', 'N m', first, at_end, with, rank_moment, &
                                        form_observed, 1.0_wp)
-      columns(moment_2) = new_quantity('total_moment', 'N m', first, 'moment at the second end', with, rank_moment, &
+      columns(moment_2) = new_quantity('total_moment', 'N m', first, at_end, with, rank_moment, &
                                        form_observed, 1.0_wp)
       columns(largest_moment) = new_quantity('total_moment', 'N m', first, 'largest moment along the shaft', with, &
                                              rank_moment, form_observed, 1.0_wp)

@@ -167,11 +167,11 @@ contains
     type(quantity_t), allocatable, intent(out) :: columns(:)
 
     allocate (columns(4))
-    columns(1) = new_quantity('position', 'm', [part_piston], 'position of the piston from the axis of the crank', &
+    columns(1) = new_quantity('position', 'm', [part_piston], 'position of the piston', &
                               'away from the crank', rank_twist, form_angle, 1.0_wp)
     columns(2) = new_quantity('velocity', 'm/s', [part_piston], 'velocity of the piston', 'away from the crank', rank_slip, &
                               form_speed, 1.0_wp)
-    columns(3) = new_quantity('force', 'N', [part_piston], 'force of the rod on the pin of the piston', 'away from the crank', &
+    columns(3) = new_quantity('force', 'N', [part_piston], 'force of the rod on the piston', 'away from the crank', &
                               rank_force, form_applied, 1.0_wp)
     columns(4) = new_quantity('torque', 'N m', [part_piston], 'torque of piston and rod on the crank', 'with a positive speed', &
                               rank_torque, form_observed, 1.0_wp)

@@ -61,7 +61,7 @@ contains
     allocate (columns(1))
     columns(1) = new_quantity(trim(merge('force ', 'torque', self%moment_unit == 'N')), self%moment_unit, &
                               [(e, e=1, self%count)], trim(merge('force ', 'torque', self%moment_unit == 'N')) // &
-                              ' of the row', 'on the moved body', rank_torque, form_total, 1.0_wp)
+                              ' on the moved body', 'with a positive speed', rank_torque, form_total, 1.0_wp)
   end subroutine torques_of_rows
 
 end module nocdyn_moving_rows

@@ -92,7 +92,7 @@ contains
     integer :: e
 
     allocate (columns(1))
-    columns(1) = new_quantity('gas_force', 'N', [(e, e=1, self%count)], 'force of the gas on the piston', 'away from the crank', &
+    columns(1) = new_quantity('gas_force', 'N', [(e, e=1, self%count)], 'gas force on the piston', 'away from the crank', &
                               rank_force, form_total, 1.0_wp)
   end subroutine quantities
 

@@ -17,7 +17,7 @@ module nocdyn_flux_motors
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, node_of, operator(*), operator(+), operator(-), operator(/), speed_of, state_of
   use nocdyn_law_tape, only: law_tape_t
-  use nocdyn_quantities, only: form_applied, form_observed, new_quantity, quantity_t, rank_detail, rank_torque
+  use nocdyn_quantities, only: form_applied, form_observed, new_quantity, quantity_t, rank_current, rank_torque
   use nocdyn_schedules, only: add_schedule, guard_schedule, schedule_t, scheduled_flag, scheduled_value, value_at
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -250,7 +250,7 @@ contains
     allocate (columns(2))
     columns(1) = new_quantity('torque', 'N m', [(e, e=1, self%count)], 'torque on the body', 'with a positive speed', &
                               rank_torque, form_applied, 1.0_wp)
-    columns(2) = new_quantity('current', 'A', columns(1)%elements, 'current of a line, rms', '', rank_detail, form_observed, 1.0_wp)
+    columns(2) = new_quantity('current', 'A', columns(1)%elements, 'line current (rms)', '', rank_current, form_observed, 1.0_wp)
   end subroutine quantities
 
   pure subroutine observe(self, elements, quantity, lane, values)

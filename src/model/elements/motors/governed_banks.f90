@@ -13,7 +13,7 @@ module nocdyn_governed_banks
     pick, speed_of, state_of
   use nocdyn_law_functions, only: add_guard
   use nocdyn_law_tape, only: law_tape_t
-  use nocdyn_quantities, only: form_applied, form_observed, new_quantity, quantity_t, rank_detail, rank_torque
+  use nocdyn_quantities, only: form_applied, form_observed, new_quantity, quantity_t, rank_current, rank_torque
   use nocdyn_schedules, only: add_schedule, guard_schedule, schedule_t, scheduled_value, value_at
   implicit none (type, external)
   private
@@ -200,10 +200,10 @@ contains
     allocate (columns(1 + self%states))
     columns(1) = new_quantity('torque', 'N m', [(e, e=1, self%count)], 'torque on the body', 'with a positive speed', &
                               rank_torque, form_applied, 1.0_wp)
-    if (self%states > 0) columns(2) = new_quantity('current', 'A', columns(1)%elements, 'current of the armature', &
-                                                    '', rank_detail, form_observed, 1.0_wp)
-    if (self%has_governor) columns(1 + self%states) = new_quantity('throttle', '1', columns(1)%elements, 'throttle, 1 if open', &
-                                                                   '', rank_detail, form_observed, 1.0_wp)
+    if (self%states > 0) columns(2) = new_quantity('current', 'A', columns(1)%elements, 'armature current', &
+                                                    '', rank_current, form_observed, 1.0_wp)
+    if (self%has_governor) columns(1 + self%states) = new_quantity('throttle', '1', columns(1)%elements, 'throttle opening', &
+                                                                   '', rank_current, form_observed, 1.0_wp)
   end subroutine quantities
 
   pure subroutine observe(self, elements, quantity, lane, values)
