@@ -2,7 +2,6 @@
 module nocdyn_response_quantities
   use nocdyn_bank, only: bank_t, role_coupling
   use nocdyn_coordinates, only: coordinates_t
-  use nocdyn_couplings, only: couplings_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_shafts, only: shafts_t
@@ -67,17 +66,6 @@ contains
     call list_reactions(machine, reference, quantities(list%count + 1:))
   end subroutine list_quantities
 
-  !> Whether the elements of a bank are meshes of teeth.
-  pure logical function is_mesh(bank)
-    class(bank_t), intent(in) :: bank
-
-    is_mesh = .false.
-    select type (bank)
-    class is (couplings_t)
-      is_mesh = bank%is_mesh
-    end select
-  end function is_mesh
-
   !> The moment of a coupling and its stress, or the force of a mesh.
   subroutine add_coupling(bank, e, list)
     class(bank_t), intent(in) :: bank
@@ -85,13 +73,13 @@ contains
     type(quantity_list_t), intent(inout) :: list
     integer :: modulus
 
-    if (is_mesh(bank)) then
+    if (bank%is_mesh) then
       call list%add(quantity_moment, bank%names(e)%text, 'force_' // bank%names(e)%text, 'N')
     else
       call list%add(quantity_moment, bank%names(e)%text, 'moment_' // bank%names(e)%text, 'N m')
     end if
     list%list(list%count)%element = [bank%first + e - 1]
-    list%list(list%count)%weight = reshape([merge(1.0_wp, -1.0_wp, is_mesh(bank))], [1, 1])
+    list%list(list%count)%weight = reshape([merge(1.0_wp, -1.0_wp, bank%is_mesh)], [1, 1])
     modulus = bank%number_of('section_modulus')
     if (modulus == 0) return
     associate (value => bank%parameters(modulus)%value(1, e))

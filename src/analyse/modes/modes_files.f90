@@ -1,7 +1,6 @@
 !> The files on the modes of a machine: modes.csv and modes.json.
 module nocdyn_modes_files
   use nocdyn_bank, only: bank_of
-  use nocdyn_couplings, only: couplings_t
   use nocdyn_equilibrium, only: t_infinity
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
@@ -158,10 +157,7 @@ contains
 
     key = 'stiffness_N_m_rad'
     associate (banks => self%machine%banks, element => self%elastic(findloc(self%whole, number, dim=1)))
-      select type (bank => banks(bank_of(banks, element))%bank)
-      class is (couplings_t)
-        if (bank%is_mesh) key = 'stiffness_N_m'
-      end select
+      if (banks(bank_of(banks, element))%bank%is_mesh) key = 'stiffness_N_m'
     end associate
   end function stiffness_key
 

@@ -1,6 +1,6 @@
 !> How dense the rows of a run must be to show the vibration that its excitations cause.
 module nocdyn_row_intervals
-  use nocdyn_bank, only: harmonic_t, role_load, role_names
+  use nocdyn_bank, only: harmonic_t, role_load
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
@@ -37,7 +37,7 @@ contains
     if (.not. frequency * interval > sparse) return
     associate (bank => machine%banks(fastest%bank)%bank)
       call append(notes, 'the rows are ' // rounded_text(interval, 3) // ' s apart and do not show the vibration by ' // &
-                  trim(role_names(bank%role)) // ' ' // quoted(bank%names(fastest%element)%text) // ', up to ' // &
+                  trim(bank%kind_name()) // ' ' // quoted(bank%names(fastest%element)%text) // ', up to ' // &
                   rounded_text(frequency, 3) // ' Hz; it would take &output interval = ' // &
                   rounded_text(dense / frequency, 2) // '. Smallest and largest values are those of the motion between rows')
     end associate
@@ -59,7 +59,7 @@ contains
     if (.not. oscillations > sparse * (usual - 1)) return
     rows = 1 + ceiling(min(oscillations / dense, real(most_rows - 1, wp)))
     associate (bank => machine%banks(fastest%bank)%bank)
-      call append(notes, to_text(rows) // ' rows for ' // trim(role_names(bank%role)) // ' ' // &
+      call append(notes, to_text(rows) // ' rows for ' // trim(bank%kind_name()) // ' ' // &
                   quoted(bank%names(fastest%element)%text) // ' with ' // rounded_text(fastest%rate / (2 * pi), 3) // &
                   ' Hz, as &output gives no interval')
     end associate

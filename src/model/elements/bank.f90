@@ -64,6 +64,7 @@ module nocdyn_bank
     logical :: is_silent = .false.                !! after `to_mean_torque`: whether the torque is zero in every state
     logical :: is_engine = .false.                !! whether its elements are excitations whose means drive
     logical :: follows_mean_speed = .false.       !! whether its torque changes with the speed from cycle to cycle, not within one
+    logical :: is_mesh = .false.                  !! whether its rows are radii: angles are deformations [m], moments forces [N]
     logical :: has_parts = .false.                !! whether consecutive elements of one name are parts of one element
     character(len=24), allocatable :: internal_names(:)   !! e.g. 'armature current', [states]
     integer :: first_internal = 1                 !! number of the first internal state of `first` in the machine
@@ -83,6 +84,7 @@ module nocdyn_bank
     procedure :: list_structure
     procedure :: last
     procedure :: named_count
+    procedure :: kind_name
     procedure :: is_source
     procedure :: quantities
     procedure :: observe
@@ -157,6 +159,15 @@ contains
 
     last = self%first + self%count - 1
   end function last
+
+  !> The kind of its elements as the input calls it: that of the role, 'shaft' or 'mesh'.
+  pure character(len=10) function kind_name(self)
+    class(bank_t), intent(in) :: self
+
+    kind_name = role_names(self%role)
+    if (self%is_mesh) kind_name = 'mesh'
+    if (self%has_parts) kind_name = 'shaft'
+  end function kind_name
 
   !> The number of elements with a name of their own.
   pure integer function named_count(self)
