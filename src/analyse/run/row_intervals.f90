@@ -1,4 +1,4 @@
-!> How dense the rows of a run must be to show the vibration that its excitations cause.
+!> How dense the rows of a run must be to show the vibration that its excitations and motors cause.
 module nocdyn_row_intervals
   use nocdyn_bank, only: harmonic_t, role_load
   use nocdyn_kinds, only: wp
@@ -65,7 +65,8 @@ contains
     end associate
   end subroutine wanted_rows
 
-  !> The fastest oscillation of an excitation at any of the speeds, with an amplitude that counts among those of its element.
+  !> The fastest oscillation of an excitation at any of the speeds, with an amplitude that counts among those of its element, or of
+  !> the transients of a motor.
   type(oscillation_t) function fastest_oscillation(machine, lowest, highest) result(fastest)
     type(machine_t), intent(in) :: machine
     real(wp), intent(in) :: lowest(:), highest(:)   !! [rad/s], [bodies]
@@ -78,6 +79,8 @@ contains
         if (bank%role == role_load) cycle
         do e = 1, bank%count
           if (bank%has_ended(e)) cycle
+          rate = bank%transient_frequency(e, allocated(machine%steady_internal))
+          if (rate > fastest%rate) fastest = oscillation_t(rate, b, e)
           speed = 0.0_wp
           associate (body => bank%rows%last_body(e))
             if (body > 0) speed = merge(lowest(body), highest(body), abs(lowest(body)) > abs(highest(body)))

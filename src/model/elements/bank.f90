@@ -74,6 +74,7 @@ module nocdyn_bank
     procedure :: to_mean_torque
     procedure :: list_harmonics
     procedure :: has_ended
+    procedure :: transient_frequency
     procedure :: hold_speed
     procedure :: follows_supply, set_supply, idle_supply
     procedure :: start_internal
@@ -212,6 +213,15 @@ contains
 
     has_ended = .false.
   end function has_ended
+
+  !> Frequency with which an element of the first lane oscillates after a change of its own [rad/s]; 0 by default.
+  pure real(wp) function transient_frequency(self, element, is_steady)
+    class(bank_t), intent(in) :: self
+    integer, intent(in) :: element     !! numbered within the bank
+    logical, intent(in) :: is_steady   !! whether its internal states begin as they stay
+
+    transient_frequency = 0.0_wp
+  end function transient_frequency
 
   !> amplitude sin(frequency t + order phi + phase).
   pure type(harmonic_t) function sine_harmonic(amplitude, frequency, order, phase, body) result(harmonic)
