@@ -71,7 +71,7 @@ contains
         if (.not. allocated(reading%error)) call assemble_for(arguments%command, reading%input, machine, reading%error)
         if (.not. allocated(reading%error)) call refuse_equal_labels(reading%input, machine, reading%error)
         if (.not. allocated(reading%error)) call analyse(arguments, reading%input, machine, folders(i)%text, reading%error)
-        if (.not. allocated(reading%error)) call check_load_cases(arguments%command, reading)
+        if (arguments%command == 'check') call check_load_cases(reading)
         if (allocated(reading%error)) call report_error(reading%error, code)
       end associate
     end do
@@ -95,19 +95,21 @@ contains
     end if
   end subroutine assemble_for
 
-  !> Builds the machines of the load cases for `check`.
-  subroutine check_load_cases(command, reading)
-    character(len=*), intent(in) :: command
+  !> Checks the load cases that can be read; if there is no mistake so far, builds their machines.
+  subroutine check_load_cases(reading)
     type(reading_t), intent(inout) :: reading   !! gets the mistakes of all of them
     type(machine_t) :: machine
     type(error_t), allocatable :: own
     integer :: c
+    logical :: is_right
 
-    if (command /= 'check') return
+    if (.not. allocated(reading%load_cases)) return
+    is_right = .not. allocated(reading%error)
     do c = 1, size(reading%load_cases)
-      call check_input(reading%load_cases(c), own)
-      if (.not. allocated(own)) then
-        call assemble_for(command, reading%load_cases(c), machine, own)
+      if (.not. allocated(reading%load_cases(c)%groups)) cycle
+      call check_input(reading%load_cases(c), own, reading%error)
+      if (is_right .and. .not. allocated(own)) then
+        call assemble_for('check', reading%load_cases(c), machine, own)
         if (allocated(own)) call name_load_case(reading%load_cases(c), own)
       end if
       call add_error(reading%error, own)
@@ -139,6 +141,7 @@ contains
     character(len=:), allocatable, intent(out) :: folder
     logical, intent(in), optional :: always_writes   !! as in `analyse_files`
     type(diagnostics_t) :: diagnostics
+    type(error_t), allocatable :: own
     integer :: chosen
 
     folder = out_folder(arguments, arguments%operands(number)%text)
@@ -146,7 +149,13 @@ contains
                     diagnostics, reading%load_cases, wanted_case(arguments))
     if (allocated(reading%error)) call add_plan_diagnostics(reading%input, diagnostics, reading%error)
     if (.not. allocated(reading%error)) call choose_case(arguments, reading%input, chosen, reading%error)
-    if (allocated(reading%error)) return
+    if (allocated(reading%error)) then
+      if (arguments%command == 'check' .and. allocated(reading%load_cases)) then   ! the machine itself can be read
+        call check_input(reading%input, own)
+        call add_error(reading%error, own)
+      end if
+      return
+    end if
     if (present(always_writes)) then
       if (always_writes) folder = result_folder(arguments, reading%input)
     end if
