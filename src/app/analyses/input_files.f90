@@ -6,16 +6,17 @@ module nocdyn_input_files
   use nocdyn_console, only: report_error
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_equilibrium, only: t_infinity
-  use nocdyn_errors, only: add_error, error_t, exit_done
+  use nocdyn_errors, only: add_error, error_t, exit_done, exit_failed, raise
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_joint_simplifications, only: refuse_joints
   use nocdyn_label_checks, only: refuse_equal_labels
   use nocdyn_load_case_checks, only: check_input, name_load_case
   use nocdyn_machine, only: machine_t
+  use nocdyn_posix, only: is_interrupted, stop_at_interrupts
   use nocdyn_result_folders, only: out_folder, refuse_shared_folders, result_folder
   use nocdyn_sweep_plan, only: add_plan_diagnostics, has_sweep, make_plan, sweep_plan_t
-  use nocdyn_text, only: string_t
+  use nocdyn_text, only: shown_path, string_t, to_text
   implicit none (type, external)
   private
 
@@ -54,6 +55,7 @@ contains
     type(string_t), allocatable :: folders(:)
     type(machine_t) :: machine
     type(error_t), allocatable :: error
+    character(len=:), allocatable :: words
     integer :: i
 
     code = exit_done
@@ -68,13 +70,20 @@ contains
     end if
     do i = 1, size(readings)
       associate (reading => readings(i))
+        words = shown_path(arguments%operands(i)%text) // ': interrupted, without results'
+        call stop_at_interrupts('nocdyn: ' // words // new_line('a'))
         if (.not. allocated(reading%error)) call assemble_for(arguments%command, reading%input, machine, reading%error)
         if (.not. allocated(reading%error)) call refuse_equal_labels(reading%input, machine, reading%error)
         if (.not. allocated(reading%error)) call analyse(arguments, reading%input, machine, folders(i)%text, reading%error)
         if (arguments%command == 'check') call check_load_cases(reading)
+        if (is_interrupted() .and. allocated(reading%error)) reading%error%message = words
         if (allocated(reading%error)) call report_error(reading%error, code)
       end associate
+      if (is_interrupted()) exit
     end do
+    if (i >= size(readings)) return
+    call raise(error, exit_failed, 'files left out after the interruption: ' // to_text(size(readings) - i))
+    call report_error(error, code)
   end subroutine analyse_files
 
   !> Builds the machine as a command looks at it: all but `check` and `matrices` look at a steady state.
