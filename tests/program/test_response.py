@@ -516,3 +516,13 @@ def test_a_peak_beyond_its_limit_is_told_beside_a_barred_range(nocdyn):
     assert one["ratio_to_limit"] > one["peak_ratio_to_limit"] > 1
     assert "  barred by moment_shaft: " in printed
     assert "  moment_shaft exceeds its limit of the peak: " in printed
+
+
+def test_columns_of_the_printed_table_are_apart(nocdyn):
+    text = GEARED + "&motor name = 'm' body = 'rotor' kind = 'constant' torque = 160 /\n"
+    text = text.replace("body = 'fan' speed_rpm = 60, 450", "body = 'rotor' speed_rpm = 180, 1350")
+    lines = nocdyn("response", nocdyn.write("machine.nml", text)).stdout.splitlines()
+    first = next(i for i, line in enumerate(lines) if line.startswith("  mode "))
+    row = lines[first + 1].split()
+    assert row[2] == "0.666667"
+    assert lines[first].index("order") + len("order") == lines[first + 1].index(row[2]) + len(row[2])
