@@ -129,6 +129,16 @@ def test_an_induction_motor_against_its_own_sense_is_refused(nocdyn):
     )
 
 
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_a_coupling_without_a_law_is_noted(nocdyn, command):
+    text = "&body name='a' inertia=1 speed=1 /\n&body name='b' inertia=1 /\n&coupling name='u' bodies='a','b' {} /\n&run t_end=1 /\n"
+    note = "note: coupling 'u' transmits nothing: it has no stiffness, table, damping or friction"
+    for keys in ("", "rest_twist = 0.1", "stiffness = 0 polynomial = 0, 0"):
+        assert note in nocdyn(command, nocdyn.write("m.nml", text.format(keys))).stdout
+    for keys in ("stiffness = 1", "damping = 1", "friction = 1", "polynomial = 0, 2", "table_twist = 0, 1 table_moment = 0, 1"):
+        assert "transmits" not in nocdyn(command, nocdyn.write("m.nml", text.format(keys))).stdout
+
+
 SHAFTED = """\
 &body name = 'a' inertia = 1 speed = 10 /
 &body name = 'b' inertia = 2 /
