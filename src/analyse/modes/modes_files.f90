@@ -8,6 +8,7 @@ module nocdyn_modes_files
   use nocdyn_modes, only: kind_names, mode_oscillating, mode_t
   use nocdyn_modes_report, only: modes_report_t
   use nocdyn_printable, only: as_utf_8
+  use nocdyn_shaft_errors, only: noted_error
   use nocdyn_text, only: string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
@@ -195,6 +196,7 @@ contains
       call json%put('undamped_frequency_Hz', mode%undamped)
       if (allocated(self%shaft_errors) .and. mode%kind == mode_oscillating) then
         call json%put('error_by_shaft_nodes', self%shaft_errors(i))
+        call json%put('has_too_few_nodes', self%shaft_errors(i) > noted_error)
       end if
       call json%put('damping_ratio', mode%damping_ratio())
       if (mode%time_constant() < huge(1.0_wp)) call json%put('time_constant_s', mode%time_constant())
