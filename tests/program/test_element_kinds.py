@@ -131,7 +131,8 @@ def test_an_induction_motor_against_its_own_sense_is_refused(nocdyn):
 
 @pytest.mark.parametrize("command", ["run", "check"])
 def test_a_coupling_without_a_law_is_noted(nocdyn, command):
-    text = "&body name='a' inertia=1 speed=1 /\n&body name='b' inertia=1 /\n&coupling name='u' bodies='a','b' {} /\n&run t_end=1 /\n"
+    text = "&body name='a' inertia=1 speed=1 /\n&body name='b' inertia=1 /\n&run t_end=1 /\n"
+    text += "&coupling name='u' bodies='a','b' {} /\n"
     note = "note: coupling 'u' transmits nothing: it has no stiffness, table, damping or friction"
     for keys in ("", "rest_twist = 0.1", "stiffness = 0 polynomial = 0, 0"):
         assert note in nocdyn(command, nocdyn.write("m.nml", text.format(keys))).stdout
@@ -143,7 +144,8 @@ SHAFTED = """\
 &body name = 'a' inertia = 1 speed = 10 /
 &body name = 'b' inertia = 2 /
 &body name = 'c' inertia = 2 /
-&shaft name = 'line' bodies = 'a', 'b' lengths = 2 diameters = 0.1 shear_modulus = 8e10 density = 7850 damping_ratio = 0.01 damping_frequency_hz = 50 nodes = 4 /
+&shaft name = 'line' bodies = 'a', 'b' lengths = 2 diameters = 0.1 shear_modulus = 8e10 density = 7850
+  damping_ratio = 0.01 damping_frequency_hz = 50 nodes = 4 /
 &mesh name = 'teeth' bodies = 'b', 'c' radii = 0.1, 0.1 stiffness = 1e8 damping = 10 /
 &motor name = 'm' body = 'a' kind = 'constant' torque = 10 /
 &load name = 'l' body = 'c' viscous = 1 /

@@ -96,7 +96,7 @@ def test_a_brake_carries_the_moments_of_the_shafts_that_it_holds(nocdyn):
                 assert float(line[body]["twist [rad]"]) == pytest.approx(twist, abs=1e-12)
                 assert float(line[body]["J omega^2 theta [N m]"]) == pytest.approx(stiffness * twist, abs=1e-8)
                 if abs(twist) > 0.5:
-                    through = 1.0 if {body, held} in ({"motor", "pinion"}, {"drum", "wheel"}) else -2.0 if body == "motor" else -0.5
+                    through = {"motor wheel": -2.0, "drum pinion": -0.5}.get(f"{body} {held}", 1.0)
                     assert float(last["sum [N m]"]) == pytest.approx(through * stiffness * twist)
         assert printed.count("joint to ground") == 2 and "remainder" not in printed
 

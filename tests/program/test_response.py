@@ -280,7 +280,8 @@ GEARED = """\
     "drive",
     [
         "&motor name = 'm' body = 'rotor' kind = 'constant' torque = 160",
-        "&motor name = 'm' body = 'rotor' kind = 'induction' breakdown_torque = 500 breakdown_slip = 0.1 synchronous_speed_rpm = 1500",
+        "&motor name = 'm' body = 'rotor' kind = 'induction' breakdown_torque = 500 breakdown_slip = 0.1 "
+        "synchronous_speed_rpm = 1500",
         "&motor name = 'm' body = 'rotor' kind = 'induction_dq' voltage = 400 frequency_hz = 50 poles = 4 rated_power = 45e3 "
         "rated_speed_rpm = 1475 efficiency = 0.94 power_factor = 0.86 breakdown_ratio = 2.6",
         "&engine name = 'm' stroke = 4 cylinders = 'rotor' firing = 0 orders = 0.5 amplitudes = 10 mean_torque = 160",

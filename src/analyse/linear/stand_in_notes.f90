@@ -75,8 +75,8 @@ contains
     lossy = 0.5_wp * loss_factor * share(m)
     viscous = lossy * linear%natural(m) / chosen
     if (max(chosen / linear%natural(m), linear%natural(m) / chosen) <= far .or. max(lossy, viscous) < counts) return
-    call append(notes, 'the viscous damping that stands for the relative damping of ' // name // ' over the time (run, sweep) ' // &
-                       'has its frequency at ' // hertz(chosen) // ' Hz: to the mode at ' // hertz(linear%natural(m)) // &
+    call append(notes, 'the viscous damping that stands for the relative damping of ' // name // ' over the time (run, ' // &
+                       'sweep) has its frequency at ' // hertz(chosen) // ' Hz: to the mode at ' // hertz(linear%natural(m)) // &
                        ' Hz it gives a damping ratio of ' // rounded_text(viscous, 2) // ', the relative damping (response, ' // &
                        'campbell) ' // rounded_text(lossy, 2) // '; equal with damping_frequency_hz = ' // &
                        hertz(linear%natural(m)))

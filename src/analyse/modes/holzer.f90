@@ -182,8 +182,8 @@ contains
     end if
   end function edge_name
 
-  !> Turns the edges towards the last body of each train and orders the bodies. It is the one that a joint holds; if there is none,
-  !> the end farthest from the first one in the input.
+  !> Turns the edges towards the last body of each train and orders the bodies. It is the one that a joint holds; if there is
+  !> none, the end farthest from the first one in the input.
   subroutine order_lines(bodies, edges, to_ground, self)
     integer, intent(in) :: bodies
     type(holzer_line_t), intent(in) :: edges(:)

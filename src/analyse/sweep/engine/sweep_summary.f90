@@ -171,8 +171,8 @@ contains
     text = ''
     allocate (limits, source=input%groups_named('limit'))
     if (size(limits) > 0 .and. .not. compares(input)) then
-      text = input%location(limits(1)) // ": note: a sweep compares nothing with a &limit; &record with statistic = 'max_abs' " // &
-             "of its moment gives what to compare, and 'ratio' of a response compares"
+      text = input%location(limits(1)) // ': note: a sweep compares nothing with a &limit; &record with statistic ' // &
+             "= 'max_abs' of its moment gives what to compare, and 'ratio' of a response compares"
     end if
     associate (variants => summary%without_trajectory)
       if (size(variants) == 0) return

@@ -199,7 +199,8 @@ contains
     logical, intent(in) :: is_steady   !! whether its fluxes begin as they stay
 
     transient_frequency = 0.0_wp
-    if (self%has_schedule .or. .not. is_steady) transient_frequency = self%parameters(self%number_of('frequency'))%value(1, element)
+    if (is_steady .and. .not. self%has_schedule) return
+    transient_frequency = self%parameters(self%number_of('frequency'))%value(1, element)
   end function transient_frequency
 
   !> Gives the motors a supply of any frequency.
