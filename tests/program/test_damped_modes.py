@@ -3,7 +3,8 @@
 import json
 import os
 import random
-from math import pi
+import re
+from math import pi, sqrt
 
 import pytest
 
@@ -313,3 +314,28 @@ def test_modes_and_campbell_agree_on_relative_damping(nocdyn, seed):
     ours = sorted((table[f"frequency_{one['mode']}"][0], table[f"damping_ratio_{one['mode']}"][0]) for one in found)
     for one, same in zip(ours, sorted((one["frequency_Hz"], one["damping_ratio"]) for one in modes), strict=True):
         assert one == pytest.approx(same, rel=1e-9)
+RUBBER = """\
+&body name = 'a' inertia = 2 speed_rpm = 1500 /
+&body name = 'b' inertia = 3 speed_rpm = 1500 /
+&coupling name = 'rubber' bodies = 'a', 'b' stiffness = 5e3 relative_damping = 1.13 damping_frequency_hz = {} /
+&motor name = 'm' body = 'a' kind = 'constant' torque = 75 /
+&load name = 'l' body = 'b' quadratic = 0.003 /
+&excitation name = 'e' body = 'b' kind = 'orders' orders = 0.4 amplitudes = 10 /
+&response body = 'a' speed_rpm = 1000, 2000 count = 3 /
+&run t_end = 0.1 start = 'equilibrium' /
+"""
+
+
+@pytest.mark.parametrize("command", ["run", "modes", "response", "campbell"])
+def test_a_stand_in_of_relative_damping_far_from_the_mode_is_noted(nocdyn, command):
+    frequency = sqrt(5e3 * (1 / 2 + 1 / 3)) / (2 * pi)
+    lossy = 1.13 / (4 * pi)  # psi / (4 pi), as a share of critical damping
+    for factor in (0.3, 3.0):
+        text = nocdyn(command, nocdyn.write("m.nml", RUBBER.format(frequency * factor)), "--out", "out").stdout
+        (note,) = [line for line in text.splitlines() if "stands for the relative damping of coupling 'rubber'" in line]
+        found = [float(word) for word in re.findall(r"(?:at|of|\)|=) ([0-9.]+)", note)]
+        expected = [frequency * factor, frequency, lossy / factor, lossy, frequency]
+        assert found == pytest.approx(expected, rel=0.01, abs=0.005)
+    for factor in (0.8, 1.0, 1.3):
+        text = nocdyn(command, nocdyn.write("m.nml", RUBBER.format(frequency * factor)), "--out", "out").stdout
+        assert "stands for" not in text

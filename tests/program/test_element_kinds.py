@@ -84,7 +84,7 @@ def test_energy_of_every_kind_of_element_adds_up(nocdyn, kinds, formulation, met
 
 def test_check_counts_elements_of_one_role_together(nocdyn):
     outcome = nocdyn("check", EVERY_KIND)
-    assert "0 gears, 6 couplings, 5 motors, 2 loads, 11 excitations" in outcome.stdout
+    assert "0 gears, 4 couplings, 1 shaft, 1 mesh, 5 motors, 2 loads, 11 excitations" in outcome.stdout
 
 
 def test_check_counts_electrical_machines_and_faults(nocdyn):
@@ -127,3 +127,36 @@ def test_an_induction_motor_against_its_own_sense_is_refused(nocdyn):
     assert outcome.stderr == (
         "nocdyn: machine.nml:3: &motor 'mains': breakdown_torque = -100 must have the sign of synchronous_speed = 157\n"
     )
+
+
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_a_coupling_without_a_law_is_noted(nocdyn, command):
+    text = "&body name='a' inertia=1 speed=1 /\n&body name='b' inertia=1 /\n&run t_end=1 /\n"
+    text += "&coupling name='u' bodies='a','b' {} /\n"
+    note = "note: coupling 'u' transmits nothing: it has no stiffness, table, damping or friction"
+    for keys in ("", "rest_twist = 0.1", "stiffness = 0 polynomial = 0, 0"):
+        assert note in nocdyn(command, nocdyn.write("m.nml", text.format(keys))).stdout
+    for keys in ("stiffness = 1", "damping = 1", "friction = 1", "polynomial = 0, 2", "table_twist = 0, 1 table_moment = 0, 1"):
+        assert "transmits" not in nocdyn(command, nocdyn.write("m.nml", text.format(keys))).stdout
+
+
+SHAFTED = """\
+&body name = 'a' inertia = 1 speed = 10 /
+&body name = 'b' inertia = 2 /
+&body name = 'c' inertia = 2 /
+&shaft name = 'line' bodies = 'a', 'b' lengths = 2 diameters = 0.1 shear_modulus = 8e10 density = 7850
+  damping_ratio = 0.01 damping_frequency_hz = 50 nodes = 4 /
+&mesh name = 'teeth' bodies = 'b', 'c' radii = 0.1, 0.1 stiffness = 1e8 damping = 10 /
+&motor name = 'm' body = 'a' kind = 'constant' torque = 10 /
+&load name = 'l' body = 'c' viscous = 1 /
+&run t_end = 0.1 /
+"""
+
+
+def test_shafts_and_meshes_are_called_so(nocdyn):
+    path = nocdyn.write("m.nml", SHAFTED)
+    assert ": 3 bodies, 0 gears, 0 couplings, 1 shaft, 1 mesh, 1 motor, 1 load, 0 excitations" in nocdyn("check", path).stdout
+    lines = nocdyn("equilibrium", path).stdout.split("power into the machine [W]")[1].splitlines()
+    assert [line.split()[:2] for line in lines if line][:4] == [
+        ["mesh", "teeth"], ["motor", "m"], ["load", "l"], ["shaft", "line"],
+    ]  # fmt: skip

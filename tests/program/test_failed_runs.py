@@ -242,3 +242,40 @@ def test_new_on_a_full_disk_leaves_nothing(nocdyn):
     outcome = nocdyn("new", "mine.nml", preexec_fn=limited_to(100))
     assert outcome.returncode == 3 and outcome.stderr == "nocdyn: cannot write 'mine.nml': File too large\n"
     assert list(nocdyn.folder.iterdir()) == []
+
+
+CHAIN = "".join(f"&body name = 'b{i}' inertia = 1 /\n" for i in range(400)) + "".join(
+    f"&coupling name = 'k{i}' bodies = 'b{i}', 'b{i + 1}' stiffness = 1e5 damping = 1 /\n" for i in range(399)
+)
+ASKED = """\
+&load name = 'l' body = 'b0' viscous = 1 /
+&motor name = 'm' body = 'b9' kind = 'constant' torque = 10 /
+&excitation name = 'x' body = 'b0' kind = 'orders' orders = 1, 2, 3 amplitudes = 1, 1, 1 /
+&response body = 'b0' speed_rpm = 100, 900 count = 10000 /
+&run t_end = 1 /
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("command", ["modes", "response", "campbell", "equilibrium"])
+def test_an_interrupted_analysis_leaves_a_message_and_no_files(nocdyn, command, number):
+    path = nocdyn.write("chain.nml", CHAIN + ASKED)
+    process = nocdyn.start(command, path, "--out", "out")
+    time.sleep(0.5)  # it takes some seconds
+    process.send_signal(number)
+    output, complaint = process.communicate(timeout=30)
+    assert (process.returncode, output) == (1, "")
+    assert complaint == f"nocdyn: {path}: interrupted, without results\n"
+    assert not (nocdyn.folder / "out").exists()
+
+
+def test_an_analysis_that_is_interrupted_while_it_writes_leaves_no_hidden_files(nocdyn):
+    text = "&body name='a' inertia=1 /\n&body name='b' inertia=1 /\n&coupling name='k' bodies='a','b' stiffness=1e5 damping=1 /\n"
+    text += "&excitation name='x' body='a' kind='orders' orders=1 amplitudes=1 /\n&run t_end=1 /\n"
+    path = nocdyn.write("two.nml", text + "&response body='a' speed=1, 9 count=60000 /\n")
+    process = nocdyn.start("response", path, "--out", "out")
+    wait_for(lambda: list(nocdyn.folder.glob("out/.*")))
+    process.send_signal(signal.SIGTERM)
+    _, complaint = process.communicate(timeout=60)
+    assert (process.returncode, complaint) == (1, f"nocdyn: {path}: interrupted, without results\n")
+    assert not list((nocdyn.folder / "out").iterdir())

@@ -70,6 +70,47 @@ def test_nothing_is_left_at_the_end_of_a_geared_branched_train(nocdyn):
                 assert abs(here - float(line["twist [rad]"]) - there) < 1e-8 * (abs(here) + abs(there) + abs(here - there))
 
 
+BRAKED = """\
+&body name = 'motor' inertia = 0.5 /
+&body name = 'pinion' inertia = 0.1 /
+&body name = 'wheel' inertia = 0.3 /
+&body name = 'drum' inertia = 2.0 /
+&coupling name = 'quill' bodies = 'motor', 'pinion' stiffness = 1e4 /
+&gear name = 'g' bodies = 'pinion', 'wheel' teeth = 20, 40 /
+&coupling name = 'shaft' bodies = 'wheel', 'drum' stiffness = 2e4 /
+&clutch name = 'joint' bodies = {bodies} capacity = 100 /
+&run t_end = 1 /
+"""
+
+
+def test_a_brake_carries_the_moments_of_the_shafts_that_it_holds(nocdyn):
+    for held in ("pinion", "wheel"):  # motor and drum each turn against the brake, through the gear or not
+        printed, rows = tables(nocdyn, nocdyn.write("m.nml", BRAKED.format(bodies=f"'{held}', 'ground'")))
+        for first in range(0, len(rows), 4):
+            last = rows[first + 3]
+            assert (last["body"], last["to"], last["by"]) == (held, "ground", "joint")
+            assert abs(float(last["theta [1]"])) < 1e-12
+            line = {row["body"]: row for row in rows[first : first + 4]}
+            for body, stiffness in (("motor", 1e4), ("drum", 2e4)):
+                twist = float(line[body]["theta [1]"])
+                assert float(line[body]["twist [rad]"]) == pytest.approx(twist, abs=1e-12)
+                assert float(line[body]["J omega^2 theta [N m]"]) == pytest.approx(stiffness * twist, abs=1e-8)
+                if abs(twist) > 0.5:
+                    through = {"motor wheel": -2.0, "drum pinion": -0.5}.get(f"{body} {held}", 1.0)
+                    assert float(last["sum [N m]"]) == pytest.approx(through * stiffness * twist)
+        assert printed.count("joint to ground") == 2 and "remainder" not in printed
+
+
+def test_a_locked_clutch_joins_as_a_gear_of_ratio_one(nocdyn):
+    text = BRAKED.replace("&gear name = 'g' bodies = 'pinion', 'wheel' teeth = 20, 40 /\n", "")
+    _, rows = tables(nocdyn, nocdyn.write("m.nml", text.format(bodies="'pinion', 'wheel'")))
+    for first in range(0, len(rows), 4):
+        lines = {row["body"]: row for row in rows[first : first + 4]}
+        assert (lines["pinion"]["to"], lines["pinion"]["by"], float(lines["pinion"]["ratio [1]"])) == ("wheel", "joint", 1.0)
+        assert lines["drum"]["by"] == ""
+        assert abs(float(lines["drum"]["sum [N m]"])) < 1e-9 * abs(float(lines["drum"]["J omega^2 theta [N m]"]))
+
+
 @pytest.mark.parametrize(
     ("addition", "message"),
     [

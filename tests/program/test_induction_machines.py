@@ -302,7 +302,7 @@ RATED = """&body name = 'rotor' inertia = 20 /
 
 
 def test_a_circuit_from_rated_values_is_noted(nocdyn):
-    run(nocdyn, RATED.format(keys="starting_torque = 1.22 starting_current = 5"))
+    run(nocdyn, RATED.format(keys="starting_torque = 1.22 starting_current = 5"), "output.interval=0.001")
     notes = nocdyn.summary("out")["machine"]["notes"]
     assert notes == [
         "motor 'mains' has from its rated values, with 40 % of the losses outside of the rotor in the stator winding and equal "
@@ -389,3 +389,15 @@ def test_a_circuit_and_rated_values_exclude_each_other(nocdyn):
     outcome = nocdyn("check", "machine.nml")
     assert outcome.returncode == 2
     assert "rotor_resistance and rated_power are both given; allowed: one of them" in outcome.stderr
+
+
+def test_automatic_rows_show_the_swings_with_the_mains_after_switching_on(nocdyn):
+    text = machine("3 hp", run="", rest="").replace("t_end = 2.0", "t_end = 20").replace("&output interval = 0.001 /\n", "")
+    outcome = run(nocdyn, text)
+    assert "note: 12001 rows for motor 'mains' with 60 Hz, as &output gives no interval" in outcome.stdout
+    torque = columns(nocdyn)["torque_mains"]
+    assert torque.max() == pytest.approx(LARGEST["3 hp"][1], rel=0.05)
+    outcome = run(nocdyn, text, "run.start=equilibrium", "motor.mains.frequency_hz=60")
+    assert ", 1001 rows, " in outcome.stdout  # nothing swings
+    outcome = run(nocdyn, text, "output.interval=0.02")
+    assert "do not show the vibration by motor 'mains', up to 60 Hz" in outcome.stdout

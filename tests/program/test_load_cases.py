@@ -440,3 +440,30 @@ def test_a_limit_belongs_to_the_machines_that_have_its_element(nocdyn, cases):
     for command in ("check", "run", "modes", "response"):
         unknown = nocdyn(command, "m.nml", "--case", "cut")
         assert (unknown.returncode, unknown.stderr.count("there is no coupling 'k3'")) == (2, 1)
+def test_check_tells_all_mistakes_of_a_file_once(nocdyn):
+    text = MACHINE + FAULT + RUN + LIFE.replace("coupling = 'shaft'", "coupling = 'shift'")
+    text += "&limit coupling = 'shaff' moment = 1 /\n&response body = 'pump' speed = 9, 3 /\n&run load_case = 'a' t_end = 2 /\n"
+    text += "&load_case name = 'a' set = 'run.t_end=-1' /\n&load_case name = 'b' with = 'falt' set = 'load.work.quadratic=x' /\n"
+    text += "&load_case name = 'c' without = 'work' /\n"
+    nocdyn.write("m.nml", text)
+    outcome = nocdyn("check", "m.nml")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    lines = outcome.stderr.splitlines()
+    for found in (
+        "m.nml:10: &fatigue 'life': there is no coupling 'shift'; did you mean 'shaft'?",
+        "m.nml:11: &limit: there is no coupling 'shaff'; did you mean 'shaft'?",
+        "m.nml:12: &response: speed = 9, 3 rad/s, which is 85.9437, 28.6479 rpm; allowed: first the slower speed, then",
+        "m.nml:14: &load_case 'a': set 'run.t_end=-1': t_end = -1 is out of range; allowed: > t_start = 0",
+        "m.nml:15: &load_case 'b': with: there is no element 'falt'; did you mean 'fault'?",
+        "m.nml:15: &load_case 'b': set 'load.work.quadratic=x': quadratic = x ",
+    ):
+        assert [found in line for line in lines].count(True) == 1, found
+    assert len(lines) == 6
+
+
+def test_check_tells_all_limits_that_cannot_be(nocdyn):
+    limits = "&limit coupling = 'shaft' /\n&limit coupling = 'shaft' stress = 1e6 /\n&response body = 'pump' speed = 3, 9 /\n"
+    nocdyn.write("m.nml", MACHINE + FAULT + RUN + limits)
+    outcome = nocdyn("check", "m.nml")
+    assert outcome.returncode == 2
+    assert [line.split(": ")[1] for line in outcome.stderr.splitlines()] == ["m.nml:10", "m.nml:11"]

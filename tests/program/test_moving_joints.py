@@ -559,7 +559,8 @@ FORCES = "crank_angles_deg = 0, 30, 60, 90, 120, 150, 180, 210 forces = 1, 2, 3,
         (CRANK.format(FORCES), "crank_angles_deg from 0 to 210 are not those of one cycle; needed: a range of 360 with stroke"),
         (
             CRANK.format(FORCES.replace("_deg", "")),
-            "from 0 to 210 are not those of one cycle; needed: a range of 6.2831",
+            "from 0 to 210 are not those of one cycle; needed: a range of 6.283185307179586 [rad] with stroke = 2; in degrees "
+            "they are crank_angles_deg",
         ),
         (CRANK.format(FORCES + " stroke = 3"), ":2: &crank 'p': stroke = 3; allowed: 2 or 4"),
         (

@@ -357,7 +357,7 @@ MACHINE = """\
 &coupling name = 'fast' bodies = 'motor', 'pinion' stiffness = 4000 damping = 4 diameter = 0.03 /
 &coupling name = 'slow' bodies = 'wheel', 'fan' stiffness = 9000 damping = 9 /
 &gear name = 'g' bodies = 'pinion', 'wheel' teeth = 20, 60 /
-&motor name = 'm' body = 'motor' kind = 'constant' torque = 10 /
+&motor name = 'm' body = 'motor' kind = 'constant' torque = -10 /
 &load name = 'l' body = 'fan' quadratic = 0.5 /
 &excitation name = 'x' body = 'fan' kind = 'orders' orders = 2, 3 amplitudes = 10, 5 /
 &excitation name = 'y' body = 'motor' amplitude = 3 frequency_hz = 20 /

@@ -250,14 +250,54 @@ def test_notes_tell_of_speeds_that_are_not_sought_or_not_driven(nocdyn):
             "the speeds of &response"
         )
         assert analysis(nocdyn, command, near.replace("1400", "1300"))["notes"] == []
-    driven = (
-        DISCS + "&motor name = 'm' body = 'one' kind = 'constant' torque = -5 /\n&load name = 'l' body = 'two' viscous = 1 /\n"
-    )
+    falling = "&load name = 'l' body = 'two' table_speed = 0, 100, 200 table_torque = 5, 0, -5 /\n"
+    driven = DISCS + "&motor name = 'm' body = 'one' kind = 'constant' torque = 5 /\n" + falling
     (note,) = analysis(nocdyn, "response", driven)["notes"]
     assert note.startswith("the motors or engines do not drive at ")
     rule = "&limit coupling = 'shaft' rule = 'iacs_m68' tensile_strength = 600e6 rated_speed_rpm = 200 /\n"
     (note,) = analysis(nocdyn, "response", DISCS + rule)["notes"]
     assert note.endswith("the rated speed of 200 rpm is that of the body of &response, which turns with 300 to 1500 rpm")
+
+
+GEARED = """\
+&body name = 'rotor' inertia = 2 /
+&body name = 'pinion' inertia = 0.1 /
+&body name = 'wheel' inertia = 1 /
+&body name = 'fan' inertia = 30 /
+&coupling name = 'fast' bodies = 'rotor', 'pinion' stiffness = 4000 damping = 4 /
+&coupling name = 'slow' bodies = 'wheel', 'fan' stiffness = 9000 damping = 9 /
+&gear name = 'g' bodies = 'pinion', 'wheel' teeth = 20, 60 /
+&load name = 'l' body = 'fan' quadratic = 0.2 /
+&excitation name = 'x' body = 'fan' kind = 'orders' orders = 2 amplitudes = 10 /
+&run t_end = 1 /
+&response body = 'fan' speed_rpm = 60, 450 count = 5 /
+"""
+
+
+@pytest.mark.parametrize("command", ["response", "campbell"])
+@pytest.mark.parametrize(
+    "drive",
+    [
+        "&motor name = 'm' body = 'rotor' kind = 'constant' torque = 160",
+        "&motor name = 'm' body = 'rotor' kind = 'induction' breakdown_torque = 500 breakdown_slip = 0.1 "
+        "synchronous_speed_rpm = 1500",
+        "&motor name = 'm' body = 'rotor' kind = 'induction_dq' voltage = 400 frequency_hz = 50 poles = 4 rated_power = 45e3 "
+        "rated_speed_rpm = 1475 efficiency = 0.94 power_factor = 0.86 breakdown_ratio = 2.6",
+        "&engine name = 'm' stroke = 4 cylinders = 'rotor' firing = 0 orders = 0.5 amplitudes = 10 mean_torque = 160",
+    ],
+)
+def test_speeds_against_the_drive_are_refused_with_the_steady_one(nocdyn, command, drive):
+    text = GEARED + drive + " /\n"
+    path = nocdyn.write("machine.nml", text)
+    report = nocdyn("equilibrium", path, "--set", "output.units=rpm").stdout
+    steady = next(line.split()[-1] for line in report.splitlines() if "omega_fan [rpm]" in line)
+    code, error = refusal(nocdyn, command, text)
+    assert code == 2
+    assert "machine.nml:11: &response: speed_rpm: the motors or engines turn 'fan'" in error and error.count("\n") == 1
+    assert float(error.split("its steady speed is ")[1].split(" rpm")[0]) == pytest.approx(float(steady), rel=1e-5)
+    assert "allowed: speeds of the other sign, e.g. speed_rpm = -60, -450" in error
+    content = analysis(nocdyn, command, text.replace("60, 450", "-60, -450"))
+    assert not any("do not drive" in note for note in content["notes"])
 
 
 def test_every_command_refuses_speeds_in_the_wrong_order(nocdyn):
@@ -476,3 +516,13 @@ def test_a_peak_beyond_its_limit_is_told_beside_a_barred_range(nocdyn):
     assert one["ratio_to_limit"] > one["peak_ratio_to_limit"] > 1
     assert "  barred by moment_shaft: " in printed
     assert "  moment_shaft exceeds its limit of the peak: " in printed
+
+
+def test_columns_of_the_printed_table_are_apart(nocdyn):
+    text = GEARED + "&motor name = 'm' body = 'rotor' kind = 'constant' torque = 160 /\n"
+    text = text.replace("body = 'fan' speed_rpm = 60, 450", "body = 'rotor' speed_rpm = 180, 1350")
+    lines = nocdyn("response", nocdyn.write("machine.nml", text)).stdout.splitlines()
+    first = next(i for i, line in enumerate(lines) if line.startswith("  mode "))
+    row = lines[first + 1].split()
+    assert row[2] == "0.666667"
+    assert lines[first].index("order") + len("order") == lines[first + 1].index(row[2]) + len(row[2])

@@ -189,6 +189,26 @@ def test_a_table_of_an_earlier_sweep_does_not_stay_beside_new_results(nocdyn, di
     assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", "sweep.nc"]
 
 
+LIFE = "&fatigue name = 'life' coupling = {0} reference_moment = 5 reference_cycles = 1e6 slope = 5 /\n"
+
+
+def test_cycles_of_an_earlier_run_do_not_stay_beside_new_results(nocdyn, discs):
+    coupling = re.search(r"&coupling\s+name = ('\w+')", TWO_DISCS)[1]
+    nocdyn.write("discs.nml", TWO_DISCS + SWEEP + LIFE.format(coupling))
+    nocdyn("run", "discs.nml", "--out", "out")
+    assert "cycles.csv" in nocdyn.files("out")
+    assert nocdyn("sweep", "discs.nml", "--out", "out").returncode == 0
+    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc"]
+
+
+def test_limits_that_a_sweep_does_not_look_at_are_noted(nocdyn, discs):
+    coupling = re.search(r"&coupling\s+name = ('\w+')", TWO_DISCS)[1]
+    path = nocdyn.write("limited.nml", TWO_DISCS + SWEEP + f"&limit coupling = {coupling} moment = 5 /\n")
+    assert ": &limit: note: a sweep compares nothing with a &limit; " in nocdyn("sweep", path, "--out", "out").stdout
+    assert "note:" not in nocdyn("sweep", discs, "--out", "other", "--set", "sweep.seed=4").stdout
+    assert nocdyn("sweep", path, "--out", "quiet", "--quiet").stdout == ""
+
+
 def test_trajectories_of_an_earlier_sweep_and_a_run_do_not_stay_beside_new_results(nocdyn, discs):
     nocdyn("run", discs, "--out", "out")
     for variants in ("1, 2, 3", "2"):

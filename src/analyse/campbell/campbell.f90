@@ -3,6 +3,7 @@
 !> The machine is linearised about its steady state at every speed, so that frequencies move with the load. Modes are followed by
 !> their shapes.
 module nocdyn_campbell
+  use nocdyn_backward_speeds, only: refuse_backward_speeds
   use nocdyn_critical_speeds, only: crossing_t, find_crossings
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_excitation_lines, only: line_t
@@ -58,6 +59,7 @@ contains
     self%response%has_oscillations = .false.
     if (.not. allocated(error)) call choose_lines(self, error)
     if (.not. allocated(error)) call self%response%add_points(self%settings%speeds, .true., error, failed_speed)
+    if (.not. allocated(error)) call refuse_backward_speeds(input, self%settings, machine, self%response, error)
     if (.not. allocated(error)) call follow_modes(self, error, failed_speed)
     if (allocated(error)) then
       call place_error(input, self%settings, failed_speed, error)

@@ -1,7 +1,6 @@
 !> Couplings, shafts and meshes of a machine in check.json: stiffnesses, dampings, segments.
 module nocdyn_elastic_data
   use nocdyn_bank, only: bank_of
-  use nocdyn_couplings, only: couplings_t
   use nocdyn_element_sets, only: element_names, whole_names, wholes
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
@@ -57,15 +56,7 @@ contains
     character(len=:), allocatable :: kind
     integer, allocatable :: bodies(:)
 
-    kind = 'coupling'
-    associate (bank => machine%banks(bank_of(machine%banks, elements(1)))%bank)
-      select type (bank)
-      class is (shafts_t)
-        kind = 'shaft'
-      class is (couplings_t)
-        if (bank%is_mesh) kind = 'mesh'
-      end select
-    end associate
+    kind = trim(machine%banks(bank_of(machine%banks, elements(1)))%bank%kind_name())
     call json%open()
     call json%put('name', name)
     call json%put('kind', kind)

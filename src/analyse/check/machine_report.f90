@@ -1,7 +1,6 @@
 !> The report of `nocdyn check` on a machine: bodies, gears, coordinates, redundant constraints.
 module nocdyn_machine_report
-  use nocdyn_bank, only: role_bearing, role_cardan, role_clutch, role_coupling, role_crank, role_drive, role_excitation, &
-    role_freewheel, role_load, role_loss, role_motor, role_names, role_relation
+  use nocdyn_bank, only: role_phase
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_rigid_trains, only: ratio_tolerance
@@ -162,21 +161,17 @@ contains
     character(len=:), allocatable :: text
     type(text_buffer_t) :: report
     type(string_t), allocatable :: notes(:)
-    integer, parameter :: roles(*) = [role_coupling, role_motor, role_load, role_excitation]   ! said even if there are none
-    integer, parameter :: others(*) = [role_clutch, role_freewheel, role_cardan, role_crank, role_relation, role_drive, &
-                                       role_bearing, role_loss]
-    character(len=*), parameter :: plurals(*) = [character(len=10) :: 'clutches', 'freewheels', 'cardans', 'cranks', &
-                                                 'relations', 'drives', 'bearings', 'losses']
+    character(len=*), parameter :: kinds(*) = [character(len=10) :: 'coupling', 'shaft', 'mesh', 'motor', 'load', 'excitation', &
+                                               'clutch', 'freewheel', 'cardan', 'crank', 'relation', 'drive', 'bearing', 'loss']
+    character(len=*), parameter :: always(*) = [character(len=10) :: 'coupling', 'motor', 'load', 'excitation']
+    character(len=:), allocatable :: plural
     integer :: i
 
     call report%append(file // ': ' // counted(machine%bodies - machine%nodes, 'body', 'bodies') // counted_constraints(machine))
-    do i = 1, size(roles)
-      call report%append(', ' // counted(elements_of(machine, roles(i)), trim(role_names(roles(i))), &
-                                         trim(role_names(roles(i))) // 's'))
-    end do
-    do i = 1, size(others)
-      if (elements_of(machine, others(i)) == 0) cycle
-      call report%append(', ' // counted(elements_of(machine, others(i)), trim(role_names(others(i))), trim(plurals(i))))
+    do i = 1, size(kinds)
+      if (all(always /= kinds(i)) .and. elements_of(machine, kinds(i)) == 0) cycle
+      plural = trim(kinds(i)) // trim(merge('es', 's ', index('hs', kinds(i)(len_trim(kinds(i)):len_trim(kinds(i)))) > 0))
+      call report%append(', ' // counted(elements_of(machine, kinds(i)), trim(kinds(i)), plural))
     end do
     call put_line(report, counted(machine%freedoms(), 'degree', 'degrees') // ' of freedom')
     call put_groups(report, machine)
@@ -199,15 +194,17 @@ contains
     end associate
   end function named_coordinates
 
-  !> The number of elements of one role.
-  pure integer function elements_of(machine, role)
+  !> The number of elements of one kind.
+  pure integer function elements_of(machine, kind)
     type(machine_t), intent(in) :: machine
-    integer, intent(in) :: role
+    character(len=*), intent(in) :: kind
     integer :: i
 
     elements_of = 0
     do i = 1, size(machine%banks)
-      if (machine%banks(i)%bank%role == role) elements_of = elements_of + machine%banks(i)%bank%named_count()
+      associate (bank => machine%banks(i)%bank)
+        if (bank%kind_name() == kind .and. bank%role /= role_phase) elements_of = elements_of + bank%named_count()
+      end associate
     end do
   end function elements_of
 

@@ -2,6 +2,7 @@
 module nocdyn_equilibrium_report
   use nocdyn_bank, only: role_coupling
   use nocdyn_column_lists, only: column_list_t
+  use nocdyn_element_sets, only: whole_names, whole_sums
   use nocdyn_energy_balance, only: work_element_names
   use nocdyn_equilibrium, only: equilibrium_t, t_infinity
   use nocdyn_errors, only: error_t, exit_failed, raise
@@ -50,6 +51,7 @@ contains
     type(trajectory_table_t) :: table
     real(wp), allocatable :: row(:), watts(:, :), y(:)
     integer, allocatable :: reported(:)                 !! columns
+    type(string_t), allocatable :: parts(:)             !! of the elements with power
     integer :: i, k
 
     allocate (self%equilibria, source=equilibria)
@@ -65,15 +67,16 @@ contains
       call self%columns%add(table%signals(reported(i)))
     end do
     allocate (self%labels, source=selected(table%labels, reported))
-    allocate (self%work_elements, source=work_element_names(formulation%machine))
+    allocate (parts, source=work_element_names(formulation%machine))
+    allocate (self%work_elements, source=whole_names(parts))
     allocate (self%values(size(self%labels), size(equilibria)), self%power(size(self%work_elements), size(equilibria)))
-    allocate (row(size(table%labels)), watts(1, size(self%work_elements)))
+    allocate (row(size(table%labels)), watts(1, size(parts)))
     do k = 1, size(equilibria)
-      y = [equilibria(k)%y(1, :), (0.0_wp, i=1, size(self%work_elements))]
+      y = [equilibria(k)%y(1, :), (0.0_wp, i=1, size(parts))]
       call table%fill(t_infinity, y, row)
       call table%columns%formulation%machine%power(watts)
       self%values(:, k) = row(reported)
-      self%power(:, k) = watts(1, :)
+      self%power(:, k) = whole_sums(parts, watts(1, :))
       i = findloc(is_finite([self%values(:, k), self%power(:, k)]), .false., dim=1)
       if (i == 0) cycle
       call raise(error, exit_failed, 'in steady state ' // to_text(k) // ' of ' // to_text(size(equilibria)) // ', ' // &

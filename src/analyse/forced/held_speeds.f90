@@ -44,6 +44,8 @@ module nocdyn_held_speeds
     real(wp), allocatable :: by_internal(:)        !! derivatives of the moments by internal states, [internal states]
     real(wp), allocatable :: rate_speed(:)         !! derivatives of their rates by the speed of the element, the same
     real(wp), allocatable :: rate_internal(:, :)   !! derivatives of the rates by the states of the element, [members, the same]
+  contains
+    procedure :: is_driven
   end type held_state_t
 
   !> The steady states of one machine over the speed, each found from the one before.
@@ -271,6 +273,13 @@ contains
 
     has_drive = size(self%sources) > 0
   end function has_drive
+
+  !> Whether motors or engines hold the speed, in the direction in which they turn.
+  pure logical function is_driven(self)
+    class(held_state_t), intent(in) :: self
+
+    is_driven = self%factor > 0 .and. self%supply >= 0
+  end function is_driven
 
   !> Power of the elements that drive, after `evaluate` of the balance [W].
   pure real(wp) function source_power(self)

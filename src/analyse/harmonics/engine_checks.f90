@@ -7,7 +7,7 @@ module nocdyn_engine_checks
   use nocdyn_kinds, only: wp
   use nocdyn_shared_loads, only: find_shared_load
   use nocdyn_text, only: counted, quoted, to_text
-  use nocdyn_written_values, only: written_element, written_key, written_number
+  use nocdyn_written_values, only: unit_of, written_element, written_key, written_number
   implicit none (type, external)
   private
 
@@ -151,7 +151,9 @@ contains
         if (span <= cycle * (1.0_wp + rounding) .and. span + step >= cycle * (1.0_wp - rounding)) return
         text = written_key(group, key) // ' from ' // written_number(group, key, angle(1)) // ' to ' // &
                written_number(group, key, angle(n)) // ' are not those of one cycle; needed: a range of ' // &
-               written_number(group, key, cycle) // ' with stroke = ' // to_text(group%whole_number('stroke'))
+               written_number(group, key, cycle) // merge(' [rad]', '      ', unit_of(group, key) == 0)
+        text = trim(text) // ' with stroke = ' // to_text(group%whole_number('stroke'))
+        if (unit_of(group, key) == 0) text = text // '; in degrees they are ' // key // '_deg'
       end associate
     end associate
   end subroutine check_crank_angles

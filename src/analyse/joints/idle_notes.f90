@@ -11,8 +11,8 @@ module nocdyn_idle_notes
 
 contains
 
-  !> Notes clutches whose engagement is 0 during the whole run, drives that prescribe no motion, and torques that begin after its
-  !> end.
+  !> Notes clutches whose engagement is 0 during the whole run, couplings without a law, drives that prescribe no motion, and
+  !> torques that begin after its end.
   subroutine note_idle_elements(input, notes)
     type(input_t), intent(in) :: input
     type(string_t), allocatable, intent(inout) :: notes(:)
@@ -26,6 +26,9 @@ contains
             if (.not. engages(group, run%number('t_start'), run%number('t_end'))) call append(notes, 'clutch ' // &
               quoted(group%name) // ' does not engage in the run: its engagement is 0 from t = ' // &
               to_text(run%number('t_start')) // ' to ' // to_text(run%number('t_end')) // ' s')
+          case ('coupling')
+            if (.not. transmits(group)) call append(notes, 'coupling ' // quoted(group%name) // ' transmits nothing: it has ' // &
+              'no stiffness, table, damping or friction')
           case ('drive')
             if (.not. has_motion(group)) call append(notes, 'drive ' // quoted(group%name) // ' has neither a speed, a ' // &
               'table nor an amplitude: it holds its body still, as speed = 0 does')
@@ -43,6 +46,16 @@ contains
       end do
     end associate
   end subroutine note_idle_elements
+
+  !> Whether a number of the law of a coupling is not 0.
+  logical function transmits(group)
+    type(group_t), intent(in) :: group   !! &coupling
+    character(len=*), parameter :: keys(*) = [character(len=15) :: 'stiffness', 'cubic_stiffness', 'polynomial', &
+                                              'table_moment', 'damping', 'friction']
+    integer :: k
+
+    transmits = any([(any(abs(group%numbers(trim(keys(k)))) > 0), k=1, size(keys))])
+  end function transmits
 
   !> Whether the engagement of a clutch is above 0 for some time of a run.
   logical function engages(group, t_start, t_end)

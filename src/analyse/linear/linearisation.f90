@@ -48,6 +48,7 @@ module nocdyn_linearisation
     real(wp), allocatable :: natural(:)     !! natural frequencies, negative for diverging modes [rad/s], [modes]
     integer, allocatable :: flexible(:)     !! modes that are not rigid
     real(wp), allocatable :: stiffness(:)   !! k of all elements [N m/rad], [elements]
+    integer, allocatable :: held(:)         !! elements of joints that hold
     real(wp), allocatable :: matrix(:, :)   !! matrix of the first-order system, [modes + flexible + internal states] squared
   end type linearisation_t
 
@@ -64,15 +65,18 @@ contains
     type(pattern_t) :: pattern
     type(slopes_t) :: slopes
     real(wp), allocatable :: jacobian(:, :), stiffness(:)
+    integer, allocatable :: held(:)
     integer :: e
 
     call differentiate(formulation, t, y, pattern, jacobian)
     incidence = new_element_coordinates(formulation%machine%elements, formulation%machine%coordinates)
     stiffness = differentiated_stiffness(formulation%machine)
     call refuse_not_finite(formulation%machine, stiffness, error)
-    if (.not. allocated(error)) call undamped_modes(formulation%machine, incidence, stiffness, self, error, &
-                                                    held_elements(formulation))
     if (allocated(error)) return
+    allocate (held, source=held_elements(formulation))
+    call undamped_modes(formulation%machine, incidence, stiffness, self, error, held)
+    if (allocated(error)) return
+    call move_alloc(held, self%held)
     call copy_slopes(formulation%machine, slopes)
     call fill_matrix(formulation%machine%elements%internal, slopes, self)
     associate (teeth => formulation%joints%teeth)

@@ -2,32 +2,35 @@
 !> of the next shaft gives the next amplitude.
 !>
 !> H. Holzer, Die Berechnung der Drehschwingungen, 1921. The train is a tree of couplings and gears. From the ends towards one
-!> body, the last one of the table, the torque of everything behind passes through a coupling unchanged, and through a gear with
-!> the inverse ratio of the angles. What is left at the last body vanishes for a natural frequency.
+!> body, the last one of the table, the torque of everything behind passes through a coupling unchanged, and through a gear or a
+!> locked joint with the inverse ratio of the angles. What is left at the last body vanishes for a natural frequency, unless a
+!> locked joint holds it: then its angle does, and the sum is the moment of the joint.
 module nocdyn_holzer
   use nocdyn_bank, only: bank_of
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: linearisation_t
   use nocdyn_machine, only: machine_t
-  use nocdyn_text, only: quoted, string_t
+  use nocdyn_text, only: quoted
   use nocdyn_union_find, only: find_root, join_components
   implicit none (type, external)
   private
 
   public :: new_holzer
 
-  integer, parameter, public :: edge_none = 0, edge_coupling = 1, edge_gear = 2
+  integer, parameter, public :: edge_none = 0, edge_coupling = 1, edge_gear = 2, edge_joint = 3
 
   !> A line of the table: a body and what joins it to the next one towards the end of the table.
   type, public :: holzer_line_t
     integer :: body = 0
-    integer :: next = 0                 !! body, 0 at the end of a train
+    integer :: next = 0                 !! body, 0 at the end of a train and for the ground
     integer :: edge = edge_none         !! what joins it to `next`
     integer :: number = 0               !! of the element or of the constraint row
     real(wp) :: stiffness = 0.0_wp      !! of a coupling [N m/rad]
     real(wp) :: to_ground = 0.0_wp      !! stiffness of couplings between the body and the ground [N m/rad]
-    real(wp) :: ratio = 1.0_wp          !! angle of `next` by that of the body, of a gear
+    real(wp) :: ratio = 1.0_wp          !! angle of `next` by that of the body, of a gear or joint
+  contains
+    procedure :: name => edge_name
   end type holzer_line_t
 
   !> The lines in an order in which everything behind a body comes before it.
@@ -52,6 +55,7 @@ contains
     n = 0
     to_ground = 0.0_wp
     call list_couplings(machine, linear, edges, n, to_ground, error)
+    if (.not. allocated(error)) call list_joints(machine, linear%held, edges, n, error)
     if (.not. allocated(error)) call list_gears(machine, edges, n, error)
     if (.not. allocated(error)) call refuse_loops(machine, edges(:n), error)
     if (.not. allocated(error)) call order_lines(machine%bodies, edges(:n), to_ground, self)
@@ -92,6 +96,35 @@ contains
     end do
   end subroutine list_couplings
 
+  !> Joints that hold, between two bodies or to the ground.
+  subroutine list_joints(machine, held, edges, n, error)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: held(:)   !! elements
+    type(holzer_line_t), intent(inout) :: edges(:)
+    integer, intent(inout) :: n
+    type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: turning(:)   ! without the ground
+    integer :: i, k
+
+    do i = 1, size(held)
+      associate (rows => machine%elements%rows, first => machine%elements%rows%first(held(i)))
+        associate (body => rows%body(first:rows%first(held(i) + 1) - 1), c => rows%coefficient(first:rows%first(held(i) + 1) - 1))
+          turning = pack([(k, k=1, size(body))], body > 0)
+          if (size(turning) > 2) then
+            call raise(error, exit_input, 'there is no table of Holzer: ' // quoted(machine%element_name(held(i))) // &
+                       ' does not join two bodies')
+            return
+          end if
+          n = n + 1
+          edges(n) = holzer_line_t(body(turning(1)), 0, edge_joint, held(i))
+          if (size(turning) == 1) cycle
+          edges(n)%next = body(turning(2))
+          edges(n)%ratio = -c(turning(1)) / c(turning(2))
+        end associate
+      end associate
+    end do
+  end subroutine list_joints
+
   !> Gears between two bodies.
   subroutine list_gears(machine, edges, n, error)
     type(machine_t), intent(in) :: machine
@@ -116,45 +149,64 @@ contains
     end associate
   end subroutine list_gears
 
-  !> Refuses a coupling or gear between bodies that others join already.
+  !> Refuses what joins bodies, or a body and the ground, that others join already.
   subroutine refuse_loops(machine, edges, error)
     type(machine_t), intent(in) :: machine
     type(holzer_line_t), intent(in) :: edges(:)
     type(error_t), allocatable, intent(out) :: error
-    integer :: component(machine%bodies), i, one, other
-    type(string_t) :: name
+    integer :: component(machine%bodies + 1), i, next, one, other   ! the last one is the ground
 
     component = [(i, i=1, size(component))]
     do i = 1, size(edges)
+      next = merge(edges(i)%next, size(component), edges(i)%next > 0)
       call find_root(component, edges(i)%body, one)
-      call find_root(component, edges(i)%next, other)
+      call find_root(component, next, other)
       if (one == other) then
-        if (edges(i)%edge == edge_gear) name = machine%constraints%names(edges(i)%number)
-        if (edges(i)%edge == edge_coupling) name%text = machine%element_name(edges(i)%number)
-        call raise(error, exit_input, 'there is no table of Holzer: ' // quoted(name%text) // ' closes a loop')
+        call raise(error, exit_input, 'there is no table of Holzer: ' // quoted(edges(i)%name(machine)) // ' closes a loop')
         return
       end if
-      call join_components(edges(i)%body, edges(i)%next, component)
+      call join_components(edges(i)%body, next, component)
     end do
   end subroutine refuse_loops
 
-  !> Turns the edges towards the last body of each train, the end farthest from the first one in the input, and orders the bodies.
+  !> The name of the coupling, gear or joint of a line.
+  function edge_name(self, machine) result(name)
+    class(holzer_line_t), intent(in) :: self
+    type(machine_t), intent(in) :: machine
+    character(len=:), allocatable :: name
+
+    if (self%edge == edge_gear) then
+      name = machine%constraints%names(self%number)%text
+    else
+      name = machine%element_name(self%number)
+    end if
+  end function edge_name
+
+  !> Turns the edges towards the last body of each train and orders the bodies. It is the one that a joint holds; if there is
+  !> none, the end farthest from the first one in the input.
   subroutine order_lines(bodies, edges, to_ground, self)
     integer, intent(in) :: bodies
     type(holzer_line_t), intent(in) :: edges(:)
     real(wp), intent(in) :: to_ground(:)
     type(holzer_t), intent(inout) :: self
     type(holzer_line_t) :: line_of(bodies)
-    integer :: b, n, order(bodies)
+    integer :: b, held(bodies), i, n, order(bodies), root
     logical :: is_known(bodies)
 
     allocate (self%lines(0))
+    held = 0   ! edge to the ground
+    do i = 1, size(edges)
+      if (edges(i)%next == 0) held(edges(i)%body) = i
+    end do
     is_known = .false.
     do b = 1, bodies
       if (is_known(b)) cycle
       call walk(edges, b, is_known, line_of, order, n)          ! to find the end farthest from the first body
       is_known(order(:n)) = .false.
-      call walk(edges, order(n), is_known, line_of, order, n)
+      root = order(n)
+      if (any(held(order(:n)) > 0)) root = order(maxloc(held(order(:n)), dim=1))
+      call walk(edges, root, is_known, line_of, order, n)
+      if (held(root) > 0) line_of(root) = edges(held(root))
       line_of(order(:n))%to_ground = to_ground(order(:n))
       self%lines = [self%lines, line_of(order(n:1:-1))]
     end do
@@ -178,6 +230,7 @@ contains
     do while (i < n)
       i = i + 1
       do e = 1, size(edges)
+        if (edges(e)%next == 0) cycle
         if (edges(e)%body == order(i)) then
           call reach(edges(e)%next, turned=.true.)
         else if (edges(e)%next == order(i)) then
@@ -212,7 +265,7 @@ contains
     real(wp), intent(in) :: omega        !! its natural frequency [rad/s]
     real(wp), intent(out) :: theta(:)    !! [lines]
     real(wp), intent(out) :: torque(:)   !! J omega^2 theta, less the moments of couplings to the ground [N m], [lines]
-    real(wp), intent(out) :: total(:)    !! moment in the coupling or gear to the next body [N m], [lines]
+    real(wp), intent(out) :: total(:)    !! moment in the coupling, gear or joint to the next body [N m], [lines]
     real(wp) :: behind(machine%bodies), scale
     integer :: i
 
@@ -224,8 +277,9 @@ contains
         theta(i) = shape(line%body) / scale
         torque(i) = (machine%inertia(1, line%body) * omega**2 - line%to_ground) * theta(i)
         total(i) = behind(line%body) + torque(i)
+        if (line%next == 0) cycle
         if (line%edge == edge_coupling) behind(line%next) = behind(line%next) + total(i)
-        if (line%edge == edge_gear) behind(line%next) = behind(line%next) + total(i) / line%ratio
+        if (line%edge /= edge_coupling) behind(line%next) = behind(line%next) + total(i) / line%ratio
       end associate
     end do
   end subroutine fill

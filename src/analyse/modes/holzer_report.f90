@@ -2,7 +2,7 @@
 module nocdyn_holzer_report
   use nocdyn_csv, only: text_cell
   use nocdyn_errors, only: error_t
-  use nocdyn_holzer, only: edge_coupling, edge_gear, edge_none, holzer_line_t, holzer_t, new_holzer
+  use nocdyn_holzer, only: edge_coupling, edge_none, holzer_line_t, holzer_t, new_holzer
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_modes_report, only: modes_report_t
@@ -74,12 +74,11 @@ contains
         select case (line%edge)
         case (edge_coupling)
           edge = edge // cell(line%stiffness) // cell(total(i) / line%stiffness)
-        case (edge_gear)
-          edge = edge // cell('ratio') // cell(line%ratio)
         case default
-          edge = edge // repeat(' ', 2 * cell_width)
+          if (line%next > 0) edge = edge // cell('ratio') // cell(line%ratio)
+          if (line%next == 0) edge = edge // repeat(' ', 2 * cell_width)
         end select
-        if (line%edge /= edge_none) edge = edge // '  ' // edge_name(machine, line) // ' to ' // machine%names(line%next)%text
+        if (line%edge /= edge_none) edge = edge // '  ' // line%name(machine) // ' to ' // next_name(machine, line)
         if (line%edge == edge_none) edge = edge // '  remainder'
         call lines%append_line(edge)
       end associate
@@ -101,13 +100,13 @@ contains
         call rows%append(text_cell(machine%names(line%body)%text) // ',' // to_text(inertia) // ',')
         call rows%append(to_text(inertia * omega**2) // ',' // to_text(theta(i)) // ',' // &
                          to_text(torque(i)) // ',' // to_text(total(i)) // ',')
-        if (line%edge /= edge_none) call rows%append(text_cell(machine%names(line%next)%text) // ',' // &
-                                                     text_cell(edge_name(machine, line)))
+        if (line%edge /= edge_none) call rows%append(text_cell(next_name(machine, line)) // ',' // &
+                                                     text_cell(line%name(machine)))
         if (line%edge == edge_none) call rows%append(',')
         call rows%append(',')
         if (line%edge == edge_coupling) call rows%append(to_text(line%stiffness))
         call rows%append(',')
-        if (line%edge == edge_gear) call rows%append(to_text(line%ratio))
+        if (line%edge /= edge_coupling .and. line%next > 0) call rows%append(to_text(line%ratio))
         call rows%append(',')
         if (line%edge == edge_coupling) call rows%append(to_text(total(i) / line%stiffness))
         call rows%append_line('')
@@ -115,17 +114,14 @@ contains
     end do
   end subroutine put_rows
 
-  !> The name of the coupling or gear of a line.
-  function edge_name(machine, line) result(name)
+  !> The name of what a line leads to: the next body or the ground.
+  function next_name(machine, line) result(name)
     type(machine_t), intent(in) :: machine
     type(holzer_line_t), intent(in) :: line
     character(len=:), allocatable :: name
 
-    if (line%edge == edge_gear) then
-      name = machine%constraints%names(line%number)%text
-    else
-      name = machine%element_name(line%number)
-    end if
-  end function edge_name
+    name = 'ground'
+    if (line%next > 0) name = machine%names(line%next)%text
+  end function next_name
 
 end module nocdyn_holzer_report

@@ -1,7 +1,6 @@
 !> The files on the modes of a machine: modes.csv and modes.json.
 module nocdyn_modes_files
   use nocdyn_bank, only: bank_of
-  use nocdyn_couplings, only: couplings_t
   use nocdyn_equilibrium, only: t_infinity
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
@@ -9,6 +8,7 @@ module nocdyn_modes_files
   use nocdyn_modes, only: kind_names, mode_oscillating, mode_t
   use nocdyn_modes_report, only: modes_report_t
   use nocdyn_printable, only: as_utf_8
+  use nocdyn_shaft_errors, only: noted_error
   use nocdyn_text, only: string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
@@ -159,10 +159,7 @@ contains
 
     key = 'stiffness_N_m_rad'
     associate (banks => self%machine%banks, element => self%elastic(findloc(self%whole, number, dim=1)))
-      select type (bank => banks(bank_of(banks, element))%bank)
-      class is (couplings_t)
-        if (bank%is_mesh) key = 'stiffness_N_m'
-      end select
+      if (banks(bank_of(banks, element))%bank%is_mesh) key = 'stiffness_N_m'
     end associate
   end function stiffness_key
 
@@ -200,6 +197,7 @@ contains
       if (mode%internal == 0) call json%put('undamped_frequency_Hz', mode%undamped)
       if (allocated(self%shaft_errors) .and. mode%kind == mode_oscillating) then
         call json%put('error_by_shaft_nodes', self%shaft_errors(i))
+        call json%put('has_too_few_nodes', self%shaft_errors(i) > noted_error)
       end if
       call json%put('damping_ratio', mode%damping_ratio())
       if (mode%time_constant() < huge(1.0_wp)) call json%put('time_constant_s', mode%time_constant())

@@ -11,6 +11,7 @@ module nocdyn_modes_report
     mode_t
   use nocdyn_shaft_errors, only: describe_error, has_shaft_nodes, noted_error, shaft_error
   use nocdyn_operating_point, only: operating_point_t
+  use nocdyn_stand_in_notes, only: note_stand_ins
   use nocdyn_table_text, only: cell, cell_width, padded, text_width
   use nocdyn_text, only: append, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
@@ -83,6 +84,7 @@ contains
     self%t = point%t
     self%point = point%text
     allocate (self%notes, source=point%notes)
+    call note_stand_ins(self%machine, self%linear, self%notes)
     self%shapes = min(size(self%modes), max_values / (3 * size(self%kinetic_names) + size(self%elastic_names)))
     if (allocated(self%shaft_errors)) call note_shaft_errors(self)
     if (self%shapes < size(self%modes)) then

@@ -1,6 +1,7 @@
 !> The forced response that &response of an input asks for, with its modes, critical speeds and peaks.
 module nocdyn_response_analysis
   use, intrinsic :: iso_fortran_env, only: int64
+  use nocdyn_backward_speeds, only: refuse_backward_speeds
   use nocdyn_critical_speeds, only: crossing_t, find_crossings, refine_peaks
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_excitation_lines, only: line_order, line_t
@@ -67,6 +68,7 @@ contains
         call self%response%add_points(speeds, .true., error, failed_speed)
       end if
     end associate
+    if (.not. allocated(error)) call refuse_backward_speeds(input, self%settings, machine, self%response, error)
     if (.not. allocated(error)) call find_peaks(self, error, failed_speed)
     if (.not. allocated(error)) then
       call note_speeds(self%response, self%unstable, 'they are left out', self%notes)

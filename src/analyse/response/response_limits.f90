@@ -6,7 +6,7 @@
 !> with c_D = 0.35 + 0.93 d^(-0.2), d in mm; for passing through quickly it is tau_T = 1.7 tau_C / sqrt(c_K), for lambda < 0.8:
 !> from there on the rule accepts no restricted range of speeds in normal operation.
 module nocdyn_response_limits
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: add_error, error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_limit_groups, only: limited_kind
@@ -37,12 +37,13 @@ module nocdyn_response_limits
 
 contains
 
-  !> Reads all groups &limit.
+  !> Reads all groups &limit. The error has a line for each mistake.
   subroutine read_limits(input, quantities, limits, error)
     type(input_t), intent(in) :: input
     type(moment_form_t), intent(in) :: quantities(:)
     type(response_limit_t), allocatable, intent(out) :: limits(:)
     type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable :: own
     integer, allocatable :: groups(:)
     character(len=8) :: kind
     integer :: before, i
@@ -54,16 +55,13 @@ contains
       kind = limited_kind(input%groups(groups(i)))
       call add_moment_limits(input%groups(groups(i)), groups(i), trim(kind), quantities, limits)
       call add_quantity_limit(input%groups(groups(i)), groups(i), trim(kind), quantities, limits)
-      call add_stress_limits(input, groups(i), trim(kind), quantities, limits, error)
-      if (allocated(error)) return
-      if (size(limits) > before .or. input%groups(groups(i))%has_value('quantity')) cycle
-      if (kind == 'mesh') then
-        call raise(error, exit_input, input%location(groups(i)) // ': nothing is limited; needed: vibratory_force or force')
-      else
-        call raise(error, exit_input, input%location(groups(i)) // ': nothing is limited; needed: vibratory_moment, moment, ' // &
-                   'stress, stress_transient or rule')
+      call add_stress_limits(input, groups(i), trim(kind), quantities, limits, own)
+      if (size(limits) == before .and. .not. (allocated(own) .or. input%groups(groups(i))%has_value('quantity'))) then
+        call raise(own, exit_input, input%location(groups(i)) // ': nothing is limited; needed: ' // &
+                   trim(merge('vibratory_force or force                                  ', &
+                              'vibratory_moment, moment, stress, stress_transient or rule', kind == 'mesh')))
       end if
-      return
+      call add_error(error, own)
     end do
   end subroutine read_limits
 

@@ -3,6 +3,7 @@ module nocdyn_response_notes
   use nocdyn_bank, only: bank_of
   use nocdyn_critical_speeds, only: crossing_t
   use nocdyn_element_sets, only: element_names
+  use nocdyn_errors, only: error_t
   use nocdyn_forced_response, only: forced_response_t
   use nocdyn_gap_couplings, only: gap_couplings_t
   use nocdyn_held_speeds, only: held_state_t
@@ -10,12 +11,14 @@ module nocdyn_response_notes
   use nocdyn_joint_texts, only: allowed_torques
   use nocdyn_kinds, only: wp
   use nocdyn_linear_ranges, only: excursion_t, find_excursions
+  use nocdyn_linearisation, only: linearisation_t, undamped_modes
   use nocdyn_machine, only: machine_t
   use nocdyn_mean_slopes, only: note_mean_slopes
   use nocdyn_moment_forms, only: kind_moment, kind_reaction
   use nocdyn_response_settings, only: response_settings_t
   use nocdyn_shaft_errors, only: describe_error, has_shaft_nodes, noted_error, shaft_error
-  use nocdyn_speed_modes, only: speed_modes_t
+  use nocdyn_speed_modes, only: most_coordinates, speed_modes_t
+  use nocdyn_stand_in_notes, only: note_stand_ins
   use nocdyn_text, only: append, joined, quoted, rounded_text, string_t, to_text
   use nocdyn_tooth_losses, only: tooth_losses_t
   use nocdyn_units, only: from_si, unit_hz, unit_rpm
@@ -102,8 +105,23 @@ contains
     end if
     call note_losses(response, notes)
     call note_drive(response, notes)
+    call note_damping(response, notes)
     call note_range(settings, notes)
   end subroutine note_steady_states
+
+  !> Notes on the damping of the modes of a run at the highest speed.
+  subroutine note_damping(response, notes)
+    type(forced_response_t), intent(in) :: response
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    type(linearisation_t) :: linear
+    type(error_t), allocatable :: error
+
+    if (.not. any(response%loss_damping > 0) .or. response%matrix%coordinates > most_coordinates) return
+    associate (highest => response%points(size(response%points))%state%stiffness)
+      call undamped_modes(response%machine, response%held%balance%incidence, highest, linear, error)
+    end associate
+    if (.not. allocated(error)) call note_stand_ins(response%machine, linear, notes)
+  end subroutine note_damping
 
   !> The slopes over the mean speed with the largest size at any speed [N m s/rad], [elements].
   pure function steepest_slopes(response) result(slope)

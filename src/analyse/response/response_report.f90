@@ -59,7 +59,7 @@ contains
     type(response_summary_t), intent(in) :: summary
     type(text_buffer_t), intent(inout) :: report
     character(len=:), allocatable :: line
-    integer :: i, width
+    integer :: i, order_width, width
     logical :: has_ratio, has_stress
 
     if (size(summary%criticals) == 0) then
@@ -67,16 +67,17 @@ contains
       return
     end if
     width = maxval([8, (text_width(coupling_name(analysis, summary%criticals(i))), i=1, size(summary%criticals))])
+    order_width = 2 + maxval([6, (len(order_word(analysis, summary%criticals(i))), i=1, size(summary%criticals))])
     has_ratio = any(summary%criticals%ratio > 0)
     has_stress = any(summary%criticals%stress > 0)
-    line = '  mode  frequency [Hz]   order  critical [rpm]  damping ratio  ' // padded('coupling', width) // &
-           cell('moment [N m]') // cell('at [rpm]')
+    line = '  mode  frequency [Hz]' // right('order', order_width) // '  critical [rpm]  damping ratio  ' // &
+           padded('coupling', width) // cell('moment [N m]') // cell('at [rpm]')
     if (has_stress) line = line // cell('stress [MPa]')
     if (has_ratio) line = line // cell('of limit')
     if (size(analysis%settings%operating) > 0) line = line // '  distance to operation'
     call report%append_line(line)
     do i = 1, min(size(summary%criticals), most_criticals)
-      call put_critical(analysis, summary%criticals(i), width, has_stress, has_ratio, report)
+      call put_critical(analysis, summary%criticals(i), order_width, width, has_stress, has_ratio, report)
     end do
     if (size(summary%criticals) > most_criticals) then
       call report%append_line('  (' // to_text(size(summary%criticals) - most_criticals) // ' more in response.json)')
@@ -92,16 +93,25 @@ contains
     if (critical%quantity > 0) name = analysis%response%quantities(critical%quantity)%element
   end function coupling_name
 
-  subroutine put_critical(analysis, critical, width, has_stress, has_ratio, report)
+  !> "0.5", "fixed".
+  function order_word(analysis, critical) result(word)
     type(response_analysis_t), intent(in) :: analysis
     type(critical_t), intent(in) :: critical
-    integer, intent(in) :: width   !! of the names
+    character(len=:), allocatable :: word
+
+    word = analysis%response%lines(critical%crossing%line)%word()
+  end function order_word
+
+  subroutine put_critical(analysis, critical, order_width, width, has_stress, has_ratio, report)
+    type(response_analysis_t), intent(in) :: analysis
+    type(critical_t), intent(in) :: critical
+    integer, intent(in) :: order_width, width   !! of the orders, of the names
     logical, intent(in) :: has_stress, has_ratio
     type(text_buffer_t), intent(inout) :: report
     character(len=:), allocatable :: line, stress
 
     line = right(to_text(critical%crossing%mode), 6) // right(rounded_text(critical%crossing%frequency / turn, 7), 16) // &
-           right(analysis%response%lines(critical%crossing%line)%word(), 8) // &
+           right(order_word(analysis, critical), order_width) // &
            right(rpm(critical%crossing%speed), 16) // right(rounded_text(critical%crossing%damping_ratio, 3), 15) // &
            '  ' // padded(coupling_name(analysis, critical), width)
     if (critical%quantity == 0) then

@@ -1,6 +1,5 @@
 !> The energy balance of a run: the work of every element, and the energies at the start and at the end.
 module nocdyn_energy_balance
-  use nocdyn_bank, only: role_names
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -37,7 +36,7 @@ contains
     do i = 1, size(machine%banks)
       associate (bank => machine%banks(i)%bank)
         do e = 1, size(bank%with_work)
-          names(next)%text = trim(role_names(bank%role)) // ' ' // bank%names(bank%with_work(e))%text
+          names(next)%text = trim(bank%kind_name()) // ' ' // bank%names(bank%with_work(e))%text
           next = next + 1
         end do
       end associate

@@ -1,6 +1,6 @@
-!> How dense the rows of a run must be to show the vibration that its excitations cause.
+!> How dense the rows of a run must be to show the vibration that its excitations and motors cause.
 module nocdyn_row_intervals
-  use nocdyn_bank, only: harmonic_t, role_load, role_names
+  use nocdyn_bank, only: harmonic_t, role_load
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -39,7 +39,7 @@ contains
     if (.not. frequency * interval > sparse) return
     associate (bank => machine%banks(fastest%bank)%bank)
       call append(notes, 'the rows are ' // rounded_text(interval, 3) // ' s apart and do not show the vibration by ' // &
-                  trim(role_names(bank%role)) // ' ' // quoted(bank%names(fastest%element)%text) // ', up to ' // &
+                  trim(bank%kind_name()) // ' ' // quoted(bank%names(fastest%element)%text) // ', up to ' // &
                   rounded_text(frequency, 3) // ' Hz; it would take &output interval = ' // &
                   rounded_text(dense / frequency, 2) // '. Smallest and largest values are those of the motion between rows')
     end associate
@@ -65,13 +65,14 @@ contains
     if (.not. oscillations > sparse * (rows - 1)) return
     rows = max(rows, 1 + ceiling(min(oscillations / dense, real(most_rows - 1, wp))))
     associate (bank => machine%banks(fastest%bank)%bank)
-      call append(notes, to_text(rows) // ' rows for ' // trim(role_names(bank%role)) // ' ' // &
+      call append(notes, to_text(rows) // ' rows for ' // trim(bank%kind_name()) // ' ' // &
                   quoted(bank%names(fastest%element)%text) // ' with ' // rounded_text(fastest%rate / (2 * pi), 3) // &
                   ' Hz, as &output gives no interval')
     end associate
   end subroutine choose_row_count
 
-  !> The fastest oscillation of an excitation at any of the speeds, with an amplitude that counts among those of its element.
+  !> The fastest oscillation of an excitation at any of the speeds, with an amplitude that counts among those of its element, or
+  !> of the transients of a motor.
   type(oscillation_t) function fastest_oscillation(machine, lowest, highest) result(fastest)
     type(machine_t), intent(in) :: machine
     real(wp), intent(in) :: lowest(:), highest(:)   !! [rad/s], [bodies]
@@ -84,6 +85,8 @@ contains
         if (bank%role == role_load) cycle
         do e = 1, bank%count
           if (bank%has_ended(e)) cycle
+          rate = bank%transient_frequency(e, allocated(machine%steady_internal))
+          if (rate > fastest%rate) fastest = oscillation_t(rate, b, e)
           speed = 0.0_wp
           associate (body => bank%rows%last_body(e))
             if (body > 0) speed = merge(lowest(body), highest(body), abs(lowest(body)) > abs(highest(body)))

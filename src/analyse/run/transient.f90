@@ -3,6 +3,7 @@ module nocdyn_transient
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_assembly, only: assemble_machine, new_asked_formulation
   use nocdyn_column_names, only: choose_columns
+  use nocdyn_equilibrium, only: mean_formulation, t_infinity
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_finite, only: is_finite
   use nocdyn_formulation, only: formulation_t
@@ -11,6 +12,7 @@ module nocdyn_transient
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_joint_events, only: describe_shared_joints, list_joint_events
   use nocdyn_kinds, only: wp
+  use nocdyn_linearisation, only: linearisation_t, linearise
   use nocdyn_signal_checks, only: check_signals
   use nocdyn_machine, only: machine_t
   use nocdyn_missed_states, only: note_missed_state
@@ -27,6 +29,7 @@ module nocdyn_transient
     solver_status_t
   use nocdyn_start_transient, only: find_start_transient
   use nocdyn_text, only: append, selected, string_t, to_text
+  use nocdyn_stand_in_notes, only: has_stand_ins, note_stand_ins
   use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
   use nocdyn_vibration_energy, only: new_vibration, vibration_t
   implicit none (type, external)
@@ -118,6 +121,7 @@ contains
     call describe_machine(formulation%machine, summary)
     if (output_note(input) /= '') call append(notes, output_note(input))
     call note_other_limits(input, notes)
+    call note_damping(formulation%machine, notes)
     do i = 1, size(notes)
       call append(summary%notes, notes(i)%text)
     end do
@@ -144,6 +148,24 @@ contains
       call note_missed_state(formulation%machine, observer%last_time, last%omega(1, 1:), summary%notes)
     end associate
   end subroutine run_transient
+
+  !> Notes on the damping of the modes about the start angles.
+  subroutine note_damping(machine, notes)
+    type(machine_t), intent(in) :: machine
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    integer, parameter :: most_bodies = 100   ! of a machine whose modes take no time
+    class(formulation_t), allocatable :: still
+    type(linearisation_t) :: linear
+    type(error_t), allocatable :: error
+    real(wp), allocatable :: y(:, :)
+
+    if (machine%bodies > most_bodies .or. .not. has_stand_ins(machine)) return
+    call mean_formulation(machine, still)
+    y = still%start()
+    y(1, :machine%coordinates%freedoms) = 0.0_wp
+    call linearise(still, t_infinity, y, linear, error)
+    if (.not. allocated(error)) call note_stand_ins(machine, linear, notes)
+  end subroutine note_damping
 
   !> The equations of motion of an input. Their machine is the only one that stays.
   subroutine build_formulation(input, formulation, settings, notes, error)

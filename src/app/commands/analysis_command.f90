@@ -10,7 +10,7 @@ module nocdyn_analysis_command
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_equilibrium, only: t_infinity
   use nocdyn_equilibrium_results, only: equilibrium_results_t
-  use nocdyn_errors, only: add_error, error_t, exit_done
+  use nocdyn_errors, only: add_error, error_t, exit_done, exit_failed, raise
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_joint_simplifications, only: refuse_joints
@@ -19,11 +19,12 @@ module nocdyn_analysis_command
   use nocdyn_machine, only: machine_t
   use nocdyn_matrices_results, only: matrices_results_t
   use nocdyn_modes_results, only: modes_results_t
+  use nocdyn_posix, only: is_interrupted, stop_at_interrupts
   use nocdyn_response_results, only: response_results_t
   use nocdyn_result_files, only: result_files_t
   use nocdyn_result_folders, only: out_folder, refuse_shared_folders, result_folder
   use nocdyn_sweep_plan, only: add_plan_diagnostics, has_sweep, make_plan, sweep_plan_t
-  use nocdyn_text, only: listed, shown_path, string_t
+  use nocdyn_text, only: listed, shown_path, string_t, to_text
   implicit none (type, external)
   private
 
@@ -70,6 +71,7 @@ contains
     type(string_t), allocatable :: folders(:)
     type(machine_t) :: machine
     type(error_t), allocatable :: error
+    character(len=:), allocatable :: words
     integer :: i
 
     code = exit_done
@@ -84,14 +86,21 @@ contains
     end if
     do i = 1, size(readings)
       associate (reading => readings(i))
+        words = shown_path(arguments%operands(i)%text) // ': interrupted, without results'
+        call stop_at_interrupts('nocdyn: ' // words // new_line('a'))
         if (.not. allocated(reading%error)) call assemble_for(arguments%command, kind, reading%input, machine, reading%error)
         if (.not. allocated(reading%error)) call check_signals(reading%input, machine, reading%error)
         if (.not. allocated(reading%error)) call analyse_one(arguments, kind, reading%input, machine, folders(i)%text, &
                                                              reading%error)
-        if (.not. allocated(reading%error)) call check_load_cases(arguments%command, kind, reading)
+        if (arguments%command == 'check') call check_load_cases(kind, reading)
+        if (is_interrupted() .and. allocated(reading%error)) reading%error%message = words
         if (allocated(reading%error)) call report_error(reading%error, code)
       end associate
+      if (is_interrupted()) exit
     end do
+    if (i >= size(readings)) return
+    call raise(error, exit_failed, 'files left out after the interruption: ' // to_text(size(readings) - i))
+    call report_error(error, code)
   end subroutine analyse_files
 
   !> Analyses one machine, prints the report, and writes the files.
@@ -149,20 +158,22 @@ contains
     end if
   end subroutine assemble_for
 
-  !> Builds the machines of the load cases for `check`.
-  subroutine check_load_cases(command, kind, reading)
-    character(len=*), intent(in) :: command
+  !> Checks the load cases that can be read; if there is no mistake so far, builds their machines.
+  subroutine check_load_cases(kind, reading)
     class(analysis_t), intent(in) :: kind
     type(reading_t), intent(inout) :: reading   !! gets the mistakes of all of them
     type(machine_t) :: machine
     type(error_t), allocatable :: own
     integer :: c
+    logical :: is_right
 
-    if (command /= 'check') return
+    if (.not. allocated(reading%load_cases)) return
+    is_right = .not. allocated(reading%error)
     do c = 1, size(reading%load_cases)
-      call check_input(reading%load_cases(c), own)
-      if (.not. allocated(own)) then
-        call assemble_for(command, kind, reading%load_cases(c), machine, own)
+      if (.not. allocated(reading%load_cases(c)%groups)) cycle
+      call check_input(reading%load_cases(c), own, reading%error)
+      if (is_right .and. .not. allocated(own)) then
+        call assemble_for('check', kind, reading%load_cases(c), machine, own)
         if (allocated(own)) call name_load_case(reading%load_cases(c), own)
       end if
       call add_error(reading%error, own)
@@ -194,6 +205,7 @@ contains
     type(reading_t), intent(inout) :: reading
     character(len=:), allocatable, intent(out) :: folder
     type(diagnostics_t) :: diagnostics
+    type(error_t), allocatable :: own
     integer :: chosen
 
     folder = out_folder(arguments, arguments%operands(number)%text)
@@ -201,7 +213,13 @@ contains
                     diagnostics, reading%load_cases, wanted_case(arguments))
     if (allocated(reading%error)) call add_plan_diagnostics(reading%input, diagnostics, reading%error)
     if (.not. allocated(reading%error)) call choose_case(arguments, reading%input, chosen, reading%error)
-    if (allocated(reading%error)) return
+    if (allocated(reading%error)) then
+      if (arguments%command == 'check' .and. allocated(reading%load_cases)) then   ! the machine itself can be read
+        call check_input(reading%input, own)
+        call add_error(reading%error, own)
+      end if
+      return
+    end if
     if (always_writes) folder = result_folder(arguments, reading%input)
     if (chosen > 0) then
       if (folder /= '') folder = folder // '/' // reading%load_cases(chosen)%load_case%name

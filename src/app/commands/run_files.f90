@@ -21,7 +21,7 @@ module nocdyn_run_files
   implicit none (type, external)
   private
 
-  public :: check_rows, check_variants, partial_file, remove_trajectories, run_to_files, trajectory_bytes, &
+  public :: check_rows, check_variants, partial_file, remove_run, run_to_files, trajectory_bytes, &
     wants_netcdf
 
   !> Names of the rows: of a run that is done, of one that is not; as CSV, as NetCDF.
@@ -140,30 +140,30 @@ contains
     type(result_files_t), intent(inout) :: files
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: name
-    integer :: i
 
     name = trim(trajectory_names(state_of(summary), writer%form))
-    call files%remove_report()
-    call remove_trajectories(writer%folder, name)
-    do i = 1, size(cycles_names)
-      call remove_file(writer%folder // '/' // trim(cycles_names(i)))
-    end do
+    call remove_run(writer%folder, name)
     call writer%file%finish(name, error)
     if (.not. allocated(error)) call files%finish(error)
   end subroutine name_files
 
-  !> Removes the trajectories in a folder.
-  subroutine remove_trajectories(folder, kept)
+  !> Removes the results of a run in a folder, but for input.nml.
+  subroutine remove_run(folder, kept)
     character(len=*), intent(in) :: folder
-    character(len=*), intent(in) :: kept   !! name of one that stays, '': none
+    character(len=*), intent(in) :: kept   !! name of a trajectory that stays, '': none
     integer :: i, k
 
+    call remove_file(folder // '/' // summary_file)
+    call remove_file(folder // '/' // columns_file)
+    do i = 1, size(cycles_names)
+      call remove_file(folder // '/' // trim(cycles_names(i)))
+    end do
     do k = 1, size(trajectory_names, 2)
       do i = 1, size(trajectory_names, 1)
         if (trajectory_names(i, k) /= kept) call remove_file(folder // '/' // trim(trajectory_names(i, k)))
       end do
     end do
-  end subroutine remove_trajectories
+  end subroutine remove_run
 
   !> Opens the file and writes its header.
   subroutine start(self, labels, rows, error)

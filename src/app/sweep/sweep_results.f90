@@ -13,7 +13,7 @@ module nocdyn_sweep_results
   use nocdyn_order_statistics, only: find_order_statistics
   use nocdyn_output_file, only: write_file
   use nocdyn_posix, only: is_interrupted, remove_file
-  use nocdyn_run_files, only: input_file, remove_trajectories, run_to_files, summary_file
+  use nocdyn_run_files, only: input_file, remove_run, run_to_files, summary_file
   use nocdyn_run_summary, only: run_summary_t
   use nocdyn_sweep_chunk, only: chunk_t, status_refused
   use nocdyn_sweep_netcdf, only: write_sweep_netcdf
@@ -70,13 +70,13 @@ contains
     type(string_t), allocatable :: names(:)
     integer :: i
 
-    call remove_run(folder)
+    call remove_run(folder, '')
     if (.not. keeps_table) call remove_file(folder // '/' // sweep_csv_name)
     allocate (names, source=folder_names(folder))
     do i = 1, size(names)
       associate (name => names(i)%text)
         if (.not. is_of_variant(name)) cycle
-        call remove_run(folder // '/' // name)
+        call remove_run(folder // '/' // name, '')
         call remove_file(folder // '/' // name // '/' // input_file)
         call remove_empty_folder(folder // '/' // name)
       end associate
@@ -90,15 +90,6 @@ contains
     is_of_variant = index(name, variant_folder) == 1 .and. len(name) > len(variant_folder)
     if (is_of_variant) is_of_variant = verify(name(len(variant_folder) + 1:), '0123456789') == 0
   end function is_of_variant
-
-  !> Removes the results of a run, but for input.nml.
-  subroutine remove_run(folder)
-    character(len=*), intent(in) :: folder
-
-    call remove_file(folder // '/' // summary_file)
-    call remove_file(folder // '/' // columns_file)
-    call remove_trajectories(folder, '')
-  end subroutine remove_run
 
   !> Prints the summary. A sweep without any variant done is a failure.
   subroutine print_results(plan, folder, header, arguments, summary, code)

@@ -7,7 +7,7 @@ module nocdyn_posix
   private
 
   public :: make_folders, rename_file, remove_file, process_id, is_terminal, catch_interrupts, is_interrupted, &
-    ignore_file_size_signal
+    stop_at_interrupts, hold_interrupts, is_to_stop, ignore_file_size_signal
   public :: create_file, write_bytes, close_file, last_failure, failure_number, is_interrupted_call
   public :: path_call, path_number_call, descriptor_call
 
@@ -21,6 +21,8 @@ module nocdyn_posix
 
   integer(c_int), volatile :: received_signal = 0
   integer(c_long), volatile :: received_time = 0
+  character(len=:), allocatable, target :: last_words   ! of a program that stops at a signal; not allocated: it notes the signal
+  logical, volatile :: is_held = .false.                ! whether it does not stop yet
 
   ! Functions of the operating system that return a negative number on failure.
   abstract interface
@@ -213,6 +215,26 @@ contains
     call watch(hang_up_signal)
   end subroutine catch_interrupts
 
+  !> Stops the program with exit code 1 at the first of these signals, from now on, unless `hold_interrupts` has it finish first.
+  subroutine stop_at_interrupts(words)
+    character(len=*), intent(in) :: words   !! the message, a whole line
+
+    is_held = .false.
+    if (allocated(last_words)) deallocate (last_words)
+    last_words = words
+    call catch_interrupts()
+  end subroutine stop_at_interrupts
+
+  !> Has a program that would stop at a signal note it instead, while it writes files.
+  subroutine hold_interrupts()
+    is_held = .true.
+  end subroutine hold_interrupts
+
+  !> Whether a signal has come that `hold_interrupts` keeps from stopping the program.
+  logical function is_to_stop()
+    is_to_stop = allocated(last_words) .and. is_interrupted()
+  end function is_to_stop
+
   !> Catches a signal, unless it is ignored already (nohup, a background job of a script).
   subroutine watch(signal)
     integer(c_int), intent(in) :: signal
@@ -233,7 +255,12 @@ contains
   subroutine note_signal(signal) bind(c)
     integer(c_int), value, intent(in) :: signal
     integer(c_long) :: now
+    logical :: is_done
 
+    if (allocated(last_words) .and. .not. is_held) then
+      call write_bytes(standard_error, last_words, is_done)
+      call c_exit_now(1_c_int)
+    end if
     now = c_time(c_null_ptr)
     if (received_signal == 0) received_time = now
     if (now - received_time > echo) call c_exit_now(128 + signal)

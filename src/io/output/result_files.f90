@@ -1,8 +1,8 @@
 !> The files of one analysis: they appear together or not at all.
 module nocdyn_result_files
-  use nocdyn_errors, only: error_t
+  use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_output_file, only: output_file_t
-  use nocdyn_posix, only: remove_file
+  use nocdyn_posix, only: hold_interrupts, is_to_stop, remove_file
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -16,7 +16,6 @@ module nocdyn_result_files
   contains
     procedure :: open => open_all
     procedure :: complete
-    procedure :: remove_report
     procedure :: finish
     procedure :: discard
   end type result_files_t
@@ -30,6 +29,7 @@ contains
     type(string_t), intent(in) :: names(:)     !! of the finished files; the report comes last
     integer :: i
 
+    call hold_interrupts()
     self%folder = folder
     allocate (self%names, source=names)
     allocate (self%files(size(names)))
@@ -51,14 +51,7 @@ contains
     if (allocated(error)) call self%discard()
   end subroutine complete
 
-  !> Removes the report of an earlier analysis.
-  subroutine remove_report(self)
-    class(result_files_t), intent(in) :: self
-
-    call remove_file(self%folder // '/' // self%names(size(self%names))%text)
-  end subroutine remove_report
-
-  !> Closes all files that are open, then gives all their names.
+  !> Closes all files that are open, then gives all their names, unless a program that stops at signals has got one.
   subroutine finish(self, error)
     class(result_files_t), intent(inout) :: self
     type(error_t), allocatable, intent(out) :: error
@@ -66,7 +59,12 @@ contains
 
     call self%complete(error)
     if (allocated(error)) return
-    if (size(self%files) > 1) call self%remove_report()
+    if (is_to_stop()) then
+      call self%discard()
+      call raise(error, exit_failed, 'interrupted')
+      return
+    end if
+    if (size(self%files) > 1) call remove_file(self%folder // '/' // self%names(size(self%names))%text)
     do i = 1, size(self%files)
       call self%files(i)%finish(self%names(i)%text, error)
       if (allocated(error)) exit

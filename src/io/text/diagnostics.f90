@@ -34,8 +34,14 @@ contains
     character(len=*), intent(in) :: text
     integer, optional, intent(in) :: override, code   !! if absent, 0 and `exit_input`
     type(diagnostic_t), allocatable :: longer(:)
+    integer :: i
 
     if (.not. allocated(self%list)) allocate (self%list(16))
+    if (present(override)) then
+      do i = 1, merge(self%count, 0, override > 0)   ! one for all groups that it sets
+        if (self%list(i)%override == override .and. self%list(i)%text == text) return
+      end do
+    end if
     if (self%count == size(self%list)) then
       allocate (longer(2 * self%count))
       longer(:self%count) = self%list

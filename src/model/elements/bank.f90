@@ -57,6 +57,7 @@ module nocdyn_bank
     logical :: is_silent = .false.                !! after `to_mean_torque`: whether the torque is zero in every state
     logical :: is_engine = .false.                !! whether its elements are excitations whose means drive
     logical :: follows_mean_speed = .false.       !! whether its torque changes with the speed from cycle to cycle, not within one
+    logical :: is_mesh = .false.                  !! whether its rows are radii: angles are deformations [m], moments forces [N]
     logical :: has_parts = .false.                !! whether consecutive elements of one name are parts of one element
     character(len=24), allocatable :: internal_names(:)   !! e.g. 'armature current', [states]
     integer :: first_internal = 1                 !! number of the first internal state of `first` in the machine
@@ -66,6 +67,7 @@ module nocdyn_bank
     procedure :: to_mean_torque
     procedure :: list_harmonics
     procedure :: has_ended
+    procedure :: transient_frequency
     procedure :: hold_speed
     procedure :: follows_supply, set_supply, idle_supply
     procedure :: start_internal
@@ -77,6 +79,7 @@ module nocdyn_bank
     procedure :: list_structure
     procedure :: last
     procedure :: named_count
+    procedure :: kind_name
     procedure :: is_source
     procedure :: quantities
     procedure :: observe
@@ -152,6 +155,15 @@ contains
     last = self%first + self%count - 1
   end function last
 
+  !> The kind of its elements as the input calls it: that of the role, 'shaft' or 'mesh'.
+  pure character(len=10) function kind_name(self)
+    class(bank_t), intent(in) :: self
+
+    kind_name = role_names(self%role)
+    if (self%is_mesh) kind_name = 'mesh'
+    if (self%has_parts) kind_name = 'shaft'
+  end function kind_name
+
   !> The number of elements with a name of their own.
   pure integer function named_count(self)
     class(bank_t), intent(in) :: self
@@ -195,6 +207,15 @@ contains
 
     has_ended = .false.
   end function has_ended
+
+  !> Frequency with which an element of the first lane oscillates after a change of its own [rad/s]; 0 by default.
+  pure real(wp) function transient_frequency(self, element, is_steady)
+    class(bank_t), intent(in) :: self
+    integer, intent(in) :: element     !! numbered within the bank
+    logical, intent(in) :: is_steady   !! whether its internal states begin as they stay
+
+    transient_frequency = 0.0_wp
+  end function transient_frequency
 
   !> amplitude sin(frequency t + order phi + phase).
   pure type(harmonic_t) function sine_harmonic(amplitude, frequency, order, phase, body) result(harmonic)

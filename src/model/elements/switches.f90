@@ -1,6 +1,6 @@
 !> The switches of a machine, numbered consecutively over all banks. A switch selects the branch of an element's law.
 module nocdyn_switches
-  use nocdyn_bank, only: bank_slot_t, role_names
+  use nocdyn_bank, only: bank_slot_t
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: quoted
   implicit none (type, external)
@@ -119,7 +119,7 @@ contains
     character(len=:), allocatable :: name
 
     associate (bank => banks(self%bank(switch))%bank, number => self%number(switch))
-      name = trim(bank%switch_names(number)) // ' of ' // trim(role_names(bank%role)) // ' ' // &
+      name = trim(bank%switch_names(number)) // ' of ' // trim(bank%kind_name()) // ' ' // &
              quoted(bank%names(bank%switch_element(number))%text)
     end associate
   end function name

@@ -1,6 +1,6 @@
 !> Why no motion fits the rows that hold: which of them contradict one another.
 module nocdyn_row_obstacles
-  use nocdyn_bank, only: bank_of, bank_slot_t, role_loss, role_names
+  use nocdyn_bank, only: bank_of, bank_slot_t, role_loss
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_element_rows, only: element_rows_t
   use nocdyn_geared_pairs, only: has_other_ratio
@@ -79,7 +79,7 @@ contains
         if (bank%role == role_loss) then
           text = 'teeth of ' // text
         else
-          text = trim(role_names(bank%role)) // ' ' // text
+          text = trim(bank%kind_name()) // ' ' // text
         end if
       end associate
     end associate

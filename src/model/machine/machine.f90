@@ -1,6 +1,6 @@
 !> A machine on a block of lanes: bodies, banks of elements, constraints, and the independent coordinates.
 module nocdyn_machine
-  use nocdyn_bank, only: bank_of, bank_slot_t, bank_t, name_length, role_names
+  use nocdyn_bank, only: bank_of, bank_slot_t, bank_t, name_length
   use nocdyn_constraints, only: constraints_t
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_element_rows, only: element_rows_t, joined_rows, rows_between
@@ -233,7 +233,7 @@ contains
       associate (bank => self%banks(self%internal_banks(i))%bank)
         associate (offset => index - bank%first_internal)
           if (offset >= bank%states * bank%count) cycle
-          name = trim(bank%internal_names(1 + modulo(offset, bank%states))) // ' of ' // trim(role_names(bank%role)) // ' ' // &
+          name = trim(bank%internal_names(1 + modulo(offset, bank%states))) // ' of ' // trim(bank%kind_name()) // ' ' // &
                  quoted(bank%names(1 + offset / bank%states)%text)
           return
         end associate

@@ -5,7 +5,6 @@
 !> depend on it, so that only the responses to moments follow. A variant is written into a lane if every target is
 !> direct and one with the same signs of all values has been assembled and had the structure of the block.
 module nocdyn_direct_parameters
-  use nocdyn_bank, only: role_coupling, role_names
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t, parameter_index_t
@@ -95,7 +94,7 @@ contains
     associate (group => input%groups(target%group))
       do b = 1, size(machine%banks)
         associate (bank => machine%banks(b)%bank)
-          if (role_names(bank%role) /= group%kind .and. .not. (bank%role == role_coupling .and. group%kind == 'mesh')) cycle
+          if (bank%has_parts .or. bank%kind_name() /= group%kind) cycle
           do e = 1, size(bank%names)
             if (bank%names(e)%text /= group%name) cycle
             index = parameters%index_of_key(trim(parameter_of(key_of(input, target))), bank%first - 1 + e)

@@ -187,24 +187,46 @@ contains
     end associate
   end function label
 
-  !> A line on the variants that have no trajectory though it was requested, '' if there are none.
+  !> Lines on limits that no result is compared with, and on the variants that have no trajectory though it was requested; '' if
+  !> there are neither.
   function sweep_note(input, summary) result(text)
     type(input_t), intent(in) :: input
     type(sweep_summary_t), intent(in) :: summary
     character(len=:), allocatable :: text
+    integer, allocatable :: limits(:)
     integer :: i
 
     text = ''
+    allocate (limits, source=input%groups_named('limit'))
+    if (size(limits) > 0 .and. .not. compares(input)) then
+      text = input%location(limits(1)) // ': note: a sweep compares nothing with a &limit; &record with statistic ' // &
+             "= 'max_abs' of its moment gives what to compare, and 'ratio' of a response compares"
+    end if
     associate (variants => summary%without_trajectory)
       if (size(variants) == 0) return
-      text = input%shown_file() // ': note: no trajectory of ' // trim(merge('variant ', 'variants', size(variants) == 1)) // &
-             ' ' // to_text(variants(1))
+      if (text /= '') text = text // new_line('a')
+      text = text // input%shown_file() // ': note: no trajectory of ' // &
+             trim(merge('variant ', 'variants', size(variants) == 1)) // ' ' // to_text(variants(1))
       do i = 2, size(variants)
         text = text // ', ' // to_text(variants(i))
       end do
       text = text // ': refused, or with more rows than allowed'
     end associate
   end function sweep_note
+
+  !> Whether a &record compares with limits.
+  pure logical function compares(input)
+    type(input_t), intent(in) :: input
+    integer :: i, k
+
+    compares = .false.
+    do i = 1, size(input%groups)
+      if (input%groups(i)%kind /= 'record') cycle
+      associate (words => input%groups(i)%texts('statistic'))
+        compares = compares .or. any([(words(k)%text == 'ratio', k=1, size(words))])
+      end associate
+    end do
+  end function compares
 
   !> A line on what was done and where the results are.
   function sweep_line(input, summary, folder) result(text)

@@ -1,7 +1,7 @@
 !> Reads an input file: scanner, schema, overrides and all checks. One error reports everything that is wrong.
 module nocdyn_input_reader
   use nocdyn_diagnostics, only: diagnostics_t, most_shown, no_line
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: add_error, error_t, exit_input, raise
   use nocdyn_group_reader, only: read_group
   use nocdyn_input, only: group_t, input_t
   use nocdyn_input_overrides, only: override_t, read_overrides
@@ -52,19 +52,21 @@ contains
     type(diagnostics_t) :: diagnostics
     logical, allocatable :: lacks(:)
     integer :: c
+    logical :: is_readable   ! whether the load cases are
 
     input%file = file
     input%overrides = overrides
     call read_all_groups(text, input, diagnostics, error)
     if (allocated(error)) return
-    if (diagnostics%count == 0) call find_load_cases(input, lacks, diagnostics)
+    is_readable = diagnostics%count == 0
+    if (is_readable) call find_load_cases(input, lacks, diagnostics)
     if (diagnostics%count > 0) then
       call raise(error, diagnostics%worst_code(), input%diagnostics_text(diagnostics))
     else if (size(input%load_cases) > 0) then
       call keep_groups(input, lacks)
     end if
     if (present(all_diagnostics)) all_diagnostics = diagnostics
-    if (allocated(error) .or. .not. present(load_cases)) return
+    if (.not. (is_readable .and. present(load_cases))) return
     allocate (load_cases(size(input%load_cases)))
     do c = 1, size(load_cases)
       if (present(only_case)) then
@@ -80,7 +82,7 @@ contains
     type(input_t), intent(in) :: machine
     integer, intent(in) :: c   !! of `machine%load_cases`
     type(string_t), intent(in) :: overrides(:)   !! PATH=VALUE of the command line
-    type(input_t), intent(out) :: input
+    type(input_t), intent(out) :: input   !! without groups if it is wrong
     type(error_t), allocatable, intent(inout) :: error   !! gets the mistakes of this case too
     type(error_t), allocatable :: own
     type(diagnostics_t) :: diagnostics
@@ -98,13 +100,12 @@ contains
     call read_all_groups(text, input, diagnostics, own)
     call refuse_lacking(input, diagnostics)
     if (diagnostics%count > 0) call raise(own, diagnostics%worst_code(), input%diagnostics_text(diagnostics))
-    if (allocated(own) .and. allocated(error)) then
-      error%message = error%message // new_line('a') // own%message
-    else if (allocated(own)) then
-      call move_alloc(own, error)
-    else
+    if (.not. allocated(own)) then
       call keep_groups(input, input%load_case%lacks)
+    else if (allocated(input%groups)) then
+      deallocate (input%groups)   ! they are not to be looked at
     end if
+    call add_error(error, own)
   end subroutine read_load_case
 
   !> Refuses values that a load case sets of elements which it leaves out.

@@ -23,7 +23,7 @@ module nocdyn_schema_response
     key_rule_t('response',   'body',            a_body,         1, '',            required,    anything, &
       'the body whose speed is held, and to whose turns orders refer'), &
     key_rule_t('response',   'speed',           a_number,       any_number, 'rad/s', required, not_zero, &
-      'lowest and highest speed of this body, or one speed', fewest=1), &
+      'lowest and highest speed of this body, or one speed, with the sign of its steady speed', fewest=1), &
     key_rule_t('response',   'count',           an_integer,     1, '',            '201',       speed_counts, &
       'number of speeds from the lowest to the highest; peaks between them are found'), &
     key_rule_t('response',   'orders',          a_number,       any_number, '',   unset,       positive, &

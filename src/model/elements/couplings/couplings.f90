@@ -40,7 +40,7 @@ module nocdyn_couplings
     real(wp), allocatable :: rest_twist(:, :)       !! [rad]
     real(wp), allocatable :: friction(:, :)         !! [N m]; not allocated: none
     real(wp), allocatable :: friction_speed(:, :)   !! [rad/s], positive
-    logical :: is_mesh = .false.                    !! whether the rows are radii: angles are deformations [m], moments forces [N]
+    logical :: is_mesh = .false.                    !! as in `bank_t`
     real(wp), allocatable :: section_modulus(:, :)  !! stress = moment / section_modulus [m3], 0: unknown; not allocated: all
     type(transmission_error_t), allocatable :: error !! of the only coupling; not allocated: none
   end type coupling_common_t
@@ -53,7 +53,6 @@ module nocdyn_couplings
   !> M_el = -(K1 + k1 w^2) w on the second body, w = u - rest_twist; damping moment -d u'. Extensions have another elastic moment.
   type, extends(bank_t), public :: couplings_t
     logical :: has_friction = .false.
-    logical :: is_mesh = .false.   !! as in `coupling_common_t`
     integer :: error_orders = 0    !! of the transmission error of its only coupling; 0: none
   contains
     procedure :: list_harmonics

@@ -43,6 +43,7 @@ module nocdyn_flux_motors
     procedure :: describe
     procedure :: circuit
     procedure :: steady_internal
+    procedure :: transient_frequency
     procedure :: hold_speed, follows_supply, set_supply, idle_supply
     procedure :: knees
     procedure :: quantities
@@ -191,6 +192,17 @@ contains
       end do
     end associate
   end subroutine steady_internal
+
+  !> The torque swings with the mains after a change of the supply, which at the start is that of switching on.
+  pure real(wp) function transient_frequency(self, element, is_steady)
+    class(flux_motors_t), intent(in) :: self
+    integer, intent(in) :: element     !! numbered within the bank
+    logical, intent(in) :: is_steady   !! whether its fluxes begin as they stay
+
+    transient_frequency = 0.0_wp
+    if (is_steady .and. .not. self%has_schedule) return
+    transient_frequency = self%parameters(self%number_of('frequency'))%value(1, element)
+  end function transient_frequency
 
   !> Gives the motors a supply of any frequency.
   subroutine hold_speed(self)

@@ -1,0 +1,92 @@
+!> Notes on the viscous damping that stands for relative damping over the time, where its frequency is not that of the vibration.
+module nocdyn_stand_in_notes
+  use nocdyn_kinds, only: wp
+  use nocdyn_linearisation, only: linearisation_t
+  use nocdyn_machine, only: machine_t
+  use nocdyn_text, only: append, quoted, rounded_text, string_t
+  use nocdyn_units, only: from_si, unit_hz
+  implicit none (type, external)
+  private
+
+  public :: has_stand_ins, note_stand_ins
+
+contains
+
+  !> Whether elements of a machine have a viscous damping in place of a relative one.
+  pure logical function has_stand_ins(machine)
+    type(machine_t), intent(in) :: machine   !! one lane
+    integer :: b
+
+    has_stand_ins = .false.
+    do b = 1, size(machine%banks)
+      if (allocated(machine%banks(b)%bank%loss_damping)) has_stand_ins = has_stand_ins .or. &
+                                                                         any(machine%banks(b)%bank%loss_damping > 0)
+    end do
+  end function has_stand_ins
+
+  !> Adds a note for each coupling or shaft: of the lowest of the modes that twist it most.
+  subroutine note_stand_ins(machine, linear, notes)
+    type(machine_t), intent(in) :: machine         !! one lane
+    type(linearisation_t), intent(in) :: linear    !! all but `matrix` and `held`
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    integer :: b, e, last
+
+    do b = 1, size(machine%banks)
+      associate (bank => machine%banks(b)%bank)
+        if (.not. allocated(bank%loss_damping)) cycle
+        e = 1
+        do while (e <= bank%count)
+          last = e
+          do while (bank%has_parts .and. last < bank%count)
+            if (bank%names(last + 1)%text /= bank%names(e)%text) exit
+            last = last + 1
+          end do
+          call note_one(trim(bank%kind_name()) // ' ' // quoted(bank%names(e)%text), bank%first - 1 + e, bank%first - 1 + last, &
+                        bank%loss_factor(e), bank%loss_damping(e), linear, notes)
+          e = last + 1
+        end do
+      end associate
+    end do
+  end subroutine note_stand_ins
+
+  !> Adds the note of one of them, if the frequencies differ and the damping counts.
+  subroutine note_one(name, first, last, loss_factor, damping, linear, notes)
+    character(len=*), intent(in) :: name
+    integer, intent(in) :: first, last          !! its elements
+    real(wp), intent(in) :: loss_factor, damping   !! of the first one; viscous, in place of it [N m s/rad]
+    type(linearisation_t), intent(in) :: linear
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    real(wp), parameter :: far = 1.5_wp         ! ratio of the frequencies
+    real(wp), parameter :: twisted = 0.5_wp     ! of the largest share of the energy
+    real(wp), parameter :: counts = 0.005_wp    ! damping ratio
+    real(wp), dimension(size(linear%natural)) :: share
+    real(wp) :: chosen, lossy, viscous
+    integer :: m
+
+    if (.not. (damping > 0 .and. linear%stiffness(first) > 0) .or. size(share) == 0) return
+    share = 0.0_wp
+    do m = 1, size(share)
+      if (linear%natural(m) > 0) share(m) = sum(linear%stiffness(first:last) * linear%twists(first:last, m)**2) &
+                                            / sum(linear%stiffness * linear%twists(:, m)**2)
+    end do
+    if (.not. maxval(share) > 0) return
+    m = minloc(linear%natural, dim=1, mask=share >= twisted * maxval(share))
+    chosen = loss_factor * linear%stiffness(first) / damping   ! [rad/s]
+    lossy = 0.5_wp * loss_factor * share(m)
+    viscous = lossy * linear%natural(m) / chosen
+    if (max(chosen / linear%natural(m), linear%natural(m) / chosen) <= far .or. max(lossy, viscous) < counts) return
+    call append(notes, 'the viscous damping that stands for the relative damping of ' // name // ' over the time (run, ' // &
+                       'sweep) has its frequency at ' // hertz(chosen) // ' Hz: to the mode at ' // hertz(linear%natural(m)) // &
+                       ' Hz it gives a damping ratio of ' // rounded_text(viscous, 2) // ', the relative damping (response, ' // &
+                       'campbell) ' // rounded_text(lossy, 2) // '; equal with damping_frequency_hz = ' // &
+                       hertz(linear%natural(m)))
+  end subroutine note_one
+
+  pure function hertz(omega) result(text)
+    real(wp), intent(in) :: omega   !! [rad/s]
+    character(len=len(rounded_text(from_si(omega, unit_hz), 3))) :: text
+
+    text = rounded_text(from_si(omega, unit_hz), 3)
+  end function hertz
+
+end module nocdyn_stand_in_notes
