@@ -314,6 +314,8 @@ def test_modes_and_campbell_agree_on_relative_damping(nocdyn, seed):
     ours = sorted((table[f"frequency_{one['mode']}"][0], table[f"damping_ratio_{one['mode']}"][0]) for one in found)
     for one, same in zip(ours, sorted((one["frequency_Hz"], one["damping_ratio"]) for one in modes), strict=True):
         assert one == pytest.approx(same, rel=1e-9)
+
+
 RUBBER = """\
 &body name = 'a' inertia = 2 speed_rpm = 1500 /
 &body name = 'b' inertia = 3 speed_rpm = 1500 /

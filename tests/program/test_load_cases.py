@@ -440,6 +440,8 @@ def test_a_limit_belongs_to_the_machines_that_have_its_element(nocdyn, cases):
     for command in ("check", "run", "modes", "response"):
         unknown = nocdyn(command, "m.nml", "--case", "cut")
         assert (unknown.returncode, unknown.stderr.count("there is no coupling 'k3'")) == (2, 1)
+
+
 def test_check_tells_all_mistakes_of_a_file_once(nocdyn):
     text = MACHINE + FAULT + RUN + LIFE.replace("coupling = 'shaft'", "coupling = 'shift'")
     text += "&limit coupling = 'shaff' moment = 1 /\n&response body = 'pump' speed = 9, 3 /\n&run load_case = 'a' t_end = 2 /\n"

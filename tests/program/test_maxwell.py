@@ -1,7 +1,7 @@
 """Couplings with Maxwell branches: springs in series with dampers, beside the spring."""
 
-import cmath
 import csv
+import itertools
 import json
 import math
 
@@ -53,7 +53,7 @@ def test_a_run_follows_the_exact_motion_and_keeps_the_energy(nocdyn, method):
         assert abs(float(row["energy_residual [J]"])) < 1e-8
     summary = json.loads((nocdyn.folder / "results/m/summary.json").read_text())
     lost = [float(row["work_out [J]"]) for row in rows]
-    assert all(after >= before - 1e-9 for before, after in zip(lost, lost[1:]))   # the dampers only lose
+    assert all(after >= before - 1e-9 for before, after in itertools.pairwise(lost))  # the dampers only lose
     assert summary["energy_account"]["work_in_J"]["coupling k"] == pytest.approx(-lost[-1], abs=1e-9)
 
 
@@ -68,10 +68,11 @@ def test_modes_are_those_of_the_matrix(nocdyn):
 
 
 def test_a_response_has_the_stiffness_of_its_frequency(nocdyn):
-    nocdyn.write("m.nml", 
+    nocdyn.write(
+        "m.nml",
         MACHINE.format(start="")
         + "&excitation name = 'x' body = 'a' kind = 'orders' orders = 1 amplitudes = 10.0 /\n"
-        + "&response body = 'a' speed = 10.0, 30.0 count = 5 /\n"
+        + "&response body = 'a' speed = 10.0, 30.0 count = 5 /\n",
     )
     assert nocdyn("response", "m.nml").returncode == 0
     with (nocdyn.folder / "results/m/response.csv").open() as file:
@@ -85,7 +86,6 @@ def test_a_response_has_the_stiffness_of_its_frequency(nocdyn):
         twist = moment / stiffness
         heat = 0.5 * speed * abs(twist) ** 2 * stiffness.imag
         assert float(row["heat_k [W]"]) == pytest.approx(heat, rel=1e-9)
-    assert cmath.isfinite(stiffness)
 
 
 @pytest.mark.parametrize(

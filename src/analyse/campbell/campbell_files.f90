@@ -38,7 +38,8 @@ contains
       call list%add_named('damping_ratio_' // to_text(m), '1', 'damping ratio')
     end do
     do m = 1, self%modes%modes
-      if (self%modes%internal(m) == 0) call list%add_named('undamped_frequency_' // to_text(m), 'Hz', 'undamped natural frequency')
+      if (self%modes%internal(m) > 0) cycle
+      call list%add_named('undamped_frequency_' // to_text(m), 'Hz', 'undamped natural frequency')
     end do
     do l = 1, size(self%order)
       call list%add_named(line_name(self, l), 'Hz', 'frequency of the line')
