@@ -26,7 +26,7 @@ VALUES_OF_A_VARIANT = {
     "input",
 }
 NAMES_IN_FAILURES = {"solver_status", "formulation", "system"}
-ANALYSES = {"limit_groups", "solve"}  # wrong limits, which the base machine has too; modes at a time of a run
+ANALYSES = {"limit_groups", "solve", "margins"}  # wrong limits, which the base machine has too; modes at a time; reports
 ALLOWED = BEFORE_THREADS | VALUES_OF_A_VARIANT | NAMES_IN_FAILURES | ANALYSES | {"serial_work"}
 
 LENGTHS = re.compile(r" [bBdD] (slen\.[0-9.]+)$", re.MULTILINE)

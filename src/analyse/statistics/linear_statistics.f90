@@ -228,7 +228,7 @@ contains
     integer, intent(in) :: degree    !! the largest one
     integer :: d
 
-    do d = 1, degree
+    do d = 1, max_degree
       self%rules(d) = new_interpolation(d)
     end do
     allocate (self%gauss(degree + 1), self%weights(degree + 1))

@@ -1,6 +1,6 @@
 !> A machine on a block of lanes: bodies, banks of elements, constraints, and the independent coordinates.
 module nocdyn_machine
-  use nocdyn_bank, only: bank_of, bank_slot_t, bank_t, name_length
+  use nocdyn_bank, only: bank_of, bank_slot_t, bank_t, name_length, role_motor
   use nocdyn_constraints, only: constraints_t
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_element_rows, only: element_rows_t, joined_rows, rows_between
@@ -246,9 +246,16 @@ contains
   logical function is_electrical(self, state)
     class(machine_t), intent(in) :: self
     integer, intent(in) :: state   !! as `index` of `internal_name`, or 0
+    integer :: i
 
-    is_electrical = state > 0
-    if (is_electrical) is_electrical = index(self%internal_name(state), 'governor') /= 1
+    is_electrical = .false.
+    do i = 1, merge(size(self%internal_banks), 0, state > 0)
+      associate (bank => self%banks(self%internal_banks(i))%bank)
+        if (state < bank%first_internal .or. state >= bank%first_internal + bank%states * bank%count) cycle
+        is_electrical = bank%role == role_motor .and. &
+                        index(bank%internal_names(1 + modulo(state - bank%first_internal, bank%states)), 'governor') /= 1
+      end associate
+    end do
   end function is_electrical
 
   !> Chooses the branches of the laws in all lanes, from the angles, speeds and internal states in `elements`.
