@@ -198,7 +198,7 @@ def test_cycles_of_an_earlier_run_do_not_stay_beside_new_results(nocdyn, discs):
     nocdyn("run", "discs.nml", "--out", "out")
     assert "cycles.csv" in nocdyn.files("out")
     assert nocdyn("sweep", "discs.nml", "--out", "out").returncode == 0
-    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc"]
+    assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", "sweep.nc"]
 
 
 def test_limits_that_a_sweep_does_not_look_at_are_noted(nocdyn, discs):

@@ -20,6 +20,7 @@ module nocdyn_analyses
     logical :: is_steady = .true.       !! whether it looks at the machine in a steady state, else over the time
     logical :: locks_joints = .true.    !! whether clutches and freewheels are locked or open for good then
     logical :: always_writes = .false.  !! whether it writes files without --out too
+    type(error_t), allocatable :: refusal   !! after `solve`: an error beside a report that can be printed, without files
   contains
     procedure(solve_interface), deferred :: solve
     procedure(list_files_interface), deferred :: list_files

@@ -40,7 +40,6 @@ contains
     do c = 1, size(signals)
       do k = 1, size(kinds)
         i = i + 1
-        statistics(i)%signal = signals(c)
         statistics(i)%column = c
         statistics(i)%kind = kinds(k)
         statistics(i)%from = from

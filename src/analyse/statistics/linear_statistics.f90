@@ -146,9 +146,9 @@ contains
     self%strip%scale(:) = steps%scale(1)
     do before = 0, size(self%accumulators) - 1, width
       do place = 1, min(width, size(self%accumulators) - before)
-        call place_column(self, self%accumulators(before + place)%column, place, y, y_new, c(:, :, :steps%degree(1)))
+        call place_column(self, self%accumulators(before + place)%column, place, y, y_new, c)
       end do
-      call widen_side_by_side(self, before, steps, steps%degree(1))
+      call widen_side_by_side(self, before, steps, size(c, 3))
     end do
     self%strip%lanes = 1
     do i = 1, size(self%accumulators)
@@ -157,8 +157,8 @@ contains
       call integrate_strip(self, self%accumulators(i), steps, size(c, 3))
     end do
     do i = 1, size(self%damages)
-      call place_column(self, self%damages(i)%column, 1, y, y_new, c(:, :, :steps%degree(1)))
-      call count_strip(self, self%damages(i), steps, steps%degree(1))
+      call place_column(self, self%damages(i)%column, 1, y, y_new, c)
+      call count_strip(self, self%damages(i), steps, size(c, 3))
     end do
   end subroutine add_single_step
 
@@ -225,12 +225,9 @@ contains
   subroutine allocate_work(self, columns, degree)
     class(linear_statistics_t), intent(inout) :: self
     integer, intent(in) :: columns   !! padded components of the state
-    integer, intent(in) :: degree    !! the largest one
-    integer :: d
+    integer, intent(in) :: degree
 
-    do d = 1, max_degree
-      self%rules(d) = new_interpolation(d)
-    end do
+    self%rules(degree) = new_interpolation(degree)
     allocate (self%gauss(degree + 1), self%weights(degree + 1))
     call gauss_legendre_rule(degree + 1, self%gauss, self%weights)
     self%gauss(:) = 2 * self%gauss - 1

@@ -37,7 +37,7 @@ module nocdyn_statistics
   !> |x - x_end| <= band |x(from) - x_end| from then on. Variants of another structure have other columns, in another order.
   type, public :: statistic_t
     integer :: result = 0                            !! its number among the results of a variant
-    type(signal_t) :: signal                         !! of the column
+    type(signal_t), allocatable :: signal            !! of the column; not allocated in runs, whose columns are known
     integer :: column = 0                            !! in the trajectory table of one machine, 0 if that has none
     integer :: kind = statistic_final                !! statistic_...
     real(wp) :: from = 0.0_wp                        !! [s]
@@ -131,8 +131,8 @@ contains
     integer :: i
 
     do i = 1, size(statistics)
+      if (allocated(statistics(i)%shaft) .or. .not. allocated(statistics(i)%signal)) cycle
       associate (statistic => statistics(i), wanted => statistics(i)%signal)
-        if (allocated(statistic%shaft)) cycle
         if (statistic%column >= 1 .and. statistic%column <= size(signals)) then
           if (signals(statistic%column)%name == wanted%name) cycle
         end if

@@ -60,7 +60,11 @@ contains
     type(statistic_t), intent(in) :: statistics(:)
     integer :: i
 
-    needs_work_integrals = any([(statistics(i)%signal%source%kind >= signal_work_in, i=1, size(statistics))])
+    needs_work_integrals = .false.
+    do i = 1, size(statistics)
+      if (.not. allocated(statistics(i)%signal)) cycle
+      needs_work_integrals = needs_work_integrals .or. statistics(i)%signal%source%kind >= signal_work_in
+    end do
   end function needs_work_integrals
 
   !> An observer of a block, which stays where it is. Only the reduced formulation may change the parameters of its lanes.
@@ -90,8 +94,8 @@ contains
     self%points = columns(size(signals) + 1:)
     self%missing = ''
     do i = size(found), 1, -1
-      if (allocated(found(i)%shaft)) cycle
-      if (found(i)%column == 0 .and. .not. is_torque(found(i))) self%missing = found(i)%signal%name
+      if (allocated(found(i)%shaft) .or. found(i)%column > 0) cycle
+      if (.not. is_torque(found(i))) self%missing = found(i)%signal%name
     end do
     allocate (self%default_value, source=value_of_zero_column(statistics))
     allocate (self%kind(size(statistics)))

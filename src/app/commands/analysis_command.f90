@@ -125,6 +125,12 @@ contains
     allocate (analysis, source=kind)
     call analysis%solve(input, machine, options, error)
     if (allocated(error)) return
+    if (allocated(analysis%refusal)) then
+      call analysis%text(input, text)
+      call print_text(text)
+      error = analysis%refusal
+      return
+    end if
     call analysis%list_files(names)
     if (folder /= '' .and. size(names) > 0) then
       call files%open(folder, names)

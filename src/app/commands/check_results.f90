@@ -64,20 +64,21 @@ contains
       if (allocated(error) .and. .not. has_load_cases(input)) return
       if (.not. allocated(error)) call move_alloc(plan%notes, notes)   ! those on columns too
       call add_sweep_lines(options%folder, input, plan, sizes, error)
+      if (allocated(error)) call move_alloc(error, self%refusal)
     else
       allocate (none(0))
       call choose_row_count(input, machine, rows, none)
       bytes = trajectory_bytes(rows, columns, wants_netcdf(input))
       if (bytes >= large) sizes = sizes // new_line('a') // '  trajectory.' // &
                                   trim(merge('nc ', 'csv', wants_netcdf(input))) // ': about ' // bytes_text(bytes)
-      call check_rows(input%location(input%position('output')), rows, columns, wants_netcdf(input), &
-                      options%folder, error)
+      call check_rows(input%location(input%position('output')), rows, columns, wants_netcdf(input), options%folder, &
+                      self%refusal)
     end if
     do i = 1, size(notes)
       sizes = sizes // new_line('a') // '  note: ' // notes(i)%text
     end do
     self%report = machine_report(input%shown_file(), machine) // speed_table(input, machine) // sizes
-    if (.not. allocated(error)) self%json = check_json(input, machine)
+    self%json = check_json(input, machine)
   end subroutine solve
 
   subroutine list_files(self, names)

@@ -43,7 +43,6 @@ module nocdyn_observer
     logical :: may_be_cut = .false.         !! whether `theta_end` may be less than 1
     logical, allocatable :: taken(:)        !! whether the lane has taken a step; only then it has dense output
     logical, allocatable :: crosses(:)      !! whether the step ends where the system changes its branch
-    integer, allocatable :: degree(:)       !! of the solution in the step of a lane; higher coefficients are zero
     real(wp), allocatable :: t(:)           !! start [s]
     real(wp), allocatable :: h(:)           !! step size [s]: theta = (time - t) / h
     real(wp), allocatable :: scale(:)       !! the solution is a polynomial in scale * theta: scale is 1 or h

@@ -23,7 +23,7 @@ contains
     do i = 1, size(candidates)
       if (abs(len(word) - len(candidates(i)%text)) >= smallest) cycle
       distance = edit_distance(lower_case(word), lower_case(candidates(i)%text))
-      if (distance < min(smallest, len(word))) then   ! else they share nothing
+      if (distance < min(smallest, max(len(word), len(candidates(i)%text)))) then   ! else they share nothing
         smallest = distance
         nearest = i
       end if

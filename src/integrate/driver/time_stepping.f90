@@ -113,7 +113,6 @@ contains
               integrator%steps%taken(lanes), &
               integrator%steps%crosses(lanes), source=.false.)
     allocate (integrator%t_new(lanes), integrator%next_time(lanes), source=t_start)
-    allocate (integrator%steps%degree(lanes), source=1)
     allocate (integrator%steps%t(lanes), integrator%steps%h(lanes), integrator%steps%scale(lanes), &
               integrator%steps%theta_end(lanes), integrator%steps%t_new(lanes), source=0.0_wp)
     allocate (integrator%next(lanes), source=2)
