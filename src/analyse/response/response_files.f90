@@ -47,7 +47,7 @@ contains
   !> The columns of response.csv.
   subroutine list_columns(analysis, wanted, list)
     type(response_analysis_t), intent(in) :: analysis
-    integer, intent(in) :: wanted(:)   !! units: indices of `units`
+    integer, intent(in) :: wanted(:)   !! indices of `units`
     type(column_list_t), intent(out) :: list
     integer :: k, q
 
@@ -209,7 +209,7 @@ contains
   !> The columns of response_orders.csv.
   subroutine list_order_columns(analysis, wanted, list)
     type(response_analysis_t), intent(in) :: analysis
-    integer, intent(in) :: wanted(:)   !! units: indices of `units`
+    integer, intent(in) :: wanted(:)   !! indices of `units`
     type(column_list_t), intent(out) :: list
     integer :: i
 
@@ -235,7 +235,7 @@ contains
   !> The text of the file that says what the columns of both tables are.
   function response_columns_json(analysis, wanted) result(text)
     type(response_analysis_t), intent(in) :: analysis
-    integer, intent(in) :: wanted(:)   !! units: indices of `units`
+    integer, intent(in) :: wanted(:)   !! indices of `units`
     character(len=:), allocatable :: text
     type(column_list_t) :: list, orders
     type(json_t) :: json
