@@ -48,6 +48,7 @@ contains
     real(wp), allocatable, intent(out) :: values(:, :)   !! [statistics, variants]; not allocated if the structures differ
     type(reduced_t), target :: block, source
     type(statistics_observer_t), target :: observer
+    type(statistic_t), allocatable :: own(:)
     type(measured_copies_t) :: ensemble
     type(solver_status_t) :: solver_status
     type(error_t), allocatable :: error
@@ -57,7 +58,8 @@ contains
     call source%list_parameters(ensemble%source)
     call block%list_parameters(ensemble%block)
     if (.not. ensemble%block%has_same_structure(ensemble%source)) return
-    observer = new_statistics_observer(block, statistics, 0.0_wp, t_end, may_bend=.true.)
+    allocate (own, source=statistics)
+    observer = new_statistics_observer(block, own, 0.0_wp, t_end, may_bend=.true.)
     ensemble%observer => observer
     allocate (ensemble%y, source=source%start())
     allocate (ensemble%values(size(statistics), variants%lanes), source=0.0_wp)
@@ -144,12 +146,14 @@ contains
     type(solver_status_t), intent(out) :: solver_status
     class(formulation_t), allocatable, target :: formulation
     type(statistics_observer_t), target :: observer
+    type(statistic_t), allocatable :: own(:)
     type(error_t), allocatable :: error
     real(wp), allocatable :: y(:, :)
     integer :: lane
 
     call new_formulation('reduced', machine, formulation)
-    observer = new_statistics_observer(formulation, statistics, 0.0_wp, t_end, may_bend=.true.)
+    allocate (own, source=statistics)
+    observer = new_statistics_observer(formulation, own, 0.0_wp, t_end, may_bend=.true.)
     y = formulation%start()
     call integrate(formulation, settings_of(method, tolerance), [0.0_wp, t_end], y, observer, solver_status, error)
     if (allocated(error)) error stop 'nocdyn_test_sweep_blocks: ' // error%message

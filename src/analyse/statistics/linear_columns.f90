@@ -22,6 +22,7 @@ module nocdyn_linear_columns
 
   type, public :: linear_columns_t
     integer :: count = 0
+    integer, private :: entries = 0
     integer, allocatable :: first(:)          !! entry of each column, [count + 1]; the number of its entries is even
     integer, allocatable :: component(:)      !! of the state, which the factor multiplies, [entries]
     real(wp), allocatable :: factor(:, :, :)  !! [width, entries, strips of lanes]
@@ -98,6 +99,7 @@ contains
       call set_column(self, i, block%machine, columns(i))
       call add_entries(self, i, block%machine)
     end do
+    call resize(self, self%entries)
     allocate (self%factor(width, size(self%component), strips), self%offset(width, self%count, strips), source=0.0_wp)
   end function new_linear_columns
 
@@ -132,13 +134,8 @@ contains
         end do
       end associate
     end if
-    if (modulo(size(self%ratio), 2) == 1) then
-      self%ratio = [self%ratio, 0]
-      self%coefficient = [self%coefficient, 0.0_wp]
-      self%component = [self%component, self%component(size(self%component))]
-      self%is_rate = [self%is_rate, .false.]
-    end if
-    self%first(number + 1) = size(self%ratio) + 1
+    if (modulo(self%entries, 2) == 1) call add_entry(self, 0, 0.0_wp, self%component(self%entries), .false.)
+    self%first(number + 1) = self%entries + 1
   end subroutine add_entries
 
   subroutine add_body(self, coordinates, body, coefficient, is_rate)
@@ -151,12 +148,38 @@ contains
 
     if (body == 0) return
     do k = coordinates%first(body), coordinates%first(body + 1) - 1
-      self%ratio = [self%ratio, k]
-      self%coefficient = [self%coefficient, coefficient]
-      self%component = [self%component, coordinates%coordinate(k) + merge(0, coordinates%freedoms, is_rate)]
-      self%is_rate = [self%is_rate, is_rate]
+      call add_entry(self, k, coefficient, coordinates%coordinate(k) + merge(0, coordinates%freedoms, is_rate), is_rate)
     end do
   end subroutine add_body
+
+  !> Appends an entry, in amortised constant time.
+  subroutine add_entry(self, ratio, coefficient, component, is_rate)
+    type(linear_columns_t), intent(inout) :: self
+    integer, intent(in) :: ratio, component
+    real(wp), intent(in) :: coefficient
+    logical, intent(in) :: is_rate
+
+    if (self%entries == size(self%ratio)) call resize(self, 2 * self%entries + 8)
+    self%entries = self%entries + 1
+    self%ratio(self%entries) = ratio
+    self%coefficient(self%entries) = coefficient
+    self%component(self%entries) = component
+    self%is_rate(self%entries) = is_rate
+  end subroutine add_entry
+
+  !> Changes the room for entries.
+  subroutine resize(self, room)
+    type(linear_columns_t), intent(inout) :: self
+    integer, intent(in) :: room
+    integer :: i
+
+    associate (kept => min(room, self%entries))
+      self%ratio = [self%ratio(:kept), (0, i=kept + 1, room)]
+      self%coefficient = [self%coefficient(:kept), (0.0_wp, i=kept + 1, room)]
+      self%component = [self%component(:kept), (0, i=kept + 1, room)]
+      self%is_rate = [self%is_rate(:kept), (.false., i=kept + 1, room)]
+    end associate
+  end subroutine resize
 
   !> Copies the parameters of a lane of the block.
   pure subroutine copy_lane(self, block, lane)

@@ -43,7 +43,7 @@ module nocdyn_statistics
     real(wp) :: from = 0.0_wp                        !! [s]
     real(wp) :: band = default_band                  !! for settling_time only
     integer :: fatigue = 0                           !! index of the &fatigue in the input, 0: none
-    type(sn_curve_t) :: curve                        !! of that
+    type(sn_curve_t), allocatable :: curve           !! of that; not allocated without a fatigue
     logical :: keeps_classes = .false.               !! whether its cycles are sorted into classes
     character(len=:), allocatable :: shaft           !! its shaft, all of whose points count; not allocated: the signal counts
     logical :: is_stress = .false.                   !! whether that is its stress, not its moment
@@ -102,6 +102,7 @@ contains
     real(wp), intent(in) :: from               !! [s]
 
     self%fatigue = fatigue
+    allocate (self%curve)
     self%signal = signal
     self%kind = kind
     self%from = from

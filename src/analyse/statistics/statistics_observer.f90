@@ -70,13 +70,13 @@ contains
   !> An observer of a block, which stays where it is. Only the reduced formulation may change the parameters of its lanes.
   function new_statistics_observer(block, statistics, t_start, t_end, may_bend, tracks_all) result(self)
     class(formulation_t), target, intent(inout) :: block   !! with work integrals if `needs_work_integrals`
-    type(statistic_t), intent(in) :: statistics(:)         !! each with t_start <= from < t_end
+    type(statistic_t), intent(inout) :: statistics(:)      !! each with t_start <= from < t_end; get their columns
     real(wp), intent(in) :: t_start, t_end                 !! of every variant [s]
     logical, intent(in) :: may_bend                        !! whether variants differ in cubic stiffnesses
     logical, intent(in), optional :: tracks_all            !! whether an extension gives the values of all columns of the table
                                                            !! and of `points`; absent: those that are needed are recorded
     type(statistics_observer_t) :: self
-    type(statistic_t), allocatable :: found(:), parts(:)
+    type(statistic_t), allocatable :: parts(:)
     type(signal_source_t), allocatable :: columns(:)
     type(signal_t), allocatable :: signals(:)
     integer :: i, tracked
@@ -88,14 +88,13 @@ contains
     self%takes_shifts = .true.
     call list_signals(block%machine, signals)
     columns = signals%source
-    allocate (found, source=statistics)
-    call find_columns(signals, found)
-    call list_parts(self, found, columns, parts)
+    call find_columns(signals, statistics)
+    call list_parts(self, statistics, columns, parts)
     self%points = columns(size(signals) + 1:)
     self%missing = ''
-    do i = size(found), 1, -1
-      if (allocated(found(i)%shaft) .or. found(i)%column > 0) cycle
-      if (.not. is_torque(found(i))) self%missing = found(i)%signal%name
+    do i = size(statistics), 1, -1
+      if (allocated(statistics(i)%shaft) .or. statistics(i)%column > 0) cycle
+      if (.not. is_torque(statistics(i))) self%missing = statistics(i)%signal%name
     end do
     allocate (self%default_value, source=value_of_zero_column(statistics))
     allocate (self%kind(size(statistics)))
