@@ -139,7 +139,7 @@ def test_auto_does_without_a_matrix_that_is_too_large_and_says_so(hub):
     summary = hub.summary("out")
     assert summary["machine"]["notes"] == [note]
     assert (summary["settings"]["method"], summary["method"]["name"]) == ("auto", "rk853")
-    assert megabytes < 150 or IS_SANITIZED  # the matrix alone would have 288
+    assert megabytes < 220 or IS_SANITIZED  # the matrix alone would have 288
     hub("run", "hub.nml", "--out", "explicit", "--set", "run.method=rk853")
     assert (hub.folder / "out/trajectory.csv").read_bytes() == (hub.folder / "explicit/trajectory.csv").read_bytes()
 
