@@ -53,7 +53,8 @@ contains
       end do
       if (size(known) > 0) then   ! else the load case lacks the element
         call raise(own, exit_input, input%location(limits(i), 'quantity') // ': ' // kind // ' ' // quoted(name) // &
-                   ' has no quantity ' // quoted(input%groups(limits(i))%text('quantity')) // '; allowed: ' // joined(known, ', '))
+                   ' has no quantity ' // quoted(input%groups(limits(i))%text('quantity')) // '; allowed: ' // &
+                   joined(known, ', '))
         call add_error(error, own)
       end if
       deallocate (known)
@@ -82,7 +83,7 @@ contains
     end do
   end subroutine refuse_equal_labels
 
-  !> The group of the input that a signal belongs to. Engines and cranks have elements of their own, whose names begin with theirs.
+  !> The group of the input that a signal belongs to. Engines and cranks have elements whose names begin with theirs.
   integer function owner(input, signal) result(group)
     type(input_t), intent(in) :: input
     type(signal_t), intent(in) :: signal

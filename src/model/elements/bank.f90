@@ -301,8 +301,8 @@ contains
     integer :: e
 
     allocate (columns(1))
-    columns(1) = new_quantity('torque', 'N m', [(e, e=1, self%count)], 'torque on the body', 'with a positive speed', rank_torque, &
-                           form_total, 1.0_wp)
+    columns(1) = new_quantity('torque', 'N m', [(e, e=1, self%count)], 'torque on the body', 'with a positive speed', &
+                              rank_torque, form_total, 1.0_wp)
   end subroutine quantities
 
   !> Values of a quantity without a form, of all elements of the bank, after `evaluate`. Banks that have one override this.

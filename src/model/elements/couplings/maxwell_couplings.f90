@@ -1,6 +1,6 @@
-!> Couplings of rubber or fluid whose stiffness grows with the frequency: beside the spring and the damper stand Maxwell branches,
-!> each a spring K in series with a damper. (The generalised Maxwell or Wiechert model; N. W. Tschoegl, The Phenomenological Theory
-!> of Linear Viscoelastic Behavior, Springer 1989, section 3.5.)
+!> Couplings of rubber or fluid whose stiffness grows with the frequency: beside the spring and the damper stand Maxwell
+!> branches, each a spring K in series with a damper: the generalised Maxwell model (N. W. Tschoegl, The Phenomenological Theory
+!> of Linear Viscoelastic Behavior, 1989, pp. 119-126).
 !>
 !> The moments F of the branches are internal states: F' = K u' - F / time, where time is the damping of the branch over K. At a
 !> frequency w the stiffness of a branch is K i w time / (1 + i w time).
