@@ -133,7 +133,8 @@ contains
   end function is_stress
 
   !> The twist of the second end against the first one [rad], the moment in the shaft [N m], elastic and of its damping, positive
-  !> with the twist, the shear stress at the surface [Pa], and the moment that a speed multiplies to the power [N m]. The values of a shaft are those of its first slice.
+  !> with the twist, the shear stress at the surface [Pa], and the moment that a speed multiplies to the power [N m]. The values
+  !> of a shaft are those of its first slice.
   pure subroutine observe(self, elements, quantity, lane, values)
     class(shafts_t), intent(in) :: self
     type(elements_t), intent(in) :: elements
