@@ -121,6 +121,7 @@ contains
     options%at = ''
     if (arguments%is_given('--at')) options%at = arguments%value('--at')
     options%has_holzer = arguments%is_given('--holzer')
+    options%writes_files = folder /= ''
     options%folder = result_folder(arguments, input)
     allocate (analysis, source=kind)
     call analysis%solve(input, machine, options, error)

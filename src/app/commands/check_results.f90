@@ -78,7 +78,7 @@ contains
       sizes = sizes // new_line('a') // '  note: ' // notes(i)%text
     end do
     self%report = machine_report(input%shown_file(), machine) // speed_table(input, machine) // sizes
-    self%json = check_json(input, machine)
+    if (options%writes_files) self%json = check_json(input, machine)
   end subroutine solve
 
   subroutine list_files(self, names)
