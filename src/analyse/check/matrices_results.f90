@@ -5,15 +5,13 @@ module nocdyn_matrices_results
   use nocdyn_input, only: group_t, input_t
   use nocdyn_machine, only: machine_t
   use nocdyn_matrix_report, only: matrix_report
-  use nocdyn_output_file, only: output_file_t
-  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
   type, extends(analysis_t), public :: matrices_results_t
     character(len=:), allocatable, private :: report
   contains
-    procedure :: solve, list_files, put_file, text => printed
+    procedure :: solve, text => printed
   end type matrices_results_t
 
 contains
@@ -30,22 +28,6 @@ contains
     call matrix_report(machine, run%number('t_start'), self%report, error)
     if (allocated(error)) error%message = input%shown_file() // ': ' // error%message
   end subroutine solve
-
-  subroutine list_files(self, names)
-    class(matrices_results_t), intent(in) :: self
-    type(string_t), allocatable, intent(out) :: names(:)
-
-    allocate (names(0))
-  end subroutine list_files
-
-  subroutine put_file(self, input, name, file)
-    class(matrices_results_t), intent(in) :: self
-    type(input_t), intent(in) :: input
-    character(len=*), intent(in) :: name
-    type(output_file_t), intent(inout) :: file
-
-    error stop 'nocdyn_matrices_results: there are no files'
-  end subroutine put_file
 
   subroutine printed(self, input, text)
     class(matrices_results_t), intent(in) :: self

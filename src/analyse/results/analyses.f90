@@ -24,8 +24,8 @@ module nocdyn_analyses
     type(error_t), allocatable :: refusal   !! after `solve`: an error beside a report that can be printed, without files
   contains
     procedure(solve_interface), deferred :: solve
-    procedure(list_files_interface), deferred :: list_files
-    procedure(put_file_interface), deferred :: put_file
+    procedure :: list_files
+    procedure :: put_file
     procedure(text_interface), deferred :: text
   end type analysis_t
 
@@ -41,22 +41,6 @@ module nocdyn_analyses
       type(error_t), allocatable, intent(out) :: error
     end subroutine solve_interface
 
-    !> The names of its files, which appear together; the report comes last.
-    subroutine list_files_interface(self, names)
-      import :: analysis_t, string_t
-      class(analysis_t), intent(in) :: self
-      type(string_t), allocatable, intent(out) :: names(:)
-    end subroutine list_files_interface
-
-    !> Writes one of these files.
-    subroutine put_file_interface(self, input, name, file)
-      import :: analysis_t, input_t, output_file_t
-      class(analysis_t), intent(in) :: self
-      type(input_t), intent(in) :: input
-      character(len=*), intent(in) :: name
-      type(output_file_t), intent(inout) :: file
-    end subroutine put_file_interface
-
     !> The printed report.
     subroutine text_interface(self, input, text)
       import :: analysis_t, input_t
@@ -66,5 +50,25 @@ module nocdyn_analyses
     end subroutine text_interface
 
   end interface
+
+contains
+
+  !> The names of the files of an analysis, which appear together; the report comes last. By default there are none.
+  subroutine list_files(self, names)
+    class(analysis_t), intent(in) :: self
+    type(string_t), allocatable, intent(out) :: names(:)
+
+    allocate (names(0))
+  end subroutine list_files
+
+  !> Writes one of these files.
+  subroutine put_file(self, input, name, file)
+    class(analysis_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: name
+    type(output_file_t), intent(inout) :: file
+
+    error stop 'nocdyn_analyses: an analysis with files overrides put_file'
+  end subroutine put_file
 
 end module nocdyn_analyses
