@@ -1,9 +1,11 @@
 """Runs that fail, are interrupted, or cannot write: exit code, message, and what is left behind."""
 
 import os
+import re
 import resource
 import signal
 import time
+from pathlib import Path
 
 import pytest
 from conftest import CASE_1, CASE_2, ENDLESS, TRAPS_EXCEPTIONS, wait_for
@@ -256,12 +258,18 @@ ASKED = """\
 """
 
 
+def catches(process, number):
+    """Whether a process has a handler for a signal."""
+    mask = re.search(r"^SigCgt:\s*(\w+)$", Path(f"/proc/{process.pid}/status").read_text(), re.MULTILINE)[1]
+    return int(mask, 16) >> (number - 1) & 1 == 1
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("command", ["modes", "response", "campbell", "equilibrium"])
 def test_an_interrupted_analysis_leaves_a_message_and_no_files(nocdyn, command, number):
     path = nocdyn.write("chain.nml", CHAIN + ASKED)
     process = nocdyn.start(command, path, "--out", "out")
-    time.sleep(0.5)  # it takes some seconds
+    wait_for(lambda: catches(process, number))  # it takes some seconds then
     process.send_signal(number)
     output, complaint = process.communicate(timeout=30)
     assert (process.returncode, output) == (1, "")
