@@ -13,51 +13,40 @@ module nocdyn_schema_fatigue
                  'Cycles and damage of a coupling, shaft, mesh or gear, in runs and responses.')]
 
   type(key_rule_t), parameter, public :: fatigue_keys(*) = [ &
-    key_rule_t('fatigue',    'name',            a_name,         1, '',            required,    anything, &
-      'name in results and messages'), &
-    key_rule_t('fatigue',    'coupling',        a_text,         1, '',            unset,       anything, &
-      'name of the coupling'), &
-    key_rule_t('fatigue',    'shaft',           a_text,         1, '',            unset,       anything, &
-      'name of the shaft; its worst section counts'), &
-    key_rule_t('fatigue',    'mesh',            a_text,         1, '',            unset,       anything, &
-      'name of the mesh'), &
-    key_rule_t('fatigue',    'gear',            a_text,         1, '',            unset,       anything, &
-      'name of the gear, with radii'), &
-    key_rule_t('fatigue',    'reference_stress', a_number,      1, 'Pa',          unset,       positive, &
+    key_rule_t('fatigue', 'name', a_name, 1, '', required, anything, 'name in results and messages'), &
+    key_rule_t('fatigue', 'coupling', a_text, 1, '', unset, anything, 'name of the coupling'), &
+    key_rule_t('fatigue', 'shaft', a_text, 1, '', unset, anything, 'name of the shaft; its worst section counts'), &
+    key_rule_t('fatigue', 'mesh', a_text, 1, '', unset, anything, 'name of the mesh'), &
+    key_rule_t('fatigue', 'gear', a_text, 1, '', unset, anything, 'name of the gear, with radii'), &
+    key_rule_t('fatigue', 'reference_stress', a_number, 1, 'Pa', unset, positive, &
       'half range of the shear stress that reference_cycles cycles of it break'), &
-    key_rule_t('fatigue',    'reference_moment', a_number,      1, 'N m',         unset,       positive, &
-      'the same as a moment'), &
-    key_rule_t('fatigue',    'reference_force', a_number,       1, 'N',           unset,       positive, &
-      'the same as a tooth force'), &
-    key_rule_t('fatigue',    'reference_cycles', a_number,      1, '',            unset,       positive, &
+    key_rule_t('fatigue', 'reference_moment', a_number, 1, 'N m', unset, positive, 'the same as a moment'), &
+    key_rule_t('fatigue', 'reference_force', a_number, 1, 'N', unset, positive, 'the same as a tooth force'), &
+    key_rule_t('fatigue', 'reference_cycles', a_number, 1, '', unset, positive, &
       'number of cycles of this point of the S-N curve'), &
-    key_rule_t('fatigue',    'slope',           a_number,       1, '',            unset,       positive, &
+    key_rule_t('fatigue', 'slope', a_number, 1, '', unset, positive, &
       'exponent k of the S-N curve: cycles = reference_cycles (reference / half range)^k'), &
-    key_rule_t('fatigue',    'second_slope',    a_number,       1, '',            unset,       positive, &
+    key_rule_t('fatigue', 'second_slope', a_number, 1, '', unset, positive, &
       'exponent below the point of the reference; slope if not given'), &
-    key_rule_t('fatigue',    'table_cycles',    a_number,       any_number, '',   unset,       positive, &
+    key_rule_t('fatigue', 'table_cycles', a_number, any_number, '', unset, positive, &
       'cycles of the points of a curve in place of slope, ascending; straight in log scales', fewest=2, ascends=.true.), &
-    key_rule_t('fatigue',    'table_stress',    a_number,       any_number, 'Pa', unset,       positive, &
+    key_rule_t('fatigue', 'table_stress', a_number, any_number, 'Pa', unset, positive, &
       'half ranges of the shear stress at these cycles, descending', fewest=2), &
-    key_rule_t('fatigue',    'table_moment',    a_number,       any_number, 'N m', unset,      positive, &
-      'the same as moments', fewest=2), &
-    key_rule_t('fatigue',    'table_force',     a_number,       any_number, 'N',  unset,       positive, &
-      'the same as tooth forces', fewest=2), &
-    key_rule_t('fatigue',    'endurance_limit', a_number,       1, '',            '0',         not_negative, &
+    key_rule_t('fatigue', 'table_moment', a_number, any_number, 'N m', unset, positive, 'the same as moments', fewest=2), &
+    key_rule_t('fatigue', 'table_force', a_number, any_number, 'N', unset, positive, 'the same as tooth forces', fewest=2), &
+    key_rule_t('fatigue', 'endurance_limit', a_number, 1, '', '0', not_negative, &
       'half range up to which no damage is done, in the unit of the reference'), &
-    key_rule_t('fatigue',    'notch_factor',    a_number,       1, '',            '1',         from_1, &
-      'fatigue notch factor on the half range'), &
-    key_rule_t('fatigue',    'mean_stress',     a_word,         1, '',            "'none'",    mean_stresses, &
+    key_rule_t('fatigue', 'notch_factor', a_number, 1, '', '1', from_1, 'fatigue notch factor on the half range'), &
+    key_rule_t('fatigue', 'mean_stress', a_word, 1, '', "'none'", mean_stresses, &
       'half range / (1 - mean / strength): ultimate_stress of goodman, yield_stress of soderberg'), &
-    key_rule_t('fatigue',    'ultimate_stress', a_number,       1, 'Pa',          unset,       positive, &
+    key_rule_t('fatigue', 'ultimate_stress', a_number, 1, 'Pa', unset, positive, &
       'shear stress that breaks the part at once, for goodman'), &
-    key_rule_t('fatigue',    'yield_stress',    a_number,       1, 'Pa',          unset,       positive, &
-      'shear stress at which it yields, for soderberg'), &
-    key_rule_t('fatigue',    'repeats',         a_number,       1, '',            '1',         positive, &
+    key_rule_t('fatigue', 'yield_stress', a_number, 1, 'Pa', unset, positive, 'shear stress at which it yields, for soderberg'), &
+    key_rule_t('fatigue', 'repeats', a_number, 1, '', '1', positive, &
       'how often the motion of the run occurs in the life of the machine'), &
-    key_rule_t('fatigue',    'profile_speeds',  a_number,       any_number, 'rad/s', unset,    not_zero, &
+    key_rule_t('fatigue', 'profile_speeds', a_number, any_number, 'rad/s', unset, not_zero, &
       'speeds of the body of &response, for the damage that its oscillations do', fewest=1), &
-    key_rule_t('fatigue',    'profile_hours',   a_number,       any_number, 'h',  unset,       positive, &
+    key_rule_t('fatigue', 'profile_hours', a_number, any_number, 'h', unset, positive, &
       'how long the machine runs at each of these speeds', fewest=1)]
 
   type(relation_rule_t), parameter, public :: fatigue_relations(*) = [ &

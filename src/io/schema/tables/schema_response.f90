@@ -14,57 +14,48 @@ module nocdyn_schema_response
   type(allowed_t), parameter :: margins = allowed_t(low=0.0_wp, high=0.9_wp)
 
   type(group_rule_t), parameter, public :: response_groups(*) = [ &
-    group_rule_t('response', in_torsional, at_most_once, '', &
-                 "Speeds and orders of 'nocdyn response' and 'nocdyn campbell'."), &
+    group_rule_t('response', in_torsional, at_most_once, '', "Speeds and orders of 'nocdyn response' and 'nocdyn campbell'."), &
     group_rule_t('limit', in_torsional, any_times, '', &
                  'Limits of moments, stresses and forces of a coupling, a shaft or a mesh.')]
 
   type(key_rule_t), parameter, public :: response_keys(*) = [ &
-    key_rule_t('response',   'body',            a_body,         1, '',            required,    anything, &
+    key_rule_t('response', 'body', a_body, 1, '', required, anything, &
       'the body whose speed is held, and to whose turns orders refer'), &
-    key_rule_t('response',   'speed',           a_number,       any_number, 'rad/s', required, not_zero, &
+    key_rule_t('response', 'speed', a_number, any_number, 'rad/s', required, not_zero, &
       'lowest and highest speed of this body, or one speed', fewest=1), &
-    key_rule_t('response',   'count',           an_integer,     1, '',            '201',       speed_counts, &
+    key_rule_t('response', 'count', an_integer, 1, '', '201', speed_counts, &
       'number of speeds from the lowest to the highest; peaks between them are found'), &
-    key_rule_t('response',   'orders',          a_number,       any_number, '',   unset,       positive, &
+    key_rule_t('response', 'orders', a_number, any_number, '', unset, positive, &
       'oscillations per turn of the body; those of the excitations if not given', fewest=1), &
-    key_rule_t('response',   'operating',       a_number,       2, 'rad/s',       unset,       not_zero, &
-      'lowest and highest speed in operation'), &
-    key_rule_t('response',   'margin',          a_number,       1, '',            '0.1',       margins, &
+    key_rule_t('response', 'operating', a_number, 2, 'rad/s', unset, not_zero, 'lowest and highest speed in operation'), &
+    key_rule_t('response', 'margin', a_number, 1, '', '0.1', margins, &
       'a critical speed so near to the speeds in operation, as a share of it, is reported'), &
-    key_rule_t('limit',      'coupling',        a_text,         1, '',            unset,       anything, &
-      'name of the coupling'), &
-    key_rule_t('limit',      'shaft',           a_text,         1, '',            unset,       anything, &
-      'name of the shaft'), &
-    key_rule_t('limit',      'mesh',            a_text,         1, '',            unset,       anything, &
-      'name of the mesh'), &
-    key_rule_t('limit',      'vibratory_moment', a_number,      1, 'N m',         unset,       positive, &
+    key_rule_t('limit', 'coupling', a_text, 1, '', unset, anything, 'name of the coupling'), &
+    key_rule_t('limit', 'shaft', a_text, 1, '', unset, anything, 'name of the shaft'), &
+    key_rule_t('limit', 'mesh', a_text, 1, '', unset, anything, 'name of the mesh'), &
+    key_rule_t('limit', 'vibratory_moment', a_number, 1, 'N m', unset, positive, &
       'half range of the moment in continuous operation'), &
-    key_rule_t('limit',      'moment',          a_number,       1, 'N m',         unset,       positive, &
-      'largest magnitude of the moment, its mean included'), &
-    key_rule_t('limit',      'vibratory_force', a_number,       1, 'N',           unset,       positive, &
+    key_rule_t('limit', 'moment', a_number, 1, 'N m', unset, positive, 'largest magnitude of the moment, its mean included'), &
+    key_rule_t('limit', 'vibratory_force', a_number, 1, 'N', unset, positive, &
       'half range of the force of the mesh in continuous operation'), &
-    key_rule_t('limit',      'force',           a_number,       1, 'N',           unset,       positive, &
-      'largest magnitude of this force, its mean included'), &
-    key_rule_t('limit',      'stress',          a_number,       1, 'Pa',          unset,       positive, &
-      'half range of the shear stress in continuous operation'), &
-    key_rule_t('limit',      'stress_transient', a_number,      1, 'Pa',          unset,       positive, &
+    key_rule_t('limit', 'force', a_number, 1, 'N', unset, positive, 'largest magnitude of this force, its mean included'), &
+    key_rule_t('limit', 'stress', a_number, 1, 'Pa', unset, positive, 'half range of the shear stress in continuous operation'), &
+    key_rule_t('limit', 'stress_transient', a_number, 1, 'Pa', unset, positive, &
       'half range of the shear stress at speeds that are passed through quickly'), &
-    key_rule_t('limit',      'quantity',        a_text,         1, '',            unset,       anything, &
+    key_rule_t('limit', 'quantity', a_text, 1, '', unset, anything, &
       "another quantity of the element: a kind in columns.json, such as 'power' of a shaft"), &
-    key_rule_t('limit',      'largest',         a_number,       1, '',            unset,       positive, &
-      'largest magnitude of the quantity, in its SI unit'), &
-    key_rule_t('limit',      'vibratory',       a_number,       1, '',            unset,       positive, &
+    key_rule_t('limit', 'largest', a_number, 1, '', unset, positive, 'largest magnitude of the quantity, in its SI unit'), &
+    key_rule_t('limit', 'vibratory', a_number, 1, '', unset, positive, &
       'half range of the quantity in continuous operation, in its SI unit'), &
-    key_rule_t('limit',      'rule',            a_word,         1, '',            unset,       rules, &
+    key_rule_t('limit', 'rule', a_word, 1, '', unset, rules, &
       'stresses by a rule: iacs_m68 is IACS Unified Requirement M68 for propulsion shafts'), &
-    key_rule_t('limit',      'tensile_strength', a_number,      1, 'Pa',          unset,       strengths, &
+    key_rule_t('limit', 'tensile_strength', a_number, 1, 'Pa', unset, strengths, &
       'specified minimum tensile strength sigma_B, for the rule'), &
-    key_rule_t('limit',      'c_k',             a_number,       1, '',            '1',         factors, &
+    key_rule_t('limit', 'c_k', a_number, 1, '', '1', factors, &
       'factor of the shape of the shaft in the rule: 1 with integral flanges, 0.6 with keyways, ...'), &
-    key_rule_t('limit',      'diameter',        a_number,       1, 'm',           unset,       positive, &
+    key_rule_t('limit', 'diameter', a_number, 1, 'm', unset, positive, &
       'outer diameter in the rule; that of the coupling if not given'), &
-    key_rule_t('limit',      'rated_speed',     a_number,       1, 'rad/s',       unset,       not_zero, &
+    key_rule_t('limit', 'rated_speed', a_number, 1, 'rad/s', unset, not_zero, &
       'rated speed of the body of &response, for the rule')]
 
   type(relation_rule_t), parameter, public :: response_relations(*) = [ &

@@ -12,62 +12,53 @@ module nocdyn_schema_constraints
     group_rule_t('planetary', in_machine, any_times, 'constraint', &
                  'A planetary gear set (Willis): z_s omega_s + z_r omega_r = (z_s + z_r) omega_c.'), &
     group_rule_t('differential', in_machine, any_times, 'constraint', 'A differential: omega_1 + omega_2 = 2 omega_case.'), &
-    group_rule_t('constraint', in_machine, any_times, 'constraint', &
-                 'Any rigid relation: the sum of coefficient * speed is 0.')]
+    group_rule_t('constraint', in_machine, any_times, 'constraint', 'Any rigid relation: the sum of coefficient * speed is 0.')]
 
   type(key_rule_t), parameter, public :: constraint_keys(*) = [ &
-    key_rule_t('gear',       'name',            a_name,         1, '',            required,    anything, &
-      'name in results and messages'), &
-    key_rule_t('gear',       'bodies',          body_or_ground, 2, '',            required,    anything, &
+    key_rule_t('gear', 'name', a_name, 1, '', required, anything, 'name in results and messages'), &
+    key_rule_t('gear', 'bodies', body_or_ground, 2, '', required, anything, &
       "the two wheels; 'ground' does not turn, and locks the other one"), &
-    key_rule_t('gear',       'radii',           a_number,       2, 'm',           unset,       positive, &
-      'pitch radii, in the order of the bodies'), &
-    key_rule_t('gear',       'teeth',           an_integer,     2, '',            unset,       from_1, &
-      'numbers of teeth, in the order of the bodies'), &
-    key_rule_t('gear',       'internal',        a_flag,         1, '',            '.false.',   anything, &
+    key_rule_t('gear', 'radii', a_number, 2, 'm', unset, positive, 'pitch radii, in the order of the bodies'), &
+    key_rule_t('gear', 'teeth', an_integer, 2, '', unset, from_1, 'numbers of teeth, in the order of the bodies'), &
+    key_rule_t('gear', 'internal', a_flag, 1, '', '.false.', anything, &
       'an internal gear: both wheels turn in the same direction'), &
-    key_rule_t('gear',       'efficiency',      a_number,       1, '',            unset,       efficiencies, &
+    key_rule_t('gear', 'efficiency', a_number, 1, '', unset, efficiencies, &
       'share of the power that the second wheel gets where the first one drives; 1 without losses'), &
-    key_rule_t('gear',       'reverse_efficiency', a_number,    1, '',            unset,       reverse_efficiencies, &
+    key_rule_t('gear', 'reverse_efficiency', a_number, 1, '', unset, reverse_efficiencies, &
       'the same where the second wheel drives; as efficiency if not given; 0 or less: self-locking'), &
-    key_rule_t('gear',       'table_speed',     a_number,       any_number, 'rad/s', unset,    not_negative, &
+    key_rule_t('gear', 'table_speed', a_number, any_number, 'rad/s', unset, not_negative, &
       'speeds of the first wheel of the points of a table of efficiencies, from 0 on', fewest=2, ascends=.true.), &
-    key_rule_t('gear',       'table_efficiency', a_number,      any_number, '',  unset,       efficiencies, &
+    key_rule_t('gear', 'table_efficiency', a_number, any_number, '', unset, efficiencies, &
       'efficiency at these speeds; beyond the last point as there', fewest=2), &
-    key_rule_t('gear',       'table_reverse',   a_number,       any_number, '',   unset,       reverse_efficiencies, &
+    key_rule_t('gear', 'table_reverse', a_number, any_number, '', unset, reverse_efficiencies, &
       'reverse efficiency at these speeds', fewest=2), &
-    key_rule_t('planetary',  'name',            a_name,         1, '',            required,    anything, &
-      'name in results and messages'), &
-    key_rule_t('planetary',  'sun',             body_or_ground, 1, '',            required,    anything, &
+    key_rule_t('planetary', 'name', a_name, 1, '', required, anything, 'name in results and messages'), &
+    key_rule_t('planetary', 'sun', body_or_ground, 1, '', required, anything, &
       "the sun wheel; one of the three members may be 'ground', which does not turn"), &
-    key_rule_t('planetary',  'ring',            body_or_ground, 1, '',            required,    anything, &
-      'the ring, an internal wheel'), &
-    key_rule_t('planetary',  'carrier',         body_or_ground, 1, '',            required,    anything, &
+    key_rule_t('planetary', 'ring', body_or_ground, 1, '', required, anything, 'the ring, an internal wheel'), &
+    key_rule_t('planetary', 'carrier', body_or_ground, 1, '', required, anything, &
       'the carrier; its inertia includes the mass of the planets, whose spin is neglected'), &
-    key_rule_t('planetary',  'teeth',           an_integer,     2, '',            required,    from_1, &
+    key_rule_t('planetary', 'teeth', an_integer, 2, '', required, from_1, &
       'numbers of teeth of sun and ring; the ring has more', ascends=.true.), &
-    key_rule_t('planetary',  'efficiency',      a_number,       1, '',            unset,       efficiencies, &
+    key_rule_t('planetary', 'efficiency', a_number, 1, '', unset, efficiencies, &
       'share that the ring gets of the power of the sun, with the carrier at rest; 1 without losses'), &
-    key_rule_t('planetary',  'reverse_efficiency', a_number,    1, '',            unset,       reverse_efficiencies, &
+    key_rule_t('planetary', 'reverse_efficiency', a_number, 1, '', unset, reverse_efficiencies, &
       'the same where the ring drives; as efficiency if not given; 0 or less: self-locking'), &
-    key_rule_t('planetary',  'table_speed',     a_number,       any_number, 'rad/s', unset,    not_negative, &
+    key_rule_t('planetary', 'table_speed', a_number, any_number, 'rad/s', unset, not_negative, &
       'speeds of the sun against the carrier of the points of a table of efficiencies, from 0 on', fewest=2, ascends=.true.), &
-    key_rule_t('planetary',  'table_efficiency', a_number,      any_number, '',  unset,       efficiencies, &
+    key_rule_t('planetary', 'table_efficiency', a_number, any_number, '', unset, efficiencies, &
       'efficiency at these speeds; beyond the last point as there', fewest=2), &
-    key_rule_t('planetary',  'table_reverse',   a_number,       any_number, '',   unset,       reverse_efficiencies, &
+    key_rule_t('planetary', 'table_reverse', a_number, any_number, '', unset, reverse_efficiencies, &
       'reverse efficiency at these speeds', fewest=2), &
-    key_rule_t('differential', 'name',          a_name,         1, '',            required,    anything, &
-      'name in results and messages'), &
-    key_rule_t('differential', 'sides',         body_or_ground, 2, '',            required,    anything, &
+    key_rule_t('differential', 'name', a_name, 1, '', required, anything, 'name in results and messages'), &
+    key_rule_t('differential', 'sides', body_or_ground, 2, '', required, anything, &
       "the two side shafts; one of the three members may be 'ground', which does not turn"), &
-    key_rule_t('differential', 'case',          body_or_ground, 1, '',            required,    anything, &
+    key_rule_t('differential', 'case', body_or_ground, 1, '', required, anything, &
       'the case, which turns with the mean speed of the sides'), &
-    key_rule_t('constraint', 'name',            a_name,         1, '',            required,    anything, &
-      'name in results and messages'), &
-    key_rule_t('constraint', 'bodies',          a_body,         any_number, '',   required,    anything, &
+    key_rule_t('constraint', 'name', a_name, 1, '', required, anything, 'name in results and messages'), &
+    key_rule_t('constraint', 'bodies', a_body, any_number, '', required, anything, &
       'the bodies whose speeds are related', fewest=1), &
-    key_rule_t('constraint', 'coefficients',    a_number,       any_number, '',   required,    not_zero, &
-      'as many numbers as bodies', fewest=1)]
+    key_rule_t('constraint', 'coefficients', a_number, any_number, '', required, not_zero, 'as many numbers as bodies', fewest=1)]
 
   type(relation_rule_t), parameter, public :: constraint_relations(*) = [ &
     relation_rule_t('gear', exactly_one, 'radii', 'teeth'), &

@@ -31,219 +31,198 @@ module nocdyn_schema_torques
     kind_rule_t('excitation', 'fault',     'decaying sines from time on: short circuits, faulty synchronisation')]
 
   type(key_rule_t), parameter, public :: motor_keys(*) = [ &
-    key_rule_t('motor',      'name',            a_name,         1, '',            required,    anything, &
-      'name in results and messages'), &
-    key_rule_t('motor',      'body',            a_body,         1, '',            required,    anything, &
-      'the driven body'), &
-    key_rule_t('motor',      'kind',            a_selector,     1, '',            "'quadratic'", anything, &
+    key_rule_t('motor', 'name', a_name, 1, '', required, anything, 'name in results and messages'), &
+    key_rule_t('motor', 'body', a_body, 1, '', required, anything, 'the driven body'), &
+    key_rule_t('motor', 'kind', a_selector, 1, '', "'quadratic'", anything, &
       'which law the torque follows; omega is the speed of the body'), &
-    key_rule_t('motor',      'a',               a_number,       1, 'N m',         required,    anything, &
-      'torque at standstill', 'quadratic'), &
-    key_rule_t('motor',      'b',               a_number,       1, 'N m s/rad',   required,    anything, &
-      'decrease of the torque per speed', 'quadratic'), &
-    key_rule_t('motor',      'c',               a_number,       1, 'N m s2/rad2', required,    anything, &
+    key_rule_t('motor', 'a', a_number, 1, 'N m', required, anything, 'torque at standstill', 'quadratic'), &
+    key_rule_t('motor', 'b', a_number, 1, 'N m s/rad', required, anything, 'decrease of the torque per speed', 'quadratic'), &
+    key_rule_t('motor', 'c', a_number, 1, 'N m s2/rad2', required, anything, &
       'decrease of the torque per square of the speed', 'quadratic'), &
-    key_rule_t('motor',      'torque',          a_number,       1, 'N m',         required,    anything, &
-      'the torque', 'constant'), &
-    key_rule_t('motor',      'table_speed',     a_number,       any_number, 'rad/s', unset,    anything, &
+    key_rule_t('motor', 'torque', a_number, 1, 'N m', required, anything, 'the torque', 'constant'), &
+    key_rule_t('motor', 'table_speed', a_number, any_number, 'rad/s', unset, anything, &
       'speeds of the points of a table, ascending', 'table', fewest=2, ascends=.true.), &
-    key_rule_t('motor',      'table_torque',    a_number,       any_number, 'N m', unset,      anything, &
+    key_rule_t('motor', 'table_torque', a_number, any_number, 'N m', unset, anything, &
       'torque at these speeds', 'table', fewest=2), &
-    key_rule_t('motor',      'table_file',      a_file,         1, '',            unset,       anything, &
+    key_rule_t('motor', 'table_file', a_file, 1, '', unset, anything, &
       'two columns, speed [rad/s] and torque [N m]; synchronous: slip, d_torque, q_torque, ...', 'table synchronous'), &
-    key_rule_t('motor',      'interpolation',   a_word,         1, '',            linear,      interpolations, &
+    key_rule_t('motor', 'interpolation', a_word, 1, '', linear, interpolations, &
       'between the points: straight lines, or the monotone cubic of Fritsch and Butland', 'table'), &
-    key_rule_t('motor',      'extrapolation',   a_word,         1, '',            linear,      extrapolations, &
+    key_rule_t('motor', 'extrapolation', a_word, 1, '', linear, extrapolations, &
       'beyond the table: straight on with the end slope, or constant', 'table'), &
-    key_rule_t('motor',      'breakdown_torque', a_number,      1, 'N m',         required,    not_zero, &
+    key_rule_t('motor', 'breakdown_torque', a_number, 1, 'N m', required, not_zero, &
       'T_k, the largest torque; it has the sign of synchronous_speed', 'induction'), &
-    key_rule_t('motor',      'breakdown_slip',  a_number,       1, '',            required,    positive, &
+    key_rule_t('motor', 'breakdown_slip', a_number, 1, '', required, positive, &
       's_k, the slip of the largest torque', 'induction'), &
-    key_rule_t('motor',      'synchronous_speed', a_number,     1, 'rad/s',       required,    not_zero, &
-      'speed without slip', 'induction'), &
-    key_rule_t('motor',      'voltage',         a_number,       1, 'V',           required,    anything, &
-      'of the supply; of mains between lines, rms; on a name plate the rated one (supply_factors)', &
-      'induction_dq dc'), &
-    key_rule_t('motor',      'frequency',       a_number,       1, 'rad/s',       required,    positive, &
+    key_rule_t('motor', 'synchronous_speed', a_number, 1, 'rad/s', required, not_zero, 'speed without slip', 'induction'), &
+    key_rule_t('motor', 'voltage', a_number, 1, 'V', required, anything, &
+      'of the supply; of mains between lines, rms; on a name plate the rated one (supply_factors)', 'induction_dq dc'), &
+    key_rule_t('motor', 'frequency', a_number, 1, 'rad/s', required, positive, &
       'angular frequency of the mains', 'induction_dq synchronous'), &
-    key_rule_t('motor',      'poles',           an_integer,     1, '',            unset,       from_2, &
+    key_rule_t('motor', 'poles', an_integer, 1, '', unset, from_2, &
       'number of poles, even; the synchronous speed is 2 frequency / poles', 'induction_dq inverter synchronous', &
       required_if='induction_dq'), &
-    key_rule_t('motor',      'reversed',        a_flag,         1, '',            '.false.',   anything, &
+    key_rule_t('motor', 'reversed', a_flag, 1, '', '.false.', anything, &
       'whether the field turns backwards, as with two lines exchanged', 'induction_dq synchronous'), &
-    key_rule_t('motor',      'stator_resistance', a_number,     1, 'Ohm',         required,    not_negative, &
+    key_rule_t('motor', 'stator_resistance', a_number, 1, 'Ohm', required, not_negative, &
       'of a phase of the star; of a delta winding a third, as of all values below', 'induction_dq'), &
-    key_rule_t('motor',      'rotor_resistance', a_number,      1, 'Ohm',         required,    positive, &
+    key_rule_t('motor', 'rotor_resistance', a_number, 1, 'Ohm', required, positive, &
       'of a phase of the rotor, referred to the stator', 'induction_dq'), &
-    key_rule_t('motor',      'stator_leakage',  a_number,       1, 'H',           required,    not_negative, &
+    key_rule_t('motor', 'stator_leakage', a_number, 1, 'H', required, not_negative, &
       'leakage inductance of a phase of the stator', 'induction_dq'), &
-    key_rule_t('motor',      'rotor_leakage',   a_number,       1, 'H',           required,    positive, &
+    key_rule_t('motor', 'rotor_leakage', a_number, 1, 'H', required, positive, &
       'leakage inductance of a phase of the rotor, referred to the stator', 'induction_dq'), &
-    key_rule_t('motor',      'mutual_inductance', a_number,     1, 'H',           required,    positive, &
-      'magnetising inductance', 'induction_dq'), &
-    key_rule_t('motor',      'stator_reactance', a_number,      1, 'Ohm',         required,    not_negative, &
+    key_rule_t('motor', 'mutual_inductance', a_number, 1, 'H', required, positive, 'magnetising inductance', 'induction_dq'), &
+    key_rule_t('motor', 'stator_reactance', a_number, 1, 'Ohm', required, not_negative, &
       'leakage reactance of a phase of the stator at the frequency', 'induction_dq'), &
-    key_rule_t('motor',      'rotor_reactance', a_number,       1, 'Ohm',         required,    positive, &
+    key_rule_t('motor', 'rotor_reactance', a_number, 1, 'Ohm', required, positive, &
       'leakage reactance of a phase of the rotor at the frequency, referred to the stator', 'induction_dq'), &
-    key_rule_t('motor',      'mutual_reactance', a_number,      1, 'Ohm',         required,    positive, &
+    key_rule_t('motor', 'mutual_reactance', a_number, 1, 'Ohm', required, positive, &
       'magnetising reactance at the frequency', 'induction_dq'), &
-    key_rule_t('motor',      'rated_power',     a_number,       1, 'W',           required,    positive, &
+    key_rule_t('motor', 'rated_power', a_number, 1, 'W', required, positive, &
       'power at the shaft on the name plate, from which the circuit follows with the values below', 'induction_dq'), &
-    key_rule_t('motor',      'rated_speed',     a_number,       1, 'rad/s',       required,    positive, &
+    key_rule_t('motor', 'rated_speed', a_number, 1, 'rad/s', required, positive, &
       'speed on the name plate, below the synchronous speed', 'induction_dq'), &
-    key_rule_t('motor',      'efficiency',      a_number,       1, '',            required,    efficiencies, &
+    key_rule_t('motor', 'efficiency', a_number, 1, '', required, efficiencies, &
       'efficiency on the name plate, 0 to 1', 'induction_dq'), &
-    key_rule_t('motor',      'power_factor',    a_number,       1, '',            required,    efficiencies, &
-      'cos phi on the name plate', 'induction_dq'), &
-    key_rule_t('motor',      'breakdown_ratio', a_number,       1, '',            required,    above_1, &
+    key_rule_t('motor', 'power_factor', a_number, 1, '', required, efficiencies, 'cos phi on the name plate', 'induction_dq'), &
+    key_rule_t('motor', 'breakdown_ratio', a_number, 1, '', required, above_1, &
       'breakdown torque over the rated torque, of the data sheet', 'induction_dq'), &
-    key_rule_t('motor',      'starting_torque', a_number,       1, '',            unset,       positive, &
+    key_rule_t('motor', 'starting_torque', a_number, 1, '', unset, positive, &
       'starting torque over the rated torque, to compare with that of the circuit', 'induction_dq'), &
-    key_rule_t('motor',      'starting_current', a_number,      1, '',            unset,       positive, &
+    key_rule_t('motor', 'starting_current', a_number, 1, '', unset, positive, &
       'starting current over the rated current, to compare with that of the circuit', 'induction_dq'), &
-    key_rule_t('motor',      'supply_times',    a_number,       any_number, 's',  unset,       anything, &
+    key_rule_t('motor', 'supply_times', a_number, any_number, 's', unset, anything, &
       'times at which the supply changes; before the first one the motor is disconnected', 'induction_dq', 1, ascends=.true.), &
-    key_rule_t('motor',      'supply_factors',  a_number,       any_number, '',   unset,       not_negative, &
+    key_rule_t('motor', 'supply_factors', a_number, any_number, '', unset, not_negative, &
       'share of the voltage from each of these times on, 0: disconnected; without times it is 1', 'induction_dq', 1), &
-    key_rule_t('motor',      'supply_ramps',    a_number,       any_number, 's',  '0',         not_negative, &
+    key_rule_t('motor', 'supply_ramps', a_number, any_number, 's', '0', not_negative, &
       'time in which the share changes evenly, from each of these times', 'induction_dq', 1), &
-    key_rule_t('motor',      'resistance',      a_number,       1, 'Ohm',         required,    positive, &
-      'resistance of the armature', 'dc'), &
-    key_rule_t('motor',      'flux_constant',   a_number,       1, 'V s/rad',     required,    not_zero, &
+    key_rule_t('motor', 'resistance', a_number, 1, 'Ohm', required, positive, 'resistance of the armature', 'dc'), &
+    key_rule_t('motor', 'flux_constant', a_number, 1, 'V s/rad', required, not_zero, &
       'torque per current, which is voltage per speed', 'dc'), &
-    key_rule_t('motor',      'inductance',      a_number,       1, 'H',           '0',         not_negative, &
+    key_rule_t('motor', 'inductance', a_number, 1, 'H', '0', not_negative, &
       'inductance of the armature; 0: the current has no delay', 'dc'), &
-    key_rule_t('motor',      'torque_limit',    a_number,       1, 'N m',         required,    positive, &
+    key_rule_t('motor', 'torque_limit', a_number, 1, 'N m', required, positive, &
       'largest torque that the control gives, in both directions', 'inverter'), &
-    key_rule_t('motor',      'harmonics',       a_number,       any_number, '',   unset,       positive, &
+    key_rule_t('motor', 'harmonics', a_number, any_number, '', unset, positive, &
       'multiples of the electrical frequency, poles / 2 times the speed, in the torque', 'inverter', 1), &
-    key_rule_t('motor',      'harmonic_shares', a_number,       any_number, '',   unset,       anything, &
+    key_rule_t('motor', 'harmonic_shares', a_number, any_number, '', unset, anything, &
       'amplitude of each as a share of the present control torque', 'inverter', 1), &
-    key_rule_t('motor',      'harmonic_torques', a_number,      any_number, 'N m', unset,      anything, &
-      'amplitude of each', 'inverter', 1), &
-    key_rule_t('motor',      'harmonic_phases', a_number,       any_number, 'rad', '0',        anything, &
+    key_rule_t('motor', 'harmonic_torques', a_number, any_number, 'N m', unset, anything, 'amplitude of each', 'inverter', 1), &
+    key_rule_t('motor', 'harmonic_phases', a_number, any_number, 'rad', '0', anything, &
       'phase of each where the angle of the body is 0', 'inverter', 1), &
-    key_rule_t('motor',      'slips',           a_number,       any_number, '',   unset,       not_negative, &
+    key_rule_t('motor', 'slips', a_number, any_number, '', unset, not_negative, &
       'slips of the points of a table, ascending: 0 at the synchronous speed, 1 at standstill', 'synchronous', 2, &
       ascends=.true.), &
-    key_rule_t('motor',      'd_torques',       a_number,       any_number, 'N m', unset,      anything, &
+    key_rule_t('motor', 'd_torques', a_number, any_number, 'N m', unset, anything, &
       'torque at these slips with the circuits of the d axis on both axes', 'synchronous', 2), &
-    key_rule_t('motor',      'q_torques',       a_number,       any_number, 'N m', unset,      anything, &
+    key_rule_t('motor', 'q_torques', a_number, any_number, 'N m', unset, anything, &
       'the same of the q axis; the mean is (d + q) / 2, the pulsation (d - q) / 2', 'synchronous', 2), &
-    key_rule_t('motor',      'mean_torques',    a_number,       any_number, 'N m', unset,      anything, &
+    key_rule_t('motor', 'mean_torques', a_number, any_number, 'N m', unset, anything, &
       'mean torque at these slips', 'synchronous', 2), &
-    key_rule_t('motor',      'pulsations',      a_number,       any_number, 'N m', unset,      anything, &
+    key_rule_t('motor', 'pulsations', a_number, any_number, 'N m', unset, anything, &
       'amplitude of the pulsation at these slips', 'synchronous', 2), &
-    key_rule_t('motor',      'phase',           a_number,       1, 'rad',         '0',         anything, &
+    key_rule_t('motor', 'phase', a_number, 1, 'rad', '0', anything, &
       'pulsation sin(2 (frequency t - poles / 2 phi) + phase), phi the angle of the body', 'synchronous'), &
-    key_rule_t('motor',      'governor_speed',  a_number,       1, 'rad/s',       unset,       anything, &
+    key_rule_t('motor', 'governor_speed', a_number, 1, 'rad/s', unset, anything, &
       'speed that a PI governor keeps by a throttle from 0 to 1 on the torque (dc: on the voltage)', governed), &
-    key_rule_t('motor',      'governor_gain',   a_number,       1, 's/rad',       unset,       not_zero, &
+    key_rule_t('motor', 'governor_gain', a_number, 1, 's/rad', unset, not_zero, &
       'throttle = z + governor_gain (governor_speed - omega); gain < 0 if the motor turns backwards', governed, &
       required_if='inverter'), &
-    key_rule_t('motor',      'governor_time',   a_number,       1, 's',           unset,       positive, &
+    key_rule_t('motor', 'governor_time', a_number, 1, 's', unset, positive, &
       'integral time: z'' = (throttle - z) / governor_time', governed, required_if='inverter'), &
-    key_rule_t('motor',      'governor_start',  a_number,       1, '',            '1',         from_0_to_1, &
+    key_rule_t('motor', 'governor_start', a_number, 1, '', '1', from_0_to_1, &
       'throttle at t_start; that of an inverter is 0', 'quadratic constant table induction dc'), &
-    key_rule_t('motor',      'set_times',       a_number,       any_number, 's',  unset,       anything, &
+    key_rule_t('motor', 'set_times', a_number, any_number, 's', unset, anything, &
       'times of points between which the set speed changes evenly, instead of governor_speed', governed, 1, ascends=.true.), &
-    key_rule_t('motor',      'set_speeds',      a_number,       any_number, 'rad/s', unset,    anything, &
+    key_rule_t('motor', 'set_speeds', a_number, any_number, 'rad/s', unset, anything, &
       'set speed at these times; constant before and after them', governed, 1)]
 
   type(key_rule_t), parameter, public :: load_keys(*) = [ &
-    key_rule_t('load',       'name',            a_name,         1, '',            required,    anything, &
-      'name in results and messages'), &
-    key_rule_t('load',       'body',            a_body,         1, '',            required,    anything, &
-      'the braked body'), &
-    key_rule_t('load',       'viscous',         a_number,       1, 'N m s/rad',   '0',         not_negative, &
-      'torque per speed'), &
-    key_rule_t('load',       'quadratic',       a_number,       1, 'N m s2/rad2', '0',         not_negative, &
+    key_rule_t('load', 'name', a_name, 1, '', required, anything, 'name in results and messages'), &
+    key_rule_t('load', 'body', a_body, 1, '', required, anything, 'the braked body'), &
+    key_rule_t('load', 'viscous', a_number, 1, 'N m s/rad', '0', not_negative, 'torque per speed'), &
+    key_rule_t('load', 'quadratic', a_number, 1, 'N m s2/rad2', '0', not_negative, &
       'torque per square of the speed, against the motion: fan, propeller'), &
-    key_rule_t('load',       'constant',        a_number,       1, 'N m',         '0',         not_negative, &
+    key_rule_t('load', 'constant', a_number, 1, 'N m', '0', not_negative, &
       'torque against the motion: constant tanh(omega / constant_speed)'), &
-    key_rule_t('load',       'constant_speed',  a_number,       1, 'rad/s',       '0.01',      positive, &
+    key_rule_t('load', 'constant_speed', a_number, 1, 'rad/s', '0.01', positive, &
       'speed at which the constant torque has 76 % of its full value'), &
-    key_rule_t('load',       'table_speed',     a_number,       any_number, 'rad/s', unset,    anything, &
+    key_rule_t('load', 'table_speed', a_number, any_number, 'rad/s', unset, anything, &
       'speeds of the points of a table, ascending', fewest=2, ascends=.true.), &
-    key_rule_t('load',       'table_torque',    a_number,       any_number, 'N m', unset,      anything, &
+    key_rule_t('load', 'table_torque', a_number, any_number, 'N m', unset, anything, &
       'resisting torque at these speeds; positive resists a positive speed', fewest=2), &
-    key_rule_t('load',       'table_file',      a_file,         1, '',            unset,       anything, &
+    key_rule_t('load', 'table_file', a_file, 1, '', unset, anything, &
       'file with the table: two columns, speed [rad/s] and resisting torque [N m]'), &
-    key_rule_t('load',       'interpolation',   a_word,         1, '',            linear,      interpolations, &
+    key_rule_t('load', 'interpolation', a_word, 1, '', linear, interpolations, &
       'between the points: straight lines, or the monotone cubic of Fritsch and Butland'), &
-    key_rule_t('load',       'extrapolation',   a_word,         1, '',            linear,      extrapolations, &
+    key_rule_t('load', 'extrapolation', a_word, 1, '', linear, extrapolations, &
       'beyond the table: straight on with the end slope, or constant')]
 
   type(key_rule_t), parameter, public :: excitation_keys(*) = [ &
-    key_rule_t('excitation', 'name',            a_name,         1, '',            required,    anything, &
-      'name in results and messages'), &
-    key_rule_t('excitation', 'body',            a_body,         1, '',            required,    anything, &
-      'the excited body'), &
-    key_rule_t('excitation', 'kind',            a_selector,     1, '',            "'harmonic'", anything, &
-      'which law the torque follows'), &
-    key_rule_t('excitation', 'amplitude',       a_number,       1, 'N m',         required,    anything, &
+    key_rule_t('excitation', 'name', a_name, 1, '', required, anything, 'name in results and messages'), &
+    key_rule_t('excitation', 'body', a_body, 1, '', required, anything, 'the excited body'), &
+    key_rule_t('excitation', 'kind', a_selector, 1, '', "'harmonic'", anything, 'which law the torque follows'), &
+    key_rule_t('excitation', 'amplitude', a_number, 1, 'N m', required, anything, &
       'largest torque', 'harmonic step ramp pulse startup'), &
-    key_rule_t('excitation', 'frequency',       a_number,       1, 'rad/s',       required,    not_negative, &
+    key_rule_t('excitation', 'frequency', a_number, 1, 'rad/s', required, not_negative, &
       'angular frequency; that of the mains for a start-up and a fault', 'harmonic startup fault'), &
-    key_rule_t('excitation', 'phase',           a_number,       1, 'rad',         '0',         anything, &
-      'phase at t = 0', 'harmonic startup'), &
-    key_rule_t('excitation', 'orders',          a_number,       any_number, '',   unset,       positive, &
+    key_rule_t('excitation', 'phase', a_number, 1, 'rad', '0', anything, 'phase at t = 0', 'harmonic startup'), &
+    key_rule_t('excitation', 'orders', a_number, any_number, '', unset, positive, &
       'oscillations per turn of the body, e.g. 0.5, 1, 1.5 of a four-stroke engine', 'orders', 1), &
-    key_rule_t('excitation', 'amplitudes',      a_number,       any_number, 'N m', unset,      anything, &
+    key_rule_t('excitation', 'amplitudes', a_number, any_number, 'N m', unset, anything, &
       'largest torque of each order', 'orders', 1), &
-    key_rule_t('excitation', 'phases',          a_number,       any_number, 'rad', '0',        anything, &
+    key_rule_t('excitation', 'phases', a_number, any_number, 'rad', '0', anything, &
       'phase of each order at phi = 0', 'orders', 1), &
-    key_rule_t('excitation', 'speeds',          a_number,       any_number, 'rad/s', unset,    anything, &
+    key_rule_t('excitation', 'speeds', a_number, any_number, 'rad/s', unset, anything, &
       'speed at which each row of orders, amplitudes and phases holds', 'orders', 1), &
-    key_rule_t('excitation', 'share_of_load',   a_number,       any_number, '',   unset,       anything, &
+    key_rule_t('excitation', 'share_of_load', a_number, any_number, '', unset, anything, &
       'amplitude of each order as a share of the torque of a load at its present speed', 'orders', 1), &
-    key_rule_t('excitation', 'load',            a_text,         1, '',            unset,       anything, &
-      'name of that load, if the body has several', 'orders'), &
-    key_rule_t('excitation', 'table_time',      a_number,       any_number, 's',  unset,       anything, &
+    key_rule_t('excitation', 'load', a_text, 1, '', unset, anything, 'name of that load, if the body has several', 'orders'), &
+    key_rule_t('excitation', 'table_time', a_number, any_number, 's', unset, anything, &
       'times of the points of a table, ascending', 'table', fewest=2, ascends=.true.), &
-    key_rule_t('excitation', 'table_torque',    a_number,       any_number, 'N m', unset,      anything, &
+    key_rule_t('excitation', 'table_torque', a_number, any_number, 'N m', unset, anything, &
       'torque at these times', 'table', fewest=2), &
-    key_rule_t('excitation', 'table_file',      a_file,         1, '',            unset,       anything, &
+    key_rule_t('excitation', 'table_file', a_file, 1, '', unset, anything, &
       'two columns, time [s] and torque [N m]; orders: order, amplitude, phase_deg, speed_rpm', 'table orders'), &
-    key_rule_t('excitation', 'interpolation',   a_word,         1, '',            linear,      interpolations, &
+    key_rule_t('excitation', 'interpolation', a_word, 1, '', linear, interpolations, &
       'between the points: straight lines, or the monotone cubic of Fritsch and Butland', 'table'), &
-    key_rule_t('excitation', 'time',            a_number,       1, 's',           required,    anything, &
+    key_rule_t('excitation', 'time', a_number, 1, 's', required, anything, &
       'start of the step, ramp, pulse or fault', 'step ramp pulse fault'), &
-    key_rule_t('excitation', 'duration',        a_number,       1, 's',           required,    positive, &
+    key_rule_t('excitation', 'duration', a_number, 1, 's', required, positive, &
       'duration of the rise or of the pulse', 'ramp pulse'), &
-    key_rule_t('excitation', 'pole_pairs',      an_integer,     1, '',            required,    from_1, &
-      'pole pairs of the motor', 'startup'), &
-    key_rule_t('excitation', 'fault',           a_word,         1, '',            unset,       faults, &
+    key_rule_t('excitation', 'pole_pairs', an_integer, 1, '', required, from_1, 'pole pairs of the motor', 'startup'), &
+    key_rule_t('excitation', 'fault', a_word, 1, '', unset, faults, &
       'at the terminals of a machine at rated voltage; resynchronisation closes with a phase angle', 'fault'), &
-    key_rule_t('excitation', 'rated_torque',    a_number,       1, 'N m',         unset,       not_zero, &
+    key_rule_t('excitation', 'rated_torque', a_number, 1, 'N m', unset, not_zero, &
       'rated apparent power / synchronous speed; > 0: brakes a body that turns forwards first', 'fault'), &
-    key_rule_t('excitation', 'subtransient_reactance', a_number, 1, '',       unset,       positive, &
+    key_rule_t('excitation', 'subtransient_reactance', a_number, 1, '', unset, positive, &
       'x'''' per unit, with that of the network up to the fault', 'fault'), &
-    key_rule_t('excitation', 'transient_reactance', a_number,   1, '',            unset,       positive, &
+    key_rule_t('excitation', 'transient_reactance', a_number, 1, '', unset, positive, &
       'x'' per unit; without it subtransient_time is the only time constant of the rotor', 'fault'), &
-    key_rule_t('excitation', 'synchronous_reactance', a_number, 1, '',            unset,       positive, &
+    key_rule_t('excitation', 'synchronous_reactance', a_number, 1, '', unset, positive, &
       'x per unit, of the current that remains; infinite if not given: the torque decays to 0', 'fault'), &
-    key_rule_t('excitation', 'subtransient_time', a_number,     1, 's',           unset,       positive, &
+    key_rule_t('excitation', 'subtransient_time', a_number, 1, 's', unset, positive, &
       'time constant T'''' of the short circuit of all phases; no decay if not given', 'fault'), &
-    key_rule_t('excitation', 'transient_time',  a_number,       1, 's',           unset,       positive, &
+    key_rule_t('excitation', 'transient_time', a_number, 1, 's', unset, positive, &
       'time constant T'' beside transient_reactance; no decay if not given', 'fault'), &
-    key_rule_t('excitation', 'armature_time',   a_number,       1, 's',           unset,       positive, &
+    key_rule_t('excitation', 'armature_time', a_number, 1, 's', unset, positive, &
       'time constant T_a of the stator''s flux; no decay if not given', 'fault'), &
-    key_rule_t('excitation', 'angle',           a_number,       1, 'rad',         '2.0943951024', anything, &
+    key_rule_t('excitation', 'angle', a_number, 1, 'rad', '2.0943951024', anything, &
       'phase angle of a resynchronisation; 120 degrees give the largest torque', 'fault'), &
-    key_rule_t('excitation', 'term_amplitudes', a_number,       any_number, 'N m', unset,      anything, &
+    key_rule_t('excitation', 'term_amplitudes', a_number, any_number, 'N m', unset, anything, &
       'amplitudes of given decaying sines, in place of fault', 'fault', 1), &
-    key_rule_t('excitation', 'term_multiples',  a_number,       any_number, '',   unset,       not_negative, &
+    key_rule_t('excitation', 'term_multiples', a_number, any_number, '', unset, not_negative, &
       'their frequencies as multiples of frequency', 'fault', 1), &
-    key_rule_t('excitation', 'term_times',      a_number,       any_number, 's',  unset,       positive, &
+    key_rule_t('excitation', 'term_times', a_number, any_number, 's', unset, positive, &
       'their time constants; no decay if not given', 'fault', 1), &
-    key_rule_t('excitation', 'term_phases',     a_number,       any_number, 'rad', unset,      anything, &
+    key_rule_t('excitation', 'term_phases', a_number, any_number, 'rad', unset, anything, &
       'their phases at the time of the fault; 0 if not given', 'fault', 1), &
-    key_rule_t('excitation', 'start',           a_number,       1, 's',           unset,       anything, &
+    key_rule_t('excitation', 'start', a_number, 1, 's', unset, anything, &
       'the torque is 0 before; time, or t_start of &run, if not given'), &
-    key_rule_t('excitation', 'end',             a_number,       1, 's',           unset,       anything, &
-      'the torque is 0 from then on'), &
-    key_rule_t('excitation', 'decay',           a_number,       1, 's',           unset,       positive, &
+    key_rule_t('excitation', 'end', a_number, 1, 's', unset, anything, 'the torque is 0 from then on'), &
+    key_rule_t('excitation', 'decay', a_number, 1, 's', unset, positive, &
       'time constant: the torque is multiplied by exp(-(t - start) / decay)')]
 
   type(relation_rule_t), parameter, public :: torque_relations(*) = [ &
