@@ -1,16 +1,23 @@
-!> Rows of the schema: the keys of &motor, &load and &excitation and the relations between them.
+!> Rows of the schema: the torques &motor, &load, &excitation and &engine.
 module nocdyn_schema_torques
-  use nocdyn_schema_rules, only: &
-    a_body, a_file, a_flag, a_name, a_number, a_selector, a_text, a_word, above_1, allowed_t, an_integer, any_number, anything, &
-    at_most_one, columns, efficiencies, equal_lengths, exactly_one, example_t, extrapolations, from_0_to_1, from_1, &
-    from_2, interpolations, key_rule_t, kind_rule_t, less_than, not_negative, not_zero, positive, relation_rule_t, required, &
-    requires, unset
+  use nocdyn_kinds, only: wp
+  use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_name, a_number, a_selector, a_text, a_word, above_1, allowed_t, &
+    an_integer, any_number, any_times, anything, at_most_one, columns, efficiencies, equal_lengths, exactly_one, example_t, &
+    extrapolations, from_0_to_1, from_1, from_2, group_rule_t, in_torques, interpolations, key_rule_t, kind_rule_t, less_than, &
+    linear, not_negative, not_zero, positive, relation_rule_t, required, requires, strokes, unset, up_to_64
   implicit none (type, external)
   private
 
   type(allowed_t), parameter :: faults = allowed_t(words='three_phase two_phase resynchronisation')
-  character(len=*), parameter :: linear = "'linear'"
   character(len=*), parameter :: governed = 'quadratic constant table induction dc inverter'   ! kinds with a governor
+  type(allowed_t), parameter :: above_minus_1 = allowed_t(low=-1.0_wp)
+
+  type(group_rule_t), parameter, public :: torque_groups(*) = [ &
+    group_rule_t('motor', in_torques, any_times, 'torque', 'A driving torque on a body, by a law of its speed.'), &
+    group_rule_t('load', in_torques, any_times, 'torque', 'A resisting torque on a body: the sum of the terms that are given.'), &
+    group_rule_t('excitation', in_torques, any_times, 'torque', 'A torque on a body, by a law of time or of its angle.'), &
+    group_rule_t('engine', in_torques, any_times, 'torque', &
+                 'The gas and inertia torques of the cylinders of an engine, on its cranks.')]
 
   type(kind_rule_t), parameter, public :: torque_kinds(*) = [ &
     kind_rule_t('motor',      'quadratic', 'a - b omega - c omega^2'), &
@@ -30,7 +37,7 @@ module nocdyn_schema_torques
     kind_rule_t('excitation', 'startup',   'amplitude sin(2 (frequency t - pole_pairs phi) + phase), synchronous motor'), &
     kind_rule_t('excitation', 'fault',     'decaying sines from time on: short circuits, faulty synchronisation')]
 
-  type(key_rule_t), parameter, public :: motor_keys(*) = [ &
+  type(key_rule_t), parameter, public :: torque_keys(*) = [ &
     key_rule_t('motor', 'name', a_name, 1, '', required, anything, 'name in results and messages'), &
     key_rule_t('motor', 'body', a_body, 1, '', required, anything, 'the driven body'), &
     key_rule_t('motor', 'kind', a_selector, 1, '', "'quadratic'", anything, &
@@ -137,9 +144,7 @@ module nocdyn_schema_torques
     key_rule_t('motor', 'set_times', a_number, any_number, 's', unset, anything, &
       'times of points between which the set speed changes evenly, instead of governor_speed', governed, 1, ascends=.true.), &
     key_rule_t('motor', 'set_speeds', a_number, any_number, 'rad/s', unset, anything, &
-      'set speed at these times; constant before and after them', governed, 1)]
-
-  type(key_rule_t), parameter, public :: load_keys(*) = [ &
+      'set speed at these times; constant before and after them', governed, 1), &
     key_rule_t('load', 'name', a_name, 1, '', required, anything, 'name in results and messages'), &
     key_rule_t('load', 'body', a_body, 1, '', required, anything, 'the braked body'), &
     key_rule_t('load', 'viscous', a_number, 1, 'N m s/rad', '0', not_negative, 'torque per speed'), &
@@ -158,9 +163,7 @@ module nocdyn_schema_torques
     key_rule_t('load', 'interpolation', a_word, 1, '', linear, interpolations, &
       'between the points: straight lines, or the monotone cubic of Fritsch and Butland'), &
     key_rule_t('load', 'extrapolation', a_word, 1, '', linear, extrapolations, &
-      'beyond the table: straight on with the end slope, or constant')]
-
-  type(key_rule_t), parameter, public :: excitation_keys(*) = [ &
+      'beyond the table: straight on with the end slope, or constant'), &
     key_rule_t('excitation', 'name', a_name, 1, '', required, anything, 'name in results and messages'), &
     key_rule_t('excitation', 'body', a_body, 1, '', required, anything, 'the excited body'), &
     key_rule_t('excitation', 'kind', a_selector, 1, '', "'harmonic'", anything, 'which law the torque follows'), &
@@ -223,7 +226,54 @@ module nocdyn_schema_torques
       'the torque is 0 before; time, or t_start of &run, if not given'), &
     key_rule_t('excitation', 'end', a_number, 1, 's', unset, anything, 'the torque is 0 from then on'), &
     key_rule_t('excitation', 'decay', a_number, 1, 's', unset, positive, &
-      'time constant: the torque is multiplied by exp(-(t - start) / decay)')]
+      'time constant: the torque is multiplied by exp(-(t - start) / decay)'), &
+    key_rule_t('engine', 'name', a_name, 1, '', required, anything, &
+      'name in results and messages; its cylinders are NAME_1, NAME_2, ...'), &
+    key_rule_t('engine', 'cylinders', a_body, any_number, '', required, anything, &
+      'the crank of each cylinder; two cylinders of a V engine may share one', fewest=1, may_repeat=.true.), &
+    key_rule_t('engine', 'stroke', an_integer, 1, '', required, strokes, &
+      '4: each cylinder fires every other turn; 2: every turn'), &
+    key_rule_t('engine', 'firing', a_number, any_number, 'rad', required, not_negative, &
+      'angle of its crank at which each cylinder fires, at top dead centre', fewest=1), &
+    key_rule_t('engine', 'orders', a_number, any_number, '', unset, not_negative, &
+      'orders of the gas torque of one cylinder; 0: its mean', fewest=1), &
+    key_rule_t('engine', 'amplitudes', a_number, any_number, 'N m', unset, anything, &
+      'amplitude of each order: amplitude sin(order (phi - firing) + phase)', fewest=1), &
+    key_rule_t('engine', 'phases', a_number, any_number, 'rad', '0', anything, 'phase of each order when the cylinder fires'), &
+    key_rule_t('engine', 'speeds', a_number, any_number, 'rad/s', unset, anything, &
+      'speed at which each row of orders, amplitudes and phases holds', fewest=1), &
+    key_rule_t('engine', 'loads', a_number, any_number, '', unset, anything, &
+      'load of the engine at which each row holds, e.g. 0.5 for half', fewest=1), &
+    key_rule_t('engine', 'misfire_amplitudes', a_number, any_number, 'N m', unset, anything, &
+      'amplitude of each order of a cylinder that does not fire', fewest=1), &
+    key_rule_t('engine', 'misfire_phases', a_number, any_number, 'rad', unset, anything, &
+      'phase of each order of such a cylinder', fewest=1), &
+    key_rule_t('engine', 'table_file', a_file, 1, '', unset, anything, &
+      'file with the columns order, amplitude, phase_deg, perhaps speed_rpm, load'), &
+    key_rule_t('engine', 'load_share', a_number, 1, '', unset, anything, &
+      'load of the engine: the torque is interpolated between the loads'), &
+    key_rule_t('engine', 'mean_torque', a_number, 1, 'N m', unset, anything, &
+      'mean gas torque of all cylinders together; each one has an equal part'), &
+    key_rule_t('engine', 'crank_angles', a_number, any_number, 'rad', unset, anything, &
+      'angles of the crank over one cycle, ascending; 0: top dead centre of firing', fewest=8, ascends=.true.), &
+    key_rule_t('engine', 'pressures', a_number, any_number, 'Pa', unset, anything, &
+      'pressure in a cylinder at these angles', fewest=8), &
+    key_rule_t('engine', 'misfire_pressures', a_number, any_number, 'Pa', unset, anything, &
+      'pressure in a cylinder that does not fire', fewest=8), &
+    key_rule_t('engine', 'pressure_file', a_file, 1, '', unset, anything, &
+      'file with the columns crank_angle_deg, pressure, perhaps misfire_pressure'), &
+    key_rule_t('engine', 'crankcase_pressure', a_number, 1, 'Pa', '0', not_negative, &
+      'pressure below the pistons; 0 if pressures are above that of the atmosphere'), &
+    key_rule_t('engine', 'harmonics_up_to', a_number, 1, '', '24', up_to_64, 'highest order that is taken from the pressure'), &
+    key_rule_t('engine', 'bore', a_number, 1, 'm', unset, positive, 'diameter of the pistons'), &
+    key_rule_t('engine', 'crank_radius', a_number, 1, 'm', unset, positive, 'half the travel of the pistons'), &
+    key_rule_t('engine', 'rod_length', a_number, 1, 'm', unset, positive, 'length of the connecting rods'), &
+    key_rule_t('engine', 'reciprocating_mass', a_number, 1, 'kg', unset, not_negative, &
+      'mass that moves with one piston; its inertia torque has the orders 1 to 4'), &
+    key_rule_t('engine', 'misfire', an_integer, 1, '', '0', not_negative, &
+      'number of a cylinder that does not fire, 0: all fire'), &
+    key_rule_t('engine', 'cylinder_scatter', a_number, any_number, '', unset, above_minus_1, &
+      'relative difference of the gas torque of each cylinder; one value: + and - in turn')]
 
   type(relation_rule_t), parameter, public :: torque_relations(*) = [ &
     relation_rule_t('motor', exactly_one, 'table_speed table_torque', 'table_file'), &
@@ -275,7 +325,23 @@ module nocdyn_schema_torques
     relation_rule_t('excitation', requires, 'term_multiples term_times term_phases', 'term_amplitudes'), &
     relation_rule_t('excitation', equal_lengths, 'term_amplitudes term_multiples', ''), &
     relation_rule_t('excitation', less_than, 'start', 'end'), &
-    relation_rule_t('excitation', less_than, 'time', 'end')]
+    relation_rule_t('excitation', less_than, 'time', 'end'), &
+    relation_rule_t('engine', at_most_one, 'table_file', &
+                    'orders amplitudes phases speeds loads misfire_amplitudes misfire_phases'), &
+    relation_rule_t('engine', at_most_one, 'pressure_file', 'crank_angles pressures misfire_pressures'), &
+    relation_rule_t('engine', at_most_one, 'orders amplitudes phases table_file mean_torque', &
+                    'crank_angles pressures pressure_file'), &
+    relation_rule_t('engine', requires, 'load_share', 'loads table_file'), &
+    relation_rule_t('engine', requires, 'misfire_phases', 'misfire_amplitudes'), &
+    relation_rule_t('engine', requires, 'pressures pressure_file', 'bore'), &
+    relation_rule_t('engine', requires, 'pressures pressure_file reciprocating_mass', 'crank_radius'), &
+    relation_rule_t('engine', requires, 'pressures pressure_file reciprocating_mass', 'rod_length'), &
+    relation_rule_t('engine', requires, 'bore crankcase_pressure harmonics_up_to', 'pressures pressure_file'), &
+    relation_rule_t('engine', requires, 'crank_radius rod_length', 'pressures pressure_file reciprocating_mass'), &
+    relation_rule_t('engine', less_than, 'crank_radius', 'rod_length'), &
+    relation_rule_t('engine', equal_lengths, 'cylinders firing', ''), &
+    relation_rule_t('engine', columns, 'orders amplitudes phases', 'table_file speeds loads misfire_amplitudes misfire_phases'), &
+    relation_rule_t('engine', columns, 'crank_angles pressures', 'pressure_file misfire_pressures')]
 
   type(example_t), parameter, public :: torque_examples(*) = [ &
     example_t('motor',      "name = 'drive'    body = 'motor'    a = 200.0  b = 10.0  c = 1.0"), &
@@ -299,6 +365,8 @@ module nocdyn_schema_torques
     example_t('excitation', "name = 'engine'   body = 'motor'    kind = 'orders'|" // &
                             'orders = 2, 4, 6  amplitudes = 90.0, 40.0, 15.0', .false.), &
     example_t('excitation', "name = 'blow'     body = 'machine'  kind = 'pulse'|" // &
-                            'amplitude = -500.0  time = 2.0  duration = 0.05', .false.)]
+                            'amplitude = -500.0  time = 2.0  duration = 0.05', .false.), &
+    example_t('engine',      "name = 'diesel'   cylinders = 'motor'  stroke = 4  firing_deg = 0|" // &
+                             'orders = 0.5, 1, 1.5, 2  amplitudes = 90, 80, 60, 40  mean_torque = 30', .false.)]
 
 end module nocdyn_schema_torques
