@@ -86,7 +86,8 @@ module nocdyn_schema_joints
     key_rule_t('constraint', 'name', a_name, 1, '', required, anything, 'name in results and messages'), &
     key_rule_t('constraint', 'bodies', a_body, any_number, '', required, anything, &
       'the bodies whose speeds are related', fewest=1), &
-    key_rule_t('constraint', 'coefficients', a_number, any_number, '', required, not_zero, 'as many numbers as bodies', fewest=1), &
+    key_rule_t('constraint', 'coefficients', a_number, any_number, '', required, not_zero, &
+      'as many numbers as bodies', fewest=1), &
     key_rule_t('clutch', 'name', a_name, 1, '', required, anything, 'name in messages and results'), &
     key_rule_t('clutch', 'bodies', body_or_ground, 2, '', required, anything, "the two bodies; one may be 'ground': a brake"), &
     key_rule_t('clutch', 'kind', a_selector, 1, '', "'friction'", anything, 'how it transmits its torque'), &
