@@ -63,8 +63,9 @@ contains
     character(len=*), intent(in) :: text
     type(parts_t), intent(out) :: parts
     type(diagnostics_t) :: diagnostics
+    character(len=:), allocatable :: label   ! the same in both inputs
     integer :: count(size(group_rules))
-    integer :: g, rule
+    integer :: g, name, rule
 
     call scan_namelist(text, parts%namelist, diagnostics)
     parts%is_readable = diagnostics%count == 0
@@ -74,45 +75,27 @@ contains
     do g = 1, parts%namelist%group_count
       rule = group_rule_index(parts%namelist%groups(g)%name)
       parts%is_readable = rule > 0
-      if (rule > 0) parts%is_readable = group_rules(rule)%name_space == '' .or. has_name(parts%namelist, g)
       if (.not. parts%is_readable) return
       count(rule) = count(rule) + 1
-      parts%labels(g)%text = label_of(parts%namelist, g, rule, count(rule))
+      label = '&' // trim(group_rules(rule)%name)
       parts%name_space(g) = 0
       if (group_rules(rule)%name_space /= '') then
+        name = find_assignment(parts%namelist, g, 'name')
+        parts%is_readable = name > 0
+        if (name > 0) parts%is_readable = parts%namelist%assignments(name)%last_item >= &
+                                          parts%namelist%assignments(name)%first_item
+        if (.not. parts%is_readable) return
+        associate (item => parts%namelist%items(parts%namelist%assignments(name)%first_item))
+          label = label // ' ' // quoted(parts%namelist%item_text(item))
+        end associate
         parts%name_space(g) = findloc(group_rules%name_space == group_rules(rule)%name_space, .true., dim=1)
+      else if (.not. is_single(rule)) then
+        label = label // ' ' // to_text(count(rule))
       end if
+      parts%labels(g)%text = label
     end do
     call argsort(parts%labels, parts%order)
   end subroutine take_apart
-
-  !> Whether a group has a value for `name`.
-  pure logical function has_name(namelist, g)
-    type(namelist_t), intent(in) :: namelist
-    integer, intent(in) :: g   !! index of the group
-    integer :: name
-
-    name = find_assignment(namelist, g, 'name')
-    has_name = name > 0
-    if (has_name) has_name = namelist%assignments(name)%last_item >= namelist%assignments(name)%first_item
-  end function has_name
-
-  !> Label of a group, the same in both inputs.
-  pure function label_of(namelist, g, rule, number) result(label)
-    type(namelist_t), intent(in) :: namelist
-    integer, intent(in) :: g, rule   !! index of the group, row of `group_rules`
-    integer, intent(in) :: number   !! among the groups of its kind
-    character(len=:), allocatable :: label
-    integer :: name
-
-    label = '&' // trim(group_rules(rule)%name)
-    if (group_rules(rule)%name_space /= '') then
-      name = find_assignment(namelist, g, 'name')
-      label = label // ' ' // quoted(namelist%item_text(namelist%items(namelist%assignments(name)%first_item)))
-    else if (.not. is_single(rule)) then
-      label = label // ' ' // to_text(number)
-    end if
-  end function label_of
 
   !> The assignment to a key of a group, 0 if there is none.
   pure integer function find_assignment(namelist, g, key) result(a)

@@ -1,6 +1,6 @@
 !> The complete input of a computation as a namelist that can be read again.
 module nocdyn_input_text
-  use nocdyn_input, only: group_t, input_t, value_t
+  use nocdyn_input, only: group_t, input_t
   use nocdyn_schema, only: first_key, key_rules
   use nocdyn_printable, only: in_quotes
   use nocdyn_text, only: string_t, to_text
@@ -34,14 +34,26 @@ contains
     type(text_buffer_t), intent(inout) :: buffer
     type(group_t), intent(in) :: group
     type(string_t), allocatable :: items(:)
-    integer :: i
+    integer :: i, k
 
     call buffer%append_line('&' // group%kind)
     do i = 1, size(group%values)
       associate (rule => key_rules(first_key(group%rule) + i - 1))
         if (rule%follows .and. .not. group%values(i)%is_given) cycle
-        call write_items(group%values(i), items)
+        allocate (items(group%values(i)%count()))
+        do k = 1, size(items)
+          if (allocated(group%values(i)%numbers)) then
+            items(k)%text = to_text(group%values(i)%numbers(k))
+          else if (allocated(group%values(i)%whole_numbers)) then
+            items(k)%text = to_text(group%values(i)%whole_numbers(k))
+          else if (allocated(group%values(i)%flags)) then
+            items(k)%text = trim(merge('.true. ', '.false.', group%values(i)%flags(k)))
+          else
+            items(k)%text = in_quotes(group%values(i)%texts(k)%text, "'")
+          end if
+        end do
         if (size(items) > 0) call append_key(buffer, trim(rule%name), items)
+        deallocate (items)
       end associate
     end do
     call buffer%append_line('/')
@@ -66,25 +78,5 @@ contains
     end do
     call buffer%append_line(line)
   end subroutine append_key
-
-  !> The values of one key in namelist notation.
-  subroutine write_items(value, items)
-    type(value_t), intent(in) :: value
-    type(string_t), allocatable, intent(out) :: items(:)
-    integer :: i
-
-    allocate (items(value%count()))
-    do i = 1, size(items)
-      if (allocated(value%numbers)) then
-        items(i)%text = to_text(value%numbers(i))
-      else if (allocated(value%whole_numbers)) then
-        items(i)%text = to_text(value%whole_numbers(i))
-      else if (allocated(value%flags)) then
-        items(i)%text = trim(merge('.true. ', '.false.', value%flags(i)))
-      else
-        items(i)%text = in_quotes(value%texts(i)%text, "'")
-      end if
-    end do
-  end subroutine write_items
 
 end module nocdyn_input_text

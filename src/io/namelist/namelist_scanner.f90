@@ -105,6 +105,7 @@ contains
     type(cursor_t), intent(inout) :: cursor
     type(namelist_t), intent(inout) :: namelist
     type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=:), allocatable :: place
     integer :: last
 
     call cursor%move_to(cursor%at + 1)
@@ -125,24 +126,14 @@ contains
     if (cursor%group_ends() > 0) then
       call cursor%move_to(cursor%at + cursor%group_ends())
     else
-      call refuse_unclosed(cursor, namelist, diagnostics)
+      associate (group => namelist%groups(namelist%group_count))
+        if (group%is_malformed) return   ! the end mark may be in the part that cannot be read
+        place = 'the end of the file'
+        if (.not. cursor%at_end()) place = 'the next group on line ' // to_text(cursor%line)
+        call diagnostics%add(group%line, namelist%group_count, "not closed: '/' is missing before " // place)
+      end associate
     end if
   end subroutine scan_group
-
-  !> Adds an error for a group without end mark, unless a part of it cannot be read: the end mark may be in that.
-  subroutine refuse_unclosed(cursor, namelist, diagnostics)
-    type(cursor_t), intent(in) :: cursor
-    type(namelist_t), intent(in) :: namelist
-    type(diagnostics_t), intent(inout) :: diagnostics
-    character(len=:), allocatable :: place
-
-    associate (group => namelist%groups(namelist%group_count))
-      if (group%is_malformed) return
-      place = 'the end of the file'
-      if (.not. cursor%at_end()) place = 'the next group on line ' // to_text(cursor%line)
-      call diagnostics%add(group%line, namelist%group_count, "not closed: '/' is missing before " // place)
-    end associate
-  end subroutine refuse_unclosed
 
   !> Adds an error for values without a key, and skips them.
   subroutine refuse_text_without_key(cursor, namelist, diagnostics)

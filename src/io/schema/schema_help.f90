@@ -2,8 +2,7 @@
 module nocdyn_schema_help
   use nocdyn_schema, only: examples, first_key, group_rules, has_word, key_rules, kind_rules, last_key, selector_name, &
     selector_rule
-  use nocdyn_schema_rules, only: a_flag, a_number, a_selector, a_word, an_integer, body_or_ground, example_t, key_rule_t, &
-    occurrence_texts
+  use nocdyn_schema_rules, only: a_flag, a_number, a_selector, a_word, an_integer, body_or_ground, key_rule_t, occurrence_texts
   use nocdyn_schema_sentences, only: default_text, sentences_on, unit_sentence
   use nocdyn_schema_text, only: allowed_text, type_text
   use nocdyn_text, only: append, listed, quoted, string_t
@@ -144,34 +143,28 @@ contains
     end do
   end subroutine append_wrapped
 
-  !> The examples of a group.
+  !> The examples of a group, each with & and /.
   subroutine append_examples(buffer, rule, only_template)
     type(text_buffer_t), intent(inout) :: buffer
     integer, intent(in) :: rule            !! row of `group_rules`
     logical, intent(in) :: only_template   !! only those of the template
-    integer :: i
+    integer :: bar, first, i
 
     do i = 1, size(examples)
-      if (examples(i)%group /= group_rules(rule)%name .or. (only_template .and. .not. examples(i)%is_in_template)) cycle
-      call buffer%append_line(example_text(examples(i)))
+      associate (example => examples(i))
+        if (example%group /= group_rules(rule)%name .or. (only_template .and. .not. example%is_in_template)) cycle
+        call buffer%append('&' // example%group(:longest_group) // ' ')
+        first = 1
+        do
+          bar = index(example%text(first:), '|')
+          if (bar == 0) exit
+          call buffer%append_line(example%text(first:first + bar - 2))
+          call buffer%append(repeat(' ', longest_group + 2))
+          first = first + bar
+        end do
+        call buffer%append_line(trim(example%text(first:)) // ' /')
+      end associate
     end do
   end subroutine append_examples
-
-  !> An example with & and /.
-  pure function example_text(example) result(text)
-    type(example_t), intent(in) :: example
-    character(len=:), allocatable :: text
-    integer :: bar, first
-
-    text = '&' // example%group(:longest_group) // ' '
-    first = 1
-    do
-      bar = index(example%text(first:), '|')
-      if (bar == 0) exit
-      text = text // example%text(first:first + bar - 2) // new_line('a') // repeat(' ', longest_group + 2)
-      first = first + bar
-    end do
-    text = text // trim(example%text(first:)) // ' /'
-  end function example_text
 
 end module nocdyn_schema_help

@@ -16,7 +16,7 @@ contains
 
   !> A page in Markdown.
   function input_reference() result(text)
-    character(len=:), allocatable :: text
+    character(len=:), allocatable :: heading, text   ! heading: "Machine: bodies and what connects them"
     type(text_buffer_t) :: buffer
     integer :: rule, topic
 
@@ -26,22 +26,15 @@ contains
                             'frequency or an angle may be given in rpm, Hz or degrees instead, by the key that ends in the unit.')
     do topic = 1, size(topics)
       call buffer%append_line('')
-      call buffer%append_line('## ' // topic_heading(topic))
+      heading = trim(topics(topic)%name) // ': ' // trim(topics(topic)%help)
+      heading(1:1) = achar(iachar(heading(1:1)) + iachar('A') - iachar('a'))
+      call buffer%append_line('## ' // heading)
       do rule = 1, size(group_rules)
         if (group_rules(rule)%topic == topic) call append_group(buffer, rule)
       end do
     end do
     text = buffer%text()
   end function input_reference
-
-  !> "Machine: bodies and what connects them".
-  pure function topic_heading(topic) result(text)
-    integer, intent(in) :: topic   !! row of `topics`
-    character(len=:), allocatable :: text
-
-    text = trim(topics(topic)%name) // ': ' // trim(topics(topic)%help)
-    text(1:1) = achar(iachar(text(1:1)) + iachar('A') - iachar('a'))
-  end function topic_heading
 
   subroutine append_group(buffer, rule)
     type(text_buffer_t), intent(inout) :: buffer

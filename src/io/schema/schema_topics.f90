@@ -5,7 +5,7 @@ module nocdyn_schema_topics
   use nocdyn_schema_help, only: append_examples, append_group
   use nocdyn_schema_rules, only: at_least_once, exactly_once, occurrence_texts, topics
   use nocdyn_schema_text, only: group_names, suggestion
-  use nocdyn_text, only: append, joined, lower_case, listed, quoted, shortened, string_t
+  use nocdyn_text, only: append, lower_case, listed, quoted, shortened, string_t
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
@@ -20,10 +20,16 @@ contains
   function input_overview() result(text)
     character(len=:), allocatable :: text
     type(text_buffer_t) :: buffer
+    type(string_t), allocatable :: needed(:)   ! groups that no input is without
     integer :: rule, topic
 
+    allocate (needed(0))
+    do rule = 1, size(group_rules)
+      if (all(group_rules(rule)%occurrence /= [exactly_once, at_least_once])) cycle
+      call append(needed, '&' // trim(group_rules(rule)%name) // ' ' // trim(occurrence_texts(group_rules(rule)%occurrence)))
+    end do
     call append_syntax(buffer)
-    call buffer%append_line('An input has ' // needed_groups() // '; all other groups are optional.')
+    call buffer%append_line('An input has ' // listed(needed, ' and ') // '; all other groups are optional.')
     do topic = 1, size(topics)
       call buffer%append_line('')
       call buffer%append_line(topic_title(topic))
@@ -40,25 +46,43 @@ contains
     text = buffer%text()
   end function input_overview
 
-  !> A topic, a group, or everything.
+  !> A topic, a group, or everything, each with its groups, their keys and examples.
   subroutine input_help(word, text, error)
     character(len=*), intent(in) :: word   !! name of a topic, of a group with or without &, or 'all'
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(out) :: error   !! there is no such topic or group
     character(len=:), allocatable :: name
-    integer :: rule
+    type(text_buffer_t) :: buffer
+    integer :: group, rule, topic
+    logical :: has_several, is_shown(size(group_rules))
 
     name = lower_case(word(verify(word // ' ', '&'):))
-    rule = group_rule_index(name)
-    if (rule > 0) then
-      text = group_help(rule)
-    else if (topic_index(name) > 0) then
-      text = topic_help(topic_index(name))
-    else if (name == everything) then
-      text = complete_help()
-    else
+    group = group_rule_index(name)
+    topic = topic_index(name)
+    is_shown = [(rule == group .or. group_rules(rule)%topic == topic .or. name == everything, rule=1, size(group_rules))]
+    if (.not. any(is_shown)) then
       call raise(error, exit_input, 'there is no topic or group ' // quoted(shortened(name)) // hint(name))
+      return
     end if
+    if (name == everything) then
+      call append_syntax(buffer)
+      call buffer%append_line("'nocdyn new FILE' writes the example below with these explanations.")
+      call buffer%append_line('')
+    else if (topic > 0) then
+      call buffer%append_line(topic_title(topic))
+      call buffer%append_line('')
+    end if
+    do rule = 1, size(group_rules)
+      if (.not. is_shown(rule)) cycle
+      call append_group(buffer, rule, '')
+      call buffer%append_line('')
+    end do
+    has_several = topic > 0 .or. (group > 0 .and. count(examples%group == name) > 1)
+    call buffer%append_line(trim(merge('Examples', 'Example ', has_several)))
+    do rule = 1, size(group_rules)
+      if (is_shown(rule)) call append_examples(buffer, rule, only_template=name == everything)
+    end do
+    text = buffer%text()
   end subroutine input_help
 
   !> Row of `topics`, 0 if there is no such topic.
@@ -84,60 +108,6 @@ contains
     if (text == '') text = "; 'nocdyn help input' lists them"
   end function hint
 
-  !> All groups with their keys, and the example of the template.
-  function complete_help() result(text)
-    character(len=:), allocatable :: text
-    type(text_buffer_t) :: buffer
-    integer :: rule
-
-    call append_syntax(buffer)
-    call buffer%append_line("'nocdyn new FILE' writes the example below with these explanations.")
-    call buffer%append_line('')
-    do rule = 1, size(group_rules)
-      call append_group(buffer, rule, '')
-      call buffer%append_line('')
-    end do
-    call buffer%append_line('Example')
-    do rule = 1, size(group_rules)
-      call append_examples(buffer, rule, .true.)
-    end do
-    text = buffer%text()
-  end function complete_help
-
-  !> The groups of a topic with their keys and examples.
-  function topic_help(topic) result(text)
-    integer, intent(in) :: topic   !! row of `topics`
-    character(len=:), allocatable :: text
-    type(text_buffer_t) :: buffer
-    integer :: rule
-
-    call buffer%append_line(topic_title(topic))
-    call buffer%append_line('')
-    do rule = 1, size(group_rules)
-      if (group_rules(rule)%topic /= topic) cycle
-      call append_group(buffer, rule, '')
-      call buffer%append_line('')
-    end do
-    call buffer%append_line('Examples')
-    do rule = 1, size(group_rules)
-      if (group_rules(rule)%topic == topic) call append_examples(buffer, rule, .false.)
-    end do
-    text = buffer%text()
-  end function topic_help
-
-  !> One group with its keys and examples.
-  function group_help(rule) result(text)
-    integer, intent(in) :: rule   !! row of `group_rules`
-    character(len=:), allocatable :: text
-    type(text_buffer_t) :: buffer
-
-    call append_group(buffer, rule, '')
-    call buffer%append_line('')
-    call buffer%append_line(trim(merge('Examples', 'Example ', count(examples%group == group_rules(rule)%name) > 1)))
-    call append_examples(buffer, rule, .false.)
-    text = buffer%text()
-  end function group_help
-
   subroutine append_syntax(buffer)
     type(text_buffer_t), intent(inout) :: buffer
 
@@ -153,19 +123,5 @@ contains
 
     text = trim(topics(topic)%name) // ': ' // trim(topics(topic)%help)
   end function topic_title
-
-  !> The groups that no input is without: "&body at least once and &run once".
-  pure function needed_groups() result(text)
-    character(len=:), allocatable :: text
-    type(string_t), allocatable :: groups(:)
-    integer :: rule
-
-    allocate (groups(0))
-    do rule = 1, size(group_rules)
-      if (all(group_rules(rule)%occurrence /= [exactly_once, at_least_once])) cycle
-      call append(groups, '&' // trim(group_rules(rule)%name) // ' ' // trim(occurrence_texts(group_rules(rule)%occurrence)))
-    end do
-    text = listed(groups, ' and ')
-  end function needed_groups
 
 end module nocdyn_schema_topics

@@ -8,7 +8,7 @@ module nocdyn_sweep_netcdf
   use nocdyn_kinds, only: wp
   use nocdyn_netcdf_file, only: check, create, define, netcdf_file_t, new_name, put_text
   use nocdyn_sweep_chunk, only: chunk_t, status_done, status_words
-  use nocdyn_sweep_header, only: quantity_t, sweep_netcdf_name, sweep_header_t
+  use nocdyn_sweep_header, only: quantity_t, sweep_netcdf_name
   use nocdyn_sweep_journal, only: sweep_journal_t
   use nocdyn_text, only: strings
   implicit none (type, external)
@@ -65,7 +65,13 @@ contains
 
     longest = max(1, maxval(journals%longest_reason))
     associate (header => journals(1)%header)
-      call put_attributes(file, header)
+      call put_text(file, nf90_global, 'Conventions', 'CF-1.8')
+      call put_text(file, nf90_global, 'title', header%title)
+      call check(file, nf90_put_att(file%id, nf90_global, 'source', header%source))   ! characters, for `nocdyn_sweep_provenance`
+      call put_text(file, nf90_global, 'design', header%design)
+      call check(file, nf90_put_att(file%id, nf90_global, 'seed', header%seed))
+      call check(file, nf90_put_att(file%id, nf90_global, 'input', header%input_text))
+      if (header%list_checksum /= '') call put_text(file, nf90_global, 'list_checksum', header%list_checksum)
       call check(file, nf90_def_dim(file%id, 'variant', header%variants, file%variant_dimension))
       call check(file, nf90_def_dim(file%id, 'failure', nf90_unlimited, file%failure_dimension))
       call check(file, nf90_def_dim(file%id, 'reason_length', longest, file%reason_dimension))
@@ -82,20 +88,6 @@ contains
     end associate
     if (.not. allocated(file%failure)) call check(file, nf90_enddef(file%id))
   end subroutine define_all
-
-  !> Writes the global attributes.
-  subroutine put_attributes(file, header)
-    type(sweep_file_t), intent(inout) :: file
-    type(sweep_header_t), intent(in) :: header
-
-    call put_text(file, nf90_global, 'Conventions', 'CF-1.8')
-    call put_text(file, nf90_global, 'title', header%title)
-    call check(file, nf90_put_att(file%id, nf90_global, 'source', header%source))   ! characters, for `nocdyn_sweep_provenance`
-    call put_text(file, nf90_global, 'design', header%design)
-    call check(file, nf90_put_att(file%id, nf90_global, 'seed', header%seed))
-    call check(file, nf90_put_att(file%id, nf90_global, 'input', header%input_text))
-    if (header%list_checksum /= '') call put_text(file, nf90_global, 'list_checksum', header%list_checksum)
-  end subroutine put_attributes
 
   !> Defines a variable for each quantity. Its name is the label as far as NetCDF allows; the attribute `label` has all of it.
   subroutine define_quantities(file, quantities, role, variables)

@@ -38,7 +38,7 @@ module nocdyn_log_file
     procedure :: size => bytes_in_file
     procedure :: close => close_log_file
     procedure :: create, cut, is_open, remove
-    procedure, private :: prepare, make_room, lock, read_start, flush_if_due, raise_write_error
+    procedure, private :: prepare, make_room, lock, read_start, raise_write_error
   end type log_file_t
 
 contains
@@ -151,6 +151,7 @@ contains
     integer(int32), intent(in) :: tag         !! what kind of entry it is
     character(len=*), intent(in) :: bytes
     type(error_t), allocatable, intent(out) :: error
+    integer(int64) :: now, rate
     integer :: begins, length, used
     logical :: is_cut, is_done
 
@@ -168,7 +169,11 @@ contains
     self%buffer(used + 1:length) = bytes
     call put_integers(self%buffer, begins, [self%table%checksum(self%buffer(begins + integer_bytes + 1:length))])
     call write_bytes(self%descriptor, self%buffer(:length), is_done)
-    if (is_done) call self%flush_if_due(is_done)
+    call system_clock(now, rate)
+    if (is_done .and. real(now - self%flushed) >= flush_interval * real(rate)) then
+      call sync_file(self%descriptor, is_done)
+      self%flushed = now
+    end if
     if (is_done) then
       self%end = self%end + length
     else
@@ -176,18 +181,6 @@ contains
       call truncate_file(self%descriptor, self%end, is_cut)
     end if
   end subroutine write_entry
-
-  subroutine flush_if_due(self, is_done)
-    class(log_file_t), intent(inout) :: self
-    logical, intent(out) :: is_done
-    integer(int64) :: now, rate
-
-    call system_clock(now, rate)
-    is_done = .true.
-    if (real(now - self%flushed) < flush_interval * real(rate)) return
-    call sync_file(self%descriptor, is_done)
-    self%flushed = now
-  end subroutine flush_if_due
 
   !> Reads the entry at `offset` into the buffer, frame included. A file that has been closed is opened again.
   subroutine read_entry(self, offset, tag, length, is_there, is_good)

@@ -78,12 +78,16 @@ contains
     type(chunk_t), intent(inout) :: chunk        !! arrays of the right shape are reused
     type(chunk_summary_t) :: summary
     type(byte_reader_t) :: reader
-    logical :: is_whole
+    logical :: fits, is_whole
     integer :: i
 
     call read_summary(bytes, summary, is_whole)
     if (.not. is_whole) error stop 'nocdyn_sweep_chunk: unpack_chunk needs the bytes of a chunk'
-    call prepare(chunk, summary)
+    fits = allocated(chunk%status)
+    if (fits) fits = size(chunk%parameters, 1) == summary%varied .and. size(chunk%results, 1) == summary%statistics .and. &
+                     size(chunk%status) == summary%count
+    chunk%first = summary%first
+    if (.not. fits) call allocate_chunk(chunk, summary%first, summary%count, summary%varied, summary%statistics)
     reader%next = summary_numbers * integer_bytes + 1
     call reader%take_reals(bytes, chunk%parameters)
     call reader%take_reals(bytes, chunk%results)
@@ -98,21 +102,6 @@ contains
     end do
     if (reader%is_short) error stop 'nocdyn_sweep_chunk: unpack_chunk needs all bytes of a chunk'
   end subroutine unpack_chunk
-
-  subroutine prepare(chunk, summary)
-    type(chunk_t), intent(inout) :: chunk
-    type(chunk_summary_t), intent(in) :: summary
-    logical :: fits
-
-    fits = allocated(chunk%status)
-    if (fits) fits = size(chunk%parameters, 1) == summary%varied .and. size(chunk%results, 1) == summary%statistics .and. &
-                     size(chunk%status) == summary%count
-    if (fits) then
-      chunk%first = summary%first
-    else
-      call allocate_chunk(chunk, summary%first, summary%count, summary%varied, summary%statistics)
-    end if
-  end subroutine prepare
 
   !> Reads the first bytes of a packed chunk.
   subroutine read_summary(bytes, summary, is_whole)

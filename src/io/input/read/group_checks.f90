@@ -4,7 +4,6 @@ module nocdyn_group_checks
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_input, only: group_t
   use nocdyn_raw_group, only: raw_group_t
-  use nocdyn_kinds, only: wp
   use nocdyn_schema, only: first_key, key_name, key_rules
   use nocdyn_schema_relations, only: relation_t, relations_t
   use nocdyn_schema_rules, only: a_body, body_or_ground, columns, equal_lengths, less_than, unset
@@ -29,7 +28,12 @@ contains
     integer :: i, k
 
     do i = 1, size(group%values)
-      if (key_rules(raw%keys(i)%rule)%ascends) call check_ascending(raw, group, i, diagnostics)
+      if (.not. key_rules(raw%keys(i)%rule)%ascends) cycle
+      do k = 2, group%values(i)%count()
+        message = ascending_message(group, i, k, raw%keys(i)%unit)
+        if (message /= '') call diagnostics%add(max(group%values(i)%line, raw%keys(i)%values(k)%line), raw%index, message, &
+                                                group%values(i)%override)
+      end do
     end do
     do i = 1, size(relations%list)
       associate (relation => relations%list(i))
@@ -52,24 +56,6 @@ contains
     end do
     call check_different_bodies(raw, group, diagnostics)
   end subroutine check_group
-
-  !> Checks the values of an ascending list.
-  subroutine check_ascending(raw, group, position, diagnostics)
-    type(raw_group_t), intent(in) :: raw
-    type(group_t), intent(in) :: group
-    integer, intent(in) :: position   !! of the key
-    type(diagnostics_t), intent(inout) :: diagnostics
-    character(len=:), allocatable :: message
-    integer :: i
-
-    associate (value => group%values(position))
-      do i = 2, value%count()
-        message = ascending_message(group, position, i, raw%keys(position)%unit)
-        if (message == '') cycle
-        call diagnostics%add(max(value%line, raw%keys(position)%values(i)%line), raw%index, message, value%override)
-      end do
-    end associate
-  end subroutine check_ascending
 
   !> What is wrong with value `i` of an ascending list if it is not greater than the one before it, else ''.
   function ascending_message(group, position, i, unit) result(message)
@@ -152,9 +138,20 @@ contains
     type(string_t), allocatable :: names(:)
     integer, allocatable :: order(:), owner(:)   ! owner: position of the key of each name
     character(len=:), allocatable :: text
-    integer :: i, last, next
+    integer :: counts(size(group%values))   ! of the bodies of each key
+    integer :: i, key, last, next
 
-    call collect_bodies(raw, group, names, owner)
+    counts = 0
+    do key = 1, size(counts)
+      associate (rule => key_rules(raw%keys(key)%rule))
+        if (any(rule%value_type == [a_body, body_or_ground]) .and. .not. rule%may_repeat) counts(key) = group%values(key)%count()
+      end associate
+    end do
+    allocate (names(sum(counts)), owner(sum(counts)))
+    owner(:) = [((key, i=1, counts(key)), key=1, size(counts))]
+    do i = 1, size(owner)
+      names(i)%text = group%values(owner(i))%texts(i - sum(counts(:owner(i) - 1)))%text
+    end do
     if (size(names) < 2) return
     call argsort(names, order)
     do i = 2, size(order)
@@ -170,31 +167,5 @@ contains
       call raw%report(owner([last, next]), text, diagnostics)
     end do
   end subroutine check_different_bodies
-
-  !> The bodies that the values of a group name, the ground included.
-  subroutine collect_bodies(raw, group, names, owner)
-    type(raw_group_t), intent(in) :: raw
-    type(group_t), intent(in) :: group
-    type(string_t), allocatable, intent(out) :: names(:)
-    integer, allocatable, intent(out) :: owner(:)   !! position of the key of each name
-    integer :: counts(size(group%values))   ! of the bodies of each key
-    integer :: i, key, n
-
-    counts = 0
-    do key = 1, size(counts)
-      associate (rule => key_rules(raw%keys(key)%rule))
-        if (any(rule%value_type == [a_body, body_or_ground]) .and. .not. rule%may_repeat) counts(key) = group%values(key)%count()
-      end associate
-    end do
-    allocate (names(sum(counts)), owner(sum(counts)))
-    n = 0
-    do key = 1, size(counts)
-      do i = 1, counts(key)
-        n = n + 1
-        names(n)%text = group%values(key)%texts(i)%text
-        owner(n) = key
-      end do
-    end do
-  end subroutine collect_bodies
 
 end module nocdyn_group_checks

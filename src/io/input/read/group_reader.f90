@@ -37,11 +37,17 @@ contains
     type(diagnostics_t), intent(inout) :: diagnostics
     type(raw_group_t), allocatable :: raw
     integer :: i, k
+    logical :: has_number
 
     allocate (raw, source=new_raw_group(index, group%rule, group%line, source%is_malformed))
     call take_assignments(namelist, source, raw, diagnostics)
-    group%name = name_of(raw)
-    call take_overrides(group%name, merge(group%ordinal, 0, is_unnamed(group%rule)), overrides, raw, diagnostics)
+    group%name = ''
+    do i = 1, size(raw%keys)
+      if (key_rules(raw%keys(i)%rule)%value_type /= a_name .or. raw%keys(i)%count_given() /= 1) cycle
+      group%name = raw%keys(i)%values(1)%text
+    end do
+    has_number = .not. is_single(group%rule) .and. group_rules(group%rule)%name_space == ''   ! instead of a name, in paths
+    call take_overrides(group%name, merge(group%ordinal, 0, has_number), overrides, raw, diagnostics)
     do i = 1, size(raw%keys)
       call raw%keys(i)%trim_values()
     end do
@@ -134,26 +140,6 @@ contains
       if (key > 0) return
     end do
   end subroutine find_key_without_equals
-
-  !> The name that the file gives to the element, '' if none.
-  pure function name_of(raw) result(name)
-    type(raw_group_t), intent(in) :: raw
-    character(len=:), allocatable :: name
-    integer :: i
-
-    name = ''
-    do i = 1, size(raw%keys)
-      if (key_rules(raw%keys(i)%rule)%value_type /= a_name .or. raw%keys(i)%count_given() /= 1) cycle
-      name = raw%keys(i)%values(1)%text
-    end do
-  end function name_of
-
-  !> Whether the groups of a row of `group_rules` have numbers instead of names in paths.
-  pure logical function is_unnamed(rule)
-    integer, intent(in) :: rule   !! row of `group_rules`
-
-    is_unnamed = .not. is_single(rule) .and. group_rules(rule)%name_space == ''
-  end function is_unnamed
 
   !> Takes over the overrides of the group, and marks them as used.
   subroutine take_overrides(name, number, overrides, raw, diagnostics)

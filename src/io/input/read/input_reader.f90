@@ -86,7 +86,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error   !! gets the mistakes of this case too
     type(error_t), allocatable :: own
     type(diagnostics_t) :: diagnostics
-    integer :: i
+    integer :: g, i
 
     input%file = machine%file
     input%load_case = machine%load_cases(c)
@@ -98,7 +98,17 @@ contains
       call append(input%overrides, overrides(i)%text)
     end do
     call read_all_groups(text, input, diagnostics, own)
-    call refuse_lacking(input, diagnostics)
+    associate (lacks => input%load_case%lacks, own_overrides => size(input%load_case%overrides))
+      do g = 1, merge(size(lacks), 0, diagnostics%count == 0)
+        if (.not. lacks(g) .or. input%groups(g)%name == '') cycle
+        do i = 1, size(input%groups(g)%values)
+          associate (override => input%groups(g)%values(i)%override)
+            if (override > 0 .and. override <= own_overrides) call diagnostics%add(no_line, 0, 'the load case leaves out ' // &
+                                                                                   input%label(g), override)
+          end associate
+        end do
+      end do
+    end associate
     if (diagnostics%count > 0) call raise(own, diagnostics%worst_code(), input%diagnostics_text(diagnostics))
     if (.not. allocated(own)) then
       call keep_groups(input, input%load_case%lacks)
@@ -107,24 +117,6 @@ contains
     end if
     call add_error(error, own)
   end subroutine read_load_case
-
-  !> Refuses values that a load case sets of elements which it leaves out.
-  subroutine refuse_lacking(input, diagnostics)
-    type(input_t), intent(in) :: input   !! with all groups of the file
-    type(diagnostics_t), intent(inout) :: diagnostics
-    integer :: g, i
-
-    if (diagnostics%count > 0) return
-    do g = 1, size(input%load_case%lacks)
-      if (.not. input%load_case%lacks(g) .or. input%groups(g)%name == '') cycle
-      do i = 1, size(input%groups(g)%values)
-        associate (override => input%groups(g)%values(i)%override)
-          if (override == 0 .or. override > size(input%load_case%overrides)) cycle
-          call diagnostics%add(no_line, 0, 'the load case leaves out ' // input%label(g), override)
-        end associate
-      end do
-    end do
-  end subroutine refuse_lacking
 
   !> Reads and checks all groups of a file.
   subroutine read_all_groups(text, input, diagnostics, error)
@@ -160,7 +152,8 @@ contains
     type(input_t), intent(inout) :: input
     type(diagnostics_t), intent(inout) :: diagnostics
     integer, allocatable :: added(:)
-    character(len=:), allocatable :: folder
+    character(len=:), allocatable :: folder, hint
+    type(namelist_group_t) :: source
     type(relations_t) :: relations(size(group_rules))
     integer :: numbers(size(group_rules))   ! of groups so far
     integer :: g, n
@@ -176,35 +169,28 @@ contains
     do g = 1, n + size(added)
       associate (group => input%groups(g))
         group%name = ''
+        source = namelist_group_t()
         if (g > n) then
           group%rule = added(g - n)
           group%kind = trim(group_rules(group%rule)%name)
-          call read_group(namelist, namelist_group_t(), g, overrides, folder, relations(group%rule), group, diagnostics)
-          cycle
+        else
+          source = namelist%groups(g)
+          group%kind = source%name
+          group%line = source%line
+          group%rule = group_rule_index(group%kind)
+          if (group%rule == 0) then
+            hint = ''
+            if (diagnostics%count < most_shown) hint = group_suggestion(group%kind)
+            call diagnostics%add(group%line, g, 'there is no such group' // hint)
+            cycle
+          end if
+          numbers(group%rule) = numbers(group%rule) + 1
+          group%ordinal = numbers(group%rule)
         end if
-        group%kind = namelist%groups(g)%name
-        group%rule = group_rule_index(group%kind)
-        group%line = namelist%groups(g)%line
-        if (group%rule == 0) call refuse_group(group, g, diagnostics)
-        if (group%rule == 0) cycle
-        numbers(group%rule) = numbers(group%rule) + 1
-        group%ordinal = numbers(group%rule)
-        call read_group(namelist, namelist%groups(g), g, overrides, folder, relations(group%rule), group, diagnostics)
+        call read_group(namelist, source, g, overrides, folder, relations(group%rule), group, diagnostics)
       end associate
     end do
   end subroutine read_groups
-
-  !> Refuses a group that the schema does not have. After many errors no similar one is searched.
-  subroutine refuse_group(group, g, diagnostics)
-    type(group_t), intent(in) :: group
-    integer, intent(in) :: g   !! its index
-    type(diagnostics_t), intent(inout) :: diagnostics
-    character(len=:), allocatable :: hint
-
-    hint = ''
-    if (diagnostics%count < most_shown) hint = group_suggestion(group%kind)
-    call diagnostics%add(group%line, g, 'there is no such group' // hint)
-  end subroutine refuse_group
 
   !> Rows of the single groups that the file does not have, but that have only defaults or overrides.
   subroutine find_absent_groups(namelist, overrides, rules)

@@ -22,7 +22,7 @@ contains
     type(raw_group_t), intent(inout) :: group
     type(relations_t), intent(in) :: relations
     type(diagnostics_t), intent(inout) :: diagnostics
-    integer :: i
+    integer :: i, k
 
     if (relations%selector > 0) call apply_selector(group, relations%selector, diagnostics)
     do i = 1, size(relations%list)
@@ -33,7 +33,13 @@ contains
         case (requires)
           call check_requirement(group, relation, diagnostics)
         case (equal_lengths, columns)
-          call lengthen_defaults(group, relation%first)
+          if (.not. allocated(group%keys(relation%first(1))%values)) cycle
+          do k = 2, size(relation%first)   ! a list with its default becomes as long as the first one
+            associate (key => group%keys(relation%first(k)))
+              if (key%is_given() .or. key_rules(key%rule)%default == unset .or. key_rules(key%rule)%count /= any_number) cycle
+              key%length = size(group%keys(relation%first(1))%values)
+            end associate
+          end do
         case default   ! of values, which are checked after their conversion
         end select
       end associate
@@ -198,6 +204,7 @@ contains
     type(relation_t), intent(in) :: relation   !! `requires`
     type(diagnostics_t), intent(inout) :: diagnostics
     type(string_t), allocatable :: words(:)
+    character(len=:), allocatable :: needed   ! "fault", "fault = 'resynchronisation'", "a or b"
     logical :: has_needed, is_known
     integer :: i, j
 
@@ -220,23 +227,15 @@ contains
           else if (key%override == 0 .and. relation%word /= '' .and. any(group%keys(others)%override > 0)) then
             call supersede(group, keys(i:i))   ! as the keys of another kind
           else if (is_known .and. .not. any(group%keys(others)%may_be_missing)) then
-            if (.not. is_zero(key)) call group%report(keys(i:i), key%name() // ' needs ' // needed_text(group, relation), &
-                                                      diagnostics)
+            if (is_zero(key)) cycle
+            needed = listed_keys(group%rule, others, ' or ')
+            if (relation%word /= '') needed = needed // ' = ' // quoted(trim(relation%word))
+            call group%report(keys(i:i), key%name() // ' needs ' // needed, diagnostics)
           end if
         end associate
       end do
     end associate
   end subroutine check_requirement
-
-  !> "fault", "fault = 'resynchronisation'", "a or b".
-  function needed_text(group, relation) result(text)
-    type(raw_group_t), intent(in) :: group
-    type(relation_t), intent(in) :: relation   !! `requires`
-    character(len=:), allocatable :: text
-
-    text = listed_keys(group%rule, relation%second, ' or ')
-    if (relation%word /= '') text = text // ' = ' // quoted(trim(relation%word))
-  end function needed_text
 
   !> Whether the key has one value, the number 0.
   logical function is_zero(key)
@@ -250,20 +249,5 @@ contains
     call read_real(key%values(1)%text, value, status)
     is_zero = status == literal_ok .and. abs(value) <= 0.0_wp
   end function is_zero
-
-  !> A list with its default becomes as long as the first list of the relation.
-  subroutine lengthen_defaults(group, lists)
-    type(raw_group_t), intent(inout) :: group
-    integer, intent(in) :: lists(:)   !! positions of the keys
-    integer :: i
-
-    if (.not. allocated(group%keys(lists(1))%values)) return
-    do i = 2, size(lists)
-      associate (key => group%keys(lists(i)), rule => key_rules(group%keys(lists(i))%rule))
-        if (key%is_given() .or. rule%default == unset .or. rule%count /= any_number) cycle
-        key%length = size(group%keys(lists(1))%values)
-      end associate
-    end do
-  end subroutine lengthen_defaults
 
 end module nocdyn_key_relations

@@ -4,7 +4,7 @@
 !> it. The run of a case is the &run that names it, else the &run without a case.
 module nocdyn_load_cases
   use nocdyn_diagnostics, only: diagnostics_t
-  use nocdyn_input, only: group_t, input_t, load_case_t, value_t
+  use nocdyn_input, only: group_t, input_t, value_t
   use nocdyn_schema, only: group_rules
   use nocdyn_schema_text, only: suggestion
   use nocdyn_text, only: append, lower_case, quoted, shortened, string_t, to_text
@@ -42,9 +42,9 @@ contains
     logical, allocatable, intent(out) :: machine_lacks(:)   !! [groups]
     type(diagnostics_t), intent(inout) :: diagnostics
     type(members_t) :: members
-    integer :: c
+    integer :: c, g
 
-    members%groups = input%groups_named('load_case')
+    allocate (members%groups, source=input%groups_named('load_case'))
     allocate (machine_lacks(size(input%groups)), source=.false.)
     if (allocated(input%load_cases)) deallocate (input%load_cases)
     allocate (input%load_cases(size(members%groups)))
@@ -56,30 +56,27 @@ contains
       call check_folder(input, members%groups(c), diagnostics)
       call find_members(input, members%groups(c), 'with', members%has(c, :), diagnostics)
       call find_members(input, members%groups(c), 'without', members%lacks(c, :), diagnostics)
-      call check_members(input, members%groups(c), members%has(c, :) .and. members%lacks(c, :), diagnostics)
+      do g = 1, size(input%groups)
+        if (members%has(c, g) .and. members%lacks(c, g)) call input%report(members%groups(c), 'with', &
+          'with and without both name ' // quoted(input%groups(g)%name) // '; allowed: one of them', diagnostics)
+      end do
       call check_values(input, members%groups(c), diagnostics)
     end do
     do c = 1, size(members%groups)
-      call describe_case(input%groups(members%groups(c)), input%load_cases(c))
-      allocate (input%load_cases(c)%lacks(size(input%groups)))
-      input%load_cases(c)%lacks(:) = members%lacks(c, :) .or. (any(members%has, dim=1) .and. .not. members%has(c, :))
-      call leave_frame(input, members, merge(members%runs(c), members%common_run, members%runs(c) > 0), &
-                       input%load_cases(c)%lacks)
+      associate (load_case => input%load_cases(c), group => input%groups(members%groups(c)))
+        load_case%name = group%name
+        load_case%title = group%text('title')
+        load_case%repeats = group%number('repeats')
+        load_case%line = group%line
+        allocate (load_case%overrides, source=group%texts('set'))
+        allocate (load_case%lacks(size(input%groups)))
+        load_case%lacks(:) = members%lacks(c, :) .or. (any(members%has, dim=1) .and. .not. members%has(c, :))
+        call leave_frame(input, members, merge(members%runs(c), members%common_run, members%runs(c) > 0), load_case%lacks)
+      end associate
     end do
     machine_lacks(:) = any(members%has, dim=1)
     call leave_frame(input, members, members%common_run, machine_lacks)
   end subroutine find_load_cases
-
-  subroutine describe_case(group, load_case)
-    type(group_t), intent(in) :: group
-    type(load_case_t), intent(inout) :: load_case
-
-    load_case%name = group%name
-    load_case%title = group%text('title')
-    load_case%repeats = group%number('repeats')
-    load_case%line = group%line
-    allocate (load_case%overrides, source=group%texts('set'))
-  end subroutine describe_case
 
   !> Leaves out the groups &load_case, every &run but one, and each &limit of an element that is left out.
   subroutine leave_frame(input, members, run, lacks)
@@ -116,16 +113,6 @@ contains
     end do
   end function limits_of
 
-  !> The position of a name, 0 if it is not there.
-  pure integer function position_of(name, names)
-    character(len=*), intent(in) :: name
-    type(string_t), intent(in) :: names(:)
-
-    do position_of = size(names), 1, -1
-      if (names(position_of)%text == name) return
-    end do
-  end function position_of
-
   !> Finds the &run of every case.
   subroutine find_runs(input, members, diagnostics)
     type(input_t), intent(in) :: input
@@ -146,8 +133,10 @@ contains
         members%common_run = runs(i)
         cycle
       end if
-      c = position_of(input%groups(runs(i))%text('load_case'), names)
-      if (c == 0) then
+      do c = 1, size(names)
+        if (names(c)%text == input%groups(runs(i))%text('load_case')) exit
+      end do
+      if (c > size(names)) then
         call input%report(runs(i), 'load_case', 'load_case: there is no &load_case ' // &
                           quoted(shortened(input%groups(runs(i))%text('load_case'))) // &
                           suggestion(input%groups(runs(i))%text('load_case'), names), diagnostics)
@@ -172,8 +161,8 @@ contains
     type(diagnostics_t), intent(inout) :: diagnostics
     integer :: i
 
-    associate (name => input%groups(group)%name)
-      if (any([(is_ending(name, trim(file_endings(i))), i=1, size(file_endings))])) then
+    associate (name => input%groups(group)%name)   ! without commas
+      if (any([(index(lower_case(name) // ',', trim(file_endings(i)) // ',') > 0, i=1, size(file_endings))])) then
         call input%report(group, 'name', 'name = ' // quoted(shortened(name)) // ' is that of a file of results; allowed: ' // &
                           'a name without such an ending, for it is that of a folder', diagnostics)
       else if (index(name, '/') > 0 .or. index(name, '.') == 1) then
@@ -182,28 +171,6 @@ contains
       end if
     end associate
   end subroutine check_folder
-
-  !> Whether a name has an ending, in upper or lower case.
-  pure logical function is_ending(name, ending)
-    character(len=*), intent(in) :: name, ending
-
-    is_ending = len(name) >= len(ending)
-    if (is_ending) is_ending = lower_case(name(len(name) - len(ending) + 1:)) == ending
-  end function is_ending
-
-  !> Refuses elements that a load case has and leaves out.
-  subroutine check_members(input, group, are_both, diagnostics)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: group   !! the &load_case
-    logical, intent(in) :: are_both(:)   !! [groups]
-    type(diagnostics_t), intent(inout) :: diagnostics
-    integer :: g
-
-    do g = 1, size(are_both)
-      if (are_both(g)) call input%report(group, 'with', 'with and without both name ' // quoted(input%groups(g)%name) // &
-                                         '; allowed: one of them', diagnostics)
-    end do
-  end subroutine check_members
 
   !> Refuses values of a load case that are not those of its machine, its run or its output.
   subroutine check_values(input, group, diagnostics)
@@ -249,8 +216,10 @@ contains
         is_named(g) = .true.
       end do
       if (found > 0) cycle
-      g = other_group(input, names(i)%text)
-      if (g > 0) then
+      do g = 1, size(input%groups)
+        if (input%groups(g)%name == names(i)%text .and. names(i)%text /= '') exit
+      end do
+      if (g <= size(input%groups)) then
         call input%report(group, key, key // ': ' // quoted(names(i)%text) // ' is a &' // trim(input%groups(g)%kind) // &
                           '; allowed: names of elements', diagnostics)
       else
@@ -259,16 +228,6 @@ contains
       end if
     end do
   end subroutine find_members
-
-  !> A group with a name that is no element, 0 if there is none.
-  pure integer function other_group(input, name) result(group)
-    type(input_t), intent(in) :: input
-    character(len=*), intent(in) :: name
-
-    do group = size(input%groups), 1, -1
-      if (input%groups(group)%name == name .and. name /= '') return
-    end do
-  end function other_group
 
   !> Whether a group is one that load cases can have or lack: one with a name, no body, no load case.
   logical function is_element(group)

@@ -1,6 +1,6 @@
 !> Checks that need all groups: duplicate names, and references to bodies.
 module nocdyn_name_checks
-  use nocdyn_input, only: group_t, value_t
+  use nocdyn_input, only: group_t
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_schema, only: first_key, group_rules, key_rules
   use nocdyn_schema_rules, only: a_body, body_or_ground, ground, key_rule_t
@@ -23,7 +23,7 @@ contains
     integer, allocatable :: members(:), order(:)
     type(string_t), allocatable :: names(:)
     character(len=len(group_rules%name_space)) :: name_space
-    integer :: i, rule
+    integer :: first, i, rule
 
     do rule = 1, size(group_rules)
       name_space = group_rules(rule)%name_space
@@ -31,7 +31,18 @@ contains
       members = pack([(i, i=1, size(groups))], [(is_member(groups(i), name_space), i=1, size(groups))])
       call collect_names(groups, members, names)
       call argsort(names, order)
-      call report_duplicates(groups, members(order), diagnostics)
+      members = members(order)
+      first = 1
+      do i = 2, size(members)
+        associate (earlier => groups(members(first)), later => groups(members(i)))
+          if (earlier%name == later%name) then
+            call diagnostics%add(later%line, members(i), 'the name ' // quoted(later%name) // ' is taken by &' // &
+                                 earlier%kind // ' on line ' // to_text(earlier%line))
+          else
+            first = i
+          end if
+        end associate
+      end do
     end do
   end subroutine check_duplicate_names
 
@@ -57,25 +68,6 @@ contains
     end do
   end subroutine collect_names
 
-  subroutine report_duplicates(groups, sorted, diagnostics)
-    type(group_t), intent(in) :: groups(:)
-    integer, intent(in) :: sorted(:)   !! groups in the order of their names
-    type(diagnostics_t), intent(inout) :: diagnostics
-    integer :: first, i
-
-    first = 1
-    do i = 2, size(sorted)
-      associate (earlier => groups(sorted(first)), later => groups(sorted(i)))
-        if (earlier%name == later%name) then
-          call diagnostics%add(later%line, sorted(i), 'the name ' // quoted(later%name) // ' is taken by &' // earlier%kind &
-            // ' on line ' // to_text(earlier%line))
-        else
-          first = i
-        end if
-      end associate
-    end do
-  end subroutine report_duplicates
-
   !> Refuses keys with names of bodies that do not exist.
   subroutine check_references(groups, bodies_are_known, diagnostics)
     type(group_t), intent(in) :: groups(:)
@@ -83,6 +75,7 @@ contains
     type(diagnostics_t), intent(inout) :: diagnostics
     type(string_t), allocatable :: bodies(:)
     integer, allocatable :: members(:), order(:)
+    character(len=:), allocatable :: hint
     type(key_rule_t) :: rule
     integer :: g, i, key, missing
 
@@ -97,32 +90,19 @@ contains
         rule = key_rules(first_key(groups(g)%rule) + key - 1)
         if (rule%value_type /= a_body .and. rule%value_type /= body_or_ground) cycle
         if (.not. allocated(groups(g)%values(key)%texts)) cycle
-        call check_missing(groups(g)%values(key), g, trim(rule%name), bodies, order, missing, diagnostics)
+        associate (value => groups(g)%values(key))
+          do i = 1, size(value%texts)
+            if (value%texts(i)%text == ground) cycle
+            if (sorted_position(value%texts(i)%text, bodies, order) > 0) cycle
+            missing = missing + 1
+            hint = ''
+            if (missing <= most_suggestions) hint = suggestion(value%texts(i)%text, bodies)
+            call diagnostics%add(value%line, g, trim(rule%name) // ': there is no &body ' // &
+                                 quoted(shortened(value%texts(i)%text)) // hint, value%override)
+          end do
+        end associate
       end do
     end do
   end subroutine check_references
-
-  !> Adds an error for each body of a key that does not exist.
-  subroutine check_missing(value, group, key, bodies, order, missing, diagnostics)
-    type(value_t), intent(in) :: value
-    integer, intent(in) :: group             !! index in the input
-    character(len=*), intent(in) :: key      !! name of the key
-    type(string_t), intent(in) :: bodies(:)  !! names of all bodies
-    integer, intent(in) :: order(:)          !! of `argsort`
-    integer, intent(inout) :: missing        !! number of missing bodies so far
-    type(diagnostics_t), intent(inout) :: diagnostics
-    character(len=:), allocatable :: hint
-    integer :: i
-
-    do i = 1, size(value%texts)
-      if (value%texts(i)%text == ground) cycle
-      if (sorted_position(value%texts(i)%text, bodies, order) > 0) cycle
-      missing = missing + 1
-      hint = ''
-      if (missing <= most_suggestions) hint = suggestion(value%texts(i)%text, bodies)
-      call diagnostics%add(value%line, group, key // ': there is no &body ' // quoted(shortened(value%texts(i)%text)) // hint, &
-                           value%override)
-    end do
-  end subroutine check_missing
 
 end module nocdyn_name_checks

@@ -103,7 +103,8 @@ contains
     integer :: last
 
     if (self%is_written .and. self%unit /= unit) then
-      message = two_units_message(self, assignment%line, unit)
+      message = self%name() // ' on line ' // to_text(self%line) // ' and ' // name_in_unit(key_rules(self%rule), unit) // &
+                ' on line ' // to_text(assignment%line) // ' are both given; allowed: one of them'
     else if (self%is_written .and. (self%has_whole_list .or. assignment%is_whole)) then
       message = duplicate_message(self)
     else
@@ -156,16 +157,6 @@ contains
 
     message = key%name() // ' is given twice, first on line ' // to_text(key%line)
   end function duplicate_message
-
-  !> "speed on line 3 and speed_rpm on line 4 are both given; allowed: one of them".
-  pure function two_units_message(key, line, unit) result(message)
-    type(raw_key_t), intent(in) :: key
-    integer, intent(in) :: line, unit   !! of the second assignment
-    character(len=:), allocatable :: message
-
-    message = key%name() // ' on line ' // to_text(key%line) // ' and ' // name_in_unit(key_rules(key%rule), unit) // &
-              ' on line ' // to_text(line) // ' are both given; allowed: one of them'
-  end function two_units_message
 
   !> Index of the last value that an assignment can set.
   subroutine find_last(namelist, assignment, key, last, message)

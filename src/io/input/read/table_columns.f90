@@ -29,14 +29,27 @@ contains
     type(raw_group_t), intent(in) :: raw
     type(group_t), intent(inout) :: group
     type(diagnostics_t), intent(inout) :: diagnostics
-    type(string_t), allocatable :: messages(:)
+    type(error_t), allocatable :: error
+    type(string_t), allocatable :: messages(:), names(:)
     type(value_t) :: source
-    integer :: code, i
+    character(len=:), allocatable :: path, text
+    real(wp), allocatable :: values(:, :)   ! [columns, rows]
+    integer :: code, i, line
 
     source = group%values(relation%second(1))
     if (.not. allocated(source%texts)) return
     group%values(relation%second(1)) = value_t()
-    call read_columns(path_in(folder, source%texts(1)%text), relation, group, messages, code)
+    path = path_in(folder, source%texts(1)%text)
+    code = exit_input
+    call read_text_file(path, text, error)
+    if (allocated(error)) then
+      code = exit_file
+      allocate (messages(0))
+      call append(messages, error%message)
+    else
+      call read_list_text(text, path, names, line, values, messages)
+      if (size(messages) == 0) call take_columns(shown_path(path), line, names, values, relation, group, messages)
+    end if
     do i = 1, size(messages)
       call diagnostics%add(source%line, raw%index, raw%keys(relation%second(1))%name() // ': ' // messages(i)%text, &
                            source%override, code)
@@ -53,31 +66,6 @@ contains
       end do
     end associate
   end subroutine read_table_columns
-
-  !> Reads a file and sets the lists of a group to its columns.
-  subroutine read_columns(file, relation, group, messages, code)
-    character(len=*), intent(in) :: file                      !! path
-    type(relation_t), intent(in) :: relation
-    type(group_t), intent(inout) :: group
-    type(string_t), allocatable, intent(out) :: messages(:)   !! sentences that begin with the file; empty: it is valid
-    integer, intent(out) :: code                              !! exit code of the messages
-    type(error_t), allocatable :: error
-    type(string_t), allocatable :: names(:)
-    character(len=:), allocatable :: text
-    real(wp), allocatable :: values(:, :)   ! [columns, rows]
-    integer :: line
-
-    code = exit_input
-    call read_text_file(file, text, error)
-    if (allocated(error)) then
-      code = exit_file
-      allocate (messages(0))
-      call append(messages, error%message)
-      return
-    end if
-    call read_list_text(text, file, names, line, values, messages)
-    if (size(messages) == 0) call take_columns(shown_path(file), line, names, values, relation, group, messages)
-  end subroutine read_columns
 
   !> Sets the lists of a group to the columns of a file.
   subroutine take_columns(file, line, names, values, relation, group, messages)

@@ -307,7 +307,10 @@ contains
       if (message /= '' .and. rows == 0 .and. reading%errors == 0 .and. scan(content, '0123456789') == 0) then
         message = message // '; a line with names of columns must begin with #'
       end if
-      if (message == '' .and. rows > 0) call check_ascent(values(1, rows), values(1, rows + 1), reading%last_row_line, message)
+      if (message == '' .and. rows > 0) then
+        if (values(1, rows + 1) <= values(1, rows)) message = 'column 1, ' // to_text(values(1, rows + 1)) // &
+          ', must be greater than ' // to_text(values(1, rows)) // ' on line ' // to_text(reading%last_row_line)
+      end if
     end if
     if (message /= '') then
       call add_error(reading, ':' // to_text(reading%line) // ': ' // message)
@@ -425,15 +428,5 @@ contains
       call add_error(reading, ': ' // counted(rows, 'row', 'rows') // '; needed: at least ' // to_text(least))
     end if
   end subroutine check_whole
-
-  !> Checks that the first column ascends.
-  subroutine check_ascent(last, this, line, message)
-    real(wp), intent(in) :: last, this   !! first column of the last row and of this one
-    integer, intent(in) :: line          !! of the last row
-    character(len=:), allocatable, intent(inout) :: message
-
-    if (this > last) return
-    message = 'column 1, ' // to_text(this) // ', must be greater than ' // to_text(last) // ' on line ' // to_text(line)
-  end subroutine check_ascent
 
 end module nocdyn_table_file

@@ -27,8 +27,9 @@ contains
     integer, intent(in) :: position             !! of the key
     type(value_t), intent(inout) :: value       !! unset if the key has no value or an error
     type(diagnostics_t), intent(inout) :: diagnostics
-    character(len=:), allocatable :: message
-    integer :: given, known
+    integer, parameter :: few = 80   ! values in a message; more are not shown anyhow
+    character(len=:), allocatable :: found, message
+    integer :: given, i, known
 
     associate (key => group%keys(position), rule => key_rules(group%keys(position)%rule))
       given = key%count_given()
@@ -45,7 +46,11 @@ contains
       if (known == 0) then
         message = trim(merge(' has no value', ' is missing  ', key%is_written)) // '; needed: ' // allowed_text(rule, key%unit)
       else if (known < size(key%values)) then
-        message = ' has ' // counted(given, 'value', 'values') // ' (' // given_values(key) // '); needed: ' // &
+        found = ''
+        do i = 1, min(size(key%values), few)
+          if (allocated(key%values(i)%written)) found = found // ', ' // key%values(i)%written
+        end do
+        message = ' has ' // counted(given, 'value', 'values') // ' (' // shortened(found(3:)) // '); needed: ' // &
                   to_text(size(key%values))
       else if (known < rule%fewest) then
         message = ' has ' // counted(known, 'value', 'values') // '; needed: at least ' // to_text(rule%fewest)
@@ -56,20 +61,6 @@ contains
       call group%report([position], key%name() // message, diagnostics)
     end associate
   end subroutine convert_key
-
-  !> The values that are given, as they are written.
-  pure function given_values(key) result(text)
-    type(raw_key_t), intent(in) :: key
-    character(len=:), allocatable :: text
-    integer, parameter :: few = 80   ! more are not shown anyhow
-    integer :: i
-
-    text = ''
-    do i = 1, min(size(key%values), few)
-      if (allocated(key%values(i)%written)) text = text // ', ' // key%values(i)%written
-    end do
-    text = shortened(text(3:))
-  end function given_values
 
   !> The default of a key.
   function default_value(rule) result(value)
@@ -148,7 +139,15 @@ contains
           return
         end if
       case (an_integer)
-        call convert_integer(raw%text, rule, value%whole_numbers(i), message)
+        call read_integer(raw%text, value%whole_numbers(i), status)
+        select case (status)
+        case (literal_ok)
+          if (is_out_of_range(real(value%whole_numbers(i), wp), rule%allowed)) message = ' is out of range'
+        case (literal_too_large)
+          message = ' is too large; at most ' // to_text(huge(0))
+        case default
+          message = ' is not a whole number'
+        end select
       case default
         call read_logical(raw%text, value%flags(i), status)
         if (status /= literal_ok) message = ' is neither true nor false'
@@ -175,29 +174,13 @@ contains
     message = ' is out of range; allowed: ' // allowed_text(rule, unit) // limit
   end subroutine convert_number
 
-  subroutine convert_integer(text, rule, value, message)
-    character(len=*), intent(in) :: text
-    type(key_rule_t), intent(in) :: rule
-    integer, intent(out) :: value
-    character(len=:), allocatable, intent(inout) :: message
-    integer :: status
-
-    call read_integer(text, value, status)
-    select case (status)
-    case (literal_ok)
-      if (is_out_of_range(real(value, wp), rule%allowed)) message = ' is out of range'
-    case (literal_too_large)
-      message = ' is too large; at most ' // to_text(huge(value))
-    case default
-      message = ' is not a whole number'
-    end select
-  end subroutine convert_integer
-
   !> Checks the text of a name, a body, a word, a file or a folder.
   subroutine check_text(rule, value, message)
     type(key_rule_t), intent(in) :: rule
-    type(string_t), intent(inout) :: value   !! a word becomes that of the schema
+    type(string_t), intent(inout) :: value   !! a word, in any case, becomes that of the schema
     character(len=:), allocatable, intent(inout) :: message
+    type(string_t), allocatable :: words(:)
+    integer :: i
 
     select case (rule%value_type)
     case (a_name)
@@ -205,7 +188,15 @@ contains
     case (a_body)
       if (value%text == ground) message = ': the ground is not allowed here; allowed: ' // allowed_text(rule)
     case (a_word, a_selector)
-      call check_word(words_of(rule), value, message)
+      allocate (words, source=words_of(rule))
+      do i = 1, size(words)
+        if (lower_case(value%text) /= lower_case(words(i)%text)) cycle
+        value%text = words(i)%text
+        return
+      end do
+      message = ' is not known; allowed: ' // joined(words, ', ')
+      i = nearest_word(value%text, words)
+      if (i > 0) message = message // "; did you mean '" // words(i)%text // "'?"
     case (a_file, a_document)
       if (value%text == '') message = ' is not the name of a file'
     case (a_folder)
@@ -214,23 +205,6 @@ contains
     case default   ! any text
     end select
   end subroutine check_text
-
-  !> Checks a word; on success it becomes the word of the schema.
-  subroutine check_word(words, value, message)
-    type(string_t), intent(in) :: words(:)   !! that are allowed
-    type(string_t), intent(inout) :: value   !! in any case; becomes the word of the schema
-    character(len=:), allocatable, intent(inout) :: message
-    integer :: i
-
-    do i = 1, size(words)
-      if (lower_case(value%text) /= lower_case(words(i)%text)) cycle
-      value%text = words(i)%text
-      return
-    end do
-    message = ' is not known; allowed: ' // joined(words, ', ')
-    i = nearest_word(value%text, words)
-    if (i > 0) message = message // "; did you mean '" // words(i)%text // "'?"
-  end subroutine check_word
 
   !> What is wrong with the name of an element, '' if nothing is. Names become parts of columns and of paths on the command line.
   pure function name_message(name) result(message)

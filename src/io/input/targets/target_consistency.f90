@@ -67,11 +67,15 @@ contains
     integer, intent(in) :: which               !! index of the target to check, which was found
     character(len=:), allocatable, intent(out) :: message   !! '' if nothing is wrong
     type(relations_t) :: relations
-    logical, allocatable :: is_given(:)   ! [keys of the group]
+    logical, allocatable :: is_given(:)   ! by the input or a target, [keys of the group]
     integer :: i
 
     message = ''
-    call find_given(input, targets, targets(which)%group, is_given)
+    allocate (is_given(size(input%groups(targets(which)%group)%values)))
+    is_given(:) = input%groups(targets(which)%group)%values%is_given
+    do i = 1, size(targets)
+      if (targets(i)%group == targets(which)%group) is_given(targets(i)%key) = .true.
+    end do
     associate (rule => input%groups(targets(which)%group)%rule, key => targets(which)%key)
       relations = relations_of(rule)
       do i = 1, size(relations%list)
@@ -98,20 +102,5 @@ contains
       end associate
     end subroutine refuse_beside
   end subroutine check_consistency
-
-  !> The keys of a group that the input or a target sets.
-  subroutine find_given(input, targets, group, is_given)
-    type(input_t), intent(in) :: input
-    type(target_t), intent(in) :: targets(:)
-    integer, intent(in) :: group   !! index in the input
-    logical, allocatable, intent(out) :: is_given(:)   !! [keys of the group]
-    integer :: t
-
-    allocate (is_given(size(input%groups(group)%values)))
-    is_given = input%groups(group)%values%is_given
-    do t = 1, size(targets)
-      if (targets(t)%group == group) is_given(targets(t)%key) = .true.
-    end do
-  end subroutine find_given
 
 end module nocdyn_target_consistency

@@ -13,7 +13,6 @@ module nocdyn_targets
   use nocdyn_schema_units, only: name_in_unit, unit_name
   use nocdyn_target_search, only: search_target
   use nocdyn_text, only: to_text
-  use nocdyn_units, only: in_si
   use nocdyn_value_conversion, only: convert_number, default_value
   implicit none (type, external)
   private
@@ -95,6 +94,7 @@ contains
     type(target_t), intent(in) :: target
     real(wp), intent(in) :: value   !! in the unit of the target; rounded if the key has integers
     character(len=:), allocatable, intent(out) :: message
+    character(len=:), allocatable :: written
     real(wp) :: number
 
     number = value
@@ -103,7 +103,14 @@ contains
       message = target%path // ' is not a finite number; allowed: ' // allowed_text(key_rules(target%rule), target%in_unit)
       return
     end if
-    call check_value(target, number, message)
+    written = to_text(number)
+    message = ''
+    if (.not. target%is_integer) then
+      call convert_number(key_rules(target%rule), target%in_unit, number, message)
+    else if (is_out_of_range(number, target%allowed)) then
+      message = ' is out of range; allowed: ' // allowed_text(key_rules(target%rule))
+    end if
+    if (message /= '') message = target%path // ' = ' // written // message
     if (message /= '') return
     if (.not. group%values(target%key)%has_any()) call give_value(group, target)
     associate (stored => group%values(target%key))
@@ -111,28 +118,10 @@ contains
       if (target%is_integer) then
         stored%whole_numbers(target%position) = int(number)
       else
-        stored%numbers(target%position) = in_si(number, target%in_unit)
+        stored%numbers(target%position) = number
       end if
     end associate
   end subroutine set_value
-
-  !> Whether a number is in the range of its key.
-  subroutine check_value(target, value, message)
-    type(target_t), intent(in) :: target
-    real(wp), intent(in) :: value   !! finite, in the unit of the target
-    character(len=:), allocatable, intent(out) :: message
-    real(wp) :: number
-
-    number = value
-    if (.not. target%is_integer) then
-      call convert_number(key_rules(target%rule), target%in_unit, number, message)
-    else if (is_out_of_range(number, target%allowed)) then
-      message = ' is out of range; allowed: ' // allowed_text(key_rules(target%rule))
-    else
-      message = ''
-    end if
-    if (message /= '') message = target%path // ' = ' // to_text(value) // message
-  end subroutine check_value
 
   !> Gives a value to a key that has none. Keys that exclude it lose theirs; keys that require it get their defaults.
   subroutine give_value(group, target)

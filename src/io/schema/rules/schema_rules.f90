@@ -137,7 +137,10 @@ module nocdyn_schema_rules
   type(allowed_t), parameter, public :: from_2 = allowed_t(low=2.0_wp)
   type(allowed_t), parameter, public :: from_0_to_1 = allowed_t(low=0.0_wp, high=1.0_wp)
   type(allowed_t), parameter, public :: interpolations = allowed_t(words='linear cubic')
+  type(allowed_t), parameter, public :: strokes = allowed_t(low=2.0_wp, high=4.0_wp)
+  type(allowed_t), parameter, public :: up_to_64 = allowed_t(low=0.0_wp, high=64.0_wp, excludes_low=.true.)
   type(allowed_t), parameter, public :: extrapolations = allowed_t(words='linear constant')
+  character(len=*), parameter, public :: linear = "'linear'"   !! default of interpolations and extrapolations
 
 contains
 

@@ -4,21 +4,15 @@
 !> Reading, checking, help, template and reference use the rows. The rows of large groups are in modules of their own.
 module nocdyn_schema
   use nocdyn_kinds, only: wp
-  use nocdyn_schema_constraints, only: constraint_examples, constraint_groups, constraint_keys, constraint_relations
-  use nocdyn_schema_couplings, only: coupling_examples, coupling_keys, coupling_relations
-  use nocdyn_schema_engines, only: engine_examples, engine_groups, engine_keys, engine_relations
+  use nocdyn_schema_couplings, only: coupling_examples, coupling_groups, coupling_keys, coupling_relations
   use nocdyn_schema_joints, only: joint_examples, joint_groups, joint_keys, joint_kinds, joint_relations
-  use nocdyn_schema_motions, only: motion_examples, motion_groups, motion_keys, motion_kinds, motion_relations
-  use nocdyn_schema_meshes, only: mesh_examples, mesh_groups, mesh_keys, mesh_relations
-  use nocdyn_schema_fatigue, only: fatigue_examples, fatigue_groups, fatigue_keys, fatigue_relations
   use nocdyn_schema_response, only: response_examples, response_groups, response_keys, response_relations
   use nocdyn_schema_rules, only: a_body, a_document, a_flag, a_folder, a_name, a_number, a_selector, a_text, a_word, alias_t, &
-    allowed_t, an_integer, any_number, any_times, anything, at_least_once, at_most_once, at_most_one, body_or_ground, &
-    exactly_once, example_t, from_2, group_alias_t, group_rule_t, in_machine, in_simulation, in_torques, key_rule_t, &
-    kind_rule_t, less_than, not_negative, positive, relation_rule_t, required, unset
-  use nocdyn_schema_shafts, only: shaft_examples, shaft_groups, shaft_keys, shaft_relations
+    allowed_t, an_integer, any_number, any_times, anything, at_least_once, at_most_once, at_most_one, exactly_once, example_t, &
+    from_2, group_alias_t, group_rule_t, in_machine, in_simulation, key_rule_t, kind_rule_t, less_than, not_negative, positive, &
+    relation_rule_t, required, unset
   use nocdyn_schema_sweep, only: sweep_aliases, sweep_examples, sweep_groups, sweep_keys, sweep_kinds, sweep_relations
-  use nocdyn_schema_torques, only: excitation_keys, load_keys, motor_keys, torque_examples, torque_kinds, torque_relations
+  use nocdyn_schema_torques, only: torque_examples, torque_groups, torque_keys, torque_kinds, torque_relations
   use nocdyn_text, only: append, string_t
   implicit none (type, external)
   private
@@ -38,103 +32,80 @@ module nocdyn_schema
   type(group_rule_t), parameter, public :: group_rules(*) = [ &
     group_rule_t('case',       in_machine,    at_most_once,  '',         'What the file is about.'), &
     group_rule_t('body',       in_machine,    at_least_once, 'body',     'A rigid body that turns about its axis.'), &
-    group_rule_t('coupling',   in_machine,    any_times,     'coupling', &
-                 'An elastic coupling of two bodies, or of a body and the ground.'), &
-    shaft_groups, mesh_groups, constraint_groups, joint_groups, motion_groups, &
-    group_rule_t('motor',      in_torques,    any_times,     'torque',   'A driving torque on a body, by a law of its speed.'), &
-    group_rule_t('load',       in_torques,    any_times,     'torque', &
-                 'A resisting torque on a body: the sum of the terms that are given.'), &
-    group_rule_t('excitation', in_torques,    any_times,     'torque', &
-                 'A torque on a body, by a law of time or of its angle.'), &
-    engine_groups, &
+    coupling_groups, joint_groups, torque_groups, &
     group_rule_t('run',        in_simulation, exactly_once,  '',         'What is computed, and how.'), &
     group_rule_t('load_case',  in_simulation, any_times,     'load_case', &
                  'A start, a fault or a load: nocdyn run does one load case after the other.'), &
     group_rule_t('output',     in_simulation, at_most_once,  '',         'What is written, in which form, and where.'), &
-    response_groups, fatigue_groups, sweep_groups]
+    response_groups, sweep_groups]
 
   type(key_rule_t), parameter :: frame_keys(*) = [ &
-    key_rule_t('case',       'title',           a_text,         1, '',            "''",        anything, &
-      'title of summaries and figures, one line'), &
-    key_rule_t('case',       'author',          a_text,         1, '',            "''",        anything, &
-      'who made the calculation, for the report'), &
-    key_rule_t('case',       'customer',        a_text,         1, '',            "''",        anything, &
-      'for whom it is made, for the report'), &
-    key_rule_t('case',       'revision',        a_text,         1, '',            "''",        anything, &
-      'of the calculation, for the report'), &
-    key_rule_t('case',       'notes_file',      a_document,     1, '',            unset,       anything, &
+    key_rule_t('case', 'title', a_text, 1, '', "''", anything, 'title of summaries and figures, one line'), &
+    key_rule_t('case', 'author', a_text, 1, '', "''", anything, 'who made the calculation, for the report'), &
+    key_rule_t('case', 'customer', a_text, 1, '', "''", anything, 'for whom it is made, for the report'), &
+    key_rule_t('case', 'revision', a_text, 1, '', "''", anything, 'of the calculation, for the report'), &
+    key_rule_t('case', 'notes_file', a_document, 1, '', unset, anything, &
       'file with the author''s own text of the report, in Markdown'), &
-    key_rule_t('body',       'name',            a_name,         1, '',            required,    anything, &
-      'name in couplings, gears, torques and results'), &
-    key_rule_t('body',       'inertia',         a_number,       1, 'kg m2',       required,    not_negative, &
+    key_rule_t('body', 'name', a_name, 1, '', required, anything, 'name in couplings, gears, torques and results'), &
+    key_rule_t('body', 'inertia', a_number, 1, 'kg m2', required, not_negative, &
       'moment of inertia about the axis; 0 where a body with an inertia is geared to it'), &
-    key_rule_t('body',       'bearing_friction', a_number,      1, 'N m',         '0',         not_negative, &
+    key_rule_t('body', 'bearing_friction', a_number, 1, 'N m', '0', not_negative, &
       'dry friction of its bearings: against the motion, and up to as much at rest'), &
-    key_rule_t('body',       'angle',           a_number,       1, 'rad',         '0',         anything, &
-      'angle at the start'), &
-    key_rule_t('body',       'speed',           a_number,       1, 'rad/s',       '0',         anything, &
+    key_rule_t('body', 'angle', a_number, 1, 'rad', '0', anything, 'angle at the start'), &
+    key_rule_t('body', 'speed', a_number, 1, 'rad/s', '0', anything, &
       'speed at the start; if not given it follows through the gears from others, else it is 0', follows=.true.), &
-    key_rule_t('run',        't_start',         a_number,       1, 's',           '0',         anything, &
-      'time of the start'), &
-    key_rule_t('run',        't_end',           a_number,       1, 's',           required,    anything, &
-      'time of the end, after t_start'), &
-    key_rule_t('run',        'method',          a_word,         1, '',            default_method, methods, &
+    key_rule_t('run', 't_start', a_number, 1, 's', '0', anything, 'time of the start'), &
+    key_rule_t('run', 't_end', a_number, 1, 's', required, anything, 'time of the end, after t_start'), &
+    key_rule_t('run', 'method', a_word, 1, '', default_method, methods, &
       'explicit: rk45, rk853, taylor; implicit: rodas4 = rosenbrock, rodas5p; auto: two of them'), &
-    key_rule_t('run',        'rtol',            a_number,       1, '',            '1e-6',      tolerance, &
+    key_rule_t('run', 'rtol', a_number, 1, '', '1e-6', tolerance, &
       'error of a step, relative to twists, their rates, internal states and rigid motions'), &
-    key_rule_t('run',        'atol',            a_number,       1, '',            '1e-9',      positive, &
+    key_rule_t('run', 'atol', a_number, 1, '', '1e-9', positive, &
       'error of a step that is allowed however small these are [rad, rad/s, unit of the state]'), &
-    key_rule_t('run',        'formulation',     a_word,         1, '',            "'reduced'", formulations, &
+    key_rule_t('run', 'formulation', a_word, 1, '', "'reduced'", formulations, &
       'equations that are integrated: they give the same motion, reduced is the fastest'), &
-    key_rule_t('run',        'independent',     a_body,         any_number, '',   unset,       anything, &
+    key_rule_t('run', 'independent', a_body, any_number, '', unset, anything, &
       'bodies whose speeds are the coordinates; found if not given'), &
-    key_rule_t('run',        'complement',      a_word,         1, '',            "'natural'", complements, &
-      'orthogonal complement of the gear constraints'), &
-    key_rule_t('run',        'start',           a_word,         1, '',            "'given'",   starts, &
+    key_rule_t('run', 'complement', a_word, 1, '', "'natural'", complements, 'orthogonal complement of the gear constraints'), &
+    key_rule_t('run', 'start', a_word, 1, '', "'given'", starts, &
       'given speeds; projected: after an impact if they violate gears; equilibrium: steady'), &
-    key_rule_t('run',        'max_steps',       an_integer,     1, '',            '1000000',   steps, &
-      'the run fails after this many steps'), &
-    key_rule_t('run',        'load_case',       a_text,         1, '',            unset,       anything, &
+    key_rule_t('run', 'max_steps', an_integer, 1, '', '1000000', steps, 'the run fails after this many steps'), &
+    key_rule_t('run', 'load_case', a_text, 1, '', unset, anything, &
       'load case whose run it is; if not given, that of all cases without a &run of their own'), &
-    key_rule_t('load_case',  'name',            a_name,         1, '',            required,    anything, &
+    key_rule_t('load_case', 'name', a_name, 1, '', required, anything, &
       'name in results and messages, and of the folder of its results'), &
-    key_rule_t('load_case',  'title',           a_text,         1, '',            "''",        anything, &
-      'title in tables and reports, one line'), &
-    key_rule_t('load_case',  'repeats',         a_number,       1, '',            '1',         positive, &
+    key_rule_t('load_case', 'title', a_text, 1, '', "''", anything, 'title in tables and reports, one line'), &
+    key_rule_t('load_case', 'repeats', a_number, 1, '', '1', positive, &
       'how often it occurs in the life of the machine, for the damage'), &
-    key_rule_t('load_case',  'set',             a_text,         any_number, '',   unset,       anything, &
+    key_rule_t('load_case', 'set', a_text, any_number, '', unset, anything, &
       "values that differ from the file, PATH=VALUE as of --set, e.g. 'load.work.viscous=80'", fewest=1), &
-    key_rule_t('load_case',  'with',            a_text,         any_number, '',   unset,       anything, &
+    key_rule_t('load_case', 'with', a_text, any_number, '', unset, anything, &
       'names of elements that only the cases have which name them here', fewest=1), &
-    key_rule_t('load_case',  'without',         a_text,         any_number, '',   unset,       anything, &
+    key_rule_t('load_case', 'without', a_text, any_number, '', unset, anything, &
       'names of elements that it leaves out', fewest=1), &
-    key_rule_t('output',     'interval',        a_number,       1, 's',           unset,       positive, &
-      'time from row to row'), &
-    key_rule_t('output',     'points',          an_integer,     1, '',            '1001',      from_2, &
+    key_rule_t('output', 'interval', a_number, 1, 's', unset, positive, 'time from row to row'), &
+    key_rule_t('output', 'points', an_integer, 1, '', '1001', from_2, &
       'number of rows; with neither interval nor points more where an excitation is fast'), &
-    key_rule_t('output',     'columns',         a_text,         any_number, '',   unset,       anything, &
+    key_rule_t('output', 'columns', a_text, any_number, '', unset, anything, &
       "columns that are written: names, or patterns with *, e.g. 'total_moment_*'; all if not given", fewest=1), &
-    key_rule_t('output',     'format',          a_word,         1, '',            "'csv'",     formats, &
+    key_rule_t('output', 'format', a_word, 1, '', "'csv'", formats, &
       'trajectory.csv, or trajectory.nc, which nocdyn-sweep writes'), &
-    key_rule_t('output',     'extremes_from',   a_number,       1, 's',           unset,       anything, &
+    key_rule_t('output', 'extremes_from', a_number, 1, 's', unset, anything, &
       'start of the time over which extremes are taken; t_start if not given'), &
-    key_rule_t('output',     'units',           a_word,         any_number, '',   unset,       output_units, &
+    key_rule_t('output', 'units', a_word, any_number, '', unset, output_units, &
       'units of speeds (rpm or Hz) and of angles (deg) in results; those of SI if not given', fewest=1), &
-    key_rule_t('output',     'directory',       a_folder,       1, '',            "''",        anything, &
+    key_rule_t('output', 'directory', a_folder, 1, '', "''", anything, &
       "folder of the results; '' means results/ and the name of the input file")]
 
-  type(kind_rule_t), parameter, public :: kind_rules(*) = [joint_kinds, motion_kinds, torque_kinds, sweep_kinds]
+  type(kind_rule_t), parameter, public :: kind_rules(*) = [joint_kinds, torque_kinds, sweep_kinds]
 
   type(key_rule_t), parameter, public :: key_rules(*) = &
-    [frame_keys, coupling_keys, shaft_keys, mesh_keys, constraint_keys, joint_keys, motion_keys, motor_keys, load_keys, &
-     excitation_keys, engine_keys, response_keys, fatigue_keys, sweep_keys]
+    [frame_keys, coupling_keys, joint_keys, torque_keys, response_keys, sweep_keys]
 
   type(relation_rule_t), parameter, public :: relation_rules(*) = [ &
     relation_rule_t('run', less_than, 't_start', 't_end'), &
     relation_rule_t('output', at_most_one, 'interval', 'points'), &
-    coupling_relations, shaft_relations, mesh_relations, constraint_relations, joint_relations, motion_relations, &
-    torque_relations, engine_relations, &
-    response_relations, fatigue_relations, sweep_relations]
+    coupling_relations, joint_relations, torque_relations, response_relations, sweep_relations]
 
   type(alias_t), parameter, public :: aliases(*) = sweep_aliases
 
@@ -160,9 +131,7 @@ module nocdyn_schema
     example_t('run',        "t_end = 10.0  method = 'rk45'  rtol = 1.0e-9  atol = 1.0e-9"), &
     example_t('output',     'interval = 0.01'), &
     example_t('load_case',  "name = 'half_load'  repeats = 5000  set = 'load.work.viscous=50'", .false.), &
-    coupling_examples, shaft_examples, mesh_examples, constraint_examples, joint_examples, motion_examples, torque_examples, &
-    engine_examples, &
-    response_examples, fatigue_examples, sweep_examples]
+    coupling_examples, joint_examples, torque_examples, response_examples, sweep_examples]
 
   ! One value for each row of `group_rules`. The rows of `key_rules` of a group are consecutive.
   integer :: rule   ! index of the lists below

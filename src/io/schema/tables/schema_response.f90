@@ -1,9 +1,9 @@
-!> Rows of the schema: the groups &response and &limit with their keys.
+!> Rows of the schema: the forced response and what is judged by it, &response, &limit and &fatigue.
 module nocdyn_schema_response
   use nocdyn_kinds, only: wp
-  use nocdyn_schema_rules, only: a_body, a_number, a_text, a_word, allowed_t, an_integer, any_number, any_times, anything, &
-    at_most_once, at_most_one, exactly_one, example_t, group_rule_t, in_torsional, key_rule_t, not_zero, positive, &
-    relation_rule_t, required, requires, unset
+  use nocdyn_schema_rules, only: a_body, a_name, a_number, a_text, a_word, allowed_t, an_integer, any_number, any_times, &
+    anything, at_most_once, at_most_one, equal_lengths, exactly_one, example_t, from_1, group_rule_t, in_torsional, key_rule_t, &
+    not_negative, not_zero, positive, relation_rule_t, required, requires, unset
   implicit none (type, external)
   private
 
@@ -12,60 +12,89 @@ module nocdyn_schema_response
   type(allowed_t), parameter :: strengths = allowed_t(low=4.0e8_wp, high=8.0e8_wp)
   type(allowed_t), parameter :: factors = allowed_t(low=0.1_wp, high=1.5_wp)
   type(allowed_t), parameter :: margins = allowed_t(low=0.0_wp, high=0.9_wp)
+  type(allowed_t), parameter :: mean_stresses = allowed_t(words='none goodman soderberg')
 
   type(group_rule_t), parameter, public :: response_groups(*) = [ &
-    group_rule_t('response', in_torsional, at_most_once, '', &
-                 "Speeds and orders of 'nocdyn response' and 'nocdyn campbell'."), &
+    group_rule_t('response', in_torsional, at_most_once, '', "Speeds and orders of 'nocdyn response' and 'nocdyn campbell'."), &
     group_rule_t('limit', in_torsional, any_times, '', &
-                 'Limits of moments, stresses and forces of a coupling, a shaft or a mesh.')]
+                 'Limits of moments, stresses and forces of a coupling, a shaft or a mesh.'), &
+    group_rule_t('fatigue', in_torsional, any_times, 'fatigue', &
+                 'Cycles and damage of a coupling, shaft, mesh or gear, in runs and responses.')]
 
   type(key_rule_t), parameter, public :: response_keys(*) = [ &
-    key_rule_t('response',   'body',            a_body,         1, '',            required,    anything, &
+    key_rule_t('response', 'body', a_body, 1, '', required, anything, &
       'the body whose speed is held, and to whose turns orders refer'), &
-    key_rule_t('response',   'speed',           a_number,       any_number, 'rad/s', required, not_zero, &
+    key_rule_t('response', 'speed', a_number, any_number, 'rad/s', required, not_zero, &
       'lowest and highest speed of this body, or one speed, with the sign of its steady speed', fewest=1), &
-    key_rule_t('response',   'count',           an_integer,     1, '',            '201',       speed_counts, &
+    key_rule_t('response', 'count', an_integer, 1, '', '201', speed_counts, &
       'number of speeds from the lowest to the highest; peaks between them are found'), &
-    key_rule_t('response',   'orders',          a_number,       any_number, '',   unset,       positive, &
+    key_rule_t('response', 'orders', a_number, any_number, '', unset, positive, &
       'oscillations per turn of the body; those of the excitations if not given', fewest=1), &
-    key_rule_t('response',   'operating',       a_number,       2, 'rad/s',       unset,       not_zero, &
-      'lowest and highest speed in operation'), &
-    key_rule_t('response',   'margin',          a_number,       1, '',            '0.1',       margins, &
+    key_rule_t('response', 'operating', a_number, 2, 'rad/s', unset, not_zero, 'lowest and highest speed in operation'), &
+    key_rule_t('response', 'margin', a_number, 1, '', '0.1', margins, &
       'a critical speed so near to the speeds in operation, as a share of it, is reported'), &
-    key_rule_t('limit',      'coupling',        a_text,         1, '',            unset,       anything, &
-      'name of the coupling'), &
-    key_rule_t('limit',      'shaft',           a_text,         1, '',            unset,       anything, &
-      'name of the shaft'), &
-    key_rule_t('limit',      'mesh',            a_text,         1, '',            unset,       anything, &
-      'name of the mesh'), &
-    key_rule_t('limit',      'vibratory_moment', a_number,      1, 'N m',         unset,       positive, &
+    key_rule_t('limit', 'coupling', a_text, 1, '', unset, anything, 'name of the coupling'), &
+    key_rule_t('limit', 'shaft', a_text, 1, '', unset, anything, 'name of the shaft'), &
+    key_rule_t('limit', 'mesh', a_text, 1, '', unset, anything, 'name of the mesh'), &
+    key_rule_t('limit', 'vibratory_moment', a_number, 1, 'N m', unset, positive, &
       'half range of the moment in continuous operation'), &
-    key_rule_t('limit',      'moment',          a_number,       1, 'N m',         unset,       positive, &
-      'largest magnitude of the moment, its mean included'), &
-    key_rule_t('limit',      'vibratory_force', a_number,       1, 'N',           unset,       positive, &
+    key_rule_t('limit', 'moment', a_number, 1, 'N m', unset, positive, 'largest magnitude of the moment, its mean included'), &
+    key_rule_t('limit', 'vibratory_force', a_number, 1, 'N', unset, positive, &
       'half range of the force of the mesh in continuous operation'), &
-    key_rule_t('limit',      'force',           a_number,       1, 'N',           unset,       positive, &
-      'largest magnitude of this force, its mean included'), &
-    key_rule_t('limit',      'stress',          a_number,       1, 'Pa',          unset,       positive, &
-      'half range of the shear stress in continuous operation'), &
-    key_rule_t('limit',      'stress_transient', a_number,      1, 'Pa',          unset,       positive, &
+    key_rule_t('limit', 'force', a_number, 1, 'N', unset, positive, 'largest magnitude of this force, its mean included'), &
+    key_rule_t('limit', 'stress', a_number, 1, 'Pa', unset, positive, 'half range of the shear stress in continuous operation'), &
+    key_rule_t('limit', 'stress_transient', a_number, 1, 'Pa', unset, positive, &
       'half range of the shear stress at speeds that are passed through quickly'), &
-    key_rule_t('limit',      'quantity',        a_text,         1, '',            unset,       anything, &
+    key_rule_t('limit', 'quantity', a_text, 1, '', unset, anything, &
       "another quantity of the element: a kind in columns.json, such as 'power' of a shaft"), &
-    key_rule_t('limit',      'largest',         a_number,       1, '',            unset,       positive, &
-      'largest magnitude of the quantity, in its SI unit'), &
-    key_rule_t('limit',      'vibratory',       a_number,       1, '',            unset,       positive, &
+    key_rule_t('limit', 'largest', a_number, 1, '', unset, positive, 'largest magnitude of the quantity, in its SI unit'), &
+    key_rule_t('limit', 'vibratory', a_number, 1, '', unset, positive, &
       'half range of the quantity in continuous operation, in its SI unit'), &
-    key_rule_t('limit',      'rule',            a_word,         1, '',            unset,       rules, &
+    key_rule_t('limit', 'rule', a_word, 1, '', unset, rules, &
       'stresses by a rule: iacs_m68 is IACS Unified Requirement M68 for propulsion shafts'), &
-    key_rule_t('limit',      'tensile_strength', a_number,      1, 'Pa',          unset,       strengths, &
+    key_rule_t('limit', 'tensile_strength', a_number, 1, 'Pa', unset, strengths, &
       'specified minimum tensile strength sigma_B, for the rule'), &
-    key_rule_t('limit',      'c_k',             a_number,       1, '',            '1',         factors, &
+    key_rule_t('limit', 'c_k', a_number, 1, '', '1', factors, &
       'factor of the shape of the shaft in the rule: 1 with integral flanges, 0.6 with keyways, ...'), &
-    key_rule_t('limit',      'diameter',        a_number,       1, 'm',           unset,       positive, &
+    key_rule_t('limit', 'diameter', a_number, 1, 'm', unset, positive, &
       'outer diameter in the rule; that of the coupling if not given'), &
-    key_rule_t('limit',      'rated_speed',     a_number,       1, 'rad/s',       unset,       not_zero, &
-      'rated speed of the body of &response, for the rule')]
+    key_rule_t('limit', 'rated_speed', a_number, 1, 'rad/s', unset, not_zero, &
+      'rated speed of the body of &response, for the rule'), &
+    key_rule_t('fatigue', 'name', a_name, 1, '', required, anything, 'name in results and messages'), &
+    key_rule_t('fatigue', 'coupling', a_text, 1, '', unset, anything, 'name of the coupling'), &
+    key_rule_t('fatigue', 'shaft', a_text, 1, '', unset, anything, 'name of the shaft; its worst section counts'), &
+    key_rule_t('fatigue', 'mesh', a_text, 1, '', unset, anything, 'name of the mesh'), &
+    key_rule_t('fatigue', 'gear', a_text, 1, '', unset, anything, 'name of the gear, with radii'), &
+    key_rule_t('fatigue', 'reference_stress', a_number, 1, 'Pa', unset, positive, &
+      'half range of the shear stress that reference_cycles cycles of it break'), &
+    key_rule_t('fatigue', 'reference_moment', a_number, 1, 'N m', unset, positive, 'the same as a moment'), &
+    key_rule_t('fatigue', 'reference_force', a_number, 1, 'N', unset, positive, 'the same as a tooth force'), &
+    key_rule_t('fatigue', 'reference_cycles', a_number, 1, '', unset, positive, &
+      'number of cycles of this point of the S-N curve'), &
+    key_rule_t('fatigue', 'slope', a_number, 1, '', unset, positive, &
+      'exponent k of the S-N curve: cycles = reference_cycles (reference / half range)^k'), &
+    key_rule_t('fatigue', 'second_slope', a_number, 1, '', unset, positive, &
+      'exponent below the point of the reference; slope if not given'), &
+    key_rule_t('fatigue', 'table_cycles', a_number, any_number, '', unset, positive, &
+      'cycles of the points of a curve in place of slope, ascending; straight in log scales', fewest=2, ascends=.true.), &
+    key_rule_t('fatigue', 'table_stress', a_number, any_number, 'Pa', unset, positive, &
+      'half ranges of the shear stress at these cycles, descending', fewest=2), &
+    key_rule_t('fatigue', 'table_moment', a_number, any_number, 'N m', unset, positive, 'the same as moments', fewest=2), &
+    key_rule_t('fatigue', 'table_force', a_number, any_number, 'N', unset, positive, 'the same as tooth forces', fewest=2), &
+    key_rule_t('fatigue', 'endurance_limit', a_number, 1, '', '0', not_negative, &
+      'half range up to which no damage is done, in the unit of the reference'), &
+    key_rule_t('fatigue', 'notch_factor', a_number, 1, '', '1', from_1, 'fatigue notch factor on the half range'), &
+    key_rule_t('fatigue', 'mean_stress', a_word, 1, '', "'none'", mean_stresses, &
+      'half range / (1 - mean / strength): ultimate_stress of goodman, yield_stress of soderberg'), &
+    key_rule_t('fatigue', 'ultimate_stress', a_number, 1, 'Pa', unset, positive, &
+      'shear stress that breaks the part at once, for goodman'), &
+    key_rule_t('fatigue', 'yield_stress', a_number, 1, 'Pa', unset, positive, 'shear stress at which it yields, for soderberg'), &
+    key_rule_t('fatigue', 'repeats', a_number, 1, '', '1', positive, &
+      'how often the motion of the run occurs in the life of the machine'), &
+    key_rule_t('fatigue', 'profile_speeds', a_number, any_number, 'rad/s', unset, not_zero, &
+      'speeds of the body of &response, for the damage that its oscillations do', fewest=1), &
+    key_rule_t('fatigue', 'profile_hours', a_number, any_number, 'h', unset, positive, &
+      'how long the machine runs at each of these speeds', fewest=1)]
 
   type(relation_rule_t), parameter, public :: response_relations(*) = [ &
     relation_rule_t('response', requires, 'margin', 'operating'), &
@@ -79,10 +108,30 @@ module nocdyn_schema_response
     relation_rule_t('limit', requires, 'quantity', 'largest vibratory'), &
     relation_rule_t('limit', requires, 'rule', 'tensile_strength'), &
     relation_rule_t('limit', requires, 'rule', 'rated_speed'), &
-    relation_rule_t('limit', requires, 'tensile_strength rated_speed c_k diameter', 'rule')]
+    relation_rule_t('limit', requires, 'tensile_strength rated_speed c_k diameter', 'rule'), &
+    relation_rule_t('fatigue', exactly_one, 'coupling shaft', 'mesh gear'), &
+    relation_rule_t('fatigue', at_most_one, 'coupling', 'shaft'), &
+    relation_rule_t('fatigue', at_most_one, 'mesh', 'gear'), &
+    relation_rule_t('fatigue', exactly_one, 'slope', 'table_cycles'), &
+    relation_rule_t('fatigue', requires, 'slope', 'reference_cycles'), &
+    relation_rule_t('fatigue', requires, 'slope', 'reference_stress reference_moment reference_force'), &
+    relation_rule_t('fatigue', requires, 'reference_cycles second_slope', 'slope'), &
+    relation_rule_t('fatigue', requires, 'reference_stress reference_moment reference_force', 'slope'), &
+    relation_rule_t('fatigue', at_most_one, 'reference_stress', 'reference_moment reference_force'), &
+    relation_rule_t('fatigue', at_most_one, 'reference_moment', 'reference_force'), &
+    relation_rule_t('fatigue', requires, 'table_cycles', 'table_stress table_moment table_force'), &
+    relation_rule_t('fatigue', requires, 'table_stress table_moment table_force', 'table_cycles'), &
+    relation_rule_t('fatigue', at_most_one, 'table_stress', 'table_moment table_force'), &
+    relation_rule_t('fatigue', at_most_one, 'table_moment', 'table_force'), &
+    relation_rule_t('fatigue', requires, 'reference_stress table_stress reference_moment table_moment', 'coupling shaft'), &
+    relation_rule_t('fatigue', requires, 'reference_force table_force', 'mesh gear'), &
+    relation_rule_t('fatigue', at_most_one, 'ultimate_stress', 'yield_stress'), &
+    relation_rule_t('fatigue', equal_lengths, 'profile_speeds profile_hours', '')]
 
   type(example_t), parameter, public :: response_examples(*) = [ &
     example_t('response', "body = 'motor'  speed_rpm = 50, 600  operating_rpm = 300, 400", .false.), &
-    example_t('limit', "coupling = 'coupling'  vibratory_moment = 40.0  moment = 200.0", .false.)]
+    example_t('limit', "coupling = 'coupling'  vibratory_moment = 40.0  moment = 200.0", .false.), &
+    example_t('fatigue', "name = 'life'  coupling = 'coupling'|" // &
+                         'reference_moment = 150.0  reference_cycles = 2.0e6  slope = 5.0', .false.)]
 
 end module nocdyn_schema_response
