@@ -21,6 +21,7 @@ from .trajectory_files import labels_of
 
 MOST_LETTERS = 24  # of names that stand side by side under the narrower axes
 MOST_MODES = 6  # of a figure
+GAP = 0.6  # between the bars of bodies and those of couplings
 KINETIC, POTENTIAL, OF_SHAFTS = COLOURS[0], COLOURS[1], COLOURS[5]
 
 
@@ -95,42 +96,43 @@ def draw_modes(modes: Modes, chosen: list[dict]) -> Figure:
         draw_shape(shape, modes, train, mode)
         _draw_energy(energy, modes, mode)
     grid[-1, 0].set_xlim(-EDGE, max(train.place) + EDGE)
-    _name_bodies(grid[-1, 1], modes)
+    _name_bars(grid[-1, 1], modes)
     grid[0, 1].legend(*grid[1, 1].get_legend_handles_labels(), loc="lower left", ncols=3, fontsize=8.5, columnspacing=1.2)
     return figure
 
 
 def _draw_energy(axes: Axes, modes: Modes, mode: dict) -> None:
-    """Kinetic energy of the bodies upwards, potential energy of the couplings downwards, between their bodies."""
+    """Kinetic energy upwards, potential energy downwards; the couplings stand right of the bodies, each over its name."""
     count = len(modes.bodies)
-    ends = [[body for body in pair if body != GROUND] for pair in modes.pairs("couplings")]
-    places = np.array([np.mean(bodies) for bodies in ends])
+    places = count + GAP + np.arange(len(modes.content["couplings"]))
     kinetic = 100 * np.array(mode["kinetic_share"])
     axes.bar(np.arange(count), kinetic[:count], width=0.8, color=KINETIC, label="kinetic energy\nin bodies [%]")
     if shafts := modes.shafts_with_inertia:
         axes.bar(
             places[shafts],
             kinetic[count : count + len(shafts)],
-            width=0.4,
+            width=0.8,
             color=OF_SHAFTS,
             edgecolor=KINETIC,
             linewidth=0.6,
             label="kinetic energy\nin shafts [%]",
         )
     axes.bar(
-        places, -100 * np.array(mode["potential_share"]), width=0.5, color=POTENTIAL, label="potential energy\nin couplings [%]"
+        places, -100 * np.array(mode["potential_share"]), width=0.8, color=POTENTIAL, label="potential energy\nin couplings [%]"
     )
     axes.axhline(0.0, color="0.5", linewidth=0.6)
     axes.yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
 
 
-def _name_bodies(axes: Axes, modes: Modes) -> None:
-    count = len(modes.bodies)
-    places = np.arange(count) if count <= MOST_NAMES else np.unique(np.linspace(0, count - 1, 8).round().astype(int))
-    slanted = sum(len(modes.bodies[place]) for place in places) > MOST_LETTERS
+def _name_bars(axes: Axes, modes: Modes) -> None:
+    """Bodies, and right of them couplings."""
+    names = [*modes.bodies, *(one["name"] for one in modes.content["couplings"])]
+    count = len(names)
+    chosen = np.arange(count) if count <= MOST_NAMES else np.unique(np.linspace(0, count - 1, 8).round().astype(int))
+    slanted = sum(len(names[one]) for one in chosen) > MOST_LETTERS
     axes.set_xticks(
-        places,
-        [plain(modes.bodies[place]) for place in places],
+        chosen + GAP * (chosen >= len(modes.bodies)),
+        [plain(names[one]) for one in chosen],
         rotation=45 if slanted else 0,
         ha="right" if slanted else "center",
     )

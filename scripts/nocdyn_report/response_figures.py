@@ -118,8 +118,7 @@ def draw_quantity(axes: Axes, response: Response, quantity: Quantity, look: Look
     for values, style in _limits(quantity, look):
         axes.plot(*thin(response.speed, values, PIXELS), zorder=5, **style)
     title = plain(quantity.column.title) + (f"   (limit, from {far:.4g} {quantity.unit} on, is above)" if far else "")
-    bars = [barred for barred in response.barred if barred.quantity == quantity.label]
-    axes.set_title(title, loc="left", pad=16 if bars else 6)
+    axes.set_title(title, loc="left", pad=16 if response.barred_by(quantity) else 6)
     axes.set_ylabel(textwrap.fill(f"{quantity.column.caption} [{quantity.unit}]", LONGEST))
     if quantity.stress:
         _add_stress(axes, quantity.stress)
@@ -186,16 +185,17 @@ def _peaks(values: np.ndarray) -> list[int]:
 
 
 def draw_page(response: Response, page: Sequence[Quantity], look: Look, styles: dict[int, dict]) -> Figure:
+    """Panels of one sort, in one unit."""
     across = 1 if len(page) == 1 else 2
     down = -(-len(page) // across)
     width, height = (WIDTH, 1.5 * PANEL) if across == 1 else (WIDE, PANEL)
     figure, grid = pyplot.subplots(down, across, squeeze=False, figsize=(width, height * down + 1.6))
     shades: list[Patch] = []
-    for axes, quantity in zip(grid.flat, map(Quantity.in_short, page)):
+    for axes, quantity in zip(grid.flat, page):
         shades = shade_operation(axes, response.operation)
         draw_quantity(axes, response, quantity, look, styles)
         labels = Labels(axes, (AXES_SHARE * width / across - (0.6 if quantity.stress else 0.0), AXES_SHARE * height - 0.3))
-        draw_barred(axes, labels, [one for one in response.barred if one.quantity == quantity.label])
+        draw_barred(axes, labels, response.barred_by(quantity))
         mark_criticals(labels, response, quantity)
         name_orders(labels, response, quantity, look, styles)
     for axes in grid.flat[len(page) :]:
@@ -225,8 +225,7 @@ def _legend(response: Response, page: Sequence[Quantity], look: Look, shades: li
         handles.append(Line2D([], [], label="limit while passing through", **TRANSIENT))
     if look.with_peak and any(quantity.peak_limit is not None for quantity in page):
         handles.append(Line2D([], [], label="limit of the magnitude", **PEAK_LIMIT))
-    labels = {quantity.label for quantity in page}
-    bars = [one for one in response.barred if one.quantity in labels]
+    bars = [one for quantity in page for one in response.barred_by(quantity)]
     if bars:
         handles.append(Patch(facecolor=BARRED[True], label="barred speeds"))
     if not all(one.can_be_passed for one in bars):
@@ -265,6 +264,8 @@ def figures_of(folder: Path, arguments: argparse.Namespace) -> Figures:
     pages: dict[str, int] = {}
     for columns in by_sort(quantity.column for quantity in quantities):
         members = [of_columns[column.label] for column in columns]
+        largest = max(one.largest for one in members)
+        members = [one.in_short(largest) for one in members]
         for first in range(0, len(members), MOST_PANELS):
             kind = columns[0].kind
             pages[kind] = pages.get(kind, 0) + 1

@@ -125,7 +125,7 @@ def read_results(folder: Path, choose: Callable[[Header], Iterable[str]] | None 
         raise ResultsError(f"{folder}: there is no such results folder")
     file = next((folder / name for name in FILES if (folder / name).is_file()), None)
     if file is None:
-        raise ResultsError(f"{folder}: no trajectory.csv here; is this the results folder of a 'nocdyn run'?")
+        raise ResultsError(f"{folder}: no trajectory.csv here; {_elsewhere(folder)}")
     labels = labels_of(file)
     if TIME not in labels:
         raise ResultsError(f"{file}: not a trajectory of nocdyn: there is no column '{TIME}'")
@@ -139,6 +139,12 @@ def read_results(folder: Path, choose: Callable[[Header], Iterable[str]] | None 
     if not machine.is_file():
         raise ResultsError(f"{machine}: missing; the figures need the input of the run beside its trajectory")
     return Results(folder, header, table, _shortfall(summary, table) if ".partial" in file.suffixes else "", rpm)
+
+
+def _elsewhere(folder: Path) -> str:
+    """Where trajectories are, as those of load cases, which have a folder each."""
+    cases = sorted(str(one) for one in folder.iterdir() if any((one / name).is_file() for name in FILES))
+    return f"draw one of its load cases: {', '.join(cases)}" if cases else "is this the results folder of a 'nocdyn run'?"
 
 
 def _columns(folder: Path, labels: list[str]) -> dict[str, Column]:

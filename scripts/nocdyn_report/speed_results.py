@@ -17,7 +17,8 @@ SPEED = re.compile(r"omega_(?P<body>.+) \[(?P<unit>rad/s|rpm|Hz)\]")
 FREQUENCY = re.compile(r"frequency_(?P<mode>\d+) \[Hz\]")
 LINE = re.compile(r"(?P<kind>order|line)_(?P<name>.+) \[Hz\]")
 TABLE, ORDERS = "response.csv", "response_orders.csv"
-STATISTICS = ("half_range", "mean", "peak", "limit", "transient_limit", "peak_limit")
+LIMITS = ("limit", "transient_limit", "peak_limit")
+STATISTICS = ("half_range", "mean", "peak", *LIMITS)
 FIXED = 1e-9  # relative range of a frequency that does not change with the speed
 
 
@@ -109,9 +110,14 @@ class Quantity:
     def _values(self) -> dict[str, np.ndarray]:
         return {name: getattr(self, name) for name in (*STATISTICS, "orders") if getattr(self, name) is not None}
 
-    def in_short(self) -> "Quantity":
-        """In kN m or MN m, if the numbers are large."""
-        largest = np.nanmax(self.half_range, initial=0.0)
+    @property
+    def largest(self) -> float:
+        """Of the half range."""
+        return float(np.nanmax(self.half_range, initial=0.0))
+
+    def in_short(self, largest: float | None = None) -> "Quantity":
+        """In kN m or MN m, if the numbers, or the largest of a figure, are large."""
+        largest = self.largest if largest is None else largest
         factor, prefix = next(((f, p) for f, p in ((1e6, "M"), (1e3, "k")) if 1e1 * f <= largest < np.inf), (1.0, ""))
         scaled = {name: values / factor for name, values in self._values().items()}
         return replace(self, unit=prefix + self.unit, stress=self.stress and self.stress * factor, **scaled)
@@ -129,6 +135,12 @@ class Response:
     criticals: list[Critical]
     barred: list[Barred]
     operation: Operation | None
+
+    def barred_by(self, quantity: Quantity) -> list[Barred]:
+        """Ranges of its own limits, and of limits of the whole element, as of a stress."""
+        column = quantity.column
+        names = {one.name for one in self.columns if one.point in ("", "max") and one.is_of(column)} | {quantity.label}
+        return [one for one in self.barred if one.quantity in names]
 
 
 @dataclass(frozen=True)
@@ -240,7 +252,7 @@ def _read_table(file: Path, rises: bool = True) -> tuple[pd.DataFrame, np.ndarra
 
 
 def _quantities(table: pd.DataFrame, orders: pd.DataFrame, columns: list[Column], shape: tuple[int, int]) -> list[Quantity]:
-    """Those of a half range; the stress of a moment is a second scale of this."""
+    """Those of a half range; the stress of a moment is a second scale of this, and has its limits there."""
     signals = [column for column in columns if column.file == TABLE and column.statistic == "half_range"]
     of_orders = {column.name: column.label for column in columns if column.file == ORDERS and not column.statistic}
     stresses = {(one.element_kind, one.element): one for one in signals if one.rank == STRESS}
@@ -249,15 +261,29 @@ def _quantities(table: pd.DataFrame, orders: pd.DataFrame, columns: list[Column]
         moments = [one for one in signals if one.rank == MOMENT and not one.point and one.is_of(signal)]
         if signal.rank == STRESS and moments:
             continue
-        labels = {one.statistic: one.label for one in columns if one.file == TABLE and one.name == signal.name}
-        values = {name: table[labels[name]].to_numpy() if name in labels else None for name in STATISTICS}
+        values = _statistics(table, columns, signal)
         stress = stresses.get((signal.element_kind, signal.element)) if signal in moments else None
         ratio = None
         if stress and values["half_range"].max() > 0:
             ratio = table[stress.label].max() / values["half_range"].max()
+            of_stress = _statistics(table, columns, stress)
+            for name in LIMITS:
+                values[name] = _lower(values[name], of_stress[name], ratio)
         amplitudes = orders[of_orders[signal.name]].to_numpy().reshape(shape) if signal.name in of_orders else None
         found.append(Quantity(signal, signal.unit, **values, orders=amplitudes, stress=ratio))
     return found
+
+
+def _statistics(table: pd.DataFrame, columns: list[Column], signal: Column) -> dict[str, np.ndarray | None]:
+    labels = {one.statistic: one.label for one in columns if one.file == TABLE and one.name == signal.name}
+    return {name: table[labels[name]].to_numpy() if name in labels else None for name in STATISTICS}
+
+
+def _lower(limit: np.ndarray | None, of_stress: np.ndarray | None, ratio: float) -> np.ndarray | None:
+    """The limit that is met first, of a moment and of its stress, which is so many times the moment."""
+    if of_stress is None:
+        return limit
+    return of_stress / ratio if limit is None else np.fmin(limit, of_stress / ratio)
 
 
 def _line(orders: np.ndarray, frequencies: np.ndarray) -> Line:

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
+from .mode_marks import marks_of
 from .style import COLOURS, REFERENCE, plain
 from .train_layout import GROUND, Train
 
@@ -132,8 +133,6 @@ def draw_shape(axes: Axes, modes: "Modes", train: Train, mode: dict) -> None:
     axes.tick_params(labelbottom=False, bottom=False)
     axes.grid(visible=False, axis="x")
     damping = mode["damping_ratio"]
-    axes.set_title(
-        f"mode {mode['mode']}: {mode['frequency_Hz']:.5g} Hz, damping ratio {damping:.3g}"
-        + (", unstable" if damping < 0 else ""),
-        loc="left",
-    )
+    told = [f"mode {mode['mode']}: {mode['frequency_Hz']:.5g} Hz", f"damping ratio {damping:.3g}"]
+    told += [*(["unstable"] if damping < 0 else []), *marks_of(mode)]
+    axes.set_title(plain(", ".join(told)), loc="left")

@@ -375,6 +375,15 @@ def test_unusable_results_are_one_clear_line(files, message, tmp_path, monkeypat
     assert message in said and str(folder) in said and "\n" not in said
 
 
+def test_a_folder_of_load_cases_names_those_of_the_cases(tmp_path, monkeypatch):
+    for name in ("start", "ice"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "trajectory.csv").write_text("t [s]\n", encoding="utf-8")
+    assert f"draw one of its load cases: {tmp_path / 'ice'}, {tmp_path / 'start'}" in refusal(
+        monkeypatch, "run_figures", tmp_path
+    )
+
+
 def test_refusals_leave_with_exit_code_1_and_one_line(tmp_path):
     result = subprocess.run(
         [sys.executable, "-m", "nocdyn_report.run_figures", tmp_path / "none"],

@@ -163,6 +163,32 @@ def test_the_stress_of_a_moment_is_a_second_scale_and_another_one_a_panel(tmp_pa
     assert panels["shaft_end"].get_ylabel() == "shear stress [MPa]" and panels["mesh"].get_ylabel() == "tooth force [N]"
 
 
+def test_a_limit_of_the_stress_is_drawn_and_barred_in_the_panel_of_the_moment(tmp_path):
+    barred = [{"quantity": "stress_s2", "from_rad_s": 280.0 / RPM, "to_rad_s": 320.0 / RPM, "can_be_passed": False}]
+    results = response(tmp_path / "r", elements=2, barred_speed_ranges=barred)
+    table = pd.read_csv(results / "response.csv")
+    table["half_range_stress_s2 [Pa]"] = 2e4 * table["half_range_moment_s2 [N m]"]
+    table["limit_stress_s2 [Pa]"] = 2e4 * 640.0
+    table.to_csv(results / "response.csv", index=False)
+    columns = json.loads((results / "response_columns.json").read_text(encoding="utf-8"))["columns"]
+    columns += [column(f"{one}_stress_s2 [Pa]", one, "response.csv") for one in ("half_range", "limit")]
+    write_columns(results, columns, "response_columns.json")
+    axes = panels_of(results)["s2"]
+    line_of(axes, 640.0 + 0.0 * SPEEDS)
+    assert "280–320" in texts(axes)  # noqa: RUF001
+    assert "not to be passed through" in [text.get_text() for text in axes.figure.legends[0].texts]
+
+
+def test_panels_of_one_sort_have_one_unit(tmp_path):
+    results = response(tmp_path / "r", elements=2)
+    table = pd.read_csv(results / "response.csv")
+    for name in ("half_range", "peak"):
+        table[f"{name}_moment_s2 [N m]"] *= 100.0
+    table.to_csv(results / "response.csv", index=False)
+    panels = panels_of(results)
+    assert {panels[name].get_ylabel().rpartition(" [")[2] for name in ("s1", "s2")} == {"kN m]"}
+
+
 def test_means_and_largest_magnitudes_are_drawn_if_asked_for(tmp_path):
     axes = panels_of(response(tmp_path / "r"), "--peak")["s1"]
     line_of(axes, SPEEDS)  # the mean is negative
@@ -441,6 +467,22 @@ def test_shafts_with_inertia_have_their_shares_of_the_kinetic_energy(tmp_path):
     assert modes.shafts_with_inertia == [1]
     energy = mode_figures.draw_modes(modes, modes.oscillating).axes[3]
     assert sorted(round(bar.get_height()) for bar in energy.patches) == [-75, -25, 20, 30, 50]
+
+
+def test_bars_stand_over_their_names_and_titles_have_the_marks_of_modes(tmp_path):
+    """The shaft from the second to the fourth body has a place of its own, not that of the third."""
+    mode = {"mode": 1, "kind": "oscillating", "frequency_Hz": 3.0, "damping_ratio": 0.1, "shape": [1.0, 0.5, 0.2, 0.1]}
+    mode |= {"phase_deg": [0, 180, 0, 0], "kinetic_share": [0.4, 0.3, 0.2, 0.1], "potential_share": [1.0]}
+    mode |= {"state": "stator flux q of motor 'm'", "error_by_shaft_nodes": 0.021}
+    content = {"title": "", "input": "a.nml", "about": "rest", "bodies": list("abcd"), "gears": []}
+    content["couplings"] = [{"name": "line", "bodies": [2, 4]}]
+    write(tmp_path, "modes.json", content | {"modes": [mode]})
+    modes = mode_figures.read_modes(tmp_path)
+    _, _, shape, energy = mode_figures.draw_modes(modes, modes.oscillating).axes
+    assert "mostly stator flux q of motor 'm', nodes too few: error about 2 %" in shape.get_title("left")
+    bar = next(bar for bar in energy.patches if bar.get_height() < 0)
+    names = {label.get_text(): place for place, label in zip(energy.get_xticks(), energy.get_xticklabels())}
+    assert bar.get_x() + bar.get_width() / 2 == pytest.approx(names["line"]) and names["line"] > names["d"]
 
 
 @pytest.mark.parametrize("seed", range(20))

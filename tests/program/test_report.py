@@ -574,3 +574,71 @@ def test_a_tooth_force_is_called_so(fresh, browser):
     assert "Tooth force over the time" in motion and "force_teeth" in motion
     heads = browser.find("#steady").text
     assert "tooth force" in heads and "deformation of the teeth" in heads
+
+
+GEARED = """&body name = 'motor' inertia = 60 speed_rpm = 990 /
+&body name = 'pinion' inertia = 4 speed_rpm = 990 /
+&body name = 'wheel' inertia = 400 speed_rpm = -198 /
+&body name = 'mill' inertia = 9000 speed_rpm = -198 /
+&body name = 'held' inertia = 1 speed_rpm = -198 /
+&coupling name = 'coupling' bodies = 'motor', 'pinion' stiffness = 6e5 damping = 300 /
+&mesh name = 'teeth' bodies = 'pinion', 'wheel' radii = 0.15, 0.75 stiffness = 5e8 damping = 2e4
+      transmission_error = 5e-6 error_orders = 20 /
+&shaft name = 'line' bodies = 'wheel', 'mill' lengths = 1 diameters = 0.3 shear_modulus = 8e10 density = 7850 nodes = 2 /
+&clutch name = 'grip' bodies = 'mill', 'held' capacity = 70 /
+&motor name = 'drive' body = 'motor' kind = 'induction' breakdown_torque = 9000 breakdown_slip = 0.1
+       synchronous_speed_rpm = 1000 /
+&load name = 'grind' body = 'mill' constant = 12000 constant_speed = 0.5 /
+&response body = 'motor' speed_rpm = 200, 1000 /
+&limit mesh = 'teeth' vibratory_force = 12000 /
+&run t_end = 0.1 start = 'equilibrium' /
+"""
+
+
+def test_marks_of_modes_units_of_forces_and_data_of_joints_are_told(fresh, browser):
+    fresh.write("m.nml", GEARED)
+    assert fresh("m.nml", "--no-pdf", "--quiet").returncode == 0
+    browser.open(fresh.page())
+    assert faults(browser) == []
+    modes = json.loads((fresh.folder / "results/m/modes.json").read_text())["modes"]
+    assert any(mode.get("error_by_shaft_nodes", 0.0) > 1e-3 for mode in modes)
+    assert "nodes too few: error " in " ".join(column(browser, "Natural frequencies", "remark"))
+    units = dict(zip(column(browser, "Resonances", "largest in"), column(browser, "Resonances", "unit")))
+    assert units["teeth"] == "N"
+    assert any(cell != "\N{EN DASH}" for cell in column(browser, "Resonances", "all orders, of the limit"))
+    assert column(browser, "Joints without", "law") == ["friction, capacity 70 N m"]
+    assert "* In the first" not in browser.find("#motion").text
+
+
+def test_paper_tells_the_curves_that_are_left_out(opened):
+    left_out = "return [...document.querySelectorAll('.left-out')].map((one) => one.textContent)"
+    assert opened.ask(left_out)[0] == ""
+    button = opened.find(".legend [aria-pressed=true]")
+    name = button.text
+    button.click()
+    assert opened.ask(left_out)[0] == f"not drawn: {name}"
+    button.click()
+
+
+def test_names_in_a_campbell_diagram_are_whole_and_points_have_theirs(fresh, browser):
+    fresh.write("m.nml", without_notes(PLANT).replace("orders = 1, 2, 3 ", "orders = 1, 0.666667, 1.333333 "))
+    assert fresh("m.nml", "--no-pdf", "--quiet").returncode == 0
+    browser.open(fresh.page())
+    outside = """const svg = document.querySelector('#campbell .picture svg'), frame = svg.getBoundingClientRect();
+    return [...svg.querySelectorAll('text')].filter((one) => one.getBoundingClientRect().right > frame.right + 0.5).length"""
+    assert browser.ask(outside) == 0
+    named = browser.ask("return [...document.querySelectorAll('#campbell .named')].map((one) => one.textContent)")
+    assert named and set(named) <= set(column(browser, "Critical speeds", "mode/order"))
+
+
+def test_a_very_large_machine_is_cut_and_the_report_says_so(fresh, browser):
+    count = 300
+    text = "".join(f"&body name = 'b{i}' inertia = 1.0 /\n" for i in range(count))
+    text += "".join(f"&coupling name = 's{i}' bodies = 'b{i}', 'b{i + 1}' stiffness = 1e4 /\n" for i in range(count - 1))
+    fresh.write("m.nml", text + "&run t_end = 0.01 /\n")
+    assert fresh("m.nml", "--no-pdf", "--quiet").returncode == 0
+    browser.open(fresh.page())
+    assert len(column(browser, "Bodies with", "body")) == 100
+    machine = browser.find("#machine").text
+    assert "200 more rows are in the input." in machine and "The first 120 of 300 bodies are drawn." in machine
+    assert "100 more lines are in the file" in browser.find("#input").text

@@ -11,6 +11,7 @@ STEP, ROW = 74.0, 150.0  # between two bodies of a shaft line, and between two l
 TALLEST, SMALLEST = 92.0, 5.0  # heights of discs [px]
 THICK = 13.0  # of a disc
 MOST_NAMES = 40  # of bodies
+MOST_BODIES = 120  # that are drawn; discs of more are thinner than a line on paper
 LONGEST = 11  # characters of a name that stands upright
 MARKS = {"motor": "M", "engine": "E", "load": "L", "excitation": "~", "drive": "D"}
 PAD = 46.0
@@ -20,11 +21,15 @@ LEAST = 600.0  # width on a screen [px]
 
 
 def train_drawing(check: dict, groups: Callable[[str], list[dict]]) -> Drawing:
-    names = [body["name"] for body in check["bodies"]]
+    """Of a large machine the first bodies, with what joins them."""
+    names, total = [body["name"] for body in check["bodies"][:MOST_BODIES]], len(check["bodies"])
     index = {name.lower(): i for i, name in enumerate(names)} | {"ground": GROUND}
+    check = check | {"bodies": check["bodies"][:MOST_BODIES]}
+    for kind in ("couplings", "constraints"):
+        check[kind] = [one for one in check[kind] if _is_known(one["bodies"], index)]
     couplings = [(one, [index[name.lower()] for name in one["bodies"]]) for one in check["couplings"]]
     elastic = {one["name"].lower() for one in check["couplings"]}
-    loose = [group for group in _joints(groups) if "bodies" in group and group["name"].lower() not in elastic]
+    loose = [one for one in _joints(groups) if one["name"].lower() not in elastic and _is_known(one.get("bodies"), index)]
     joints = [(group, [index[str(name).lower()] for name in group["bodies"]]) for group in loose]
     meshes = [(one, [index[name.lower()] for name in one["bodies"]]) for one in check["constraints"]]
     pairs = [pair for one, bodies in couplings + joints for pair in _pairs(bodies)]
@@ -37,11 +42,17 @@ def train_drawing(check: dict, groups: Callable[[str], list[dict]]) -> Drawing:
     for one, bodies in meshes:
         picture.add_mesh(one, bodies)
     picture.add_discs(_marks(groups, index))
+    some = f" The first {len(names)} of {total} bodies are drawn." if total > len(names) else ""
     return Drawing(
-        "The train. Heights of the discs: the fourth root of the inertia, as of discs of one thickness and one material",
+        f"The train.{some} Heights of the discs: the fourth root of the inertia, as of discs of one thickness and one material",
         _description(names, check),
         picture.svg(),
     )
+
+
+def _is_known(bodies: list[str] | None, index: dict[str, int]) -> bool:
+    """Whether all bodies that something joins are drawn."""
+    return bodies is not None and all(str(name).lower() in index for name in bodies)
 
 
 def _pairs(bodies: list[int]) -> list[tuple[int, int]]:

@@ -55,11 +55,20 @@ const report = (() => {
           const shown = !curves[0].shown;
           curves.forEach((curve) => { curve.shown = shown; });
           tell();
+          tellLeftOut();
           this.draw();
         });
         tell();
         legend.append(button);
       }
+      const leftOut = document.createElement("span"); // on paper, which has no buttons to press
+      leftOut.className = "left-out";
+      const tellLeftOut = () => {
+        const names = [...groups].filter(([, curves]) => !curves[0].shown).map(([name]) => name);
+        leftOut.textContent = names.length ? `not drawn: ${names.join(", ")}` : "";
+      };
+      tellLeftOut();
+      legend.append(leftOut);
       const told = new Set();
       for (const band of this.spec.bands || []) {
         if (told.has(band.label)) continue;

@@ -1,6 +1,7 @@
 "use strict";
 // A figure: axes, shaded ranges, curves with their names, critical speeds. By D3, as SVG.
 const PRINTED = 655, MARGIN = { top: 26, right: 44, bottom: 44, left: 72 }; // width on paper and margins [px]
+const LETTER = 6.5; // width of one in names [px]
 const DASHES = 3, COLOURS = 8; // of curves, in report.css
 
 class Picture {
@@ -55,8 +56,10 @@ class Picture {
     const width = this.width(), height = Math.round(Math.max(230, Math.min(380, 0.52 * width)));
     const margin = { ...MARGIN };
     if (this.spec.x.ticks) margin.bottom = 84;
-    if (this.spec.marks && this.spec.marks.length) margin.top = 42;
+    const ends = this.shown().filter((curve) => curve.end).map((curve) => curve.end.length);
+    if (ends.length || (this.spec.marks && this.spec.marks.length)) margin.top = 42;
     if (width < 480) Object.assign(margin, { left: 60, right: 30 });
+    margin.right = Math.max(margin.right, 8 + LETTER * (d3.max(ends) || 0));
     this.x = d3.scaleLinear(this.window.x, [margin.left, width - margin.right]);
     this.y = d3.scaleLinear(this.yDomain(), [height - margin.bottom, margin.top]);
     this.box = { left: margin.left, right: width - margin.right, top: margin.top, bottom: height - margin.bottom };
@@ -73,6 +76,7 @@ class Picture {
     for (const curve of this.shown()) this.drawCurve(inner, curve);
     this.drawEnds();
     this.drawMarks();
+    this.drawNames();
     this.figure.dataset.drawn = "yes";
   }
 
@@ -141,6 +145,27 @@ class Picture {
     spread(beside, 11);
     for (const { at, curve } of above) this.svg.append("text").attr("class", `end ${curve.look}`).attr("x", at).attr("y", top - 4).attr("text-anchor", "middle").text(curve.end);
     for (const { at, curve } of beside) this.svg.append("text").attr("class", `end ${curve.look}`).attr("x", right + 4).attr("y", at + 3).text(curve.end);
+  }
+
+  // Names of points, where none covers another or is nearer to another point; the first have the first choice.
+  drawNames() {
+    const named = this.shown().filter((curve) => curve.names).reverse(), height = 12;
+    const inside = ([x, y]) => x >= this.box.left && x <= this.box.right && y >= this.box.top && y <= this.box.bottom;
+    const points = named.flatMap((curve) => curve.names.map((name, i) => ({ name, at: [this.x(curve.x[i]), this.y(curve.y[i])] }))).filter((one) => inside(one.at));
+    const taken = points.map(({ at: [x, y] }) => [x - 3, y - 3, x + 3, y + 3]);
+    for (const { name, at: [x, y] } of points) {
+      const width = LETTER * name.length;
+      for (const [a, b] of [[x - 5 - width, y - 9 - height], [x + 5, y + 9], [x - width / 2, y + 6], [x - width / 2, y - 6 - height]]) {
+        const box = [a, b, a + width, b + height];
+        if (a < this.box.left || box[2] > this.box.right || b < this.box.top || box[3] > this.box.bottom) continue;
+        if (taken.some((one) => one[0] < box[2] && box[0] < one[2] && one[1] < box[3] && box[1] < one[3])) continue;
+        const far = (one) => Math.hypot(Math.max(box[0] - one[0], one[0] - box[2], 0), Math.max(box[1] - one[1], one[1] - box[3], 0));
+        if (points.some((one) => far(one.at) < far([x, y]))) continue;
+        taken.push(box);
+        this.svg.append("text").attr("class", "end named").attr("x", a).attr("y", b + height - 3).text(name);
+        break;
+      }
+    }
   }
 
   drawMarks() {

@@ -9,6 +9,7 @@ from ..failure import ReportError
 from ..sources import Sources
 
 TABLE = re.compile(r"""^[^!\n]*?\b(?!notes_file)\w+_file\s*=\s*(?:'([^'\n]*)'|"([^"\n]*)")""", re.MULTILINE | re.IGNORECASE)
+MOST_OF_INPUT = 500  # lines
 MOST_LINES = 300  # of a table
 MOST_BYTES = 1_000_000  # likewise
 NARROW = 40  # characters in a line of a table that has room beside others
@@ -16,7 +17,10 @@ NARROW = 40  # characters in a line of a table that has room beside others
 
 def input_section(sources: Sources, overrides: list[str], folder: Folder) -> Section:
     section = Section("input", "Input", is_appendix=True)
-    section.add(Listing(f"{sources.check['input']}, as it was read", sources.text))
+    lines = sources.text.splitlines(keepends=True)
+    section.add(Listing(f"{sources.check['input']}, as it was read", "".join(lines[:MOST_OF_INPUT])))
+    if len(lines) > MOST_OF_INPUT:
+        section.add(Paragraph(f"{len(lines) - MOST_OF_INPUT} more lines are in the file; report.html has the complete input."))
     if overrides:
         section.add(Items([f"--set {one}" for one in overrides]))
     for name in dict.fromkeys(one or other for one, other in TABLE.findall(sources.text)):

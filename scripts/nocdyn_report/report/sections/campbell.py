@@ -69,7 +69,7 @@ def _diagram(sources: Sources) -> Figure:
             ]
             labels = [f"{one.name} at {number_text(sources.of_rpm(one.speed))} {sources.speed_unit}" for one in chosen]
             places = [sources.of_rpm(one.speed) for one in chosen], [one.frequency for one in chosen]
-            curves.append(arrays.points(name, *places, labels, role=kind))
+            curves.append(arrays.points(name, *places, labels, role=kind, names=[one.name for one in chosen]))
     spec = {
         "x": {"label": f"speed of {campbell.body}", "unit": sources.speed_unit},
         "y": {"label": "frequency", "unit": "Hz", "range": [0.0, float(top)]},

@@ -1,30 +1,38 @@
 """The machine: its drawing and the mass-elastic table."""
 
-from ..content import Cell, Heading, Section, Table, number, text
+from ..content import Cell, Heading, Section, Table, first, number, text
 from ..numbers import number_text, unit_text
 from ..sources import Sources
 from ..train_svg import train_drawing
 
+MOST_ROWS = 100
 ACTING = ("motor", "load", "excitation", "drive", "engine")
 
 
 def machine_section(sources: Sources) -> Section:
     section = Section("machine", "Machine")
     section.add(train_drawing(sources.check, sources.groups))
-    section.add(Heading("Bodies", "bodies"), _bodies(sources))
+    section.add(Heading("Bodies", "bodies"), _cut(_bodies(sources)))
     if sources.check["couplings"]:
-        section.add(Heading("Couplings and shafts", "couplings"), _couplings(sources))
+        section.add(Heading("Couplings and shafts", "couplings"), _cut(_couplings(sources)))
     if sources.check["shafts"]:
-        section.add(_segments(sources))
+        section.add(_cut(_segments(sources)))
     if sources.check["constraints"]:
-        section.add(Heading("Gears and other rigid relations", "gears"), _constraints(sources))
+        section.add(Heading("Gears and other rigid relations", "gears"), _cut(_constraints(sources)))
     joints = _joints(sources)
     if joints.rows:
-        section.add(joints)
+        section.add(_cut(joints))
     torques = _torques(sources)
     if torques.rows:
-        section.add(Heading("Torques", "torques"), torques)
+        section.add(Heading("Torques", "torques"), _cut(torques))
     return section
+
+
+def _cut(table: Table) -> Table:
+    """Its first rows."""
+    table.rows, more = first(table.rows, MOST_ROWS, "the input")
+    table.note = f"{table.note} {more}".strip()
+    return table
 
 
 def _bodies(sources: Sources) -> Table:
@@ -98,6 +106,27 @@ LAW_KEYS = {  # of the input, as the table calls them, with their units
 }
 
 
+JOINT_KEYS = {  # likewise, of joints
+    "capacity": ("capacity", "N m"),
+    "static_capacity": ("static capacity", "N m"),
+    "angle": ("angle", "rad"),
+    "crank_radius": ("crank radius", "m"),
+    "rod_length": ("rod length", "m"),
+    "piston_mass": ("piston", "kg"),
+    "rod_mass": ("rod", "kg"),
+}
+
+
+def _given(group: dict) -> str:
+    """What tells a joint."""
+    parts = [str(group[key]) for key in ("kind", "direction") if key in group]
+    for key, (word, unit) in JOINT_KEYS.items():
+        value = group.get(key)
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and value != 0:
+            parts.append(f"{word} {number_text(value)} {unit_text(unit)}".rstrip())
+    return ", ".join(parts) or NO_KIND
+
+
 def _law(group: dict) -> str:
     parts = []
     for key, (word, unit) in LAW_KEYS.items():
@@ -147,7 +176,7 @@ def _joints(sources: Sources) -> Table:
             if kind == "coupling" and group["name"].lower() in elastic:
                 continue
             bodies = group.get("bodies", group.get("body", []))
-            law = _law(group) if kind == "coupling" else NO_KIND
+            law = _law(group) if kind == "coupling" else _given(group)
             rows.append(
                 [text(group.get("name", "")), text(kind), text(" \N{EN DASH} ".join(map(str, _listed(bodies)))), text(law)]
             )

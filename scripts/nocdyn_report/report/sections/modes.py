@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from ...mode_marks import marks_of
 from ...speed_results import roman
 from ...train_layout import GROUND, Train, lay_out
 from ..content import Figure, Heading, Paragraph, Section, Table, first, number, text
@@ -53,8 +54,9 @@ def _kinetic_names(modes: dict, mode: dict) -> list[str]:
 
 
 def _frequencies(oscillating: list[dict], modes: dict) -> Table:
+    marks = [", ".join(marks_of(mode)) for mode in oscillating]
     rows = []
-    for mode in oscillating:
+    for mode, mark in zip(oscillating, marks):
         damping = mode["damping_ratio"]
         rows.append(
             [
@@ -66,12 +68,14 @@ def _frequencies(oscillating: list[dict], modes: dict) -> Table:
                 number(mode.get("time_constant_s"), 3),
                 text(_shares(mode.get("kinetic_share", []), _kinetic_names(modes, mode))),
                 text(_shares(mode.get("potential_share", []), [one["name"] for one in modes["couplings"]])),
+                *([text(mark, "warn" if mark else "")] if any(marks) else []),
             ]
         )
     rows, more = first(rows, MOST_ROWS, "modes.csv")
     columns = ["mode", "frequency [Hz]", "frequency [1/min]", "undamped [Hz]", "damping ratio", "decay time [s]"]
     note = f"Negative damping: the mode grows. {more}" if any(mode["damping_ratio"] < 0 for mode in oscillating) else more
-    return Table("Natural frequencies", [*columns, "kinetic energy in", "potential energy in"], rows, note)
+    columns += ["kinetic energy in", "potential energy in", *(["remark"] if any(marks) else [])]
+    return Table("Natural frequencies", columns, rows, note)
 
 
 def _others(others: list[dict], modes: dict) -> Table:

@@ -10,7 +10,7 @@ TIME = "t [s]"
 NO_FIGURE = (LOSS, TWIST)  # only their extremes are told
 MOST_CURVES = 10  # of a figure
 SHOWN_CURVES = 5  # at first
-MOST_ROWS = 200
+MOST_ROWS = 120
 
 
 def motion_section(sources: Sources) -> Section | None:
@@ -92,13 +92,16 @@ def _limits(run: Run) -> Table:
 
 def _extremes(run: Run) -> Table:
     transient = run.summary.get("start_transient", {})
+    starred = {*transient.get("has_min_of", []), *transient.get("has_max_of", [])}
     rows: list[list[Cell]] = []
+    shown_labels: list[str] = []
     for label, signal in run.column_list.items():
         column = run.columns.get(label, {})
         name, unit = signal.name, signal.unit
         if "min" not in column or not _is_shown(signal):
             continue
-        star = "*" if label in [*transient.get("has_min_of", []), *transient.get("has_max_of", [])] else ""
+        star = "*" if label in starred else ""
+        shown_labels.append(label)
         shown = rounded({key: column[key] for key in ("min", "max", "last")}, dict.fromkeys(("min", "max", "last"), unit))
         row = [
             text(name + star),
@@ -109,11 +112,12 @@ def _extremes(run: Run) -> Table:
         ]
         rows.append([*row, number(column["time_of_max"]), number(shown["last"])])
     rows, more = first(rows, MOST_ROWS, "summary.json")
+    shown_labels = shown_labels[: len(rows)]
     notes = [f"The extremes are those {run.summary.get('extremes', 'of the motion')}."]
     if "extremes_from" in run.summary:
         notes.append(f"They are taken from {number_text(run.summary['extremes_from'])} s on.")
     notes.append("Angles, parts of moments, energies and inner nodes of shafts are in summary.json.")
-    if transient:
+    if any(label in starred for label in shown_labels):
         notes.append(f"* In the first fast transient of a start out of balance, up to {number_text(transient['until'])} s.")
     columns = ["quantity", "unit", "smallest", "at t [s]", "largest", "largest at t [s]", "last"]
     return Table(f"Peaks{_of(run)} and their times", columns, rows, " ".join([*notes, more]).strip())

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ...columns import FORCE, MOMENT
 from ...speed_results import Quantity
 from ..content import Figure, Heading, Paragraph, Section, Table, first, number, share, text
 from ..curves import band
@@ -88,6 +89,7 @@ def _limits(sources: Sources) -> list[Paragraph | Table]:
 
 
 def _resonances(sources: Sources) -> Table:
+    units = {one.column.element: one.column.unit for one in sources.response.quantities if one.column.rank in (MOMENT, FORCE)}
     rows = []
     for one, critical in zip(sources.response_report["critical_speeds"], sources.response.criticals):
         words, tone = verdict(critical)
@@ -99,6 +101,7 @@ def _resonances(sources: Sources) -> Table:
                 number(one["frequency_Hz"]),
                 number(one["damping_ratio"], 3),
                 text(one.get("coupling", "")),
+                text(unit_text(units.get(one.get("coupling", ""), ""))),
                 number(one.get("moment_N_m")),
                 number(one.get("half_range_N_m")),
                 number(sources.speed(one["peak_speed_rad_s"]) if "peak_speed_rad_s" in one else None),
@@ -115,10 +118,12 @@ def _resonances(sources: Sources) -> Table:
         "frequency [Hz]",
         "damping ratio",
         "largest in",
-        "moment of the order [N m]",
+        "unit",
+        "of the order",
     ]
-    columns += ["half range of all [N m]", f"at [{unit}]", "stress [Pa]", "of its limit [%]", "operation"]
-    return Table("Resonances and what they reach", columns, rows, more)
+    columns += ["half range of all orders", f"at [{unit}]", "stress [Pa]", "all orders, of the limit [%]", "operation"]
+    note = "Half range and share of the limit are those of all orders together, there; the order may have a small part in them."
+    return Table("Resonances and what they reach", columns, rows, f"{note} {more}".strip())
 
 
 def _largest(sources: Sources) -> Table:
@@ -196,13 +201,8 @@ def _orders(sources: Sources, quantity: Quantity, speed: np.ndarray) -> list[dic
 
 
 def _barred(sources: Sources, quantity: Quantity) -> list[dict]:
-    """Those of its own limits, and of limits of the whole element, as of a stress."""
-    column = quantity.column
-    whole = {one.name for one in sources.response.columns if one.point in ("", "max") and one.is_of(column)}
-    own = {quantity.label, *whole}
     bands = []
-    for one in sources.response.barred:
-        if one.quantity in own:
-            kind, label = ("passable", "barred") if one.can_be_passed else ("barred", "barred, also for passing")
-            bands.append(band(sources.of_rpm(one.start), sources.of_rpm(one.end), kind, label))
+    for one in sources.response.barred_by(quantity):
+        kind, label = ("passable", "barred") if one.can_be_passed else ("barred", "barred, also for passing")
+        bands.append(band(sources.of_rpm(one.start), sources.of_rpm(one.end), kind, label))
     return bands

@@ -7,7 +7,7 @@ from ..content import Heading, Section, Table, first, number, rounded, text
 from ..numbers import number_text, unit_text
 from ..sources import Sources
 
-MOST_ROWS = 160
+MOST_ROWS = 100
 ELASTIC = ("coupling", "shaft", "mesh")
 TORQUES = ("Couplings and shafts", "Torques and reactions")
 
