@@ -75,7 +75,8 @@ contains
     end if
     self%freedoms = size(self%body)
     coordinate_of(self%body) = [(k, k=1, self%freedoms)]
-    allocate (self%first(size(group_of) + 1), self%coordinate(sum([(size(groups(group_of(b))%independent), b=1, size(group_of))])))
+    allocate (self%first(size(group_of) + 1))
+    allocate (self%coordinate(sum([(size(groups(group_of(b))%independent), b=1, size(group_of))])))
     self%first(1) = 1
     do b = 1, size(group_of)
       associate (independent => groups(group_of(b))%independent, first => self%first(b))

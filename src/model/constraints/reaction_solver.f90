@@ -62,8 +62,8 @@ contains
     self%relations = relations
     allocate (self%ratio(lanes, constraints%bodies))
     allocate (self%of_trains(size(trains%root)), self%of_relations(size(relations%row)))
-    with_relations = pack([(g, g=1, size(groups))], [(size(groups(g)%elimination%relation) + size(groups(g)%elimination%core) > 0, &
-                                                      g=1, size(groups))])
+    with_relations = pack([(g, g=1, size(groups))], [(size(groups(g)%elimination%relation) &
+                                                      + size(groups(g)%elimination%core) > 0, g=1, size(groups))])
     allocate (self%group_index(size(groups)), source=0)
     self%group_index(with_relations) = [(k, k=1, size(with_relations))]
     allocate (self%groups(size(with_relations)))
