@@ -12,7 +12,7 @@ module nocdyn_constraint_analysis
   use nocdyn_lapack, only: pivoted_rank
   use nocdyn_rigid_trains, only: find_trains, ratio_tolerance, rigid_trains_t
   use nocdyn_sparse_map, only: transposed_order
-  use nocdyn_train_motion, only: elimination_t, find_loads, find_motion, train_motion_t
+  use nocdyn_train_motion, only: find_loads, find_motion, train_motion_t
   use nocdyn_text, only: string_t, to_text
   use nocdyn_train_relations, only: distinct_trains, new_relations, scaled_rows, leaf_elimination_t, train_relations_t
   use nocdyn_union_find, only: find_root, join_components
@@ -59,8 +59,15 @@ contains
       groups(r)%kept = pack(groups(r)%rows, is_kept(groups(r)%rows))
     end do
     call eliminate(relations, is_kept(relations%row), group_of, trains, groups)
-    call raise_first_lock(constraints, body_names, trains, relations, groups, offending_row, error)
-    if (allocated(error)) return
+    do r = 1, size(groups)
+      associate (elimination => groups(r)%elimination)
+        if (size(elimination%relation) + size(elimination%core) == 0 .or. any(constraints%may_stop(groups(r)%rows))) cycle
+        if (.not. any(locked_trains(relations, elimination))) cycle
+        call raise_lock(constraints, body_names, trains, relations, [elimination%relation, elimination%core], &
+                        offending_row, error)
+        return
+      end associate
+    end do
     call explain_redundancies(constraints, trains, relations, is_kept, groups, offending_row, error)
     if (allocated(error)) return
     call choose_coordinates(constraints, body_names, wanted, group_of, is_kept, trains, groups, error)
@@ -96,19 +103,33 @@ contains
     end do
   end subroutine find_independent_relations
 
-  !> Removes relations that are combinations of those before them. Where rounding hides one, it then removes the first relation
-  !> that does not raise the rank (column-pivoted QR), until the rank is full.
+  !> Removes relations that are combinations of those before them (Gram-Schmidt, twice per relation). Where rounding hides one,
+  !> it then removes the first relation that does not raise the rank (column-pivoted QR), until the rank is full.
   subroutine find_independent_core(relations, core, is_kept)
     type(train_relations_t), intent(in) :: relations
     integer, intent(in) :: core(:)         !! relations, ascending
     logical, intent(inout) :: is_kept(:)   !! [rows]
     integer, allocatable :: remaining(:)
-    real(wp), allocatable :: rows(:, :)
+    real(wp), allocatable :: basis(:, :), part(:), rows(:, :)   ! the columns of the basis are orthonormal
     integer :: dependent, independent, i, middle   ! bisection: the first `independent` rows are, the first `dependent` are not
+    integer :: k, n, pass
     logical :: is_new(size(core))
 
     allocate (rows, source=scaled_rows(relations%equations, core, distinct_trains(relations%equations, core)))
-    is_new = independent_rows(rows)
+    allocate (basis(size(rows, 2), size(core)))
+    n = 0
+    do i = 1, size(core)
+      part = rows(i, :)
+      do pass = 1, 2
+        do k = 1, n
+          part = part - dot_product(basis(:, k), part) * basis(:, k)
+        end do
+      end do
+      is_new(i) = norm2(part) > ratio_tolerance
+      if (.not. is_new(i)) cycle
+      n = n + 1
+      basis(:, n) = part / norm2(part)
+    end do
     is_kept(relations%row(pack(core, .not. is_new))) = .false.
     remaining = pack(core, is_new)
     rows(:size(remaining), :) = rows(pack([(i, i=1, size(core))], is_new), :)
@@ -130,28 +151,6 @@ contains
     end do
   end subroutine find_independent_core
 
-  !> Which rows of unit length are independent of those before them: Gram-Schmidt, twice per row.
-  function independent_rows(rows) result(is_new)
-    real(wp), intent(in) :: rows(:, :)   !! [rows, trains]
-    logical :: is_new(size(rows, 1))
-    real(wp) :: basis(size(rows, 2), size(rows, 1)), part(size(rows, 2))   ! the basis is orthonormal
-    integer :: i, k, n, pass
-
-    n = 0
-    do i = 1, size(rows, 1)
-      part = rows(i, :)
-      do pass = 1, 2
-        do k = 1, n
-          part = part - dot_product(basis(:, k), part) * basis(:, k)
-        end do
-      end do
-      is_new(i) = norm2(part) > ratio_tolerance
-      if (.not. is_new(i)) cycle
-      n = n + 1
-      basis(:, n) = part / norm2(part)
-    end do
-  end function independent_rows
-
   !> Rank by column-pivoted QR.
   integer function rank_of(rows)
     real(wp), intent(in) :: rows(:, :)   !! [rows, trains]
@@ -161,28 +160,6 @@ contains
     if (all(abs(rows) <= 0.0_wp)) return
     call pivoted_rank(rows, ratio_tolerance, rank_of, pivots)
   end function rank_of
-
-  !> Raises the error for the first group that is locked and has no row that may do so.
-  subroutine raise_first_lock(constraints, body_names, trains, relations, groups, offending_row, error)
-    type(constraints_t), intent(in) :: constraints
-    type(string_t), intent(in) :: body_names(:)
-    type(rigid_trains_t), intent(in) :: trains
-    type(train_relations_t), intent(in) :: relations
-    type(geared_group_t), intent(in) :: groups(:)
-    integer, intent(inout) :: offending_row
-    type(error_t), allocatable, intent(out) :: error
-    integer :: g
-
-    do g = 1, size(groups)
-      associate (elimination => groups(g)%elimination)
-        if (.not. elimination%has_relations() .or. any(constraints%may_stop(groups(g)%rows))) cycle
-        if (.not. any(locked_trains(relations, elimination))) cycle
-        call raise_lock(constraints, body_names, trains, relations, &
-                           [elimination%relation, elimination%core], offending_row, error)
-        return
-      end associate
-    end do
-  end subroutine raise_first_lock
 
   !> Finds the kept rows that each redundant row repeats. Ends at the first row that has more than `most_redundant` others to
   !> share loads with.
@@ -196,11 +173,14 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(train_motion_t) :: found
     integer, allocatable :: bodies(:), redundant(:), rows(:)
-    integer :: g, i, k, next, local(size(trains%root))
+    integer :: g, i, k, local(size(trains%root)), relation
     integer :: parent(size(is_kept)), sharing(size(is_kept))   ! union-find over the rows; redundant ones of each component
+    logical :: is_repeated(size(is_kept))
+    real(wp) :: lambda(size(relations%row)), moment(size(trains%root))
 
     parent = [(i, i=1, size(parent))]
     sharing = 0
+    is_repeated = .false.
     do g = 1, size(groups)
       associate (group => groups(g))
         allocate (group%redundancies(size(group%rows) - size(group%kept)))
@@ -211,14 +191,28 @@ contains
         do i = 1, size(redundant)
           offending_row = redundant(i)
           group%redundancies(i)%row = redundant(i)
-          next = constraints%first(redundant(i))
           if (constraints%entries(redundant(i)) == 2) then
-            call trains%find_path(constraints%body(next), constraints%body(next + 1), bodies, rows)
-            group%redundancies(i)%repeats = ascending(rows)
-          else
-            group%redundancies(i)%repeats = repeated_rows(constraints, trains, relations, group%elimination, found%dual, &
-                                                          redundant(i))
+            associate (next => constraints%first(redundant(i)))
+              call trains%find_path(constraints%body(next), constraints%body(next + 1), bodies, rows)
+            end associate
+          else   ! rows whose reactions together have the effect of its own
+            relation = findloc(relations%row, redundant(i), dim=1)
+            moment = 0.0_wp
+            associate (first => relations%equations%first(relation), last => relations%equations%first(relation + 1) - 1)
+              moment(relations%equations%body(first:last)) = relations%equations%coefficient(1, first:last)
+            end associate
+            lambda = 0.0_wp
+            call find_loads(relations, group%elimination, found%dual, 1, moment, lambda)
+            lambda = -lambda
+            lambda(relation) = 1.0_wp
+            rows = relations%loaded_rows(constraints, trains, lambda, 0)
           end if
+          is_repeated(rows) = .true.
+          is_repeated(redundant(i)) = .false.
+          associate (least => minval(rows), most => maxval(rows))
+            group%redundancies(i)%repeats = pack([(k, k=least, most)], is_repeated(least:most))
+          end associate
+          is_repeated(rows) = .false.
           call join_rows(group%redundancies(i), parent, sharing, error)
           if (allocated(error)) return
         end do
@@ -249,42 +243,5 @@ contains
     if (joined > most_redundant) call raise(error, exit_input, 'the row is redundant, as are ' // to_text(most_redundant) // &
                                             ' others that share its loads by common rows; allowed: ' // to_text(most_redundant))
   end subroutine join_rows
-
-  !> Rows in ascending order.
-  pure function ascending(rows) result(sorted)
-    integer, intent(in) :: rows(:)
-    integer, allocatable :: sorted(:)
-    logical :: is_there(minval(rows):maxval(rows))
-    integer :: i
-
-    is_there = .false.
-    is_there(rows) = .true.
-    sorted = pack([(i, i=lbound(is_there, 1), ubound(is_there, 1))], is_there)
-  end function ascending
-
-  !> The rows of a group whose reactions together have the effect of the reaction of a redundant relation.
-  function repeated_rows(constraints, trains, relations, elimination, dual, row) result(rows)
-    type(constraints_t), intent(in) :: constraints
-    type(rigid_trains_t), intent(in) :: trains
-    type(train_relations_t), intent(in) :: relations
-    type(elimination_t), intent(in) :: elimination   !! of the group
-    real(wp), intent(in) :: dual(:, :)               !! D of its core
-    integer, intent(in) :: row                       !! the redundant relation's row
-    integer, allocatable :: rows(:)
-    integer :: relation
-    real(wp) :: lambda(size(relations%row)), moment(size(trains%root))
-
-    relation = findloc(relations%row, row, dim=1)
-    moment = 0.0_wp
-    associate (first => relations%equations%first(relation), last => relations%equations%first(relation + 1) - 1)
-      moment(relations%equations%body(first:last)) = relations%equations%coefficient(1, first:last)
-    end associate
-    lambda = 0.0_wp
-    call find_loads(relations, elimination, dual, 1, moment, lambda)
-    lambda = -lambda
-    lambda(relation) = 1.0_wp
-    rows = relations%loaded_rows(constraints, trains, lambda, 0)
-    rows = pack(rows, rows /= row)
-  end function repeated_rows
 
 end module nocdyn_constraint_analysis

@@ -88,16 +88,25 @@ contains
     type(elimination_t), intent(in) :: elimination
     logical :: is_locked(relations%equations%bodies)
     type(train_motion_t) :: found
-    real(wp) :: bound(size(elimination%free)), speed(size(elimination%free))
+    real(wp) :: bound(size(elimination%free)), speed(size(elimination%free)), log_determinant
+    real(wp), allocatable :: dual(:, :), motion(:, :), rows(:, :)
     integer, allocatable :: trains(:)
-    integer :: entry, i, local(relations%equations%bodies)
+    integer :: entry, i, local(relations%equations%bodies), pivots(size(elimination%core_trains)), rank
+    logical :: is_singular
 
     is_locked = .false.
     allocate (trains, source=[elimination%core_trains, distinct_trains(relations%equations, elimination%relation)])
     local(trains) = [(i, i=1, size(trains))]
     local(elimination%free) = [(size(trains) + i, i=1, size(elimination%free))]
     call find_motion(relations, elimination, local, size(trains) + size(elimination%free), 1, found)
-    if (size(elimination%core) > 0) is_locked(elimination%core_trains) = has_zero_speed(relations, elimination)
+    if (size(elimination%core) > 0) then   ! by the complement with effective speeds
+      allocate (rows, source=scaled_rows(relations%equations, elimination%core, elimination%core_trains))
+      call pivoted_rank(rows, ratio_tolerance, rank, pivots)
+      call natural_complement(rows, pivots(rank + 1:), motion, dual, log_determinant, is_singular)
+      if (is_singular) error stop 'nocdyn_constraint_conflicts: relations must be independent here'
+      is_locked(elimination%core_trains) = .true.
+      if (size(motion, 2) > 0) is_locked(elimination%core_trains) = maxval(abs(motion), dim=2) <= ratio_tolerance
+    end if
     associate (equations => relations%equations)
       do i = size(elimination%relation), 1, -1
         bound = 0.0_wp
@@ -114,24 +123,6 @@ contains
     end associate
   end function locked_trains
 
-  !> Whether the trains of the core are locked, from the complement with effective speeds.
-  function has_zero_speed(relations, elimination) result(rests)
-    type(train_relations_t), intent(in) :: relations
-    type(elimination_t), intent(in) :: elimination
-    logical :: rests(size(elimination%core_trains))
-    real(wp) :: rows(size(elimination%core), size(rests)), log_determinant
-    real(wp), allocatable :: dual(:, :), motion(:, :)
-    integer :: pivots(size(rests)), rank
-    logical :: is_singular
-
-    rows = scaled_rows(relations%equations, elimination%core, elimination%core_trains)
-    call pivoted_rank(rows, ratio_tolerance, rank, pivots)
-    call natural_complement(rows, pivots(rank + 1:), motion, dual, log_determinant, is_singular)
-    if (is_singular) error stop 'nocdyn_constraint_conflicts: relations must be independent here'
-    rests = .true.
-    if (size(motion, 2) > 0) rests = maxval(abs(motion), dim=2) <= ratio_tolerance
-  end function has_zero_speed
-
   !> Raises the error for the first relation, in the order of the input, with which the group is locked.
   subroutine raise_lock(constraints, body_names, trains, relations, members, offending_row, error)
     type(constraints_t), intent(in) :: constraints
@@ -142,10 +133,12 @@ contains
     integer, intent(out) :: offending_row   !! constraint row
     type(error_t), allocatable, intent(out) :: error
     type(elimination_t) :: elimination
+    type(train_motion_t) :: found
     logical :: is_member(size(relations%row)), is_locked(size(trains%root))
+    real(wp) :: lambda(size(relations%row)), moment(size(trains%root))
     integer, allocatable :: ascending(:), rows(:)
     character(len=:), allocatable :: reason
-    integer :: free, i, lock, middle
+    integer :: free, i, local(size(trains%root)), lock, middle, train
 
     is_member = .false.
     is_member(members) = .true.
@@ -163,7 +156,14 @@ contains
     offending_row = relations%row(ascending(lock))
     elimination = partial_elimination(relations, ascending(:lock))
     is_locked = locked_trains(relations, elimination)
-    rows = locking_rows(constraints, trains, relations, elimination, findloc(is_locked, .true., dim=1))
+    train = findloc(is_locked, .true., dim=1)
+    local = [(i, i=1, size(local))]
+    call find_motion(relations, elimination, local, size(local), 1, found)
+    moment = 0.0_wp
+    moment(train) = 1.0_wp
+    lambda = 0.0_wp
+    call find_loads(relations, elimination, found%dual, 1, moment, lambda)
+    rows = relations%loaded_rows(constraints, trains, lambda, trains%root(train))   ! the rows that lock it together
     rows = pack(rows, rows /= offending_row)
     reason = ', as no other body in it turns'
     if (size(rows) > 0) reason = ': together with ' // joined(selected(constraints%names, rows), ', ', most_names) // &
@@ -186,26 +186,5 @@ contains
     elimination = pivoted_elimination(relations, distinct_trains(relations%equations, chosen), leaves%relation, &
                                       leaves%train, leaves%core)
   end function partial_elimination
-
-  !> The rows whose combination locks a train.
-  function locking_rows(constraints, trains, relations, elimination, locked) result(rows)
-    type(constraints_t), intent(in) :: constraints
-    type(rigid_trains_t), intent(in) :: trains
-    type(train_relations_t), intent(in) :: relations
-    type(elimination_t), intent(in) :: elimination
-    integer, intent(in) :: locked   !! train
-    integer, allocatable :: rows(:)
-    type(train_motion_t) :: found
-    real(wp) :: lambda(size(relations%row)), moment(size(trains%root))
-    integer :: i, local(size(trains%root))
-
-    local = [(i, i=1, size(local))]
-    call find_motion(relations, elimination, local, size(local), 1, found)
-    moment = 0.0_wp
-    moment(locked) = 1.0_wp
-    lambda = 0.0_wp
-    call find_loads(relations, elimination, found%dual, 1, moment, lambda)
-    rows = relations%loaded_rows(constraints, trains, lambda, trains%root(locked))
-  end function locking_rows
 
 end module nocdyn_constraint_conflicts

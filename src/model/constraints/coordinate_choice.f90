@@ -106,16 +106,37 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(train_relations_t) :: relations
     logical :: must_be_free(size(trains%root))
-    integer :: g
+    integer :: first(size(groups) + 1), freedoms, g, order(size(wanted)), roots(size(trains%root)), t
+    integer :: body(size(trains%root)), largest(size(trains%root))
 
     if (size(wanted) == 0) return
-    call set_wanted(body_names, wanted, group_of, trains, groups, error)
-    if (allocated(error)) return
-    call set_wanted_roots(constraints, body_names, wanted, trains, error)
-    if (allocated(error)) return
-    relations = new_relations(constraints, trains)
     must_be_free = .false.
     must_be_free(trains%train(wanted)) = .true.
+    call transposed_order(group_of(wanted), size(groups), order, first)
+    do g = 1, size(groups)
+      freedoms = size(groups(g)%independent)
+      groups(g)%independent = wanted(order(first(g):first(g + 1) - 1))
+      if (size(groups(g)%independent) /= freedoms) then
+        call raise(error, exit_input, count_text(selected(body_names, groups(g)%bodies), &
+                                                 selected(body_names, groups(g)%independent), freedoms))
+        return
+      end if
+      if (count(must_be_free(groups(g)%trains)) < freedoms) then
+        call raise_related(body_names, groups(g)%independent, error)
+        return
+      end if
+    end do
+    roots = trains%root
+    roots(trains%train(wanted)) = wanted
+    call trains%choose_roots(constraints, roots)
+    call trains%largest_exponents(constraints, largest, body)
+    t = maxloc(largest, dim=1)   ! there is one, as something is wanted
+    if (largest(t) > max_exponent) then
+      call raise(error, exit_input, quoted(body_names(trains%root(t))%text) // ' cannot be independent: ' // &
+                 quoted(body_names(body(t))%text) // ' turns more than 1e100 times as fast')
+      return
+    end if
+    relations = new_relations(constraints, trains)
     call distribute(relations, relations%eliminate_leaves(is_kept(relations%row), must_be_free), group_of(trains%root), groups)
     do g = 1, size(groups)
       groups(g)%elimination%free = trains%train(groups(g)%independent)
@@ -124,53 +145,6 @@ contains
       return
     end do
   end subroutine choose_coordinates
-
-  !> Replaces the independent bodies of each group by the wanted ones. They must be as many, and of different trains.
-  subroutine set_wanted(body_names, wanted, group_of, trains, groups, error)
-    type(string_t), intent(in) :: body_names(:)
-    integer, intent(in) :: wanted(:), group_of(:)   !! bodies; group of each body
-    type(rigid_trains_t), intent(in) :: trains
-    type(geared_group_t), intent(inout) :: groups(:)
-    type(error_t), allocatable, intent(out) :: error
-    integer :: first(size(groups) + 1), order(size(wanted)), freedoms, g
-    logical :: is_taken(size(trains%root))
-
-    is_taken = .false.
-    call transposed_order(group_of(wanted), size(groups), order, first)
-    do g = 1, size(groups)
-      freedoms = size(groups(g)%independent)
-      groups(g)%independent = wanted(order(first(g):first(g + 1) - 1))
-      if (size(groups(g)%independent) /= freedoms) then
-        call raise_count(selected(body_names, groups(g)%bodies), selected(body_names, groups(g)%independent), freedoms, error)
-        return
-      end if
-      is_taken(trains%train(groups(g)%independent)) = .true.
-      if (count(is_taken(groups(g)%trains)) < freedoms) then
-        call raise_related(body_names, groups(g)%independent, error)
-        return
-      end if
-    end do
-  end subroutine set_wanted
-
-  !> Makes the wanted bodies roots. It is an error if a body turns so much faster that ratios overflow.
-  subroutine set_wanted_roots(constraints, body_names, wanted, trains, error)
-    type(constraints_t), intent(in) :: constraints
-    type(string_t), intent(in) :: body_names(:)
-    integer, intent(in) :: wanted(:)
-    type(rigid_trains_t), intent(inout) :: trains
-    type(error_t), allocatable, intent(out) :: error
-    integer :: body(size(trains%root)), largest(size(trains%root)), roots(size(trains%root)), t
-
-    roots = trains%root
-    roots(trains%train(wanted)) = wanted
-    call trains%choose_roots(constraints, roots)
-    call trains%largest_exponents(constraints, largest, body)
-    t = maxloc(largest, dim=1)
-    if (t == 0) return
-    if (largest(t) > max_exponent) call raise(error, exit_input, quoted(body_names(trains%root(t))%text) // &
-                                          ' cannot be independent: ' // quoted(body_names(body(t))%text) // &
-                                          ' turns more than 1e100 times as fast')
-  end subroutine set_wanted_roots
 
   !> Whether the core can be solved for the trains that need not be free.
   logical function is_solvable(relations, elimination, must_be_free)
@@ -191,21 +165,10 @@ contains
     is_solvable = rank == size(dependent)
   end function is_solvable
 
-  !> Raises the error for independent bodies whose speeds the constraints relate.
-  subroutine raise_related(body_names, independent, error)
-    type(string_t), intent(in) :: body_names(:)
-    integer, intent(in) :: independent(:)
-    type(error_t), allocatable, intent(inout) :: error
-
-    call raise(error, exit_input, joined(selected(body_names, independent), ', ', most_names) // &
-               ' cannot be independent: the constraints relate their speeds')
-  end subroutine raise_related
-
-  !> Raises the error for a wrong number of independent bodies in a group.
-  subroutine raise_count(bodies, named, freedoms, error)
+  !> Why a group cannot have this number of independent bodies.
+  pure function count_text(bodies, named, freedoms) result(text)
     type(string_t), intent(in) :: bodies(:), named(:)   !! of the group; those that the input names
     integer, intent(in) :: freedoms                     !! number that must be named
-    type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: text
 
     if (size(bodies) == 1) then
@@ -219,7 +182,16 @@ contains
     else
       text = text // '; it names ' // joined(named, ', ', most_names)
     end if
-    call raise(error, exit_input, text)
-  end subroutine raise_count
+  end function count_text
+
+  !> Raises the error for independent bodies whose speeds the constraints relate.
+  subroutine raise_related(body_names, independent, error)
+    type(string_t), intent(in) :: body_names(:)
+    integer, intent(in) :: independent(:)
+    type(error_t), allocatable, intent(inout) :: error
+
+    call raise(error, exit_input, joined(selected(body_names, independent), ', ', most_names) // &
+               ' cannot be independent: the constraints relate their speeds')
+  end subroutine raise_related
 
 end module nocdyn_coordinate_choice

@@ -46,7 +46,8 @@ module nocdyn_coordinates
 
 contains
 
-  !> Builds the operators, group by group. It is an error if rounding makes a mass matrix indefinite.
+  !> Builds the operators, group by group; a body has an entry for each coordinate of its group. It is an error if rounding makes
+  !> a mass matrix indefinite.
   subroutine build_coordinates(constraints, body_names, trains, groups, inertia, wanted, choice, self, error)
     type(constraints_t), intent(in) :: constraints
     type(string_t), intent(in) :: body_names(:)
@@ -58,11 +59,33 @@ contains
     type(coordinates_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
     type(train_relations_t) :: relations
-    integer :: coordinate_of(size(inertia, 2)), b, lane, offending_group
+    integer, dimension(size(inertia, 2)) :: coordinate_of, group_of   ! of each body; coordinate 0: it is dependent
+    integer :: b, g, k, lane, offending_group
     logical :: is_geared(size(inertia, 2))
 
-    call number_coordinates(groups, wanted, self, coordinate_of)
-    call lay_out_entries(groups, coordinate_of, size(inertia, 2), size(inertia, 1), self)
+    coordinate_of = 0
+    do g = 1, size(groups)
+      coordinate_of(groups(g)%independent) = 1
+      group_of(groups(g)%bodies) = g
+    end do
+    if (size(wanted) > 0) then
+      self%body = wanted
+    else
+      self%body = pack([(b, b=1, size(coordinate_of))], coordinate_of == 1)
+    end if
+    self%freedoms = size(self%body)
+    coordinate_of(self%body) = [(k, k=1, self%freedoms)]
+    allocate (self%first(size(group_of) + 1))
+    allocate (self%coordinate(sum([(size(groups(group_of(b))%independent), b=1, size(group_of))])))
+    self%first(1) = 1
+    do b = 1, size(group_of)
+      associate (independent => groups(group_of(b))%independent, first => self%first(b))
+        self%first(b + 1) = first + size(independent)
+        self%coordinate(first:first + size(independent) - 1) = coordinate_of(independent)
+      end associate
+    end do
+    allocate (self%ratio(size(inertia, 1), size(self%coordinate)), source=0.0_wp)
+    allocate (self%response, source=self%ratio)
     relations = new_relations(constraints, trains)
     self%reactions = new_reaction_solver(constraints, trains, relations, groups)
     allocate (self%inertia, source=inertia)
@@ -81,49 +104,6 @@ contains
     allocate (self%imbalance(size(inertia, 2)), self%acceleration(self%freedoms))
   end subroutine build_coordinates
 
-  subroutine number_coordinates(groups, wanted, self, coordinate_of)
-    type(geared_group_t), intent(in) :: groups(:)
-    integer, intent(in) :: wanted(:)   !! as in `build_coordinates`
-    type(coordinates_t), intent(inout) :: self
-    integer, intent(out) :: coordinate_of(:)   !! coordinate of each body, 0 for dependent bodies
-    integer :: b, g, k
-
-    coordinate_of = 0
-    do g = 1, size(groups)
-      coordinate_of(groups(g)%independent) = 1
-    end do
-    if (size(wanted) > 0) then
-      self%body = wanted
-    else
-      self%body = pack([(b, b=1, size(coordinate_of))], coordinate_of == 1)
-    end if
-    self%freedoms = size(self%body)
-    coordinate_of(self%body) = [(k, k=1, self%freedoms)]
-  end subroutine number_coordinates
-
-  !> Allocates the entries: every body has one for each coordinate of its group.
-  subroutine lay_out_entries(groups, coordinate_of, bodies, lanes, self)
-    type(geared_group_t), intent(in) :: groups(:)
-    integer, intent(in) :: coordinate_of(:), bodies, lanes   !! `coordinate_of` as in `number_coordinates`
-    type(coordinates_t), intent(inout) :: self
-    integer :: group_of(bodies), b, g
-
-    do g = 1, size(groups)
-      group_of(groups(g)%bodies) = g
-    end do
-    allocate (self%first(bodies + 1))
-    self%first(1) = 1
-    do b = 1, bodies
-      self%first(b + 1) = self%first(b) + size(groups(group_of(b))%independent)
-    end do
-    allocate (self%coordinate(self%first(bodies + 1) - 1))
-    do b = 1, bodies
-      self%coordinate(self%first(b):self%first(b + 1) - 1) = coordinate_of(groups(group_of(b))%independent)
-    end do
-    allocate (self%ratio(lanes, size(self%coordinate)), source=0.0_wp)
-    allocate (self%response, source=self%ratio)
-  end subroutine lay_out_entries
-
   !> Computes L_tau, the responses and the values of the reaction solver in one lane.
   subroutine fill_lane(constraints, trains, relations, groups, choice, lane, self, offending_group)
     type(constraints_t), intent(in) :: constraints
@@ -135,7 +115,8 @@ contains
     type(coordinates_t), intent(inout) :: self
     integer, intent(out) :: offending_group   !! group whose mass matrix is not positive definite, 0 if there is none
     type(train_motion_t) :: found
-    real(wp) :: factor, inertia(size(self%inertia, 2)), ratio(size(self%inertia, 2))
+    real(wp) :: factor, log_determinant, other, own
+    real(wp), dimension(size(self%inertia, 2)) :: inertia, ratio
     integer :: g, k, local(size(trains%root))   ! number of every train in its group
     logical :: is_indefinite
 
@@ -146,8 +127,15 @@ contains
     do g = 1, size(groups)
       local(groups(g)%trains) = [(k, k=1, size(groups(g)%trains))]
       call find_motion(relations, groups(g)%elimination, local, size(groups(g)%trains), lane, found)
-      factor = complement_factor(choice, found%log_determinant + pair_determinant(constraints, trains, groups(g)%bodies, lane), &
-                                 size(groups(g)%kept))
+      log_determinant = 0.0_wp   ! of L_lambda^ext, the part of the tree rows; each gives its body by a division
+      do k = 1, size(groups(g)%bodies)
+        associate (b => groups(g)%bodies(k))
+          if (trains%parent(b) == 0) cycle
+          call constraints%pair_coefficients(lane, trains%parent_row(b), b, own, other)
+          log_determinant = log_determinant + log(abs(own))
+        end associate
+      end do
+      factor = complement_factor(choice, found%log_determinant + log_determinant, size(groups(g)%kept))
       do k = 1, size(groups(g)%bodies)
         associate (b => groups(g)%bodies(k))
           self%ratio(lane, self%first(b):self%first(b + 1) - 1) = ratio(b) * (factor * found%motion(local(trains%train(b)), :))
@@ -163,22 +151,6 @@ contains
       end associate
     end do
   end subroutine fill_lane
-
-  !> Part of log |det L_lambda^ext| from the tree rows of a group; each gives its body by a division.
-  pure real(wp) function pair_determinant(constraints, trains, bodies, lane) result(log_determinant)
-    type(constraints_t), intent(in) :: constraints
-    type(rigid_trains_t), intent(in) :: trains
-    integer, intent(in) :: bodies(:), lane
-    integer :: i
-    real(wp) :: other, own
-
-    log_determinant = 0.0_wp
-    do i = 1, size(bodies)
-      if (trains%parent(bodies(i)) == 0) cycle
-      call constraints%pair_coefficients(lane, trains%parent_row(bodies(i)), bodies(i), own, other)
-      log_determinant = log_determinant + log(abs(own))
-    end do
-  end function pair_determinant
 
   !> Computes the responses of a group from its ratios and new inertias, by its mass matrix L_tau^T J L_tau.
   subroutine update_inertia(self, trains, group, inertia, lane, is_indefinite)

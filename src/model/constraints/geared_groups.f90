@@ -35,13 +35,20 @@ contains
     integer, allocatable, intent(out) :: group_of(:)   !! group of each body, [bodies]
     integer :: root(constraints%bodies), bodies(constraints%bodies), rows(constraints%rows())
     integer, allocatable :: first_body(:), first_row(:)
-    integer :: b, g, r
+    integer :: b, entry, g, r
 
-    root = component_roots(constraints)
+    root = [(b, b=1, constraints%bodies)]
+    do r = 1, constraints%rows()
+      do entry = constraints%first(r) + 1, constraints%first(r + 1) - 1
+        call join_components(constraints%body(constraints%first(r)), constraints%body(entry), root)
+      end do
+    end do
     allocate (group_of(constraints%bodies), source=0)
     g = 0
     do b = 1, constraints%bodies
-      if (root(b) /= b) cycle
+      call find_root(root, b, r)   ! the smallest body of the component
+      root(b) = r
+      if (r /= b) cycle
       g = g + 1
       group_of(b) = g
     end do
@@ -54,23 +61,5 @@ contains
       groups(g)%rows = rows(first_row(g):first_row(g + 1) - 1)
     end do
   end subroutine find_groups
-
-  !> The smallest body of the component of each body.
-  pure function component_roots(constraints) result(root)
-    type(constraints_t), intent(in) :: constraints
-    integer :: root(constraints%bodies)
-    integer :: a, b, entry, r
-
-    root = [(b, b=1, constraints%bodies)]
-    do r = 1, constraints%rows()
-      do entry = constraints%first(r) + 1, constraints%first(r + 1) - 1
-        call join_components(constraints%body(constraints%first(r)), constraints%body(entry), root)
-      end do
-    end do
-    do b = 1, constraints%bodies
-      call find_root(root, b, a)
-      root(b) = a
-    end do
-  end function component_roots
 
 end module nocdyn_geared_groups

@@ -39,7 +39,8 @@ contains
     integer, intent(in) :: rows, lanes
     type(load_sharing_t) :: self
     type(redundancy_t), allocatable :: redundancies(:)
-    integer :: parent(rows), block_of(rows)   ! union-find over the rows
+    integer, allocatable :: first(:), members(:), order(:), redundant(:)
+    integer :: parent(rows), block_of(rows)   ! union-find over the rows; block of each row, 0: none
     integer :: g, i, j, k, r, root
 
     parent = [(r, r=1, rows)]
@@ -68,30 +69,23 @@ contains
       call find_root(parent, r, root)
       block_of(r) = block_of(root)
     end do
-    call fill_blocks(redundancies, block_of, lanes, self%blocks)
-  end function new_load_sharing
-
-  subroutine fill_blocks(redundancies, block_of, lanes, blocks)
-    type(redundancy_t), intent(in) :: redundancies(:)
-    integer, intent(in) :: block_of(:)   !! block of each row, 0: none
-    integer, intent(in) :: lanes
-    type(load_sharing_block_t), intent(inout) :: blocks(:)
-    integer, allocatable :: rows(:), order(:)
-    integer :: first(size(blocks) + 1), first_redundant(size(blocks) + 1), i, k, redundant(size(redundancies))
-
-    rows = pack([(i, i=1, size(block_of))], block_of > 0)
-    allocate (order(size(rows)))
-    call transposed_order(block_of(rows), size(blocks), order, first)
-    call transposed_order(block_of(redundancies%row), size(blocks), redundant, first_redundant)
-    do k = 1, size(blocks)
-      blocks(k)%rows = rows(order(first(k):first(k + 1) - 1))
-      allocate (blocks(k)%redundancies(first_redundant(k + 1) - first_redundant(k)))
-      do i = 1, size(blocks(k)%redundancies)
-        blocks(k)%redundancies(i) = redundancies(redundant(first_redundant(k) - 1 + i))
-      end do
-      allocate (blocks(k)%null_vectors(size(blocks(k)%rows), size(blocks(k)%redundancies), lanes), source=0.0_wp)
+    members = pack([(r, r=1, rows)], block_of > 0)
+    allocate (order(size(members)), redundant(size(redundancies)), first(k + 1))
+    call transposed_order(block_of(members), k, order, first)
+    do k = 1, size(self%blocks)
+      self%blocks(k)%rows = members(order(first(k):first(k + 1) - 1))
     end do
-  end subroutine fill_blocks
+    call transposed_order(block_of(redundancies%row), size(self%blocks), redundant, first)
+    do k = 1, size(self%blocks)
+      associate (block => self%blocks(k))
+        allocate (block%redundancies(first(k + 1) - first(k)))
+        do i = 1, size(block%redundancies)   ! a copy of all in one assignment is wrong with gfortran
+          block%redundancies(i) = redundancies(redundant(first(k) - 1 + i))
+        end do
+        allocate (block%null_vectors(size(block%rows), size(block%redundancies), lanes), source=0.0_wp)
+      end associate
+    end do
+  end function new_load_sharing
 
   !> Orthonormalises the null vectors of one lane: Gram-Schmidt, twice per vector.
   pure subroutine orthonormalise(self, lane)

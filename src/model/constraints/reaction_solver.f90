@@ -43,7 +43,6 @@ module nocdyn_reaction_solver
     procedure :: find_reactions
     procedure :: list_parameters
     procedure, private :: back_substitute
-    procedure, private :: solve_relations
   end type reaction_solver_t
 
 contains
@@ -55,61 +54,36 @@ contains
     type(train_relations_t), intent(in) :: relations
     type(geared_group_t), intent(in) :: groups(:)
     type(reaction_solver_t) :: self
-    integer :: lanes
+    integer, allocatable :: with_relations(:)
+    integer :: g, k, lane, lanes
 
     lanes = size(constraints%coefficient, 1)
     allocate (self%train, source=trains%train)
     self%relations = relations
     allocate (self%ratio(lanes, constraints%bodies))
     allocate (self%of_trains(size(trains%root)), self%of_relations(size(relations%row)))
-    call list_groups(groups, lanes, self)
-    call list_pairs(constraints, trains, self)
-  end function new_reaction_solver
-
-  subroutine list_groups(groups, lanes, self)
-    type(geared_group_t), intent(in) :: groups(:)
-    integer, intent(in) :: lanes
-    type(reaction_solver_t), intent(inout) :: self
-    integer :: g, k
-
+    with_relations = pack([(g, g=1, size(groups))], [(size(groups(g)%elimination%relation) &
+                                                      + size(groups(g)%elimination%core) > 0, g=1, size(groups))])
     allocate (self%group_index(size(groups)), source=0)
-    allocate (self%groups(count([(groups(g)%elimination%has_relations(), g=1, size(groups))])))
-    k = 0
-    do g = 1, size(groups)
-      if (.not. groups(g)%elimination%has_relations()) cycle
-      k = k + 1
-      self%group_index(g) = k
-      associate (group => self%groups(k), elimination => groups(g)%elimination)
-        group%bodies = groups(g)%bodies
+    self%group_index(with_relations) = [(k, k=1, size(with_relations))]
+    allocate (self%groups(size(with_relations)))
+    do k = 1, size(with_relations)
+      associate (group => self%groups(k), elimination => groups(with_relations(k))%elimination)
+        group%bodies = groups(with_relations(k))%bodies
         group%elimination = elimination
         allocate (group%dual(size(elimination%core_trains), size(elimination%core), lanes))
       end associate
     end do
-  end subroutine list_groups
-
-  !> Lists the pairs of bodies and parents, from the outside inwards.
-  subroutine list_pairs(constraints, trains, self)
-    type(constraints_t), intent(in) :: constraints
-    type(rigid_trains_t), intent(in) :: trains
-    type(reaction_solver_t), intent(inout) :: self
-    integer :: b, i, k, lane, pairs
-
-    pairs = count(trains%parent > 0)
-    allocate (self%child(pairs), self%parent(pairs), self%row(pairs))
-    allocate (self%own(size(constraints%coefficient, 1), pairs), self%other(size(constraints%coefficient, 1), pairs))
-    k = 0
-    do i = size(trains%order), 1, -1
-      b = trains%order(i)
-      if (trains%parent(b) == 0) cycle
-      k = k + 1
-      self%child(k) = b
-      self%parent(k) = trains%parent(b)
-      self%row(k) = trains%parent_row(b)
-      do lane = 1, size(self%own, 1)
-        call constraints%pair_coefficients(lane, self%row(k), b, self%own(lane, k), self%other(lane, k))
+    self%child = pack(trains%order(size(trains%order):1:-1), trains%parent(trains%order(size(trains%order):1:-1)) > 0)
+    self%parent = trains%parent(self%child)
+    self%row = trains%parent_row(self%child)
+    allocate (self%own(lanes, size(self%child)), self%other(lanes, size(self%child)))
+    do k = 1, size(self%child)
+      do lane = 1, lanes
+        call constraints%pair_coefficients(lane, self%row(k), self%child(k), self%own(lane, k), self%other(lane, k))
       end do
     end do
-  end subroutine list_pairs
+  end function new_reaction_solver
 
   !> Finds the null vectors of the redundant rows, after the values of all lanes have been set: a reaction 1 of such a row and the
   !> negative reactions that the rows which it repeats have instead.
@@ -155,28 +129,14 @@ contains
     call self%load_sharing%minimise_norm(lane, lambda)
   end subroutine find_reactions
 
-  !> Reactions of the kept rows only.
+  !> Reactions of the kept rows only: first those of the relations, then those of the rows between two bodies.
   pure subroutine back_substitute(self, lane, moment, lambda)
     class(reaction_solver_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(inout) :: moment(:), lambda(:)   !! as in `find_reactions`
-    integer :: k
+    integer :: b, entry, g, i, k
 
     lambda = 0.0_wp
-    if (size(self%groups) > 0) call self%solve_relations(lane, moment, lambda)
-    do k = 1, size(self%child)
-      lambda(self%row(k)) = moment(self%child(k)) / self%own(lane, k)
-      moment(self%parent(k)) = moment(self%parent(k)) - self%other(lane, k) * lambda(self%row(k))
-    end do
-  end subroutine back_substitute
-
-  !> Reactions of the relations; subtracts their moments from those on the bodies.
-  pure subroutine solve_relations(self, lane, moment, lambda)
-    class(reaction_solver_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    real(wp), intent(inout) :: moment(:), lambda(:)   !! as in `find_reactions`
-    integer :: b, entry, g, i
-
     self%of_trains(:) = 0.0_wp
     self%of_relations(:) = 0.0_wp
     do g = 1, size(self%groups)
@@ -196,7 +156,11 @@ contains
         end do
       end associate
     end do
-  end subroutine solve_relations
+    do k = 1, size(self%child)
+      lambda(self%row(k)) = moment(self%child(k)) / self%own(lane, k)
+      moment(self%parent(k)) = moment(self%parent(k)) - self%other(lane, k) * lambda(self%row(k))
+    end do
+  end subroutine back_substitute
 
   !> Registers the arrays whose values may differ from variant to variant.
   subroutine list_parameters(self, parameters)

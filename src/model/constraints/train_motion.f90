@@ -18,8 +18,6 @@ module nocdyn_train_motion
     integer, allocatable :: train(:)         !! the train that each gives
     integer, allocatable :: core(:)          !! relations that are solved together
     integer, allocatable :: core_trains(:)   !! all trains in the core
-  contains
-    procedure :: has_relations
   end type elimination_t
 
   !> The motion of the trains of a group in one lane.
@@ -39,14 +37,24 @@ contains
     integer, intent(in) :: trains     !! number of trains in this group
     integer, intent(in) :: lane
     type(train_motion_t), intent(out) :: found
-    integer :: entry, i, k
+    real(wp), allocatable :: complement(:, :)
+    integer :: column(size(elimination%free)), entry, i, k   ! column of each free train in the core, 0 for none
     real(wp) :: own
+    logical :: is_singular
 
     allocate (found%motion(trains, size(elimination%free)), source=0.0_wp)
     do k = 1, size(elimination%free)
       found%motion(local(elimination%free(k)), k) = 1.0_wp
     end do
-    call move_core(relations, elimination, local, lane, found)
+    if (size(elimination%core) == 0) then
+      allocate (found%dual(0, 0))
+    else
+      column = [(findloc(elimination%core_trains, elimination%free(k), dim=1), k=1, size(column))]
+      call natural_complement(relations%equations%block(lane, elimination%core, elimination%core_trains), &
+                              pack(column, column > 0), complement, found%dual, found%log_determinant, is_singular)
+      if (is_singular) error stop 'nocdyn_train_motion: the constraints must have been analysed'
+      found%motion(local(elimination%core_trains), pack([(k, k=1, size(column))], column > 0)) = complement
+    end if
     do i = size(elimination%relation), 1, -1
       associate (relation => elimination%relation(i), train => elimination%train(i), equations => relations%equations)
         own = relations%coefficient_of(lane, relation, train)
@@ -61,27 +69,6 @@ contains
       end associate
     end do
   end subroutine find_motion
-
-  !> Computes the natural complement of the core.
-  subroutine move_core(relations, elimination, local, lane, found)
-    type(train_relations_t), intent(in) :: relations
-    type(elimination_t), intent(in) :: elimination
-    integer, intent(in) :: local(:), lane
-    type(train_motion_t), intent(inout) :: found
-    real(wp), allocatable :: complement(:, :)
-    integer :: column(size(elimination%free)), k
-    logical :: is_singular
-
-    if (size(elimination%core) == 0) then
-      allocate (found%dual(0, 0))
-      return
-    end if
-    column = [(findloc(elimination%core_trains, elimination%free(k), dim=1), k=1, size(column))]
-    call natural_complement(relations%equations%block(lane, elimination%core, elimination%core_trains), &
-                            pack(column, column > 0), complement, found%dual, found%log_determinant, is_singular)
-    if (is_singular) error stop 'nocdyn_train_motion: the constraints must have been analysed'
-    found%motion(local(elimination%core_trains), pack([(k, k=1, size(column))], column > 0)) = complement
-  end subroutine move_core
 
   !> Multipliers of the relations that balance moments on the trains. Moments on the free trains remain.
   pure subroutine find_loads(relations, elimination, dual, lane, moment, lambda)
@@ -110,12 +97,5 @@ contains
       end do
     end do
   end subroutine find_loads
-
-  !> Whether relations between trains are left in the group.
-  pure logical function has_relations(self)
-    class(elimination_t), intent(in) :: self
-
-    has_relations = size(self%relation) + size(self%core) > 0
-  end function has_relations
 
 end module nocdyn_train_motion

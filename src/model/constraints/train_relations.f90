@@ -32,70 +32,51 @@ module nocdyn_train_relations
 
 contains
 
-  !> The relations of a machine, for all lanes.
+  !> The relations of a machine, for all lanes, with each train once in a relation. A coefficient is 0 where those of the bodies
+  !> cancel.
   function new_relations(constraints, trains) result(self)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
     type(train_relations_t) :: self
-    integer, allocatable :: first(:), train(:), entry_of(:)
-    integer :: lane, r
-    real(wp), allocatable :: coefficient(:, :)
+    integer, allocatable :: first(:), train(:), entry_of(:)   ! entry of the relation of each entry of the rows
+    integer :: at(size(trains%root)), entry, lane, next, r
+    real(wp), allocatable :: bound(:), coefficient(:, :)
+    real(wp) :: ratio(constraints%bodies), term
 
     allocate (self%row, source=pack([(r, r=1, constraints%rows())], [(constraints%entries(r) /= 2, r=1, constraints%rows())]))
     self%rows = constraints%subset(self%row)
-    call gather_trains(self%rows, trains, first, train, entry_of)
-    allocate (coefficient(size(constraints%coefficient, 1), size(train)))
-    do lane = 1, size(coefficient, 1)
-      coefficient(lane, :) = summed(self%rows, entry_of, trains%ratios(constraints, lane), lane, size(train))
-    end do
-    self%equations = new_constraints(size(trains%root), self%rows%names, self%rows%units, first, train, coefficient)
-  end function new_relations
-
-  !> Lists the trains of each relation once, and the relation entry of each row entry.
-  subroutine gather_trains(rows, trains, first, train, entry_of)
-    type(constraints_t), intent(in) :: rows
-    type(rigid_trains_t), intent(in) :: trains
-    integer, allocatable, intent(out) :: first(:), train(:)
-    integer, allocatable, intent(out) :: entry_of(:)   !! of each entry of `rows`
-    integer :: at(size(trains%root)), entry, i, next
-
-    allocate (first(size(rows%first)), train(size(rows%body)), entry_of(size(rows%body)))
-    at = 0
-    next = 1
-    do i = 1, rows%rows()
-      first(i) = next
-      do entry = rows%first(i), rows%first(i + 1) - 1
-        associate (t => trains%train(rows%body(entry)))
-          if (at(t) < first(i)) then
-            at(t) = next
-            train(next) = t
-            next = next + 1
-          end if
-          entry_of(entry) = at(t)
-        end associate
+    associate (rows => self%rows)
+      allocate (first(size(rows%first)), train(size(rows%body)), entry_of(size(rows%body)))
+      at = 0
+      next = 1
+      do r = 1, rows%rows()
+        first(r) = next
+        do entry = rows%first(r), rows%first(r + 1) - 1
+          associate (t => trains%train(rows%body(entry)))
+            if (at(t) < first(r)) then
+              at(t) = next
+              train(next) = t
+              next = next + 1
+            end if
+            entry_of(entry) = at(t)
+          end associate
+        end do
       end do
-    end do
-    first(size(first)) = next
-    train = train(:next - 1)
-  end subroutine gather_trains
-
-  !> Coefficients of the relations of one lane, [entries]; 0 where those of the bodies cancel.
-  function summed(rows, entry_of, ratio, lane, entries) result(coefficient)
-    type(constraints_t), intent(in) :: rows
-    integer, intent(in) :: entry_of(:), lane, entries
-    real(wp), intent(in) :: ratio(:)   !! of each body to the root of its train
-    real(wp) :: coefficient(entries), bound(entries), term
-    integer :: entry
-
-    coefficient = 0.0_wp
-    bound = 0.0_wp
-    do entry = 1, size(entry_of)
-      term = rows%coefficient(lane, entry) * ratio(rows%body(entry))
-      coefficient(entry_of(entry)) = coefficient(entry_of(entry)) + term
-      bound(entry_of(entry)) = bound(entry_of(entry)) + abs(term)
-    end do
-    where (abs(coefficient) <= ratio_tolerance * bound) coefficient = 0.0_wp
-  end function summed
+      first(size(first)) = next
+      allocate (coefficient(size(constraints%coefficient, 1), next - 1), source=0.0_wp)
+      do lane = 1, size(coefficient, 1)
+        ratio = trains%ratios(constraints, lane)
+        bound = 0.0_wp * coefficient(lane, :)
+        do entry = 1, size(entry_of)
+          term = rows%coefficient(lane, entry) * ratio(rows%body(entry))
+          coefficient(lane, entry_of(entry)) = coefficient(lane, entry_of(entry)) + term
+          bound(entry_of(entry)) = bound(entry_of(entry)) + abs(term)
+        end do
+        where (abs(coefficient(lane, :)) <= ratio_tolerance * bound) coefficient(lane, :) = 0.0_wp
+      end do
+      self%equations = new_constraints(size(trains%root), rows%names, rows%units, first, train(:next - 1), coefficient)
+    end associate
+  end function new_relations
 
   !> Coefficient of one train in a relation.
   pure real(wp) function coefficient_of(self, lane, relation, train) result(coefficient)
@@ -108,7 +89,8 @@ contains
     end do
   end function coefficient_of
 
-  !> Eliminates leaves as long as there are any, by the coefficients of the first lane.
+  !> Eliminates leaves as long as there are any, by the coefficients of the first lane: of a relation, the leaf with the largest
+  !> one, if it is a good pivot. A relation that gets a leaf by this is put into the queue.
   function eliminate_leaves(self, takes_part, must_be_free) result(leaves)
     class(train_relations_t), intent(in) :: self
     logical, intent(in) :: takes_part(:)     !! whether a relation is considered, [relations]
@@ -116,8 +98,9 @@ contains
     type(leaf_elimination_t) :: leaves
     integer, allocatable :: first(:), of_train(:)
     integer :: uses(size(must_be_free)), queue(size(takes_part) + size(self%equations%body))
-    integer :: entry, i, last, train
+    integer :: entry, i, k, last, place, train
     logical :: is_left(size(takes_part))
+    real(wp) :: largest
 
     call self%equations%list_body_rows(takes_part, first, of_train)
     uses = first(2:) - first(:size(uses))
@@ -127,64 +110,40 @@ contains
     queue(:last) = pack([(i, i=1, size(takes_part))], takes_part)
     leaves%core = queue(:last)
     i = 0
-    do entry = 1, size(queue)
-      if (entry > last) exit
-      associate (relation => queue(entry))
-        if (.not. is_left(relation)) cycle
-        train = leaf_train(self%equations, relation, uses, must_be_free)
+    do place = 1, size(queue)
+      if (place > last) exit
+      if (.not. is_left(queue(place))) cycle
+      associate (relation => queue(place), begin => self%equations%first(queue(place)), &
+                 end => self%equations%first(queue(place) + 1) - 1, body => self%equations%body)
+        associate (sizes => abs(self%equations%coefficient(1, begin:end)))
+          train = 0
+          largest = min_pivot_share * maxval(sizes)
+          do entry = begin, end
+            if (uses(body(entry)) /= 1 .or. must_be_free(body(entry)) .or. sizes(entry - begin + 1) <= largest) cycle
+            largest = sizes(entry - begin + 1)
+            train = body(entry)
+          end do
+        end associate
         if (train == 0) cycle
         i = i + 1
         leaves%relation(i) = relation
         leaves%train(i) = train
         is_left(relation) = .false.
-        call drop_relation(self%equations, relation, first, of_train, is_left, uses, queue, last)
+        do entry = begin, end
+          uses(body(entry)) = uses(body(entry)) - 1
+          if (uses(body(entry)) /= 1) cycle
+          do k = first(body(entry)), first(body(entry) + 1) - 1
+            if (.not. is_left(of_train(k))) cycle
+            last = last + 1
+            queue(last) = of_train(k)
+          end do
+        end do
       end associate
     end do
     leaves%relation = leaves%relation(:i)
     leaves%train = leaves%train(:i)
     leaves%core = pack(leaves%core, is_left(leaves%core))
   end function eliminate_leaves
-
-  !> The train that is in this relation only, with the largest coefficient; 0 if there is none with a good pivot.
-  pure integer function leaf_train(equations, relation, uses, must_be_free) result(train)
-    type(constraints_t), intent(in) :: equations
-    integer, intent(in) :: relation, uses(:)
-    logical, intent(in) :: must_be_free(:)
-    real(wp) :: largest
-    integer :: entry
-
-    associate (first => equations%first(relation), last => equations%first(relation + 1) - 1)
-      largest = min_pivot_share * maxval(abs(equations%coefficient(1, first:last)))
-      train = 0
-      do entry = first, last
-        if (uses(equations%body(entry)) /= 1 .or. must_be_free(equations%body(entry))) cycle
-        if (abs(equations%coefficient(1, entry)) <= largest) cycle
-        largest = abs(equations%coefficient(1, entry))
-        train = equations%body(entry)
-      end do
-    end associate
-  end function leaf_train
-
-  !> Removes an eliminated relation. Another relation that has got a leaf by this is put into the queue.
-  pure subroutine drop_relation(equations, relation, first, of_train, is_left, uses, queue, last)
-    type(constraints_t), intent(in) :: equations
-    integer, intent(in) :: relation, first(:), of_train(:)
-    logical, intent(in) :: is_left(:)
-    integer, intent(inout) :: uses(:), queue(:), last
-    integer :: entry, k
-
-    do entry = equations%first(relation), equations%first(relation + 1) - 1
-      associate (train => equations%body(entry))
-        uses(train) = uses(train) - 1
-        if (uses(train) /= 1) cycle
-        do k = first(train), first(train + 1) - 1
-          if (.not. is_left(of_train(k))) cycle
-          last = last + 1
-          queue(last) = of_train(k)
-        end do
-      end associate
-    end do
-  end subroutine drop_relation
 
   !> The constraint rows that carry load when the relations have these multipliers, ascending: relations whose multiplier is
   !> more than rounding, and the tree rows that they load. In the first lane.
@@ -195,14 +154,21 @@ contains
     real(wp), intent(in) :: lambda(:)   !! multipliers, [relations]
     integer, intent(in) :: root         !! root of a train that carries a unit torque, 0: none
     integer, allocatable :: rows(:)
-    integer, allocatable :: active(:)
-    real(wp), allocatable :: sizes(:)
-    real(wp) :: moment(constraints%bodies)
+    integer, allocatable :: active(:), members(:)
+    real(wp), allocatable :: sizes(:)   ! largest term of each active relation at the effective speeds
+    real(wp) :: moment(constraints%bodies), speed(self%equations%bodies)
     logical :: is_loaded(constraints%rows())
     integer :: i, r
 
     active = pack([(i, i=1, size(lambda))], abs(lambda) > 0.0_wp)
-    allocate (sizes, source=row_sizes(self%equations, active))
+    allocate (members, source=distinct_trains(self%equations, active))
+    speed(members) = effective_speeds(self%equations, active, members)
+    allocate (sizes(size(active)))
+    do i = 1, size(active)
+      associate (first => self%equations%first(active(i)), last => self%equations%first(active(i) + 1) - 1)
+        sizes(i) = maxval(abs(self%equations%coefficient(1, first:last)) * speed(self%equations%body(first:last)))
+      end associate
+    end do
     associate (weight => abs(lambda(active)) * sizes)   ! a relation of size 0 has entries in one train only
       active = pack(active, sizes <= 0.0_wp .or. weight > ratio_tolerance * maxval(weight))
     end associate
@@ -217,24 +183,6 @@ contains
     is_loaded(self%row(active)) = .true.
     rows = pack([(r, r=1, size(is_loaded))], is_loaded)
   end function loaded_rows
-
-  !> The largest term of each relation when the trains have their effective speeds.
-  function row_sizes(equations, relations) result(sizes)
-    type(constraints_t), intent(in) :: equations
-    integer, intent(in) :: relations(:)
-    real(wp) :: sizes(size(relations))
-    integer, allocatable :: trains(:)
-    real(wp) :: speed(equations%bodies)
-    integer :: i
-
-    allocate (trains, source=distinct_trains(equations, relations))
-    speed(trains) = effective_speeds(equations, relations, trains)
-    do i = 1, size(relations)
-      associate (first => equations%first(relations(i)), last => equations%first(relations(i) + 1) - 1)
-        sizes(i) = maxval(abs(equations%coefficient(1, first:last)) * speed(equations%body(first:last)))
-      end associate
-    end do
-  end function row_sizes
 
   !> The trains of some relations, ascending.
   function distinct_trains(equations, relations) result(trains)

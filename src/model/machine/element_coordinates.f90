@@ -35,25 +35,41 @@ contains
     type(coordinates_t), intent(in) :: coordinates
     type(element_coordinates_t) :: self
     integer :: entry_of(coordinates%freedoms)   ! entry of each coordinate in the present element, if not below its first one
-    integer :: e, entries, k
+    integer :: e, entries, i, k, least
 
-    entries = 0
-    do k = 1, size(elements%rows%body)
-      entries = entries + body_entries(coordinates, elements%rows%body(k))
-    end do
-    allocate (self%first(elements%count + 1), self%coordinate(entries))
-    allocate (self%ratio(size(elements%time), entries), source=0.0_wp)
-    allocate (self%response, source=self%ratio)
-    entry_of = 0
-    self%first(1) = 1
-    do e = 1, elements%count
-      self%first(e + 1) = self%first(e)
-      do k = elements%rows%first(e), elements%rows%first(e + 1) - 1
-        call add_body(coordinates, elements%rows%body(k), elements%rows%coefficient(k), self%first(e), self%first(e + 1), &
-                      entry_of, self)
+    associate (rows => elements%rows)
+      entries = sum(coordinates%first(rows%body + 1) - coordinates%first(max(1, rows%body)), mask=rows%body > 0)
+      allocate (self%first(elements%count + 1), self%coordinate(entries))
+      allocate (self%ratio(size(elements%time), entries), source=0.0_wp)
+      allocate (self%response, source=self%ratio)
+      entry_of = 0
+      self%first(1) = 1
+      do e = 1, elements%count
+        associate (begin => self%first(e), next => self%first(e + 1))
+          next = begin
+          do k = rows%first(e), rows%first(e + 1) - 1
+            if (rows%body(k) == 0) cycle
+            do i = coordinates%first(rows%body(k)), coordinates%first(rows%body(k) + 1) - 1
+              associate (entry => entry_of(coordinates%coordinate(i)))
+                if (entry < begin) then
+                  entry = next
+                  self%coordinate(next) = coordinates%coordinate(i)
+                  next = next + 1
+                end if
+                self%ratio(:, entry) = self%ratio(:, entry) + rows%coefficient(k) * coordinates%ratio(:, i)
+                self%response(:, entry) = self%response(:, entry) + rows%coefficient(k) * coordinates%response(:, i)
+              end associate
+            end do
+          end do
+          do k = begin, next - 2
+            least = k - 1 + minloc(self%coordinate(k:next - 1), dim=1)
+            self%coordinate([k, least]) = self%coordinate([least, k])
+            self%ratio(:, [k, least]) = self%ratio(:, [least, k])
+            self%response(:, [k, least]) = self%response(:, [least, k])
+          end do
+        end associate
       end do
-      call sort_entries(self, self%first(e), self%first(e + 1) - 1)
-    end do
+    end associate
     entries = self%first(size(self%first)) - 1
     self%coordinate = self%coordinate(:entries)
     self%ratio = self%ratio(:, :entries)
@@ -92,35 +108,24 @@ contains
     integer, intent(in) :: lane
     type(elements_t), intent(in) :: elements
     type(coordinates_t), intent(in) :: coordinates
-    integer :: e, k
+    integer :: e, entry, i, k
 
-    do e = 1, elements%count
-      self%response(lane, self%first(e):self%first(e + 1) - 1) = 0.0_wp
-      do k = elements%rows%first(e), elements%rows%first(e + 1) - 1
-        call add_response(coordinates, elements%rows%body(k), elements%rows%coefficient(k), lane, self%first(e), self)
+    associate (rows => elements%rows)
+      self%response(lane, :) = 0.0_wp
+      do e = 1, elements%count
+        do k = rows%first(e), rows%first(e + 1) - 1
+          if (rows%body(k) == 0) cycle
+          do i = coordinates%first(rows%body(k)), coordinates%first(rows%body(k) + 1) - 1
+            entry = self%first(e)
+            do while (self%coordinate(entry) /= coordinates%coordinate(i))
+              entry = entry + 1
+            end do
+            self%response(lane, entry) = self%response(lane, entry) + rows%coefficient(k) * coordinates%response(lane, i)
+          end do
+        end do
       end do
-    end do
+    end associate
   end subroutine refresh_responses
-
-  !> Adds the response of one body to those of an element in one lane.
-  pure subroutine add_response(coordinates, body, coefficient, lane, begin, self)
-    type(coordinates_t), intent(in) :: coordinates
-    integer, intent(in) :: body    !! 0 = ground, which has none
-    real(wp), intent(in) :: coefficient   !! of the body in the row of the element
-    integer, intent(in) :: lane
-    integer, intent(in) :: begin   !! first entry of the element
-    type(element_coordinates_t), intent(inout) :: self
-    integer :: k, of_body
-
-    if (body == 0) return
-    do of_body = coordinates%first(body), coordinates%first(body + 1) - 1
-      k = begin
-      do while (self%coordinate(k) /= coordinates%coordinate(of_body))
-        k = k + 1
-      end do
-      self%response(lane, k) = self%response(lane, k) + coefficient * coordinates%response(lane, of_body)
-    end do
-  end subroutine add_response
 
   !> Updates the responses of one lane in entries made by `selected`.
   pure subroutine refresh_selected(self, lane, all)
@@ -150,52 +155,6 @@ contains
       element(self%first(e):self%first(e + 1) - 1) = e
     end do
   end function entry_elements
-
-  pure integer function body_entries(coordinates, body)
-    type(coordinates_t), intent(in) :: coordinates
-    integer, intent(in) :: body   !! 0 = ground, which has none
-
-    body_entries = 0
-    if (body > 0) body_entries = coordinates%first(body + 1) - coordinates%first(body)
-  end function body_entries
-
-  !> Adds the coordinates of a body to the entries of an element.
-  pure subroutine add_body(coordinates, body, coefficient, begin, next, entry_of, self)
-    type(coordinates_t), intent(in) :: coordinates
-    integer, intent(in) :: body             !! 0 = ground, which has none
-    real(wp), intent(in) :: coefficient     !! of the body in the row of the element
-    integer, intent(in) :: begin            !! first entry of the element
-    integer, intent(inout) :: next          !! next free entry
-    integer, intent(inout) :: entry_of(:)   !! entry of each coordinate, [freedoms]; below `begin`: not in this element yet
-    type(element_coordinates_t), intent(inout) :: self
-    integer :: c, k
-
-    do k = 1, body_entries(coordinates, body)
-      associate (of_body => coordinates%first(body) + k - 1)
-        c = coordinates%coordinate(of_body)
-        if (entry_of(c) < begin) then
-          entry_of(c) = next
-          self%coordinate(next) = c
-          next = next + 1
-        end if
-        self%ratio(:, entry_of(c)) = self%ratio(:, entry_of(c)) + coefficient * coordinates%ratio(:, of_body)
-        self%response(:, entry_of(c)) = self%response(:, entry_of(c)) + coefficient * coordinates%response(:, of_body)
-      end associate
-    end do
-  end subroutine add_body
-
-  pure subroutine sort_entries(self, begin, end)
-    type(element_coordinates_t), intent(inout) :: self
-    integer, intent(in) :: begin, end   !! first and last entry of the element
-    integer :: least, k
-
-    do k = begin, end - 1
-      least = k - 1 + minloc(self%coordinate(k:end), dim=1)
-      self%coordinate([k, least]) = self%coordinate([least, k])
-      self%ratio(:, [k, least]) = self%ratio(:, [least, k])
-      self%response(:, [k, least]) = self%response(:, [least, k])
-    end do
-  end subroutine sort_entries
 
   !> Registers the arrays whose values may differ from variant to variant.
   subroutine list_parameters(self, parameters)

@@ -22,9 +22,9 @@ contains
     integer, allocatable :: bodies(:)
     type(train_motion_t) :: found
     type(train_relations_t) :: relations
-    logical, allocatable :: has_mass(:), is_massless(:)
+    logical, allocatable :: has_mass(:), is_massless(:)   ! [trains of the group]
     integer :: local(size(machine%trains%root))   ! of every train in its group
-    integer :: g, k
+    integer :: g, k, rank
 
     allocate (bodies(0))
     if (all(machine%inertia(1, :) > 0)) return
@@ -32,37 +32,25 @@ contains
     do g = 1, size(machine%groups)
       associate (group => machine%groups(g))
         local(group%trains) = [(k, k=1, size(group%trains))]
-        if (allocated(has_mass)) deallocate (has_mass)
-        allocate (has_mass(size(group%trains)), source=.false.)
+        has_mass = spread(.false., 1, size(group%trains))
         has_mass(local(machine%trains%train(pack(group%bodies, machine%inertia(1, group%bodies) > 0)))) = .true.
         if (all(has_mass)) cycle
         call find_motion(relations, group%elimination, local, size(group%trains), 1, found)
-        is_massless = moves_alone(found%motion, has_mass)
+        rank = rank_of(found%motion, has_mass)
+        if (rank == size(found%motion, 2)) cycle
+        is_massless = spread(.false., 1, size(has_mass))   ! whether a train moves where all with mass stand still
+        do k = 1, size(has_mass)
+          if (has_mass(k)) cycle
+          has_mass(k) = .true.
+          is_massless(k) = rank_of(found%motion, has_mass) > rank
+          has_mass(k) = .false.
+        end do
         if (.not. any(is_massless)) cycle
         bodies = pack(group%bodies, is_massless(local(machine%trains%train(group%bodies))))
         return
       end associate
     end do
   end function massless_bodies
-
-  !> Whether a train moves in a motion of the group in which all trains with mass stand still.
-  function moves_alone(motion, has_mass)
-    real(wp), intent(in) :: motion(:, :)   !! speeds of the roots by the coordinates, [trains, coordinates]
-    logical, intent(in) :: has_mass(:)     !! [trains]
-    logical :: moves_alone(size(has_mass))
-    integer :: rank, t
-    logical :: with_train(size(has_mass))
-
-    moves_alone = .false.
-    rank = rank_of(motion, has_mass)
-    if (rank == size(motion, 2)) return
-    do t = 1, size(has_mass)
-      if (has_mass(t)) cycle
-      with_train = has_mass
-      with_train(t) = .true.
-      moves_alone(t) = rank_of(motion, with_train) > rank
-    end do
-  end function moves_alone
 
   !> Rank of the selected rows, each scaled to the length 1.
   integer function rank_of(motion, selected)

@@ -47,7 +47,8 @@ contains
     integer, intent(in) :: elastic(:)                      !! elements that must not be twisted
     type(linear_combination_t) :: definition(freedoms)
     type(row_t) :: row
-    integer :: e, k
+    integer, allocatable :: left(:)
+    integer :: c, e, freedom_of(freedoms), i, k
 
     allocate (row%active(freedoms), row%value(freedoms), row%scale(freedoms), row%is_active(freedoms))
     row%is_active = .false.
@@ -55,9 +56,33 @@ contains
       do k = incidence%first(elastic(e)), incidence%first(elastic(e) + 1) - 1
         call add(row, incidence%coordinate(k), incidence%ratio(1, k), abs(incidence%ratio(1, k)))
       end do
-      call eliminate(row, definition)
+      call substitute(row, definition, left)
+      if (size(left) == 0) cycle
+      c = maxval(left)
+      left = pack(left, left /= c)
+      definition(c)%of = left
+      definition(c)%ratio = -row%value(left) / row%value(c)
     end do
-    call express_by_free(definition, row, self)
+    self%free = pack([(c, c=1, freedoms)], [(.not. allocated(definition(c)%of), c=1, freedoms)])
+    freedom_of(self%free) = [(i, i=1, size(self%free))]
+    do c = 1, freedoms
+      if (.not. allocated(definition(c)%of)) cycle
+      call add(row, c, 1.0_wp, 1.0_wp)
+      call substitute(row, definition, left)
+      definition(c)%of = left
+      definition(c)%ratio = row%value(left)
+    end do
+    do i = 1, size(self%free)
+      definition(self%free(i))%of = [self%free(i)]
+      definition(self%free(i))%ratio = [1.0_wp]
+    end do
+    allocate (self%first(freedoms + 1))
+    self%first(1) = 1
+    do c = 1, freedoms
+      self%first(c + 1) = self%first(c) + size(definition(c)%of)
+    end do
+    self%freedom = [(freedom_of(definition(c)%of), c=1, freedoms)]
+    self%ratio = [(definition(c)%ratio, c=1, freedoms)]
   end function new_rigid_motions
 
   !> Adds a term to an entry of a row.
@@ -77,10 +102,12 @@ contains
     row%scale(coordinate) = row%scale(coordinate) + scale
   end subroutine add
 
-  !> Replaces the eliminated coordinates of a row by those of their definitions.
-  pure subroutine substitute(row, definition)
+  !> Replaces the eliminated coordinates of a row by those of their definitions, and ends the row: its values stay until the next
+  !> `add`.
+  pure subroutine substitute(row, definition, left)
     type(row_t), intent(inout) :: row
     type(linear_combination_t), intent(in) :: definition(:)
+    integer, allocatable, intent(out) :: left(:)   ! coordinates of the row whose sums are not rounding
     integer :: c, i, position
     real(wp) :: scale, value
 
@@ -101,75 +128,12 @@ contains
       end do
       position = 1
     end do
-  end subroutine substitute
-
-  !> Solves the row for its highest coordinate and defines it by this; clears the row.
-  pure subroutine eliminate(row, definition)
-    type(row_t), intent(inout) :: row
-    type(linear_combination_t), intent(inout) :: definition(:)
-    integer, allocatable :: left(:)
-    integer :: c
-
-    call substitute(row, definition)
-    left = significant(row)
-    if (size(left) > 0) then
-      c = maxval(left)
-      left = pack(left, left /= c)
-      definition(c)%of = left
-      definition(c)%ratio = -row%value(left) / row%value(c)
-    end if
-    call clear(row)
-  end subroutine eliminate
-
-  !> The coordinates of a row whose sums are not rounding.
-  pure function significant(row) result(coordinates)
-    type(row_t), intent(in) :: row
-    integer, allocatable :: coordinates(:)
-
     associate (active => row%active(:row%used))
-      coordinates = pack(active, abs(row%value(active)) > rounding * row%scale(active))
+      left = pack(active, abs(row%value(active)) > rounding * row%scale(active))
+      row%is_active(active) = .false.
     end associate
-  end function significant
-
-  pure subroutine clear(row)
-    type(row_t), intent(inout) :: row
-
-    row%is_active(row%active(:row%used)) = .false.
     row%used = 0
-  end subroutine clear
-
-  pure subroutine express_by_free(definition, row, self)
-    type(linear_combination_t), intent(inout) :: definition(:)
-    type(row_t), intent(inout) :: row
-    type(rigid_motions_t), intent(inout) :: self
-    integer :: c, i
-    integer :: freedom_of(size(definition))
-
-    self%free = pack([(c, c=1, size(definition))], [(.not. allocated(definition(c)%of), c=1, size(definition))])
-    freedom_of(self%free) = [(i, i=1, size(self%free))]
-    do c = 1, size(definition)
-      if (.not. allocated(definition(c)%of)) cycle
-      call add(row, c, 1.0_wp, 1.0_wp)
-      call substitute(row, definition)
-      definition(c)%of = significant(row)
-      definition(c)%ratio = row%value(definition(c)%of)
-      call clear(row)
-    end do
-    do i = 1, size(self%free)
-      definition(self%free(i))%of = [self%free(i)]
-      definition(self%free(i))%ratio = [1.0_wp]
-    end do
-    allocate (self%first(size(definition) + 1))
-    self%first(1) = 1
-    do c = 1, size(definition)
-      self%first(c + 1) = self%first(c) + size(definition(c)%of)
-    end do
-    allocate (self%freedom(self%first(size(definition) + 1) - 1), self%ratio(self%first(size(definition) + 1) - 1))
-    do c = 1, size(definition)
-      self%freedom(self%first(c):self%first(c + 1) - 1) = freedom_of(definition(c)%of)
-      self%ratio(self%first(c):self%first(c + 1) - 1) = definition(c)%ratio
-    end do
-  end subroutine express_by_free
+  end subroutine substitute
 
   !> Speeds q' of all coordinates, [coordinates].
   pure function speeds(self, s) result(q_rate)
