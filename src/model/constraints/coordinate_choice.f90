@@ -117,8 +117,7 @@ contains
       freedoms = size(groups(g)%independent)
       groups(g)%independent = wanted(order(first(g):first(g + 1) - 1))
       if (size(groups(g)%independent) /= freedoms) then
-        call raise(error, exit_input, count_text(selected(body_names, groups(g)%bodies), &
-                                                 selected(body_names, groups(g)%independent), freedoms))
+        call raise_count(selected(body_names, groups(g)%bodies), selected(body_names, groups(g)%independent), freedoms, error)
         return
       end if
       if (count(must_be_free(groups(g)%trains)) < freedoms) then
@@ -165,10 +164,11 @@ contains
     is_solvable = rank == size(dependent)
   end function is_solvable
 
-  !> Why a group cannot have this number of independent bodies.
-  pure function count_text(bodies, named, freedoms) result(text)
+  !> Raises the error for a wrong number of independent bodies in a group.
+  subroutine raise_count(bodies, named, freedoms, error)
     type(string_t), intent(in) :: bodies(:), named(:)   !! of the group; those that the input names
     integer, intent(in) :: freedoms                     !! number that must be named
+    type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: text
 
     if (size(bodies) == 1) then
@@ -182,7 +182,8 @@ contains
     else
       text = text // '; it names ' // joined(named, ', ', most_names)
     end if
-  end function count_text
+    call raise(error, exit_input, text)
+  end subroutine raise_count
 
   !> Raises the error for independent bodies whose speeds the constraints relate.
   subroutine raise_related(body_names, independent, error)

@@ -92,23 +92,22 @@ contains
     class(shafts_t), intent(in) :: self
     type(quantity_t), allocatable, intent(out) :: columns(:)
     character(len=*), parameter :: at_end = 'moment at an end of the shaft', with = 'with the twist'
-    integer :: s
+    integer :: first(size(self%shafts)), s
 
     allocate (columns(power))
-    associate (first => self%shafts%first)
-      columns(twist) = new_quantity('twist', 'rad', first, 'twist', 'if the second end is ahead', rank_twist, form_observed, &
-                                    1.0_wp)
-      columns(moment_1) = new_quantity('total_moment', 'N m', first, at_end, with, rank_moment, &
-                                       form_observed, 1.0_wp)
-      columns(moment_2) = new_quantity('total_moment', 'N m', first, at_end, with, rank_moment, &
-                                       form_observed, 1.0_wp)
-      columns(largest_moment) = new_quantity('total_moment', 'N m', first, 'largest moment along the shaft', with, &
-                                             rank_moment, form_observed, 1.0_wp)
-      columns(stress) = new_quantity('stress', 'Pa', first, 'largest shear stress along the shaft', with, rank_stress, &
+    first = self%shafts%first
+    columns(twist) = new_quantity('twist', 'rad', first, 'twist', 'if the second end is ahead', rank_twist, form_observed, &
+                                  1.0_wp)
+    columns(moment_1) = new_quantity('total_moment', 'N m', first, at_end, with, rank_moment, &
                                      form_observed, 1.0_wp)
-      columns(power) = new_quantity('power', 'W', first, 'power through the shaft', 'from the first end to the second', &
-                                    rank_torque, form_observed, 1.0_wp)
-    end associate
+    columns(moment_2) = new_quantity('total_moment', 'N m', first, at_end, with, rank_moment, &
+                                     form_observed, 1.0_wp)
+    columns(largest_moment) = new_quantity('total_moment', 'N m', first, 'largest moment along the shaft', with, &
+                                           rank_moment, form_observed, 1.0_wp)
+    columns(stress) = new_quantity('stress', 'Pa', first, 'largest shear stress along the shaft', with, rank_stress, &
+                                   form_observed, 1.0_wp)
+    columns(power) = new_quantity('power', 'W', first, 'power through the shaft', 'from the first end to the second', &
+                                  rank_torque, form_observed, 1.0_wp)
     allocate (columns(power)%body(size(self%shafts)))
     do s = 1, size(self%shafts)   ! at the second end if the first one is held
       columns(power)%body(s) = merge(self%shafts(s)%ends(1), self%shafts(s)%ends(2), self%shafts(s)%ends(1) > 0)
