@@ -1,4 +1,4 @@
-"""nocdyn equilibrium: the steady states of machines, what is told of them, and what is refused."""
+"""nocdyn equilibrium: the steady states of machines, what is said about them, and what is refused."""
 
 import json
 from math import atanh, sqrt, tanh
@@ -66,7 +66,7 @@ def test_a_train_runs_where_its_torques_balance(nocdyn):
 def test_both_solutions_of_the_paper_s_motor_curve_are_told_apart(nocdyn):
     outcome = nocdyn("equilibrium", CASE_1, "--out", "out")
     assert outcome.stdout.startswith(f"{CASE_1}: steady state 1 of 2, unstable: a disturbance grows with ")
-    assert f"\n{CASE_1}: steady state 2 of 2, stable: disturbances decay with " in outcome.stdout
+    assert f"\n{CASE_1}: steady state 2 of 2, stable: disturbances decay at " in outcome.stdout
     states = steady_states(nocdyn)
     assert [state["values"]["omega_motor [rad/s]"] for state in states] == pytest.approx(UNIFORM, rel=EXACT)
     assert [state["stability"] for state in states] == ["unstable", "stable"]
@@ -149,8 +149,8 @@ def test_a_free_body_beside_a_stable_machine_leaves_it_stable(nocdyn):
     (state,) = analyse(nocdyn, TRAIN + "&body name = 'idler' inertia = 2.0 /\n")
     assert state["stability"] == "stable"
     printed = nocdyn("equilibrium", nocdyn.write("free.nml", TRAIN + "&body name = 'idler' inertia = 2.0 /\n")).stdout
-    assert "stable but for the speeds of the notes, which disturbances change for good: others decay with " in printed
-    assert "steady state, stable: disturbances decay with " in nocdyn("equilibrium", nocdyn.write("held.nml", TRAIN)).stdout
+    assert "stable but for the speeds of the notes, which disturbances change for good: others decay at " in printed
+    assert "steady state, stable: disturbances decay at " in nocdyn("equilibrium", nocdyn.write("held.nml", TRAIN)).stdout
 
 
 def test_machines_side_by_side_have_every_combination(nocdyn):

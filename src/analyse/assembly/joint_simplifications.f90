@@ -90,8 +90,8 @@ contains
         end if
       end associate
     end do
-    if (locked /= '') call append(notes, 'in this state there are locked: ' // locked)
-    if (open /= '') call append(notes, 'in this state there are open: ' // open)
+    if (locked /= '') call append(notes, 'locked in this state: ' // locked)
+    if (open /= '') call append(notes, 'open in this state: ' // open)
     if (means /= '') call append(notes, 'means over a turn stand for the ratios, inertias and torques of ' // means)
   end subroutine list_simplifications
 

@@ -49,7 +49,7 @@ contains
     end do
   end subroutine find_unstable
 
-  !> The same of points that came between those with known modes.
+  !> Marks unstable points between those with known modes.
   subroutine mark_between(response, is_unstable)
     type(forced_response_t), intent(in) :: response
     logical, intent(out) :: is_unstable(:)   !! [points]; false for those of the grid

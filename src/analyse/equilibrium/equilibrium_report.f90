@@ -150,9 +150,9 @@ contains
     end if
     select case (equilibrium%stability)
     case ('stable')
-      text = 'stable: disturbances decay with '
+      text = 'stable: disturbances decay at '
       if (equilibrium%free_modes > 0) text = 'stable but for the speeds of the notes, which disturbances change for good: ' // &
-                                             'others decay with '
+                                             'others decay at '
       text = text // rounded_text(-equilibrium%growth, 4) // ' 1/s or faster'
     case ('unstable')
       text = 'unstable: a disturbance grows with ' // rounded_text(equilibrium%growth, 4) // ' 1/s'

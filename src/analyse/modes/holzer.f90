@@ -33,7 +33,7 @@ module nocdyn_holzer
     procedure :: name => edge_name
   end type holzer_line_t
 
-  !> The lines in an order in which everything behind a body comes before it.
+  !> Shaft lines in leaf-to-root order.
   type, public :: holzer_t
     type(holzer_line_t), allocatable :: lines(:)
   contains

@@ -1,4 +1,4 @@
-!> What one looks for in a forced response: critical speeds with their peaks, the largest synthesis of every coupling, ranges of
+!> Key results of a forced response: critical speeds with their peaks, the largest synthesis of every coupling, ranges of
 !> speeds that its limits bar.
 module nocdyn_response_summary
   use nocdyn_critical_speeds, only: crossing_t, undamped

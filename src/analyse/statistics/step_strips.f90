@@ -57,7 +57,7 @@ contains
     call bound_excursions(degree, chord_gap, strip%scale, strip%c, strip%above, strip%below)
   end subroutine expand
 
-  !> The same, without the bounds, for a column of a block of one lane, with the same bits. The strip has a column in each place.
+  !> `expand`, in the same bits, without the bounds and for a column of a block of one lane. The strip has a column in each place.
   pure subroutine expand_single(states, degree, entries, component, factor, offset, y, y_new, c, place, strip)
     integer, intent(in) :: states, degree
     integer, intent(in) :: entries   !! even

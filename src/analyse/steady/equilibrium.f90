@@ -33,7 +33,6 @@ module nocdyn_equilibrium
   !> A steady state and its stability.
   type, public :: equilibrium_t
     real(wp), allocatable :: y(:, :)   !! state of the reduced formulation without work integrals, [1, states]
-    type(string_t), allocatable :: joints(:)   !! which joints hold, slip or are open, ends of sentences
     character(len=14) :: stability = 'not determined'   !! stable, unstable, neutral, not determined
     real(wp) :: growth = 0.0_wp   !! largest real part of the eigenvalues without those of free rigid motions [1/s]
     integer :: free_modes = 0   !! number of rigid motions without torques, or in a range of steady speeds
@@ -106,12 +105,12 @@ contains
     type(equilibrium_t) :: moved
     real(wp) :: speed(size(equilibria))
     type(string_t), allocatable :: listed(:)
+    character(len=:), allocatable :: state
     integer :: i, k
 
     if (formulation%joints%locking == 0) return
     do i = 1, size(equilibria)
       call formulation%observe([t], equilibria(i)%y)
-      call describe_joints(formulation, equilibria(i)%joints)
       equilibria(i)%is_at_rest = all(abs(formulation%omega(1, 1:)) <= 0.0_wp)
       speed(i) = formulation%omega(1, maxloc(abs(formulation%omega(1, 1:)), dim=1))
     end do
@@ -125,15 +124,11 @@ contains
       end do
     end do
     allocate (listed(0))
+    state = 'this state'
     do i = 1, size(equilibria)
-      do k = 1, size(equilibria(i)%joints)
-        if (size(equilibria) == 1) then
-          call append(listed, 'in this state ' // equilibria(i)%joints(k)%text)
-        else
-          call append(listed, 'in steady state ' // to_text(i) // ' of ' // to_text(size(equilibria)) // ' ' // &
-                              equilibria(i)%joints(k)%text)
-        end if
-      end do
+      if (size(equilibria) > 1) state = 'steady state ' // to_text(i) // ' of ' // to_text(size(equilibria))
+      call formulation%observe([t], equilibria(i)%y)
+      call describe_joints(formulation, state, listed)
     end do
     notes = [listed, notes]
   end subroutine complete_states

@@ -19,14 +19,14 @@ module nocdyn_joint_texts
 
 contains
 
-  !> Which joints hold, slip or are open in the state that was observed, as ends of sentences on a state.
-  subroutine describe_joints(formulation, texts)
+  !> Lists which joints hold, slip or are open in the state that was observed: "locked in this state: clutch 'a', clutch 'b'".
+  subroutine describe_joints(formulation, state, notes)
     class(formulation_t), intent(in) :: formulation   !! after `observe`
-    type(string_t), allocatable, intent(out) :: texts(:)
+    character(len=*), intent(in) :: state             !! "this state"
+    type(string_t), allocatable, intent(inout) :: notes(:)
     character(len=:), allocatable :: holding, open, slipping
     integer :: j
 
-    allocate (texts(0))
     holding = ''
     open = ''
     slipping = ''
@@ -43,9 +43,9 @@ contains
         end if
       end associate
     end do
-    if (holding /= '') call append(texts, 'there are locked: ' // holding)
-    if (slipping /= '') call append(texts, 'there are slipping: ' // slipping)
-    if (open /= '') call append(texts, 'there are open: ' // open)
+    if (holding /= '') call append(notes, 'locked in ' // state // ': ' // holding)
+    if (slipping /= '') call append(notes, 'slipping in ' // state // ': ' // slipping)
+    if (open /= '') call append(notes, 'open in ' // state // ': ' // open)
   end subroutine describe_joints
 
   !> "clutch", before its name.

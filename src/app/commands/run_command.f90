@@ -42,7 +42,7 @@ contains
     call run_inputs(arguments, code)
   end subroutine run_command
 
-  !> The same, in a program that can write NetCDF if `netcdf` is present.
+  !> `nocdyn run` in a program that can write NetCDF if `netcdf` is present.
   subroutine run_inputs(arguments, code, netcdf)
     type(arguments_t), intent(in) :: arguments
     integer, intent(out) :: code

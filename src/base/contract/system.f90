@@ -40,9 +40,9 @@ module nocdyn_system
     integer :: quadratures = 0   !! components after the states that are integrals only
     integer :: switches = 0      !! indicator functions: a step ends where one of them falls through zero
     integer :: measures = 0      !! quantities in which `measure` measures errors; 0: errors are those of the states
-    integer :: phases = 0        !! the last of these: angles whose speeds tell nothing about the step size
-    logical :: hides_bends = .false. !! whether a series of the solution may not show a bend of it, however near, as that of tanh
-    logical :: is_shared = .false.   !! whether its lanes are variants, which share vectors and are looked at little: other costs
+    integer :: phases = 0        !! the last of these: angles excluded from the estimate of the first step
+    logical :: hides_bends = .false. !! whether the series can miss a sharp transition, as of tanh
+    logical :: is_shared = .false.   !! whether its lanes are variants of a sweep, which changes the cost model
     logical :: may_shift = .false.   !! whether `find_far` is called after every step
     logical :: projects = .false.    !! whether `project_state` is called after every step
     logical :: limits_steps = .false. !! whether `limit_steps` is called before every step

@@ -51,7 +51,7 @@ module nocdyn_text
       integer(c_int), intent(out) :: length
     end subroutine shortest_decimal
 
-    !> The same without an exponent, or always with one.
+    !> Shortest decimal without an exponent, or always with one.
     pure subroutine shortest_form(value, has_exponent, buffer, capacity, length) bind(c, name='nocdyn_shortest_form')
       import :: c_char, c_double, c_int, c_size_t
       real(c_double), value, intent(in) :: value

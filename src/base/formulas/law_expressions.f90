@@ -131,7 +131,7 @@ contains
     call tape%append(node, parameter%node)
   end function parameter_of
 
-  !> The same number for all elements.
+  !> A number that all elements share.
   function literal(tape, value) result(number)
     type(law_tape_t), target, intent(inout) :: tape
     real(wp), intent(in) :: value   !! in any unit

@@ -38,7 +38,7 @@ contains
     end do
   end subroutine load
 
-  !> The same for numbers that all elements of a lane share.
+  !> Loads numbers that all elements of a lane share.
   pure subroutine load_lanes(law, work, node, k, strip, x)
     type(law_t), intent(in) :: law
     type(law_work_t), intent(inout) :: work

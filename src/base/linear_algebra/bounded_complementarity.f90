@@ -54,7 +54,7 @@ contains
     end do
   end subroutine solve_bounded_complementarity
 
-  !> The same where x / scale is to have the least norm.
+  !> Solves the problem where x / scale is to have the least norm.
   subroutine solve_scaled_complementarity(w, b, scale, bounds, x, a, state, is_solved)
     real(wp), intent(in) :: w(:, :), b(:)    !! as in `solve_bounded_complementarity`, also what follows
     real(wp), intent(in) :: scale(:)         !! positive, [n]

@@ -185,7 +185,7 @@ contains
     end do
   end function last_failure
 
-  !> The same as a number, `errno`.
+  !> Number of the last failure, `errno`.
   integer function failure_number()
     failure_number = int(c_errno())
   end function failure_number

@@ -164,7 +164,7 @@ contains
     is_done = c_fdatasync(int(descriptor, c_int)) == 0
   end subroutine sync_file
 
-  !> The same for a file or folder by its path.
+  !> Writes a file or folder, given by its path, to the disk.
   subroutine sync_path(path, is_done)
     character(len=*), intent(in) :: path
     logical, intent(out) :: is_done

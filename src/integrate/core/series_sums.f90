@@ -35,7 +35,7 @@ contains
     end do
   end subroutine sum_series
 
-  !> The same for `long` numbers at a time, so that the processor does not wait for a sum.
+  !> Sums series of `long` numbers at a time, so that the processor does not wait for a sum.
   pure subroutine sum_long_vectors(n, order, series, h, y)
     integer, intent(in) :: n   !! a multiple of `long`
     integer, intent(in) :: order

@@ -105,7 +105,7 @@ contains
     all_finite = iand(transfer((total(1) + total(2)) + (total(3) + total(4)), exponent_mask), exponent_mask) /= exponent_mask
   end subroutine sum_stages
 
-  !> The same in large tiles, each of which stays in the first-level cache until it has been checked for infinities.
+  !> Sums stages in large tiles, each of which stays in the first-level cache until it has been checked for infinities.
   pure recursive subroutine sum_large_tiles(stage_sum, k, x_length, x, h_length, h, y, all_finite)
     type(stage_sum_t), intent(in) :: stage_sum
     real(wp), intent(in) :: k(stage_sum%extent)

@@ -114,7 +114,7 @@ contains
     if (any_differs(attempt%lanes, attempt%rhs_status, evaluation_ok)) call disable_failed_lanes(attempt, dydt)
   end subroutine evaluate
 
-  !> The same, and disables lanes whose values are not finite.
+  !> Evaluates the right-hand side, and disables lanes whose values are not finite.
   subroutine evaluate_finite(attempt, system, t, y, dydt)
     type(step_attempt_t), intent(inout) :: attempt
     class(system_t), intent(inout) :: system

@@ -129,7 +129,7 @@ contains
     is_settled = is_settled_part(before, middle, bend) .and. is_settled_part(middle, after, bend)
   end function is_settled
 
-  !> The same for one of the parts: it is monotonic, or stays above zero.
+  !> Whether one of the parts is monotonic or stays above zero.
   elemental logical function is_settled_part(before, after, bend)
     real(wp), intent(in) :: before, after
     real(wp), intent(in) :: bend   !! second difference

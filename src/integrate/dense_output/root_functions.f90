@@ -67,7 +67,7 @@ contains
     roots%side(lane, :) = sign_of(roots%last(:, lane))
   end subroutine start_root_functions
 
-  !> The same where the values are known.
+  !> Starts the functions of a lane from known values.
   pure subroutine set_start(roots, lane, g)
     type(root_functions_t), intent(inout) :: roots
     integer, intent(in) :: lane

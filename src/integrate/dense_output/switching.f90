@@ -181,7 +181,7 @@ contains
     call system%indicator_values(dense%lane, dense%t + theta * dense%h, switching%y, switching%g)
   end subroutine find_indicators
 
-  !> The same for crossings from which an indicator returns before the end of a part, as at a grazing contact.
+  !> Finds crossings from which an indicator returns before the end of a part, as at a grazing contact.
   subroutine find_grazing_crossings(switching, system, observer, dense, theta)
     type(switching_t), intent(inout) :: switching
     class(system_t), intent(inout) :: system

@@ -58,7 +58,7 @@ contains
     call integrate_with(stepper, system, settings, times, ensemble, observer, solver_status)
   end subroutine integrate_ensemble
 
-  !> The same with a given stepper and with settings that have been checked.
+  !> Integrates with a given stepper and with settings that have been checked.
   subroutine integrate_with(stepper, system, settings, times, ensemble, observer, solver_status)
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(inout) :: system

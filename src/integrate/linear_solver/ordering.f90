@@ -69,7 +69,7 @@ contains
     graph%start(nodes + 1) = filled + 1
   end function neighbours
 
-  !> The same graph, with the neighbours of each node in the order of `nodes`.
+  !> The graph with the neighbours of each node in the order of `nodes`.
   pure function sorted_neighbours(graph, nodes) result(sorted)
     type(groups_t), intent(in) :: graph
     integer, intent(in) :: nodes(:)

@@ -58,7 +58,7 @@ contains
     operations = n * (2 * l * (l + u) + column_cost + solutions * (2 * (2 * l + u) + column_cost))
   end function banded_operations
 
-  !> The same with a dense one: 2/3 n^3 for the factorisation, 2 n^2 for each solution.
+  !> Operations of a step with a dense matrix: 2/3 n^3 for the factorisation, 2 n^2 for each solution.
   elemental real(wp) function dense_operations(n) result(operations)
     real(wp), intent(in) :: n   !! states
 

@@ -150,7 +150,7 @@ contains
     end do
   end subroutine choose_steps
 
-  !> The same as `choose_steps` if no lane has anything to decide: all go on by series. Else does nothing that is done again.
+  !> Chooses series for all lanes if none has anything to decide. Otherwise leaves the state unchanged.
   subroutine choose_calm_steps(self, system, attempt, control)
     class(auto_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
@@ -269,7 +269,7 @@ contains
     call try_kind(self, attempt, control, lane, by_stages)
   end subroutine try_kinds
 
-  !> The same for one kind.
+  !> Tries one kind of step.
   subroutine try_kind(self, attempt, control, lane, kind)
     type(auto_stepper_t), intent(inout) :: self
     type(step_attempt_t), intent(in) :: attempt

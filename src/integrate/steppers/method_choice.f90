@@ -109,7 +109,7 @@ contains
     if (frequency > 1 / break_even) break_even = 1 / frequency
   end function break_even
 
-  !> The same, instead of steps of size h by the present kind.
+  !> Step size from which another kind costs less, instead of steps of size h by the present kind.
   pure real(wp) function needed_step(choice, data, kind, t, h)
     type(choice_t), intent(in) :: choice
     type(kind_data_t), intent(in) :: data

@@ -98,7 +98,7 @@ contains
     text = source_text(self, self%groups(index)%line, 0) // ': ' // self%label(index)
   end function location_of_group
 
-  !> The same with the line of `key` if the file sets it, or "--set PATH=VALUE: &gear 'reducer'" if an override does.
+  !> Location of a key: the line of `key` if the file sets it, or "--set PATH=VALUE: &gear 'reducer'" if an override does.
   pure function location_of_key(self, index, key) result(text)
     class(input_t), intent(in) :: self
     integer, intent(in) :: index   !! of the group

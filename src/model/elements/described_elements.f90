@@ -387,7 +387,7 @@ contains
                                        self%branch(lane, switch), motion, internal, .true., distance)
   end subroutine indicator
 
-  !> The same for all switches and the lanes of a block.
+  !> Indicators of all switches in all lanes of a block.
   subroutine block_indicators(self, time, angle, speed, internal, distance)
     class(described_elements_t), intent(inout) :: self
     real(wp), intent(in) :: time(self%lanes)                         !! t [s]

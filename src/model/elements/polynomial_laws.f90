@@ -206,7 +206,7 @@ contains
     end do
   end subroutine moments
 
-  !> The same for plain springs, with the same bits: the added zero makes -0 a +0, as the constant does in `moments`.
+  !> Moments of springs without a constant, in the bits of `moments`: the added zero makes -0 a +0, as the constant does there.
   pure subroutine plain_moments(n, linear, cubic, by_speed, angle, speed, restoring, applied)
     integer, intent(in) :: n   !! values of the part
     real(wp), intent(in), dimension(n) :: linear, cubic, by_speed, angle, speed

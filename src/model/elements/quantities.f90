@@ -14,7 +14,7 @@ module nocdyn_quantities
   integer, parameter, public :: form_applied = 4    !! `applied`
   integer, parameter, public :: form_total = 5      !! both together
 
-  !> What one looks for first in a table, first; `rank_detail` is left out of short tables.
+  !> Key results of a table come first; `rank_detail` is left out of short tables.
   integer, parameter, public :: rank_moment = 1, rank_reaction = 2, rank_force = 3, rank_stress = 4, rank_torque = 5, &
     rank_loss = 6, rank_speed = 7, rank_slip = 8, rank_twist = 9, rank_current = 10, rank_detail = 11
 

@@ -84,7 +84,7 @@ contains
                                                  internal(self%first_internal(switch):self%last_internal(switch)), distance)
   end subroutine indicator
 
-  !> The same for all switches and the lanes of a block.
+  !> Indicators of all switches in all lanes of a block.
   subroutine block_indicators(self, banks, time, angle, speed, internal, distance)
     class(switches_t), intent(in) :: self
     type(bank_slot_t), intent(inout) :: banks(:)

@@ -226,7 +226,7 @@ contains
     end associate
   end function angle_at_zero
 
-  !> The same for the twist of an element [rad].
+  !> Twist of an element where all coordinates are zero [rad].
   pure real(wp) function twist_at_zero(self, lane, element)
     class(coordinate_formulation_t), intent(in) :: self
     integer, intent(in) :: lane, element

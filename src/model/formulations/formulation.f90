@@ -180,7 +180,7 @@ contains
     angle_at_zero = 0.0_wp
   end function angle_at_zero
 
-  !> The same for the twist of an element [rad].
+  !> Twist of an element where all coordinates are zero [rad].
   pure real(wp) function twist_at_zero(self, lane, element)
     class(formulation_t), intent(in) :: self
     integer, intent(in) :: lane, element
@@ -297,7 +297,7 @@ contains
     end do
   end subroutine indicator_values
 
-  !> One of them.
+  !> Indicator of one switch.
   subroutine indicate_branch(self, which, lane, t, y, g)
     class(formulation_t), intent(inout) :: self
     integer, intent(in) :: which, lane            !! switch, 1 to `switches`; lane
@@ -328,7 +328,7 @@ contains
     end associate
   end subroutine choose_branch
 
-  !> The same for an integrator, which lets the state jump.
+  !> Changes a branch for an integrator, which lets the state jump.
   subroutine change_to_branch(self, lane, which, t, y)
     class(formulation_t), intent(inout) :: self
     integer, intent(in) :: lane

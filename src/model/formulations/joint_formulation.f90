@@ -103,7 +103,7 @@ contains
     end do
   end subroutine indicate_all
 
-  !> One of them.
+  !> Indicator of one switch.
   subroutine indicate_one(self, which, lane, t, y, g)
     class(joint_formulation_t), intent(inout) :: self
     integer, intent(in) :: which, lane            !! switch, 1 to `switches`; lane
@@ -121,7 +121,7 @@ contains
     call set_joint_indicator(self, which, t, y, g)
   end subroutine indicate_one
 
-  !> That of a joint, if it is not locked or its moment has been found.
+  !> Indicator of a joint; the moment of a locked one must be known.
   subroutine set_joint_indicator(self, switch, t, y, g)
     class(joint_formulation_t), intent(inout) :: self
     integer, intent(in) :: switch
@@ -309,7 +309,7 @@ contains
     end associate
   end subroutine strike
 
-  !> The same at an event in a motion, which is noted.
+  !> Settles joints at an event in a motion, and notes it.
   subroutine settle_at_event(self, which, t, y)
     class(joint_formulation_t), intent(inout) :: self
     integer, intent(in) :: which                  !! joint

@@ -154,7 +154,7 @@ contains
     if (self%joints%count > 0) call self%hold_derivative(self%states + self%quadratures, t(1), dydt, status(1))
   end subroutine derivative
 
-  !> The same with arrays of one dimension: speeds, angles, internal states and work integrals follow one another.
+  !> Derivative in arrays of one dimension: speeds, angles, internal states and work integrals follow one another.
   subroutine fill_derivative(self, n, internal, quadratures, t, y, dydt)
     type(reduced_t), intent(inout) :: self
     integer, intent(in) :: n                                                       !! lanes * freedoms

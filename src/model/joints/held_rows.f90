@@ -175,7 +175,7 @@ contains
     end associate
   end subroutine find_moments
 
-  !> The same where rows move.
+  !> Moments of locked joints where rows move.
   subroutine find_moving_moments(self)
     class(held_rows_t), intent(inout) :: self
     real(wp) :: x(self%count)
@@ -200,7 +200,7 @@ contains
     self%moment(self%holding(:n)) = -x(:n)
   end subroutine find_moving_moments
 
-  !> The same with teeth that have losses.
+  !> Moments of locked joints beside teeth with losses.
   subroutine find_moments_with_teeth(self, drag)
     class(held_rows_t), intent(inout) :: self
     real(wp), intent(in) :: drag(:)   !! s T [N m], [losses]

@@ -99,7 +99,7 @@ contains
     end do
   end subroutine equations
 
-  !> The same in the unit of `roots`. Redundant locks have some flexibility here, by which they share their moment.
+  !> Equations in the unit of `roots`. Redundant locks have some flexibility here, by which they share their moment.
   pure subroutine scaled_equations(self, matrix, wanted)
     class(joint_problem_t), intent(in) :: self
     real(wp), intent(out) :: matrix(:, :)   !! [joints, joints]

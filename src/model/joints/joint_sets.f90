@@ -291,7 +291,7 @@ contains
     self%moment(resting) = x
   end subroutine decide_resting
 
-  !> The same where some are teeth with losses: which of their wheels drives is decided even where they turn.
+  !> Decides joints at rest where some are teeth with losses: which of their wheels drives is decided even where they turn.
   subroutine decide_with_teeth(self, banks, t, is_at_rest, slip, is_solved)
     class(joint_sets_t), intent(inout) :: self
     type(bank_slot_t), intent(in) :: banks(:)

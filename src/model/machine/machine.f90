@@ -34,7 +34,7 @@ module nocdyn_machine
     type(start_impulse_t), allocatable :: start_impulse   !! if the start speeds of the input were projected
     real(wp), allocatable :: steady_internal(:, :)        !! internal states of a steady start, [lanes, internal states]
     type(string_t), allocatable :: start_notes(:)         !! how the start was found; joints that do nothing
-    type(string_t), allocatable :: simplifications(:)     !! what it leaves out of the input, and what stands for it
+    type(string_t), allocatable :: simplifications(:)     !! simplifications of the model, one sentence each
     type(bank_slot_t), allocatable :: banks(:)
     type(elements_t) :: elements                !! elements of all banks, after `number_elements`
     type(polynomial_laws_t) :: laws             !! polynomial parts of their laws, after `number_elements`

@@ -26,10 +26,10 @@ def steady_section(sources: Sources) -> Section | None:
 
 
 def stability_text(state: dict) -> str:
-    """As 'Stable: disturbances decay with 0.98 1/s or faster.'"""
+    """As 'Stable: disturbances decay at 0.98 1/s or faster.'"""
     growth = state.get("growth_rate_1_s")
     if state["stability"] == "stable" and growth is not None:
-        return f"Stable: disturbances decay with {number_text(-growth)} 1/s or faster."
+        return f"Stable: disturbances decay at {number_text(-growth)} 1/s or faster."
     if growth is not None and growth > 0:
         return f"{state['stability'].capitalize()}: disturbances grow with {number_text(growth)} 1/s."
     return f"Stability: {state['stability']}."

@@ -205,7 +205,7 @@ contains
     call fourier_coefficients(sampled_force(group), force%mean, force%sine, force%cosine)
   end function force_of
 
-  !> The same at equal distances over a cycle.
+  !> Force at equal distances over a cycle.
   function sampled_force(group) result(force)
     type(group_t), intent(in) :: group
     real(wp) :: force(samples)   !! [N]

@@ -209,7 +209,7 @@ contains
     end do
   end function torques
 
-  !> The same torques in every lane.
+  !> Repeats the torques in every lane.
   function in_lanes(torque, lanes) result(all_torques)
     type(order_torque_t), intent(in) :: torque(:)
     integer, intent(in) :: lanes

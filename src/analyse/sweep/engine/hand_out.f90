@@ -52,7 +52,7 @@ contains
     self%range = 1
   end subroutine refill_ranges
 
-  !> The same for the range that another hand-out has taken, which may have no variants.
+  !> Takes one range, as another hand-out has taken it; it may have no variants.
   subroutine refill_range(self, first, count)
     class(hand_out_t), intent(inout) :: self
     integer, intent(in) :: first, count

@@ -98,7 +98,7 @@ contains
     call block%machines%release()
   end subroutine compute_chunks
 
-  !> Of a clock that only runs forward [s].
+  !> Monotonic clock time [s].
   real(wp) function time_now() result(seconds)
     integer(int64) :: count, rate
 
