@@ -28,6 +28,15 @@ OTHER_STEPS = 1e-3  # of the largest value of a column: the tolerances of the st
 ROWS = 0.05  # of means, which a run does not have: a single row that is apart
 ROUNDING = 1e-9  # columns without larger values are zero but for rounding
 
+TEETH = """\
+&body name = 'a' inertia = 1.8 /
+&body name = 'b' inertia = 0.461 /
+&mesh name = 'c' bodies = 'a', 'b' radii = 0.1, 0.157 stiffness = 84000.0 damping = 26.1 /
+&motor name = 'm' body = 'a' kind = 'constant' torque = 46.2 /
+&load name = 'l' body = 'b' viscous = 1.87 constant = 5.69 constant_speed = 0.413 /
+&run t_end = 0.5 /
+"""
+
 
 def variants_of(machine, seed):
     """Some numbers that vary, and their values in each variant."""
@@ -44,7 +53,12 @@ def run(nocdyn, targets, row):
     if outcome.returncode:
         return None
     header, rows = nocdyn.table("run")
-    return dict(zip(header, np.array(rows).T)), nocdyn.summary("run")["columns"]
+    values, extremes = dict(zip(header, np.array(rows).T)), nocdyn.summary("run")["columns"]
+    for column in extremes.keys() & values.keys() - {"energy_residual [J]"}:  # of rounding
+        of_run = extremes[column]
+        size = OTHER_STEPS * max(abs(of_run["min"]), abs(of_run["max"]), ROUNDING)
+        assert of_run["min"] - size <= min(values[column]) and max(values[column]) <= of_run["max"] + size, column
+    return values, extremes
 
 
 def write_sweep(nocdyn, text, targets, rows, columns):
@@ -170,6 +184,15 @@ IMPACT = """\
 &record quantity = 'omega_b' statistic = 'max', 'time_of_max' /
 &record quantity = 'omega_a' statistic = 'max', 'time_of_max' /
 """
+
+
+def test_statistics_of_a_tooth_force_have_its_sign(nocdyn):
+    nocdyn.write("machine.nml", TEETH)
+    values, extremes = run(nocdyn, [], [])
+    assert max(values["force_c [N]"]) <= 0 and extremes["force_c [N]"]["max"] <= 0 and extremes["force_c [N]"]["min"] < -90
+    write_sweep(nocdyn, TEETH, ["body.a.inertia"], [[1.8]], ["force_c"])
+    (variant,) = sweep(nocdyn, "one")
+    assert not differences(variant, {name: values[name] for name in ("t [s]", "force_c [N]")}, extremes, OTHER_STEPS)
 
 
 @pytest.mark.parametrize("time", [0, 0.3])

@@ -34,6 +34,7 @@ module nocdyn_linear_columns
     logical, allocatable, private :: has_law(:)     !! whether it is an elastic moment; [columns]
     integer, allocatable, private :: bank(:)        !! of a whole moment or a stress, 0 of other columns; [columns]
     integer, allocatable, private :: divisor(:)     !! parameter of the bank that divides a moment, 0: none; [columns]
+    real(wp), allocatable, private :: direction(:)  !! 1 if a moment is positive on the first body, else -1; [columns]
     logical, allocatable, private :: is_rate(:)     !! whether a speed is multiplied, [entries]
     integer, allocatable, private :: body(:)        !! whose angle or speed the column is; [columns]
   contains
@@ -95,6 +96,7 @@ contains
     allocate (self%is_speed, source=columns%kind == signal_speed)
     allocate (self%has_law(self%count), source=.false.)
     allocate (self%element(self%count), self%body(self%count), self%bank(self%count), self%divisor(self%count), source=0)
+    allocate (self%direction(self%count), source=1.0_wp)
     do i = 1, self%count
       call set_column(self, i, block%machine, columns(i))
       call add_entries(self, i, block%machine)
@@ -113,6 +115,7 @@ contains
     if (column%kind /= signal_element) return
     self%element(number) = machine%banks(column%bank)%bank%first - 1 + column%index
     self%has_law(number) = has_law(machine, column)
+    if (column%form /= form_angle) self%direction(number) = -column%factor
     if (self%has_law(number) .or. column%form == form_angle) return
     self%bank(number) = column%bank
     self%divisor(number) = column%divisor
@@ -219,8 +222,8 @@ contains
     real(wp) :: stiffness, damping
     integer :: k
 
-    stiffness = machine%laws%linear(lane, self%element(i))
-    damping = -machine%laws%by_speed(lane, self%element(i))
+    stiffness = self%direction(i) * machine%laws%linear(lane, self%element(i))
+    damping = -self%direction(i) * machine%laws%by_speed(lane, self%element(i))
     if (self%divisor(i) > 0) then
       associate (bank => machine%banks(self%bank(i))%bank)
         associate (modulus => bank%parameters(self%divisor(i))%value(lane, self%element(i) - bank%first + 1))
@@ -230,7 +233,7 @@ contains
       end associate
     end if
     associate (at => lane_in_strip(lane), strip => strip_of(lane))
-      self%offset(at, i, strip) = stiffness * self%offset(at, i, strip)
+      self%offset(at, i, strip) = 0.0_wp + stiffness * self%offset(at, i, strip)   ! not -0
       do k = self%first(i), self%first(i + 1) - 1
         self%factor(at, k, strip) = merge(damping, stiffness, self%is_rate(k)) * self%factor(at, k, strip)
       end do
@@ -247,8 +250,8 @@ contains
 
     do i = 1, self%count
       if (.not. self%has_law(i)) cycle
-      linear(lane, i) = machine%laws%linear(lane, self%element(i))
-      cubic(lane, i) = machine%laws%cubic(lane, self%element(i))
+      linear(lane, i) = self%direction(i) * machine%laws%linear(lane, self%element(i))
+      cubic(lane, i) = self%direction(i) * machine%laws%cubic(lane, self%element(i))
     end do
   end subroutine find_laws
 
