@@ -134,13 +134,14 @@ contains
     character(len=*), intent(in) :: name
     type(signal_t), intent(in) :: signals(:)
     character(len=:), allocatable, intent(out) :: text
-    type(string_t) :: labels(size(signals)), names(size(signals))
+    type(string_t), allocatable :: labels(:)
+    type(string_t) :: names(size(signals))
     integer :: i
 
     do i = 1, size(signals)
       names(i)%text = signals(i)%name
-      labels(i)%text = signals(i)%name // ' [' // signals(i)%unit // ']'
     end do
+    call label_signals(signals, labels)
     text = near_match(name, names)
     if (index(name, '[') > 0) text = near_match(name, labels)
     if (text == '') text = ', which has ' // related_names(name(:index(name // ' [', ' [') - 1), signals, names)
