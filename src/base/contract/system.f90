@@ -4,15 +4,15 @@
 !> so that each operation is a loop over lanes; one machine is a block of one lane. A lane never reads the values of another lane.
 !>
 !> The last `quadratures` components of a state are pure integrals: the derivative depends on none of them. Their errors are
-!> controlled loosely: those of all steps add up to about a ten-thousandth of what they change by in all. Linear systems have only
-!> the first `states` components.
+!> controlled loosely: over all steps they add up to about a ten-thousandth of what they change by in all. Linear systems have
+!> only the first `states` components.
 !>
 !> The Jacobian is a list of values at the positions that `jacobian_pattern` returns once, before the integration. By default
 !> these are all positions, column by column.
 !>
 !> A system may provide the Taylor series of its solution, which the method `taylor` needs; by default it does not.
 !>
-!> The error of a step is that of the states, each relative to its own size, unless the system names quantities of its own in
+!> The error of a step is measured in the states, each relative to its own size, unless the system names quantities of its own in
 !> which it is measured: combinations of the states that matter, such as differences of large numbers. If its equations stay the
 !> same when some states are shifted together, it may keep such a shift apart, so that those states stay small and keep their
 !> digits.
@@ -39,7 +39,7 @@ module nocdyn_system
     integer :: states = 0        !! components that the equations depend on
     integer :: quadratures = 0   !! components after the states that are integrals only
     integer :: switches = 0      !! indicator functions: a step ends where one of them falls through zero
-    integer :: measures = 0      !! quantities in which `measure` measures errors; 0: errors are those of the states
+    integer :: measures = 0      !! quantities in which `measure` measures errors; 0: in the states
     integer :: phases = 0        !! the last of these: angles excluded from the estimate of the first step
     logical :: hides_bends = .false. !! whether the series can miss a sharp transition, as of tanh
     logical :: is_shared = .false.   !! whether its lanes are variants of a sweep, which changes the cost model
@@ -142,7 +142,7 @@ contains
     error stop 'nocdyn_system: a system with measures overrides measure'
   end subroutine measure
 
-  !> The name of a measured quantity in messages, e.g. "twist of 'shaft'"; that of the state if the states are measured.
+  !> The name of a measured quantity in messages, e.g. "twist of 'shaft'"; the state's name if the states are measured.
   function measure_name(self, index) result(name)
     class(system_t), intent(in) :: self
     integer, intent(in) :: index   !! 1 to measures, or to states
@@ -232,7 +232,7 @@ contains
     error stop 'nocdyn_system: a system with a Taylor series overrides series'
   end subroutine series
 
-  !> The cost of an evaluation of f in a lane, in the unit of `nocdyn_step_costs`; the default is that of a chain of bodies.
+  !> The cost of an evaluation of f in a lane, in the unit of `nocdyn_step_costs`; the default is the cost of a chain of bodies.
   pure real(wp) function evaluation_cost(self) result(cost)
     class(system_t), intent(in) :: self
 

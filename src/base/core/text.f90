@@ -15,7 +15,7 @@ module nocdyn_text
   integer, parameter, public :: number_width = 32   !! no number of `write_number` is longer
 
   !> A text of any length, for arrays of texts. gfortran 12 never frees the texts of an array constructor with `string_t(...)`,
-  !> nor those of an argument with a vector subscript; `strings`, `append` and `selected` avoid both.
+  !> nor of an argument with a vector subscript; `strings`, `append` and `selected` avoid both.
   !>
   !> gfortran 12 keeps the length of an allocatable text that a function returns in static memory of the caller, which all threads
   !> share. Functions that threads of a sweep call therefore return texts of lengths that other functions find before.

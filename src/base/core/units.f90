@@ -1,4 +1,4 @@
-!> Units of the field beside those of SI: the only place that converts one into the other.
+!> Units of the field beside SI: the only place that converts one into the other.
 module nocdyn_units
   use nocdyn_kinds, only: wp
   implicit none (type, external)
@@ -15,7 +15,7 @@ module nocdyn_units
 
   real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)   ! [rad]
 
-  !> The unit with the index 0 is that of SI, whatever it is. Of two units of one quantity the first is preferred for speeds.
+  !> The unit with the index 0 is the SI unit of the quantity. Of two units of one quantity the first is preferred for speeds.
   type(unit_t), parameter, public :: units(*) = [unit_t('rpm', 'rad/s', turn / 60.0_wp), unit_t('Hz', 'rad/s', turn), &
                                                  unit_t('deg', 'rad', turn / 360.0_wp)]
   integer, parameter, public :: unit_rpm = 1, unit_hz = 2, unit_deg = 3   !! indices of `units`

@@ -144,7 +144,7 @@ contains
     call tape%append(node, number%node)
   end function literal
 
-  !> One of several constants: that of the present branch, 1 to the number of choices, of a switch of the element.
+  !> The constant of the present branch, 1 to the number of choices, of a switch of the element.
   function pick(switch, choices) result(picked)
     integer, intent(in) :: switch                  !! of each element, 1 for its first one
     type(expression_t), intent(in) :: choices(:)   !! constants, by branch

@@ -1,6 +1,6 @@
 !> Operators of formulas as they are written in Fortran: with numbers on either side, whole numbers, and any powers.
 !>
-!> They extend those of `nocdyn_law_expressions`. A quotient x / c is x times 1 / c.
+!> They extend the operators of `nocdyn_law_expressions`. A quotient x / c is x times 1 / c.
 module nocdyn_law_operators
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: apply, expression_t, literal, operator(*), operator(**), operator(+), operator(-), operator(/)

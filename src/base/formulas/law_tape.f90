@@ -2,7 +2,7 @@
 !>
 !> Every node of the list is a number for each element and lane. Constants follow from the parameters and from the present
 !> branches; they change where these do. Variables follow from the motion: the relative angle u and speed u' of an element,
-!> those of its phase, its internal states, and the time. `nocdyn_law_expressions` writes such lists from formulas,
+!> u and u' of its phase, its internal states, and the time. `nocdyn_law_expressions` writes such lists from formulas,
 !> `nocdyn_law_walk` carries them out.
 module nocdyn_law_tape
   use nocdyn_kinds, only: wp
@@ -204,7 +204,7 @@ contains
   end function constants
 
   !> The variables that some nodes need, these among them, ascending. The series of a sine needs the cosine, which follows it in
-  !> the list, unless its argument grows evenly, and that of tanh needs 1 - tanh^2, which follows too.
+  !> the list, unless its argument grows evenly, and the series of tanh needs 1 - tanh^2, which follows too.
   pure function needed(self, results, with_series) result(nodes)
     class(law_tape_t), intent(in) :: self
     integer, intent(in) :: results(:)        !! nodes, or 0

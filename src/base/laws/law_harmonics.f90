@@ -21,7 +21,7 @@ contains
     if (order > 0) harmonic_work = 4 + order / 4
   end function harmonic_work
 
-  !> The factors n^j / j! of derivatives, with the signs of those of a sine.
+  !> The factors n^j / j! of derivatives, with the signs of a sine's derivatives.
   pure function harmonic_factors(order, n) result(factors)
     integer, intent(in) :: order
     integer, intent(in) :: n(:)

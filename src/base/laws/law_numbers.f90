@@ -71,7 +71,7 @@ contains
     end associate
   end function new_law_numbers
 
-  !> The guards of each branch that is named; other branches, in the last column, have those of all branches.
+  !> The guards of each branch that is named; other branches, in the last column, have the guards of all branches.
   pure subroutine find_guards(self, tape)
     type(law_numbers_t), intent(inout) :: self
     type(law_tape_t), intent(in) :: tape

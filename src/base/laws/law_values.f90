@@ -51,7 +51,7 @@ contains
     has_harmonics = any(self%operation == op_harmonics)
   end function has_harmonics
 
-  !> Computes the values, from those of the inputs and constants.
+  !> Computes the values from the inputs and constants.
   pure subroutine compute(self, last, x)
     class(law_program_t), intent(in) :: self
     integer, intent(in) :: last               !! node

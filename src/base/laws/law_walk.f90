@@ -11,7 +11,7 @@ module nocdyn_law_walk
 
 contains
 
-  !> Computes the coefficient k of the variables of a work space, from those of lower number and those of the inputs.
+  !> Computes the coefficient k of the variables of a work space, from coefficients of lower number and from the inputs.
   subroutine walk(law, work, k, first_group)
     type(law_t), intent(in) :: law
     type(law_work_t), intent(inout) :: work

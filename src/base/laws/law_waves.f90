@@ -26,7 +26,7 @@ contains
   end function is_wave
 
   !> The largest rate of the arguments of its sines [rad/s], in which harmonics count with their largest multiple. Arguments are
-  !> sums of multiples of the time and of angles; those of other form do not count.
+  !> sums of multiples of the time and of angles; other forms do not count.
   pure real(wp) function fastest_wave(law, slot, speed) result(fastest)
     type(law_t), intent(in) :: law
     integer, intent(in) :: slot            !! of the element, counted through all strips

@@ -14,7 +14,7 @@ module nocdyn_law_work
     integer :: w = 0                        !! numbers of a group
     integer :: groups = 0
     integer, allocatable :: nodes(:)        !! variables that are computed, ascending
-    integer, allocatable :: later(:)        !! those of them whose coefficients from the second on are computed one by one
+    integer, allocatable :: later(:)        !! variables whose coefficients from the second on are computed one by one
     integer, allocatable :: first(:)        !! of each node; 0 for constants, and for variables that are not needed
     integer, allocatable :: work_first(:)   !! of the work space of harmonics, which follows
     integer, allocatable :: table_first(:)  !! of the factors of harmonics in `table`

@@ -100,7 +100,7 @@ contains
     end associate
   end function slot
 
-  !> How many slots after that of an element in one lane are copies of it.
+  !> How many slots after the slot of an element in one lane are copies of it.
   pure integer function copies(self, lane, element)
     class(law_t), intent(in) :: self
     integer, intent(in) :: lane, element

@@ -2,7 +2,7 @@
 !> at a bound, at least zero where it is the lower one and at most zero where it is the upper one.
 !>
 !> These are the conditions for the least of x^T W x / 2 + b^T x, with W symmetric and positive semidefinite; a is unique, and
-!> the forces that are not at their bounds are those of least norm. The active set changes by one force at a time:
+!> the forces that are not at their bounds have the least norm. The active set changes by one force at a time:
 !> J. Nocedal, S. J. Wright, Numerical Optimization, 2nd ed., algorithm 16.3. Joints with dry friction at rest are of this kind:
 !> Ch. Glocker, F. Pfeiffer, Nonlinear Dynamics 4 (1993) 465-480.
 module nocdyn_bounded_complementarity
@@ -16,7 +16,7 @@ module nocdyn_bounded_complementarity
 
   integer, parameter, public :: is_free = 0, at_lower = -1, at_upper = 1   !! where a force is
   real(wp), parameter :: rounding = 1.0e-12_wp                             ! of a, relative to the sum of its terms
-  real(wp), parameter :: mixed = 1.0e-2_wp                                 ! of the largest terms, in those of all a
+  real(wp), parameter :: mixed = 1.0e-2_wp                                 ! of the largest terms in the sums of all a
   real(wp), parameter :: inconsistent = 1.0e-7_wp                          ! a of free forces that none can make zero, likewise
   real(wp), parameter :: far = 1.0e30_wp                                   ! beyond all bounds that are not huge
 
@@ -25,8 +25,8 @@ contains
   !> Solves the problem. Bounds may be huge.
   subroutine solve_bounded_complementarity(w, b, lower, upper, x, a, state, is_solved)
     real(wp), intent(in) :: w(:, :)              !! [n, n], in any unit
-    real(wp), intent(in) :: b(:)                 !! [n], that of a
-    real(wp), intent(in) :: lower(:), upper(:)   !! lower <= upper, [n], that of x
+    real(wp), intent(in) :: b(:)                 !! [n], offset of a
+    real(wp), intent(in) :: lower(:), upper(:)   !! bounds of x, lower <= upper, [n]
     real(wp), intent(out) :: x(:), a(:)          !! [n]
     integer, intent(out) :: state(:)             !! is_free, at_lower or at_upper, [n]
     logical, intent(out) :: is_solved            !! false without such forces, or after too many changes of the active set

@@ -5,7 +5,7 @@
 !>
 !> Integrators mostly solve small systems, for which the calls inside LAPACK cost more than the arithmetic. With the reference
 !> LAPACK and gfortran 12, at order 4 (12), the unblocked DGETF2 takes a third (two fifths) of the time of DGETRF, and a plain
-!> loop over the factors a quarter (three fifths) of that of DGETRS.
+!> loop over the factors a quarter (three fifths) of the time of DGETRS.
 module nocdyn_lapack_lu
   use nocdyn_kinds, only: wp
   implicit none (type, external)

@@ -85,7 +85,7 @@ contains
     end associate
   end subroutine choose_row
 
-  !> Makes a column that of the unit vector of a row.
+  !> Turns a column into the unit vector of a row.
   pure subroutine pivot(table, row, column)
     real(wp), intent(inout) :: table(:, :)
     integer, intent(in) :: row, column

@@ -110,7 +110,7 @@ contains
     if (rank < size(chosen)) dependent = chosen(pivots(rank + 1))
   end subroutine find_rank
 
-  !> Replaces a right-hand side by the solution, that of least norm of the scaled matrix if it is singular.
+  !> Replaces a right-hand side by the solution; by the one of least norm of the scaled matrix if it is singular.
   subroutine solve(self, x)
     class(semidefinite_t), intent(inout) :: self
     real(wp), intent(inout) :: x(:)   !! [order]

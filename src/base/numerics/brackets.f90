@@ -1,8 +1,8 @@
 !> A root between two arguments at which a function has different signs.
 !>
-!> The caller evaluates the function at `next()` and gives the value to `narrow`, until the bracket `is_narrow`. The arguments are
-!> those of regula falsi with the Illinois rule (M. Dowell, P. Jarratt, BIT 11 (1971) 168-174); where that has not halved the
-!> bracket enough in two steps, the middle. A jump or a kink is found like a root.
+!> The caller evaluates the function at `next()` and gives the value to `narrow`, until the bracket `is_narrow`. The arguments
+!> follow regula falsi with the Illinois rule (M. Dowell, P. Jarratt, BIT 11 (1971) 168-174); where it has not halved the bracket
+!> enough in two steps, the argument is the middle. A jump or a kink is found like a root.
 module nocdyn_brackets
   use nocdyn_kinds, only: wp
   implicit none (type, external)

@@ -15,7 +15,7 @@ module nocdyn_chebyshev
   integer, parameter :: max_parts = 1000            ! far more than are needed to resolve a polynomial
   integer, parameter :: max_newton_steps = 60       ! bisection alone would need as many
   integer, parameter :: rows = 8                    ! of the matrix that are multiplied together
-  real(wp), parameter :: last_change = 1.0e-4_wp    ! of Newton's method: the error of x is its square, that of the maximum less
+  real(wp), parameter :: last_change = 1.0e-4_wp    ! of Newton's method: the error of x is its square, of the maximum less
   real(wp), parameter :: least_half = 1.0e-8_wp     ! length of a part: its middle is a maximum to rounding
   real(wp), parameter :: lebesgue_constant = 4.0_wp   ! bound on the ratio of a polynomial to its values at up to 40 nodes
 
@@ -243,8 +243,8 @@ contains
     end do
   end subroutine find_series
 
-  !> The size of the last terms of a polynomial, by which that of those that it lacks is judged. That of the last but one counts
-  !> a little, as the last one may be zero by symmetry.
+  !> The size of the last terms of a polynomial, a measure of the terms that it lacks. The last term but one counts a little, as
+  !> the last one may be zero by symmetry.
   pure real(wp) function last_terms(rule, values) result(size)
     type(interpolation_t), intent(in) :: rule
     real(wp), intent(in) :: values(0:rule%degree)   !! at the nodes

@@ -58,8 +58,8 @@ contains
     end do
   end function spline_slopes
 
-  !> The slope at an end: 0 if it is clamped, else that of the polynomial through six points, by Newton's divided differences. It
-  !> is not known if there are fewer points, or if the last term is not small.
+  !> The slope at an end: 0 if it is clamped, else the polynomial's through six points, by Newton's divided differences. It is
+  !> not known if there are fewer points, or if the last term is not small.
   pure subroutine find_end_slope(h, secant, is_clamped, slope, is_known)
     real(wp), intent(in) :: h(:), secant(:)   !! from the end inwards
     logical, intent(in) :: is_clamped
@@ -90,7 +90,7 @@ contains
     is_known = abs(factor * difference(1)) <= small * maxval(abs(secant(:degree)))
   end subroutine find_end_slope
 
-  !> The equation of the slope at an end that is not clamped: diagonal * slope + beside * that of the next point = right.
+  !> The equation of the slope at an end that is not clamped: diagonal * slope + beside * slope at the next point = right.
   pure subroutine set_free_end(h, next_h, secant, next_secant, diagonal, beside, right)
     real(wp), intent(in) :: h, next_h, secant, next_secant   !! from the end inwards
     real(wp), intent(out) :: diagonal, beside, right

@@ -122,7 +122,7 @@ contains
     end do
   end subroutine pair_of_toeplitz
 
-  !> The pair of products with two diagonals, as those of a chain: nothing is read twice.
+  !> The pair of products with two diagonals, as in a chain: nothing is read twice.
   pure subroutine pair_of_chain(rows, columns, column, coefficient, without_offset, offset, x, y, u, v)
     integer, intent(in) :: rows, columns
     integer, intent(in) :: column(2)

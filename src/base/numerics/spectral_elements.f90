@@ -16,7 +16,7 @@ module nocdyn_spectral_elements
   type, public :: spectral_element_t
     integer :: order = 1                     !! n
     real(wp), allocatable :: node(:)         !! on [0, 1], ascending, 0 to n
-    real(wp), allocatable :: mass(:)         !! of each node as a share of that of the bar, 0 to n
+    real(wp), allocatable :: mass(:)         !! of each node as a share of the mass of the bar, 0 to n
     real(wp), allocatable :: gauss(:)        !! on [0, 1], ascending, [n]
     real(wp), allocatable :: weight(:)       !! of the Gauss points, their sum is 1, [n]
     real(wp), allocatable :: row(:, :)       !! weight * strain at each Gauss point for the nodes, [n, 0 to n]
@@ -105,7 +105,7 @@ contains
     slope = value * total
   end function slope_of
 
-  !> The matrix from values at the Gauss points to those of the polynomial of degree n - 1 at other points, [points, n].
+  !> The matrix from values at the Gauss points to values of the polynomial of degree n - 1 at other points, [points, n].
   pure function interpolation(self, points) result(matrix)
     class(spectral_element_t), intent(in) :: self
     real(wp), intent(in) :: points(:)   !! on [0, 1]

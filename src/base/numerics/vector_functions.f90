@@ -10,7 +10,7 @@
 !>
 !> tanh x = E / (E + 2) for x >= 0 with E = exp(2 x) - 1 = 2^k (exp(r) - 1) + (2^k - 1), r = 2 x - k ln 2 in
 !> [-ln 2 / 2, ln 2 / 2]; ln 2 is in two parts, the first of 32 bits, and the Taylor series up to r^14 / 14! leaves less than
-!> 1e-19. The error is below 4 units in the last place too. So is that of exp x = 2^k (1 + (exp(r) - 1)).
+!> 1e-19. The errors of this and of exp x = 2^k (1 + (exp(r) - 1)) are below 4 units in the last place too.
 !>
 !> The logarithm and the power to base 2 are for step sizes, which do not need all digits: their errors are below 1e-8.
 !> log2 x = k + 1/2 + 2 / ln 2 artanh s with x = 2^k m, 1 <= m < 2, s = (m - sqrt 2) / (m + sqrt 2), |s| < 0.172.

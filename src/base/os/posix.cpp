@@ -13,7 +13,7 @@ extern "C" int nocdyn_open_existing(const char *path, int is_to_change) {
   return open(path, (is_to_change ? O_RDWR : O_RDONLY) | O_CLOEXEC);
 }
 
-// Whether a path is that of a pipe, socket, device or folder: to open it may wait, to read it may never end.
+// Whether a path leads to a pipe, socket, device or folder: to open it may wait, to read it may never end.
 extern "C" int nocdyn_is_irregular(const char *path) {
   struct stat about;
   return stat(path, &about) == 0 && !S_ISREG(about.st_mode);

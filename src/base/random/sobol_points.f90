@@ -1,12 +1,12 @@
 !> Sobol points, which fill the unit cube far more evenly than random points.
 !>
-!> The direction numbers are those of S. Joe, F. Y. Kuo, Constructing Sobol sequences with better two-dimensional projections,
+!> The direction numbers are by S. Joe, F. Y. Kuo, Constructing Sobol sequences with better two-dimensional projections,
 !> SIAM J. Sci. Comput. 30 (2008) 2635-2654: the first dimensions of their file new-joe-kuo-6.21201 (LICENSE-sobol-points).
 !>
 !> The points are in the order of the Gray code (I. A. Antonov, V. M. Saleev, USSR Comput. Math. Math. Phys. 19 (1979) 252-256),
 !> as in the authors' program and in SciPy's unscrambled `qmc.Sobol`, so that they can be compared one by one.
 !> Point k is the exclusive-or of the direction numbers of the bits of k + k / 2 without carry; the first 2^m points are
-!> those of the natural order.
+!> a permutation of the first 2^m in natural order.
 module nocdyn_sobol_points
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_kinds, only: wp

@@ -1,6 +1,6 @@
 !> The error norm of a step attempt: the root mean square of the errors, each relative to its tolerance.
 !>
-!> The errors are those of the states, or of the quantities that the system measures. The size of such a quantity is remembered
+!> Errors are measured in the states, or in the quantities that the system names. The size of such a quantity is remembered
 !> over some dozens of steps, so that an oscillation is as large where it passes through zero as elsewhere.
 module nocdyn_error_norm
   use nocdyn_kinds, only: wp

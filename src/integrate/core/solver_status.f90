@@ -34,7 +34,7 @@ module nocdyn_solver_status
     integer, allocatable :: evaluations(:)      !! of f
     integer, allocatable :: jacobians(:)
     integer, allocatable :: factorisations(:)
-    integer, allocatable :: implicit_steps(:)   !! accepted steps of an implicit method, but those of trials
+    integer, allocatable :: implicit_steps(:)   !! accepted steps of an implicit method without trials
     integer, allocatable :: switches(:)         !! changes between explicit and implicit method
     real(wp), allocatable :: switch_times(:, :) !! times of the first such changes [s], [max_switch_times, lanes]
     logical, allocatable :: implicit(:)         !! whether the last accepted step was an implicit method's

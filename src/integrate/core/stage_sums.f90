@@ -25,7 +25,7 @@ module nocdyn_stage_sums
     integer :: stages(max_terms) = 0     !! indices in the array of stages
     integer :: length = 0                !! of a stage
     integer :: extent = 0                !! of the array of stages
-    integer :: offsets(max_terms) = 0    !! of the stages in that array; after the last term those of the first one
+    integer :: offsets(max_terms) = 0    !! of the stages in that array; after the last term the offsets of the first one
   end type stage_sum_t
 
 contains

@@ -196,7 +196,7 @@ contains
     attempt%h_spread(lane, :) = 0.0_wp
   end subroutine disable_lane
 
-  !> Takes new values for those of accepted lanes; the new ones are not read any more.
+  !> Takes the new values of accepted lanes; the new ones are not read any more.
   pure subroutine advance(accepted, values, new_values)
     logical, intent(in) :: accepted(:)                                  !! [lanes]
     real(wp), allocatable, intent(inout) :: values(:, :), new_values(:, :)   !! [lanes, any]

@@ -16,7 +16,7 @@ module nocdyn_block_scan
     logical :: is_used = .false.               !! whether the system evaluates its indicators for blocks
     logical, allocatable :: is_near(:)         !! whether a lane may cross a boundary in the step, [lanes]
     integer, allocatable :: parts(:)           !! of the step of each lane
-    real(wp), allocatable :: g(:, :, :)        !! [lanes, functions, 0:parts]; those of part 0 stay from step to step
+    real(wp), allocatable :: g(:, :, :)        !! [lanes, functions, 0:parts]; part 0 stays from step to step
     real(wp), allocatable, private :: t(:)     !! [s], [lanes]
     real(wp), allocatable, private :: theta(:, :)   !! [lanes, batch]
     real(wp), allocatable, private :: y(:, :, :)    !! [lanes, padded columns, batch]

@@ -18,7 +18,7 @@ module nocdyn_root_functions
   integer, parameter :: least_parts = 4   !! of a step; more for dense output of higher degree, whose steps are longer
   integer, parameter :: max_grazing_steps = 10
   real(wp), parameter :: promising = 0.5_wp             ! of the least value: a parabola with a higher minimum predicts no root
-  real(wp), parameter :: least_distance = 1.0e-8_wp     ! in theta, of points on a parabola: rounding spoils that of closer points
+  real(wp), parameter :: least_distance = 1.0e-8_wp     ! in theta, of points on a parabola: rounding spoils closer ones
 
   type, public :: root_functions_t
     logical :: of_system = .false.                      !! indicator functions of the system, else events of the observer

@@ -25,7 +25,7 @@ module nocdyn_step_pieces
     integer :: depth = 0                               !! halvings of the present piece
     integer, private :: piece = 1, pieces = 1          !! before they are halved
     real(wp), private :: t_start = 0.0_wp, t_end = 0.0_wp   !! of the step [s]
-    real(wp), private :: ends(0:most_halvings) = 0.0_wp     !! of the present piece, and of those of which it is a half [s]
+    real(wp), private :: ends(0:most_halvings) = 0.0_wp     !! of the present piece, and of the pieces that contain it [s]
     real(wp), allocatable, private :: terms(:, :)           !! last terms there, [functions, 0:halvings]
     real(wp), allocatable, private :: lowest(:), highest(:) !! values so far, [functions]
   contains

@@ -138,8 +138,8 @@ contains
     end do
   end subroutine take_scan
 
-  !> Replaces the crossing at theta by that of one indicator in a bracket, if that is earlier. Of many indicators with a crossing
-  !> in one part of a step, most are still positive at the first crossing so far, so that few roots have to be found.
+  !> Replaces the crossing at theta by the crossing of one indicator in a bracket, if it is earlier. Of many indicators with a
+  !> crossing in one part of a step, most are still positive at the first crossing so far, so that few roots have to be found.
   subroutine find_earlier_crossing(switching, system, observer, dense, whole, theta)
     type(switching_t), intent(inout) :: switching
     class(system_t), intent(inout) :: system

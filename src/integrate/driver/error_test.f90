@@ -101,7 +101,7 @@ contains
     wanted = merge(integrator%attempt%lanes, 0, integrator%wants_dense_steps)
   end subroutine accept_all
 
-  !> Finds the lanes whose errors are within the tolerances, and those of them whose dense output is needed.
+  !> Finds the lanes whose errors are within the tolerances, and among them the lanes whose dense output is needed.
   pure subroutine find_wanted(integrator, wanted)
     type(integrator_t), intent(inout) :: integrator
     integer, intent(out) :: wanted   !! how many

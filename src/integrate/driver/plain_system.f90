@@ -114,8 +114,8 @@ contains
     self%last_step = 0.0_wp
   end subroutine start_lane
 
-  !> Sets dfdy and dfdt by differences. A shift is a cube root of the rounding error, which is where the errors by rounding and by
-  !> curvature meet, of a size: that of a component is its value, its change over a step, and what the tolerances tell from zero.
+  !> Sets dfdy and dfdt by differences. A shift is the cube root of the rounding error, where the errors by rounding and by
+  !> curvature meet, times the largest of a component's value, its change over a step, and what the tolerances tell from zero.
   subroutine take_differences(self, t, y, dfdt)
     type(plain_system_t), intent(inout) :: self
     real(wp), intent(in) :: t

@@ -35,7 +35,7 @@ module nocdyn_auto_stepper
     logical, allocatable :: active(:)          !! lanes at the start of the attempt
     logical, allocatable :: was_tried(:)       !! an attempt has been made since the last decision
     logical, allocatable :: has_moved(:)       !! and was accepted
-    real(wp), allocatable :: h(:)              !! step sizes before those of new series [s]
+    real(wp), allocatable :: h(:)              !! step sizes before new series change them [s]
     real(wp), allocatable :: lambda(:)         !! dominant eigenvalues by the series [1/s]
   contains
     procedure :: prepare

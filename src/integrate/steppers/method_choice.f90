@@ -1,6 +1,6 @@
 !> Which kind of step a lane takes: by a Taylor series, explicit or implicit.
 !>
-!> The measure is the cost of a second of the motion: that of a step (`nocdyn_step_costs`), divided by the step size. Another kind
+!> The measure is the cost of a second of the motion: the cost of a step (`nocdyn_step_costs`) over the step size. Another kind
 !> is tried where it may cost less: with the step at which it would, from the state that the lane has reached. If its error
 !> estimate allows longer steps, the lane keeps it; if not, the lane goes on as before, and the next trial is made after twice as
 !> many steps. The step by a series is known without a trial, from the series alone.

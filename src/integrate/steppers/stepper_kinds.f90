@@ -91,7 +91,7 @@ contains
     end select
   end function degree_of
 
-  !> Attempts the steps of the active lanes; those of one kind after those of another.
+  !> Attempts the steps of the active lanes, one kind of steps after another.
   subroutine take_steps(self, system, attempt)
     class(stepper_kinds_t), intent(inout) :: self
     class(system_t), intent(inout) :: system

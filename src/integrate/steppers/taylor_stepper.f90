@@ -358,7 +358,7 @@ contains
     sizes(:) = self%order * sizes
   end subroutine find_eigenvalues
 
-  !> The limit of |h lambda| on the negative real axis, near that of the truncated exponential series for orders from 5 to 40.
+  !> The limit of |h lambda| on the negative real axis, near the truncated exponential series' limit for orders 5 to 40.
   pure real(wp) function stability_limit(self)
     class(taylor_stepper_t), intent(in) :: self
 

@@ -18,11 +18,11 @@ module nocdyn_signal_values
 
   !> Signals one after the other whose indices are consecutive.
   type, extends(signal_source_t) :: segment_t
-    integer :: first = 1, last = 1     !! signals; `index` is that of the first
+    integer :: first = 1, last = 1     !! signals; `index` belongs to the first
     logical :: has_new_values = .true. !! whether the segment before is of another bank or quantity
   end type segment_t
 
-  !> Evaluates a copy of the formulation, because `observe` chooses branches: those of the integration must not change. After
+  !> Evaluates a copy of the formulation, because `observe` chooses branches: the integration's branches must not change. After
   !> `copy_lane` it must not be moved in memory.
   type, public :: signal_values_t
     class(formulation_t), allocatable :: formulation
@@ -34,7 +34,7 @@ module nocdyn_signal_values
     real(wp), allocatable, private :: values(:)          !! of one quantity of a bank; work space
     real(wp), allocatable, private :: lambda(:)          !! multipliers of the constraint rows; work space
     integer, allocatable, private :: works_in(:)         !! indices of the works that count as put in, in the quadratures
-    integer, allocatable, private :: works_out(:)        !! those of the others
+    integer, allocatable, private :: works_out(:)        !! of the other elements
     real(wp), private :: energies(signal_kinetic:signal_residual) = 0.0_wp   !! of one row [J]; work space
     real(wp), allocatable, private :: start_energy(:)    !! [J], [lanes]
     real(wp), allocatable, private :: start_kept(:)      !! of this what internal states keep

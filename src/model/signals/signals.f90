@@ -189,7 +189,7 @@ contains
     end associate
   end subroutine add_bank
 
-  !> The group of the input that an element is of. Losses are those of a gear or a similar row, else of a mesh.
+  !> The group of the input to which an element belongs. A loss belongs to a gear or a similar row, else to a mesh.
   function group_kind(machine, bank, element) result(kind)
     type(machine_t), intent(in) :: machine
     class(bank_t), intent(in) :: bank
@@ -211,8 +211,8 @@ contains
     end do
   end function group_kind
 
-  !> The multiplier of each row, followed by the torques on those of its members that have a signal. The multiplier of a row that
-  !> holds a joint, as that of a clutch, is its torque on the second body.
+  !> The multiplier of each row, followed by the torques on its members that have a signal. The multiplier of a row that
+  !> holds a joint, such as a clutch, is its torque on the second body.
   subroutine add_reactions(machine, signals, count)
     type(machine_t), intent(in) :: machine
     type(signal_t), allocatable, intent(inout) :: signals(:)
@@ -282,7 +282,7 @@ contains
     call move_alloc(others, signals)
   end subroutine resize
 
-  !> Whether a signal is that of a node inside of a shaft, which is shown only if it is asked for.
+  !> Whether a signal belongs to a node inside of a shaft, which is shown only if it is asked for.
   elemental logical function is_inner(self)
     class(signal_t), intent(in) :: self
 
