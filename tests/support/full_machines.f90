@@ -44,7 +44,7 @@ contains
     integer, intent(in) :: variants(:)   !! of each lane
     integer, intent(in) :: wanted(:)     !! bodies chosen as coordinates; empty: they are chosen by the analysis
     integer, intent(in) :: choice        !! complement_...
-    type(machine_t) :: machine
+    class(machine_t), allocatable :: machine
 
     machine = random_machine(seed, bodies, variants, wanted, choice)
     call add_couplings(bodies, variants, machine)

@@ -8,13 +8,18 @@ module nocdyn_test_lane_copies
   use nocdyn_machine, only: machine_t
   use nocdyn_solver_status, only: integration_done, solver_status_t
   use nocdyn_ensemble, only: ensemble_t
-  use nocdyn_reduced, only: new_reduced, reduced_t
+  use nocdyn_reduced, only: reduced_t
   use nocdyn_observer, only: observer_t
   use nocdyn_system, only: system_t
+  use nocdyn_test_states, only: reduced_form
   implicit none (type, external)
   private
 
   public :: run_alone, run_copied
+
+  type, public :: machine_slot_t
+    class(machine_t), allocatable :: machine
+  end type machine_slot_t
 
   !> Copies the lanes of a source, in their order, into the lanes that become free.
   type, extends(ensemble_t) :: copies_t
@@ -32,16 +37,16 @@ contains
 
   !> End states of machines, each run in a block of its own.
   subroutine run_alone(machines, method, times, y)
-    type(machine_t), intent(in) :: machines(:)   !! with one lane each
+    type(machine_slot_t), intent(in) :: machines(:)   !! with one lane each
     character(len=*), intent(in) :: method
     real(wp), contiguous, intent(in) :: times(:)
     real(wp), allocatable, intent(out) :: y(:, :)   !! [machines, components]
-    type(reduced_t), target :: system
+    class(reduced_t), allocatable, target :: system
     type(copies_t) :: ensemble
     integer :: i
 
     do i = 1, size(machines)
-      system = new_reduced(machines(i), .true.)
+      system = reduced_form(machines(i)%machine, .true.)
       ensemble%next_variant = 1
       ensemble%done = 0
       allocate (ensemble%y, source=system%start())

@@ -1,4 +1,5 @@
-!> Machines for tests.
+!> Machines for tests: polymorphic, although of one type, for a compiler then copies and frees them by calls instead of tens of
+!> kilobytes of code for each.
 module nocdyn_test_machines
   use nocdyn_bank, only: append_bank, bank_slot_t, bank_t
   use nocdyn_cardan_rows, only: new_cardan_rows
@@ -33,7 +34,7 @@ contains
   function paper_machine(amplitude, choice) result(machine)
     real(wp), intent(in) :: amplitude   !! M_0 [N m]: 0 in case 1, which has no excitation, 20 in case 2
     integer, intent(in) :: choice       !! complement_...
-    type(machine_t) :: machine
+    class(machine_t), allocatable :: machine
 
     machine = machine_of_bodies(row([10.0_wp, 5.0_wp, 5.0_wp]))
     machine%names = strings([character(len=7) :: 'motor', 'pinion', 'machine'])
@@ -52,7 +53,7 @@ contains
 
   !> Four bodies without gears between two walls: damping, rest twists, softening and hardening springs, phases.
   function damped_chain() result(machine)
-    type(machine_t) :: machine
+    class(machine_t), allocatable :: machine
 
     machine = machine_of_bodies(row([4.0_wp, 2.0_wp, 1.0_wp, 3.0_wp]))
     call install(machine%banks, new_couplings(coupling_common_t(numbered_names('spring', 5), [0, 1, 2, 3, 4], [1, 2, 3, 4, 0], &
@@ -73,7 +74,7 @@ contains
   !> Rotors of 1 kg m2 in a row, driven at the first one and braked at the last one.
   function long_chain(bodies) result(machine)
     integer, intent(in) :: bodies
-    type(machine_t) :: machine
+    class(machine_t), allocatable :: machine
     integer :: i
 
     machine = machine_of_bodies(row([(1.0_wp, i=1, bodies)]))
@@ -91,7 +92,7 @@ contains
   !> Seven bodies: body 2 drives 1, 3 (an internal gear) and 4; 5 drives 6; 7 is free. The couplings form a loop.
   function branched_train(choice) result(machine)
     integer, intent(in) :: choice   !! complement_...
-    type(machine_t) :: machine
+    class(machine_t), allocatable :: machine
 
     machine = machine_of_bodies(row([4.0_wp, 2.0_wp, 6.0_wp, 1.0_wp, 3.0_wp, 2.5_wp, 8.0_wp]))
     call install(machine%banks, new_couplings(coupling_common_t(numbered_names('shaft', 4), [4, 3, 6, 0], [5, 5, 7, 7], &
@@ -109,7 +110,7 @@ contains
 
   !> Four wheels in a ring, whose last gear is redundant, and a fifth body on a coupling.
   function gear_loop() result(machine)
-    type(machine_t) :: machine
+    class(machine_t), allocatable :: machine
 
     machine = machine_of_bodies(row([4.0_wp, 2.0_wp, 6.0_wp, 1.0_wp, 3.0_wp]))
     call install(machine%banks, new_couplings(coupling_common_t(numbered_names('shaft', 1), [3], [5], row([0.5_wp]), &
@@ -125,7 +126,7 @@ contains
   !> Two geared bodies, of which the second drives the third by a cardan joint, that the fourth by a cam, and both a slider-crank
   !> with a heavy rod and a force on the piston; an elastic coupling to the fifth, which a drive moves.
   function moving_machine() result(machine)
-    type(machine_t) :: machine
+    class(machine_t), allocatable :: machine
     type(string_t) :: names(4)
     type(teeth_t) :: teeth
     integer :: k
@@ -168,8 +169,9 @@ contains
   !> Bodies at rest without elements and constraints.
   function machine_of_bodies(inertia) result(machine)
     real(wp), intent(in) :: inertia(:, :)   !! [lanes, bodies] [kg m2]
-    type(machine_t) :: machine
+    class(machine_t), allocatable :: machine
 
+    allocate (machine)
     machine%lanes = size(inertia, 1)
     machine%bodies = size(inertia, 2)
     allocate (machine%names, source=numbered_names('body', machine%bodies))

@@ -25,7 +25,7 @@ contains
     integer, intent(in) :: variants(:)   !! of each lane
     integer, intent(in) :: wanted(:)     !! bodies that become the coordinates; empty: they are found
     integer, intent(in) :: choice        !! complement_...
-    type(machine_t) :: machine
+    class(machine_t), allocatable :: machine
     type(random_stream_t) :: layout, lanes(size(variants))
     real(wp) :: speed(size(variants), bodies)   ! speeds that satisfy all gears
     integer :: b, l

@@ -33,7 +33,7 @@ contains
   !> the bodies and other factors of the rows, so that the same rows are redundant.
   subroutine draw_train(seed, bodies, lanes, machine, is_independent)
     integer, intent(in) :: seed, bodies, lanes
-    type(machine_t), intent(out) :: machine
+    class(machine_t), allocatable, intent(out) :: machine
     logical, allocatable, intent(out) :: is_independent(:)   !! whether a row is independent of those before it
     type(random_stream_t) :: layout, numbers(lanes)
     type(growth_t) :: growth

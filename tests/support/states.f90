@@ -12,7 +12,7 @@ module nocdyn_test_states
   implicit none (type, external)
   private
 
-  public :: draw_state, state_of, bring_to, enter_all, formulate
+  public :: draw_state, state_of, bring_to, enter_all, formulate, reduced_form
 
   !> The formulations of `formulate`, for loops.
   integer, parameter, public :: reduced = 1, paper = 2, multiplier = 3
@@ -37,6 +37,16 @@ contains
       formulation = new_multiplier(machine, has_works)
     end select
   end subroutine formulate
+
+  !> As `new_reduced`, polymorphic as the machines of `nocdyn_test_machines`.
+  function reduced_form(machine, with_energy_balance, as_block) result(form)
+    type(machine_t), intent(in) :: machine
+    logical, intent(in) :: with_energy_balance
+    logical, intent(in), optional :: as_block
+    class(reduced_t), allocatable :: form
+
+    form = new_reduced(machine, with_energy_balance, as_block)
+  end function reduced_form
 
   !> Random angles and speeds that satisfy the gear constraints, [lanes, ground and bodies].
   subroutine draw_state(machine, seed, phi, omega)
@@ -99,7 +109,7 @@ contains
     type(machine_t), intent(in) :: machine
     real(wp), contiguous, intent(in) :: phi(:, 0:), omega(:, 0:)
     real(wp), intent(inout) :: y(:, :)
-    type(machine_t) :: copy
+    class(machine_t), allocatable :: copy
     real(wp) :: moments(machine%bodies)
     integer :: l, n
 

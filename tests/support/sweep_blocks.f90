@@ -11,13 +11,14 @@ module nocdyn_test_sweep_blocks
   use nocdyn_solver_status, only: solver_status_t
   use nocdyn_ensemble, only: ensemble_t
   use nocdyn_recorder, only: recorder, recorder_t
-  use nocdyn_reduced, only: new_reduced, reduced_t
+  use nocdyn_reduced, only: reduced_t
   use nocdyn_statistics, only: new_statistic, statistic_final, statistic_max, statistic_max_abs, statistic_mean, statistic_min, &
     statistic_rms, statistic_settling_time, statistic_t, statistic_time_of_max, statistic_time_of_max_abs, &
     statistic_time_of_min
   use nocdyn_statistics_observer, only: new_statistics_observer, statistics_observer_t
   use nocdyn_system, only: system_t
   use nocdyn_signals, only: list_signals, signal_t
+  use nocdyn_test_states, only: reduced_form
   use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
   implicit none (type, external)
   private
@@ -46,15 +47,15 @@ contains
     real(wp), intent(in) :: tolerance, t_end
     type(statistic_t), intent(in) :: statistics(:)
     real(wp), allocatable, intent(out) :: values(:, :)   !! [statistics, variants]; not allocated if the structures differ
-    type(reduced_t), target :: block, source
+    class(reduced_t), allocatable, target :: block, source
     type(statistics_observer_t), target :: observer
     type(statistic_t), allocatable :: own(:)
     type(measured_copies_t) :: ensemble
     type(solver_status_t) :: solver_status
     type(error_t), allocatable :: error
 
-    source = new_reduced(variants, .true., as_block=.true.)
-    block = new_reduced(lanes, .true., as_block=.true.)
+    source = reduced_form(variants, .true., as_block=.true.)
+    block = reduced_form(lanes, .true., as_block=.true.)
     call source%list_parameters(ensemble%source)
     call block%list_parameters(ensemble%block)
     if (.not. ensemble%block%has_same_structure(ensemble%source)) return
