@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import CASE_1, CASE_2, ENDLESS, TRAPS_EXCEPTIONS, wait_for
+from conftest import CASE_1, CASE_2, ENDLESS, IS_SLOW, TRAPS_EXCEPTIONS, wait_for
 
 RESULTS = ["columns.json", "input.nml", "summary.json", "trajectory.csv"]
 PARTIAL = ["columns.json", "input.nml", "summary.json", "trajectory.partial.csv"]
@@ -157,7 +157,8 @@ def test_a_second_interruption_ends_a_program_that_does_not_end(nocdyn):
 
 def test_a_signal_that_the_shell_ignores_stays_ignored(nocdyn):
     options = {"preexec_fn": lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)}
-    process = nocdyn.start("run", CASE_2, "--out", "out", "-q", "--set", "run.t_end=2e3", "--set", "output.interval=1", **options)
+    horizon = ("--set", f"run.t_end={200 if IS_SLOW else 2000}", "--set", "output.interval=1")
+    process = nocdyn.start("run", CASE_2, "--out", "out", "-q", *horizon, **options)
     wait_for(lambda: list((nocdyn.folder / "out").glob(".trajectory.csv.*")))
     process.send_signal(signal.SIGHUP)
     process.communicate(timeout=60)

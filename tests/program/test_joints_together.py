@@ -4,6 +4,9 @@ import random
 
 import numpy as np
 import pytest
+from conftest import IS_SLOW
+
+T_END = 0.3 if IS_SLOW else 1
 
 BETWEEN = {
     "cardan": "&cardan name = 'x' bodies = 'b1', 'b2' angle_deg = 20 /\n",
@@ -35,7 +38,7 @@ def machine(seed, between, behind, driven):
         text += (
             f"&excitation name = 'e{i}' body = 'b{i}' amplitude = {amplitude!r} frequency = {frequency!r} phase = {phase!r} /\n"
         )
-    return text + "&run t_end = 1 rtol = 1e-10 atol = 1e-12 METHOD /\n&output points = 21 /\n"
+    return text + f"&run t_end = {T_END} rtol = 1e-10 atol = 1e-12 METHOD /\n&output points = 21 /\n"
 
 
 @pytest.mark.parametrize("driven", [False, True])
