@@ -140,12 +140,12 @@ def _colour(mode: int) -> str:
 def _mark_crossings(axes: Axes, campbell: Campbell, crossings: list[Critical]) -> list[Artist]:
     """Those near the speeds in operation are large and have the speed, as far as there is room."""
     handles: list[Artist] = []
-    for chosen, style, label in (
-        ([one for one in crossings if not one.is_too_near], FAR, "mode and order meet at rpm"),
-        ([one for one in crossings if one.is_too_near and one.distance > 0], MARGIN, "meet within the margin"),
-        ([one for one in crossings if one.is_too_near and one.distance <= 0], INSIDE, "meet in operation"),
+    for places, style, label in (
+        (("", "clear"), FAR, "mode and order meet at rpm"),
+        (("margin",), MARGIN, "meet within the margin"),
+        (("inside",), INSIDE, "meet in operation"),
     ):
-        if chosen:
+        if chosen := [one for one in crossings if one.place in places]:
             axes.plot([one.speed for one in chosen], [one.frequency for one in chosen], zorder=5, **style)
             handles.append(Line2D([], [], label=label, **style))
     labels = Labels(axes, PANEL)

@@ -1,11 +1,9 @@
 """Draws the modes that 'nocdyn modes --out' wrote: the drivetrain, the shapes along it, and where their energies are."""
 
 import argparse
-import json
 import math
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,68 +11,15 @@ from matplotlib import pyplot
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .results import ResultsError
+from .modes_results import Modes, read_modes
 from .style import COLOURS, WIDTH, add_format_option, add_title, plain, save, saved
 from .train_drawing import EDGE, MOST_NAMES, ROW, draw_shape, draw_train
-from .train_layout import GROUND, Train, lay_out
-from .trajectory_files import labels_of
+from .trajectory_files import ResultsError
 
 MOST_LETTERS = 24  # of names that stand side by side under the narrower axes
 MOST_MODES = 6  # of a figure
 GAP = 0.6  # between the bars of bodies and those of couplings
 KINETIC, POTENTIAL, OF_SHAFTS = COLOURS[0], COLOURS[1], COLOURS[5]
-
-
-@dataclass(frozen=True)
-class Modes:
-    folder: Path
-    content: dict  # of modes.json
-
-    @property
-    def titles(self) -> tuple[str, str]:
-        return self.content["title"] or Path(self.content["input"]).name, f"modes about {self.content['about']}"
-
-    @property
-    def bodies(self) -> list[str]:
-        return self.content["bodies"]
-
-    @property
-    def oscillating(self) -> list[dict]:
-        """Those that are drawn; of large machines the file has the shapes of the first modes only."""
-        return [mode for mode in self.content["modes"] if mode["kind"] == "oscillating" and "shape" in mode]
-
-    def pairs(self, kind: str) -> list[list[int]]:
-        """The bodies of couplings or gears, from 0 on, GROUND for the ground."""
-        return [[body - 1 if body else GROUND for body in joint["bodies"]] for joint in self.content[kind]]
-
-    @property
-    def shafts_with_inertia(self) -> list[int]:
-        """Which couplings have shares in the kinetic energy, after the bodies, by the columns of modes.csv."""
-        file = self.folder / "modes.csv"
-        parts = [label for label in labels_of(file) if label.startswith("kinetic_")] if file.is_file() else []
-        names = [coupling["name"] for coupling in self.content["couplings"]]
-        shafts = [label.removeprefix("kinetic_").rsplit(" [", 1)[0] for label in parts[len(self.bodies) :]]
-        return [names.index(shaft) for shaft in shafts if shaft in names]
-
-    @property
-    def train(self) -> Train:
-        return lay_out(len(self.bodies), self.pairs("couplings"), self.pairs("gears"))
-
-
-def read_modes(folder: Path) -> Modes:
-    file = folder / "modes.json"
-    try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ResultsError(f"{folder}: no modes.json here; 'nocdyn modes FILE --out {folder}' writes it") from None
-    except (OSError, ValueError) as error:
-        raise ResultsError(f"{file}: cannot be read: {error}") from None
-    if not isinstance(content, dict) or not {"bodies", "couplings", "gears", "modes", "about"} <= content.keys():
-        raise ResultsError(f"{file}: this is no modes.json of nocdyn")
-    modes = Modes(folder, content)
-    if not modes.oscillating:
-        raise ResultsError(f"{file}: nothing to draw: no mode oscillates")
-    return modes
 
 
 def draw_modes(modes: Modes, chosen: list[dict]) -> Figure:
@@ -104,7 +49,7 @@ def draw_modes(modes: Modes, chosen: list[dict]) -> Figure:
 def _draw_energy(axes: Axes, modes: Modes, mode: dict) -> None:
     """Kinetic energy upwards, potential energy downwards; the couplings stand right of the bodies, each over its name."""
     count = len(modes.bodies)
-    places = count + GAP + np.arange(len(modes.content["couplings"]))
+    places = count + GAP + np.arange(len(modes.couplings))
     kinetic = 100 * np.array(mode["kinetic_share"])
     axes.bar(np.arange(count), kinetic[:count], width=0.8, color=KINETIC, label="kinetic energy\nin bodies [%]")
     if shafts := modes.shafts_with_inertia:
@@ -126,7 +71,7 @@ def _draw_energy(axes: Axes, modes: Modes, mode: dict) -> None:
 
 def _name_bars(axes: Axes, modes: Modes) -> None:
     """Bodies, and right of them couplings."""
-    names = [*modes.bodies, *(one["name"] for one in modes.content["couplings"])]
+    names = [*modes.bodies, *modes.couplings]
     count = len(names)
     chosen = np.arange(count) if count <= MOST_NAMES else np.unique(np.linspace(0, count - 1, 8).round().astype(int))
     slanted = sum(len(names[one]) for one in chosen) > MOST_LETTERS
@@ -140,11 +85,14 @@ def _name_bars(axes: Axes, modes: Modes) -> None:
 
 def draw_all(modes: Modes, most: int, folder: Path, formats: Sequence[str]) -> list[str]:
     """Saves figures of the first modes, a few in each, and gives their names."""
-    chosen = modes.oscillating[:most]
+    chosen = modes.shaped[:most]
+    if not chosen:
+        raise ResultsError(f"{modes.folder / 'modes.json'}: nothing to draw: no mode oscillates")
+    titles = modes.content["title"] or Path(modes.content["input"]).name, f"modes about {modes.content['about']}"
     names = []
     for part in range(math.ceil(len(chosen) / MOST_MODES)):
         figure = draw_modes(modes, chosen[part * MOST_MODES : (part + 1) * MOST_MODES])
-        add_title(figure, *modes.titles)
+        add_title(figure, *titles)
         names.append("modes" if part == 0 else f"modes_{part + 1}")
         save(figure, folder, names[-1], formats)
     return names

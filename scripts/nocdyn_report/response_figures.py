@@ -1,7 +1,6 @@
 """Draws forced responses over the speed: the half range of every moment and reaction, its orders, limits, barred speed ranges."""
 
 import argparse
-import re
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from matplotlib.patches import Patch
 from .columns import by_sort
 from .response_marks import BARRED, draw_barred, mark_criticals
 from .results import ResultsError
+from .selection import matches
 from .speed_panels import (
     DANGER,
     Figures,
@@ -33,7 +33,7 @@ from .speed_panels import (
     speed_label,
     window_of,
 )
-from .speed_results import Quantity, Response, read_response
+from .speed_results import NAMED, NEAR, Quantity, Response, read_response
 from .style import COLOURS, PIXELS, WIDTH, add_title, plain
 from .thinning import thin
 
@@ -41,9 +41,7 @@ MOST_PANELS = 6  # of a figure
 WIDE = 11.5  # width of a figure of two columns [in]
 PANEL = 2.75  # height of a panel [in]
 AXES_SHARE = 0.84  # of a panel that its axes have, about
-NAMED = 4  # orders of a panel
 SMALLEST = 0.02  # of the largest half range that a named order has
-FAR = 2.5  # times what is drawn: limits above are not in the picture
 LONGEST = 34  # characters of a line beside a panel
 HEADROOM = 1.3  # for the names of critical speeds
 MOST_OF, AT_END = 0.5, 0.9  # of the half range that an order has whose name stands above it; at the ends of the speeds
@@ -75,12 +73,10 @@ def named_lines(response: Response, quantity: Quantity, look: Look) -> list[int]
     """Places of the lines that are named, the largest first."""
     if quantity.orders is None or len(response.lines) == 1:
         return []
-    inside = (response.speed >= look.window[0]) & (response.speed <= look.window[1])
-    largest = np.nan_to_num(quantity.orders[inside]).max(axis=0)
     if look.orders:
         return [place for place, line in enumerate(response.lines) if line.is_order and line.value in look.orders]
-    ranked = np.argsort(-largest, kind="stable")[:NAMED]
-    return [int(place) for place in ranked if largest[place] > SMALLEST * np.nan_to_num(quantity.half_range[inside]).max()]
+    inside = (response.speed >= look.window[0]) & (response.speed <= look.window[1])
+    return response.largest_lines(quantity, inside, SMALLEST)
 
 
 def _has_orders(response: Response, quantity: Quantity) -> bool:
@@ -138,7 +134,7 @@ def _set_scale(axes: Axes, response: Response, quantity: Quantity, look: Look) -
     values = np.concatenate([one[inside] for one in drawn])
     top = max(np.nanmax(values[np.isfinite(values)], initial=0.0), 1e-300)
     limits = [values[inside].min() for values, _ in _limits(quantity, look)]
-    near = [limit for limit in limits if limit <= FAR * top]
+    near = [limit for limit in limits if limit <= NEAR * top]
     largest = max([top, *near])
     if look.is_logarithmic:
         axes.set_yscale("log")
@@ -210,8 +206,8 @@ def draw_page(response: Response, page: Sequence[Quantity], look: Look, styles: 
 
 
 def _legend(response: Response, page: Sequence[Quantity], look: Look, shades: list[Patch]) -> list[Artist]:
-    only = f"half range: {'order ' * response.lines[0].is_order}{response.lines[0].name}"
-    together = only if len(response.lines) == 1 else "half range of all orders together"
+    only = len(response.lines) == 1
+    together = f"half range: {response.lines[0].title}" if only else "half range of all orders together"
     handles: list[Artist] = [Line2D([], [], label=together, **SYNTHESIS)]
     if any(_has_orders(response, quantity) for quantity in page):
         handles.append(Line2D([], [], color=ORDER_COLOURS[0], label="orders, named by number"))
@@ -236,13 +232,12 @@ def _legend(response: Response, page: Sequence[Quantity], look: Look, shades: li
 
 
 def chosen(response: Response, patterns: Sequence[str] | None) -> list[Quantity]:
-    """The quantities that patterns name; '*' stands for any text, '?' for a character."""
+    """The quantities that patterns name."""
     if not patterns:
         return response.quantities
     labels: set[str] = set()
     for pattern in patterns:
-        expression = re.compile(re.escape(pattern).replace(r"\*", ".*").replace(r"\?", "."), re.IGNORECASE | re.DOTALL)
-        found = {one.label for one in response.quantities if expression.fullmatch(one.label)}
+        found = {one.label for one in response.quantities if matches(pattern, one.label)}
         if not found:
             there = ", ".join(one.label for one in response.quantities[:8])
             raise ResultsError(f"{response.folder}: no quantity matches '{pattern}'; there are: {there}")

@@ -123,7 +123,7 @@ def read_results(folder: Path, choose: Callable[[Header], Iterable[str]] | None 
     """The results in a folder; of a run that failed, what it has. `choose` gives the labels that are needed besides the time."""
     if not folder.is_dir():
         raise ResultsError(f"{folder}: there is no such results folder")
-    file = next((folder / name for name in FILES if (folder / name).is_file()), None)
+    file = trajectory_in(folder)
     if file is None:
         raise ResultsError(f"{folder}: no trajectory.csv here; {_elsewhere(folder)}")
     labels = labels_of(file)
@@ -131,7 +131,7 @@ def read_results(folder: Path, choose: Callable[[Header], Iterable[str]] | None 
         raise ResultsError(f"{file}: not a trajectory of nocdyn: there is no column '{TIME}'")
     summary, machine = _read_summary(folder), folder / "input.nml"
     header = Header(
-        folder, _columns(folder, labels), _ranges(summary), f90nml.read(machine) if machine.is_file() else f90nml.Namelist()
+        folder, _columns(folder, labels), ranges_of(summary), f90nml.read(machine) if machine.is_file() else f90nml.Namelist()
     )
     table = read_columns(file, {TIME, *choose(header)} if choose else set(labels))
     if len(table) < 2:
@@ -141,9 +141,14 @@ def read_results(folder: Path, choose: Callable[[Header], Iterable[str]] | None 
     return Results(folder, header, table, _shortfall(summary, table) if ".partial" in file.suffixes else "", rpm)
 
 
+def trajectory_in(folder: Path) -> Path | None:
+    """The trajectory of a run, also of one that failed."""
+    return next((folder / name for name in FILES if (folder / name).is_file()), None)
+
+
 def _elsewhere(folder: Path) -> str:
     """Where trajectories are, as those of load cases, which have a folder each."""
-    cases = sorted(str(one) for one in folder.iterdir() if any((one / name).is_file() for name in FILES))
+    cases = sorted(str(one) for one in folder.iterdir() if trajectory_in(one))
     return f"draw one of its load cases: {', '.join(cases)}" if cases else "is this the results folder of a 'nocdyn run'?"
 
 
@@ -155,7 +160,8 @@ def _columns(folder: Path, labels: list[str]) -> dict[str, Column]:
     return {label: known[label] for label in labels if label != TIME}
 
 
-def _ranges(summary: dict) -> dict[str, float]:
+def ranges_of(summary: dict) -> dict[str, float]:
+    """Largest less smallest value of columns, as far as summary.json has them."""
     columns = summary.get("columns", {})
     return {label: column["max"] - column["min"] for label, column in columns.items() if "max" in column}
 

@@ -111,7 +111,7 @@ def default_labels(header: Header) -> dict[str, list[str]]:
     """The columns of each figure: of sorts that many elements have, those that vary most."""
 
     def shown(sorts: list[list[str]]) -> list[str]:
-        return [label for labels in sorts for label in widest(header, labels, MOST_PANELS)]
+        return [label for labels in sorts for label in widest(labels, header.ranges, MOST_PANELS)]
 
     angles = [] if header.of("omega") else [header.of("phi")]
     motion, torques = shown(angles + _sorts(header, *MOTION)), shown(_sorts(header, *TORQUES))
@@ -125,8 +125,8 @@ def _plane_labels(header: Header) -> list[str]:
     if len(twists) + len(angles) <= MOST_PLANES:
         return twists + angles + header.of("omega")
     if not twists:
-        return widest(header, angles, MOST_PLANES) + header.of("omega")
-    planes = widest(header, twists, MOST_PLANES)
+        return widest(angles, header.ranges, MOST_PLANES) + header.of("omega")
+    planes = widest(twists, header.ranges, MOST_PLANES)
     return planes + [speed for twist in planes for speed in header.speeds_about(twist)]
 
 

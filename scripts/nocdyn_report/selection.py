@@ -1,21 +1,24 @@
-"""Columns of a trajectory by patterns of their names."""
+"""Columns by patterns of their names, and those that vary most."""
 
 import difflib
 import re
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from .columns import Column
 from .results import Header, ResultsError
 
 
+def matches(pattern: str, *names: str) -> bool:
+    """Whether a pattern is one of the names; '*' stands for any text, '?' for a character."""
+    expression = re.escape(pattern).replace(r"\*", ".*").replace(r"\?", ".")
+    return any(re.fullmatch(expression, name, re.IGNORECASE | re.DOTALL) for name in names)
+
+
 def matching(header: Header, patterns: Iterable[str]) -> list[str]:
-    """Labels of the columns that a pattern matches, in the order of the file; '*' stands for any text, '?' for a character."""
+    """Labels of the columns that a pattern matches, in the order of the file."""
     chosen: set[str] = set()
     for pattern in patterns:
-        expression = re.compile(re.escape(pattern).replace(r"\*", ".*").replace(r"\?", "."), re.IGNORECASE | re.DOTALL)
-        found = [
-            one.label for one in header.columns.values() if expression.fullmatch(one.name) or expression.fullmatch(one.label)
-        ]
+        found = [one.label for one in header.columns.values() if matches(pattern, one.name, one.label)]
         if not found:
             hint = _nearest(pattern, header.columns.values())
             raise ResultsError(f"{header.folder}: no column matches '{pattern}'{hint}")
@@ -30,9 +33,9 @@ def _nearest(pattern: str, columns: Collection[Column]) -> str:
     return f"; {'nearest' if nearest else 'there are'}: {', '.join(choices)}" if choices else ""
 
 
-def widest(header: Header, labels: Sequence[str], most: int) -> list[str]:
-    """As many labels at most, those whose values have the widest ranges, in the order of the file."""
+def widest(labels: Sequence[str], ranges: Mapping[str, float], most: int) -> list[str]:
+    """As many labels at most, those whose values have the widest ranges, in their order."""
     if len(labels) <= most:
         return list(labels)
-    chosen = sorted(labels, key=lambda label: -header.ranges.get(label, 0.0))[:most]
-    return [label for label in labels if label in set(chosen)]
+    chosen = set(sorted(labels, key=lambda label: -ranges.get(label, 0.0))[:most])
+    return [label for label in labels if label in chosen]

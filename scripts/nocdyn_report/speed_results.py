@@ -20,6 +20,8 @@ TABLE, ORDERS = "response.csv", "response_orders.csv"
 LIMITS = ("limit", "transient_limit", "peak_limit")
 STATISTICS = ("half_range", "mean", "peak", *LIMITS)
 FIXED = 1e-9  # relative range of a frequency that does not change with the speed
+NAMED = 4  # orders that are named beside the curve of all
+NEAR = 2.5  # times what is drawn: limits above are not in the picture
 
 
 def rpm(speed: float) -> float:
@@ -37,6 +39,10 @@ class Line:
     @property
     def name(self) -> str:
         return f"{self.value:.6g}" if self.is_order else f"{self.value:.5g} Hz"
+
+    @property
+    def title(self) -> str:
+        return f"order {self.name}" if self.is_order else self.name
 
 
 @dataclass(frozen=True)
@@ -71,6 +77,15 @@ class Critical:
     def name(self) -> str:
         """As 'II/4.5': mode and order."""
         return f"{roman(self.mode)}/{self.line.name}"
+
+    @property
+    def place(self) -> str:
+        """Where it is, as seen from the speeds in operation: 'inside', 'margin', 'clear'; '' if nothing is said of it."""
+        if self.is_electrical or math.isnan(self.distance):
+            return ""
+        if self.distance <= 0:
+            return "inside"
+        return "margin" if self.is_too_near else "clear"
 
 
 @dataclass(frozen=True)
@@ -141,6 +156,14 @@ class Response:
         column = quantity.column
         names = {one.name for one in self.columns if one.point in ("", "max") and one.is_of(column)} | {quantity.label}
         return [one for one in self.barred if one.quantity in names]
+
+    def largest_lines(self, quantity: Quantity, rows: slice | np.ndarray = slice(None), least: float = 0.0) -> list[int]:
+        """Places of the lines that are named, the largest first, each above a share of the largest half range; in some rows."""
+        if quantity.orders is None:
+            return []
+        largest = np.nan_to_num(quantity.orders[rows]).max(axis=0)
+        least *= np.nan_to_num(quantity.half_range[rows]).max()
+        return [int(place) for place in np.argsort(-largest, kind="stable")[:NAMED] if largest[place] > least]
 
 
 @dataclass(frozen=True)

@@ -1,17 +1,12 @@
 """A drivetrain seen from the side, and the shapes of its modes along it."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
-from .mode_marks import marks_of
+from .modes_results import Modes, marks_of, motion_of
 from .style import COLOURS, REFERENCE, plain
 from .train_layout import GROUND, Train
-
-if TYPE_CHECKING:
-    from .mode_figures import Modes
 
 MOST_NAMES = 24  # bodies that are named
 FEW_NAMES = 8  # that are named of more bodies
@@ -26,7 +21,7 @@ STRETCH = 0.12  # room above and below the largest motion
 STEP = {**REFERENCE, "zorder": 1}  # from a gear to its mate
 
 
-def draw_train(axes: Axes, modes: "Modes", train: Train) -> None:
+def draw_train(axes: Axes, modes: Modes, train: Train) -> None:
     """Discs by the fourth root of their inertias on their shaft lines; gears are dashed, with the ratio of the speeds."""
     place, row = np.array(train.place), np.array(train.row)
     heights = _heights(np.array(modes.content.get("inertia_kg_m2", np.ones(len(place))), dtype=float))
@@ -72,13 +67,13 @@ def _colour(train: Train, body: int) -> str:
     return LINE_COLOURS[train.line[body] % len(LINE_COLOURS)]
 
 
-def _free_side(body: int, modes: "Modes", train: Train) -> int:
+def _free_side(body: int, modes: Modes, train: Train) -> int:
     """The side of a body on which no shaft goes on, -1 or 1."""
     others = [b if a == body else a for a, b in modes.pairs("couplings") if body in (a, b) and GROUND not in (a, b)]
     return 1 if any(train.place[other] < train.place[body] for other in others) else -1
 
 
-def _name_discs(axes: Axes, modes: "Modes", train: Train, heights: np.ndarray) -> None:
+def _name_discs(axes: Axes, modes: Modes, train: Train, heights: np.ndarray) -> None:
     """Below the discs, slanted where the names are long, beside the line to a gear below."""
     count = len(train.place)
     named = range(count) if count <= MOST_NAMES else np.unique(np.linspace(0, count - 1, FEW_NAMES).round().astype(int))
@@ -105,10 +100,10 @@ def _name_discs(axes: Axes, modes: "Modes", train: Train, heights: np.ndarray) -
         )
 
 
-def draw_shape(axes: Axes, modes: "Modes", train: Train, mode: dict) -> None:
+def draw_shape(axes: Axes, modes: Modes, train: Train, mode: dict) -> None:
     """Along every shaft line what moves in phase with the largest motion; what lags shows by its amplitude, an open circle."""
     amplitude = np.array(mode["shape"])
-    motion = amplitude * np.cos(np.radians(mode["phase_deg"]))
+    motion = motion_of(mode)
     place = np.array(train.place)
     few = len(motion) <= MOST_NAMES
     axes.axhline(0.0, color="0.5", linewidth=0.6)

@@ -10,12 +10,14 @@ import f90nml
 import pandas as pd
 
 from ..columns import DETAIL, Column, columns_of, read_column_list
-from ..results import RPM
-from ..speed_results import Campbell, Response, read_campbell, read_response
+from ..modes_results import Modes, read_modes
+from ..results import RPM, groups_of, ranges_of, trajectory_in
+from ..speed_results import Campbell, Critical, Response, read_campbell, read_response, rpm
 from ..trajectory_files import ResultsError, labels_of, read_columns
 from .calculations import Calculations
 from .curves import Arrays
 from .failure import FILES, ReportError
+from .numbers import number_text
 
 NOTES_FILE = re.compile(
     r"""^[^!\n]*\bnotes_file\s*=\s*(?:'(?P<one>(?:[^'\n]|'')*)'|"(?P<other>[^"\n]*)")""", re.MULTILINE | re.IGNORECASE
@@ -59,8 +61,7 @@ class Sources:
         return found if isinstance(found, str) else ""
 
     def groups(self, kind: str) -> list[f90nml.Namelist]:
-        groups = self.machine.get(kind, [])
-        return groups if isinstance(groups, list) else [groups]
+        return groups_of(self.machine, kind)
 
     @property
     def case(self) -> f90nml.Namelist:
@@ -86,8 +87,8 @@ class Sources:
         return {column.label: column for column in columns_of(self.equilibrium["columns"])}
 
     @cached_property
-    def modes(self) -> dict:
-        return self.read_json("modes.json")
+    def modes(self) -> Modes:
+        return _told(read_modes, self.results.folder)
 
     @cached_property
     def response_report(self) -> dict:
@@ -151,11 +152,14 @@ class Sources:
 
     def speed(self, value: float) -> float:
         """A speed [rad/s] in that unit."""
-        rpm = value * RPM["rad/s"]
-        return {"rpm": rpm, "Hz": rpm / 60.0, "rad/s": value}[self.speed_unit]
+        return value if self.speed_unit == "rad/s" else self.of_rpm(rpm(value))
 
     def of_rpm(self, value: float) -> float:
-        return self.speed(value / RPM["rad/s"])
+        return value / RPM.get(self.speed_unit, 1.0)
+
+    def named(self, critical: Critical) -> str:
+        """As 'II/4.5 at 312 rpm'."""
+        return f"{critical.name} at {number_text(self.of_rpm(critical.speed))} {self.speed_unit}"
 
 
 class Run:
@@ -170,9 +174,11 @@ class Run:
 
     @property
     def file(self) -> Path | None:
-        """The trajectory, also that of a run that failed."""
-        names = ("trajectory.csv", "trajectory.nc", "trajectory.partial.csv", "trajectory.partial.nc")
-        return next((self.folder / name for name in names if (self.folder / name).is_file()), None)
+        return trajectory_in(self.folder)
+
+    @property
+    def ranges(self) -> dict[str, float]:
+        return ranges_of(self.summary)
 
     @cached_property
     def column_list(self) -> dict[str, Column]:

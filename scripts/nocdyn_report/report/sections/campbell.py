@@ -5,12 +5,19 @@ import numpy as np
 from ...speed_results import Critical, roman
 from ..content import Figure, Heading, Paragraph, Section, Table, first, number, share, text
 from ..curves import band
-from ..numbers import number_text
 from ..sources import Sources
 
 MOST_MODES = 24
 MOST_ROWS = 120
 ROOM = 1.15  # above the highest crossing
+VERDICTS = {"inside": ("in operation", "bad"), "margin": ("within the margin", "warn"), "clear": ("clear", "good")}
+# what points are called and how they look, by their places
+POINTS = {
+    "clear": ("clear of operation", "far"),
+    "": ("critical speed", "far"),
+    "margin": ("within the margin", "margin"),
+    "inside": ("in operation", "inside"),
+}
 
 
 def campbell_section(sources: Sources) -> Section | None:
@@ -41,13 +48,7 @@ def operation_bands(sources: Sources, report: object) -> list[dict]:
 
 def verdict(critical: Critical) -> tuple[str, str]:
     """A critical speed and operation, in words and a tone."""
-    if critical.is_electrical:
-        return "electrical mode", ""
-    if critical.distance != critical.distance:
-        return "", ""
-    if critical.distance <= 0:
-        return "in operation", "bad"
-    return ("within the margin", "warn") if critical.is_too_near else ("clear", "good")
+    return VERDICTS.get(critical.place) or ("electrical mode" if critical.is_electrical else "", "")
 
 
 def _diagram(sources: Sources) -> Figure:
@@ -57,19 +58,14 @@ def _diagram(sources: Sources) -> Figure:
     highest = max((one.frequency for one in campbell.crossings), default=0.0)
     top = ROOM * highest if highest else ROOM * min(frequency.max() for frequency in campbell.modes.values())
     for line, frequency in campbell.lines:
-        name = f"order {line.name}" if line.is_order else line.name
-        curves.append(arrays.curve(name, speed, frequency, role="order", end=line.name))
+        curves.append(arrays.curve(line.title, speed, frequency, role="order", end=line.name))
     for mode, frequency in list(campbell.modes.items())[:MOST_MODES]:
         curves.append(arrays.curve(f"mode {roman(mode)}", speed, frequency, role="mode", end=roman(mode)))
-    for kind, wanted in (("far", "good"), ("far", ""), ("margin", "warn"), ("inside", "bad")):
-        chosen = [one for one in campbell.crossings if verdict(one)[1] == wanted]
-        if chosen:
-            name = {"good": "clear of operation", "": "critical speed", "warn": "within the margin", "bad": "in operation"}[
-                wanted
-            ]
-            labels = [f"{one.name} at {number_text(sources.of_rpm(one.speed))} {sources.speed_unit}" for one in chosen]
+    for place, (name, role) in POINTS.items():
+        if chosen := [one for one in campbell.crossings if one.place == place]:
             places = [sources.of_rpm(one.speed) for one in chosen], [one.frequency for one in chosen]
-            curves.append(arrays.points(name, *places, labels, role=kind, names=[one.name for one in chosen]))
+            labels = [sources.named(one) for one in chosen]
+            curves.append(arrays.points(name, *places, labels, role=role, names=[one.name for one in chosen]))
     spec = {
         "x": {"label": f"speed of {campbell.body}", "unit": sources.speed_unit},
         "y": {"label": "frequency", "unit": "Hz", "range": [0.0, float(top)]},
@@ -78,9 +74,7 @@ def _diagram(sources: Sources) -> Figure:
         "nearest": True,
         "name": "line",
     }
-    told = "; ".join(
-        f"{one.name} at {number_text(sources.of_rpm(one.speed))} {sources.speed_unit}" for one in campbell.crossings[:20]
-    )
+    told = "; ".join(map(sources.named, campbell.crossings[:20]))
     return Figure(
         f"Campbell diagram over the speed of {campbell.body}. Points: mode and order meet, as II/6 where order 6 meets mode 2",
         f"Natural frequencies and orders over the speed. Critical speeds: {told or 'none'}.",

@@ -4,8 +4,6 @@ from ..content import Figure, Heading, Paragraph, Section, Table, number, text
 from ..numbers import number_text
 from ..sources import Run, Sources
 
-HOURLY = "damage_per_hour_"
-
 
 def fatigue_section(sources: Sources) -> Section | None:
     section = Section("fatigue", "Fatigue")
@@ -96,18 +94,17 @@ def _profile_tone(one: dict) -> str:
 
 
 def _hourly(sources: Sources) -> Figure | None:
-    table = sources.table("response.csv")
-    labels = [label for label in table.columns if label.startswith(HOURLY)]
-    if not labels:
+    columns = [column for column in sources.response.columns if column.kind == "damage_per_hour"]
+    if not columns:
         return None
-    response = sources.response
+    response, table = sources.response, sources.table("response.csv")
     speed = [sources.of_rpm(one) for one in response.speed]
     order = table.iloc[:, 0].argsort(kind="stable")
-    names = [label.removeprefix(HOURLY).rsplit(" [", 1)[0] for label in labels]
+    names, labels = [column.title for column in columns], [column.label for column in columns]
     curves = [sources.arrays.curve(name, speed, table[label].to_numpy()[order]) for name, label in zip(names, labels)]
     spec = {
         "x": {"label": f"speed of {response.body}", "unit": sources.speed_unit},
-        "y": {"label": "damage per hour", "unit": "1/h", "zero": True},
+        "y": {"label": columns[0].caption, "unit": columns[0].unit, "zero": True},
         "curves": curves,
         "name": "fatigue",
     }

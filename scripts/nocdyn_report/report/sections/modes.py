@@ -2,11 +2,10 @@
 
 import math
 
-import numpy as np
-
-from ...mode_marks import marks_of
+from ...modes_results import Modes, marks_of, motion_of
+from ...results import RPM
 from ...speed_results import roman
-from ...train_layout import GROUND, Train, lay_out
+from ...train_layout import Train
 from ..content import Figure, Heading, Paragraph, Section, Table, first, number, text
 from ..numbers import number_text, percent
 from ..sources import Sources
@@ -24,17 +23,14 @@ def modes_section(sources: Sources) -> Section | None:
         return None
     section = Section("modes", "Natural frequencies and modes")
     modes = sources.modes
-    section.add(Paragraph(f"The machine is linearised about {modes['about']}."))
-    oscillating = [mode for mode in modes["modes"] if mode["kind"] == "oscillating"]
-    if oscillating:
-        section.add(_frequencies(oscillating, modes))
-        shaped = [mode for mode in oscillating if "shape" in mode][:MOST_SHAPES]
-        if shaped and len(modes["bodies"]) > 1:
-            section.add(_shapes(sources, shaped))
+    section.add(Paragraph(f"The machine is linearised about {modes.content['about']}."))
+    if modes.oscillating:
+        section.add(_frequencies(modes))
+        if modes.shaped and len(modes.bodies) > 1:
+            section.add(_shapes(sources, modes.shaped[:MOST_SHAPES]))
     else:
         section.add(Paragraph("Nothing oscillates: there is no mode with a frequency."))
-    others = [mode for mode in modes["modes"] if mode["kind"] != "oscillating"]
-    if others:
+    if others := [mode for mode in modes.content["modes"] if mode["kind"] != "oscillating"]:
         section.add(_others(others, modes))
     section.add(Heading("Holzer tables", "holzer"), *_holzer(sources))
     return section
@@ -46,42 +42,35 @@ def _shares(values: list[float], names: list[str]) -> str:
     return ", ".join(f"{name} {percent(value, 2)}" for value, name in ranked if value >= SMALLEST_SHARE)
 
 
-def _kinetic_names(modes: dict, mode: dict) -> list[str]:
-    """Of the bodies, and of shafts with inner nodes, which come after them."""
-    extra = len(mode.get("kinetic_share", [])) - len(modes["bodies"])
-    shafts = [one["name"] for one in modes["couplings"]][-extra:] if extra > 0 else []
-    return modes["bodies"] + shafts
-
-
-def _frequencies(oscillating: list[dict], modes: dict) -> Table:
-    marks = [", ".join(marks_of(mode)) for mode in oscillating]
+def _frequencies(modes: Modes) -> Table:
+    marks = [", ".join(marks_of(mode)) for mode in modes.oscillating]
     rows = []
-    for mode, mark in zip(oscillating, marks):
+    for mode, mark in zip(modes.oscillating, marks):
         damping = mode["damping_ratio"]
         rows.append(
             [
                 number(mode["mode"]),
                 number(mode["frequency_Hz"]),
-                number(60.0 * mode["frequency_Hz"]),
+                number(RPM["Hz"] * mode["frequency_Hz"]),
                 number(mode.get("undamped_frequency_Hz")),
                 number(damping, 3, "bad" if damping < 0 else ""),
                 number(mode.get("time_constant_s"), 3),
-                text(_shares(mode.get("kinetic_share", []), _kinetic_names(modes, mode))),
-                text(_shares(mode.get("potential_share", []), [one["name"] for one in modes["couplings"]])),
+                text(_shares(mode.get("kinetic_share", []), modes.kinetic_names)),
+                text(_shares(mode.get("potential_share", []), modes.couplings)),
                 *([text(mark, "warn" if mark else "")] if any(marks) else []),
             ]
         )
     rows, more = first(rows, MOST_ROWS, "modes.csv")
     columns = ["mode", "frequency [Hz]", "frequency [1/min]", "undamped [Hz]", "damping ratio", "decay time [s]"]
-    note = f"Negative damping: the mode grows. {more}" if any(mode["damping_ratio"] < 0 for mode in oscillating) else more
+    note = f"Negative damping: the mode grows. {more}" if any(mode["damping_ratio"] < 0 for mode in modes.oscillating) else more
     columns += ["kinetic energy in", "potential energy in", *(["remark"] if any(marks) else [])]
     return Table("Natural frequencies", columns, rows, note)
 
 
-def _others(others: list[dict], modes: dict) -> Table:
+def _others(others: list[dict], modes: Modes) -> Table:
     rows = []
     for mode in others:
-        where = mode.get("state") or _shares(mode.get("kinetic_share", []), _kinetic_names(modes, mode))
+        where = mode.get("state") or _shares(mode.get("kinetic_share", []), modes.kinetic_names)
         rows.append([text(mode["kind"]), number(mode["eigenvalue_1_s"][0]), number(mode.get("time_constant_s")), text(where)])
     rows, more = first(rows, MOST_ROWS, "modes.csv")
     columns = ["kind", "rate [1/s]", "time constant [s]", "kinetic energy in, or state"]
@@ -91,23 +80,20 @@ def _others(others: list[dict], modes: dict) -> Table:
 def _shapes(sources: Sources, shaped: list[dict]) -> Figure:
     """What moves in phase with the largest motion, along the shaft lines, one beside the other."""
     modes = sources.modes
-    pairs = [[GROUND if b == 0 else b - 1 for b in one["bodies"]] for one in modes["couplings"]]
-    gears = [[GROUND if b == 0 else b - 1 for b in one["bodies"]] for one in modes["gears"]]
-    train = lay_out(len(modes["bodies"]), [pair for pair in pairs if len(pair) == 2], gears)
-    places, order = _abscissas(train)
+    places, order = _abscissas(modes.train)
     curves = []
     for i, mode in enumerate(shaped):
-        motion = np.array(mode["shape"]) * np.cos(np.radians(mode["phase_deg"]))
+        motion = motion_of(mode)
         x, y, labels = [], [], []
         for body in order:
             if body is None:
                 x, y, labels = [*x, x[-1] + 0.5], [*y, math.nan], [*labels, ""]
             else:
-                x, y, labels = [*x, places[body]], [*y, motion[body]], [*labels, modes["bodies"][body]]
+                x, y, labels = [*x, places[body]], [*y, motion[body]], [*labels, modes.bodies[body]]
         name = f"{roman(mode['mode'])}: {number_text(mode['frequency_Hz'])} Hz"
         curve = {"name": name, "x": sources.arrays.put(x), "y": sources.arrays.put(y), "labels": labels}
         curves.append({**curve, "shown": i < SHOWN_SHAPES, "dots": True})
-    ticks = [[places[body], modes["bodies"][body]] for body in range(len(places))]
+    ticks = [[places[body], modes.bodies[body]] for body in range(len(places))]
     spec = {
         "x": {"label": "", "unit": "", "ticks": ticks, "range": [min(places) - 0.5, max(places) + 0.5]},
         "y": {"label": "relative amplitude", "unit": "", "range": [-1.1, 1.1]},
@@ -115,7 +101,7 @@ def _shapes(sources: Sources, shaped: list[dict]) -> Figure:
         "name": "mode",
     }
     told = "; ".join(f"mode {mode['mode']} at {number_text(mode['frequency_Hz'])} Hz" for mode in shaped)
-    lines = " Shaft lines stand one beside the other." if train.lines > 1 else ""
+    lines = " Shaft lines stand one beside the other." if modes.train.lines > 1 else ""
     return Figure(
         f"Shapes of the modes along the train.{lines}", f"Curves of the relative amplitudes of the bodies: {told}.", spec
     )

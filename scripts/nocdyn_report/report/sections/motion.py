@@ -1,12 +1,13 @@
 """Runs over the time: peaks with their times, the load cases, curves."""
 
 from ...columns import DETAIL, LOSS, TWIST, Column, by_sort
+from ...results import TIME
+from ...selection import widest
 from ..content import Cell, Figure, Heading, Paragraph, Section, Table, first, number, rounded, share, text
 from ..numbers import number_text, unit_text
 from ..sources import Run, Sources
 from .response import ratio_tone
 
-TIME = "t [s]"
 NO_FIGURE = (LOSS, TWIST)  # only their extremes are told
 MOST_CURVES = 10  # of a figure
 SHOWN_CURVES = 5  # at first
@@ -139,29 +140,24 @@ def _events(run: Run) -> Table:
 
 def _figures(sources: Sources, run: Run) -> list[Figure]:
     """A figure for each sort of columns, with those that vary most."""
-    ranges = {label: column["max"] - column["min"] for label, column in run.columns.items() if "max" in column}
     sorts = by_sort(column for column in run.drawn() if column.rank not in NO_FIGURE)
-    chosen = [first_by_range(columns, ranges, MOST_CURVES) for columns in sorts]
-    needed = [column.label for columns in chosen for column in columns]
+    chosen = [widest([column.label for column in columns], run.ranges, MOST_CURVES) for columns in sorts]
+    needed = [label for labels in chosen for label in labels]
     if not needed:
         return []
     table = run.values([TIME, *needed])
     if len(table) < 2:
         return []
-    return [_figure(sources, run, table, columns, len(all_of), ranges) for columns, all_of in zip(chosen, sorts)]
+    return [_figure(sources, run, table, labels, len(all_of)) for labels, all_of in zip(chosen, sorts)]
 
 
-def first_by_range(columns: list[Column], ranges: dict[str, float], most: int) -> list[Column]:
-    """Those that vary most, in their order."""
-    kept = sorted(columns, key=lambda column: -ranges.get(column.label, 0.0))[:most]
-    return [column for column in columns if column in kept]
-
-
-def _figure(sources: Sources, run: Run, table: object, columns: list[Column], count: int, ranges: dict[str, float]) -> Figure:
+def _figure(sources: Sources, run: Run, table: object, labels: list[str], count: int) -> Figure:
+    columns = [run.column_list[label] for label in labels]
     time, one = table[TIME].to_numpy(), columns[0]
-    shown = first_by_range(columns, ranges, SHOWN_CURVES)
+    shown = widest(labels, run.ranges, SHOWN_CURVES)
     curves = [
-        sources.arrays.curve(column.title, time, table[column.label].to_numpy(), shown=column in shown) for column in columns
+        sources.arrays.curve(column.title, time, table[column.label].to_numpy(), shown=column.label in shown)
+        for column in columns
     ]
     spec = {
         "x": {"label": "time", "unit": "s"},
@@ -170,7 +166,7 @@ def _figure(sources: Sources, run: Run, table: object, columns: list[Column], co
         "name": one.kind,
     }
     some = f", the {len(columns)} of {count} that vary most" if len(columns) < count else ""
-    told = "; ".join(_range(column, run.columns[column.label]) for column in columns if column.label in ranges)
+    told = "; ".join(_range(column, run.columns[column.label]) for column in columns if column.label in run.ranges)
     caption = one.caption[0].upper() + one.caption[1:]
     return Figure(f"{caption}{_of(run)} over the time{some}", f"Curves over the time: {told}.", spec)
 

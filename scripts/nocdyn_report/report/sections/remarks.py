@@ -42,7 +42,7 @@ def program_notes(sources: Sources) -> list[tuple[str, str]]:
     """Each once, with the calculations that gave it."""
     given = [("check", sources.check["notes"])]
     given += [("equilibrium", sources.equilibrium["notes"])] if sources.has("equilibrium") else []
-    given += [("modes", sources.modes["notes"])] if sources.has("modes") else []
+    given += [("modes", sources.modes.content["notes"])] if sources.has("modes") else []
     given += [("campbell", sources.campbell_report["notes"])] if sources.has("campbell") else []
     given += [("response", sources.response_report["notes"])] if sources.has("response") else []
     given += [(f"run {run.name}".strip(), run.summary.get("machine", {}).get("notes", [])) for run in sources.runs]

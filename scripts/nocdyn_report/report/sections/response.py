@@ -3,17 +3,15 @@
 import numpy as np
 
 from ...columns import FORCE, MOMENT
-from ...speed_results import Quantity
+from ...speed_results import NEAR, Quantity
 from ..content import Figure, Heading, Paragraph, Section, Table, first, number, share, text
 from ..curves import band
 from ..numbers import number_text, unit_text
 from ..sources import Sources
 from .campbell import operation_bands, verdict
 
-NAMED_ORDERS = 4  # of a figure
 MOST_FIGURES = 24
 MOST_ROWS = 120
-LIMIT_ROOM = 2.5  # a limit that is higher above the curves is not drawn
 
 
 def response_section(sources: Sources) -> Section | None:
@@ -171,7 +169,7 @@ def _figure(sources: Sources, quantity: Quantity) -> Figure:
     top = float(np.nanmax(quantity.half_range, initial=0.0))
     for name, values, role in (("limit", quantity.limit, "limit"), ("limit for passing", quantity.transient_limit, "passing")):
         if values is not None and np.isfinite(values).any():
-            is_near = np.nanmin(values) <= LIMIT_ROOM * top
+            is_near = np.nanmin(values) <= NEAR * top
             curves.append(arrays.curve(name, speed, values, role=role, shown=bool(is_near)))
     spec = {
         "x": {"label": f"speed of {response.body}", "unit": sources.speed_unit},
@@ -191,13 +189,10 @@ def _figure(sources: Sources, quantity: Quantity) -> Figure:
 
 
 def _orders(sources: Sources, quantity: Quantity, speed: np.ndarray) -> list[dict]:
-    if quantity.orders is None:
-        return []
-    peaks = np.nanmax(quantity.orders, axis=0)
-    chosen = sorted(np.argsort(-peaks)[:NAMED_ORDERS])
-    lines = sources.response.lines
-    names = [f"order {lines[i].name}" if lines[i].is_order else lines[i].name for i in chosen]
-    return [sources.arrays.curve(name, speed, quantity.orders[:, i]) for name, i in zip(names, chosen) if peaks[i] > 0]
+    """The largest, in the order of the file."""
+    response = sources.response
+    chosen = sorted(response.largest_lines(quantity))
+    return [sources.arrays.curve(response.lines[i].title, speed, quantity.orders[:, i]) for i in chosen]
 
 
 def _barred(sources: Sources, quantity: Quantity) -> list[dict]:

@@ -5,7 +5,6 @@ from ...speed_results import roman
 from ..content import Cell, Section, Table, text
 from ..numbers import number_text, percent
 from ..sources import Sources
-from .campbell import verdict
 from .response import limited, passage, ratio_tone, shares_of_limits
 from .steady import stability_text
 
@@ -55,7 +54,7 @@ def _steady(sources: Sources) -> list[list[Cell]]:
 def _frequencies(sources: Sources) -> list[list[Cell]]:
     if not sources.has("modes"):
         return []
-    found = [mode for mode in sources.modes["modes"] if mode["kind"] == "oscillating"]
+    found = sources.modes.oscillating
     if not found:
         return []
     named = [f"{roman(mode['mode'])} {number_text(mode['frequency_Hz'])} Hz" for mode in found]
@@ -69,16 +68,14 @@ def _criticals(sources: Sources) -> list[list[Cell]]:
         return []
     rows = []
     crossings = sources.campbell.crossings
-    for wanted, words in (("bad", "in operation"), ("warn", "within the margin of operation")):
-        chosen = [one for one in crossings if verdict(one)[1] == wanted]
-        named = [f"{one.name} at {number_text(sources.of_rpm(one.speed))} {sources.speed_unit}" for one in chosen]
-        if named:
+    for wanted, words in (("inside", "in operation"), ("margin", "within the margin of operation")):
+        if named := [sources.named(one) for one in crossings if one.place == wanted]:
             rows.append(_row("Critical speeds", "critical", _listed(named), words, "warn"))
     if rows or not crossings:
         return rows or [
             _row("Critical speeds", "critical", "No order meets a natural frequency in the range of speeds.", "none", "good")
         ]
-    named = [f"{one.name} at {number_text(sources.of_rpm(one.speed))} {sources.speed_unit}" for one in crossings]
+    named = list(map(sources.named, crossings))
     words, tone = ("clear of operation", "good") if sources.campbell.operation else ("", "")
     return [_row("Critical speeds", "critical", _listed(named), words, tone)]
 
