@@ -1,13 +1,11 @@
 """Clutches, brakes and freewheels: when they lock and slip, their torques and heat, against other computations."""
 
 import csv
-import random
 from math import pi, sin
 
-import numpy as np
 import pytest
-
-BODY = "&body name = '{}' inertia = {} speed = {} /\n"
+from clutch_references import BODY, SEEDS, STEP, Train
+from conftest import IS_SLOW
 
 
 def run(nocdyn, text, *words):
@@ -41,7 +39,7 @@ def coupled_clutches():
 
 
 @pytest.mark.parametrize("formulation", ["reduced", "multiplier", "paper"])
-@pytest.mark.parametrize("method", ["rk45", "rk853", "rodas5p", "auto"])
+@pytest.mark.parametrize("method", ["auto"] if IS_SLOW else ["rk45", "rk853", "rodas5p", "auto"])
 def test_coupled_clutches_lock_and_slip_when_those_of_modelica_do(nocdyn, method, formulation):
     text = coupled_clutches().replace("METHOD", method).replace("rtol", f"formulation = '{formulation}' rtol")
     table, events = run(nocdyn, text)
@@ -198,68 +196,24 @@ def test_a_clutch_that_never_engages_in_the_run_is_noted(nocdyn, keys, engages):
     assert (f"\n  note: {note}\n" in nocdyn("check", text).stdout) is not engages
 
 
-# Random trains against time stepping with impulses: v_1 = v_0 + J^-1 (h T + B p), each |p| at most h times its capacity.
-STEP, END = 2e-5, 0.5
+# Speeds at the end of random trains, printed by clutch_references.py.
+STEPPED = [
+    [-0.152569, 0.000137, 0.000137, -0.218452],
+    [-0.126531, -0.126531, -0.126531],
+    [1.373497, 1.383275, 0.862994],
+    [-0.096437, -0.096437, -0.096437],
+    [-3.991207, 0.0, 0.981071],
+    [0.052004, 0.052004, 1.500120, 0.052004, 0.052004],
+]
 
 
-class Train:
-    def __init__(self, seed):
-        chance = random.Random(seed)
-        self.bodies = chance.randint(3, 5)
-        self.inertia = [chance.uniform(0.5, 3) for _ in range(self.bodies)]
-        self.speed = [chance.uniform(-5, 5) for _ in range(self.bodies)]
-        self.torque = [(chance.uniform(5, 30), chance.uniform(5, 40)) for _ in range(self.bodies)]
-        self.joints = []
-        for i in range(chance.randint(3, 6)):
-            pair = chance.sample(range(-1, self.bodies), 2)
-            least = -chance.uniform(3, 25)
-            self.joints.append((pair, least, 0.0 if i == 2 else -least))  # the third is a freewheel that slips
-
-    def text(self):
-        names = [*(f"b{i}" for i in range(self.bodies)), "ground"]
-        text = "".join(BODY.format(names[i], self.inertia[i], self.speed[i]) for i in range(self.bodies))
-        for i, (amplitude, frequency) in enumerate(self.torque):
-            text += f"&excitation name = 'e{i}' body = 'b{i}' amplitude = {amplitude} frequency = {frequency} /\n"
-        for i, ((one, two), least, most) in enumerate(self.joints):
-            kind = "clutch" if most else "freewheel direction = 'backward'"
-            text += f"&{kind.split()[0]} name = 'j{i}' bodies = '{names[one]}', '{names[two]}' capacity = {-least} "
-            text += kind.partition(" ")[2] + " /\n"
-        return text + f"&run t_end = {END} rtol = 1e-9 atol = 1e-11 /\n&output points = 11 /\n"
-
-    def stepped(self):
-        rows = np.zeros((len(self.joints), self.bodies))
-        for i, ((one, two), _, _) in enumerate(self.joints):
-            if one >= 0:
-                rows[i, one] -= 1
-            if two >= 0:
-                rows[i, two] += 1
-        weight = rows / self.inertia @ rows.T
-        least = [STEP * joint[1] for joint in self.joints]
-        most = [STEP * joint[2] for joint in self.joints]
-        speed, impulse = np.array(self.speed), np.zeros(len(self.joints))
-        free = np.array([[amplitude * sin(frequency * STEP * (k + 0.5)) for amplitude, frequency in self.torque]
-                         for k in range(round(END / STEP))]) * STEP / self.inertia  # fmt: skip
-        for push in free:
-            speed = speed + push
-            slips = rows @ speed
-            for _ in range(40):
-                before = impulse.copy()
-                for i in range(len(impulse)):
-                    wanted = impulse[i] - (slips[i] + weight[i] @ impulse) / weight[i, i]
-                    impulse[i] = min(max(wanted, least[i]), most[i])
-                if abs(impulse - before).max() < 1e-12:
-                    break
-            speed = speed + rows.T @ impulse / self.inertia
-        return speed
-
-
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_random_trains_move_as_time_stepping_with_impulses_says(nocdyn, seed):
     train = Train(seed)
     table, events = run(nocdyn, train.text())
     assert events
     speeds = [table[f"omega_b{i} [rad/s]"][-1] for i in range(train.bodies)]
-    assert speeds == pytest.approx(train.stepped(), abs=40 * STEP * max(t[0] / j for t, j in zip(train.torque, train.inertia)))
+    assert speeds == pytest.approx(STEPPED[seed], abs=40 * STEP * max(t[0] / j for t, j in zip(train.torque, train.inertia)))
     assert max(map(abs, table["energy_residual [J]"])) < 1e-6
 
 
