@@ -32,6 +32,15 @@ def first_case(path):
     return ("--case", found[1]) if found else ()
 
 
+# For what a slow build shows no better, and other tests compute there too.
+fast_only = pytest.mark.skipif(IS_SLOW, reason="takes long in a slow build")
+
+
+def all_if_fast(*values):
+    """Values of a parameter of tests; in a slow build the first one."""
+    return values[:1] if IS_SLOW else values
+
+
 # A run that no test waits for, with few rows.
 ENDLESS = ("--set", "run.t_end=1e6", "--set", "run.max_steps=100000000", "--set", "output.interval=1")
 

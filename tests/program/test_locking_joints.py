@@ -4,8 +4,8 @@ import csv
 from math import pi, sin
 
 import pytest
-from clutch_references import BODY, SEEDS, STEP, Train
-from conftest import IS_SLOW
+from conftest import all_if_fast
+from impulse_references import BODY, SEEDS, STEP, Train
 
 
 def run(nocdyn, text, *words):
@@ -39,7 +39,7 @@ def coupled_clutches():
 
 
 @pytest.mark.parametrize("formulation", ["reduced", "multiplier", "paper"])
-@pytest.mark.parametrize("method", ["auto"] if IS_SLOW else ["rk45", "rk853", "rodas5p", "auto"])
+@pytest.mark.parametrize("method", all_if_fast("auto", "rk45", "rk853", "rodas5p"))
 def test_coupled_clutches_lock_and_slip_when_those_of_modelica_do(nocdyn, method, formulation):
     text = coupled_clutches().replace("METHOD", method).replace("rtol", f"formulation = '{formulation}' rtol")
     table, events = run(nocdyn, text)
@@ -196,7 +196,7 @@ def test_a_clutch_that_never_engages_in_the_run_is_noted(nocdyn, keys, engages):
     assert (f"\n  note: {note}\n" in nocdyn("check", text).stdout) is not engages
 
 
-# Speeds at the end of random trains, printed by clutch_references.py.
+# Speeds at the end of random trains, printed by impulse_references.py.
 STEPPED = [
     [-0.152569, 0.000137, 0.000137, -0.218452],
     [-0.126531, -0.126531, -0.126531],

@@ -1,14 +1,13 @@
 """Losses of teeth and bearings, and friction over the slip, against closed forms and other computations."""
 
 import json
-import random
 from math import exp, sin
 
 import numpy as np
 import pytest
+from impulse_references import LOSSY_SEEDS, STEP, LossyTrain
 
 FORMULATIONS = ("reduced", "multiplier", "paper")
-END, STEP = 0.6, 2e-5  # of the computation by small steps [s]
 
 
 def run(nocdyn, text, *words):
@@ -252,71 +251,22 @@ def test_the_capacity_follows_its_table_over_the_slip(nocdyn, method):
     assert events[0]["time"] == pytest.approx(kink + np.log(2) / 10, abs=1e-9)
 
 
-class LossyTrain:
-    """Random bodies with lossy gears, clutches, bearings and torques, and their motion by small steps with impulses."""
-
-    def __init__(self, seed):
-        chance = random.Random(1000 + seed)
-        self.inertia = [chance.uniform(0.5, 3) for _ in range(5)]
-        self.ratio = [chance.uniform(0.5, 2) for _ in range(2)]  # of the gears 0-1 and 2-3
-        self.efficiency = [(chance.uniform(0.6, 0.95), chance.uniform(0.3, 0.9)) for _ in range(2)]
-        first, third = chance.uniform(-5, 5), chance.uniform(-5, 5)
-        self.speed = [first, -first / self.ratio[0], third, -third / self.ratio[1], chance.uniform(-5, 5)]
-        self.torque = [(chance.uniform(5, 30), chance.uniform(5, 40)) for _ in range(5)]
-        self.clutches = [((1, 2), chance.uniform(3, 25)), ((3, 4), chance.uniform(3, 25)), ((4, -1), chance.uniform(1, 5))]
-
-    def text(self):
-        text = "".join(body(f"b{i}", j, v) for i, (j, v) in enumerate(zip(self.inertia, self.speed, strict=True)))
-        for i, (ratio, (forward, reverse)) in enumerate(zip(self.ratio, self.efficiency, strict=True)):
-            text += f"&gear name = 'g{i}' bodies = 'b{2 * i}', 'b{2 * i + 1}' radii = 1.0, {ratio!r}\n"
-            text += f"  efficiency = {forward!r} reverse_efficiency = {reverse!r} /\n"
-        for i, ((one, two), most) in enumerate(self.clutches):
-            other = f"b{two}" if two >= 0 else "ground"
-            text += f"&clutch name = 'c{i}' bodies = 'b{one}', '{other}' capacity = {most!r} /\n"
-        for i, (amplitude, frequency) in enumerate(self.torque):
-            text += f"&excitation name = 'e{i}' body = 'b{i}' amplitude = {amplitude!r} frequency = {frequency!r} /\n"
-        return text + f"&run t_end = {END} rtol = 1e-9 atol = 1e-11 /\n&output points = 11 /\n"
-
-    def stepped(self):
-        # rows of gears, of losses on their first wheels, and of clutches
-        rows = np.zeros((7, 5))
-        for i in range(2):
-            rows[i, 2 * i], rows[i, 2 * i + 1], rows[2 + i, 2 * i] = 1, self.ratio[i], 1
-        for i, ((one, two), _) in enumerate(self.clutches):
-            rows[4 + i, one] = -1
-            if two >= 0:
-                rows[4 + i, two] = 1
-        weight = rows / self.inertia @ rows.T
-        least = np.array([-np.inf] * 2 + [0.0] * 2 + [-STEP * most for _, most in self.clutches])
-        most = -least
-        shares = [(1 - 1 / forward, 1 - reverse) for forward, reverse in self.efficiency]
-        speed, impulse = np.array(self.speed), np.zeros(7)
-        for k in range(round(END / STEP)):
-            t = STEP * (k + 0.5)
-            push = np.array([amplitude * sin(frequency * t) for amplitude, frequency in self.torque])
-            speed = speed + STEP * push / self.inertia
-            slips = rows @ speed
-            for _ in range(300):
-                before = impulse.copy()
-                for i in range(7):
-                    wanted = impulse[i] - (slips[i] + weight[i] @ impulse) / weight[i, i]
-                    if i in (2, 3):  # -s T, with the share s between those of both directions of the power
-                        bounds = [-share * impulse[i - 2] for share in shares[i - 2]]
-                        least[i], most[i] = min(bounds), max(bounds)
-                    impulse[i] = min(max(wanted, least[i]), most[i])
-                if abs(impulse - before).max() < 1e-11:
-                    break
-            speed = speed + rows.T @ impulse / self.inertia
-        return speed
+# Speeds at the end of random trains with losses, printed by impulse_references.py.
+STEPPED = [
+    [-1.30274838, 1.00055511, 0.57921187, -0.29439522, -0.29439522],
+    [-0.08272308, 0.044625, 0.0209477, -0.01247746, -0.01247746],
+    [1.00615827, -0.69914175, -0.70097732, 0.48961777, 0.48961777],
+    [0.10326849, -0.19163237, -0.23740127, 0.23684437, 0.23684437],
+]
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", LOSSY_SEEDS)
 def test_random_trains_with_losses_move_as_small_steps_say(nocdyn, seed):
     train = LossyTrain(seed)
     table, events = run(nocdyn, train.text())
     assert events
     speeds = [column(table, f"omega_b{i}")[-1] for i in range(5)]
-    assert speeds == pytest.approx(train.stepped(), abs=100 * STEP * max(t[0] / j for t, j in zip(train.torque, train.inertia)))
+    assert speeds == pytest.approx(STEPPED[seed], abs=100 * STEP * max(t[0] / j for t, j in zip(train.torque, train.inertia)))
     assert max(abs(column(table, "energy_residual"))) < 1e-6
     for formulation in FORMULATIONS[1:]:
         table, _ = run(nocdyn, train.text(), "--set", f"run.formulation={formulation}")

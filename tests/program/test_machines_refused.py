@@ -1,7 +1,7 @@
 """Machines that cannot be, and notes on those that can: file, line, group and name."""
 
 import pytest
-from conftest import CASE_2, IS_SANITIZED, peak_memory
+from conftest import CASE_2, IS_SANITIZED, fast_only, peak_memory
 
 PAIR = """\
 &body name = 'a' inertia = 1.0 speed = {a} /
@@ -125,6 +125,7 @@ def test_implicit_methods_are_refused_where_their_matrix_is_too_large(hub, metho
     assert not (hub.folder / "refused").exists()
 
 
+@fast_only
 @pytest.mark.parametrize("method", ["rk45", "rk853"])
 def test_explicit_methods_run_where_a_matrix_would_be_too_large(hub, method):
     outcome = hub("run", "hub.nml", "--out", "out", "--set", f"run.method={method}")
@@ -132,6 +133,7 @@ def test_explicit_methods_run_where_a_matrix_would_be_too_large(hub, method):
     assert "note" not in outcome.stdout
 
 
+@fast_only
 def test_auto_does_without_a_matrix_that_is_too_large_and_says_so(hub):
     megabytes, output = peak_memory(hub, "run", "hub.nml", "--out", "out")
     note = f"method = 'auto' takes explicit steps alone, those of 'rk853': implicit ones need {NEED}"
@@ -144,6 +146,7 @@ def test_auto_does_without_a_matrix_that_is_too_large_and_says_so(hub):
     assert (hub.folder / "out/trajectory.csv").read_bytes() == (hub.folder / "explicit/trajectory.csv").read_bytes()
 
 
+@fast_only
 def test_a_long_chain_keeps_its_implicit_steps(nocdyn):
     bodies = "".join(f"&body name = 'b{i}' inertia = 1.0 speed = {i % 2} /\n" for i in range(3001))
     couplings = "".join(f"&coupling name = 'c{i}' bodies = 'b{i}', 'b{i + 1}' stiffness = 1.0 /\n" for i in range(3000))
