@@ -5,6 +5,7 @@ from math import exp, sin
 
 import numpy as np
 import pytest
+from conftest import all_if_fast
 from impulse_references import LOSSY_SEEDS, STEP, LossyTrain
 
 FORMULATIONS = ("reduced", "multiplier", "paper")
@@ -94,7 +95,7 @@ def gear_pair(drive, keys, method="auto", formulation="reduced"):
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize("method", ["auto", "rk853", "rodas5p", "rodas4"])
+@pytest.mark.parametrize("method", all_if_fast("auto", "rk853", "rodas5p", "rodas4"))
 def test_the_driving_wheel_pays_for_the_loss(nocdyn, method, formulation):
     # T = 0.1 F on the first wheel; it needs T / efficiency where it drives: 0.2 a = 6 - T / 0.8, 3 a / 3 = 3 T - 9 sign
     text = gear_pair({"one": 6.0}, "efficiency = 0.8 reverse_efficiency = 0.6", method, formulation)

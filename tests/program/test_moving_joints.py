@@ -7,7 +7,7 @@ from math import asin, atan2, cos, pi, radians, sin, sqrt
 
 import numpy as np
 import pytest
-from conftest import SOURCE
+from conftest import SOURCE, all_if_fast, fast_only
 
 BODY = "&body name = '{}' inertia = {} speed = {} /\n"
 FREE = "&body name = '{}' inertia = {} /\n"
@@ -73,7 +73,7 @@ TURN = 0.56898708728104
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize("method", ["rk45", "rk853", "rodas5p", "auto"])
+@pytest.mark.parametrize("method", all_if_fast("rk853", "rk45", "rodas5p", "auto"))
 def test_a_cardan_joint_turns_freely_as_by_the_closed_form(nocdyn, formulation, method):
     end = f"&run t_end = {TURN} method = '{method}' formulation = '{formulation}' {TIGHT} /\n&output points = 5 /\n"
     table = run(nocdyn, PAIR + end)
@@ -84,6 +84,7 @@ def test_a_cardan_joint_turns_freely_as_by_the_closed_form(nocdyn, formulation, 
     assert max(abs(column(table, "energy_residual"))) < 1e-9
 
 
+@fast_only
 def test_a_cardan_joint_keeps_its_angles_over_many_turns(nocdyn):
     table = run(nocdyn, PAIR + "&run t_end = 600 /\n&output points = 101 /\n")
     turned = column(table, "phi_a")
@@ -112,7 +113,7 @@ def driveline(formulation, method):
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize("method", ["rk853", "rodas5p"])
+@pytest.mark.parametrize("method", all_if_fast("rk853", "rodas5p"))
 def test_a_driveline_with_a_cardan_joint_moves_as_by_its_own_equation(nocdyn, formulation, method):
     """One equation for the angle of the fork: (J_1 + J_2 g'^2) v'' + J_2 g' g'' v'^2 = T_1 + g' T_2."""
     table = run(nocdyn, driveline(formulation, method))
@@ -192,7 +193,7 @@ SLIDER = BODY.format("a", 0.02, 100) + "&crank name = 'p' body = 'a' crank_radiu
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize("method", ["rk45", "rk853", "rodas5p", "auto"])
+@pytest.mark.parametrize("method", all_if_fast("rk853", "rk45", "rodas5p", "auto"))
 def test_a_slider_crank_turns_freely_as_by_the_closed_form(nocdyn, formulation, method):
     end = f"&run t_end = 0.064780516961413 method = '{method}' formulation = '{formulation}' {TIGHT} /\n&output points = 5 /\n"
     table = run(nocdyn, SLIDER + end)
@@ -438,7 +439,7 @@ def test_what_the_harmonics_leave_out_is_noted_with_its_size(nocdyn):
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize("method", ["auto", "rk45", "rodas5p"])
+@pytest.mark.parametrize("method", all_if_fast("auto", "rk45", "rodas5p"))
 def test_a_ramp_of_the_speed_needs_the_torque_of_the_inertia(nocdyn, formulation, method):
     text = FREE.format("a", 2) + "&drive name = 'd' body = 'a' table_time = 0, 2, 3 table_speed_rpm = 0, 600, 600 /\n"
     text += f"&run t_end = 4 method = '{method}' formulation = '{formulation}' /\n&output points = 9 /\n"
@@ -659,6 +660,7 @@ def test_start_speeds_that_fit_the_position_do_not_hinder_the_modes(nocdyn):
     assert [mode["undamped_frequency_Hz"] for mode in modes if mode["kind"] == "oscillating"] == pytest.approx([frequency])
 
 
+@fast_only
 def test_the_response_of_a_compressor_is_that_of_its_settled_motion(nocdyn):
     """Mean inertia and torque by orders against the motion with the crank; they differ by the square of the speed's ripple."""
     source = SOURCE / "input/examples/compressor"
@@ -683,6 +685,7 @@ def test_the_response_of_a_compressor_is_that_of_its_settled_motion(nocdyn):
     assert rows[1][half] == pytest.approx(np.ptp(moment) / 2, rel=1e-2)
 
 
+@fast_only
 def test_a_crank_is_as_exact_after_a_thousand_turns(nocdyn):
     table = run(nocdyn, SLIDER + "&run t_end = 65 /\n&output points = 101 /\n")
     turned = column(table, "phi_a")
