@@ -97,3 +97,31 @@ def test_a_limit_of_a_quantity_has_a_number_and_no_other_limit(nocdyn):
         nocdyn.write("m.nml", SHAFT + f"&limit shaft = 's' {keys} /\n")
         outcome = nocdyn("check", "m.nml")
         assert outcome.returncode == 2 and outcome.stderr.startswith("nocdyn: m.nml:8: &limit:")
+
+
+NAMESAKES = """\
+&body name = 'm' inertia = 2.0 speed = 10.0 /
+&body name = 'p' inertia = 0.5 speed = 10.0 /
+&body name = 'w' inertia = 5.0 speed = -4.0 /
+&body name = 'v' inertia = 5.0 speed = -4.0 /
+&coupling name = 'c' bodies = 'm', 'p' stiffness = 1e4 damping = 5.0 /
+&gear name = 'x' bodies = 'p', 'w' radii = 2.0, 5.0 /
+&clutch name = '{}' bodies = 'w', 'v' capacity = 1e4 /
+&motor name = 'd' body = 'm' a = 100.0 b = 5.0 c = 0.0 /
+&load name = 'l' body = 'v' viscous = 10.0 /
+&excitation name = 'e' body = 'm' kind = 'orders' orders = 2 amplitudes = 10.0 /
+&fatigue name = 'f' gear = 'x' reference_force = 30.0 reference_cycles = 1e6 slope = 5 /
+&run t_end = 0.5 rtol = 1e-9 /
+&response body = 'm' speed = 5.0, 60.0 count = 12 /
+"""
+
+
+def test_the_damage_of_a_gear_is_not_of_a_clutch_with_its_name(nocdyn):
+    damage = []
+    for clutch in "yx":
+        nocdyn.write("m.nml", NAMESAKES.format(clutch))
+        assert nocdyn("response", "m.nml", "--out", "out").returncode == 0
+        header, rows = nocdyn.table("out", "response.csv")
+        damage.append([row[header.index("damage_per_hour_f [1/h]")] for row in rows])
+    assert damage[0] == damage[1]
+    assert max(damage[0]) > 0

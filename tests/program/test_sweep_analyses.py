@@ -87,6 +87,69 @@ def test_recorded_modes_are_those_of_the_machine_alone(nocdyn):
         assert mode["damping_ratio"] == pytest.approx(ratio, rel=1e-10)
 
 
+PATHS = (
+    "equilibrium.steady_states[1].values.moment_shaft [N m]",
+    "modes.modes[2].frequency_Hz",
+    "modes.modes[2].shape[1]",
+    "campbell.crossings[2].speed_rad_s",
+    "response.limits_exceeded",
+    "response.largest[1].half_range",
+)
+TURNING = (
+    MACHINE.replace("DAMPING", VISCOUS).replace("inertia", "speed = 60 inertia")
+    + """\
+&motor name = 'm' body = 'one' a = 100 b = 1 c = 0 /
+&load name = 'l' body = 'two' viscous = 0.5 /
+"""
+)
+
+
+def value_at(content, path):
+    """The number that a path such as 'modes[2].shape[1]' has in JSON that has been read."""
+    if path in content:
+        return float(content[path])
+    head, _, rest = path.partition(".")
+    name, _, index = head.partition("[")
+    content = content[name][int(index[:-1]) - 1] if index else content[name]
+    return value_at(content, rest) if rest else float(content)
+
+
+def test_a_number_of_any_report_is_recorded_by_its_path(nocdyn):
+    listed = ", ".join(f"'{path}'" for path in PATHS)
+    found = sweep(nocdyn, TURNING + GRID + f"&record path = {listed} /\n" + MODES)
+    assert sweep(nocdyn, TURNING + GRID + f"&record path = {listed} /\n" + MODES, "--threads", "3") == found
+    stiffness = [STIFFNESS * share for share in (0.8, 1.0, 1.2)]
+    for row, value in zip(found, stiffness, strict=True):
+        for path in PATHS:
+            command, place = path.split(".", 1)
+            assert float(row[path]) == value_at(report(nocdyn, command, TURNING, value), place)
+        assert row["modes.modes[2].frequency_Hz"] == row["mode_1_frequency [Hz]"]
+    assert len({row["campbell.crossings[2].speed_rad_s"] for row in found}) == 3
+
+
+def test_a_variant_without_the_number_of_a_path_fails_and_says_so(nocdyn):
+    grid = GRID.replace("low = 0.8 high = 1.2", "low = 1.0 high = 20.0")  # the mode leaves the range of speeds
+    found = sweep(nocdyn, TURNING + grid + "&record path = 'campbell.crossings[1].speed_rad_s' /\n")
+    assert [row["status"] for row in found] == ["done", "failed", "failed"]
+    assert found[1]["reason"] == "campbell.json of this variant has no number crossings[1].speed_rad_s"
+
+
+CLUTCH = """\
+&body name = 'three' inertia = 1 speed = 60 /
+&clutch name = 'k' bodies = 'two', 'three' capacity = 1e6 /
+"""
+
+
+def test_sweeps_of_modes_and_responses_lock_clutches_as_the_commands_do(nocdyn):
+    machine = TURNING + CLUTCH
+    found = sweep(nocdyn, machine + GRID + "&record response = 'shaft' statistic = 'peak' /\n" + MODES)
+    for row, share in zip(found, (0.8, 1.0, 1.2), strict=True):
+        modes = report(nocdyn, "modes", machine, STIFFNESS * share)["modes"]
+        assert [mode["frequency_Hz"] for mode in modes if mode["kind"] == "oscillating"] == [float(row["mode_1_frequency [Hz]"])]
+        (largest, *_) = report(nocdyn, "response", machine, STIFFNESS * share)["largest"]
+        assert largest["half_range"] == float(row["total_moment_shaft_peak [N m]"])
+
+
 def test_motion_modes_and_responses_are_recorded_together_in_the_order_of_the_file(nocdyn):
     machine = MACHINE.replace("DAMPING", VISCOUS)
     motion = "&record quantity = 'omega_two' statistic = 'final' /\n"
@@ -220,6 +283,22 @@ def test_trajectories_of_tied_variants_are_those_of_the_variants(nocdyn):
             "mode = 2 is out of range; the machine of the input has 1 oscillating modes about its steady state",
         ),
         ("&record mode = 1 /", "mode needs statistic"),
+        ("&record mode = 1 path = 'modes.modes[1].frequency_Hz' statistic = 'frequency' /", "mode and path"),
+        ("&record path = 'modes.modes[1].frequency_Hz' statistic = 'max' /", "statistic needs"),
+        (
+            "&record path = 'mode.frequency_Hz' /",
+            "path = 'mode.frequency_Hz' does not begin with the name of an analysis; allowed: 'equilibrium.', 'modes.', "
+            "'campbell.' or 'response.' and what its report has",
+        ),
+        (
+            "&record path = 'modes.modes[2].frequency_hz' /",
+            "path = 'modes.modes[2].frequency_hz': modes.json of this machine has no number 'modes[2].frequency_hz'; "
+            "did you mean 'modes[2].frequency_Hz'?",
+        ),
+        (
+            "&record path = 'modes.modes[2].frequency_Hz', 'modes.modes[2].frequency_Hz' /",
+            "'modes.modes[2].frequency_Hz' is recorded already; allowed: once",
+        ),
         ("&record mode = 1 response = 'shaft' statistic = 'peak' /", "mode and response"),
         ("&record quantity = 'omega_one' mode = 1 statistic = 'final' /", "quantity and mode"),
         ("&record mode = 1 order = 2 statistic = 'frequency' /", "order needs response"),

@@ -13,7 +13,7 @@ module nocdyn_campbell_files
   implicit none (type, external)
   private
 
-  public :: put_campbell_csv, campbell_json
+  public :: put_campbell_csv, put_campbell
 
 contains
 
@@ -66,13 +66,12 @@ contains
     if (self%is_order(line)) name = 'order_' // rounded_text(self%order(line), 8)
   end function line_name
 
-  !> The text of campbell.json.
-  function campbell_json(input, body, self) result(text)
+  !> The members of campbell.json.
+  subroutine put_campbell(json, input, body, self)
+    type(json_t), intent(inout) :: json
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: body
     type(campbell_t), intent(in) :: self
-    character(len=:), allocatable :: text
-    type(json_t) :: json
     real(wp), allocatable :: unstable(:)
     integer :: i
 
@@ -102,8 +101,7 @@ contains
     end do
     call json%close_list()
     call json%close()
-    text = json%text()
-  end function campbell_json
+  end subroutine put_campbell
 
   subroutine put_crossing(json, self, i)
     type(json_t), intent(inout) :: json

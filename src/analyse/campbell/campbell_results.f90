@@ -2,10 +2,11 @@
 module nocdyn_campbell_results
   use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_campbell, only: analyse_campbell, campbell_t
-  use nocdyn_campbell_files, only: campbell_json, put_campbell_csv
+  use nocdyn_campbell_files, only: put_campbell, put_campbell_csv
   use nocdyn_campbell_report, only: campbell_text
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
+  use nocdyn_json, only: json_t
   use nocdyn_machine, only: machine_t
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: output_units
@@ -13,13 +14,11 @@ module nocdyn_campbell_results
   implicit none (type, external)
   private
 
-  character(len=*), parameter :: table_name = 'campbell.csv', report_name = 'campbell.json'
-
   type, extends(analysis_t), public :: campbell_results_t
     type(campbell_t), private :: campbell
     character(len=:), allocatable, private :: body   !! whose speed is held
   contains
-    procedure :: solve, list_files, put_file, text => printed
+    procedure :: solve, list_tables, put_table, put_report, text => printed
   end type campbell_results_t
 
 contains
@@ -35,25 +34,29 @@ contains
     if (.not. allocated(error)) self%body = machine%names(self%campbell%settings%body)%text
   end subroutine solve
 
-  subroutine list_files(self, names)
+  subroutine list_tables(self, names)
     class(campbell_results_t), intent(in) :: self
     type(string_t), allocatable, intent(out) :: names(:)
 
-    names = [string_t(table_name), string_t(report_name)]
-  end subroutine list_files
+    names = [string_t('campbell.csv')]
+  end subroutine list_tables
 
-  subroutine put_file(self, input, name, file)
+  subroutine put_table(self, input, name, file)
     class(campbell_results_t), intent(in) :: self
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: name
     type(output_file_t), intent(inout) :: file
 
-    if (name == table_name) then
-      call put_campbell_csv(self%campbell, self%body, output_units(input), file)
-    else
-      call file%put(campbell_json(input, self%body, self%campbell))
-    end if
-  end subroutine put_file
+    call put_campbell_csv(self%campbell, self%body, output_units(input), file)
+  end subroutine put_table
+
+  subroutine put_report(self, input, json)
+    class(campbell_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    type(json_t), intent(inout) :: json
+
+    call put_campbell(json, input, self%body, self%campbell)
+  end subroutine put_report
 
   subroutine printed(self, input, text)
     class(campbell_results_t), intent(in) :: self

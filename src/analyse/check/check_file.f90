@@ -12,16 +12,15 @@ module nocdyn_check_file
   implicit none (type, external)
   private
 
-  public :: check_json
+  public :: put_check
 
 contains
 
-  !> The text of check.json.
-  function check_json(input, machine) result(text)
+  !> The members of check.json.
+  subroutine put_check(json, input, machine)
+    type(json_t), intent(inout) :: json
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
-    character(len=:), allocatable :: text
-    type(json_t) :: json
     type(string_t), allocatable :: notes(:)
     integer :: i
 
@@ -41,8 +40,7 @@ contains
     call put_load_cases(json, input)
     call json%put('complete_input', input_text(input))
     call json%close()
-    text = json%text()
-  end function check_json
+  end subroutine put_check
 
   !> The bodies of the input: their inertias there and with the ends of shafts, their speeds at the start, and these as a sum of
   !> ratios times the speeds of independent bodies.

@@ -24,7 +24,7 @@ module nocdyn_equilibrium_report
   implicit none (type, external)
   private
 
-  public :: equilibrium_json, equilibrium_text, new_equilibrium_report
+  public :: put_equilibrium, equilibrium_text, new_equilibrium_report
 
   !> The contents of the printed report and of equilibrium.json.
   type, public :: equilibrium_report_t
@@ -182,12 +182,11 @@ contains
                             rounded_text(sum(max(power, 0.0_wp)), cell_digits) // ' put in')
   end subroutine put_power
 
-  !> The text of equilibrium.json.
-  function equilibrium_json(input, self) result(text)
+  !> The members of equilibrium.json.
+  subroutine put_equilibrium(json, input, self)
+    type(json_t), intent(inout) :: json
     type(input_t), intent(in) :: input
     type(equilibrium_report_t), intent(in) :: self
-    character(len=:), allocatable :: text
-    type(json_t) :: json
     integer :: k
 
     call json%open_report(input%file, input%title())
@@ -212,7 +211,6 @@ contains
     end do
     call json%close_list()
     call json%close()
-    text = json%text()
-  end function equilibrium_json
+  end subroutine put_equilibrium
 
 end module nocdyn_equilibrium_report

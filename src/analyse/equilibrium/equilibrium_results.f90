@@ -2,12 +2,12 @@
 module nocdyn_equilibrium_results
   use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability, t_infinity
-  use nocdyn_equilibrium_report, only: equilibrium_json, equilibrium_report_t, equilibrium_text, new_equilibrium_report
+  use nocdyn_equilibrium_report, only: put_equilibrium, equilibrium_report_t, equilibrium_text, new_equilibrium_report
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
+  use nocdyn_json, only: json_t
   use nocdyn_machine, only: machine_t
-  use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: output_units
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -16,7 +16,7 @@ module nocdyn_equilibrium_results
   type, extends(analysis_t), public :: equilibrium_results_t
     type(equilibrium_report_t), private :: report
   contains
-    procedure :: solve, list_files, put_file, text => printed
+    procedure :: solve, put_report, text => printed
   end type equilibrium_results_t
 
 contains
@@ -39,21 +39,13 @@ contains
     if (allocated(error)) error%message = input%shown_file() // ': ' // error%message
   end subroutine solve
 
-  subroutine list_files(self, names)
-    class(equilibrium_results_t), intent(in) :: self
-    type(string_t), allocatable, intent(out) :: names(:)
-
-    names = [string_t('equilibrium.json')]
-  end subroutine list_files
-
-  subroutine put_file(self, input, name, file)
+  subroutine put_report(self, input, json)
     class(equilibrium_results_t), intent(in) :: self
     type(input_t), intent(in) :: input
-    character(len=*), intent(in) :: name
-    type(output_file_t), intent(inout) :: file
+    type(json_t), intent(inout) :: json
 
-    call file%put(equilibrium_json(input, self%report))
-  end subroutine put_file
+    call put_equilibrium(json, input, self%report)
+  end subroutine put_report
 
   subroutine printed(self, input, text)
     class(equilibrium_results_t), intent(in) :: self

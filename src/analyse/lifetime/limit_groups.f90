@@ -1,13 +1,14 @@
-!> The elements that groups &limit are of.
+!> The elements and the signals that groups &limit are of.
 module nocdyn_limit_groups
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
   use nocdyn_schema_text, only: suggestion
+  use nocdyn_signals, only: find_signal, signal_t
   use nocdyn_text, only: quoted, string_t
   implicit none (type, external)
   private
 
-  public :: check_limit, limited_kind
+  public :: check_limit, limited_kind, limited_signal
 
 contains
 
@@ -20,6 +21,25 @@ contains
     if (group%has_value('shaft')) kind = 'shaft'
     if (group%has_value('mesh')) kind = 'mesh'
   end function limited_kind
+
+  !> The signal that a group compares with its limits, 0 if there is none: its `quantity`, else the moment of a coupling, the
+  !> largest one along a shaft, or the force of a mesh.
+  integer function limited_signal(group, signals) result(found)
+    type(group_t), intent(in) :: group   !! &limit
+    type(signal_t), intent(in) :: signals(:)
+    character(len=:), allocatable :: kind
+
+    kind = trim(limited_kind(group))
+    if (group%has_value('quantity')) then
+      found = find_signal(signals, kind, group%text(kind), group%text('quantity'))
+    else if (kind == 'mesh') then
+      found = find_signal(signals, kind, group%text(kind), 'force')
+    else if (kind == 'shaft') then
+      found = find_signal(signals, kind, group%text(kind), 'total_moment', 'max')
+    else
+      found = find_signal(signals, kind, group%text(kind), 'total_moment')
+    end if
+  end function limited_signal
 
   !> Refuses limits of elements that there are not.
   subroutine check_limit(input, index, error)

@@ -5,8 +5,8 @@ module nocdyn_run_limits
   use nocdyn_input, only: group_t, input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
-  use nocdyn_limit_groups, only: limited_kind
-  use nocdyn_signals, only: find_signal, signal_t
+  use nocdyn_limit_groups, only: limited_kind, limited_signal
+  use nocdyn_signals, only: signal_t
   use nocdyn_text, only: append, rounded_text, string_t
   implicit none (type, external)
   private
@@ -30,7 +30,6 @@ contains
     type(string_t), intent(in) :: labels(:)               !! theirs
     real(wp), intent(in) :: lowest(:), highest(:)         !! [columns]
     type(run_limit_t), allocatable, intent(out) :: limits(:)
-    character(len=:), allocatable :: kind
     integer, allocatable :: groups(:)
     integer :: column, i, k, n
 
@@ -42,16 +41,7 @@ contains
         if (.not. has_peak(group)) cycle
         n = n + 1
         limits(n)%name = group%text(trim(limited_kind(group)))
-        kind = trim(limited_kind(group))
-        select case (kind)
-        case ('mesh')
-          column = find_signal(signals, kind, limits(n)%name, 'force')
-        case ('shaft')
-          column = find_signal(signals, kind, limits(n)%name, 'total_moment', 'max')
-        case default
-          column = find_signal(signals, kind, limits(n)%name, 'total_moment')
-        end select
-        if (group%has_value('quantity')) column = find_signal(signals, kind, limits(n)%name, group%text('quantity'))
+        column = limited_signal(group, signals)
         do k = 1, size(peak_keys)
           if (group%has_value(trim(peak_keys(k)))) limits(n)%limit = group%number(trim(peak_keys(k)))
         end do

@@ -14,7 +14,7 @@ module nocdyn_modes_files
   implicit none (type, external)
   private
 
-  public :: modes_csv, modes_json
+  public :: modes_csv, put_modes
 
   real(wp), parameter :: degree = acos(-1.0_wp) / 180.0_wp
 
@@ -95,12 +95,11 @@ contains
     if (abs(motion) > 0.0_wp) phases = atan2(aimag(motion), real(motion, wp)) / degree
   end function phases
 
-  !> The text of modes.json: drivetrain, operating point and modes; lists are in the order of the bodies or of the couplings.
-  function modes_json(input, self) result(text)
+  !> The members of modes.json: drivetrain, operating point and modes; lists are in the order of the bodies or of the couplings.
+  subroutine put_modes(json, input, self)
+    type(json_t), intent(inout) :: json
     type(input_t), intent(in) :: input
     type(modes_report_t), intent(in) :: self
-    character(len=:), allocatable :: text
-    type(json_t) :: json
     integer :: i
 
     call json%open_report(input%file, input%title())
@@ -114,8 +113,7 @@ contains
     end do
     call json%close_list()
     call json%close()
-    text = json%text()
-  end function modes_json
+  end subroutine put_modes
 
   !> The topology: bodies, elastic couplings, and gears with the ratio of the second body's speed to the first one's.
   subroutine put_drivetrain(json, self)

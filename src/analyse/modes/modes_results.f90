@@ -4,8 +4,9 @@ module nocdyn_modes_results
   use nocdyn_errors, only: error_t, exit_failed
   use nocdyn_holzer_report, only: holzer_tables
   use nocdyn_input, only: input_t
+  use nocdyn_json, only: json_t
   use nocdyn_machine, only: machine_t
-  use nocdyn_modes_files, only: modes_csv, modes_json
+  use nocdyn_modes_files, only: modes_csv, put_modes
   use nocdyn_modes_report, only: modes_report_t, modes_text, new_modes_report
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
   use nocdyn_output_file, only: output_file_t
@@ -14,13 +15,13 @@ module nocdyn_modes_results
   implicit none (type, external)
   private
 
-  character(len=*), parameter :: holzer_name = 'holzer.csv', table_name = 'modes.csv', report_name = 'modes.json'
+  character(len=*), parameter :: holzer_name = 'holzer.csv', table_name = 'modes.csv'
 
   type, extends(analysis_t), public :: modes_results_t
     type(modes_report_t), private :: report
     character(len=:), allocatable, private :: holzer_text, holzer_csv   !! not allocated: not wanted
   contains
-    procedure :: solve, list_files, put_file, text => printed
+    procedure :: solve, list_tables, put_table, put_report, text => printed
   end type modes_results_t
 
 contains
@@ -43,31 +44,35 @@ contains
     if (is_of_holzer .or. error%code == exit_failed) error%message = input%shown_file() // ': ' // error%message
   end subroutine solve
 
-  subroutine list_files(self, names)
+  subroutine list_tables(self, names)
     class(modes_results_t), intent(in) :: self
     type(string_t), allocatable, intent(out) :: names(:)
 
     allocate (names(0))
     if (allocated(self%holzer_csv)) call append(names, holzer_name)
     call append(names, table_name)
-    call append(names, report_name)
-  end subroutine list_files
+  end subroutine list_tables
 
-  subroutine put_file(self, input, name, file)
+  subroutine put_table(self, input, name, file)
     class(modes_results_t), intent(in) :: self
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: name
     type(output_file_t), intent(inout) :: file
 
-    select case (name)
-    case (holzer_name)
+    if (name == holzer_name) then
       call file%put(self%holzer_csv)
-    case (table_name)
+    else
       call file%put(modes_csv(self%report))
-    case default
-      call file%put(modes_json(input, self%report))
-    end select
-  end subroutine put_file
+    end if
+  end subroutine put_table
+
+  subroutine put_report(self, input, json)
+    class(modes_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    type(json_t), intent(inout) :: json
+
+    call put_modes(json, input, self%report)
+  end subroutine put_report
 
   subroutine printed(self, input, text)
     class(modes_results_t), intent(in) :: self

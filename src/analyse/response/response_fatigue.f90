@@ -92,7 +92,8 @@ contains
     end associate
     allocate (item%quantities(0))
     do q = 1, size(quantities)
-      if (quantities(q)%kind == kind .and. quantities(q)%element == item%element) item%quantities = [item%quantities, q]
+      if (quantities(q)%kind == kind .and. quantities(q)%element == item%element .and. &
+          quantities(q)%element_kind == trim(element_kind(input%groups(index)))) item%quantities = [item%quantities, q]
     end do
     if (size(item%quantities) == 0) error stop 'nocdyn_response_fatigue: a checked group has a quantity'
     associate (first => quantities(item%quantities(1)))

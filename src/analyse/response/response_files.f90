@@ -16,7 +16,7 @@ module nocdyn_response_files
   implicit none (type, external)
   private
 
-  public :: put_response_csv, put_orders_csv, response_columns_json, response_json
+  public :: put_response_csv, put_orders_csv, response_columns_json, put_response
 
   character(len=*), parameter, public :: response_table = 'response.csv', orders_table = 'response_orders.csv'
 
@@ -260,13 +260,12 @@ contains
     if (abs(amplitude) > 0) phase = atan2(aimag(amplitude), real(amplitude, wp)) / degree
   end function phase
 
-  !> The text of response.json.
-  function response_json(input, analysis, summary) result(text)
+  !> The members of response.json.
+  subroutine put_response(json, input, analysis, summary)
+    type(json_t), intent(inout) :: json
     type(input_t), intent(in) :: input
     type(response_analysis_t), intent(in) :: analysis
     type(response_summary_t), intent(in) :: summary
-    character(len=:), allocatable :: text
-    type(json_t) :: json
     real(wp), allocatable :: unstable(:)
     integer :: i
 
@@ -300,8 +299,7 @@ contains
     call put_barred(json, input, analysis, summary)
     call put_fatigue(json, analysis)
     call json%close()
-    text = json%text()
-  end function response_json
+  end subroutine put_response
 
   !> The order of a line, or its fixed frequency, or its number if its frequency is neither.
   subroutine put_line(json, analysis, l)

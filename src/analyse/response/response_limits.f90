@@ -9,8 +9,8 @@ module nocdyn_response_limits
   use nocdyn_errors, only: add_error, error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_limit_groups, only: limited_kind
-  use nocdyn_moment_forms, only: kind_along, kind_moment, kind_stress, moment_form_t
+  use nocdyn_limit_groups, only: limited_kind, limited_signal
+  use nocdyn_moment_forms, only: moment_form_t
   use nocdyn_signals, only: find_signal
   use nocdyn_text, only: quoted
   implicit none (type, external)
@@ -53,8 +53,7 @@ contains
     do i = 1, size(groups)
       before = size(limits)
       kind = limited_kind(input%groups(groups(i)))
-      call add_moment_limits(input%groups(groups(i)), groups(i), trim(kind), quantities, limits)
-      call add_quantity_limit(input%groups(groups(i)), groups(i), trim(kind), quantities, limits)
+      call add_limit(input%groups(groups(i)), groups(i), quantities, limits)
       call add_stress_limits(input, groups(i), trim(kind), quantities, limits, own)
       if (size(limits) == before .and. .not. (allocated(own) .or. input%groups(groups(i))%has_value('quantity'))) then
         call raise(own, exit_input, input%location(groups(i)) // ': nothing is limited; needed: ' // &
@@ -65,49 +64,26 @@ contains
     end do
   end subroutine read_limits
 
-  !> Limits of the moment of a coupling, of the largest one along a shaft, or of the force of a mesh.
-  subroutine add_moment_limits(group, index, kind, quantities, limits)
+  !> A limit of the moment of a coupling or shaft, the force of a mesh or a named quantity, if it is linear in the motion.
+  subroutine add_limit(group, index, quantities, limits)
     type(group_t), intent(in) :: group
     integer, intent(in) :: index   !! of the group
-    character(len=*), intent(in) :: kind
     type(moment_form_t), intent(in) :: quantities(:)
     type(response_limit_t), allocatable, intent(inout) :: limits(:)
+    character(len=*), parameter :: vibratory(*) = [character(len=16) :: 'vibratory_moment', 'vibratory_force', 'vibratory']
+    character(len=*), parameter :: peak(*) = [character(len=7) :: 'moment', 'force', 'largest']
     type(response_limit_t) :: limit
-    integer :: limited, q
+    integer :: k
 
     limit%group = index
-    limited = merge(kind_along, kind_moment, kind == 'shaft')
-    if (kind == 'mesh') then
-      limit%vibratory = group%number('vibratory_force', absent=no_limit)
-      limit%peak = group%number('force', absent=no_limit)
-    else
-      limit%vibratory = group%number('vibratory_moment', absent=no_limit)
-      limit%peak = group%number('moment', absent=no_limit)
-    end if
-    if (min(limit%vibratory, limit%peak) >= no_limit) return
-    do q = 1, size(quantities)
-      if (quantities(q)%kind /= limited .or. quantities(q)%element /= group%text(kind)) cycle
-      limit%quantity = q
-      limits = [limits, limit]
+    do k = 1, size(peak)
+      limit%vibratory = min(limit%vibratory, group%number(trim(vibratory(k)), absent=no_limit))
+      limit%peak = min(limit%peak, group%number(trim(peak(k)), absent=no_limit))
     end do
-  end subroutine add_moment_limits
-
-  !> A limit of any other quantity, if it is linear in the motion.
-  subroutine add_quantity_limit(group, index, kind, quantities, limits)
-    type(group_t), intent(in) :: group
-    integer, intent(in) :: index   !! of the group
-    character(len=*), intent(in) :: kind
-    type(moment_form_t), intent(in) :: quantities(:)
-    type(response_limit_t), allocatable, intent(inout) :: limits(:)
-    type(response_limit_t) :: limit
-
-    if (.not. group%has_value('quantity')) return
-    limit%group = index
-    limit%quantity = find_signal(quantities%signal_t, kind, group%text(kind), group%text('quantity'))
-    limit%vibratory = group%number('vibratory', absent=no_limit)
-    limit%peak = group%number('largest', absent=no_limit)
+    if (min(limit%vibratory, limit%peak) >= no_limit) return
+    limit%quantity = limited_signal(group, quantities%signal_t)
     if (limit%quantity > 0) limits = [limits, limit]
-  end subroutine add_quantity_limit
+  end subroutine add_limit
 
   !> Limits of its stress.
   subroutine add_stress_limits(input, index, kind, quantities, limits, error)
@@ -119,7 +95,6 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(response_limit_t) :: limit
     character(len=:), allocatable :: key
-    integer :: q
 
     associate (group => input%groups(index))
       key = ''
@@ -127,9 +102,7 @@ contains
       if (group%has_value('stress')) key = 'stress'
       if (group%has_value('rule')) key = 'rule'
       if (key == '') return
-      do q = 1, size(quantities)
-        if (quantities(q)%kind == kind_stress .and. quantities(q)%element == group%text(kind)) limit%quantity = q
-      end do
+      limit%quantity = find_signal(quantities%signal_t, kind, group%text(kind), 'stress')
       if (limit%quantity == 0) then
         call raise(error, exit_input, input%location(index, key) // ': ' // key // ' limits a stress, but ' // &
                    quoted(group%text(kind)) // ' has none; required: section_modulus [m3] or diameter [m] of &coupling')

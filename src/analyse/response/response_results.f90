@@ -3,11 +3,12 @@ module nocdyn_response_results
   use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
+  use nocdyn_json, only: json_t
   use nocdyn_machine, only: machine_t
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: output_units
   use nocdyn_response_analysis, only: add_fatigue, analyse_response, response_analysis_t
-  use nocdyn_response_files, only: orders_table, put_orders_csv, put_response_csv, response_columns_json, response_json, &
+  use nocdyn_response_files, only: orders_table, put_orders_csv, put_response_csv, response_columns_json, put_response, &
     response_table
   use nocdyn_response_report, only: response_text
   use nocdyn_response_summary, only: response_summary_t, summarise_response
@@ -15,13 +16,13 @@ module nocdyn_response_results
   implicit none (type, external)
   private
 
-  character(len=*), parameter :: columns_name = 'response_columns.json', report_name = 'response.json'
+  character(len=*), parameter :: columns_name = 'response_columns.json'
 
   type, extends(analysis_t), public :: response_results_t
     type(response_analysis_t), private :: analysis
     type(response_summary_t), private :: summary
   contains
-    procedure :: solve, list_files, put_file, text => printed
+    procedure :: solve, list_tables, put_table, put_report, text => printed
   end type response_results_t
 
 contains
@@ -38,14 +39,14 @@ contains
     if (.not. allocated(error)) self%summary = summarise_response(self%analysis)
   end subroutine solve
 
-  subroutine list_files(self, names)
+  subroutine list_tables(self, names)
     class(response_results_t), intent(in) :: self
     type(string_t), allocatable, intent(out) :: names(:)
 
-    names = [string_t(response_table), string_t(orders_table), string_t(columns_name), string_t(report_name)]
-  end subroutine list_files
+    names = [string_t(response_table), string_t(orders_table), string_t(columns_name)]
+  end subroutine list_tables
 
-  subroutine put_file(self, input, name, file)
+  subroutine put_table(self, input, name, file)
     class(response_results_t), intent(in) :: self
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: name
@@ -56,12 +57,18 @@ contains
       call put_response_csv(self%analysis, output_units(input), file)
     case (orders_table)
       call put_orders_csv(self%analysis, output_units(input), file)
-    case (columns_name)
-      call file%put(response_columns_json(self%analysis, output_units(input)))
     case default
-      call file%put(response_json(input, self%analysis, self%summary))
+      call file%put(response_columns_json(self%analysis, output_units(input)))
     end select
-  end subroutine put_file
+  end subroutine put_table
+
+  subroutine put_report(self, input, json)
+    class(response_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    type(json_t), intent(inout) :: json
+
+    call put_response(json, input, self%analysis, self%summary)
+  end subroutine put_report
 
   subroutine printed(self, input, text)
     class(response_results_t), intent(in) :: self

@@ -1,8 +1,9 @@
-!> What an analysis of a machine is: a solver, the files and the text that it leaves. One driver runs them all; a new analysis is
-!> a type that extends `analysis_t` and a row in the table of commands.
+!> What an analysis of a machine is: a solver, and the report, tables and text that it leaves. One driver runs them all; a new
+!> analysis is a type that extends `analysis_t` and a row in the table of commands.
 module nocdyn_analyses
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
+  use nocdyn_json, only: json_t
   use nocdyn_machine, only: machine_t
   use nocdyn_output_file, only: output_file_t
   use nocdyn_text, only: string_t
@@ -21,11 +22,14 @@ module nocdyn_analyses
     logical :: is_steady = .true.       !! whether it looks at the machine in a steady state, else over the time
     logical :: locks_joints = .true.    !! whether clutches and freewheels are locked or open for good then
     logical :: always_writes = .false.  !! whether it writes files without --out too
+    logical :: has_report = .true.      !! whether it has a report in JSON
+    logical :: is_for_threads = .false. !! whether threads may call `solve` at the same time
     type(error_t), allocatable :: refusal   !! after `solve`: an error beside a report that can be printed, without files
   contains
     procedure(solve_interface), deferred :: solve
-    procedure :: list_files
-    procedure :: put_file
+    procedure :: list_tables
+    procedure :: put_table
+    procedure :: put_report
     procedure(text_interface), deferred :: text
   end type analysis_t
 
@@ -53,22 +57,31 @@ module nocdyn_analyses
 
 contains
 
-  !> The names of the files of an analysis, which appear together; the report comes last. By default there are none.
-  subroutine list_files(self, names)
+  !> The names of the tables of an analysis. By default there are none.
+  subroutine list_tables(self, names)
     class(analysis_t), intent(in) :: self
     type(string_t), allocatable, intent(out) :: names(:)
 
     allocate (names(0))
-  end subroutine list_files
+  end subroutine list_tables
 
-  !> Writes one of these files.
-  subroutine put_file(self, input, name, file)
+  !> Writes one of these tables.
+  subroutine put_table(self, input, name, file)
     class(analysis_t), intent(in) :: self
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: name
     type(output_file_t), intent(inout) :: file
 
-    error stop 'nocdyn_analyses: an analysis with files overrides put_file'
-  end subroutine put_file
+    error stop 'nocdyn_analyses: an analysis with tables overrides put_table'
+  end subroutine put_table
+
+  !> Fills the report: the file COMMAND.json, and what sweeps record by paths.
+  subroutine put_report(self, input, json)
+    class(analysis_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    type(json_t), intent(inout) :: json
+
+    error stop 'nocdyn_analyses: an analysis with a report overrides put_report'
+  end subroutine put_report
 
 end module nocdyn_analyses

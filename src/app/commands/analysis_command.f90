@@ -2,29 +2,24 @@
 module nocdyn_analysis_command
   use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_arguments, only: arguments_t
-  use nocdyn_assembly, only: assemble_machine, assemble_steady_machine
-  use nocdyn_campbell_results, only: campbell_results_t
   use nocdyn_case_choice, only: choose_case, wanted_case
   use nocdyn_check_results, only: check_results_t
   use nocdyn_console, only: print_text, report_error
   use nocdyn_diagnostics, only: diagnostics_t
-  use nocdyn_equilibrium, only: t_infinity
-  use nocdyn_equilibrium_results, only: equilibrium_results_t
   use nocdyn_errors, only: add_error, error_t, exit_done, exit_failed, raise
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
-  use nocdyn_joint_simplifications, only: refuse_joints
+  use nocdyn_json, only: json_t
   use nocdyn_signal_checks, only: check_signals
   use nocdyn_load_case_checks, only: check_input, name_load_case
   use nocdyn_machine, only: machine_t
   use nocdyn_matrices_results, only: matrices_results_t
-  use nocdyn_modes_results, only: modes_results_t
+  use nocdyn_named_analyses, only: assemble_analysed, new_analysis
   use nocdyn_posix, only: is_interrupted, stop_at_interrupts
-  use nocdyn_response_results, only: response_results_t
   use nocdyn_result_files, only: result_files_t
   use nocdyn_result_folders, only: out_folder, refuse_shared_folders, result_folder
   use nocdyn_sweep_plan, only: add_plan_diagnostics, has_sweep, make_plan, sweep_plan_t
-  use nocdyn_text, only: listed, shown_path, string_t, to_text
+  use nocdyn_text, only: append, listed, shown_path, string_t, to_text
   implicit none (type, external)
   private
 
@@ -43,22 +38,16 @@ contains
   subroutine analysis_command(arguments, code)
     type(arguments_t), intent(in) :: arguments
     integer, intent(out) :: code   !! the highest exit code of all files
+    class(analysis_t), allocatable :: kind
 
     select case (arguments%command)
     case ('check')
       call analyse_files(arguments, check_results_t(is_steady=.false., locks_joints=.false.), code)
     case ('matrices')
-      call analyse_files(arguments, matrices_results_t(is_steady=.false., locks_joints=.false.), code)
-    case ('equilibrium')
-      call analyse_files(arguments, equilibrium_results_t(locks_joints=.false.), code)
-    case ('modes')
-      call analyse_files(arguments, modes_results_t(locks_joints=.false.), code)
-    case ('campbell')
-      call analyse_files(arguments, campbell_results_t(always_writes=.true.), code)
-    case ('response')
-      call analyse_files(arguments, response_results_t(always_writes=.true.), code)
+      call analyse_files(arguments, matrices_results_t(is_steady=.false., locks_joints=.false., has_report=.false.), code)
     case default
-      error stop 'nocdyn_analysis_command: the table of commands has an unknown analysis'
+      call new_analysis(arguments%command, kind)
+      call analyse_files(arguments, kind, code)
     end select
   end subroutine analysis_command
 
@@ -88,7 +77,8 @@ contains
       associate (reading => readings(i))
         words = shown_path(arguments%operands(i)%text) // ': interrupted, without results'
         call stop_at_interrupts('nocdyn: ' // words // new_line('a'))
-        if (.not. allocated(reading%error)) call assemble_for(arguments%command, kind, reading%input, machine, reading%error)
+        if (.not. allocated(reading%error)) call assemble_analysed(arguments%command, kind, reading%input, machine, &
+                                                                     reading%error)
         if (.not. allocated(reading%error)) call check_signals(reading%input, machine, reading%error)
         if (.not. allocated(reading%error)) call analyse_one(arguments, kind, reading%input, machine, folders(i)%text, &
                                                              reading%error)
@@ -116,6 +106,7 @@ contains
     type(result_files_t) :: files
     type(string_t), allocatable :: names(:)
     character(len=:), allocatable :: text
+    type(json_t) :: json
     integer :: i
 
     options%at = ''
@@ -132,12 +123,15 @@ contains
       error = analysis%refusal
       return
     end if
-    call analysis%list_files(names)
-    if (folder /= '' .and. size(names) > 0) then
+    if (folder /= '' .and. analysis%has_report) then
+      call analysis%list_tables(names)
+      call append(names, arguments%command // '.json')
       call files%open(folder, names)
-      do i = 1, size(names)
-        call analysis%put_file(input, names(i)%text, files%files(i))
+      do i = 1, size(names) - 1
+        call analysis%put_table(input, names(i)%text, files%files(i))
       end do
+      call analysis%put_report(input, json)
+      call files%files(size(names))%put(json%text())
       call files%finish(error)
       if (allocated(error)) return
     end if
@@ -147,23 +141,6 @@ contains
     if (analysis%always_writes) call print_text(input%shown_file() // ': ' // shown_path(folder) // ' has ' // &
                                                 listed(names, ' and '))
   end subroutine analyse_one
-
-  !> Builds the machine as an analysis looks at it.
-  subroutine assemble_for(command, kind, input, machine, error)
-    character(len=*), intent(in) :: command
-    class(analysis_t), intent(in) :: kind
-    type(input_t), intent(in) :: input
-    type(machine_t), intent(out) :: machine
-    type(error_t), allocatable, intent(out) :: error
-
-    if (command /= 'check') call refuse_joints(input, kind%is_steady, 'nocdyn ' // command, error)
-    if (allocated(error)) return
-    if (kind%is_steady) then
-      call assemble_steady_machine(input, t_infinity, kind%locks_joints, machine, error)
-    else
-      call assemble_machine(input, machine, error)
-    end if
-  end subroutine assemble_for
 
   !> Checks the load cases that can be read; if there is no mistake so far, builds their machines.
   subroutine check_load_cases(kind, reading)
@@ -180,7 +157,7 @@ contains
       if (.not. allocated(reading%load_cases(c)%groups)) cycle
       call check_input(reading%load_cases(c), own, reading%error)
       if (is_right .and. .not. allocated(own)) then
-        call assemble_for('check', kind, reading%load_cases(c), machine, own)
+        call assemble_analysed('check', kind, reading%load_cases(c), machine, own)
         if (allocated(own)) call name_load_case(reading%load_cases(c), own)
       end if
       call add_error(reading%error, own)

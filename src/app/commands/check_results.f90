@@ -1,16 +1,16 @@
 !> The report of nocdyn check on a machine, as an analysis: check.json.
 module nocdyn_check_results
   use nocdyn_analyses, only: analysis_options_t, analysis_t
-  use nocdyn_check_file, only: check_json
+  use nocdyn_check_file, only: put_check
   use nocdyn_column_names, only: count_columns
   use nocdyn_disk_room, only: bytes_text
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
   use nocdyn_input_speeds, only: given_speeds, named_speeds_t
+  use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: machine_report
-  use nocdyn_output_file, only: output_file_t
   use nocdyn_output_times, only: output_note
   use nocdyn_row_intervals, only: choose_row_count
   use nocdyn_run_files, only: check_rows, check_variants, trajectory_bytes, wants_netcdf
@@ -27,9 +27,10 @@ module nocdyn_check_results
   real(wp), parameter :: large = 100.0e6_wp   ! files from this size on are told [bytes]
 
   type, extends(analysis_t), public :: check_results_t
-    character(len=:), allocatable, private :: report, json
+    type(machine_t), private :: machine
+    character(len=:), allocatable, private :: report
   contains
-    procedure :: solve, list_files, put_file, text => printed
+    procedure :: solve, put_report, text => printed
   end type check_results_t
 
 contains
@@ -78,24 +79,16 @@ contains
       sizes = sizes // new_line('a') // '  note: ' // notes(i)%text
     end do
     self%report = machine_report(input%shown_file(), machine) // speed_table(input, machine) // sizes
-    if (options%writes_files) self%json = check_json(input, machine)
+    if (options%writes_files) self%machine = machine
   end subroutine solve
 
-  subroutine list_files(self, names)
-    class(check_results_t), intent(in) :: self
-    type(string_t), allocatable, intent(out) :: names(:)
-
-    names = [string_t('check.json')]
-  end subroutine list_files
-
-  subroutine put_file(self, input, name, file)
+  subroutine put_report(self, input, json)
     class(check_results_t), intent(in) :: self
     type(input_t), intent(in) :: input
-    character(len=*), intent(in) :: name
-    type(output_file_t), intent(inout) :: file
+    type(json_t), intent(inout) :: json
 
-    call file%put(self%json)
-  end subroutine put_file
+    call put_check(json, input, self%machine)
+  end subroutine put_report
 
   subroutine printed(self, input, text)
     class(check_results_t), intent(in) :: self

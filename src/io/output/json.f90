@@ -1,4 +1,4 @@
-!> A JSON text that is built key by key.
+!> A JSON text that is built key by key. On request its numbers are kept too, each with its path, such as 'modes[2].frequency_Hz'.
 module nocdyn_json
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use nocdyn_kinds, only: wp
@@ -11,19 +11,29 @@ module nocdyn_json
 
   public :: has_utf_8
 
+  integer, parameter :: most_levels = 16
+
   !> Nested objects and lists in the order of the calls, indented by two blanks per level.
   type, public :: json_t
+    logical :: keeps_numbers = .false.               !! whether `paths` and `numbers` are filled
+    type(string_t), allocatable :: paths(:)          !! of the numbers, [at least `count`]
+    real(wp), allocatable :: numbers(:)              !! [at least `count`]
+    integer :: count = 0
     type(text_buffer_t), private :: buffer
-    integer, private :: depth = 0           !! number of open objects and lists
-    logical, private :: is_first = .true.   !! the next member or item is the first one
+    integer, private :: depth = 0                    !! number of open objects and lists
+    logical, private :: is_first = .true.            !! the next member or item is the first one
+    character(len=:), allocatable, private :: path   !! of what is open; allocated if numbers are kept
+    integer, private :: lengths(most_levels) = 0     !! of the paths around it
+    integer, private :: items(most_levels) = 0       !! of each open list so far
   contains
+    procedure :: find => find_number
     procedure :: open => open_object
     procedure :: open_report
     procedure :: close => close_object
     procedure :: open_list, close_list, text
     generic :: put => put_text, put_texts, put_number, put_numbers, put_flag, put_integer, put_integers, put_members
     procedure, private :: put_text, put_texts, put_number, put_numbers, put_flag, put_integer, put_integers, put_members
-    procedure, private :: begin_member, begin_item, end_level
+    procedure, private :: begin_member, begin_item, begin_level, end_level, keep
   end type json_t
 
 contains
@@ -35,12 +45,11 @@ contains
 
     if (present(key)) then
       call self%begin_member(key)
-    else if (self%depth > 0) then
-      call self%begin_item()
+      call self%begin_level('{', key)
+    else
+      if (self%depth > 0) call self%begin_item()
+      call self%begin_level('{')
     end if
-    call self%buffer%append('{')
-    self%depth = self%depth + 1
-    self%is_first = .true.
   end subroutine open_object
 
   !> Begins the outermost object, that of a report: the program, how a computation ended, the input.
@@ -73,9 +82,7 @@ contains
     character(len=*), intent(in) :: key
 
     call self%begin_member(key)
-    call self%buffer%append('[')
-    self%depth = self%depth + 1
-    self%is_first = .true.
+    call self%begin_level('[', key)
   end subroutine open_list
 
   !> Ends the list that was opened last.
@@ -85,12 +92,77 @@ contains
     call self%end_level(']')
   end subroutine close_list
 
+  !> Begins an object or a list; without a key it is an item of a list, or the outermost object.
+  subroutine begin_level(self, bracket, key)
+    class(json_t), intent(inout) :: self
+    character(len=1), intent(in) :: bracket
+    character(len=*), intent(in), optional :: key
+
+    call self%buffer%append(bracket)
+    self%is_first = .true.
+    if (self%keeps_numbers) then
+      if (.not. allocated(self%path)) self%path = ''
+      if (self%depth > 0) self%lengths(self%depth) = len(self%path)
+      if (present(key)) then
+        self%path = member_path(self%path, key)
+      else if (self%depth > 0) then
+        self%items(self%depth) = self%items(self%depth) + 1
+        self%path = self%path // '[' // to_text(self%items(self%depth)) // ']'
+      end if
+      self%items(self%depth + 1) = 0
+    end if
+    self%depth = self%depth + 1
+  end subroutine begin_level
+
+  !> The path of a member of an object.
+  pure function member_path(path, key)
+    character(len=*), intent(in) :: path, key
+    character(len=len(path) + len(key) + merge(1, 0, path /= '')) :: member_path
+
+    member_path = key
+    if (path /= '') member_path = path // '.' // key
+  end function member_path
+
+  !> Keeps the number of a member, on request.
+  subroutine keep(self, key, value)
+    class(json_t), intent(inout) :: self
+    character(len=*), intent(in) :: key
+    real(wp), intent(in) :: value
+    type(string_t), allocatable :: paths(:)
+    integer :: i
+
+    if (.not. self%keeps_numbers) return
+    if (.not. allocated(self%paths)) allocate (self%paths(100), self%numbers(100))
+    if (self%count == size(self%paths)) then
+      allocate (paths(2 * self%count))
+      do i = 1, self%count
+        call move_alloc(self%paths(i)%text, paths(i)%text)
+      end do
+      call move_alloc(paths, self%paths)
+      self%numbers = [self%numbers, self%numbers]
+    end if
+    self%count = self%count + 1
+    self%paths(self%count)%text = member_path(self%path, key)
+    self%numbers(self%count) = value
+  end subroutine keep
+
+  !> The place in `numbers` of the number with a path; 0 if none was kept.
+  pure integer function find_number(self, path) result(found)
+    class(json_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+
+    do found = self%count, 1, -1
+      if (self%paths(found)%text == path) return
+    end do
+  end function find_number
+
   !> Ends an object or a list.
   subroutine end_level(self, bracket)
     class(json_t), intent(inout) :: self
     character(len=1), intent(in) :: bracket
 
     self%depth = self%depth - 1
+    if (self%keeps_numbers .and. self%depth > 0) self%path = self%path(:self%lengths(self%depth))
     if (.not. self%is_first) call self%buffer%append(new_line('a') // repeat('  ', self%depth))
     call self%buffer%append(bracket)
     self%is_first = .false.
@@ -151,6 +223,7 @@ contains
 
     call self%begin_member(key)
     call self%buffer%append(number_text(value))
+    call self%keep(key, value)
   end subroutine put_number
 
   !> A list of numbers, on one line.
@@ -163,6 +236,7 @@ contains
 
     do i = 1, size(values)
       items(i)%text = number_text(values(i))
+      call self%keep(key // '[' // to_text(i) // ']', values(i))
     end do
     call put_list(self, key, items)
   end subroutine put_numbers
@@ -183,6 +257,7 @@ contains
 
     call self%begin_member(key)
     call self%buffer%append(trim(merge('true ', 'false', value)))
+    call self%keep(key, merge(1.0_wp, 0.0_wp, value))
   end subroutine put_flag
 
   !> A whole number.
@@ -193,6 +268,7 @@ contains
 
     call self%begin_member(key)
     call self%buffer%append(to_text(value))
+    call self%keep(key, real(value, wp))
   end subroutine put_integer
 
   !> A list of whole numbers, on one line.

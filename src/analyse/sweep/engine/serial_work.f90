@@ -1,19 +1,25 @@
-!> The work of the threads of a sweep that one thread at a time does: checking the values of a variant, explaining a failure.
+!> The work of the threads of a sweep that one thread at a time does: checking the values of a variant, writing a
+!> report, explaining a failure.
 !>
 !> gfortran 12 keeps the length of an allocatable text that a function returns in static memory of the caller, which all threads
 !> share, with `-frecursive` as without it. What threads run at the same time therefore calls no such functions. What does call
 !> them stands in the critical section `texts`, or has the lock of the scheduler, as the journal and the progress have.
 module nocdyn_serial_work
+  use nocdyn_analyses, only: analysis_options_t, analysis_t
+  use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
   use nocdyn_integration_settings, only: integration_settings_t
+  use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_named_analyses, only: assemble_analysed, new_analysis
   use nocdyn_solver_status, only: failure_message, solver_status_t
   use nocdyn_targets, only: set_targets, target_t
   implicit none (type, external)
   private
 
-  public :: check_values, explain_failure
+  public :: analyse_for_report, check_values, explain_failure
 
 contains
 
@@ -41,5 +47,28 @@ contains
     message = failure_message(solver_status, lane, formulation, settings%rtol, settings%atol)
     !$omp end critical (texts)
   end subroutine explain_failure
+
+  !> The report of an analysis of the machine of an input, with its numbers.
+  subroutine analyse_for_report(word, input, report, error)
+    character(len=*), intent(in) :: word   !! of `analysis_words`
+    type(input_t), intent(in) :: input
+    type(json_t), intent(out) :: report
+    type(error_t), allocatable, intent(out) :: error
+    class(analysis_t), allocatable :: analysis
+    type(machine_t) :: machine
+
+    report%keeps_numbers = .true.
+    call new_analysis(word, analysis)
+    call assemble_analysed(word, analysis, input, machine, error)
+    if (.not. allocated(error) .and. analysis%is_for_threads) then
+      call analysis%solve(input, machine, analysis_options_t(at=''), error)
+    end if
+    !$omp critical (texts)
+    if (.not. (allocated(error) .or. analysis%is_for_threads)) then
+      call analysis%solve(input, machine, analysis_options_t(at=''), error)
+    end if
+    if (.not. allocated(error)) call analysis%put_report(input, report)
+    !$omp end critical (texts)
+  end subroutine analyse_for_report
 
 end module nocdyn_serial_work

@@ -50,7 +50,7 @@ contains
     if (formulation%joints%count == 0) return
     setup%lanes = 1   ! whose joints may be in different sets
     setup%has_energy_balance = .true.   ! a run has it, which takes the same steps
-    if (size(plan%analyses) > 0) call refuse_joints(plan%input, .false., 'a sweep of modes or responses', error)
+    if (size(plan%analyses) > 0) call refuse_joints(plan%input, .true., 'a sweep of modes or responses', error)
   end subroutine prepare_sweep
 
   !> Computes the variants that `scheduler` hands out, by threads with a block of lanes each.

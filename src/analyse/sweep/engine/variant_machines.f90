@@ -44,7 +44,7 @@ module nocdyn_variant_machines
     type(reduced_t), pointer, private :: assembled => null()   !! a variant of one lane, laid out as the block
     type(lane_parameters_t), private :: assembled_parameters
   contains
-    procedure :: set_variant, set_by_assembly, needs_assembly, own_formulation, own_machine, release
+    procedure :: set_variant, set_by_assembly, needs_assembly, own_formulation, set_input, release
   end type variant_machines_t
 
 contains
@@ -224,20 +224,19 @@ contains
     character(len=:), allocatable, intent(out) :: message   !! why there is no such machine, ''
     type(machine_t) :: machine
 
-    call self%own_machine(values, machine, message)
+    call assemble_variant(self%input, self%targets, values, machine, message)
     if (message /= '') return
     call new_asked_formulation(self%input, machine, formulation, count_joints(machine) > 0 .or. self%has_energy_balance)
   end subroutine own_formulation
 
-  !> The machine, of one lane, of a variant. Its input is then `input`.
-  subroutine own_machine(self, values, machine, message)
+  !> Sets the values of a variant in `input`.
+  subroutine set_input(self, values, message)
     class(variant_machines_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: values(:)   !! [targets]
-    type(machine_t), intent(out) :: machine
-    character(len=:), allocatable, intent(out) :: message   !! why there is no such machine, ''
+    real(wp), contiguous, intent(in) :: values(:)           !! [targets]
+    character(len=:), allocatable, intent(out) :: message   !! why they are not allowed, ''
 
-    call assemble_variant(self%input, self%targets, values, machine, message)
-  end subroutine own_machine
+    call check_values(self%input, self%targets, values, message)
+  end subroutine set_input
 
   !> Frees the block.
   subroutine release(self)

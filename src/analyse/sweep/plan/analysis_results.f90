@@ -6,7 +6,7 @@ module nocdyn_analysis_results
   implicit none (type, external)
   private
 
-  public :: new_mode_result, new_response_result
+  public :: new_mode_result, new_path_result, new_response_result
 
   integer, parameter, public :: analysis_frequency = 1       !! of the damped oscillation, as nocdyn modes has it
   integer, parameter, public :: analysis_damping_ratio = 2
@@ -20,11 +20,14 @@ module nocdyn_analysis_results
   character(len=*), parameter, public :: analysis_owners(6) = [character(len=8) :: 'mode', 'mode', 'response', 'response', &
     'response', 'response']   !! the key of &record that each belongs to
 
+  integer, parameter, public :: of_path = -1
+
   !> One result.
   type, public :: analysis_result_t
     integer :: result = 0                           !! its number among the results of a variant
     integer :: statistic = analysis_frequency       !! analysis_...
-    integer :: mode = 0                             !! number of an oscillating mode; 0 for a result of the response
+    integer :: mode = 0                             !! number of an oscillating mode; 0 for a result of the response, else `of_path`
+    character(len=:), allocatable :: command, path  !! of a number of a report: the command and the path in its report
     type(signal_t) :: signal                        !! of the response
     character(len=:), allocatable :: quantity       !! element, or column of response.csv without its unit
     real(wp) :: order = 0.0_wp                      !! 0 stands for all orders together
@@ -53,6 +56,23 @@ contains
       self%long_name = 'damping ratio of mode ' // to_text(mode)
     end if
   end subroutine new_mode_result
+
+  !> A number of the report of an analysis.
+  subroutine new_path_result(text, self)
+    character(len=*), intent(in) :: text   !! command and path, with a point between them
+    type(analysis_result_t), intent(out) :: self
+    integer :: point
+
+    point = index(text, '.')
+    self%mode = of_path
+    self%statistic = 0
+    self%command = text(:point - 1)
+    self%path = text(point + 1:)
+    self%label = text
+    self%quantity = ''
+    self%unit = ''
+    self%long_name = self%path // ' in ' // self%command // '.json'
+  end subroutine new_path_result
 
   !> Of a quantity of the forced response.
   subroutine new_response_result(quantity, column, unit, order, statistic, self)

@@ -1,15 +1,18 @@
 !> The results of modes and of the forced response that the groups &record ask for.
 module nocdyn_recorded_analyses
+  use nocdyn_analyses, only: analysis_t
   use nocdyn_analysis_results, only: analysis_margin, analysis_names, analysis_owners, analysis_peak_speed, analysis_ratio, &
-    analysis_result_t, new_mode_result, new_response_result
+    analysis_result_t, new_mode_result, new_path_result, new_response_result
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_errors, only: error_t
   use nocdyn_excitation_lines, only: line_order
   use nocdyn_forced_response, only: forced_response_t, new_forced_response
   use nocdyn_input, only: input_t
+  use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_modes, only: mode_t
+  use nocdyn_named_analyses, only: analysis_words, solve_named
   use nocdyn_output_units, only: output_units
   use nocdyn_response_analysis, only: list_orders
   use nocdyn_response_limits, only: no_limit, read_limits, response_limit_t
@@ -32,9 +35,10 @@ module nocdyn_recorded_analyses
     type(response_limit_t), allocatable :: limits(:)
     type(forced_response_t), allocatable :: response   !! with its lines, if the base machine has steady states
     integer :: oscillations = huge(1)                   !! number of its modes; unknown if it has no steady state
+    type(json_t) :: reports(size(analysis_words))       !! with their numbers, as far as paths ask for them
   contains
     procedure :: add_results
-    procedure, private :: check_mode, check_response, check_statistic
+    procedure, private :: add_paths, check_mode, check_response, check_statistic
   end type analysis_reader_t
 
 contains
@@ -52,9 +56,10 @@ contains
     allocate (self%wanted_units, source=output_units(input))
     allocate (self%quantities(0), self%limits(0))
     if (asks_for(input, 'mode')) then
-      call oscillating_modes(input, machine, 0, modes, failure)
+      call oscillating_modes(input, 0, modes, failure)
       if (.not. allocated(failure)) self%oscillations = size(modes)
     end if
+    if (asks_for(input, 'path')) call read_reports(input, self%reports)
     if (.not. asks_for(input, 'response')) return
     call read_response_settings(input, machine, self%settings, error)
     if (allocated(error)) return
@@ -65,6 +70,35 @@ contains
     call new_forced_response(machine, self%settings%body, self%settings%speeds, response, failure)
     if (.not. allocated(failure)) call move_alloc(response, self%response)
   end subroutine new_analysis_reader
+
+  !> The reports of the base machine that paths name; without numbers if there is none.
+  subroutine read_reports(input, reports)
+    type(input_t), intent(in) :: input
+    type(json_t), intent(inout) :: reports(:)   !! [analyses]
+    class(analysis_t), allocatable :: analysis
+    type(error_t), allocatable :: failure
+    integer, allocatable :: records(:)
+    logical :: is_wanted(size(reports))
+    integer :: i, k
+
+    is_wanted = .false.
+    allocate (records, source=input%groups_named('record'))
+    do i = 1, size(records)
+      if (.not. input%groups(records(i))%has_value('path')) cycle
+      associate (paths => input%groups(records(i))%texts('path'))
+        do k = 1, size(paths)
+          is_wanted = is_wanted .or. analysis_words == paths(k)%text(:max(index(paths(k)%text, '.') - 1, 0))
+        end do
+      end associate
+    end do
+    do k = 1, size(reports)
+      if (.not. is_wanted(k)) cycle
+      call solve_named(trim(analysis_words(k)), input, analysis, failure)
+      if (allocated(failure)) cycle
+      reports(k)%keeps_numbers = .true.
+      call analysis%put_report(input, reports(k))
+    end do
+  end subroutine read_reports
 
   !> Whether a &record has a key.
   logical function asks_for(input, key)
@@ -77,7 +111,39 @@ contains
     asks_for = any([(input%groups(records(i))%has_value(key), i=1, size(records))])
   end function asks_for
 
-  !> Adds the results of a &record with a mode or a response.
+  !> Adds the numbers of reports that a &record names by their paths.
+  subroutine add_paths(self, input, record, others, results, diagnostics)
+    class(analysis_reader_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record, others   !! as in `add_results`
+    type(analysis_result_t), allocatable, intent(inout) :: results(:)
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(analysis_result_t) :: one
+    type(string_t), allocatable :: paths(:)
+    integer :: i, k
+
+    allocate (paths, source=input%groups(record)%texts('path'))
+    do i = 1, size(paths)
+      associate (text => paths(i)%text)
+        call new_path_result(text, one)
+        k = findloc(analysis_words == one%command, .true., dim=1)
+        if (k == 0) then
+          call input%report(record, 'path', 'path = ' // quoted(text) // ' does not begin with the name of an analysis; ' // &
+                            "allowed: 'equilibrium.', 'modes.', 'campbell.' or 'response.' and what its report has", diagnostics)
+          cycle
+        end if
+        if (self%reports(k)%count > 0 .and. self%reports(k)%find(one%path) == 0) then
+          call input%report(record, 'path', 'path = ' // quoted(text) // ': ' // one%command // '.json of this machine has ' // &
+                            'no number ' // quoted(one%path) // &
+                            suggestion(one%path, self%reports(k)%paths(:self%reports(k)%count)), diagnostics)
+          cycle
+        end if
+      end associate
+      call append_new(input, record, 'path', others, one, results, diagnostics)
+    end do
+  end subroutine add_paths
+
+  !> Adds the results of a &record with a mode, a response or paths.
   subroutine add_results(self, input, record, others, results, diagnostics)
     class(analysis_reader_t), intent(in) :: self
     type(input_t), intent(in) :: input
@@ -90,6 +156,10 @@ contains
     character(len=:), allocatable :: owner
     integer :: before, i, k
 
+    if (input%groups(record)%has_value('path')) then
+      call self%add_paths(input, record, others, results, diagnostics)
+      return
+    end if
     owner = 'mode'
     if (input%groups(record)%has_value('response')) owner = 'response'
     before = diagnostics%count
@@ -110,12 +180,7 @@ contains
         call self%check_statistic(input, record, k, diagnostics)
         call make_response_result(self, input, record, k, one)
       end if
-      if (any([(results(k)%label == one%label, k=1, size(results))])) then
-        call input%report(record, 'statistic', quoted(one%label) // ' is recorded already; allowed: once', diagnostics)
-      else
-        one%result = others + size(results) + 1
-        call append_result(results, one)
-      end if
+      call append_new(input, record, 'statistic', others, one, results, diagnostics)
     end do
   end subroutine add_results
 
@@ -224,15 +289,26 @@ contains
     if (one%in_unit > 0) one%unit = trim(units(one%in_unit)%name)
   end subroutine make_response_result
 
-  subroutine append_result(results, one)
-    type(analysis_result_t), allocatable, intent(inout) :: results(:)
+  !> Appends a result that is not recorded yet.
+  subroutine append_new(input, record, key, others, one, results, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record, others     !! as in `add_results`
+    character(len=*), intent(in) :: key       !! that asks for it
     type(analysis_result_t), intent(in) :: one
+    type(analysis_result_t), allocatable, intent(inout) :: results(:)
+    type(diagnostics_t), intent(inout) :: diagnostics
     type(analysis_result_t), allocatable :: longer(:)
+    integer :: k
 
+    if (any([(results(k)%label == one%label, k=1, size(results))])) then
+      call input%report(record, key, quoted(one%label) // ' is recorded already; allowed: once', diagnostics)
+      return
+    end if
     allocate (longer(size(results) + 1))
     longer(:size(results)) = results
     longer(size(longer)) = one
+    longer(size(longer))%result = others + size(longer)
     call move_alloc(longer, results)
-  end subroutine append_result
+  end subroutine append_new
 
 end module nocdyn_recorded_analyses

@@ -1,5 +1,6 @@
 !> Computes the results of a machine that need no motion.
 module nocdyn_variant_analysis
+  use nocdyn_analyses, only: analysis_t
   use nocdyn_analysis_results, only: analysis_damping_ratio, analysis_frequency, analysis_margin, analysis_peak, &
     analysis_peak_speed, analysis_ratio, analysis_result_t
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
@@ -10,6 +11,7 @@ module nocdyn_variant_analysis
   use nocdyn_linearisation, only: linearisation_t, linearise
   use nocdyn_machine, only: machine_t
   use nocdyn_modes, only: find_modes, mode_oscillating, mode_t
+  use nocdyn_named_analyses, only: assemble_analysed, new_analysis
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
   use nocdyn_response_analysis, only: analyse_response, response_analysis_t
   use nocdyn_moment_forms, only: kind_along, kind_moment, kind_stress, moment_form_t
@@ -28,23 +30,26 @@ module nocdyn_variant_analysis
 contains
 
   !> Computes the results of one machine.
-  subroutine analyse_variant(input, machine, results, values, error)
+  subroutine analyse_variant(input, results, values, error)
     type(input_t), intent(in) :: input
-    type(machine_t), intent(in) :: machine           !! of the input, one lane
-    type(analysis_result_t), intent(in) :: results(:)
+    type(analysis_result_t), intent(in) :: results(:)   !! paths are left out
     real(wp), intent(out) :: values(:)               !! [results]
     type(error_t), allocatable, intent(out) :: error
+    class(analysis_t), allocatable :: command
+    type(machine_t) :: machine
     type(response_analysis_t) :: analysis
     type(mode_t), allocatable :: modes(:)
     integer :: i
 
     values = 0.0_wp
     if (any(results%mode > 0)) then
-      call oscillating_modes(input, machine, maxval(results%mode), modes, error)
+      call oscillating_modes(input, maxval(results%mode), modes, error)
       if (allocated(error)) return
     end if
     if (any(results%mode == 0)) then
-      call analyse_response(input, machine, analysis, error)
+      call new_analysis('response', command)
+      call assemble_analysed('response', command, input, machine, error)
+      if (.not. allocated(error)) call analyse_response(input, machine, analysis, error)
       if (allocated(error)) return
     end if
     do i = 1, size(results)
@@ -59,18 +64,21 @@ contains
   end subroutine analyse_variant
 
   !> The oscillating modes about the steady state, by their frequencies.
-  subroutine oscillating_modes(input, machine, needed, modes, error)
+  subroutine oscillating_modes(input, needed, modes, error)
     type(input_t), intent(in) :: input
-    type(machine_t), intent(in) :: machine
     integer, intent(in) :: needed   !! modes
     type(mode_t), allocatable, intent(out) :: modes(:)
     type(error_t), allocatable, intent(out) :: error
+    class(analysis_t), allocatable :: command
+    type(machine_t) :: machine
     type(operating_point_t) :: point
     type(linearisation_t) :: linear
     type(mode_t), allocatable :: all_modes(:)
     integer :: found, i, no_elements(0)
 
-    call find_operating_point(input, machine, 'equilibrium', point, error)
+    call new_analysis('modes', command)
+    call assemble_analysed('modes', command, input, machine, error)
+    if (.not. allocated(error)) call find_operating_point(input, machine, 'equilibrium', point, error)
     if (.not. allocated(error)) call linearise(point%formulation, point%t, point%y, linear, error)
     if (.not. allocated(error)) call find_modes(point%formulation, linear, no_elements, all_modes, error)
     if (allocated(error)) return

@@ -75,6 +75,8 @@ module nocdyn_schema_sweep
     key_rule_t('record', 'response', a_text, 1, '', unset, anything, &
       'coupling, shaft or mesh, or a column of response.csv, in the forced response by &response'), &
     key_rule_t('record', 'order', a_number, 1, '', unset, positive, 'order of the response; all together if not given'), &
+    key_rule_t('record', 'path', a_text, any_number, '', unset, anything, &
+               "numbers of reports: a command and what its report has, such as 'modes.modes[2].frequency_Hz'"), &
     key_rule_t('record', 'from', a_number, 1, 's', unset, anything, &
       'start of the time over which statistics are taken; t_start if not given'), &
     key_rule_t('record', 'trajectories', an_integer, any_number, '', unset, from_1, &
@@ -85,9 +87,10 @@ module nocdyn_schema_sweep
       'tolerance band of the settling time; 0.02 if not given', 'settling_time')]
 
   type(relation_rule_t), parameter, public :: sweep_relations(*) = [ &
-    relation_rule_t('record', at_most_one, 'quantity', 'fatigue mode response'), &
-    relation_rule_t('record', at_most_one, 'fatigue', 'mode response'), &
-    relation_rule_t('record', at_most_one, 'mode', 'response'), &
+    relation_rule_t('record', at_most_one, 'quantity', 'fatigue mode response path'), &
+    relation_rule_t('record', at_most_one, 'fatigue', 'mode response path'), &
+    relation_rule_t('record', at_most_one, 'mode', 'response path'), &
+    relation_rule_t('record', at_most_one, 'response', 'path'), &
     relation_rule_t('record', requires, 'quantity fatigue mode response', 'statistic'), &
     relation_rule_t('record', requires, 'statistic', 'quantity fatigue mode response'), &
     relation_rule_t('record', requires, 'from', 'quantity'), &
@@ -117,6 +120,7 @@ module nocdyn_schema_sweep
     example_t('record', "fatigue = 'life' statistic = 'damage', 'cycles'", .false.), &
     example_t('record', "mode = 2 statistic = 'frequency', 'damping_ratio'", .false.), &
     example_t('record', "response = 'coupling' order = 6 statistic = 'peak', 'peak_speed'", .false.), &
+    example_t('record', "path = 'campbell.crossings[1].speed_rad_s'", .false.), &
     example_t('record', 'trajectories = 1, 17, 90', .false.)]
 
 end module nocdyn_schema_sweep
