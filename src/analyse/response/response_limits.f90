@@ -11,7 +11,7 @@ module nocdyn_response_limits
   use nocdyn_kinds, only: wp
   use nocdyn_limit_groups, only: limited_kind, limited_signal
   use nocdyn_moment_forms, only: moment_form_t
-  use nocdyn_signals, only: find_signal
+  use nocdyn_signals, only: find_signal, signal_t
   use nocdyn_text, only: quoted
   implicit none (type, external)
   private
@@ -43,18 +43,22 @@ contains
     type(moment_form_t), intent(in) :: quantities(:)
     type(response_limit_t), allocatable, intent(out) :: limits(:)
     type(error_t), allocatable, intent(out) :: error
+    type(signal_t), allocatable :: signals(:)
     type(error_t), allocatable :: own
     integer, allocatable :: groups(:)
     character(len=8) :: kind
     integer :: before, i
 
     allocate (groups, source=input%groups_named('limit'))
-    allocate (limits(0))
+    allocate (limits(0), signals(size(quantities)))
+    do i = 1, size(signals)
+      signals(i) = quantities(i)%signal_t
+    end do
     do i = 1, size(groups)
       before = size(limits)
       kind = limited_kind(input%groups(groups(i)))
-      call add_limit(input%groups(groups(i)), groups(i), quantities, limits)
-      call add_stress_limits(input, groups(i), trim(kind), quantities, limits, own)
+      call add_limit(input%groups(groups(i)), groups(i), signals, limits)
+      call add_stress_limits(input, groups(i), trim(kind), signals, limits, own)
       if (size(limits) == before .and. .not. (allocated(own) .or. input%groups(groups(i))%has_value('quantity'))) then
         call raise(own, exit_input, input%location(groups(i)) // ': nothing is limited; needed: ' // &
                    trim(merge('vibratory_force or force                                  ', &
@@ -65,10 +69,10 @@ contains
   end subroutine read_limits
 
   !> A limit of the moment of a coupling or shaft, the force of a mesh or a named quantity, if it is linear in the motion.
-  subroutine add_limit(group, index, quantities, limits)
+  subroutine add_limit(group, index, signals, limits)
     type(group_t), intent(in) :: group
     integer, intent(in) :: index   !! of the group
-    type(moment_form_t), intent(in) :: quantities(:)
+    type(signal_t), intent(in) :: signals(:)   !! of the quantities
     type(response_limit_t), allocatable, intent(inout) :: limits(:)
     character(len=*), parameter :: vibratory(*) = [character(len=16) :: 'vibratory_moment', 'vibratory_force', 'vibratory']
     character(len=*), parameter :: peak(*) = [character(len=7) :: 'moment', 'force', 'largest']
@@ -81,16 +85,16 @@ contains
       limit%peak = min(limit%peak, group%number(trim(peak(k)), absent=no_limit))
     end do
     if (min(limit%vibratory, limit%peak) >= no_limit) return
-    limit%quantity = limited_signal(group, quantities%signal_t)
+    limit%quantity = limited_signal(group, signals)
     if (limit%quantity > 0) limits = [limits, limit]
   end subroutine add_limit
 
   !> Limits of its stress.
-  subroutine add_stress_limits(input, index, kind, quantities, limits, error)
+  subroutine add_stress_limits(input, index, kind, signals, limits, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
     character(len=*), intent(in) :: kind
-    type(moment_form_t), intent(in) :: quantities(:)
+    type(signal_t), intent(in) :: signals(:)   !! of the quantities
     type(response_limit_t), allocatable, intent(inout) :: limits(:)
     type(error_t), allocatable, intent(out) :: error
     type(response_limit_t) :: limit
@@ -102,7 +106,7 @@ contains
       if (group%has_value('stress')) key = 'stress'
       if (group%has_value('rule')) key = 'rule'
       if (key == '') return
-      limit%quantity = find_signal(quantities%signal_t, kind, group%text(kind), 'stress')
+      limit%quantity = find_signal(signals, kind, group%text(kind), 'stress')
       if (limit%quantity == 0) then
         call raise(error, exit_input, input%location(index, key) // ': ' // key // ' limits a stress, but ' // &
                    quoted(group%text(kind)) // ' has none; required: section_modulus [m3] or diameter [m] of &coupling')

@@ -26,7 +26,7 @@ module nocdyn_analysis_results
   type, public :: analysis_result_t
     integer :: result = 0                           !! its number among the results of a variant
     integer :: statistic = analysis_frequency       !! analysis_...
-    integer :: mode = 0                             !! number of an oscillating mode; 0 for a result of the response, else `of_path`
+    integer :: mode = 0                             !! number of an oscillating mode; 0: of the response; or `of_path`
     character(len=:), allocatable :: command, path  !! of a number of a report: the command and the path in its report
     type(signal_t) :: signal                        !! of the response
     character(len=:), allocatable :: quantity       !! element, or column of response.csv without its unit

@@ -1,4 +1,4 @@
-!> The analyses of steady machines by the names of their commands: what sweeps can record of, each of the machine that it looks at.
+!> The analyses of steady machines by the names of their commands, which sweeps can record: each of the machine that it looks at.
 module nocdyn_named_analyses
   use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_assembly, only: assemble_machine, assemble_steady_machine
