@@ -37,8 +37,8 @@ MANY_ARGUMENTS = {
     ),
     "src/model/elements/polynomial_laws.f90": (KERNEL, "moments"),
     "src/model/formulations/kernels/series_kernel.inc": (KERNEL, "accelerate", "begin_motion", "find_moments", "find_values"),
-    "src/base/laws/law_harmonics.inc": (KERNEL, "harmonic_sum"),
-    "src/model/lanes/sparse_map.f90": (KERNEL, "pair_of_rows", "pair_on_lanes"),
+    "src/base/formulas/law_harmonics.inc": (KERNEL, "harmonic_sum"),
+    "src/base/contract/sparse_map.f90": (KERNEL, "pair_of_rows", "pair_on_lanes"),
 }
 
 # Longer procedures, by file, and why.

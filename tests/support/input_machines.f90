@@ -1,7 +1,6 @@
 !> Machines of inputs, as analyses get them.
 module nocdyn_test_input_machines
   use nocdyn_assembly, only: assemble_steady_machine
-  use nocdyn_equilibrium, only: t_infinity
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input_text
@@ -38,7 +37,7 @@ contains
 
     allocate (machine)
     call read_input_text(text, 'm.nml', [string_t ::], input, error)
-    if (.not. allocated(error)) call assemble_steady_machine(input, t_infinity, .true., machine, error)
+    if (.not. allocated(error)) call assemble_steady_machine(input, .true., machine, error)
     if (allocated(error)) error stop error%message
   end subroutine read_steady_machine
 

@@ -1,5 +1,6 @@
 !> From an input to a machine at its start, and to its formulation.
 module nocdyn_assembly
+  use nocdyn_equilibrium, only: t_infinity
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_harmonic_notes, only: note_left_out_harmonics
@@ -47,18 +48,19 @@ contains
 
   !> Builds the machine as it is in a steady state: with means over a turn, and, if it is asked for, with clutches and freewheels
   !> that are locked as constraint rows.
-  recursive subroutine assemble_steady_machine(input, t, locks_joints, machine, error)
+  recursive subroutine assemble_steady_machine(input, locks_joints, machine, error, t)
     type(input_t), intent(in) :: input
-    real(wp), intent(in) :: t               !! the time at which clutches are engaged or not [s]
     logical, intent(in) :: locks_joints     !! whether locked joints are rows
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
+    real(wp), intent(in), optional :: t   !! the time at which clutches are engaged or not [s]; absent: after all changes
     type(steady_view_t) :: view
     logical :: is_changed
     integer :: trials
 
     view%is_steady = .true.
-    view%at = t
+    view%at = t_infinity
+    if (present(t)) view%at = t
     view%locks_joints = locks_joints
     allocate (view%overruns(size(input%groups)), source=.false.)
     do trials = 0, 2 * size(input%groups_named('freewheel'))
@@ -100,7 +102,7 @@ contains
       call refuse_joints(input, .false., "start = 'equilibrium'", error, knows_locks=.true.)
       if (allocated(error)) return
       allocate (steady)
-      call assemble_steady_machine(input, run%number('t_start'), .false., steady, error)
+      call assemble_steady_machine(input, .false., steady, error, run%number('t_start'))
       if (.not. allocated(error)) call start_as(steady, machine)
     end associate
   end subroutine start_machine

@@ -7,8 +7,8 @@ module nocdyn_run_statistics
   use nocdyn_machine, only: machine_t
   use nocdyn_run_fatigue, only: new_run_fatigue, run_fatigue_t
   use nocdyn_run_summary, only: extremes_t
-  use nocdyn_statistics, only: statistic_damage, statistic_max, statistic_min, statistic_t, statistic_time_of_max, &
-    statistic_time_of_min
+  use nocdyn_statistics, only: statistic_damage, statistic_max, statistic_min, statistic_t, &
+    statistic_time_of_max, statistic_time_of_min
   use nocdyn_statistics_observer, only: statistics_observer_t
   use nocdyn_signals, only: list_signals, signal_t
   use nocdyn_units, only: from_si

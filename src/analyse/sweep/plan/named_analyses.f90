@@ -3,7 +3,6 @@ module nocdyn_named_analyses
   use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_assembly, only: assemble_machine, assemble_steady_machine
   use nocdyn_campbell_results, only: campbell_results_t
-  use nocdyn_equilibrium, only: t_infinity
   use nocdyn_equilibrium_results, only: equilibrium_results_t
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
@@ -50,7 +49,7 @@ contains
     if (word /= 'check') call refuse_joints(input, analysis%is_steady, 'nocdyn ' // word, error)
     if (allocated(error)) return
     if (analysis%is_steady) then
-      call assemble_steady_machine(input, t_infinity, analysis%locks_joints, machine, error)
+      call assemble_steady_machine(input, analysis%locks_joints, machine, error)
     else
       call assemble_machine(input, machine, error)
     end if
