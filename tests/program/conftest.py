@@ -9,6 +9,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 SOURCE = Path(os.environ["NOCDYN_SOURCE"])
@@ -43,6 +44,16 @@ def all_if_fast(*values):
 
 # A run that no test waits for, with few rows.
 ENDLESS = ("--set", "run.t_end=1e6", "--set", "run.max_steps=100000000", "--set", "output.interval=1")
+
+
+class Values(dict):
+    """The numbers of columns, by their labels or without the units."""
+
+    def __missing__(self, name):
+        return self.by_name()[name]
+
+    def by_name(self):
+        return {label.split(" [")[0]: values for label, values in self.items()}
 
 
 class Program:
@@ -81,6 +92,17 @@ class Program:
         with open(self.folder / folder / name, newline="") as file:
             header, *rows = csv.reader(file)
         return header, [[float(cell) for cell in row] for row in rows]
+
+    def values(self, folder="out", name="trajectory.csv"):
+        """The columns of a table of numbers."""
+        header, rows = self.table(folder, name)
+        return Values(zip(header, np.array(rows).T, strict=True))
+
+    def done(self, text, *words, command="run"):
+        """A command that succeeds on an input with this text, its results in the folder `out`; what it printed."""
+        outcome = self(command, self.write("machine.nml", text), "--out", "out", *words)
+        assert outcome.returncode == 0, outcome.stderr
+        return outcome
 
     def summary(self, folder):
         return json.loads((self.folder / folder / "summary.json").read_text())

@@ -58,11 +58,6 @@ def result(nocdyn, command, text):
     return json.loads((nocdyn.folder / f"out/{command}.json").read_text())
 
 
-def columns(nocdyn, name="campbell.csv"):
-    header, rows = nocdyn.table("out", name)
-    return dict(zip((label.split(" [")[0] for label in header), zip(*rows)))
-
-
 RELATIVE = COMPRESSOR.replace("damping=1000", "relative_damping=0.06 damping_frequency_hz=15").replace(
     "damping=600", "relative_damping=0.8 damping_frequency_hz=15"
 )
@@ -88,7 +83,7 @@ def test_all_commands_have_the_frequency_with_the_field_of_the_motor(nocdyn, tex
 
 
 def columns_of_mode(nocdyn, mode):
-    return columns(nocdyn)[f"undamped_frequency_{mode}"]
+    return nocdyn.values(name="campbell.csv")[f"undamped_frequency_{mode}"]
 
 
 def test_an_electrical_mode_has_no_margin_and_no_undamped_frequency(nocdyn):
@@ -99,7 +94,7 @@ def test_an_electrical_mode_has_no_margin_and_no_undamped_frequency(nocdyn):
         assert ours[0]["mostly"] == "stator flux d of motor 'mains'" and ours[0]["is_electrical"]
         assert not {"is_too_near", "distance_to_operation"} & set(ours[0])
         assert "  electrical mode  mostly stator flux d of motor 'mains'\n" in nocdyn(command, "machine.nml").stdout
-    numbers = {label[-1] for label in columns(nocdyn) if label.startswith("undamped_")}
+    numbers = {label[-1] for label in nocdyn.values(name="campbell.csv").by_name() if label.startswith("undamped_")}
     assert numbers == {str(one["mode"]) for one in json.loads((nocdyn.folder / "out/campbell.json").read_text())["modes"]} - {
         str(ours[0]["mode"])
     }
@@ -116,7 +111,7 @@ def test_branches_cross_without_changing_places(nocdyn, count):
         pytest.approx([7.962521, 26.498150], rel=1e-6),
         pytest.approx([50 / pi, 50 / pi], rel=1e-6),
     ]
-    table = columns(nocdyn)
+    table = nocdyn.values(name="campbell.csv")
     assert max(map(abs, table["damping_ratio_2"])) < 1e-9 and min(table["damping_ratio_1"]) > 0.009
     assert list(table["frequency_1"]) == sorted(table["frequency_1"])
 
@@ -153,7 +148,7 @@ def test_branches_do_not_depend_on_the_grid(nocdyn, seed):
     ends = []
     for count in (3, 17, 65):
         report = result(nocdyn, "campbell", random_machine(seed).format(count))
-        table = columns(nocdyn)
+        table = nocdyn.values(name="campbell.csv")
         ends.append(
             [
                 (table[f"frequency_{one['mode']}"][i], table[f"damping_ratio_{one['mode']}"][i])
@@ -182,12 +177,12 @@ def test_an_unstable_speed_does_not_stop_the_others(nocdyn):
     (note,) = [note for note in report["notes"] if "is unstable" in note]
     assert note.startswith("the steady state is unstable at 4 speeds from 1241.41 to 1527.89 rpm: an oscillation with")
     assert report["unstable_speeds_rad_s"] == pytest.approx([130, 140, 150, 160])
-    speeds = columns(nocdyn, "response.csv")["omega_a"]
+    speeds = nocdyn.values(name="response.csv")["omega_a"]
     assert not [speed for speed in speeds if 126 < speed < 164]
     assert {100.0, 110.0, 120.0, 170.0, 200.0} <= {round(speed, 9) for speed in speeds}
     report = result(nocdyn, "campbell", text)
     assert {130, 140, 150, 160} <= {round(speed, 9) for speed in report["unstable_speeds_rad_s"]}
-    table = columns(nocdyn)
+    table = nocdyn.values(name="campbell.csv")
     assert all((ratio < 0) == (126 < speed < 164) for speed, ratio in zip(table["omega_a"], table["damping_ratio_1"]))
 
 
@@ -217,7 +212,7 @@ def test_a_limit_of_a_shaft_holds_inside_too(nocdyn):
 &run t_end = 1 /
 """
     report = result(nocdyn, "response", text)
-    table = columns(nocdyn, "response.csv")
+    table = nocdyn.values(name="response.csv")
     inside, ends = max(table["peak_total_moment_s_max"]), max(table["peak_total_moment_s_1"] + table["peak_total_moment_s_2"])
     assert inside > 15 > ends
     assert report["limits_exceeded"]
@@ -280,7 +275,7 @@ def test_at_the_steady_state_campbell_has_the_modes(nocdyn, motor, damping):
     speeds = [one["values"]["omega_m [rad/s]"] for one in states if one["stability"] == "stable"]
     speed = min(speeds, key=lambda speed: abs(speed - 100))
     result(nocdyn, "campbell", text + f"&response body='m' speed={speed!r},{1.1 * speed!r} count=3 orders=1 /\n")
-    table = columns(nocdyn)
+    table = nocdyn.values(name="campbell.csv")
     ours = sorted((table[f"frequency_{k + 1}"][0], table[f"damping_ratio_{k + 1}"][0]) for k in range(len(modes)))
     theirs = sorted((one["frequency_Hz"], one["damping_ratio"]) for one in modes)
     assert len(ours) >= 2
@@ -310,7 +305,7 @@ def lossy_machine(seed):
 def test_modes_and_campbell_agree_on_relative_damping(nocdyn, seed):
     modes = [one for one in result(nocdyn, "modes", lossy_machine(seed))["modes"] if one["kind"] == "oscillating"]
     found = result(nocdyn, "campbell", lossy_machine(seed))["modes"]
-    table = columns(nocdyn)
+    table = nocdyn.values(name="campbell.csv")
     ours = sorted((table[f"frequency_{one['mode']}"][0], table[f"damping_ratio_{one['mode']}"][0]) for one in found)
     for one, same in zip(ours, sorted((one["frequency_Hz"], one["damping_ratio"]) for one in modes), strict=True):
         assert one == pytest.approx(same, rel=1e-9)

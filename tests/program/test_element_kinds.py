@@ -30,20 +30,13 @@ DRIVE = """&body name = 'rotor' inertia = 2.0 /
 """
 
 
-def columns(nocdyn):
-    header, rows = nocdyn.table("out")
-    return dict(zip(header, zip(*rows)))
-
-
 def largest_residual(table):
     return max(map(abs, table["energy_residual [J]"]))
 
 
 def run(nocdyn, text, *settings):
-    (nocdyn.folder / "machine.nml").write_text(text)
-    outcome = nocdyn("run", "machine.nml", "--out", "out", *[word for s in settings for word in ("--set", s)])
-    assert outcome.returncode == 0, outcome.stderr
-    return columns(nocdyn)
+    nocdyn.done(text, *[word for s in settings for word in ("--set", s)])
+    return nocdyn.values()
 
 
 def test_an_induction_motor_runs_up_in_its_time(nocdyn):
@@ -77,7 +70,7 @@ def test_energy_of_every_kind_of_element_adds_up(nocdyn, kinds, formulation, met
     settings = [f"run.formulation={formulation}", f"run.method={method}", "run.rtol=1e-9", "run.atol=1e-10"]
     words = [word for s in settings for word in ("--set", s)]
     assert nocdyn("run", kinds, "--out", "out", *words).returncode == 0
-    table = columns(nocdyn)
+    table = nocdyn.values()
     assert largest_residual(table) < 1e-6
     assert table["work_in [J]"][-1] > 1
 

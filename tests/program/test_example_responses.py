@@ -49,11 +49,6 @@ def small(text, factor):
     return GROUP.sub(changed, re.sub(r"^&(run|output|response)\b[^/]*/", "", text, flags=re.MULTILINE))
 
 
-def columns(nocdyn, folder, name):
-    header, rows = nocdyn.table(folder, name)
-    return {label.split(" [")[0]: np.array(values) for label, values in zip(header, zip(*rows, strict=True), strict=True)}
-
-
 def steady_speed(nocdyn, machine, body):
     outcome = nocdyn("equilibrium", nocdyn.write("steady.nml", machine + "&run t_end = 1 /\n"), "--out", "steady")
     assert outcome.returncode == 0, outcome.stderr
@@ -78,7 +73,7 @@ def test_response_is_the_settled_transient(nocdyn, path):
     text = machine + f"&run t_end = 1 /\n&response body = '{body}' speed = {0.9 * held!r}, {1.1 * held!r} count = 3 /\n"
     outcome = nocdyn("response", nocdyn.write("response.nml", text), "--out", "out", "-q")
     assert outcome.returncode == 0, outcome.stderr
-    response = columns(nocdyn, "out", "response_orders.csv")
+    response = nocdyn.values("out", "response_orders.csv").by_name()
     lines = np.flatnonzero(abs(response[f"omega_{body}"] - held) < 1e-9 * held)
     frequencies = response["frequency"][lines] * 2 * pi
     period = 2 * pi / float(min(frequencies))
@@ -88,7 +83,7 @@ def test_response_is_the_settled_transient(nocdyn, path):
     text = machine + RUN.format(method="rk45" if "ship" in path else "taylor", end=rows * step, step=step, start=start)
     outcome = nocdyn("run", nocdyn.write("run.nml", text), "--out", "run", "-q")
     assert outcome.returncode == 0, outcome.stderr
-    motion = {label: values[-50 * turns :] for label, values in columns(nocdyn, "run", "trajectory.csv").items()}
+    motion = {label: values[-50 * turns :] for label, values in nocdyn.values("run").by_name().items()}
     kinds = ("moment_", "total_moment_", "reaction_")
     quantities = [label for label in response if label.startswith(kinds) and f"phase_{label}" in response]
     assert quantities

@@ -57,15 +57,10 @@ def run(nocdyn, text, *settings, command="run"):
     return outcome
 
 
-def columns(nocdyn):
-    header, rows = nocdyn.table("out")
-    return {name.split(" ")[0]: np.array(values) for name, values in zip(header, zip(*rows))}
-
-
 @pytest.mark.parametrize("name", RUN_UP)
 def test_machines_run_up_as_in_another_frame_and_program(nocdyn, name):
     run(nocdyn, machine(name))
-    table = columns(nocdyn)
+    table = nocdyn.values()
     for time, *expected in RUN_UP[name]:
         at = round(time / 0.001)
         found = [table[key][at] for key in ("omega_rotor", "torque_mains", "current_mains")]
@@ -80,7 +75,7 @@ def test_every_formulation_and_kind_of_method_computes_the_same_run_up(nocdyn, m
         method = "taylor"
     settings = f"method = '{method}' formulation = '{formulation}' rtol = 1e-8 atol = 1e-8"
     run(nocdyn, machine("3 hp", run=settings), "run.t_end=0.3")
-    table = columns(nocdyn)
+    table = nocdyn.values()
     for time, *expected in RUN_UP["3 hp"][:4]:
         found = [table[key][round(time / 0.001)] for key in ("omega_rotor", "torque_mains", "current_mains")]
         assert np.abs((np.array(found) - expected) / LARGEST["3 hp"]).max() < 1e-5
@@ -108,14 +103,14 @@ def test_a_large_machine_overshoots_the_synchronous_speed(nocdyn):
 
 def test_a_small_machine_reaches_95_percent_of_its_speed_in_the_known_time(nocdyn):
     run(nocdyn, machine("3 hp"), "run.t_end=0.33395391300129")
-    assert columns(nocdyn)["omega_rotor"][-1] == pytest.approx(0.95 * 60 * np.pi, rel=1e-9)
+    assert nocdyn.values()["omega_rotor"][-1] == pytest.approx(0.95 * 60 * np.pi, rel=1e-9)
 
 
 def test_a_reversed_field_gives_the_mirror_image(nocdyn):
     run(nocdyn, machine("3 hp"), "run.t_end=0.2")
-    forwards = columns(nocdyn)
+    forwards = nocdyn.values()
     run(nocdyn, machine("3 hp", "reversed = .true."), "run.t_end=0.2")
-    backwards = columns(nocdyn)
+    backwards = nocdyn.values()
     assert np.abs(forwards["torque_mains"] + backwards["torque_mains"]).max() == 0
     assert np.abs(forwards["omega_rotor"] + backwards["omega_rotor"]).max() == 0
     assert np.abs(forwards["current_mains"] - backwards["current_mains"]).max() == 0
@@ -124,7 +119,7 @@ def test_a_reversed_field_gives_the_mirror_image(nocdyn):
 def test_a_start_in_the_steady_state_stays_there(nocdyn):
     load = "&load name = 'fan' body = 'rotor' quadratic = 4e-4 /"
     run(nocdyn, machine("3 hp", run=PRECISE + " start = 'equilibrium'", rest=load))
-    table = columns(nocdyn)
+    table = nocdyn.values()
     for key in ("omega_rotor", "torque_mains", "current_mains"):
         assert np.ptp(table[key]) < 1e-9 * table[key][0]
     assert table["torque_mains"][0] == pytest.approx(4e-4 * table["omega_rotor"][0] ** 2, rel=1e-9)
@@ -217,7 +212,7 @@ def supplied(name, run=PRECISE):
 def test_motors_on_a_changing_supply_move_as_in_another_program(nocdyn, name, method, precision):
     size, _, t_end, _ = SUPPLIES[name]
     run(nocdyn, supplied(name, method), f"run.t_end={t_end}", f"output.interval={t_end / 10}")
-    table = columns(nocdyn)
+    table = nocdyn.values()
     for row, (_, *expected) in enumerate(SUPPLIED[name], start=1):
         found = [table[key][row] for key in ("omega_rotor", "torque_mains", "current_mains")]
         assert np.abs((np.array(found) - expected) / LARGEST[size]).max() < precision
@@ -232,7 +227,7 @@ def test_a_reconnection_in_phase_opposition_gives_ten_times_the_rated_torque(noc
 
 def test_a_disconnected_motor_keeps_its_rotor_flux_but_no_current(nocdyn):
     run(nocdyn, supplied("reconnection"), "run.t_end=2.92", "output.interval=0.01")
-    table = columns(nocdyn)
+    table = nocdyn.values()
     assert table["current_mains"][281] < 0.03 and table["current_mains"][291] < 1e-6
     assert np.abs(table["torque_mains"][284:]).max() < 1e-6
 
@@ -240,15 +235,15 @@ def test_a_disconnected_motor_keeps_its_rotor_flux_but_no_current(nocdyn):
 def test_a_start_in_the_steady_state_takes_the_share_of_the_supply_at_its_time(nocdyn):
     text = supplied("soft start", PRECISE + " t_start = 0.5 start = 'equilibrium'").replace("t_end = 2.0", "t_end = 0.6")
     run(nocdyn, text)
-    table = columns(nocdyn)
+    table = nocdyn.values()
     assert np.ptp(table["omega_rotor"]) < 1e-9 * table["omega_rotor"][0]
     run(nocdyn, text, "run.t_start=0.25", "run.t_end=0.251")
-    on_the_ramp = columns(nocdyn)
+    on_the_ramp = nocdyn.values()
     constant = machine(
         "3 hp", run=PRECISE + " start = 'equilibrium'", rest="&load name = 'fan' body = 'rotor' quadratic = 4e-4 /"
     )
     run(nocdyn, constant, "motor.mains.voltage=88", "run.t_end=0.001")
-    table = columns(nocdyn)
+    table = nocdyn.values()
     for key in ("omega_rotor", "torque_mains", "current_mains"):
         assert on_the_ramp[key][0] == pytest.approx(table[key][0], rel=1e-9)
 
@@ -316,14 +311,14 @@ def test_a_circuit_from_rated_values_is_noted(nocdyn):
 
 def test_the_circuit_of_a_note_gives_the_motion_of_the_rated_values(nocdyn):
     run(nocdyn, RATED.format(keys=""))
-    table = columns(nocdyn)
+    table = nocdyn.values()
     rated = RATED[RATED.index("  rated_power") : RATED.index("{keys}")]
     circuit = (
         "stator_resistance = 0.643653 rotor_resistance = 0.414587 "
         "stator_reactance = 5.97825 rotor_reactance = 5.97825 mutual_reactance = 129.174 "
     )
     run(nocdyn, RATED.replace(rated, circuit).format(keys=""))
-    same = columns(nocdyn)
+    same = nocdyn.values()
     for key in ("omega_rotor", "torque_mains", "current_mains"):
         assert np.abs(table[key] - same[key]).max() < 1e-4 * np.abs(table[key]).max()
 
@@ -395,7 +390,7 @@ def test_automatic_rows_show_the_swings_with_the_mains_after_switching_on(nocdyn
     text = machine("3 hp", run="", rest="").replace("t_end = 2.0", "t_end = 20").replace("&output interval = 0.001 /\n", "")
     outcome = run(nocdyn, text)
     assert "note: 12001 rows for motor 'mains' with 60 Hz, as &output gives no interval" in outcome.stdout
-    torque = columns(nocdyn)["torque_mains"]
+    torque = nocdyn.values()["torque_mains"]
     assert torque.max() == pytest.approx(LARGEST["3 hp"][1], rel=0.05)
     outcome = run(nocdyn, text, "run.start=equilibrium", "motor.mains.frequency_hz=60")
     assert ", 1001 rows, " in outcome.stdout  # nothing swings

@@ -2,7 +2,6 @@
 
 import os
 
-import numpy as np
 import pytest
 from conftest import TRAPS_EXCEPTIONS
 from random_trains import random_train
@@ -22,10 +21,8 @@ def test_runs_of_random_trains_go_to_their_end(nocdyn, seed):
 
 
 def run(nocdyn, text):
-    outcome = nocdyn("run", nocdyn.write("train.nml", text), "--out", "out")
-    assert outcome.returncode == 0, outcome.stderr
-    header, rows = nocdyn.table("out")
-    return dict(zip((name.split(" ")[0] for name in header), np.array(rows).T, strict=True))
+    nocdyn.done(text)
+    return nocdyn.values()
 
 
 def test_brakes_at_both_ends_of_a_cardan_joint_carry_nothing_at_rest(nocdyn):

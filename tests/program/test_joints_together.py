@@ -49,10 +49,8 @@ def test_formulations_agree_and_keep_the_energy(nocdyn, between, behind, driven)
     found = []
     for method, formulation in (("auto", "reduced"), ("rk45", "multiplier"), ("rodas5p", "paper")):
         keys = f"method = '{method}' formulation = '{formulation}'"
-        outcome = nocdyn("run", nocdyn.write("machine.nml", text.replace("METHOD", keys)), "--out", "out")
-        assert outcome.returncode == 0, outcome.stderr
-        header, rows = nocdyn.table("out")
-        table = dict(zip((name.split(" ")[0] for name in header), np.array(rows).T, strict=True))
+        nocdyn.done(text.replace("METHOD", keys))
+        table = nocdyn.values()
         found.append(np.array([table[f"omega_b{i}"] for i in range(6)]))
         assert abs(table["energy_residual"]).max() < 1e-7 * (1 + table["work_in"].max())
     assert found[1] == pytest.approx(found[0], abs=1e-6)
@@ -66,10 +64,8 @@ def test_a_drive_takes_a_self_locking_gear_through_standstill(nocdyn):
     text += "&drive name = 'd' body = 'one' table_time = 0, 1, 3, 4 table_speed = 10, 10, -10, -10 /\n"
     text += "&excitation name = 'e' body = 'two' kind = 'step' amplitude = 12 time = -1 /\n"
     text += "&run t_end = 4 /\n&output interval = 0.25 /\n"
-    outcome = nocdyn("run", nocdyn.write("machine.nml", text), "--out", "out")
-    assert outcome.returncode == 0, outcome.stderr
-    header, rows = nocdyn.table("out")
-    table = dict(zip((name.split(" ")[0] for name in header), np.array(rows).T, strict=True))
+    nocdyn.done(text)
+    table = nocdyn.values()
     assert table["omega_one"] == pytest.approx(np.interp(table["t"], [0, 1, 3, 4], [10, 10, -10, -10]), abs=1e-9)
     for t, torque in zip(table["t"], table["torque_d"], strict=True):
         if min(abs(t - edge) for edge in (1, 2, 3)) < 1e-9:

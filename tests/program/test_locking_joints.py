@@ -9,10 +9,8 @@ from impulse_references import BODY, SEEDS, STEP, Train
 
 
 def run(nocdyn, text, *words):
-    outcome = nocdyn("run", nocdyn.write("machine.nml", text), "--out", "out", *words)
-    assert outcome.returncode == 0, outcome.stderr
-    header, rows = nocdyn.table("out")
-    return dict(zip(header, zip(*rows, strict=True), strict=True)), nocdyn.summary("out")["joint_events"]
+    nocdyn.done(text, *words)
+    return nocdyn.values(), nocdyn.summary("out")["joint_events"]
 
 
 def changes(events):

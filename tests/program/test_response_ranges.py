@@ -26,11 +26,6 @@ def notes(nocdyn, text):
     return [line for line in outcome.stdout.splitlines() if "note: " in line]
 
 
-def columns(nocdyn, name):
-    header, rows = nocdyn.table("out", name)
-    return {label.split(" [")[0]: list(values) for label, values in zip(header, zip(*rows, strict=True), strict=True)}
-
-
 def equivalent(law, mean, amplitude):
     """The first harmonic of a law over its argument, as a slope."""
     angles = [2 * pi * (i + 0.5) / SAMPLES for i in range(SAMPLES)]
@@ -58,7 +53,7 @@ def test_the_change_of_stiffness_is_that_of_the_first_harmonic(nocdyn, name):
     found = [NOTE.search(note) for note in notes(nocdyn, DUFFING.format(keys, 0.08, torque))]
     assert sum(map(bool, found)) == 1
     found = next(filter(None, found))
-    motion = columns(nocdyn, "response_orders.csv")
+    motion = nocdyn.values(name="response_orders.csv")
     hub, mass = motion["phi_hub"], motion["phi_mass"]
     assert max(hub) < 1e-6 * max(mass)
     mean = torque + 0.05 if torque else 0
@@ -73,9 +68,9 @@ def test_the_duffing_oscillator_at_resonance_is_told(nocdyn):
     """Its run settles at a half range of 1.539 N m, the linear response has 3.606 N m."""
     text = DUFFING.format("stiffness = 1 cubic_stiffness = 0.1", 0.18, 0)
     found = next(filter(None, map(NOTE.search, notes(nocdyn, text))))
-    amplitude = max(columns(nocdyn, "response_orders.csv")["phi_mass"])
+    amplitude = max(nocdyn.values(name="response_orders.csv")["phi_mass"])
     assert float(found[2]) == pytest.approx(100 * 0.75 * 0.1 * amplitude**2, rel=0.02)
-    assert columns(nocdyn, "response.csv")["half_range_total_moment_spring"][1] == pytest.approx(3.6056, rel=1e-3)
+    assert nocdyn.values(name="response.csv")["half_range_total_moment_spring"][1] == pytest.approx(3.6056, rel=1e-3)
 
 
 def test_a_load_whose_speed_swings_beyond_its_law_is_told(nocdyn):
@@ -92,8 +87,8 @@ def test_a_load_whose_speed_swings_beyond_its_law_is_told(nocdyn):
 """
     (note,) = (n for n in notes(nocdyn, text) if "'brake'" in n)
     found = re.search(r"at (\S+) rpm its slope over the speed is on average (\S+) % (above|below)", note)
-    speed = columns(nocdyn, "response.csv")["omega_a"]
-    swing = columns(nocdyn, "response_orders.csv")["omega_amplitude_b"]
+    speed = nocdyn.values(name="response.csv")["omega_a"]
+    swing = nocdyn.values(name="response_orders.csv")["omega_amplitude_b"]
     changes = []
     for mean, amplitude in zip(speed, swing, strict=True):
         slope = 0.5 * (1 - tanh(mean) ** 2)
@@ -117,7 +112,7 @@ CLUTCH = """\
 
 def test_a_clutch_that_would_slip_is_told_with_its_torque(nocdyn):
     assert not any("does not hold" in note for note in notes(nocdyn, CLUTCH.format(400.0)))
-    peaks = columns(nocdyn, "response.csv")["peak_torque_dry"]
+    peaks = nocdyn.values(name="response.csv")["peak_torque_dry"]
     (note,) = (n for n in notes(nocdyn, CLUTCH.format(200.0)) if "does not hold" in n)
     assert f"clutch 'dry' does not hold at {sum(p > 200 for p in peaks)} of {len(peaks)} speeds" in note
     assert float(re.search(r"up to (\S+) N m at", note)[1]) == pytest.approx(max(peaks), rel=1e-3)

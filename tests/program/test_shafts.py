@@ -50,10 +50,8 @@ def modes_of(nocdyn, text, *options):
 
 
 def run(nocdyn, text, *words):
-    outcome = nocdyn("run", nocdyn.write("machine.nml", text), "--out", "out", *words)
-    assert outcome.returncode == 0, outcome.stderr
-    header, rows = nocdyn.table("out")
-    return dict(zip(header, zip(*rows)))
+    nocdyn.done(text, *words)
+    return nocdyn.values()
 
 
 def moment_left_over(frequency, segments, j1, j2):

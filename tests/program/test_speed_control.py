@@ -25,11 +25,6 @@ def run(nocdyn, text, *settings, command="run"):
     return outcome
 
 
-def columns(nocdyn):
-    header, rows = nocdyn.table("out")
-    return {name.split(" ")[0]: np.array(values) for name, values in zip(header, zip(*rows))}
-
-
 def set_speed(t):
     return np.interp(t, [1, 3, 4], [0, 150, 100])
 
@@ -67,7 +62,7 @@ def test_a_drive_follows_its_ramp_within_the_torque_limit(nocdyn, method, formul
         f"run.formulation={formulation}",
         "output.points=11",
     )
-    table = columns(nocdyn)
+    table = nocdyn.values()
     assert np.abs(table["omega_rotor"][1:] - integrate(8.0, 40000)).max() < 1e-5
     assert np.abs(table["throttle_drive"]).max() <= 1 + 1e-9
     assert np.abs(table["energy_residual"]).max() < 1e-4
@@ -75,7 +70,7 @@ def test_a_drive_follows_its_ramp_within_the_torque_limit(nocdyn, method, formul
 
 def test_the_lag_behind_a_ramp_is_that_of_a_pi_controller(nocdyn):
     run(nocdyn, DRIVE.format(keys="set_times = 0, 100 set_speeds = 0, 1000"), "run.t_end=20")
-    table = columns(nocdyn)
+    table = nocdyn.values()
     lag = VISCOUS * 10.0 * TIME / (LIMIT * GAIN)
     assert table["omega_rotor"][-1] == pytest.approx(200 - lag, rel=1e-9)
     assert table["torque_drive"][-1] == pytest.approx(INERTIA * 10 + VISCOUS * table["omega_rotor"][-1], rel=1e-8)
@@ -83,7 +78,7 @@ def test_the_lag_behind_a_ramp_is_that_of_a_pi_controller(nocdyn):
 
 def test_a_limited_drive_does_not_overshoot_by_its_integral(nocdyn):
     run(nocdyn, DRIVE.format(keys="governor_speed = 100"), "motor.drive.torque_limit=300")
-    table = columns(nocdyn)
+    table = nocdyn.values()
     assert table["throttle_drive"][15] == pytest.approx(1.0, abs=1e-9)
     assert table["omega_rotor"].max() < 103
     assert table["omega_rotor"][-1] == pytest.approx(100, rel=1e-2)
@@ -92,18 +87,18 @@ def test_a_limited_drive_does_not_overshoot_by_its_integral(nocdyn):
 def test_a_governor_of_another_motor_follows_the_same_points(nocdyn):
     constant = DRIVE.replace("'inverter' torque_limit", "'constant' torque").format(keys=RAMP)
     run(nocdyn, constant.replace("governor_gain", "governor_start = 0 governor_gain"), "run.t_end=2.5")
-    governed = columns(nocdyn)
+    governed = nocdyn.values()
     run(nocdyn, DRIVE.format(keys=RAMP), "run.t_end=2.5")
-    drive = columns(nocdyn)
+    drive = nocdyn.values()
     assert governed["throttle_drive"].min() >= 0
     assert np.abs(governed["omega_rotor"] - drive["omega_rotor"]).max() < 1e-6
 
 
 def test_points_with_one_speed_are_a_constant_set_speed(nocdyn):
     run(nocdyn, DRIVE.format(keys="set_times = 1, 3 set_speeds_rpm = 600, 600"))
-    points = columns(nocdyn)
+    points = nocdyn.values()
     run(nocdyn, DRIVE.format(keys="governor_speed_rpm = 600"))
-    constant = columns(nocdyn)
+    constant = nocdyn.values()
     assert np.abs(points["omega_rotor"] - constant["omega_rotor"]).max() < 1e-7
 
 
@@ -113,7 +108,7 @@ def test_steady_states_have_the_set_speed_of_their_time(nocdyn):
     assert (values["omega_rotor"], values["torque_drive"]) == ("100", "200")
     keys = "set_times = 1, 3, 4 set_speeds = 0, 150, 100"
     run(nocdyn, DRIVE.format(keys=keys), "run.start=equilibrium", "run.t_start=2")
-    table = columns(nocdyn)
+    table = nocdyn.values()
     assert table["omega_rotor"][0] == pytest.approx(75, rel=1e-9)
     assert table["torque_drive"][0] == pytest.approx(150, rel=1e-9)
 

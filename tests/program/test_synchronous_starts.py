@@ -29,16 +29,11 @@ def run(nocdyn, motor, *settings, rest="", precision=PRECISE, command="run"):
     return outcome
 
 
-def columns(nocdyn):
-    header, rows = nocdyn.table("out")
-    return {name.split(" ")[0]: np.array(values) for name, values in zip(header, zip(*rows))}
-
-
 def test_torques_of_both_axes_are_a_mean_and_a_pulsation(nocdyn):
     run(nocdyn, AXES, precision="")
-    by_axes = columns(nocdyn)
+    by_axes = nocdyn.values()
     run(nocdyn, PARTS, precision="")
-    by_parts = columns(nocdyn)
+    by_parts = nocdyn.values()
     for key, values in by_axes.items():
         assert np.abs(values - by_parts[key]).max() <= 1e-9 * max(1, np.abs(values).max())
 
@@ -46,20 +41,20 @@ def test_torques_of_both_axes_are_a_mean_and_a_pulsation(nocdyn):
 def test_a_constant_pulsation_is_that_of_the_excitation(nocdyn):
     motor = PARTS.replace("pulsations = 0, 10, 15, 15", "pulsations = 12, 12, 12, 12 phase = 0.5")
     run(nocdyn, motor, "run.t_end=8")
-    pulsating = columns(nocdyn)
+    pulsating = nocdyn.values()
     table = "kind = 'table' table_speed_rpm = 0, 750, 1425, 1500 table_torque = 45, 55, 80, 0"
     excitation = (
         "&excitation name = 'beat' body = 'motor' kind = 'startup' amplitude = 12 frequency_hz = 50 pole_pairs = 2 phase = 0.5 /"
     )
     run(nocdyn, table, "run.t_end=8", rest=excitation)
-    separate = columns(nocdyn)
+    separate = nocdyn.values()
     for key in ("omega_motor", "moment_coupling"):
         assert np.abs(pulsating[key] - separate[key]).max() < 1e-4 * np.abs(separate[key]).max()
 
 
 def test_a_start_passes_its_resonance_at_twice_the_slip_frequency(nocdyn):
     run(nocdyn, AXES)
-    table = columns(nocdyn)
+    table = nocdyn.values()
     modes = run(nocdyn, AXES, command="modes").stdout
     frequency = next(float(line.split()[1]) for line in modes.splitlines() if line.split()[:1] == ["1"])
     critical = 1500 * (1 - frequency / 100)
@@ -81,9 +76,9 @@ def test_the_steady_state_has_the_mean_torque(nocdyn):
 
 def test_a_reversed_field_gives_the_mirror_image(nocdyn):
     run(nocdyn, AXES, precision="")
-    forwards = columns(nocdyn)
+    forwards = nocdyn.values()
     run(nocdyn, AXES + " reversed = .true.", precision="")
-    assert np.abs(forwards["omega_motor"] + columns(nocdyn)["omega_motor"]).max() < 1e-5
+    assert np.abs(forwards["omega_motor"] + nocdyn.values()["omega_motor"]).max() < 1e-5
 
 
 @pytest.mark.parametrize("last", ["q_torque", "pulsation"])
@@ -93,9 +88,9 @@ def test_tables_may_be_in_a_file(nocdyn, last):
     lines = [f"slip, {first}, {last}", *(f"{slip}, {a}, {b}" for slip, (a, b) in zip((0, 0.05, 0.5, 1), rows, strict=True))]
     (nocdyn.folder / "start.csv").write_text("\n".join(lines) + "\n")
     run(nocdyn, "kind = 'synchronous' frequency_hz = 50 poles = 4 table_file = 'start.csv'", precision="")
-    from_file = columns(nocdyn)
+    from_file = nocdyn.values()
     run(nocdyn, AXES if last == "q_torque" else PARTS, precision="")
-    assert np.abs(from_file["omega_motor"] - columns(nocdyn)["omega_motor"]).max() == 0
+    assert np.abs(from_file["omega_motor"] - nocdyn.values()["omega_motor"]).max() == 0
 
 
 BOTH = "allowed over the slips: d_torques and q_torques, or mean_torques and pulsations"
