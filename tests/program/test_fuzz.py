@@ -13,7 +13,7 @@ sys.path.insert(0, str(SOURCE / "scripts"))
 from nocdyn_fuzz import corpus, findings, judgement
 from nocdyn_fuzz.execution import Limits, Outcome, execute
 
-MUTANTS = 2000
+MUTANTS = 1000
 
 
 @pytest.mark.skipif(TRAPS_EXCEPTIONS, reason="the debug build ends where the others go on with infinity, and then refuse it")
