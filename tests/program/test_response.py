@@ -6,6 +6,7 @@ from math import log, pi, radians, sqrt
 
 import numpy as np
 import pytest
+from conftest import fast_only
 
 # E. J. Gunter, W. J. Chen: Introduction to Dynamics of Rotor-Bearing Systems, 2001, example 8.1: frequencies [cycles/min] and the
 # largest moment of the propeller shaft [N m] for 10 % of the propeller's torque at order 5.
@@ -117,6 +118,7 @@ def test_response_to_a_harmonic_is_the_settled_transient(nocdyn):
             assert table["mean_" + column][1] == pytest.approx(mean, rel=1e-5)
 
 
+@fast_only
 def test_response_to_orders_is_the_settled_transient(nocdyn):
     """Orders of two bodies that a gear joins: their phases follow the angles of both."""
     amplitudes = [1e-2 * AMPLITUDE, 4e-3 * AMPLITUDE, 1e-2 * AMPLITUDE]

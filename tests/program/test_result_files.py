@@ -6,7 +6,7 @@ import re
 from decimal import Decimal
 
 import pytest
-from conftest import BALANCE, CASE_2, DATA, POLYNOMIALS, SOURCE
+from conftest import BALANCE, CASE_2, DATA, POLYNOMIALS, SOURCE, all_if_fast, fast_only
 
 FULL = DATA / "full_machine.nml"
 ENERGIES = ["kinetic_energy [J]", "elastic_energy [J]", "work_in [J]", "work_out [J]", "energy_residual [J]"]
@@ -241,7 +241,7 @@ def peak(values, i):
 
 
 @pytest.mark.parametrize("path", [CASE_2, FULL], ids=["case2", "full"])
-@pytest.mark.parametrize("method", ["auto", "rk45", "rodas5p"])
+@pytest.mark.parametrize("method", all_if_fast("auto", "rk45", "rodas5p"))
 def test_the_extremes_are_those_of_the_motion_between_the_rows(nocdyn, path, method):
     common = ["run.t_end=3", f"run.method={method}", "run.rtol=1e-9", "run.atol=1e-9"]
     words = [word for override in common for word in ("--set", override)]
@@ -388,6 +388,7 @@ def test_input_nml_reproduces_the_run_bit_for_bit(nocdyn, path, overrides):
     assert (first / "input.nml").read_bytes() == (second / "input.nml").read_bytes()
 
 
+@fast_only
 def test_a_motion_that_the_energy_balance_refutes_is_noted(nocdyn):
     nocdyn.write(
         "coarse.nml",
