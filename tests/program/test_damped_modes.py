@@ -336,3 +336,25 @@ def test_a_stand_in_of_relative_damping_far_from_the_mode_is_noted(nocdyn, comma
     for factor in (0.8, 1.0, 1.3):
         text = nocdyn(command, nocdyn.write("m.nml", RUBBER.format(frequency * factor)), "--out", "out").stdout
         assert "stands for" not in text
+
+
+LOSSY_BRAKE = """\
+&body name = 'a' inertia = 10 speed = 100 /
+&body name = 'b' inertia = 1 speed = 100 /
+&coupling name = 'k' bodies = 'a', 'b' stiffness = 4000 relative_damping = {} /
+&motor name = 'm' body = 'a' kind = 'quadratic' a = 100 b = 0.5 c = 0 /
+&load name = 'l' body = 'b' table_speed = 0, 50, 150, 1000 table_torque = 0, 65, 35, 2000 extrapolation = 'constant' /
+&response body = 'a' speed = 100, 101 count = 2 orders = 1 /
+&run t_end = 1 /
+"""
+
+
+@pytest.mark.parametrize(("damping", "is_stable"), [("0.05", True), ("0.05 damping_frequency_hz = 1000", True), ("0.005", False)])
+def test_stability_is_one_with_relative_damping(nocdyn, damping, is_stable):
+    text = LOSSY_BRAKE.format(damping)
+    (state,) = result(nocdyn, "equilibrium", text)["steady_states"]
+    assert state["stability"] == ("stable" if is_stable else "unstable")
+    (mode,) = [mode for mode in result(nocdyn, "modes", text)["modes"] if mode["kind"] == "oscillating"]
+    assert (mode["damping_ratio"] > 0) == is_stable
+    if not is_stable:
+        assert state["growth_rate_1_s"] == pytest.approx(mode["eigenvalue_1_s"][0], rel=1e-9)

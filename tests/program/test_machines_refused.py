@@ -1,5 +1,7 @@
 """Machines that cannot be, and notes on those that can: file, line, group and name."""
 
+import re
+
 import pytest
 from conftest import CASE_2, IS_SANITIZED, fast_only, peak_memory
 
@@ -235,3 +237,42 @@ def test_the_mistakes_of_all_groups_are_told_at_once_in_the_order_of_the_file(no
     assert outcome.returncode == 2
     lines = [int(line.split(":")[2]) for line in outcome.stderr.splitlines()]
     assert lines == [*range(3, 14), 15]
+
+
+MISTAKES = """\
+&body name = 'a' inertia = 1 /
+&body name = 'b' inertia = 2 /
+&body name = 'c' inertia = 3 /
+&shaft name = 's' bodies = 'a', 'b' lengths = 1, 2 diameters = 0.1, 0.2 bores = 0.1, 0 density = 7850, 7850, 7850 \
+shear_modulus = 8e10, 7e10, 6e10 /
+&clutch name = 'k' bodies = 'b', 'c' table_slip = 1, 2 table_capacity = 100, 90 static_capacity = 50 /
+&crank name = 'p' body = 'a' crank_radius = 0.1 rod_length = 0.15 offset = 0.06 rod_mass = 1 piston_mass = 1 /
+&motor name = 'm' body = 'a' kind = 'inverter' torque_limit = 10 poles = 3 /
+&excitation name = 'f' body = 'c' kind = 'fault' fault = 'two_phase' rated_torque = 1e3 time = -1 frequency_hz = 50 \
+subtransient_reactance = 0.3 transient_reactance = 0.2 synchronous_reactance = 0.1 subtransient_time = 0.03 transient_time = 1 \
+armature_time = 0.1 /
+&fatigue name = 'l' shaft = 't' table_cycles = 1e3, 1e6 table_moment = 10, 20 ultimate_stress = 1e9 profile_speeds = 1 \
+profile_hours = 1 /
+&run t_end = 1 /
+"""
+WRONG_KEYS = {
+    4: ["shear_modulus", "density", "bores"],
+    5: ["table_slip", "static_capacity"],
+    6: ["offset", "rod_mass"],
+    7: ["kind", "poles"],
+    8: ["time", "transient_reactance", "synchronous_reactance"],
+    9: ["shaft", "table_moment", "ultimate_stress", "profile_speeds"],
+}
+
+
+@pytest.mark.parametrize("command", ["check", "run", "modes", "campbell"])
+def test_all_mistakes_of_all_groups_are_named_at_once(nocdyn, command):
+    outcome = nocdyn(command, nocdyn.write("wrong.nml", MISTAKES))
+    assert outcome.returncode == 2
+    found = {}
+    for line in outcome.stderr.splitlines():
+        match = re.fullmatch(r"nocdyn: .*wrong\.nml:(\d+): &\w+ '\w': (\w+)\b.*", line)
+        assert match, line
+        found.setdefault(int(match[1]), []).append(match[2])
+    assert list(found) == sorted(found)
+    assert {line: len(keys) for line, keys in found.items()} == {line: len(keys) for line, keys in WRONG_KEYS.items()}

@@ -1,6 +1,6 @@
 !> The ranges of speeds of &response, which every command checks.
 module nocdyn_response_ranges
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: rounded_text, to_text
@@ -17,11 +17,11 @@ contains
   subroutine check_response_range(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
 
     associate (group => input%groups(index))
       call check_range(input, index, 'speed', group%numbers('speed'), error)
-      if (.not. allocated(error)) call check_range(input, index, 'operating', group%numbers('operating'), error)
+      call check_range(input, index, 'operating', group%numbers('operating'), error)
     end associate
   end subroutine check_response_range
 
@@ -31,13 +31,13 @@ contains
     integer, intent(in) :: group
     character(len=*), intent(in) :: key
     real(wp), intent(in) :: range(:)   !! [rad/s], or empty
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: text
 
     if (size(range) == 0) return
     if (size(range) == 1 .and. key == 'speed') return
     if (size(range) > 2) then
-      call raise(error, exit_input, input%location(group, key) // ': ' // to_text(size(range)) // ' speeds; allowed: one, ' // &
+      call add_mistake(error, input%location(group, key) // ': ' // to_text(size(range)) // ' speeds; allowed: one, ' // &
                  'or the slowest and the fastest one')
       return
     end if
@@ -49,7 +49,7 @@ contains
       if (unit_of(written, key) == 0) text = text // ' rad/s, which is ' // rounded_text(from_si(range(1), unit_rpm), 6) // &
                                              ', ' // rounded_text(from_si(range(2), unit_rpm), 6) // ' rpm'
     end associate
-    call raise(error, exit_input, input%location(group, key) // ': ' // text // '; allowed: first the slower speed, then ' // &
+    call add_mistake(error, input%location(group, key) // ': ' // text // '; allowed: first the slower speed, then ' // &
                'the faster one, both with one sign')
   end subroutine check_range
 

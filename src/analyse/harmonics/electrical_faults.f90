@@ -1,7 +1,7 @@
 !> The torques of electrical faults on the rotor of a synchronous or an induction machine, as sums of decaying sines: of the
 !> fluxes of the machine, or as they are given. They brake a rotor that turns with the mains, at rated voltage and after no load.
 module nocdyn_electrical_faults
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_fault_excitations, only: fault_terms_t
   use nocdyn_fault_fluxes, only: fault_machine_t, find_flux_terms
   use nocdyn_input, only: group_t, input_t
@@ -18,7 +18,7 @@ contains
   subroutine check_fault(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
     type(fault_terms_t) :: terms
     real(wp) :: t_start
     logical :: has_failed
@@ -26,22 +26,24 @@ contains
     t_start = input%groups(input%position('run'))%number('t_start')
     associate (group => input%groups(index))
       if (group%number('time') < t_start) then
-        call raise(error, exit_input, input%location(index, 'time') // ': time = ' // to_text(group%number('time')) // &
+        call add_mistake(error, input%location(index, 'time') // ': time = ' // to_text(group%number('time')) // &
                    ' is before the run; allowed: >= t_start = ' // to_text(t_start) // ' [s]')
-      else if (group%number('frequency', absent=1.0_wp) <= 0) then
-        call raise(error, exit_input, input%location(index, 'frequency') // ': frequency = ' // &
+      end if
+      if (group%number('frequency', absent=1.0_wp) <= 0) then
+        call add_mistake(error, input%location(index, 'frequency') // ': frequency = ' // &
                    to_text(group%number('frequency')) // "; allowed with kind = 'fault': > 0 [rad/s]")
-      else if (group%has_value('fault')) then
+      end if
+      if (group%has_value('fault')) then
         call check_order('transient_reactance', 'subtransient_reactance')
-        if (.not. allocated(error)) call check_order('synchronous_reactance', 'subtransient_reactance')
-        if (.not. allocated(error)) call check_order('synchronous_reactance', 'transient_reactance')
+        call check_order('synchronous_reactance', &
+                         trim(merge('transient_reactance   ', 'subtransient_reactance', group%has_value('transient_reactance'))))
         if (allocated(error)) return
         call find_fault_terms(group, terms, has_failed)
-        if (has_failed) call raise(error, exit_input, input%location(index, 'subtransient_reactance') // &
+        if (has_failed) call add_mistake(error, input%location(index, 'subtransient_reactance') // &
                                    ': the reactances and time constants are so far apart that no torque can be computed')
       else
         call check_length('term_times')
-        if (.not. allocated(error)) call check_length('term_phases')
+        call check_length('term_phases')
       end if
     end associate
 
@@ -54,7 +56,7 @@ contains
       associate (group => input%groups(index))
         if (.not. group%has_value(key) .or. .not. group%has_value(earlier)) return
         if (group%number(key) >= group%number(earlier)) return
-        call raise(error, exit_input, input%location(index, key) // ': ' // key // ' = ' // to_text(group%number(key)) // &
+        call add_mistake(error, input%location(index, key) // ': ' // key // ' = ' // to_text(group%number(key)) // &
                    '; allowed: >= ' // earlier // ' = ' // to_text(group%number(earlier)))
       end associate
     end subroutine check_order
@@ -66,7 +68,7 @@ contains
       associate (group => input%groups(index))
         associate (terms => size(group%numbers('term_amplitudes')), values => size(group%numbers(key)))
           if (values == 0 .or. values == terms) return
-          call raise(error, exit_input, input%location(index, key) // ': ' // key // ' has ' // &
+          call add_mistake(error, input%location(index, key) // ': ' // key // ' has ' // &
                      counted(values, 'value', 'values') // ' and term_amplitudes has ' // counted(terms, 'value', 'values') // &
                      '; needed: as many of each')
         end associate

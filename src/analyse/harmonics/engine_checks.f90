@@ -1,7 +1,7 @@
 !> Mistakes in the values of &engine, and of &excitation with orders, that the schema does not know.
 module nocdyn_engine_checks
   use nocdyn_cylinder_torques, only: cycle_of
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_harmonic_tables, only: distinct, find_table_obstacle
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
@@ -23,19 +23,30 @@ contains
   subroutine check_engine(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error   !! names file, line, group and key
+    type(error_t), allocatable, intent(inout) :: error   !! names file, line, group and key
     character(len=:), allocatable :: key, text
 
     associate (group => input%groups(index))
       call check_cylinders(group, key, text)
-      if (text == '') call check_cycle(group, key, text)
-      if (text == '' .and. group%has_value('orders')) call find_table_obstacle(group, key, text)
-      if (text == '') call check_loads(group, key, text)
+      if (text == '') call check_cycle(group, key, text)   ! of a known stroke
       if (text == '' .and. group%has_value('pressures')) call check_crank_angles(group, key, text)
-      if (text == '') call check_names(input, group, key, text)
+      call note()
+      if (group%has_value('orders')) call find_table_obstacle(group, key, text)
+      call note()
+      call check_loads(group, key, text)
+      call note()
+      call check_names(input, group, key, text)
+      call note()
     end associate
-    if (text == '') return
-    call raise(error, exit_input, input%location(index, key) // ': ' // text)
+
+  contains
+
+    !> Takes up what is wrong with a key.
+    subroutine note()
+      if (text /= '') call add_mistake(error, input%location(index, key) // ': ' // text)
+      text = ''
+    end subroutine note
+
   end subroutine check_engine
 
   !> Lists and numbers of cylinders, and whether there is a torque.
@@ -183,20 +194,18 @@ contains
   subroutine check_order_torques(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error   !! names file, line, group and key
+    type(error_t), allocatable, intent(inout) :: error   !! names file, line, group and key
     character(len=:), allocatable :: key, text
     integer :: load
 
     associate (group => input%groups(index))
       text = ''
       if (group%has_value('speeds')) call find_table_obstacle(group, key, text)
-      if (group%has_value('share_of_load')) then
-        key = 'share_of_load'
-        call find_shared_load(input, index, load, text)
-      end if
+      if (text /= '') call add_mistake(error, input%location(index, key) // ': ' // text)
+      if (.not. group%has_value('share_of_load')) return
+      call find_shared_load(input, index, load, text)
+      if (text /= '') call add_mistake(error, input%location(index, 'share_of_load') // ': ' // text)
     end associate
-    if (text == '') return
-    call raise(error, exit_input, input%location(index, key) // ': ' // text)
   end subroutine check_order_torques
 
 end module nocdyn_engine_checks

@@ -1,6 +1,6 @@
 !> The groups &fatigue of an input: what they may ask for, and their S-N curves.
 module nocdyn_fatigue_groups
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_near_words, only: nearest_word
@@ -60,19 +60,19 @@ contains
   subroutine check_fatigue(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
 
     call check_element(input, index, error)
-    if (.not. allocated(error)) call check_curve(input, index, error)
-    if (.not. allocated(error)) call check_mean(input, index, error)
-    if (.not. allocated(error)) call check_profile(input, index, error)
+    call check_curve(input, index, error)
+    call check_mean(input, index, error)
+    call check_profile(input, index, error)
   end subroutine check_fatigue
 
   !> The element must exist and have the quantity.
   subroutine check_element(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
     type(string_t), allocatable :: names(:)
     integer, allocatable :: candidates(:)
     character(len=8) :: kind
@@ -90,10 +90,10 @@ contains
       end do
       near = nearest_word(group%text(trim(kind)), names)
       if (near > 0) then
-        call raise(error, exit_input, input%location(index, trim(kind)) // ': there is no ' // trim(kind) // ' ' // &
+        call add_mistake(error, input%location(index, trim(kind)) // ': there is no ' // trim(kind) // ' ' // &
                    quoted(group%text(trim(kind))) // '; did you mean ' // quoted(names(near)%text) // '?')
       else
-        call raise(error, exit_input, input%location(index, trim(kind)) // ': there is no ' // trim(kind) // ' ' // &
+        call add_mistake(error, input%location(index, trim(kind)) // ': there is no ' // trim(kind) // ' ' // &
                    quoted(group%text(trim(kind))))
       end if
     end associate
@@ -104,16 +104,16 @@ contains
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
     type(group_t), intent(in) :: element
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
 
     if (element%kind == 'coupling' .and. quantity_of(input%groups(index)) == quantity_stress) then
       if (element%has_value('section_modulus') .or. element%has_value('diameter')) return
-      call raise(error, exit_input, input%location(index, 'coupling') // ': a stress needs a section, but coupling ' // &
+      call add_mistake(error, input%location(index, 'coupling') // ': a stress needs a section, but coupling ' // &
                  quoted(element%name) // ' has none; required: section_modulus [m3] or diameter [m] of &coupling, or ' // &
                  'a moment in place of the stress')
     else if (element%kind == 'gear') then
       if (element%has_value('radii')) return
-      call raise(error, exit_input, input%location(index, 'gear') // ': a tooth force needs radii, but gear ' // &
+      call add_mistake(error, input%location(index, 'gear') // ': a tooth force needs radii, but gear ' // &
                  quoted(element%name) // ' has none; required: radii [m] of &gear')
     end if
   end subroutine check_quantity
@@ -122,7 +122,7 @@ contains
   subroutine check_curve(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
     real(wp), allocatable :: cycles(:), half_range(:)
     character(len=18) :: key
     integer :: i
@@ -133,14 +133,14 @@ contains
       allocate (cycles, source=group%numbers('table_cycles'))
       allocate (half_range, source=group%numbers(trim(key)))
       if (size(half_range) /= size(cycles)) then
-        call raise(error, exit_input, input%location(index, trim(key)) // ': ' // trim(key) // ' has ' // &
+        call add_mistake(error, input%location(index, trim(key)) // ': ' // trim(key) // ' has ' // &
                    counted(size(half_range), 'value', 'values') // ' and table_cycles has ' // &
                    counted(size(cycles), 'value', 'values') // '; needed: as many of each')
         return
       end if
       do i = 2, size(cycles)
         if (half_range(i) < half_range(i - 1)) cycle
-        call raise(error, exit_input, input%location(index, trim(key)) // ': ' // trim(key) // '(' // to_text(i) // ') = ' // &
+        call add_mistake(error, input%location(index, trim(key)) // ': ' // trim(key) // '(' // to_text(i) // ') = ' // &
                    to_text(half_range(i)) // ' is not less than the value before, ' // to_text(half_range(i - 1)) // &
                    '; needed: half ranges that descend')
         return
@@ -152,7 +152,7 @@ contains
   subroutine check_mean(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
     character(len=15) :: key
 
     associate (group => input%groups(index))
@@ -165,16 +165,16 @@ contains
         key = ''
         if (group%has_value('ultimate_stress')) key = 'ultimate_stress'
         if (group%has_value('yield_stress')) key = 'yield_stress'
-        if (key /= '') call raise(error, exit_input, input%location(index, trim(key)) // ': ' // trim(key) // &
+        if (key /= '') call add_mistake(error, input%location(index, trim(key)) // ': ' // trim(key) // &
                                   " has no effect with mean_stress = 'none'; allowed: goodman with ultimate_stress, " // &
                                   'soderberg with yield_stress')
         return
       end select
       if (quantity_of(group) /= quantity_stress) then
-        call raise(error, exit_input, input%location(index, 'mean_stress') // ': mean_stress = ' // &
+        call add_mistake(error, input%location(index, 'mean_stress') // ': mean_stress = ' // &
                    quoted(group%text('mean_stress')) // ' needs an S-N curve of stresses, reference_stress or table_stress')
       else if (.not. group%has_value(trim(key))) then
-        call raise(error, exit_input, input%location(index, 'mean_stress') // ': mean_stress = ' // &
+        call add_mistake(error, input%location(index, 'mean_stress') // ': mean_stress = ' // &
                    quoted(group%text('mean_stress')) // ' needs ' // trim(key) // ' [Pa]')
       end if
     end associate
@@ -184,7 +184,7 @@ contains
   subroutine check_profile(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
     integer, allocatable :: responses(:)
     real(wp), allocatable :: range(:), speeds(:)
     integer :: i
@@ -193,7 +193,7 @@ contains
     if (size(speeds) == 0) return
     allocate (responses, source=input%groups_named('response'))
     if (size(responses) == 0) then
-      call raise(error, exit_input, input%location(index, 'profile_speeds') // ': profile_speeds are those of the body of ' // &
+      call add_mistake(error, input%location(index, 'profile_speeds') // ': profile_speeds are those of the body of ' // &
                  '&response; required: a group &response')
       return
     end if
@@ -201,7 +201,7 @@ contains
     do i = 1, size(speeds)
       if (minval(range) <= speeds(i) .and. speeds(i) <= maxval(range)) cycle
       associate (group => input%groups(index))
-        call raise(error, exit_input, input%location(index, 'profile_speeds') // ': ' // &
+        call add_mistake(error, input%location(index, 'profile_speeds') // ': ' // &
                    written_element(group, 'profile_speeds', i) // ' is outside of the speeds of &response; allowed: ' // &
                    written_number(group, 'profile_speeds', range(1)) // ' to ' // &
                    written_number(group, 'profile_speeds', range(2)) // ' [' // written_unit(group, 'profile_speeds') // ']')

@@ -1,6 +1,6 @@
 !> The elements and the signals that groups &limit are of.
 module nocdyn_limit_groups
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_schema_text, only: suggestion
   use nocdyn_signals, only: find_signal, signal_t
@@ -45,7 +45,7 @@ contains
   subroutine check_limit(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error   !! names file, line, group and key
+    type(error_t), allocatable, intent(inout) :: error   !! names file, line, group and key
     character(len=*), parameter :: kinds(*) = [character(len=8) :: 'coupling', 'shaft', 'mesh']
     character(len=8) :: kind
     type(string_t), allocatable :: names(:)
@@ -61,11 +61,11 @@ contains
     end do
     do i = 1, size(kinds)
       if (kinds(i) == kind .or. .not. has_name(input, trim(kinds(i)), input%groups(index)%text(trim(kind)))) cycle
-      call raise(error, exit_input, input%location(index, trim(kind)) // ': ' // quoted(input%groups(index)%text(trim(kind))) // &
+      call add_mistake(error, input%location(index, trim(kind)) // ': ' // quoted(input%groups(index)%text(trim(kind))) // &
                  ' is a ' // trim(kinds(i)) // '; needed: ' // trim(kinds(i)) // ' in place of ' // trim(kind))
       return
     end do
-    call raise(error, exit_input, input%location(index, trim(kind)) // ': there is no ' // trim(kind) // ' ' // &
+    call add_mistake(error, input%location(index, trim(kind)) // ': there is no ' // trim(kind) // ' ' // &
                quoted(input%groups(index)%text(trim(kind))) // suggestion(input%groups(index)%text(trim(kind)), names))
   end subroutine check_limit
 

@@ -6,7 +6,7 @@ module nocdyn_relative_damping
   implicit none (type, external)
   private
 
-  public :: add_loss, find_losses, settle
+  public :: add_loss, find_losses, settle, take_relative_damping
 
 contains
 
@@ -26,6 +26,22 @@ contains
       end associate
     end do
   end subroutine find_losses
+
+  !> Takes the viscous damping that stands for relative damping over the time out of the first-order matrix, and adds the relative
+  !> damping itself.
+  subroutine take_relative_damping(machine, linear, loss)
+    type(machine_t), intent(in) :: machine
+    type(linearisation_t), intent(inout) :: linear
+    real(wp), allocatable, intent(out) :: loss(:)   !! k eta [N m/rad], [elements]
+    real(wp), allocatable :: damping(:), factor(:)
+
+    call find_losses(machine, factor, damping)
+    loss = linear%stiffness * factor
+    associate (rates => linear%matrix(:size(linear%natural), :size(linear%natural)))
+      rates = rates + matmul(transpose(linear%twists), spread(damping, 2, size(linear%natural)) * linear%twists)
+    end associate
+    call add_loss(loss, linear)
+  end subroutine take_relative_damping
 
   !> Adds the relative damping to the first-order matrix: that at the frequencies of the undamped modes, and between two of them
   !> that at the mean of their frequencies.

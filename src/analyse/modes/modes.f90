@@ -5,7 +5,7 @@ module nocdyn_modes
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: linearisation_t
-  use nocdyn_relative_damping, only: add_loss, find_losses
+  use nocdyn_relative_damping, only: take_relative_damping
   implicit none (type, external)
   private
 
@@ -48,18 +48,13 @@ contains
     type(mode_t), allocatable, intent(out) :: modes(:)
     type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
     complex(wp), allocatable :: twists(:, :)
-    real(wp), allocatable :: damping(:), loss(:)
+    real(wp), allocatable :: loss(:)
     type(eigenpairs_t) :: pairs
     type(linearisation_t) :: lossy
     integer :: i
 
-    call find_losses(formulation%machine, loss, damping)
-    loss = linear%stiffness * loss
     lossy = linear
-    associate (rates => lossy%matrix(:size(linear%natural), :size(linear%natural)))
-      rates = rates + matmul(transpose(linear%twists), spread(damping, 2, size(linear%natural)) * linear%twists)
-    end associate
-    call add_loss(loss, lossy)
+    call take_relative_damping(formulation%machine, lossy, loss)
     call find_eigenpairs(lossy, pairs, error, loss)
     if (allocated(error)) return
     call find_twists(linear, elastic, pairs%vector, twists)

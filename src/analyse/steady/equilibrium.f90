@@ -5,15 +5,16 @@ module nocdyn_equilibrium
   use nocdyn_balance_texts, only: describe_speeds, describe_state_speeds, explain_no_balance, list_moving_bodies
   use nocdyn_block_solutions, only: block_solutions_t
   use nocdyn_element_sets, only: element_names
+  use nocdyn_eigenpairs, only: eigenpairs_t, find_eigenpairs
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_floating_motions, only: hold_floating
   use nocdyn_formulation, only: formulation_t
   use nocdyn_joint_texts, only: describe_joints, describe_overload
   use nocdyn_kinds, only: wp
-  use nocdyn_lapack_eigen, only: eigenvectors
   use nocdyn_linearisation, only: linearisation_t, linearise
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: reduced_t
+  use nocdyn_relative_damping, only: take_relative_damping
   use nocdyn_resting_joints, only: list_resting_sets, new_resting_joints, resting_joints_t, slips_where_it_cannot
   use nocdyn_static_twists, only: find_twists, undetermined_elements
   use nocdyn_text, only: append, joined, string_t, to_text
@@ -398,21 +399,23 @@ contains
     real(wp), parameter :: rounding = 1.0e-10_wp   ! as a share of the largest eigenvalue
     type(linearisation_t) :: linear
     type(error_t), allocatable :: error
-    complex(wp), allocatable :: values(:), vectors(:, :)
-    logical :: has_failed
+    type(eigenpairs_t) :: pairs
+    complex(wp), allocatable :: values(:)
+    real(wp), allocatable :: loss(:)
 
     equilibrium%stability = 'not determined'
     if (formulation%states > most_states) return
     call linearise(formulation, t, equilibrium%y, linear, error)
     if (allocated(error)) return
-    allocate (values(size(linear%matrix, 1)), vectors(size(linear%matrix, 1), size(linear%matrix, 1)))
-    call eigenvectors(linear%matrix, values, vectors, has_failed)
-    if (has_failed) return
-    equilibrium%is_fixed = size(values) == 0
+    equilibrium%is_fixed = size(linear%matrix) == 0
     if (equilibrium%is_fixed) then
       equilibrium%stability = 'stable'
       return
     end if
+    call take_relative_damping(formulation%machine, linear, loss)
+    call find_eigenpairs(linear, pairs, error, loss)
+    if (allocated(error)) return
+    values = [pairs%value, conjg(pack(pairs%value, aimag(pairs%value) > 0))]
     equilibrium%growth = growth_rate(values, equilibrium%free_modes)
     if (equilibrium%growth < -rounding * maxval(abs(values))) then
       equilibrium%stability = 'stable'

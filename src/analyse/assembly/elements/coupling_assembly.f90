@@ -4,7 +4,7 @@ module nocdyn_coupling_assembly
   use nocdyn_couplings, only: coupling_common_t, new_couplings
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_element_rows, only: rows_between
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_gap_couplings, only: new_gap_couplings
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
@@ -27,21 +27,20 @@ contains
   subroutine check_coupling(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error   !! names file, line, group and key
+    type(error_t), allocatable, intent(inout) :: error   !! names file, line, group and key
     character(len=:), allocatable :: obstacle
 
     associate (group => input%groups(index))
       call check_relative_damping(input, index, error)
-      if (allocated(error)) return
       select case (elastic_form(group))
       case (gap)
         call find_gap_obstacle(coefficients_of(group), group%number('gap'), obstacle)
         if (obstacle == '') return
-        call raise(error, exit_input, input%location(index, 'gap') // ': gap = ' // &
+        call add_mistake(error, input%location(index, 'gap') // ': gap = ' // &
                    to_text(group%number('gap')) // obstacle)
       case (saturated)
         if (group%number('stiffness') > 0) return
-        call raise(error, exit_input, input%location(index, 'saturation') // ': saturation = ' // &
+        call add_mistake(error, input%location(index, 'saturation') // ': saturation = ' // &
                    to_text(group%number('saturation')) // ' needs stiffness > 0 [N m/rad]')
       case default
         return
@@ -75,11 +74,11 @@ contains
   subroutine check_relative_damping(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
 
     associate (group => input%groups(index))
       if (.not. group%has_value('damping_frequency') .or. group%number('stiffness', absent=0.0_wp) > 0) return
-      call raise(error, exit_input, input%location(index, 'damping_frequency') // ': damping_frequency needs stiffness > 0 ' // &
+      call add_mistake(error, input%location(index, 'damping_frequency') // ': damping_frequency needs stiffness > 0 ' // &
                  '[N m/rad], in proportion to which relative damping acts over the time')
     end associate
   end subroutine check_relative_damping

@@ -6,7 +6,7 @@ module nocdyn_crank_assembly
   use nocdyn_cylinder_torques, only: cycle_of
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_engine_checks, only: check_crank_angles, check_stroke
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_fourier, only: fourier_coefficients
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
@@ -30,26 +30,24 @@ contains
   subroutine check_crank(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: key, text
 
     associate (group => input%groups(index))
       if (group%number('crank_radius') + abs(group%number('offset')) >= group%number('rod_length')) then
-        call raise(error, exit_input, input%location(index, 'offset') // ': offset = ' // &
+        call add_mistake(error, input%location(index, 'offset') // ': offset = ' // &
                    to_text(group%number('offset')) // ' m: the rod of ' // to_text(group%number('rod_length')) // ' m ' // &
                    'does not reach the piston at all angles; allowed: crank_radius + |offset| below rod_length')
-        return
       end if
       if (group%number('rod_mass') > 0 .and. .not. group%has_value('rod_center')) then
-        call raise(error, exit_input, input%location(index, 'rod_mass') // ': rod_mass = ' // &
+        call add_mistake(error, input%location(index, 'rod_mass') // ': rod_mass = ' // &
                    to_text(group%number('rod_mass')) // ' kg, but rod_center is missing')
-        return
       end if
       if (.not. group%has_value('crank_angles')) return
       call check_stroke(group, key, text)
       if (text == '') call check_crank_angles(group, key, text)
       if (text == '') return
-      call raise(error, exit_input, input%location(index, key) // ': ' // text)
+      call add_mistake(error, input%location(index, key) // ': ' // text)
     end associate
   end subroutine check_crank
 

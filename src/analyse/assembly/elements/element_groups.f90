@@ -4,7 +4,7 @@ module nocdyn_element_groups
   use nocdyn_bank, only: bank_slot_t
   use nocdyn_curves, only: curve_t, extrapolation_constant, extrapolation_linear, interpolation_cubic, interpolation_linear, &
                            new_curve
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_schema_rules, only: ground
@@ -200,12 +200,12 @@ contains
     integer, intent(in) :: index             !! of the group
     character(len=*), intent(in) :: key      !! of the speeds [rad/s]; they may be unset
     character(len=*), intent(in) :: speeds   !! what they are, e.g. 'slips'
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
     real(wp), allocatable :: x(:)
 
     allocate (x, source=input%groups(index)%numbers(key))
     if (size(x) == 0) return
-    if (x(1) > 0) call raise(error, exit_input, input%location(index, key) // ': ' // &
+    if (x(1) > 0) call add_mistake(error, input%location(index, key) // ': ' // &
                              written_element(input%groups(index), key, 1) // '; allowed: 0 first, then the ' // speeds // &
                              ' in either direction')
   end subroutine check_from_standstill

@@ -2,7 +2,7 @@
 module nocdyn_induction_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
   use nocdyn_element_groups, only: element_groups_t
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_flux_motors, only: circuit_keys, new_flux_motors
   use nocdyn_induction_circuits, only: induction_circuit_t
   use nocdyn_input, only: group_t, input_t
@@ -161,18 +161,17 @@ contains
   subroutine check_flux_motor(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
 
     associate (group => input%groups(index))
       call check_poles(input, index, error)
-      if (allocated(error)) return
       if (.not. group%number('voltage') > 0) then
-        call raise(error, exit_input, input%location(index, 'voltage') // ': voltage = ' // to_text(group%number('voltage')) // &
+        call add_mistake(error, input%location(index, 'voltage') // ': voltage = ' // to_text(group%number('voltage')) // &
                    '; allowed: > 0 [V]')
-      else
-        if (group%has_value('supply_times')) call check_supply(input, index, error)
-        if (group%has_value('rated_power') .and. .not. allocated(error)) call check_rating(input, index, error)
+      else if (group%has_value('rated_power') .and. .not. allocated(error)) then   ! the circuit needs poles and voltage
+        call check_rating(input, index, error)
       end if
+      if (group%has_value('supply_times')) call check_supply(input, index, error)
     end associate
   end subroutine check_flux_motor
 
@@ -180,10 +179,10 @@ contains
   subroutine check_poles(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
 
     associate (poles => input%groups(index)%whole_number('poles'))
-      if (modulo(poles, 2) == 1) call raise(error, exit_input, input%location(index, 'poles') // ': poles = ' // &
+      if (modulo(poles, 2) == 1) call add_mistake(error, input%location(index, 'poles') // ': poles = ' // &
                                             to_text(poles) // '; allowed: an even number, twice the pole pairs')
     end associate
   end subroutine check_poles
@@ -192,7 +191,7 @@ contains
   subroutine check_rating(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
     type(induction_circuit_t) :: circuit
     integer :: status
     real(wp) :: limit
@@ -200,7 +199,7 @@ contains
     associate (group => input%groups(index), rating => rating_of(input%groups(index)))
       if (.not. (rating%slip() > 0 .and. rating%slip() < 0.5_wp)) then
         associate (synchronous => rating%frequency / rating%pole_pairs)
-          call raise(error, exit_input, input%location(index, 'rated_speed') // ': ' // written_key(group, 'rated_speed') // &
+          call add_mistake(error, input%location(index, 'rated_speed') // ': ' // written_key(group, 'rated_speed') // &
                      ' = ' // written_number(group, 'rated_speed', rating%speed) // '; allowed: below ' // &
                      written_number(group, 'rated_speed', synchronous) // ' and above ' // &
                      written_number(group, 'rated_speed', 0.5_wp * synchronous) // ' [' // written_unit(group, 'rated_speed') // &
@@ -211,19 +210,19 @@ contains
       call fit_circuit(rating, circuit, status, limit)
       select case (status)
       case (rating_too_efficient)
-        call raise(error, exit_input, input%location(index, 'efficiency') // ': efficiency = ' // to_text(rating%efficiency) // &
+        call add_mistake(error, input%location(index, 'efficiency') // ': efficiency = ' // to_text(rating%efficiency) // &
                    '; allowed: < ' // rounded_text(limit, 6) // ', as the slip takes ' // rounded_text(rating%slip(), 4) // &
                    ' of the power of the air gap')
       case (rating_too_strong)
-        call raise(error, exit_input, input%location(index, 'breakdown_ratio') // ': breakdown_ratio = ' // &
+        call add_mistake(error, input%location(index, 'breakdown_ratio') // ': breakdown_ratio = ' // &
                    to_text(rating%breakdown_ratio) // '; allowed: <= ' // &
                    to_text(floor(limit * resolution) / resolution) // ' with these losses, slip and power factor')
       case (rating_too_weak)
-        call raise(error, exit_input, input%location(index, 'breakdown_ratio') // ': breakdown_ratio = ' // &
+        call add_mistake(error, input%location(index, 'breakdown_ratio') // ': breakdown_ratio = ' // &
                    to_text(rating%breakdown_ratio) // '; allowed: >= ' // &
                    to_text(ceiling(limit * resolution) / resolution) // ' with these losses, slip and power factor')
       case (rating_impossible)
-        call raise(error, exit_input, input%location(index, 'power_factor') // ': power_factor = ' // &
+        call add_mistake(error, input%location(index, 'power_factor') // ': power_factor = ' // &
                    to_text(rating%power_factor) // ' leaves no reactive power to magnetise the motor; allowed: smaller values')
       case default
       end select
@@ -234,21 +233,20 @@ contains
   subroutine check_supply(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
     integer :: k
 
     associate (group => input%groups(index))
       associate (time => group%numbers('supply_times'), factor => group%numbers('supply_factors'), &
                  ramp => group%numbers('supply_ramps'))
         if (.not. factor(1) > 0) then
-          call raise(error, exit_input, input%location(index, 'supply_factors') // ': ' // &
+          call add_mistake(error, input%location(index, 'supply_factors') // ': ' // &
                      written_element(group, 'supply_factors', 1) // '; allowed: > 0, as the motor is disconnected before ' // &
                      written_element(group, 'supply_times', 1))
-          return
         end if
         do k = 1, size(time) - 1
           if (time(k) + ramp(k) <= time(k + 1)) cycle
-          call raise(error, exit_input, input%location(index, 'supply_ramps') // ': ' // &
+          call add_mistake(error, input%location(index, 'supply_ramps') // ': ' // &
                      written_element(group, 'supply_ramps', k) // ' from ' // written_element(group, 'supply_times', k) // &
                      ' ends after ' // written_element(group, 'supply_times', k + 1) // '; allowed: ramps that end before')
           return

@@ -3,7 +3,7 @@ module nocdyn_joint_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t, role_bearing, role_clutch, role_freewheel
   use nocdyn_curves, only: curve_t, new_steps
   use nocdyn_element_groups, only: check_from_standstill, element_groups_t, group_curve
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_friction_joints, only: joint_ranges_t, new_friction_joints
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
@@ -22,13 +22,13 @@ contains
   subroutine check_clutch(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
 
     call check_from_standstill(input, index, 'table_slip', 'slips', error)
     associate (group => input%groups(index))
-      if (allocated(error) .or. .not. group%has_value('static_capacity')) return
+      if (.not. group%has_value('static_capacity')) return
       if (group%number('static_capacity') < sliding_capacity(group)) then
-        call raise(error, exit_input, input%location(index, 'static_capacity') // ': static_capacity = ' // &
+        call add_mistake(error, input%location(index, 'static_capacity') // ': static_capacity = ' // &
                  to_text(group%number('static_capacity')) // ' is below capacity = ' // to_text(sliding_capacity(group)) // &
                  '; allowed: at least that of slip [N m]')
       end if

@@ -5,7 +5,7 @@ module nocdyn_mesh_assembly
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_element_rows, only: new_element_rows
   use nocdyn_gap_couplings, only: new_gap_couplings
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_mesh_phases, only: mesh_phases_t, new_mesh_phases
@@ -25,7 +25,7 @@ contains
   subroutine check_mesh(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
     character(len=*), parameter :: keys(*) = [character(len=12) :: 'error_orders', 'error_phases']
     integer :: k
 
@@ -33,13 +33,12 @@ contains
       if (errors == 0) return
       do k = 1, size(keys)
         if (any(size(mesh%numbers(keys(k))) == [0, errors])) cycle
-        call raise(error, exit_input, input%location(index, keys(k)) // ': ' // keys(k) // ' has ' // &
+        call add_mistake(error, input%location(index, keys(k)) // ': ' // keys(k) // ' has ' // &
                    to_text(size(mesh%numbers(keys(k)))) // ' and transmission_error ' // to_text(errors) // &
                    ' values; needed: as many of each')
-        return
       end do
       if (mesh%has_value('teeth') .or. mesh%has_value('error_orders')) return
-      call raise(error, exit_input, input%location(index, 'transmission_error') // ': error_orders is missing; needed ' // &
+      call add_mistake(error, input%location(index, 'transmission_error') // ': error_orders is missing; needed ' // &
                  'where radii stand for the teeth, whose number is the order')
     end associate
   end subroutine check_mesh

@@ -6,7 +6,7 @@ module nocdyn_motion_assembly
     interpolation_linear, interpolation_spline, new_curve
   use nocdyn_drives, only: drive_motion_t, new_drives
   use nocdyn_element_groups, only: element_groups_t
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_phases, only: new_phases
@@ -29,28 +29,28 @@ contains
   subroutine check_relation(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error   !! names file, line, group and key
+    type(error_t), allocatable, intent(inout) :: error   !! names file, line, group and key
     character(len=:), allocatable :: text
 
     call find_table_mistake(input%groups(index), text)
-    if (text /= '') call raise(error, exit_input, input%location(index, 'table_driven') // ': ' // text)
+    if (text /= '') call add_mistake(error, input%location(index, 'table_driven') // ': ' // text)
   end subroutine check_relation
 
   !> Refuses drives whose motion jumps.
   subroutine check_drive(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error   !! names file, line, group and key
+    type(error_t), allocatable, intent(inout) :: error   !! names file, line, group and key
     character(len=:), allocatable :: text
 
     associate (group => input%groups(index))
       if (is_polygon_of_angles(group)) then
-        call raise(error, exit_input, input%location(index, 'interpolation') // ": interpolation = 'linear' with kind = " // &
+        call add_mistake(error, input%location(index, 'interpolation') // ": interpolation = 'linear' with kind = " // &
                    "'angle': the speed would jump at the points, which needs an infinite torque; allowed: spline, dwells, cubic")
         return
       end if
       call find_jump(group, text)
-      if (text /= '') call raise(error, exit_input, input%location(index, 'table_time') // ': table_time' // text)
+      if (text /= '') call add_mistake(error, input%location(index, 'table_time') // ': table_time' // text)
     end associate
   end subroutine check_drive
 

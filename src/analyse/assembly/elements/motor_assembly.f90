@@ -3,7 +3,7 @@ module nocdyn_motor_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
   use nocdyn_dc_motors, only: new_dc_motors
   use nocdyn_element_groups, only: element_groups_t
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_governed_banks, only: governor_t
   use nocdyn_induction_assembly, only: add_flux_motors, check_flux_motor, check_poles
   use nocdyn_input, only: group_t, input_t
@@ -29,7 +29,7 @@ contains
   subroutine check_motor(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
 
     select case (input%groups(index)%text('kind'))
     case ('induction')
@@ -48,11 +48,11 @@ contains
   subroutine check_induction(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
 
     associate (torque => input%groups(index)%number('breakdown_torque'), speed => input%groups(index)%number('synchronous_speed'))
       if ((torque > 0 .and. speed > 0) .or. (torque < 0 .and. speed < 0)) return
-      call raise(error, exit_input, input%location(index, 'breakdown_torque') // ': breakdown_torque = ' // to_text(torque) // &
+      call add_mistake(error, input%location(index, 'breakdown_torque') // ': breakdown_torque = ' // to_text(torque) // &
                  ' must have the sign of synchronous_speed = ' // to_text(speed))
     end associate
   end subroutine check_induction
@@ -61,18 +61,17 @@ contains
   subroutine check_inverter(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
 
     associate (group => input%groups(index))
       if (.not. (group%has_value('governor_speed') .or. group%has_value('set_times'))) then
-        call raise(error, exit_input, input%location(index, 'kind') // ": kind = 'inverter' needs a set speed; " // &
+        call add_mistake(error, input%location(index, 'kind') // ": kind = 'inverter' needs a set speed; " // &
                    'required: governor_speed [rad/s], or set_times and set_speeds')
       else if (.not. group%number('governor_gain') > 0) then
-        call raise(error, exit_input, input%location(index, 'governor_gain') // ': governor_gain = ' // &
+        call add_mistake(error, input%location(index, 'governor_gain') // ': governor_gain = ' // &
                    to_text(group%number('governor_gain')) // "; allowed with kind = 'inverter': > 0 [s/rad]")
-      else if (group%has_value('poles')) then
-        call check_poles(input, index, error)
       end if
+      if (group%has_value('poles')) call check_poles(input, index, error)
     end associate
   end subroutine check_inverter
 
@@ -80,16 +79,15 @@ contains
   subroutine check_synchronous(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
     logical :: by_axes, by_parts
 
     call check_poles(input, index, error)
-    if (allocated(error)) return
     associate (group => input%groups(index))
       by_axes = group%has_value('d_torques') .and. group%has_value('q_torques')
       by_parts = group%has_value('mean_torques') .and. group%has_value('pulsations')
       if (by_axes .neqv. by_parts) return
-      call raise(error, exit_input, input%location(index, 'slips') // ': allowed over the slips: d_torques and q_torques, ' // &
+      call add_mistake(error, input%location(index, 'slips') // ': allowed over the slips: d_torques and q_torques, ' // &
                  'or mean_torques and pulsations')
     end associate
   end subroutine check_synchronous

@@ -1,6 +1,6 @@
 !> The uniform segments of a shaft, and the spectral elements that they are divided into.
 module nocdyn_shaft_segments
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_spectral_elements, only: highest_order, least_order, new_spectral_element, spectral_element_t
@@ -33,25 +33,25 @@ contains
   subroutine check_shaft(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
 
     call check_material(input, index, 'shear_modulus', error)
-    if (.not. allocated(error)) call check_material(input, index, 'density', error)
-    if (.not. allocated(error)) call check_sizes(input, index, error)
+    call check_material(input, index, 'density', error)
+    call check_sizes(input, index, error)
   end subroutine check_shaft
 
   subroutine check_material(input, index, key, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index
     character(len=*), intent(in) :: key
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
 
     associate (values => input%groups(index)%numbers(key), segments => size(input%groups(index)%numbers('lengths')))
       if (size(values) > 0 .and. all(size(values) /= [1, segments])) then
-        call raise(error, exit_input, input%location(index, key) // ': ' // key // ' has ' // to_text(size(values)) // &
+        call add_mistake(error, input%location(index, key) // ': ' // key // ' has ' // to_text(size(values)) // &
                    ' values, lengths has ' // to_text(segments) // '; allowed: one for the whole shaft, or one for each segment')
       else if (any(values > 0) .and. .not. all(values > 0)) then
-        call raise(error, exit_input, input%location(index, key) // ': ' // key // '(' // &
+        call add_mistake(error, input%location(index, key) // ': ' // key // '(' // &
                    to_text(findloc(values > 0, .false., dim=1)) // ') = 0, others are not; allowed: all are 0, or none')
       end if
     end associate
@@ -60,21 +60,21 @@ contains
   subroutine check_sizes(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(inout) :: error
     integer :: k
 
     associate (group => input%groups(index))
       associate (bores => group%numbers('bores'), diameters => group%numbers('diameters'))
         do k = 1, size(bores)
           if (bores(k) < diameters(k)) cycle
-          call raise(error, exit_input, input%location(index, 'bores') // ': bores(' // to_text(k) // ') = ' // &
+          call add_mistake(error, input%location(index, 'bores') // ': bores(' // to_text(k) // ') = ' // &
                      to_text(bores(k)) // ' m is not less than diameters(' // to_text(k) // ') = ' // to_text(diameters(k)) // &
                      ' m; allowed: 0 to below the diameter')
           return
         end do
         if (.not. group%has_value('nodes') .or. .not. has_inertia(group)) return
         if (group%whole_number('nodes') >= size(bores) - 1) return
-        call raise(error, exit_input, input%location(index, 'nodes') // ': nodes = ' // &
+        call add_mistake(error, input%location(index, 'nodes') // ': nodes = ' // &
                    to_text(group%whole_number('nodes')) // ' is out of range; allowed: from ' // to_text(size(bores) - 1) // &
                    ', one between two segments, to ' // to_text(most_nodes))
       end associate
