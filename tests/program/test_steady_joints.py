@@ -5,6 +5,7 @@ import json
 import random
 
 import pytest
+from conftest import IS_SLOW
 
 BODIES = "".join(
     f"&body name = '{name}' inertia = {inertia} /\n"
@@ -210,7 +211,8 @@ def random_train(seed):
     return text + "&run t_end = 120 rtol = 1e-9 atol = 1e-10 /\n&output interval = 10 /\n"
 
 
-@pytest.mark.parametrize("seed", range(12))
+# In a slow build the search of train 6, 15 s of a fast one, would take minutes.
+@pytest.mark.parametrize("seed", range(4) if IS_SLOW else range(12))
 def test_random_trains_run_into_their_steady_states(nocdyn, seed):
     text = random_train(seed)
     found = steady_states(nocdyn, text)["steady_states"]
