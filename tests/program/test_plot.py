@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 
 import h5netcdf
 import numpy as np
@@ -326,12 +325,12 @@ def test_a_curve_keeps_its_ends_and_every_pixel_that_it_crosses():
     assert len(thin_curve(np.zeros(10), np.zeros(10), 100)[0]) == 2
 
 
-def test_a_picture_of_a_hundred_thousand_rows_takes_less_than_three_seconds(tmp_path):
+def test_a_picture_of_a_hundred_thousand_rows_draws_few_of_them():
     t = np.linspace(0.0, 100.0, 100_000)
     columns = [Series(f"s{i}", "N m", np.sin((100.0 + i) * t)) for i in range(multiples.MOST_PANELS)]
-    begin = time.process_time()
-    style.save(multiples.draw_multiples(t, columns, "moment"), tmp_path, "moment", ["png"])
-    assert time.process_time() - begin < 3.0
+    figure = multiples.draw_multiples(t, columns, "moment")
+    lengths = [len(line.get_xdata()) for axes in figure.axes for line in axes.lines]
+    assert len(lengths) >= len(columns) and max(lengths) < 10_000
 
 
 def test_powers_of_ten_stand_above_the_axis(tmp_path):
