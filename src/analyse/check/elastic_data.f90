@@ -2,15 +2,17 @@
 module nocdyn_elastic_data
   use nocdyn_bank, only: bank_of
   use nocdyn_element_sets, only: element_names, whole_names, wholes
+  use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
-  use nocdyn_linearisation, only: tangent_stiffness
+  use nocdyn_linearisation, only: find_slopes
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: new_reduced
   use nocdyn_shaft_segments, only: segment_inertia, segment_stiffness
   use nocdyn_shafts, only: shafts_t
+  use nocdyn_slopes, only: slopes_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -25,6 +27,8 @@ contains
     type(machine_t), intent(in) :: machine
     class(formulation_t), allocatable :: formulation
     type(string_t), allocatable :: elements(:), names(:)
+    type(error_t), allocatable :: ignored   ! numbers that are not finite are written as null
+    type(slopes_t) :: slopes
     real(wp), allocatable :: damping(:), stiffness(:), y(:, :)
     integer, allocatable :: elastic(:), whole(:)
     integer :: i
@@ -32,9 +36,9 @@ contains
     allocate (elastic, source=machine%elastic())
     allocate (formulation, source=new_reduced(machine, .false.))
     y = formulation%start()
-    call tangent_stiffness(formulation, 0.0_wp, y, stiffness, damping)
-    stiffness = stiffness(elastic)
-    damping = damping(elastic)
+    call find_slopes(formulation, 0.0_wp, y, slopes, ignored)
+    stiffness = slopes%stiffness(elastic)
+    damping = slopes%damping(elastic) + slopes%stand_in(elastic)
     allocate (elements, source=element_names(machine, elastic))
     allocate (names, source=whole_names(elements))
     whole = wholes(elements)

@@ -10,7 +10,7 @@ module nocdyn_critical_speeds
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: sort_ascending
   use nocdyn_response_points, only: response_point_t
-  use nocdyn_speed_modes, only: speed_modes_t
+  use nocdyn_mode_branches, only: speed_modes_t
   implicit none (type, external)
   private
 

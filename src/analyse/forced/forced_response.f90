@@ -9,9 +9,7 @@ module nocdyn_forced_response
   use nocdyn_excitation_lines, only: line_t, list_sources, new_lines, source_t
   use nocdyn_held_speeds, only: held_speeds_t, held_state_t, new_held_speeds
   use nocdyn_kinds, only: wp
-  use nocdyn_lapack_complex, only: complex_solve
   use nocdyn_machine, only: machine_t
-  use nocdyn_relative_damping, only: find_losses
   use nocdyn_response_points, only: keep_points, merge_points, response_point_t
   use nocdyn_moment_forms, only: list_moment_forms, moment_form_t
   use nocdyn_signals, only: list_signals, signal_angle, signal_t
@@ -37,10 +35,8 @@ module nocdyn_forced_response
     type(response_point_t), allocatable :: points(:)   !! ascending by the size of the speed
     real(wp), allocatable :: left_out(:)               !! speeds of the grid at which there is no steady state [rad/s]
     character(len=:), allocatable :: left_out_message  !! why, at the first one
-    real(wp), allocatable :: loss_factor(:)            !! [elements]
-    real(wp), allocatable :: loss_damping(:)           !! damping that stands for it over the time [N m s/rad], [elements]
   contains
-    procedure :: add_points, complex_stiffness, speeds, frequencies, values_at_a_speed
+    procedure :: add_points, speeds, frequencies, values_at_a_speed
   end type forced_response_t
 
   !> Work space of one thread.
@@ -70,7 +66,6 @@ contains
     self%machine = machine
     call new_held_speeds(machine, reference, self%held, error)
     if (allocated(error)) return
-    call find_losses(machine, self%loss_factor, self%loss_damping)
     if (size(speeds) > 1) then
       call hold_first(self%held, speeds(size(speeds):1:-1), high, error)
     else
@@ -83,8 +78,8 @@ contains
     call new_lines(of_low, of_high, self%lines)
     lowest = minval([unexcited, of_low%frequency], mask=[.true., of_low%frequency > 0])
     call new_dynamic_stiffness(machine, self%held%balance%incidence, lowest, &
-                               max(abs(low%stiffness) + lowest * abs(low%damping), &
-                                   abs(high%stiffness) + lowest * abs(high%damping)), self%matrix, error)
+                               max(abs(low%slopes%stiffness) + lowest * abs(low%slopes%damping), &
+                                   abs(high%slopes%stiffness) + lowest * abs(high%slopes%damping)), self%matrix, error)
     if (allocated(error)) return
     call list_moment_forms(machine, reference, self%quantities)
     call list_signals(machine, signals)
@@ -209,8 +204,8 @@ contains
     type(work_t), intent(out) :: work
 
     work%band = new_band_work(self%matrix)
-    allocate (work%stiffness(size(self%loss_factor)), work%moment(size(self%loss_factor), size(self%lines)), &
-              work%series(size(self%loss_factor)))
+    allocate (work%stiffness(self%machine%elements%count), work%moment(self%machine%elements%count, size(self%lines)), &
+              work%series(self%machine%elements%count))
   end subroutine prepare_work
 
   !> Solves for every line at one speed.
@@ -228,7 +223,7 @@ contains
       end do
       if (.not. self%has_oscillations) return
       allocate (point%quantity(lines, quantities), point%angle(lines, self%machine%bodies))
-      allocate (point%heat(size(self%loss_factor)), source=0.0_wp)
+      allocate (point%heat(self%machine%elements%count), source=0.0_wp)
       allocate (point%mean(quantities), point%lowest(quantities), point%highest(quantities))
       do l = 1, lines
         call solve_line(self, l, point, work)
@@ -286,9 +281,7 @@ contains
     logical :: singular
 
     associate (frequency => point%frequency(l), sources => point%sources, line => self%lines(l))
-      do e = 1, size(work%stiffness)
-        work%stiffness(e) = self%complex_stiffness(point%state, e, frequency)
-      end do
+      call point%state%slopes%find_stiffness(self%machine%elements%internal, cmplx(0.0_wp, frequency, wp), work%stiffness)
       call self%matrix%factor(frequency, work%stiffness, work%band, singular)
       if (singular) call self%matrix%factor(frequency * (1.0_wp + beside), work%stiffness, work%band, singular)
       work%band%x(:) = (0.0_wp, 0.0_wp)
@@ -344,47 +337,6 @@ contains
       end do
     end associate
   end subroutine set_angles
-
-  !> The complex stiffness of an element at a frequency: k (1 + i eta) + i Omega c, and the delay of its internal states [N
-  !> m/rad].
-  pure complex(wp) function complex_stiffness(self, state, element, frequency)
-    class(forced_response_t), intent(in) :: self
-    type(held_state_t), intent(in) :: state
-    integer, intent(in) :: element
-    real(wp), intent(in) :: frequency   !! Omega [rad/s]
-
-    complex_stiffness = cmplx(state%stiffness(element), &
-                              state%stiffness(element) * self%loss_factor(element) &
-                              + frequency * (state%damping(element) - self%loss_damping(element)), wp)
-    if (size(state%by_internal) > 0) then
-      complex_stiffness = complex_stiffness - internal_moment(self, state, element, frequency)
-    end if
-  end function complex_stiffness
-
-  !> The moment of the internal states z of an element that twists by exp(i Omega t): i Omega z = A z + b i Omega.
-  pure complex(wp) function internal_moment(self, state, element, frequency) result(moment)
-    class(forced_response_t), intent(in) :: self
-    type(held_state_t), intent(in) :: state
-    integer, intent(in) :: element
-    real(wp), intent(in) :: frequency   !! Omega [rad/s]
-    complex(wp), allocatable :: matrix(:, :), z(:)
-    integer :: first, i, n
-
-    moment = (0.0_wp, 0.0_wp)
-    associate (internal => self%machine%elements%internal)
-      first = findloc(internal%element, element, dim=1)
-      if (first == 0) return
-      n = internal%members(first)
-      allocate (matrix(n, n), z(n))
-      do i = 1, n
-        matrix(i, :) = -state%rate_internal(:n, first + i - 1)
-        matrix(i, i) = matrix(i, i) + cmplx(0.0_wp, frequency, wp)
-        z(i) = cmplx(0.0_wp, frequency * state%rate_speed(first + i - 1), wp)
-      end do
-      call complex_solve(matrix, z)
-      moment = sum(state%by_internal(first:first + n - 1) * z)
-    end associate
-  end function internal_moment
 
   !> Speeds of the reference body at all points [rad/s].
   pure function speeds(self)

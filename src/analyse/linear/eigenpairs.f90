@@ -4,8 +4,7 @@ module nocdyn_eigenpairs
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_eigen, only: eigenvectors
-  use nocdyn_linearisation, only: linearisation_t
-  use nocdyn_relative_damping, only: settle
+  use nocdyn_linearisation, only: linearisation_t, undamped_loss
   implicit none (type, external)
   private
 
@@ -21,12 +20,11 @@ module nocdyn_eigenpairs
 
 contains
 
-  !> Finds all, with the relative damping at the frequency of each oscillation if it is given.
-  subroutine find_eigenpairs(linear, self, error, loss)
+  !> Finds all, with the relative damping at the frequency of each oscillation.
+  subroutine find_eigenpairs(linear, self, error)
     type(linearisation_t), intent(in) :: linear   !! with its matrix
     type(eigenpairs_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
-    real(wp), intent(in), optional :: loss(:)   !! that the matrix has by `add_loss`
     complex(wp), allocatable :: left(:, :), values(:), vectors(:, :)
     integer, allocatable :: kept(:)
     real(wp), parameter :: small = 1.0e-6_wp   ! of a value, or of the lowest natural frequency: more is no rounding
@@ -35,8 +33,7 @@ contains
 
     states = size(linear%matrix, 1)
     allocate (values(states), vectors(states, states))
-    has_loss = .false.
-    if (present(loss)) has_loss = any(abs(loss) > 0)
+    has_loss = any(abs(linear%loss) > 0)
     if (has_internal(linear) .or. has_loss) then
       allocate (left(states, states))
       call eigenvectors(linear%matrix, values, vectors, has_failed, left)
@@ -52,7 +49,7 @@ contains
     kept = pack([(i, i=1, states)], aimag(values) >= 0.0_wp)
     self%value = values(kept)
     self%vector = vectors(:, kept)
-    if (has_loss) call settle(linear, loss, values, vectors, left, kept, self%value, self%vector)
+    if (has_loss) call settle(linear, values, vectors, left, kept, self%value, self%vector)
     self%speeds = matmul(cmplx(linear%shapes, kind=wp), self%vector(:size(linear%natural), :))
     allocate (self%internal(size(kept)), source=0)
     if (.not. has_internal(linear)) return
@@ -78,6 +75,61 @@ contains
       if (sum(shares(mechanical + 1:)) > sum(shares(:mechanical))) internal = maxloc(shares(mechanical + 1:), dim=1)
     end associate
   end function internal_of
+
+  !> Moves oscillations of the first-order matrix to where the relative damping is that at their own frequencies. With the right
+  !> and left eigenvectors v and u and the change D of the matrix, one is x = v_i + sum of v_j u_j^H D x / (value - value_j), with
+  !> the value value_i + u_i^H D x (the perturbation of Brillouin and Wigner). What does not settle stays as it is.
+  subroutine settle(linear, values, vectors, left, chosen, value, vector)
+    type(linearisation_t), intent(in) :: linear
+    complex(wp), intent(in) :: values(:)                   !! eigenvalues [1/s], [states]
+    complex(wp), intent(in) :: vectors(:, :), left(:, :)   !! [states, states]
+    integer, intent(in) :: chosen(:)                       !! eigenvalues of which `value` and `vector` are
+    complex(wp), intent(inout) :: value(:), vector(:, :)   !! [chosen], [states, chosen]
+    integer, parameter :: most_rounds = 100
+    real(wp), parameter :: accuracy = 1.0e-13_wp, settled = 1.0e-8_wp, same = 1.0e-9_wp   ! relative
+    complex(wp) :: next, part(size(values), size(chosen)), share(size(values), size(chosen))
+    complex(wp) :: lefts(size(linear%natural), size(values)), motion(size(linear%natural), size(chosen))
+    real(wp), allocatable :: at_one(:, :), start(:, :)   ! the loss of the modes at the frequency 1 and at theirs
+    real(wp) :: change(size(chosen)), frequency(size(chosen)), pace
+    integer :: i, j, n, round
+
+    n = size(linear%natural)
+    allocate (start, source=undamped_loss(linear))
+    allocate (at_one, source=matmul(transpose(linear%twists), spread(linear%loss, 2, n) * linear%twists))
+    do j = 1, size(values)
+      lefts(:, j) = left(:n, j) / sum(left(:, j) * conjg(vectors(:, j)))
+    end do
+    share = 0.0_wp
+    do i = 1, size(chosen)
+      share(chosen(i), i) = 1.0_wp
+    end do
+    change = merge(1.0_wp, 0.0_wp, aimag(value) > 0)
+    do round = 1, most_rounds
+      motion = matmul(vectors(:n, :), share)
+      frequency = merge(aimag(value), 1.0_wp, aimag(value) > 0)
+      part = matmul(conjg(transpose(lefts)), matmul(start, motion) - matmul(at_one, motion) / spread(frequency, 1, n))
+      pace = merge(1.0_wp, 0.5_wp, round <= most_rounds / 5)   ! what swings to and fro settles at the lower one
+      do i = 1, size(chosen)
+        if (change(i) <= accuracy) cycle
+        next = values(chosen(i)) + part(chosen(i), i)
+        change(i) = abs(next - value(i)) / abs(value(i))
+        value(i) = next
+        do j = 1, size(values)
+          if (j == chosen(i)) cycle
+          share(j, i) = (1.0_wp - pace) * share(j, i)
+          if (abs(values(j) - next) > same * abs(next)) share(j, i) = share(j, i) + pace * part(j, i) / (next - values(j))
+        end do
+      end do
+      if (all(change <= accuracy)) exit
+    end do
+    do i = 1, size(chosen)
+      if (.not. (change(i) <= settled .and. (aimag(value(i)) > 0 .or. .not. aimag(values(chosen(i))) > 0))) then
+        value(i) = values(chosen(i))
+        cycle
+      end if
+      vector(:, i) = matmul(vectors, share(:, i))
+    end do
+  end subroutine settle
 
   !> Sets real and imaginary parts to zero that are rounding of the largest number.
   pure subroutine clear_rounding(values, most)

@@ -14,31 +14,21 @@ module nocdyn_linearisation
   use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates
   use nocdyn_elements, only: elements_t, internal_states_t
   use nocdyn_errors, only: error_t, exit_failed, raise
-  use nocdyn_finite, only: is_finite
   use nocdyn_formulation, only: formulation_t
   use nocdyn_friction_joints, only: locked
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pivoted_rank
   use nocdyn_lapack_eigen, only: cholesky_factor, singular_vectors, solve_triangular, symmetric_eigenvectors
   use nocdyn_machine, only: machine_t
+  use nocdyn_slopes, only: new_slopes, slopes_t
   use nocdyn_system, only: pattern_t
-  use nocdyn_text, only: quoted
   implicit none (type, external)
   private
 
-  public :: fill_matrix, linearise, mass_matrix, tangent_stiffness, undamped_modes
+  public :: fill_matrix, find_slopes, linearise, mass_matrix, undamped_loss, undamped_modes
 
   !> With negative stiffnesses, a mode is rigid if the square of its natural frequency is below this share of the highest one.
   real(wp), parameter :: rigid_share_of_squares = 1.0e-13_wp
-
-  !> How the moments of the elements and the rates of their internal states change beside the stiffness.
-  type, public :: slopes_t
-    real(wp), allocatable :: damping(:)            !! minus the derivatives by the rates of twist [N m s/rad], [elements]
-    real(wp), allocatable :: mean_damping(:)       !! the same of torques that follow the mean speed: of rigid motions only
-    real(wp), allocatable :: by_internal(:)        !! derivatives of the moments by internal states, [internal states]
-    real(wp), allocatable :: rate_speed(:)         !! derivatives of their rates by the speed of the element, the same
-    real(wp), allocatable :: rate_internal(:, :)   !! derivatives of the rates by the states of the element, [members, the same]
-  end type slopes_t
 
   !> The modes and the first-order matrix at one state.
   type, public :: linearisation_t
@@ -48,8 +38,10 @@ module nocdyn_linearisation
     real(wp), allocatable :: natural(:)     !! natural frequencies, negative for diverging modes [rad/s], [modes]
     integer, allocatable :: flexible(:)     !! modes that are not rigid
     real(wp), allocatable :: stiffness(:)   !! k of all elements [N m/rad], [elements]
+    real(wp), allocatable :: loss(:)        !! the imaginary part of k [N m/rad], [elements]
     integer, allocatable :: held(:)         !! elements of joints that hold
-    real(wp), allocatable :: matrix(:, :)   !! matrix of the first-order system, [modes + flexible + internal states] squared
+    real(wp), allocatable :: matrix(:, :)   !! matrix of the first-order system, [modes + flexible + internal states] squared,
+                                            !! with the relative damping of undamped modes
   end type linearisation_t
 
 contains
@@ -64,24 +56,22 @@ contains
     type(element_coordinates_t) :: incidence
     type(pattern_t) :: pattern
     type(slopes_t) :: slopes
-    real(wp), allocatable :: jacobian(:, :), stiffness(:)
+    real(wp), allocatable :: jacobian(:, :)
     integer, allocatable :: held(:)
     integer :: e
 
     call differentiate(formulation, t, y, pattern, jacobian)
     incidence = new_element_coordinates(formulation%machine%elements, formulation%machine%coordinates)
-    stiffness = differentiated_stiffness(formulation%machine)
-    call refuse_not_finite(formulation%machine, stiffness, error)
+    call new_slopes(formulation%machine, slopes, error)
     if (allocated(error)) return
     allocate (held, source=held_elements(formulation))
-    call undamped_modes(formulation%machine, incidence, stiffness, self, error, held)
+    call undamped_modes(formulation%machine, incidence, slopes%stiffness, self, error, held)
     if (allocated(error)) return
     call move_alloc(held, self%held)
-    call copy_slopes(formulation%machine, slopes)
     call fill_matrix(formulation%machine%elements%internal, slopes, self)
     associate (teeth => formulation%joints%teeth)
       if (teeth%count > 0 .and. .not. any([(carries_nothing(formulation, teeth%joint(e)), e=1, teeth%count)])) then
-        call follow_losses(formulation, pattern, jacobian(1, :), self)
+        call follow_losses(formulation, slopes, pattern, jacobian(1, :), self)
       end if
     end associate
   end subroutine linearise
@@ -113,20 +103,19 @@ contains
     end associate
   end function carries_nothing
 
-  !> Tangent stiffness and damping of all elements at a state of a formulation of one lane without work integrals.
-  subroutine tangent_stiffness(formulation, t, y, stiffness, damping)
+  !> The slopes of all elements at a state of a formulation of one lane without work integrals.
+  subroutine find_slopes(formulation, t, y, slopes, error)
     class(formulation_t), intent(inout) :: formulation
     real(wp), intent(in) :: t                          !! [s]
     real(wp), contiguous, intent(in) :: y(:, :)        !! [1, states]
-    real(wp), allocatable, intent(out) :: stiffness(:) !! [N m/rad], [elements]
-    real(wp), allocatable, intent(out) :: damping(:)   !! [N m s/rad], [elements]
+    type(slopes_t), intent(out) :: slopes
+    type(error_t), allocatable, intent(out) :: error   !! if a number is not finite
     type(pattern_t) :: pattern
     real(wp), allocatable :: jacobian(:, :)
 
     call differentiate(formulation, t, y, pattern, jacobian)
-    stiffness = differentiated_stiffness(formulation%machine)
-    damping = -formulation%machine%elements%applied_speed(1, :)
-  end subroutine tangent_stiffness
+    call new_slopes(formulation%machine, slopes, error)
+  end subroutine find_slopes
 
   !> Differentiates the laws of all elements, and the equations of motion.
   subroutine differentiate(formulation, t, y, pattern, jacobian)
@@ -144,28 +133,6 @@ contains
     call formulation%start_lane(1, t, reshape(y, [size(y)]))
     call formulation%jacobian([t], y, jacobian, dfdt, status)
   end subroutine differentiate
-
-  !> Of all elements [N m/rad].
-  pure function differentiated_stiffness(machine) result(stiffness)
-    type(machine_t), intent(in) :: machine   !! differentiated
-    real(wp), allocatable :: stiffness(:)
-
-    stiffness = -(machine%elements%restoring_angle(1, :) + machine%elements%applied_angle(1, :))
-  end function differentiated_stiffness
-
-  subroutine refuse_not_finite(machine, stiffness, error)
-    type(machine_t), intent(in) :: machine   !! differentiated
-    real(wp), intent(in) :: stiffness(:)     !! of all elements [N m/rad]
-    type(error_t), allocatable, intent(out) :: error
-    integer :: e
-
-    do e = 1, size(stiffness)
-      if (is_finite(stiffness(e)) .and. is_finite(machine%elements%applied_speed(1, e))) cycle
-      call raise(error, exit_failed, 'the stiffness or damping of ' // quoted(machine%element_name(e)) // &
-                 ' in this state is not a finite number')
-      return
-    end do
-  end subroutine refuse_not_finite
 
   !> The undamped modes of a machine: all of `self` but `matrix`.
   subroutine undamped_modes(machine, incidence, stiffness, self, error, held)
@@ -317,23 +284,10 @@ contains
     end associate
   end function mass_matrix
 
-  !> The slopes of all elements of a machine, in its first lane.
-  subroutine copy_slopes(machine, slopes)
-    type(machine_t), intent(in) :: machine   !! differentiated
-    type(slopes_t), intent(out) :: slopes
-
-    associate (elements => machine%elements, follows => machine%follows_mean_speed())
-      slopes%damping = merge(0.0_wp, -elements%applied_speed(1, :), follows)
-      slopes%mean_damping = merge(-elements%applied_speed(1, :), 0.0_wp, follows)
-      slopes%by_internal = elements%internal%applied(1, :)
-      slopes%rate_speed = elements%internal%rate_speed(1, :)
-      slopes%rate_internal = elements%internal%rate_internal(1, :, :)
-    end associate
-  end subroutine copy_slopes
-
   !> Fills the matrix for p' = -C p - sign(natural) |natural| e + the moments of the internal states, e' = |natural| p, and the
   !> rates of the internal states, which depend on the speeds and not on the angles of their elements. C is not symmetric where a
-  !> torque follows the mean speed of a cycle: the rigid motions change it, and it acts on all modes.
+  !> torque follows the mean speed of a cycle: the rigid motions change it, and it acts on all modes. C has the relative damping at
+  !> the frequencies of the undamped modes, and between two of them at the mean of their frequencies.
   subroutine fill_matrix(internal, slopes, self)
     type(internal_states_t), intent(in) :: internal   !! of the machine
     type(slopes_t), intent(in) :: slopes
@@ -354,6 +308,8 @@ contains
       rates(:, i) = rates(:, i) * self%twists(damped, i)
     end do
     self%matrix(:n, :n) = matmul(transpose(self%twists(damped, :)), rates)
+    self%loss = slopes%loss
+    if (any(abs(self%loss) > 0)) self%matrix(:n, :n) = self%matrix(:n, :n) - undamped_loss(self)
     do i = 1, size(self%flexible)
       associate (natural => self%natural(self%flexible(i)))
         self%matrix(self%flexible(i), n + i) = -natural
@@ -369,11 +325,26 @@ contains
     end do
   end subroutine fill_matrix
 
+  !> The relative damping of the undamped modes, [modes, modes].
+  function undamped_loss(self) result(matrix)
+    type(linearisation_t), intent(in) :: self
+    real(wp) :: matrix(size(self%natural), size(self%natural))
+    real(wp) :: scaled(size(self%loss), size(self%natural))
+    integer :: m
+
+    do m = 1, size(self%natural)
+      scaled(:, m) = 0.0_wp
+      if (abs(self%natural(m)) > 0) scaled(:, m) = self%twists(:, m) / sqrt(abs(self%natural(m)))
+    end do
+    matrix = matmul(transpose(scaled), spread(self%loss, 2, size(self%natural)) * scaled)
+  end function undamped_loss
+
   !> Replaces the accelerations by the speeds and twists by those with the losses of teeth.
-  subroutine follow_losses(formulation, pattern, slopes, self)
+  subroutine follow_losses(formulation, slopes, pattern, jacobian, self)
     class(formulation_t), intent(in) :: formulation
+    type(slopes_t), intent(in) :: slopes
     type(pattern_t), intent(in) :: pattern   !! positions of the Jacobian
-    real(wp), intent(in) :: slopes(:)        !! values at these positions
+    real(wp), intent(in) :: jacobian(:)      !! values at these positions
     type(linearisation_t), intent(inout) :: self
     real(wp), allocatable :: by_speed(:, :), by_angle(:, :), left(:, :)
     integer :: f, i, n, p
@@ -381,15 +352,16 @@ contains
     f = formulation%machine%coordinates%freedoms
     n = size(self%natural)
     allocate (by_speed(f, f), by_angle(f, f), source=0.0_wp)
-    do p = 1, size(slopes)
+    do p = 1, size(jacobian)
       associate (row => pattern%row(p), column => pattern%column(p))
         if (row > f .or. column > 2 * f) cycle
-        if (column <= f) by_speed(row, column) = slopes(p)
-        if (column > f) by_angle(row, column - f) = slopes(p)
+        if (column <= f) by_speed(row, column) = jacobian(p)
+        if (column > f) by_angle(row, column - f) = jacobian(p)
       end associate
     end do
     left = matmul(transpose(self%shapes), mass_matrix(formulation%machine))
-    self%matrix(:n, :n) = matmul(left, matmul(by_speed, self%shapes))
+    self%matrix(:n, :n) = matmul(left, matmul(by_speed, self%shapes)) - undamped_loss(self) &
+                          + matmul(transpose(self%twists), spread(slopes%stand_in, 2, n) * self%twists)
     do i = 1, size(self%flexible)
       associate (mode => self%flexible(i))
         self%matrix(:n, n + i) = matmul(left, matmul(by_angle, self%shapes(:, mode))) / abs(self%natural(mode))

@@ -5,7 +5,6 @@ module nocdyn_modes
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: linearisation_t
-  use nocdyn_relative_damping, only: take_relative_damping
   implicit none (type, external)
   private
 
@@ -48,14 +47,10 @@ contains
     type(mode_t), allocatable, intent(out) :: modes(:)
     type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
     complex(wp), allocatable :: twists(:, :)
-    real(wp), allocatable :: loss(:)
     type(eigenpairs_t) :: pairs
-    type(linearisation_t) :: lossy
     integer :: i
 
-    lossy = linear
-    call take_relative_damping(formulation%machine, lossy, loss)
-    call find_eigenpairs(lossy, pairs, error, loss)
+    call find_eigenpairs(linear, pairs, error)
     if (allocated(error)) return
     call find_twists(linear, elastic, pairs%vector, twists)
     allocate (modes(size(pairs%value)))

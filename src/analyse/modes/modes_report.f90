@@ -6,12 +6,11 @@ module nocdyn_modes_report
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: linearisation_t, linearise
   use nocdyn_machine, only: machine_t
-  use nocdyn_mean_slopes, only: note_mean_slopes
   use nocdyn_modes, only: find_modes, kind_names, mode_diverging, mode_internal, mode_oscillating, mode_overdamped, mode_rigid, &
     mode_t
   use nocdyn_shaft_errors, only: describe_error, has_shaft_nodes, noted_error, shaft_error
   use nocdyn_operating_point, only: operating_point_t
-  use nocdyn_stand_in_notes, only: note_stand_ins
+  use nocdyn_damping_notes, only: note_mean_slopes, note_stand_ins
   use nocdyn_table_text, only: cell, cell_width, padded, text_width
   use nocdyn_text, only: append, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t

@@ -5,7 +5,7 @@ module nocdyn_margins
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_response_settings, only: response_settings_t
-  use nocdyn_speed_modes, only: speed_modes_t
+  use nocdyn_mode_branches, only: speed_modes_t
   use nocdyn_text, only: rounded_text
   implicit none (type, external)
   private

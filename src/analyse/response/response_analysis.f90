@@ -11,14 +11,13 @@ module nocdyn_response_analysis
   use nocdyn_kinds, only: wp
   use nocdyn_limit_edges, only: refine_edges
   use nocdyn_machine, only: machine_t
-  use nocdyn_mode_branches, only: new_speed_modes
   use nocdyn_response_fatigue, only: find_response_fatigue, response_fatigue_t
   use nocdyn_response_limits, only: read_limits, response_limit_t
   use nocdyn_response_points, only: keep_points
   use nocdyn_response_notes, only: note_linear_ranges, note_overloads, note_rated_speeds, note_shaft_modes, note_separation, &
     note_simplifications, note_steady_states
   use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
-  use nocdyn_speed_modes, only: most_coordinates, speed_modes_t
+  use nocdyn_mode_branches, only: most_coordinates, new_speed_modes, speed_modes_t
   use nocdyn_synthesis, only: new_synthesis
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
   use nocdyn_unstable_speeds, only: describe_first, find_unstable, mark_between, note_speeds, unstable_speed_t

@@ -8,17 +8,16 @@ module nocdyn_response_notes
   use nocdyn_gap_couplings, only: gap_couplings_t
   use nocdyn_held_speeds, only: held_state_t
   use nocdyn_input, only: input_t
-  use nocdyn_joint_texts, only: allowed_torques
+  use nocdyn_steady_texts, only: allowed_torques
   use nocdyn_kinds, only: wp
   use nocdyn_linear_ranges, only: excursion_t, find_excursions
   use nocdyn_linearisation, only: linearisation_t, undamped_modes
   use nocdyn_machine, only: machine_t
-  use nocdyn_mean_slopes, only: note_mean_slopes
   use nocdyn_moment_forms, only: kind_moment, kind_reaction
   use nocdyn_response_settings, only: response_settings_t
   use nocdyn_shaft_errors, only: describe_error, has_shaft_nodes, noted_error, shaft_error
-  use nocdyn_speed_modes, only: most_coordinates, speed_modes_t
-  use nocdyn_stand_in_notes, only: note_stand_ins
+  use nocdyn_mode_branches, only: most_coordinates, speed_modes_t
+  use nocdyn_damping_notes, only: note_mean_slopes, note_stand_ins
   use nocdyn_text, only: append, joined, quoted, rounded_text, string_t, to_text
   use nocdyn_tooth_losses, only: tooth_losses_t
   use nocdyn_units, only: from_si, unit_hz, unit_rpm
@@ -116,9 +115,9 @@ contains
     type(linearisation_t) :: linear
     type(error_t), allocatable :: error
 
-    if (.not. any(response%loss_damping > 0) .or. response%matrix%coordinates > most_coordinates) return
-    associate (highest => response%points(size(response%points))%state%stiffness)
-      call undamped_modes(response%machine, response%held%balance%incidence, highest, linear, error)
+    associate (highest => response%points(size(response%points))%state%slopes)
+      if (.not. any(highest%stand_in > 0) .or. response%matrix%coordinates > most_coordinates) return
+      call undamped_modes(response%machine, response%matrix%incidence, highest%stiffness, linear, error)
     end associate
     if (.not. allocated(error)) call note_stand_ins(response%machine, linear, notes)
   end subroutine note_damping
@@ -131,8 +130,8 @@ contains
 
     slope = 0.0_wp
     do i = 1, size(response%points)
-      associate (here => response%points(i)%state%mean_slope)
-        where (abs(here) > abs(slope)) slope = here
+      associate (here => response%points(i)%state%slopes%mean_damping)
+        where (abs(here) > abs(slope)) slope = -here
       end associate
     end do
   end function steepest_slopes
@@ -227,7 +226,7 @@ contains
     do e = 1, size(elastic)
       open = 0
       do i = 1, size(response%points)
-        if (abs(response%points(i)%state%stiffness(elastic(e))) <= 0) open = open + 1
+        if (abs(response%points(i)%state%slopes%stiffness(elastic(e))) <= 0) open = open + 1
       end do
       if (open == 0) cycle
       call append(notes, quoted(names(e)%text) // ' has no stiffness at ' // to_text(open) // ' of ' // &

@@ -128,7 +128,7 @@ contains
       energy = 0.0_wp
       do k = 1, size(analysis%response%quantities(q)%elements)
         e = analysis%response%quantities(q)%elements(k)
-        energy = energy + abs(analysis%response%points(1)%state%stiffness(e)) * abs(analysis%modes%twists(e, mode))**2
+        energy = energy + abs(analysis%response%points(1)%state%slopes%stiffness(e)) * abs(analysis%modes%twists(e, mode))**2
       end do
       if (energy <= most) cycle
       coupling = q

@@ -1,6 +1,6 @@
 !> A hint after a run: the machine ends in a slow steady state, as a motor does that cannot start its load, and could run faster.
 module nocdyn_missed_states
-  use nocdyn_balance_texts, only: describe_state_speeds
+  use nocdyn_steady_texts, only: describe_state_speeds
   use nocdyn_equilibrium, only: distances, equilibrium_t, find_equilibria, find_stability
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t

@@ -29,7 +29,7 @@ module nocdyn_transient
     solver_status_t
   use nocdyn_start_transient, only: find_start_transient
   use nocdyn_text, only: append, selected, string_t, to_text
-  use nocdyn_stand_in_notes, only: has_stand_ins, note_stand_ins
+  use nocdyn_damping_notes, only: has_stand_ins, note_stand_ins
   use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
   use nocdyn_vibration_energy, only: new_vibration, vibration_t
   implicit none (type, external)

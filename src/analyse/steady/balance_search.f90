@@ -8,9 +8,8 @@ module nocdyn_balance_search
   use nocdyn_balance_starts, only: search_from_starts
   use nocdyn_block_solutions, only: block_solutions_t, is_nearly_balanced
   use nocdyn_brackets, only: bracket_t, have_same_sign, new_bracket
-  use nocdyn_eliminated_balance, only: eliminated_balance_t, new_eliminated_balance
+  use nocdyn_eliminated_balance, only: eliminated_balance_t, new_eliminated_balance, new_speed_grid
   use nocdyn_kinds, only: wp
-  use nocdyn_speed_grid, only: new_speed_grid
   use nocdyn_torque_balance, only: torque_balance_t
   implicit none (type, external)
   private

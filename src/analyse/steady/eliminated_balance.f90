@@ -9,16 +9,20 @@
 module nocdyn_eliminated_balance
   use nocdyn_brackets, only: bracket_t, have_same_sign, new_bracket
   use nocdyn_kinds, only: wp
-  use nocdyn_lapack, only: pseudo_inverse
-  use nocdyn_speed_grid, only: new_speed_grid
+  use nocdyn_lapack, only: pseudo_inverse, sort_ascending
   use nocdyn_torque_balance, only: torque_balance_t
   implicit none (type, external)
   private
 
-  public :: new_eliminated_balance
+  public :: new_eliminated_balance, new_speed_grid
 
   real(wp), parameter :: rounding = 8 * epsilon(1.0_wp)   ! a sum below this share of its terms is zero
   real(wp), parameter :: tight = 1.0e-13_wp, loose = 1.0e-9_wp   ! shares below which torques balance: the aim, and what serves
+
+  integer, parameter :: decades = 6            ! from 1e-6 to 1e6 rad/s, in both directions
+  integer, parameter :: knee_decades = 8       ! distances from a knee, down to 1e-8 of its speed
+  integer, parameter :: knee_points = 6        ! per decade
+  integer, parameter :: most_dense_knees = 30  ! of more, only the knees themselves are added
 
   !> Knees of the elements whose torques rise somewhere, or jump, and whose speed is that of a column of the basis.
   type, public :: rising_speed_t
@@ -373,5 +377,27 @@ contains
       if (all(abs(direction) <= 0.0_wp)) direction = matmul(others, torques)
     end associate
   end function newton_direction
+
+  !> Speeds at which laws are looked at, ascending: they grow geometrically on both sides of zero, and are dense about those where
+  !> a law bends.
+  function new_speed_grid(points_per_decade, unit, knees) result(grid)
+    integer, intent(in) :: points_per_decade
+    real(wp), intent(in) :: unit       !! the speed that is 1 rad/s of the fastest body [rad/s]
+    real(wp), intent(in) :: knees(:)   !! [rad/s]
+    real(wp), allocatable :: grid(:)
+    real(wp) :: nearness(knee_decades * knee_points), steps(2 * decades * points_per_decade + 1)
+    integer :: i
+
+    steps = unit * [(10.0_wp**(real(i, wp) / points_per_decade), i=-decades * points_per_decade, decades * points_per_decade)]
+    allocate (grid, source=[-steps, 0.0_wp, steps, knees])
+    if (size(knees) <= most_dense_knees) then
+      nearness = [(10.0_wp**(-real(i, wp) / knee_points), i=1, size(nearness))]
+      do i = 1, size(knees)
+        grid = [grid, knees(i) * (1.0_wp - nearness), knees(i) * (1.0_wp + nearness)]
+      end do
+    end if
+    call sort_ascending(grid)
+    grid = pack(grid, [.true., grid(2:) > grid(:size(grid) - 1)])
+  end function new_speed_grid
 
 end module nocdyn_eliminated_balance

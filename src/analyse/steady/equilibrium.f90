@@ -2,21 +2,20 @@
 module nocdyn_equilibrium
   use nocdyn_balance_search, only: search_balance
   use nocdyn_balance_starts, only: solve_by_newton
-  use nocdyn_balance_texts, only: describe_speeds, describe_state_speeds, explain_no_balance, list_moving_bodies
+  use nocdyn_steady_texts, only: describe_joints, describe_overload, describe_speeds, describe_state_speeds, &
+    explain_no_balance, list_moving_bodies
   use nocdyn_block_solutions, only: block_solutions_t
   use nocdyn_element_sets, only: element_names
   use nocdyn_eigenpairs, only: eigenpairs_t, find_eigenpairs
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_floating_motions, only: hold_floating
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_joint_texts, only: describe_joints, describe_overload
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: linearisation_t, linearise
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: reduced_t
-  use nocdyn_relative_damping, only: take_relative_damping
   use nocdyn_resting_joints, only: list_resting_sets, new_resting_joints, resting_joints_t, slips_where_it_cannot
-  use nocdyn_static_twists, only: find_twists, undetermined_elements
+  use nocdyn_static_twists, only: find_twists, twist_problem_t, undetermined_elements
   use nocdyn_text, only: append, joined, string_t, to_text
   use nocdyn_torque_balance, only: set_up_balance, torque_balance_t
   implicit none (type, external)
@@ -211,14 +210,21 @@ contains
   end function distances
 
   !> The reduced formulation of a machine with mean torques, without work integrals.
-  subroutine mean_formulation(machine, formulation)
+  subroutine mean_formulation(machine, formulation, holds_speed)
     type(machine_t), intent(in) :: machine
     class(formulation_t), allocatable, intent(out) :: formulation
+    logical, intent(in), optional :: holds_speed   !! whether governors and supplies leave the speed to who holds it; absent: no
     type(reduced_t), allocatable :: reduced
+    integer :: b
 
     allocate (reduced)
     reduced%machine = machine
     call reduced%machine%to_mean_torque()
+    if (present(holds_speed)) then
+      do b = 1, merge(size(machine%banks), 0, holds_speed)
+        call reduced%machine%banks(b)%bank%hold_speed()
+      end do
+    end if
     call reduced%formulate(.false., .false.)
     call move_alloc(reduced, formulation)
   end subroutine mean_formulation
@@ -334,6 +340,7 @@ contains
     logical, intent(out) :: is_found   !! whether such twists exist
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: difference(balance%joints%teeth%count), q(balance%coordinates)
+    type(twist_problem_t) :: twists
     real(wp), parameter :: tolerance = 1.0e-11_wp   ! of torques of teeth, relative
     integer :: trial
 
@@ -352,7 +359,7 @@ contains
         call describe_overload(balance, resting, refusal)
         return
       end if
-      call find_twists(balance, q, is_found, error)
+      call find_twists(twists, balance, q, is_found, error)
       call balance%set_state(z)
       balance%y(1, balance%coordinates + 1:2 * balance%coordinates) = q
       if (.not. is_found .or. allocated(error) .or. size(difference) == 0) exit
@@ -401,7 +408,6 @@ contains
     type(error_t), allocatable :: error
     type(eigenpairs_t) :: pairs
     complex(wp), allocatable :: values(:)
-    real(wp), allocatable :: loss(:)
 
     equilibrium%stability = 'not determined'
     if (formulation%states > most_states) return
@@ -412,8 +418,7 @@ contains
       equilibrium%stability = 'stable'
       return
     end if
-    call take_relative_damping(formulation%machine, linear, loss)
-    call find_eigenpairs(linear, pairs, error, loss)
+    call find_eigenpairs(linear, pairs, error)
     if (allocated(error)) return
     values = [pairs%value, conjg(pack(pairs%value, aimag(pairs%value) > 0))]
     equilibrium%growth = growth_rate(values, equilibrium%free_modes)

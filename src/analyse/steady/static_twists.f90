@@ -23,12 +23,16 @@ module nocdyn_static_twists
   real(wp), parameter :: angle_rounding = 16 * epsilon(1.0_wp)   ! relative error of the angles of which a twist is the difference
   real(wp), parameter :: max_twist = 1.0e8_wp     ! rad: the iteration diverges
 
-  !> The minimisation problem: the stiffness matrix of the coordinates that are not free, and the torques.
-  type :: twist_problem_t
+  !> The minimisation problem: the stiffness matrix of the coordinates that are not free, and the torques. Where every stiffness is
+  !> as before, the factors serve again: a linear machine is factored once for all its steady states.
+  type, public :: twist_problem_t
+    private
     integer, allocatable :: unknown(:)    !! coordinates in the order of the band, [unknowns]
     integer, allocatable :: position(:)   !! position of each coordinate in the band, 0 if it is free, [coordinates]
     integer :: width = 0                  !! number of diagonals beside the main one
-    real(wp), allocatable :: band(:, :)
+    real(wp), allocatable :: band(:, :)   !! factors
+    integer, allocatable :: pivots(:)
+    real(wp), allocatable :: factored(:)  !! stiffnesses of the factors [N m/rad], [elastic elements]; not allocated: none
     real(wp), allocatable :: diagonal_scale(:)   !! what is damped: the largest diagonal elements so far, [unknowns]
     real(wp), allocatable :: external_torque(:)   !! torques of all other elements [N m], [coordinates]
     real(wp), allocatable :: external_scale(:)   !! sum of their absolute terms, [coordinates]
@@ -41,7 +45,8 @@ module nocdyn_static_twists
 contains
 
   !> Finds the angles q of the coordinates; free coordinates stay. `balance` is evaluated at the speeds of the steady state.
-  subroutine find_twists(balance, q, is_found, error, weight, torque)
+  subroutine find_twists(self, balance, q, is_found, error, weight, torque)
+    type(twist_problem_t), intent(inout) :: self      !! of the same balance before, or new
     type(torque_balance_t), intent(inout) :: balance
     real(wp), intent(inout) :: q(:)   !! start, then solution [rad], [coordinates]
     logical, intent(out) :: is_found
@@ -50,15 +55,16 @@ contains
     real(wp), intent(in), optional :: torque(:)        !! more torques on the coordinates [N m], [coordinates]; absent: none
     integer, parameter :: most_steps = 500
     real(wp), parameter :: stalled = 1.0e3_wp   ! residuals up to this many tolerances are rounding if they stop falling
-    type(twist_problem_t) :: self
     real(wp) :: damping, energy, excess, last_excess, new_q(size(q)), step(size(q))
     integer :: i
     logical :: is_singular
 
     is_found = .false.
-    call set_up(balance, weight, torque, self, error)
+    if (.not. allocated(self%unknown)) call set_up(balance, self, error)
     if (allocated(error)) return
+    call find_external(balance, self, weight, torque)
     call evaluate_angles(balance, q, self)
+    self%diagonal_scale = 0.0_wp
     damping = 0.0_wp
     last_excess = huge(1.0_wp)
     do i = 1, most_steps
@@ -141,10 +147,9 @@ contains
     lowers_energy = self%energy <= energy + rounding * (abs(energy) + sum(abs(self%external_torque * step)))
   end function lowers_energy
 
-  !> Sets the order of the coordinates and the torques of the other elements.
-  subroutine set_up(balance, weight, torque, self, error)
+  !> Sets the order of the coordinates.
+  subroutine set_up(balance, self, error)
     type(torque_balance_t), intent(in) :: balance
-    real(wp), intent(in), optional :: weight(:), torque(:)   !! as in `find_twists`
     type(twist_problem_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error   !! if the band is too large
     type(entries_t) :: entries
@@ -162,6 +167,7 @@ contains
       call raise(error, exit_input, 'the twists need a matrix of ' // to_text(3 * self%width + 1) // ' x ' // &
                  to_text(size(order)) // ' entries for this machine, whose couplings leave no narrower band; at most ' // &
                  to_text(largest_matrix) // ' x ' // to_text(largest_matrix) // ' are allowed')
+      deallocate (self%unknown)
       return
     end if
     self%unknown = self%unknown(order)
@@ -170,7 +176,7 @@ contains
     allocate (self%band(3 * self%width + 1, size(self%unknown)), self%diagonal_scale(size(self%unknown)), source=0.0_wp)
     allocate (self%external_torque(size(number)), self%torque(size(number)), source=0.0_wp)
     allocate (self%external_scale, self%tolerance, source=self%external_torque)
-    call find_external(balance, self, weight, torque)
+    allocate (self%pivots(size(self%unknown)))
   end subroutine set_up
 
   !> Pairs of coordinates that an elastic element couples.
@@ -207,6 +213,8 @@ contains
     real(wp) :: moment
     integer :: e, k
 
+    self%external_torque = 0.0_wp
+    self%external_scale = 0.0_wp
     associate (elements => balance%formulation%machine%elements, incidence => balance%incidence)
       do e = 1, size(balance%is_elastic)
         moment = elements%applied(1, e)
@@ -266,11 +274,34 @@ contains
     real(wp), intent(out) :: step(:)   !! [rad], [coordinates]
     logical, intent(out) :: is_singular
     real(wp) :: x(size(self%unknown))
-    integer :: column, diagonal, e, i, k, l, pivots(size(self%unknown)), row
 
     step = 0.0_wp
     is_singular = .false.
     if (size(self%unknown) == 0) return
+    associate (slopes => balance%formulation%machine%elements%restoring_angle(1, balance%elastic))
+      if (allocated(self%factored)) then
+        if (damping > 0 .or. any(abs(self%factored - slopes) > 0)) deallocate (self%factored)
+      end if
+      if (.not. allocated(self%factored)) then
+        call fill(balance, damping, self)
+        call band_factor(self%width, self%width, self%band, self%pivots, is_singular)
+        if (is_singular) return
+        if (.not. damping > 0) self%factored = slopes
+      end if
+    end associate
+    x = self%torque(self%unknown)
+    call band_solve(self%width, self%width, self%band, self%pivots, x)
+    step(self%unknown) = x
+    if (maxval(abs(x)) > max_twist) is_singular = .true.
+  end subroutine solve
+
+  !> Fills the matrix K + damping * diagonal_scale.
+  subroutine fill(balance, damping, self)
+    type(torque_balance_t), intent(in) :: balance
+    real(wp), intent(in) :: damping
+    type(twist_problem_t), intent(inout) :: self
+    integer :: column, diagonal, e, i, k, l, row
+
     self%band = 0.0_wp
     diagonal = 2 * self%width + 1
     associate (elements => balance%formulation%machine%elements, incidence => balance%incidence)
@@ -290,12 +321,6 @@ contains
     end associate
     self%diagonal_scale = max(self%diagonal_scale, self%band(diagonal, :))
     self%band(diagonal, :) = self%band(diagonal, :) + damping * merge(self%diagonal_scale, 1.0_wp, self%diagonal_scale > 0.0_wp)
-    x = self%torque(self%unknown)
-    call band_factor(self%width, self%width, self%band, pivots, is_singular)
-    if (is_singular) return
-    call band_solve(self%width, self%width, self%band, pivots, x)
-    step(self%unknown) = x
-    if (maxval(abs(x)) > max_twist) is_singular = .true.
-  end subroutine solve
+  end subroutine fill
 
 end module nocdyn_static_twists

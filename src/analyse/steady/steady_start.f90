@@ -1,6 +1,6 @@
 !> The start of a machine in a steady state: the speeds, the angles and the internal states there.
 module nocdyn_steady_start
-  use nocdyn_balance_texts, only: describe_state_speeds
+  use nocdyn_steady_texts, only: describe_state_speeds
   use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability, nearest_equilibrium
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t

@@ -10,11 +10,28 @@ module nocdyn_mode_branches
   use nocdyn_kinds, only: wp
   use nocdyn_mode_links, only: find_links
   use nocdyn_mode_pairs, only: find_pairs, mode_pairs_t, move_pairs
-  use nocdyn_speed_modes, only: speed_modes_t
   implicit none (type, external)
   private
 
-  public :: new_speed_modes
+  public :: find_pairs_at, new_speed_modes
+
+  integer, parameter, public :: most_coordinates = 600   !! of a machine whose modes are computed at every speed
+
+  !> The oscillating modes, in the order of their frequencies at the first speed; then those that begin at other speeds.
+  type, public :: speed_modes_t
+    integer :: modes = 0
+    logical, allocatable :: exists(:, :)           !! whether a mode oscillates, [modes, points]
+    real(wp), allocatable :: frequency(:, :)       !! of the damped oscillations, 0 where there is none [rad/s], [modes, points]
+    real(wp), allocatable :: damping_ratio(:, :)   !! negative where they grow, [modes, points]
+    real(wp), allocatable :: undamped(:, :)        !! frequency of the most similar undamped mode [rad/s], [modes, points];
+                                                   !! 0 of a mode that is mostly an internal state
+    real(wp), allocatable :: divergence(:)         !! negative where a negative stiffness drives a motion apart [rad/s], [points]
+    integer, allocatable :: internal(:)            !! the internal state that a mode mostly is, or 0, [modes]
+    logical, allocatable :: is_electrical(:)       !! whether that is a current or a flux, [modes]
+    real(wp), allocatable :: shape(:, :)           !! angles of the bodies where a mode begins, the largest 1, [bodies, modes]
+    complex(wp), allocatable :: twists(:, :)       !! of all elements there, in any scale, [elements, modes]
+    logical :: is_constant = .true.                !! whether all points have the same frequencies
+  end type speed_modes_t
 
   integer, parameter :: most_halvings = 12, most_speeds_between = 400   ! of all intervals together
 
@@ -56,7 +73,7 @@ contains
               tracks%ended_undamped(0))
     allocate (tracks%divergence(points), source=0.0_wp)
     first%point = 1
-    call find_pairs(response, response%points(1)%state, first%pairs, error)
+    call find_pairs_at(response, response%points(1)%state, first%pairs, error)
     if (allocated(error)) return
     allocate (first%branch(size(first%pairs%value)))
     do m = 1, size(first%branch)
@@ -65,13 +82,28 @@ contains
     call record(tracks, first)
     if (points > 1) then
       last%point = points
-      call find_pairs(response, response%points(points)%state, last%pairs, error, first%pairs)
+      call find_pairs_at(response, response%points(points)%state, last%pairs, error, first%pairs)
       if (.not. allocated(error)) call connect(response, tracks, first, last, error)
       if (allocated(error)) return
     end if
     call set_modes(tracks, self)
     self%is_electrical = [(response%machine%is_electrical(self%internal(m)), m=1, self%modes)]
   end subroutine new_speed_modes
+
+  !> Finds the modes at a steady state.
+  subroutine find_pairs_at(response, state, pairs, error, known)
+    type(forced_response_t), intent(in) :: response
+    type(held_state_t), intent(in) :: state
+    type(mode_pairs_t), intent(out) :: pairs
+    type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
+    type(mode_pairs_t), intent(in), optional :: known   !! as of `find_pairs`
+
+    associate (points => response%points)
+      call find_pairs(response%machine, response%matrix, state%slopes, maxval([0.0_wp, points(size(points))%frequency]), pairs, &
+                      error, known)
+    end associate
+    pairs%speed = state%speed
+  end subroutine find_pairs_at
 
   !> Connects the modes of two points, and finds those of all points between.
   recursive subroutine connect(response, tracks, a, b, error)
@@ -90,7 +122,7 @@ contains
       return
     end if
     if (response%machine%elements%internal%count == 0 .and. min(a%pairs%divergence, b%pairs%divergence) >= 0) then
-      call find_links(response, a%pairs, b%pairs, link, are_clear)
+      call find_links(response%machine, a%pairs, b%pairs, link, are_clear)
       if (are_clear) call fill_between(response, tracks, a, b, link, are_clear)
       if (are_clear) then
         call take_over(tracks, a, link, b)
@@ -99,7 +131,7 @@ contains
       end if
     end if
     between%point = (a%point + b%point) / 2
-    call find_pairs(response, response%points(between%point)%state, between%pairs, error, a%pairs)
+    call find_pairs_at(response, response%points(between%point)%state, between%pairs, error, a%pairs)
     if (.not. allocated(error)) call connect(response, tracks, a, between, error)
     if (.not. allocated(error)) call connect(response, tracks, between, b, error)
   end subroutine connect
@@ -118,10 +150,11 @@ contains
     between%branch = a%branch
     do k = a%point + 1, b%point - 1
       between%point = k
-      call move_pairs(response, response%points(k)%state, a%pairs, b%pairs, link, &
+      between%pairs = mode_pairs_t(slopes=response%points(k)%state%slopes)
+      call move_pairs(response%machine, response%matrix, a%pairs, b%pairs, link, &
                       real(k - a%point, wp) / (b%point - a%point), between%pairs, is_done)
       is_done = .not. is_done
-      if (is_done) call find_links(response, a%pairs, between%pairs, same, is_done)
+      if (is_done) call find_links(response%machine, a%pairs, between%pairs, same, is_done)
       if (is_done) is_done = all(same == [(m, m=1, size(same))])
       if (.not. is_done) return
       call record(tracks, between)
@@ -142,12 +175,12 @@ contains
     type(held_state_t) :: state
     logical :: are_clear
 
-    call find_links(response, a%pairs, b%pairs, link, are_clear)
+    call find_links(response%machine, a%pairs, b%pairs, link, are_clear)
     if (.not. are_clear .and. halvings > 0 .and. tracks%left > 0) then
       tracks%left = tracks%left - 1
       if (.not. allocated(tracks%held)) tracks%held = response%held
-      call tracks%held%hold(0.5_wp * (a%pairs%state%speed + b%pairs%state%speed), state, error)
-      if (.not. allocated(error)) call find_pairs(response, state, between%pairs, error, a%pairs)
+      call tracks%held%hold(0.5_wp * (a%pairs%speed + b%pairs%speed), state, error)
+      if (.not. allocated(error)) call find_pairs_at(response, state, between%pairs, error, a%pairs)
       if (.not. allocated(error)) then
         call pass_between(response, tracks, a, between, halvings - 1)
         call pass_between(response, tracks, between, b, halvings - 1)

@@ -1,16 +1,37 @@
-!> Notes on the viscous damping that stands for relative damping over the time, where its frequency is not that of the vibration.
-module nocdyn_stand_in_notes
+!> Notes on damping that a run has otherwise: the viscous one that stands for relative damping over the time, where its frequency
+!> is not the one of the vibration, and torques that follow the mean speed of a cycle and do not damp oscillations.
+module nocdyn_damping_notes
+  use nocdyn_element_sets, only: element_names
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: linearisation_t
   use nocdyn_machine, only: machine_t
-  use nocdyn_text, only: append, quoted, rounded_text, string_t
+  use nocdyn_text, only: append, joined, quoted, rounded_text, string_t
   use nocdyn_units, only: from_si, unit_hz
   implicit none (type, external)
   private
 
-  public :: has_stand_ins, note_stand_ins
+  public :: has_stand_ins, note_mean_slopes, note_stand_ins
 
 contains
+
+  !> Adds a note if a torque that follows the mean speed has a slope over it.
+  subroutine note_mean_slopes(machine, slope, notes)
+    type(machine_t), intent(in) :: machine
+    real(wp), intent(in) :: slope(:)   !! derivatives of the torques by the speeds, others have no part [N m s/rad], [elements]
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    integer, parameter :: most_names = 4
+    integer :: e
+    integer, allocatable :: changing(:)
+
+    changing = pack([(e, e=1, size(slope))], machine%follows_mean_speed() .and. abs(slope) > 0)
+    if (size(changing) == 0) return
+    associate (steepest => slope(changing(maxloc(abs(slope(changing)), dim=1))))
+      call append(notes, 'the mean torque of ' // joined(element_names(machine, changing), ', ', most_names) // &
+                         ' changes over the speed by up to ' // rounded_text(steepest, 3) // ' N m s/rad: it follows the ' // &
+                         'mean speed and does not damp oscillations here; nocdyn run takes it at the speed of the moment, ' // &
+                         'where it does')
+    end associate
+  end subroutine note_mean_slopes
 
   !> Whether elements of a machine have a viscous damping in place of a relative one.
   pure logical function has_stand_ins(machine)
@@ -89,4 +110,4 @@ contains
     text = rounded_text(from_si(omega, unit_hz), 3)
   end function hertz
 
-end module nocdyn_stand_in_notes
+end module nocdyn_damping_notes

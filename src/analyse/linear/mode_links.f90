@@ -4,9 +4,9 @@
 !> x_m^T (T(lambda_m) - T(lambda_n)) / (lambda_m - lambda_n) x_n is 1 for one and the same mode and 0 for two modes of one state
 !> (the modal assurance criterion, with the eigenvectors of the damped machine).
 module nocdyn_mode_links
-  use nocdyn_forced_response, only: forced_response_t
   use nocdyn_kinds, only: wp
-  use nocdyn_mode_pairs, only: element_delay, mode_pairs_t
+  use nocdyn_machine, only: machine_t
+  use nocdyn_mode_pairs, only: mode_pairs_t
   implicit none (type, external)
   private
 
@@ -15,8 +15,8 @@ module nocdyn_mode_links
 contains
 
   !> Links the modes of two states.
-  subroutine find_links(response, a, b, link, are_clear)
-    type(forced_response_t), intent(in) :: response
+  subroutine find_links(machine, a, b, link, are_clear)
+    type(machine_t), intent(in) :: machine
     type(mode_pairs_t), intent(in) :: a, b
     integer, allocatable, intent(out) :: link(:)   !! mode of `b` of each mode of `a`, or 0
     logical, intent(out) :: are_clear              !! whether no other links come into question
@@ -25,7 +25,7 @@ contains
     integer :: best(2), k, m
     real(wp), allocatable :: left(:, :)
 
-    call compare(response, a, b, likeness)
+    call compare(machine, a, b, likeness)
     allocate (link(size(a%value)), source=0)
     left = likeness
     do k = 1, min(size(a%value), size(b%value))
@@ -92,26 +92,26 @@ contains
   end subroutine link_internal
 
   !> Squares of the products of all modes, 1 for the same ones.
-  subroutine compare(response, a, b, likeness)
-    type(forced_response_t), intent(in) :: response
+  subroutine compare(machine, a, b, likeness)
+    type(machine_t), intent(in) :: machine
     type(mode_pairs_t), intent(in) :: a, b
     real(wp), allocatable, intent(out) :: likeness(:, :)   !! [modes of a, modes of b]
     complex(wp), dimension(size(a%value), size(b%value)) :: by_damping, by_loss, by_mass
     integer :: m, n
     real(wp) :: damping(size(a%twist, 1)), loss(size(a%twist, 1))
 
-    damping = 0.5_wp * (a%state%damping + b%state%damping) - response%loss_damping
-    loss = 0.5_wp * (a%state%stiffness + b%state%stiffness) * response%loss_factor
+    damping = 0.5_wp * (a%slopes%damping + b%slopes%damping)
+    loss = 0.5_wp * (a%slopes%loss + b%slopes%loss)
     by_damping = products(damping, a%twist, b%twist)
     by_loss = products(loss, a%twist, b%twist)
-    by_mass = products(response%machine%inertia(1, :), a%angle, b%angle)
+    by_mass = products(machine%inertia(1, :), a%angle, b%angle)
     do n = 1, size(b%value)
       do m = 1, size(a%value)
         by_mass(m, n) = by_damping(m, n) + 2.0_wp * by_loss(m, n) / (aimag(a%value(m)) + aimag(b%value(n))) &
                         + (a%value(m) + b%value(n)) * by_mass(m, n)
       end do
     end do
-    call subtract_delays(response, a, b, by_mass)
+    call subtract_delays(machine, a, b, by_mass)
     likeness = real(by_mass, wp)**2 + aimag(by_mass)**2
   end subroutine compare
 
@@ -127,8 +127,8 @@ contains
   end function products
 
   !> The part of the internal states.
-  subroutine subtract_delays(response, a, b, product)
-    type(forced_response_t), intent(in) :: response
+  subroutine subtract_delays(machine, a, b, product)
+    type(machine_t), intent(in) :: machine
     type(mode_pairs_t), intent(in) :: a, b
     complex(wp), intent(inout) :: product(:, :)
     real(wp), parameter :: apart = 1.0e-6_wp   ! relative
@@ -136,11 +136,11 @@ contains
     complex(wp) :: ratio
     integer :: m, n, s
 
-    associate (internal => response%machine%elements%internal)
+    associate (internal => machine%elements%internal)
       do s = 1, internal%count
         if (internal%first(s) /= s) cycle
-        call list_delays(response, a, b, s, a%value, delay_a, slope_a)
-        call list_delays(response, a, b, s, b%value, delay_b, slope_b)
+        call list_delays(machine, a, b, s, a%value, delay_a, slope_a)
+        call list_delays(machine, a, b, s, b%value, delay_b, slope_b)
         do n = 1, size(b%value)
           do m = 1, size(a%value)
             associate (distance => a%value(m) - b%value(n))
@@ -158,8 +158,8 @@ contains
   end subroutine subtract_delays
 
   !> The means of both states.
-  subroutine list_delays(response, a, b, first, values, delay, slope)
-    type(forced_response_t), intent(in) :: response
+  subroutine list_delays(machine, a, b, first, values, delay, slope)
+    type(machine_t), intent(in) :: machine
     type(mode_pairs_t), intent(in) :: a, b
     integer, intent(in) :: first   !! internal state
     complex(wp), intent(in) :: values(:)
@@ -168,8 +168,8 @@ contains
     integer :: m
 
     do m = 1, size(values)
-      call element_delay(response, a%state, first, values(m), delay(m), slope(m))
-      call element_delay(response, b%state, first, values(m), other_delay, other_slope)
+      call a%slopes%find_delay(machine%elements%internal, first, values(m), delay(m), slope(m))
+      call b%slopes%find_delay(machine%elements%internal, first, values(m), other_delay, other_slope)
       delay(m) = 0.5_wp * (delay(m) + other_delay)
       slope(m) = 0.5_wp * (slope(m) + other_slope)
     end do

@@ -7,20 +7,18 @@
 !> holds the speed. Governors leave their throttles open while the speed is found; then they hold it.
 module nocdyn_held_speeds
   use nocdyn_bank, only: role_bearing, role_excitation, role_motor
-  use nocdyn_equilibrium, only: t_infinity
+  use nocdyn_equilibrium, only: mean_formulation, t_infinity
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_finite, only: is_finite
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_held_supplies, only: all_follow, idle_share, set_supplies
+  use nocdyn_held_drives, only: all_follow, close_speed_loops, idle_share, set_supplies
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_machine, only: machine_t
-  use nocdyn_reduced, only: reduced_t
-  use nocdyn_speed_loops, only: close_speed_loops
-  use nocdyn_static_twists, only: find_twists
+  use nocdyn_slopes, only: new_slopes, slopes_t
+  use nocdyn_static_twists, only: find_twists, twist_problem_t
   use nocdyn_text, only: quoted
   use nocdyn_torque_balance, only: set_up_balance, torque_balance_t
-  use nocdyn_twist_solver, only: new_twist_solver, twist_solver_t
   implicit none (type, external)
   private
 
@@ -37,13 +35,7 @@ module nocdyn_held_speeds
     real(wp), allocatable :: twist(:)       !! of the elements [rad], [elements]
     real(wp), allocatable :: rate(:)        !! of twist [rad/s], [elements]
     real(wp), allocatable :: mean(:)        !! moments of the elements [N m], [elements] as all that follow
-    real(wp), allocatable :: stiffness(:)   !! minus the derivatives of the moments by the twists [N m/rad]
-    real(wp), allocatable :: damping(:)     !! minus the derivatives by the rates of twist [N m s/rad]; 0 of what follows the mean
-                                            !! speed of a cycle, whose oscillation is zero
-    real(wp), allocatable :: mean_slope(:)  !! derivatives by the speed of what follows the mean one, 0 of others [N m s/rad]
-    real(wp), allocatable :: by_internal(:)        !! derivatives of the moments by internal states, [internal states]
-    real(wp), allocatable :: rate_speed(:)         !! derivatives of their rates by the speed of the element, the same
-    real(wp), allocatable :: rate_internal(:, :)   !! derivatives of the rates by the states of the element, [members, the same]
+    type(slopes_t) :: slopes                !! about this state; weighted by `factor` of the motors
   contains
     procedure :: is_driven
   end type held_state_t
@@ -52,12 +44,11 @@ module nocdyn_held_speeds
   type, public :: held_speeds_t
     type(torque_balance_t) :: balance        !! of the machine with mean torques
     integer :: reference = 0                 !! body whose speed is held
-    logical, allocatable, private :: follows_mean_speed(:)   !! as in `machine_t`, [elements]
     integer, allocatable, private :: sources(:)      !! elements whose torques are multiplied, numbered in `balance%inelastic`
     real(wp), allocatable, private :: ratio(:)       !! speed of the reference body by the rigid motions, [freedoms]
     real(wp), allocatable, private :: z(:)           !! last rigid motions and internal states
     real(wp), allocatable, private :: q(:)           !! last angles of the coordinates [rad]
-    type(twist_solver_t), private :: twists
+    type(twist_problem_t), private :: twists
     real(wp), private :: last_speed = 0.0_wp         !! of these
     logical, private :: motors_hold = .false.        !! whether the motors hold the speed, else a torque
     logical :: supply_holds = .false.                !! whether they do so by the frequency of their supply
@@ -75,20 +66,10 @@ contains
     type(held_speeds_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
     class(formulation_t), allocatable :: formulation
-    type(reduced_t), allocatable :: reduced
-    integer :: i
 
-    allocate (reduced)
-    reduced%machine = machine
-    call reduced%machine%to_mean_torque()
-    do i = 1, size(machine%banks)
-      call reduced%machine%banks(i)%bank%hold_speed()
-    end do
-    call reduced%formulate(.false., .false.)
-    call move_alloc(reduced, formulation)
+    call mean_formulation(machine, formulation, holds_speed=.true.)
     call set_up_balance(formulation, t_infinity, self%balance)
     call leave_out_silent(self%balance%formulation%machine)
-    self%twists = new_twist_solver(self%balance)
     self%reference = reference
     allocate (self%ratio(size(self%balance%motions%free)))
     call find_ratios(self%balance, reference, self%ratio)
@@ -100,7 +81,6 @@ contains
     self%z = self%balance%start()
     allocate (self%q(self%balance%coordinates), source=0.0_wp)
     self%sources = sources_of(self%balance)
-    self%follows_mean_speed = machine%follows_mean_speed()
     self%supply_holds = all_follow(self%balance, self%sources)
     self%last_speed = sum(self%ratio * self%z(:size(self%ratio)))
   end subroutine new_held_speeds
@@ -423,13 +403,8 @@ contains
     end associate
     call self%balance%evaluate(z)
     q = self%q
-    call self%twists%solve(self%balance, weight, extra, q, is_found)
-    if (is_found) then
-      self%q(:) = q
-    else
-      call self%balance%evaluate(z)
-      call find_twists(self%balance, self%q, is_found, error, weight, extra)
-    end if
+    call find_twists(self%twists, self%balance, q, is_found, error, weight, extra)
+    if (is_found) self%q(:) = q
     if (.not. allocated(error) .and. .not. is_found) then
       call raise(error, exit_failed, 'the torques balance, but no twists of the couplings were found that carry them')
     end if
@@ -463,7 +438,6 @@ contains
     real(wp), intent(in) :: z(:), weight(:)
     type(held_state_t), intent(inout) :: state
     type(error_t), allocatable, intent(out) :: error
-    integer :: e
 
     call self%balance%set_state(z)
     associate (balance => self%balance, formulation => self%balance%formulation)
@@ -480,20 +454,8 @@ contains
       state%twist = elements%angle(1, :)
       state%rate = elements%speed(1, :)
       state%mean = weight * (elements%restoring(1, :) + elements%applied(1, :))
-      state%stiffness = -weight * (elements%restoring_angle(1, :) + elements%applied_angle(1, :))
-      state%damping = -weight * elements%applied_speed(1, :)
-      state%mean_slope = merge(-state%damping, 0.0_wp, self%follows_mean_speed)
-      where (self%follows_mean_speed) state%damping = 0.0_wp
-      state%by_internal = weight(elements%internal%element) * elements%internal%applied(1, :)
-      state%rate_speed = elements%internal%rate_speed(1, :)
-      state%rate_internal = elements%internal%rate_internal(1, :, :)
     end associate
-    do e = 1, size(weight)
-      if (is_finite(state%mean(e)) .and. is_finite(state%stiffness(e)) .and. is_finite(state%damping(e))) cycle
-      call raise(error, exit_failed, 'the moment, stiffness or damping of ' // &
-                 quoted(self%balance%formulation%machine%element_name(e)) // ' is not a finite number')
-      return
-    end do
+    call new_slopes(self%balance%formulation%machine, state%slopes, error, weight)
   end subroutine linearise
 
 end module nocdyn_held_speeds

@@ -3,8 +3,8 @@ module nocdyn_unstable_speeds
   use nocdyn_errors, only: error_t
   use nocdyn_forced_response, only: forced_response_t
   use nocdyn_kinds, only: wp
-  use nocdyn_mode_pairs, only: find_pairs, mode_pairs_t
-  use nocdyn_speed_modes, only: speed_modes_t
+  use nocdyn_mode_branches, only: find_pairs_at, speed_modes_t
+  use nocdyn_mode_pairs, only: mode_pairs_t
   use nocdyn_text, only: append, rounded_text, string_t, to_text
   use nocdyn_units, only: from_si, unit_rpm
   implicit none (type, external)
@@ -60,7 +60,7 @@ contains
     is_unstable = .false.
     do i = 1, size(response%points)
       if (response%points(i)%is_of_grid) cycle
-      call find_pairs(response, response%points(i)%state, pairs, error)
+      call find_pairs_at(response, response%points(i)%state, pairs, error)
       if (allocated(error)) cycle
       is_unstable(i) = pairs%divergence < 0 .or. any(-real(pairs%value, wp) < -rounding * abs(pairs%value))
     end do

@@ -1,0 +1,130 @@
+!> How the moments of the elements change about a state: the linear machine of every analysis.
+!>
+!> Relative damping is the imaginary part `loss` of a stiffness at every frequency. Over the time a viscous damping stands for it,
+!> which is no part of the linear machine.
+module nocdyn_slopes
+  use nocdyn_elements, only: internal_states_t
+  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_finite, only: is_finite
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack_complex, only: complex_solve
+  use nocdyn_machine, only: machine_t
+  use nocdyn_text, only: quoted
+  implicit none (type, external)
+  private
+
+  public :: new_slopes
+
+  type, public :: slopes_t
+    real(wp), allocatable :: stiffness(:)          !! minus the derivatives of the moments by the twists [N m/rad], [elements]
+    real(wp), allocatable :: loss(:)               !! the imaginary part of the stiffness [N m/rad], [elements]
+    real(wp), allocatable :: damping(:)            !! minus the derivatives by the rates of twist, without the two below
+                                                   !! [N m s/rad], [elements]
+    real(wp), allocatable :: stand_in(:)           !! viscous damping in place of `loss` over the time, the same
+    real(wp), allocatable :: mean_damping(:)       !! of torques that follow the mean speed of a cycle: of rigid motions only
+    real(wp), allocatable :: by_internal(:)        !! derivatives of the moments by internal states, [internal states]
+    real(wp), allocatable :: rate_speed(:)         !! derivatives of their rates by the speed of the element, the same
+    real(wp), allocatable :: rate_internal(:, :)   !! derivatives of the rates by the states of the element, [members, the same]
+  contains
+    procedure :: find_stiffness, find_delay
+  end type slopes_t
+
+contains
+
+  !> The slopes of a machine of one lane whose elements are evaluated and differentiated.
+  subroutine new_slopes(machine, self, error, weight)
+    type(machine_t), intent(in) :: machine
+    type(slopes_t), intent(out) :: self
+    type(error_t), allocatable, intent(out) :: error   !! if a number is not finite; `self` is complete
+    real(wp), intent(in), optional :: weight(:)        !! factors on the moments, [elements]; absent: 1
+    real(wp) :: factor(machine%elements%count)
+    integer :: b, e
+
+    factor = 1.0_wp
+    if (present(weight)) factor = weight
+    allocate (self%loss(size(factor)), self%stand_in(size(factor)), source=0.0_wp)
+    associate (elements => machine%elements, internal => machine%elements%internal, follows => machine%follows_mean_speed())
+      self%stiffness = -factor * (elements%restoring_angle(1, :) + elements%applied_angle(1, :))
+      self%damping = -factor * elements%applied_speed(1, :)
+      do b = 1, size(machine%banks)
+        associate (bank => machine%banks(b)%bank)
+          if (.not. allocated(bank%loss_factor)) cycle
+          self%loss(bank%first:bank%last()) = self%stiffness(bank%first:bank%last()) * bank%loss_factor
+          self%stand_in(bank%first:bank%last()) = bank%loss_damping
+        end associate
+      end do
+      self%damping = self%damping - self%stand_in
+      self%mean_damping = merge(self%damping, 0.0_wp, follows)
+      where (follows) self%damping = 0.0_wp
+      self%by_internal = factor(internal%element) * internal%applied(1, :)
+      self%rate_speed = internal%rate_speed(1, :)
+      self%rate_internal = internal%rate_internal(1, :, :)
+      do e = 1, size(factor)
+        if (all(is_finite([self%stiffness(e), self%damping(e) + self%mean_damping(e), &
+                           elements%restoring(1, e) + elements%applied(1, e)]))) cycle
+        call raise(error, exit_failed, 'the moment, stiffness or damping of ' // quoted(machine%element_name(e)) // &
+                   ' in this state is not a finite number')
+        return
+      end do
+    end associate
+  end subroutine new_slopes
+
+  !> The complex stiffnesses D_e of motions exp(lambda t), and their derivatives by lambda, in which the relative damping stays as
+  !> it is: k + lambda c + i loss at a frequency, less the moments of the internal states.
+  pure subroutine find_stiffness(self, internal, value, stiffness, slope)
+    class(slopes_t), intent(in) :: self
+    type(internal_states_t), intent(in) :: internal   !! of the machine
+    complex(wp), intent(in) :: value                  !! lambda, imaginary part >= 0 [1/s]
+    complex(wp), intent(out) :: stiffness(:)          !! [N m/rad], [elements]
+    complex(wp), intent(out), optional :: slope(:)    !! [N m s/rad], [elements]
+    complex(wp) :: delay, turn
+    integer :: s
+
+    turn = (0.0_wp, 1.0_wp)
+    if (aimag(value) > 0) turn = value / aimag(value)
+    stiffness = self%stiffness + (value * self%damping + turn * self%loss)
+    if (present(slope)) slope = self%damping + self%loss / aimag(value)
+    do s = 1, internal%count
+      if (internal%first(s) /= s) cycle
+      associate (e => internal%element(s))
+        if (present(slope)) then
+          call self%find_delay(internal, s, value, delay, turn)
+          slope(e) = slope(e) - turn
+        else
+          call self%find_delay(internal, s, value, delay)
+        end if
+        stiffness(e) = stiffness(e) - delay
+      end associate
+    end do
+  end subroutine find_stiffness
+
+  !> The moment h^T (lambda - A)^-1 b lambda of the internal states of an element per unit of its twist, and its derivative by
+  !> lambda.
+  pure subroutine find_delay(self, internal, first, value, moment, slope)
+    class(slopes_t), intent(in) :: self
+    type(internal_states_t), intent(in) :: internal   !! of the machine
+    integer, intent(in) :: first        !! the first of the states
+    complex(wp), intent(in) :: value    !! lambda [1/s]
+    complex(wp), intent(out) :: moment
+    complex(wp), intent(out), optional :: slope
+    complex(wp), dimension(internal%members(first)) :: z, z_slope
+    complex(wp) :: matrix(size(z), size(z)), again(size(z), size(z))
+    integer :: i
+
+    do i = 1, size(z)
+      matrix(i, :) = -self%rate_internal(:size(z), first + i - 1)
+      matrix(i, i) = matrix(i, i) + value
+    end do
+    z = cmplx(self%rate_speed(first:first + size(z) - 1), kind=wp)
+    again = matrix
+    call complex_solve(again, z)
+    associate (by_internal => self%by_internal(first:first + size(z) - 1))
+      moment = value * sum(by_internal * z)
+      if (.not. present(slope)) return
+      z_slope = z
+      call complex_solve(matrix, z_slope)
+      slope = sum(by_internal * z) - value * sum(by_internal * z_slope)
+    end associate
+  end subroutine find_delay
+
+end module nocdyn_slopes
