@@ -302,13 +302,18 @@ def lossy_machine(seed):
 
 
 @pytest.mark.parametrize("seed", [24, 29, 103, 112, *range(MACHINES)])
-def test_modes_and_campbell_agree_on_relative_damping(nocdyn, seed):
-    modes = [one for one in result(nocdyn, "modes", lossy_machine(seed))["modes"] if one["kind"] == "oscillating"]
+def test_modes_campbell_and_equilibrium_agree_on_relative_damping(nocdyn, seed):
+    all_modes = result(nocdyn, "modes", lossy_machine(seed))["modes"]
+    modes = [one for one in all_modes if one["kind"] == "oscillating"]
     found = result(nocdyn, "campbell", lossy_machine(seed))["modes"]
     table = nocdyn.values(name="campbell.csv")
     ours = sorted((table[f"frequency_{one['mode']}"][0], table[f"damping_ratio_{one['mode']}"][0]) for one in found)
     for one, same in zip(ours, sorted((one["frequency_Hz"], one["damping_ratio"]) for one in modes), strict=True):
         assert one == pytest.approx(same, rel=1e-9)
+    nocdyn("equilibrium", "machine.nml", "--out", "out")
+    (state,) = json.loads((nocdyn.folder / "out/equilibrium.json").read_text())["steady_states"]
+    slowest = max(one["eigenvalue_1_s"][0] for one in all_modes if one["kind"] != "rigid body")
+    assert state["growth_rate_1_s"] == pytest.approx(slowest, rel=1e-8)
 
 
 RUBBER = """\

@@ -286,8 +286,8 @@ contains
 
   !> Fills the matrix for p' = -C p - sign(natural) |natural| e + the moments of the internal states, e' = |natural| p, and the
   !> rates of the internal states, which depend on the speeds and not on the angles of their elements. C is not symmetric where a
-  !> torque follows the mean speed of a cycle: the rigid motions change it, and it acts on all modes. C has the relative damping at
-  !> the frequencies of the undamped modes, and between two of them at the mean of their frequencies.
+  !> torque follows the mean speed of a cycle: the rigid motions change it, and it acts on all modes. C has the relative damping
+  !> at the frequencies of the undamped modes, and between two of them at the mean of their frequencies.
   subroutine fill_matrix(internal, slopes, self)
     type(internal_states_t), intent(in) :: internal   !! of the machine
     type(slopes_t), intent(in) :: slopes

@@ -23,8 +23,8 @@ module nocdyn_static_twists
   real(wp), parameter :: angle_rounding = 16 * epsilon(1.0_wp)   ! relative error of the angles of which a twist is the difference
   real(wp), parameter :: max_twist = 1.0e8_wp     ! rad: the iteration diverges
 
-  !> The minimisation problem: the stiffness matrix of the coordinates that are not free, and the torques. Where every stiffness is
-  !> as before, the factors serve again: a linear machine is factored once for all its steady states.
+  !> The minimisation problem: the stiffness matrix of the coordinates that are not free, and the torques. Where every stiffness
+  !> is as before, the factors serve again: a linear machine is factored once for all its steady states.
   type, public :: twist_problem_t
     private
     integer, allocatable :: unknown(:)    !! coordinates in the order of the band, [unknowns]
