@@ -89,6 +89,7 @@ contains
     type(machine_t), intent(inout) :: machine
     type(error_t), allocatable, intent(out) :: error
     type(machine_t), allocatable :: steady   ! of one lane
+    integer :: i
 
     associate (run => input%groups(input%position('run')))
       if (run%text('start') /= 'equilibrium') return
@@ -103,23 +104,17 @@ contains
       if (allocated(error)) return
       allocate (steady)
       call assemble_steady_machine(input, .false., steady, error, run%number('t_start'))
-      if (.not. allocated(error)) call start_as(steady, machine)
+      if (.not. allocated(error)) then
+        ! starts all lanes of a machine as another one with the same bodies
+        machine%start_speed(:, :) = spread(steady%start_speed(1, :), 1, machine%lanes)
+        machine%start_angle(:, :) = spread(steady%start_angle(1, :), 1, machine%lanes)
+        allocate (machine%steady_internal, source=spread(steady%steady_internal(1, :), 1, machine%lanes))
+        do i = 1, size(steady%start_notes)
+          call append(machine%start_notes, steady%start_notes(i)%text)
+        end do
+      end if
     end associate
   end subroutine start_machine
-
-  !> Starts all lanes of a machine as another one with the same bodies.
-  subroutine start_as(single, machine)
-    type(machine_t), intent(in) :: single
-    type(machine_t), intent(inout) :: machine
-    integer :: i
-
-    machine%start_speed(:, :) = spread(single%start_speed(1, :), 1, machine%lanes)
-    machine%start_angle(:, :) = spread(single%start_angle(1, :), 1, machine%lanes)
-    allocate (machine%steady_internal, source=spread(single%steady_internal(1, :), 1, machine%lanes))
-    do i = 1, size(single%start_notes)
-      call append(machine%start_notes, single%start_notes(i)%text)
-    end do
-  end subroutine start_as
 
   !> The formulation that an input asks for.
   subroutine new_asked_formulation(input, machine, formulation, with_energy_balance)

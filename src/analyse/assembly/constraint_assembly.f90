@@ -96,9 +96,29 @@ contains
 
     select case (group%kind)
     case ('gear')
-      call read_gear(group, body_index, joint)
+      ! Eq. (8): R1 omega_1 + R2 omega_2 = 0, a minus for an internal gear.
+      !
+      ! With radii the multiplier is the tooth force [N]. With teeth the row is scaled so that the multiplier is the torque on the
+      ! first body [N m].
+      joint%bodies = bodies_of(group, 'bodies', body_index)
+      if (group%has_value('radii')) then
+        joint%coefficients = group%numbers('radii')
+        joint%unit = 'N'
+      else
+        joint%coefficients = real(group%whole_numbers('teeth'), wp)
+        joint%coefficients = joint%coefficients / joint%coefficients(1)
+      end if
+      if (group%flag('internal')) joint%coefficients(2) = -joint%coefficients(2)
+      joint%members = [character(len=7) :: '', '']
     case ('planetary')
-      call read_planetary(group, body_index, joint)
+      ! willis' equation z_s omega_s + z_r omega_r - (z_s + z_r) omega_c = 0, scaled so that the multiplier is the torque on the
+      ! sun
+      joint%bodies = [bodies_of(group, 'sun', body_index), bodies_of(group, 'ring', body_index), &
+                      bodies_of(group, 'carrier', body_index)]
+      associate (teeth => real(group%whole_numbers('teeth'), wp))
+        joint%coefficients = [1.0_wp, teeth(2) / teeth(1), -(teeth(1) + teeth(2)) / teeth(1)]
+      end associate
+      joint%members = [character(len=7) :: '', 'ring', 'carrier']
     case ('differential')
       joint%bodies = [bodies_of(group, 'sides', body_index), bodies_of(group, 'case', body_index)]
       joint%coefficients = [1.0_wp, 1.0_wp, -2.0_wp]
@@ -132,41 +152,6 @@ contains
     end associate
   end function mean_ratio
 
-  !> Eq. (8): R1 omega_1 + R2 omega_2 = 0, a minus for an internal gear.
-  !>
-  !> With radii the multiplier is the tooth force [N]. With teeth the row is scaled so that the multiplier is the torque on the
-  !> first body [N m].
-  subroutine read_gear(gear, body_index, joint)
-    type(group_t), intent(in) :: gear
-    type(body_index_t), intent(in) :: body_index
-    type(joint_t), intent(inout) :: joint
-
-    joint%bodies = bodies_of(gear, 'bodies', body_index)
-    if (gear%has_value('radii')) then
-      joint%coefficients = gear%numbers('radii')
-      joint%unit = 'N'
-    else
-      joint%coefficients = real(gear%whole_numbers('teeth'), wp)
-      joint%coefficients = joint%coefficients / joint%coefficients(1)
-    end if
-    if (gear%flag('internal')) joint%coefficients(2) = -joint%coefficients(2)
-    joint%members = [character(len=7) :: '', '']
-  end subroutine read_gear
-
-  !> Willis' equation z_s omega_s + z_r omega_r - (z_s + z_r) omega_c = 0, scaled so that the multiplier is the torque on the sun.
-  subroutine read_planetary(planetary, body_index, joint)
-    type(group_t), intent(in) :: planetary
-    type(body_index_t), intent(in) :: body_index
-    type(joint_t), intent(inout) :: joint
-
-    joint%bodies = [bodies_of(planetary, 'sun', body_index), bodies_of(planetary, 'ring', body_index), &
-                    bodies_of(planetary, 'carrier', body_index)]
-    associate (teeth => real(planetary%whole_numbers('teeth'), wp))
-      joint%coefficients = [1.0_wp, teeth(2) / teeth(1), -(teeth(1) + teeth(2)) / teeth(1)]
-    end associate
-    joint%members = [character(len=7) :: '', 'ring', 'carrier']
-  end subroutine read_planetary
-
   !> Drops the ground, which has no speed, from the rows. Its torque may still have a column.
   subroutine form_rows(input, view, indices, joints, bodies, lanes, constraints)
     type(input_t), intent(in) :: input
@@ -178,7 +163,8 @@ contains
     type(string_t), allocatable :: kinds(:), names(:), units(:)
     integer, allocatable :: body(:), first(:)
     real(wp), allocatable :: coefficient(:, :)
-    integer :: i, k, next
+    integer :: i, k, m, next
+    type(member_torques_t) :: members
 
     associate (entries => sum([(count(joints(i)%bodies > 0), i=1, size(joints))]))
       allocate (body(entries), coefficient(lanes, entries), first(size(joints) + 1))
@@ -198,7 +184,21 @@ contains
       end do
     end do
     first(size(first)) = next
-    constraints = new_constraints(bodies, names, units, first, body, coefficient, kinds, member_torques(joints, lanes))
+    ! the torques of members that have columns of their own
+    associate (columns => sum([(count(joints(i)%members /= ''), i=1, size(joints))]))
+      allocate (members%names(columns), members%row(columns), members%factor(lanes, columns))
+    end associate
+    m = 0
+    do i = 1, size(joints)
+      do k = 1, size(joints(i)%members)
+        if (joints(i)%members(k) == '') cycle
+        m = m + 1
+        members%names(m)%text = trim(joints(i)%members(k))
+        members%row(m) = i
+        members%factor(:, m) = joints(i)%coefficients(k)
+      end do
+    end do
+    constraints = new_constraints(bodies, names, units, first, body, coefficient, kinds, members)
     do i = 1, size(indices)
       call limit_of_lock(input%groups(indices(i)), view%at, constraints%least(i), constraints%most(i))
     end do
@@ -217,26 +217,5 @@ contains
     most = engagement_at(group, t) * most
     least = -most
   end subroutine limit_of_lock
-
-  !> The torques of members that have columns of their own.
-  type(member_torques_t) function member_torques(joints, lanes) result(members)
-    type(joint_t), intent(in) :: joints(:)
-    integer, intent(in) :: lanes
-    integer :: i, k, m
-
-    associate (columns => sum([(count(joints(i)%members /= ''), i=1, size(joints))]))
-      allocate (members%names(columns), members%row(columns), members%factor(lanes, columns))
-    end associate
-    m = 0
-    do i = 1, size(joints)
-      do k = 1, size(joints(i)%members)
-        if (joints(i)%members(k) == '') cycle
-        m = m + 1
-        members%names(m)%text = trim(joints(i)%members(k))
-        members%row(m) = i
-        members%factor(:, m) = joints(i)%coefficients(k)
-      end do
-    end do
-  end function member_torques
 
 end module nocdyn_constraint_assembly

@@ -156,9 +156,17 @@ contains
     real(wp) :: free(size(complement, 2), size(complement, 2)), speed(size(bodies))
     type(string_t), allocatable :: changes(:), left_open(:)
     character(len=:), allocatable :: text
-    integer :: i
+    integer :: i, k
 
-    free = free_motions(known)
+    ! projection on the motions that do not change the known combinations, [coordinates, coordinates]
+    free = 0.0_wp
+    do i = 1, size(free, 1)
+      free(i, i) = 1.0_wp
+      do k = 1, known%count
+        free(:, i) = free(:, i) - known%orthonormal(i, k) * known%orthonormal(:, k)
+      end do
+    end do
+    if (known%count == size(free, 1)) free = 0.0_wp
     speed = matmul(complement, smallest_speeds(complement, known, free))
     allocate (changes(0), left_open(0))
     do i = 1, size(bodies)
@@ -186,22 +194,6 @@ contains
                                        ': the smallest ones that fit are taken')
     end if
   end subroutine set_speeds
-
-  !> Projection on the motions that do not change the known combinations, [coordinates, coordinates].
-  pure function free_motions(known) result(free)
-    type(known_t), intent(in) :: known
-    real(wp) :: free(size(known%value), size(known%value))
-    integer :: i, k
-
-    free = 0.0_wp
-    do i = 1, size(free, 1)
-      free(i, i) = 1.0_wp
-      do k = 1, known%count
-        free(:, i) = free(:, i) - known%orthonormal(i, k) * known%orthonormal(:, k)
-      end do
-    end do
-    if (known%count == size(free, 1)) free = 0.0_wp
-  end function free_motions
 
   !> Speeds of the coordinates with the known combinations, and the smallest speeds of the bodies [rad/s], [coordinates].
   function smallest_speeds(complement, known, free) result(speeds)

@@ -17,6 +17,7 @@ contains
     type(input_t), intent(in) :: input
     type(string_t), allocatable, intent(inout) :: notes(:)
     integer :: i
+    logical :: is_connected
 
     associate (run => input%groups(input%position('run')))
       do i = 1, size(input%groups)
@@ -30,16 +31,19 @@ contains
             if (.not. transmits(group)) call append(notes, 'coupling ' // quoted(group%name) // ' transmits nothing: it has ' // &
               'no stiffness, table, damping or friction')
           case ('drive')
-            if (.not. has_motion(group)) call append(notes, 'drive ' // quoted(group%name) // ' has neither a speed, a ' // &
-              'table nor an amplitude: it holds its body still, as speed = 0 does')
+            if (.not. (group%is_given('speed') .or. group%has_value('table_time') .or. group%has_value('speed_amplitude') .or. &
+                group%has_value('angle_amplitude'))) call append(notes, 'drive ' // quoted(group%name) // &
+                ' has neither a speed, a ' // 'table nor an amplitude: it holds its body still, as speed = 0 does')
           case ('excitation')
             associate (begin => group%number('start', absent=group%number('time', absent=run%number('t_start'))))
               if (begin >= run%number('t_end')) call append(notes, 'excitation ' // quoted(group%name) // &
                 ' has no torque in the run: it begins at t = ' // to_text(begin) // ' s')
             end associate
           case ('motor')
-            if (.not. is_connected(group, run%number('t_end'))) call append(notes, 'motor ' // quoted(group%name) // &
-              ' is not connected in the run: its supply begins at t = ' // to_text(first_time(group)) // ' s')
+            is_connected = .not. group%has_value('supply_times')
+            if (.not. is_connected) is_connected = first_time(group) < run%number('t_end')
+            if (.not. is_connected) call append(notes, 'motor ' // quoted(group%name) // &
+                ' is not connected in the run: its supply begins at t = ' // to_text(first_time(group)) // ' s')
           case default   ! these have no such mistakes
           end select
         end associate
@@ -70,15 +74,6 @@ contains
     engages = any([(engagement_at(group, looked_at(i)) > 0, i=1, size(looked_at))])
   end function engages
 
-  !> Whether the supply of a motor begins before the end of the run.
-  logical function is_connected(group, t_end)
-    type(group_t), intent(in) :: group   !! &motor
-    real(wp), intent(in) :: t_end        !! [s]
-
-    is_connected = .not. group%has_value('supply_times')
-    if (.not. is_connected) is_connected = first_time(group) < t_end
-  end function is_connected
-
   !> When the supply of a motor changes first [s].
   real(wp) function first_time(group)
     type(group_t), intent(in) :: group   !! &motor with supply_times
@@ -87,13 +82,5 @@ contains
     allocate (times, source=group%numbers('supply_times'))
     first_time = times(1)
   end function first_time
-
-  !> Whether a drive has keys of a motion.
-  pure logical function has_motion(group)
-    type(group_t), intent(in) :: group   !! &drive
-
-    has_motion = group%is_given('speed') .or. group%has_value('table_time') .or. group%has_value('speed_amplitude') .or. &
-                 group%has_value('angle_amplitude')
-  end function has_motion
 
 end module nocdyn_idle_notes

@@ -34,11 +34,12 @@ contains
     integer, intent(in) :: unit             !! of speeds in messages: index of `units`, 0: rad/s
     integer, intent(out) :: offending_row   !! first violated row, 0 if there is no error
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: nearest(machine%bodies)
+    real(wp) :: nearest(machine%bodies), residual, scale
     integer, allocatable :: groups(:), violated(:)
-    character(len=:), allocatable :: message
-    integer :: g
+    character(len=:), allocatable :: message, row
+    integer :: b, entry, g, i, last
     logical :: is_consistent
+    integer, allocatable :: others(:)   ! bodies with another speed
 
     offending_row = 0
     allocate (violated, source=violated_rows(machine))
@@ -56,7 +57,33 @@ contains
       call project_start(nearest, machine)
     else
       offending_row = violated(1)
-      call describe_violation(machine, violated, nearest, unit, message)
+      ! "the start speeds violate this gear: 2 * 1 rad/s ('pinion') + ... = 2, which must be 0; nearest speeds that ...".
+      call machine%constraints%residual(1, violated(1), machine%start_speed(1, :), residual, scale)
+      ! The left-hand side of a row with the start speeds in it, e.g. "2 * 1 rad/s ('pinion') + 3 * 0 rad/s ('machine')".
+      row = ''
+      associate (rows => machine%constraints)
+        last = min(rows%first(violated(1) + 1) - 1, rows%first(violated(1)) + most_bodies - 1)
+        do entry = rows%first(violated(1)), last
+          if (entry > rows%first(violated(1))) row = row // ' + '
+          row = row // to_text(rows%coefficient(1, entry)) // ' * ' // &
+                 speed_text(machine%start_speed(1, rows%body(entry)), unit, digits) // ' (' // &
+                 quoted(machine%names(rows%body(entry))%text) // ')'
+        end do
+        if (last < rows%first(violated(1) + 1) - 1) row = row // ' + ' // to_text(rows%first(violated(1) + 1) - 1 - last) // &
+            ' more terms'
+      end associate
+      message = 'the start speeds violate it: ' // row // ' = ' // rounded_text(from_si(residual, unit), 6) // &
+             ', which must be 0'
+      if (size(violated) > 1) message = message // ' (and ' // to_text(size(violated) - 1) // ' more)'
+      message = message // '; nearest speeds that fit:'
+      others = pack([(b, b=1, machine%bodies)], abs(nearest - machine%start_speed(1, :)) > speed_tolerance * abs(nearest))
+      do i = 1, min(size(others), most_bodies)
+        if (i > 1) message = message // ','
+        message = message // ' ' // speed_text(nearest(others(i)), unit, digits) // ' (' // &
+                  quoted(machine%names(others(i))%text) // ')'
+      end do
+      if (size(others) > most_bodies) message = message // ' and ' // to_text(size(others) - most_bodies) // ' more'
+      message = message // '; &run start = ' // quoted('projected') // ' takes them'
       call raise(error, exit_input, message)
     end if
   end subroutine fit_start_speeds
@@ -125,53 +152,5 @@ contains
     machine%start_impulse%energy_lost = 0.5_wp * sum(machine%inertia(1, :) * change**2)
     machine%start_speed(:, :) = spread(nearest, 1, machine%lanes)
   end subroutine project_start
-
-  !> "the start speeds violate this gear: 2 * 1 rad/s ('pinion') + ... = 2, which must be 0; nearest speeds that ...".
-  subroutine describe_violation(machine, violated, nearest, unit, text)
-    type(machine_t), intent(in) :: machine
-    integer, intent(in) :: violated(:)   !! rows
-    real(wp), intent(in) :: nearest(:)   !! [bodies] [rad/s]
-    integer, intent(in) :: unit          !! as in `fit_start_speeds`
-    character(len=:), allocatable, intent(out) :: text
-    character(len=:), allocatable :: row
-    real(wp) :: residual, scale
-    integer, allocatable :: others(:)   ! bodies with another speed
-    integer :: b, i
-
-    call machine%constraints%residual(1, violated(1), machine%start_speed(1, :), residual, scale)
-    call describe_row(machine, violated(1), unit, row)
-    text = 'the start speeds violate it: ' // row // ' = ' // rounded_text(from_si(residual, unit), 6) // &
-           ', which must be 0'
-    if (size(violated) > 1) text = text // ' (and ' // to_text(size(violated) - 1) // ' more)'
-    text = text // '; nearest speeds that fit:'
-    others = pack([(b, b=1, machine%bodies)], abs(nearest - machine%start_speed(1, :)) > speed_tolerance * abs(nearest))
-    do i = 1, min(size(others), most_bodies)
-      if (i > 1) text = text // ','
-      text = text // ' ' // speed_text(nearest(others(i)), unit, digits) // ' (' // quoted(machine%names(others(i))%text) // ')'
-    end do
-    if (size(others) > most_bodies) text = text // ' and ' // to_text(size(others) - most_bodies) // ' more'
-    text = text // '; &run start = ' // quoted('projected') // ' takes them'
-  end subroutine describe_violation
-
-  !> The left-hand side of a row with the start speeds in it, e.g. "2 * 1 rad/s ('pinion') + 3 * 0 rad/s ('machine')".
-  subroutine describe_row(machine, row, unit, text)
-    type(machine_t), intent(in) :: machine
-    integer, intent(in) :: row
-    integer, intent(in) :: unit   !! as in `fit_start_speeds`
-    character(len=:), allocatable, intent(out) :: text
-    integer :: entry, last
-
-    text = ''
-    associate (rows => machine%constraints)
-      last = min(rows%first(row + 1) - 1, rows%first(row) + most_bodies - 1)
-      do entry = rows%first(row), last
-        if (entry > rows%first(row)) text = text // ' + '
-        text = text // to_text(rows%coefficient(1, entry)) // ' * ' // &
-               speed_text(machine%start_speed(1, rows%body(entry)), unit, digits) // ' (' // &
-               quoted(machine%names(rows%body(entry))%text) // ')'
-      end do
-      if (last < rows%first(row + 1) - 1) text = text // ' + ' // to_text(rows%first(row + 1) - 1 - last) // ' more terms'
-    end associate
-  end subroutine describe_row
 
 end module nocdyn_start_speeds

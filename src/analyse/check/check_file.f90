@@ -22,7 +22,9 @@ contains
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
     type(string_t), allocatable :: notes(:)
-    integer :: i
+    integer :: b, c, e, i
+    integer, allocatable :: entries(:), groups(:)
+    real(wp), allocatable :: ratios(:)
 
     allocate (notes, source=machine_notes(machine))
     do i = 1, size(machine%simplifications)
@@ -33,25 +35,8 @@ contains
     call json%put('degrees_of_freedom', machine%freedoms())
     call json%put('independent', selected(machine%names, named_coordinates(machine)))
     call json%put('notes', notes)
-    call put_bodies(json, input, machine)
-    call put_couplings(json, machine)
-    call put_shafts(json, input, machine)
-    call put_constraints(json, machine)
-    call put_load_cases(json, input)
-    call json%put('complete_input', input_text(input))
-    call json%close()
-  end subroutine put_check
-
-  !> The bodies of the input: their inertias there and with the ends of shafts, their speeds at the start, and these as a sum of
-  !> ratios times the speeds of independent bodies.
-  subroutine put_bodies(json, input, machine)
-    type(json_t), intent(inout) :: json
-    type(input_t), intent(in) :: input
-    type(machine_t), intent(in) :: machine
-    integer, allocatable :: entries(:), groups(:)
-    real(wp), allocatable :: ratios(:)
-    integer :: b, e
-
+    ! The bodies of the input: their inertias there and with the ends of shafts, their speeds at the start, and these as a sum of
+    ! ratios times the speeds of independent bodies.
     allocate (groups, source=input%groups_named('body'))
     call json%open_list('bodies')
     associate (map => machine%coordinates)
@@ -72,7 +57,23 @@ contains
       end do
     end associate
     call json%close_list()
-  end subroutine put_bodies
+    call put_couplings(json, machine)
+    call put_shafts(json, input, machine)
+    call put_constraints(json, machine)
+    if (allocated(input%load_cases)) then
+      call json%open_list('load_cases')
+      do c = 1, size(input%load_cases)
+        call json%open()
+        call json%put('name', input%load_cases(c)%name)
+        call json%put('title', input%load_cases(c)%title)
+        call json%put('repeats', input%load_cases(c)%repeats)
+        call json%close()
+      end do
+      call json%close_list()
+    end if
+    call json%put('complete_input', input_text(input))
+    call json%close()
+  end subroutine put_check
 
   !> The ratio of the speed of the independent body of a coordinate to this: 1 with the natural complement.
   pure real(wp) function own_ratio(machine, coordinate) result(ratio)
@@ -109,22 +110,5 @@ contains
     end associate
     call json%close_list()
   end subroutine put_constraints
-
-  subroutine put_load_cases(json, input)
-    type(json_t), intent(inout) :: json
-    type(input_t), intent(in) :: input
-    integer :: c
-
-    if (.not. allocated(input%load_cases)) return
-    call json%open_list('load_cases')
-    do c = 1, size(input%load_cases)
-      call json%open()
-      call json%put('name', input%load_cases(c)%name)
-      call json%put('title', input%load_cases(c)%title)
-      call json%put('repeats', input%load_cases(c)%repeats)
-      call json%close()
-    end do
-    call json%close_list()
-  end subroutine put_load_cases
 
 end module nocdyn_check_file

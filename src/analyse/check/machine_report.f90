@@ -24,10 +24,22 @@ contains
     type(machine_t), intent(in) :: machine
     type(string_t), allocatable :: notes(:)
     integer :: i
+    character(len=:), allocatable :: text
 
     allocate (notes(0))
     call add_redundancy_notes(machine, notes)
-    if (allocated(machine%start_impulse)) call add_impulse_note(machine, notes)
+    if (allocated(machine%start_impulse)) then
+      text = 'the start speeds were projected onto the constraints: impulse'
+      associate (impulse => machine%start_impulse)
+        do i = 1, min(size(impulse%row), max_names)
+          if (i > 1) text = text // ','
+          text = text // ' ' // rounded_text(impulse%impulse(i), 7) // ' ' // machine%constraints%units(impulse%row(i))%text // &
+                 ' s in ' // label(machine, impulse%row(i))
+        end do
+        if (size(impulse%row) > max_names) text = text // ' and ' // to_text(size(impulse%row) - max_names) // ' more'
+        call append(notes, text // '; kinetic energy lost: ' // rounded_text(impulse%energy_lost, 7) // ' J')
+      end associate
+    end if
     call add_loose_note(machine, notes)
     call add_self_locking_notes(machine, notes)
     if (.not. allocated(machine%start_notes)) return
@@ -109,24 +121,6 @@ contains
     end select
   end function reaction_word
 
-  subroutine add_impulse_note(machine, notes)
-    type(machine_t), intent(in) :: machine
-    type(string_t), allocatable, intent(inout) :: notes(:)
-    character(len=:), allocatable :: text
-    integer :: i
-
-    text = 'the start speeds were projected onto the constraints: impulse'
-    associate (impulse => machine%start_impulse)
-      do i = 1, min(size(impulse%row), max_names)
-        if (i > 1) text = text // ','
-        text = text // ' ' // rounded_text(impulse%impulse(i), 7) // ' ' // machine%constraints%units(impulse%row(i))%text // &
-               ' s in ' // label(machine, impulse%row(i))
-      end do
-      if (size(impulse%row) > max_names) text = text // ' and ' // to_text(size(impulse%row) - max_names) // ' more'
-      call append(notes, text // '; kinetic energy lost: ' // rounded_text(impulse%energy_lost, 7) // ' J')
-    end associate
-  end subroutine add_impulse_note
-
   !> Appends a note on the bodies that no element and no constraint acts on.
   subroutine add_loose_note(machine, notes)
     type(machine_t), intent(in) :: machine
@@ -165,7 +159,9 @@ contains
                                                'clutch', 'freewheel', 'cardan', 'crank', 'relation', 'drive', 'bearing', 'loss']
     character(len=*), parameter :: always(*) = [character(len=10) :: 'coupling', 'motor', 'load', 'excitation']
     character(len=:), allocatable :: plural
-    integer :: i
+    integer :: b, i
+    logical :: is_coordinate(machine%bodies)
+    integer, allocatable :: others(:)
 
     call report%append(file // ': ' // counted(machine%bodies - machine%nodes, 'body', 'bodies') // counted_constraints(machine))
     do i = 1, size(kinds)
@@ -176,7 +172,14 @@ contains
     call put_line(report, counted(machine%freedoms(), 'degree', 'degrees') // ' of freedom')
     call put_groups(report, machine)
     call put_line(report, 'coordinates: ' // joined(selected(machine%names, named_coordinates(machine)), ', ', max_lines))
-    call put_relations(report, machine)
+    ! appends the speeds of the dependent bodies in terms of the independent ones
+    is_coordinate = .false.
+    is_coordinate(machine%coordinates%body) = .true.
+    others = pack([(b, b=1, machine%bodies)], .not. is_coordinate)
+    do b = 1, min(size(others), max_lines)
+      call put_line(report, speed_relation(machine, others(b)))
+    end do
+    if (size(others) > max_lines) call put_line(report, 'and ' // to_text(size(others) - max_lines) // ' more dependent speeds')
     allocate (notes, source=machine_notes(machine))
     do i = 1, size(notes)
       call put_line(report, 'note: ' // notes(i)%text)
@@ -264,29 +267,12 @@ contains
                   ' others; ratios count as equal within 1e-9 of their size')
   end subroutine put_groups
 
-  !> Appends the speeds of the dependent bodies in terms of the independent ones.
-  subroutine put_relations(report, machine)
-    type(text_buffer_t), intent(inout) :: report
-    type(machine_t), intent(in) :: machine
-    logical :: is_coordinate(machine%bodies)
-    integer, allocatable :: others(:)
-    integer :: b
-
-    is_coordinate = .false.
-    is_coordinate(machine%coordinates%body) = .true.
-    others = pack([(b, b=1, machine%bodies)], .not. is_coordinate)
-    do b = 1, min(size(others), max_lines)
-      call put_line(report, speed_relation(machine, others(b)))
-    end do
-    if (size(others) > max_lines) call put_line(report, 'and ' // to_text(size(others) - max_lines) // ' more dependent speeds')
-  end subroutine put_relations
-
   !> "speed of 'machine' = -0.6666667 * speed of 'pinion'", for a dependent body.
   function speed_relation(machine, body) result(text)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: body
     character(len=:), allocatable :: text
-    real(wp) :: factor, largest
+    real(wp) :: factor, largest, ratio
     integer :: entry, terms
 
     associate (first => machine%coordinates%first(body), last => machine%coordinates%first(body + 1) - 1)
@@ -298,7 +284,12 @@ contains
         terms = terms + 1
         if (terms > max_names) cycle
         associate (independent => machine%coordinates%body(machine%coordinates%coordinate(entry)))
-          factor = machine%coordinates%ratio(1, entry) / own_ratio(machine, independent)
+          ! the ratio of an independent body's speed to its coordinate: 1 with the natural complement
+          associate (map => machine%coordinates, first => machine%coordinates%first(independent), &
+                     last => machine%coordinates%first(independent + 1) - 1)
+            ratio = sum(map%ratio(1, first:last), mask=map%body(map%coordinate(first:last)) == independent)
+          end associate
+          factor = machine%coordinates%ratio(1, entry) / ratio
           if (terms > 1) text = text // trim(merge(' -', ' +', factor < 0.0_wp))
           if (terms > 1) factor = abs(factor)
           text = text // ' ' // rounded_text(factor, 7) // ' * speed of ' // quoted(machine%names(independent)%text)
@@ -308,16 +299,5 @@ contains
       if (terms == 0) text = text // ' 0'
     end associate
   end function speed_relation
-
-  !> The ratio of an independent body's speed to its coordinate: 1 with the natural complement.
-  pure real(wp) function own_ratio(machine, body) result(ratio)
-    type(machine_t), intent(in) :: machine
-    integer, intent(in) :: body
-
-    associate (map => machine%coordinates, first => machine%coordinates%first(body), &
-               last => machine%coordinates%first(body + 1) - 1)
-      ratio = sum(map%ratio(1, first:last), mask=map%body(map%coordinate(first:last)) == body)
-    end associate
-  end function own_ratio
 
 end module nocdyn_machine_report

@@ -41,6 +41,8 @@ contains
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(out) :: error   !! a number is not finite
     type(equations_t) :: equations
+    type(string_t), allocatable :: names(:)
+    integer :: i, role
 
     equations%machine = machine
     call set_start_state(equations%machine, t_start)
@@ -48,8 +50,27 @@ contains
     call equations%report%append_line('Bodies 1 to ' // to_text(machine%bodies) // ': ' // joined(machine%names, ', '))
     call equations%report%append_line('Coordinates: ' // joined(selected(machine%names, machine%coordinates%body), ', '))
     call equations%report%append_line('At the start: t = ' // rounded_text(t_start, digits) // ' s')
-    call report_other_laws(equations)
-    call report_free_bodies(equations)
+    if (.not. all([(equations%machine%banks(i)%bank%has_paper_law, i=1, size(equations%machine%banks))])) then
+      ! lists the elements whose laws are not those of the paper, and says what the matrices contain for them
+      do role = 1, size(role_names)
+        call collect_other_laws(equations%machine, role, names)
+        if (size(names) == 0) cycle
+        call equations%report%append_line('Other laws than those of the paper: ' // trim(role_names(role)) // ' ' // &
+                                          joined(names, ', '))
+      end do
+      call equations%report%append_line('For these K holds the elastic moment divided by the twist, K_4 its derivative, C the')
+      call equations%report%append_line('viscous part, Q the rest, all at the start. Currents and governors are not in beta.')
+    end if
+    ! The bodies before the constraints: eqs. (13)-(22).
+    call equations%put_matrix('(13) J [kg m2]', equations%inertias%inertia)
+    call equations%put_vector('(15) omega [rad/s]', equations%machine%start_speed(1, :))
+    call equations%put_vector('(17) Q_0, excitations [N m]', equations%excitation)
+    call equations%put_vector('(18), (20) Q_m, motors [N m]', equations%motor)
+    call equations%put_vector('K12 * rest twist of the couplings, a further term of Q [N m]', equations%rest)
+    call equations%put_vector('(16) Q [N m]', equations%matrices%torque)
+    call equations%put_vector('(19) phi [rad]', equations%machine%start_angle(1, :))
+    call equations%put_matrix('(21) K, secant stiffness [N m/rad]', equations%matrices%stiffness)
+    call equations%put_matrix('(22) C [N m s/rad]', equations%matrices%damping)
     call report_constraints(equations)
     call report_projection(equations)
     call report_first_order(equations)
@@ -57,23 +78,6 @@ contains
     text = equations%report%text()
     call move_alloc(equations%error, error)
   end subroutine matrix_report
-
-  !> Lists the elements whose laws are not those of the paper, and says what the matrices contain for them.
-  subroutine report_other_laws(equations)
-    type(equations_t), intent(inout) :: equations
-    type(string_t), allocatable :: names(:)
-    integer :: i, role
-
-    if (all([(equations%machine%banks(i)%bank%has_paper_law, i=1, size(equations%machine%banks))])) return
-    do role = 1, size(role_names)
-      call collect_other_laws(equations%machine, role, names)
-      if (size(names) == 0) cycle
-      call equations%report%append_line('Other laws than those of the paper: ' // trim(role_names(role)) // ' ' // &
-                                        joined(names, ', '))
-    end do
-    call equations%report%append_line('For these K holds the elastic moment divided by the twist, K_4 its derivative, C the')
-    call equations%report%append_line('viscous part, Q the rest, all at the start. Currents and governors are not in beta.')
-  end subroutine report_other_laws
 
   subroutine collect_other_laws(machine, role, names)
     type(machine_t), intent(in) :: machine
@@ -127,21 +131,6 @@ contains
       equations%rest = equations%rest + of_phases
     end associate
   end subroutine assemble
-
-  !> The bodies before the constraints: eqs. (13)-(22).
-  subroutine report_free_bodies(equations)
-    type(equations_t), intent(inout) :: equations
-
-    call equations%put_matrix('(13) J [kg m2]', equations%inertias%inertia)
-    call equations%put_vector('(15) omega [rad/s]', equations%machine%start_speed(1, :))
-    call equations%put_vector('(17) Q_0, excitations [N m]', equations%excitation)
-    call equations%put_vector('(18), (20) Q_m, motors [N m]', equations%motor)
-    call equations%put_vector('K12 * rest twist of the couplings, a further term of Q [N m]', equations%rest)
-    call equations%put_vector('(16) Q [N m]', equations%matrices%torque)
-    call equations%put_vector('(19) phi [rad]', equations%machine%start_angle(1, :))
-    call equations%put_matrix('(21) K, secant stiffness [N m/rad]', equations%matrices%stiffness)
-    call equations%put_matrix('(22) C [N m s/rad]', equations%matrices%damping)
-  end subroutine report_free_bodies
 
   !> L_lambda and the complement that follows from it: eqs. (23), (31), (73)-(83).
   subroutine report_constraints(equations)

@@ -138,7 +138,9 @@ contains
         do l = 1, size(response%lines)
           do i = 2, size(points) - 1
             if (square(i, l) < max(square(i - 1, l), square(i + 1, l)) .or. .not. square(i, l) > counts**2 * largest) cycle
-            if (has_undamped(crossings, l, points(i - 1)%state%speed, points(i + 1)%state%speed)) cycle
+            if (any(crossings%line == l .and. crossings%damping_ratio <= undamped .and. &
+                crossings%speed >= min(points(i - 1)%state%speed, points(i + 1)%state%speed) .and. &
+                crossings%speed <= max(points(i - 1)%state%speed, points(i + 1)%state%speed))) cycle
             call add_vertex(points(i - 1:i + 1), square(i - 1:i + 1, l), sqrt(square(i, l) / largest), vertices)
           end do
         end do
@@ -166,16 +168,6 @@ contains
     unrefined = gain(size(gain) - most)
     speeds = pack(vertices%speed(:vertices%count), vertices%gain(:vertices%count) > unrefined)
   end subroutine keep_highest
-
-  !> Whether a mode without damping is crossed between two speeds.
-  pure logical function has_undamped(crossings, line, first, last)
-    type(crossing_t), intent(in) :: crossings(:)
-    integer, intent(in) :: line
-    real(wp), intent(in) :: first, last   !! [rad/s]
-
-    has_undamped = any(crossings%line == line .and. crossings%damping_ratio <= undamped .and. &
-                       crossings%speed >= min(first, last) .and. crossings%speed <= max(first, last))
-  end function has_undamped
 
   !> Adds the vertex of a maximum, unless it is so near that the peak grows by rounding only, or another speed is there.
   subroutine add_vertex(points, amplitude, share, vertices)

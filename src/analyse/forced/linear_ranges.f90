@@ -63,26 +63,21 @@ contains
   pure function curved_elements(machine) result(elements)
     type(machine_t), intent(in) :: machine
     integer, allocatable :: elements(:)
-    integer :: e, i
+    integer :: cubic, e, i
+    logical :: is_curved
 
     allocate (elements(0))
     do i = 1, size(machine%banks)
       associate (bank => machine%banks(i)%bank)
         if (all(bank%role /= [role_coupling, role_load, role_motor]) .or. bank%states > 0) cycle
-        if (.not. is_curved(bank)) cycle
+        is_curved = .not. bank%is_polynomial
+        cubic = bank%number_of('cubic_stiffness')
+        if (cubic > 0) is_curved = is_curved .or. any(abs(bank%parameters(cubic)%value) > 0)
+        if (.not. is_curved) cycle
         elements = [elements, [(e, e=bank%first, bank%last())]]
       end associate
     end do
   end function curved_elements
-
-  pure logical function is_curved(bank)
-    class(bank_t), intent(in) :: bank
-    integer :: cubic
-
-    is_curved = .not. bank%is_polynomial
-    cubic = bank%number_of('cubic_stiffness')
-    if (cubic > 0) is_curved = is_curved .or. any(abs(bank%parameters(cubic)%value) > 0)
-  end function is_curved
 
   !> Compares all elements at one point.
   subroutine compare(response, point, machine, t, share, excursions)

@@ -94,7 +94,13 @@ contains
     terms%frequency = group%number('frequency')
     has_failed = .false.
     if (group%has_value('term_amplitudes')) then
-      call copy_terms(group, terms)
+      ! the given terms
+      terms%amplitude = group%numbers('term_amplitudes')
+      terms%multiple = group%numbers('term_multiples')
+      terms%rate = 0 * terms%amplitude
+      terms%phase = 0 * terms%amplitude
+      if (group%has_value('term_times')) terms%rate = 1 / group%numbers('term_times')
+      if (group%has_value('term_phases')) terms%phase = group%numbers('term_phases')
       return
     end if
     machine%frequency = terms%frequency
@@ -121,19 +127,6 @@ contains
     admittance = 0.0_wp
     if (group%has_value(key)) admittance = 1 / group%number(key)
   end function admittance_of
-
-  !> The given terms.
-  subroutine copy_terms(group, terms)
-    type(group_t), intent(in) :: group
-    type(fault_terms_t), intent(inout) :: terms
-
-    terms%amplitude = group%numbers('term_amplitudes')
-    terms%multiple = group%numbers('term_multiples')
-    terms%rate = 0 * terms%amplitude
-    terms%phase = 0 * terms%amplitude
-    if (group%has_value('term_times')) terms%rate = 1 / group%numbers('term_times')
-    if (group%has_value('term_phases')) terms%phase = group%numbers('term_phases')
-  end subroutine copy_terms
 
   !> 1 / a time constant, 0 if that is not given [1/s].
   pure real(wp) function rate_of(group, key) result(rate)

@@ -50,9 +50,35 @@ contains
     logical, intent(out) :: has_failed               !! the equations cannot be solved in floating point
     type(flux_model_t) :: model
     complex(wp), allocatable :: current(:, :), flux(:, :), value(:)
+    integer :: k, z
 
     if (fault == 'two_phase') then
-      model = two_phase_model(machine)
+      ! No current in axis 1, no voltage in axis 2 of the stator's frame, from the zero of the voltage of axis 2 on, where the
+      ! torque is largest. The first states are the flux of no load.
+      model = empty_model(size(machine%share))
+      model%start(driving + 2) = 1.0_wp
+      model%start(stator + 2) = 1.0_wp
+      call turn(model%matrix, driving, machine%frequency)
+      model%flux(1, driving + 1) = 1.0_wp
+      model%flux(2, stator + 2) = 1.0_wp
+      model%current(2, stator + 2) = 1.0_wp / machine%reactance
+      model%current(2, driving + 2) = -1.0_wp / machine%reactance
+      do k = 1, size(machine%share)
+        z = rotor + 2 * (k - 1)
+        model%flux(1, z + 1) = machine%reactance * machine%share(k)
+        model%current(2, z + 2) = -machine%share(k)
+      end do
+      model%matrix(stator + 2, :) = -machine%stator_rate * machine%reactance * model%current(2, :)
+      do k = 1, size(machine%share)
+        z = rotor + 2 * (k - 1)
+        model%matrix(z + 1, :) = machine%rate(k) * model%flux(1, :)
+        model%matrix(z + 1, driving + 1) = 0.0_wp   ! the change of the flux, without that of no load
+        model%matrix(z + 2, stator + 2) = machine%rate(k)
+        model%matrix(z + 2, driving + 2) = -machine%rate(k)
+        model%matrix(z + 1, z + 1) = model%matrix(z + 1, z + 1) - machine%rate(k)
+        model%matrix(z + 2, z + 2) = model%matrix(z + 2, z + 2) - machine%rate(k)
+        call turn(model%matrix, z, machine%frequency)
+      end do
     else if (fault == 'three_phase') then
       model = three_phase_model(machine, [0.0_wp, 0.0_wp])
     else
@@ -93,39 +119,6 @@ contains
       row = row + machine%frequency * [-network(2), network(1)]
     end associate
   end function three_phase_model
-
-  !> No current in axis 1, no voltage in axis 2 of the stator's frame, from the zero of the voltage of axis 2 on, where the torque
-  !> is largest. The first states are the flux of no load.
-  pure function two_phase_model(machine) result(model)
-    type(fault_machine_t), intent(in) :: machine
-    type(flux_model_t) :: model
-    integer :: k, z
-
-    model = empty_model(size(machine%share))
-    model%start(driving + 2) = 1.0_wp
-    model%start(stator + 2) = 1.0_wp
-    call turn(model%matrix, driving, machine%frequency)
-    model%flux(1, driving + 1) = 1.0_wp
-    model%flux(2, stator + 2) = 1.0_wp
-    model%current(2, stator + 2) = 1.0_wp / machine%reactance
-    model%current(2, driving + 2) = -1.0_wp / machine%reactance
-    do k = 1, size(machine%share)
-      z = rotor + 2 * (k - 1)
-      model%flux(1, z + 1) = machine%reactance * machine%share(k)
-      model%current(2, z + 2) = -machine%share(k)
-    end do
-    model%matrix(stator + 2, :) = -machine%stator_rate * machine%reactance * model%current(2, :)
-    do k = 1, size(machine%share)
-      z = rotor + 2 * (k - 1)
-      model%matrix(z + 1, :) = machine%rate(k) * model%flux(1, :)
-      model%matrix(z + 1, driving + 1) = 0.0_wp   ! the change of the flux, without that of no load
-      model%matrix(z + 2, stator + 2) = machine%rate(k)
-      model%matrix(z + 2, driving + 2) = -machine%rate(k)
-      model%matrix(z + 1, z + 1) = model%matrix(z + 1, z + 1) - machine%rate(k)
-      model%matrix(z + 2, z + 2) = model%matrix(z + 2, z + 2) - machine%rate(k)
-      call turn(model%matrix, z, machine%frequency)
-    end do
-  end function two_phase_model
 
   pure function empty_model(circuits) result(model)
     integer, intent(in) :: circuits

@@ -239,7 +239,9 @@ contains
     complex(wp), intent(in) :: stiffness(:)
     complex(wp), intent(out) :: band(n)
     real(wp), intent(inout) :: scale(:)   !! of the moments that are unknowns
+    real(wp), parameter :: above = 4.0_wp
     integer :: e, k
+    real(wp) :: moment_scale
 
     band = (0.0_wp, 0.0_wp)
     do e = 1, size(stiffness)
@@ -253,46 +255,26 @@ contains
     end do
     do e = 1, size(stiffness)
       if (self%unknown(e) == 0) cycle
-      scale(e) = moment_scale(self, e, band)
-      call fill_moment(self, e, scale(e), stiffness(e), band)
-    end do
-  end subroutine fill
-
-  !> A power of two above the entries beside a moment: the pivots are those of rigid rows, whose sums around a ring are exact.
-  pure real(wp) function moment_scale(self, element, band) result(scale)
-    class(dynamic_stiffness_t), intent(in) :: self
-    integer, intent(in) :: element
-    complex(wp), intent(in) :: band(:)   !! with the other stiffnesses and the masses
-    real(wp), parameter :: above = 4.0_wp
-    integer :: k
-
-    scale = tiny(1.0_wp)
-    do k = self%incidence%first(element), self%incidence%first(element + 1) - 1
-      associate (diagonal => (3 * self%width + 1) * (self%position(self%incidence%coordinate(k)) - 1) + 2 * self%width + 1)
-        scale = max(scale, abs(band(diagonal)) / abs(self%incidence%ratio(1, k)))
+      ! A power of two above the entries beside a moment: the pivots are those of rigid rows, whose sums around a ring are exact
+      moment_scale = tiny(1.0_wp)
+      do k = self%incidence%first(e), self%incidence%first(e + 1) - 1
+        associate (diagonal => (3 * self%width + 1) * (self%position(self%incidence%coordinate(k)) - 1) + 2 * self%width + 1)
+          moment_scale = max(moment_scale, abs(band(diagonal)) / abs(self%incidence%ratio(1, k)))
+        end associate
+      end do
+      moment_scale = 2.0_wp**exponent(above * moment_scale)
+      scale(e) = moment_scale
+      ! The column and the row of a moment m = scale * unknown, both times the scale. Without stiffness the moment is zero.
+      associate (first => self%stiffness%first(e), last => self%stiffness%first(e + 1) - 1)
+        do k = first, last - 1
+          if (2 * (k - first) >= last - first .and. .not. abs(stiffness(e)) > 0) cycle
+          band(self%stiffness%place(k)) = band(self%stiffness%place(k)) + self%stiffness%value(k) * scale(e)
+        end do
+        band(self%stiffness%place(last)) = scale(e)
+        if (abs(stiffness(e)) > 0) band(self%stiffness%place(last)) = -scale(e) * (scale(e) / stiffness(e))
       end associate
     end do
-    scale = 2.0_wp**exponent(above * scale)
-  end function moment_scale
-
-  !> The column and the row of a moment m = scale * unknown, both times the scale. Without stiffness the moment is zero.
-  pure subroutine fill_moment(self, element, scale, stiffness, band)
-    class(dynamic_stiffness_t), intent(in) :: self
-    integer, intent(in) :: element
-    real(wp), intent(in) :: scale           !! [N m]
-    complex(wp), intent(in) :: stiffness    !! [N m/rad]
-    complex(wp), intent(inout) :: band(:)
-    integer :: k
-
-    associate (first => self%stiffness%first(element), last => self%stiffness%first(element + 1) - 1)
-      do k = first, last - 1
-        if (2 * (k - first) >= last - first .and. .not. abs(stiffness) > 0) cycle
-        band(self%stiffness%place(k)) = band(self%stiffness%place(k)) + self%stiffness%value(k) * scale
-      end do
-      band(self%stiffness%place(last)) = scale
-      if (abs(stiffness) > 0) band(self%stiffness%place(last)) = -scale * (scale / stiffness)
-    end associate
-  end subroutine fill_moment
+  end subroutine fill
 
   !> Adds a twist in series with an element to the forces `work%x`, after `factor`.
   pure subroutine add_twist(self, element, stiffness, twist, work)

@@ -28,7 +28,7 @@ contains
     complex(wp), allocatable :: left(:, :), values(:), vectors(:, :)
     integer, allocatable :: kept(:)
     real(wp), parameter :: small = 1.0e-6_wp   ! of a value, or of the lowest natural frequency: more is no rounding
-    integer :: i, states
+    integer :: i, internal, states
     logical :: has_failed, has_loss
 
     states = size(linear%matrix, 1)
@@ -54,7 +54,14 @@ contains
     allocate (self%internal(size(kept)), source=0)
     if (.not. has_internal(linear)) return
     do i = 1, size(kept)
-      self%internal(i) = internal_of(linear, left(:, kept(i)) * vectors(:, kept(i)))
+      ! Which internal state a mode is, if they take part more than the motion does; else 0. Participation factors, products of
+      ! left and right eigenvectors, compare states of different units.
+      internal = 0
+      associate (shares => abs((left(:, kept(i)) * vectors(:, kept(i)))), mechanical => size(linear%natural) + &
+        size(linear%flexible))
+        if (sum(shares(mechanical + 1:)) > sum(shares(:mechanical))) internal = maxloc(shares(mechanical + 1:), dim=1)
+      end associate
+      self%internal(i) = internal
     end do
   end subroutine find_eigenpairs
 
@@ -63,18 +70,6 @@ contains
 
     has_internal = size(linear%matrix, 1) > size(linear%natural) + size(linear%flexible)
   end function has_internal
-
-  !> Which internal state a mode is, if they take part more than the motion does; else 0. Participation factors, products of left
-  !> and right eigenvectors, compare states of different units.
-  pure integer function internal_of(linear, participation) result(internal)
-    type(linearisation_t), intent(in) :: linear
-    complex(wp), intent(in) :: participation(:)   !! [first-order states]
-
-    internal = 0
-    associate (shares => abs(participation), mechanical => size(linear%natural) + size(linear%flexible))
-      if (sum(shares(mechanical + 1:)) > sum(shares(:mechanical))) internal = maxloc(shares(mechanical + 1:), dim=1)
-    end associate
-  end function internal_of
 
   !> Moves oscillations of the first-order matrix to where the relative damping is that at their own frequencies. With the right
   !> and left eigenvectors v and u and the change D of the matrix, one is x = v_i + sum of v_j u_j^H D x / (value - value_j), with

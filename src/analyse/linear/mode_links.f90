@@ -20,12 +20,28 @@ contains
     type(mode_pairs_t), intent(in) :: a, b
     integer, allocatable, intent(out) :: link(:)   !! mode of `b` of each mode of `a`, or 0
     logical, intent(out) :: are_clear              !! whether no other links come into question
+    real(wp), parameter :: near = 0.5_wp   ! relative
     real(wp), parameter :: certain = 0.6_wp, doubtful = 0.25_wp, worst = 0.05_wp
     real(wp), allocatable :: likeness(:, :)
-    integer :: best(2), k, m
+    integer :: best(2), k, m, n, i
     real(wp), allocatable :: left(:, :)
+    complex(wp), dimension(size(a%value), size(b%value)) :: by_damping, by_loss, by_mass
+    real(wp) :: damping(size(a%twist, 1)), loss(size(a%twist, 1))
 
-    call compare(machine, a, b, likeness)
+    ! squares of the products of all modes, 1 for the same ones
+    damping = 0.5_wp * (a%slopes%damping + b%slopes%damping)
+    loss = 0.5_wp * (a%slopes%loss + b%slopes%loss)
+    by_damping = products(damping, a%twist, b%twist)
+    by_loss = products(loss, a%twist, b%twist)
+    by_mass = products(machine%inertia(1, :), a%angle, b%angle)
+    do i = 1, size(b%value)
+      do m = 1, size(a%value)
+        by_mass(m, i) = by_damping(m, i) + 2.0_wp * by_loss(m, i) / (aimag(a%value(m)) + aimag(b%value(i))) &
+                        + (a%value(m) + b%value(i)) * by_mass(m, i)
+      end do
+    end do
+    call subtract_delays(machine, a, b, by_mass)
+    allocate (likeness, source=real(by_mass, wp)**2 + aimag(by_mass)**2)
     allocate (link(size(a%value)), source=0)
     left = likeness
     do k = 1, min(size(a%value), size(b%value))
@@ -35,7 +51,13 @@ contains
       left(best(1), :) = -1.0_wp
       left(:, best(2)) = -1.0_wp
     end do
-    call link_internal(a, b, link)
+    ! modes without motion, of currents or fluxes, by their eigenvalues
+    do m = 1, size(link)
+      if (link(m) > 0 .or. a%internal(m) == 0 .or. size(b%value) == 0) cycle
+      n = minloc(abs(b%value - a%value(m)), dim=1, mask=[(all(link /= n), n=1, size(b%value))])
+      if (n == 0) cycle
+      if (abs(b%value(n) - a%value(m)) <= near * abs(a%value(m))) link(m) = n
+    end do
     are_clear = size(a%value) == size(b%value) .and. all(link > 0)
     if (.not. are_clear) return
     do m = 1, size(link)
@@ -75,45 +97,6 @@ contains
 
     are_same = abs(pairs%value - pairs%value(mode)) <= same * abs(pairs%value(mode))
   end function are_same
-
-  !> Modes without motion, of currents or fluxes, by their eigenvalues.
-  pure subroutine link_internal(a, b, link)
-    type(mode_pairs_t), intent(in) :: a, b
-    integer, intent(inout) :: link(:)
-    real(wp), parameter :: near = 0.5_wp   ! relative
-    integer :: m, n
-
-    do m = 1, size(link)
-      if (link(m) > 0 .or. a%internal(m) == 0 .or. size(b%value) == 0) cycle
-      n = minloc(abs(b%value - a%value(m)), dim=1, mask=[(all(link /= n), n=1, size(b%value))])
-      if (n == 0) cycle
-      if (abs(b%value(n) - a%value(m)) <= near * abs(a%value(m))) link(m) = n
-    end do
-  end subroutine link_internal
-
-  !> Squares of the products of all modes, 1 for the same ones.
-  subroutine compare(machine, a, b, likeness)
-    type(machine_t), intent(in) :: machine
-    type(mode_pairs_t), intent(in) :: a, b
-    real(wp), allocatable, intent(out) :: likeness(:, :)   !! [modes of a, modes of b]
-    complex(wp), dimension(size(a%value), size(b%value)) :: by_damping, by_loss, by_mass
-    integer :: m, n
-    real(wp) :: damping(size(a%twist, 1)), loss(size(a%twist, 1))
-
-    damping = 0.5_wp * (a%slopes%damping + b%slopes%damping)
-    loss = 0.5_wp * (a%slopes%loss + b%slopes%loss)
-    by_damping = products(damping, a%twist, b%twist)
-    by_loss = products(loss, a%twist, b%twist)
-    by_mass = products(machine%inertia(1, :), a%angle, b%angle)
-    do n = 1, size(b%value)
-      do m = 1, size(a%value)
-        by_mass(m, n) = by_damping(m, n) + 2.0_wp * by_loss(m, n) / (aimag(a%value(m)) + aimag(b%value(n))) &
-                        + (a%value(m) + b%value(n)) * by_mass(m, n)
-      end do
-    end do
-    call subtract_delays(machine, a, b, by_mass)
-    likeness = real(by_mass, wp)**2 + aimag(by_mass)**2
-  end subroutine compare
 
   pure function products(weight, x, y)
     real(wp), intent(in) :: weight(:)

@@ -46,10 +46,12 @@ contains
     type(mode_pairs_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
     type(mode_pairs_t), intent(in), optional :: known   !! whose undamped modes serve again if the stiffnesses are the same
+    real(wp), parameter :: least = 0.05_wp   ! of the kinetic energy
     type(eigenpairs_t) :: pairs
     integer, allocatable :: kept(:)
     type(band_work_t) :: work
     integer :: m
+    real(wp) :: divergence, elastic
 
     self%slopes = slopes
     self%highest = highest
@@ -62,7 +64,17 @@ contains
     kept = kept(ascending(aimag(pairs%value(kept))))
     call set_sizes(machine, matrix, size(kept), self)
     self%internal = pairs%internal(kept)
-    self%divergence = divergence_of(self%linear, pairs)
+    ! The growth of what does not oscillate, by a negative stiffness or a strong negative damping: of positive real eigenvalues
+    ! whose motion has elastic energy. A motion of the whole machine is held.
+    divergence = min(0.0_wp, minval(self%linear%natural))
+    do m = 1, size(pairs%value)
+      if (aimag(pairs%value(m)) > 0 .or. .not. real(pairs%value(m), wp) > 0 .or. pairs%internal(m) > 0) cycle
+      associate (n => size(self%linear%natural))
+        elastic = sum(abs(pairs%vector(n + 1:n + size(self%linear%flexible), m))**2)
+        if (elastic > least * sum(abs(pairs%vector(:n, m))**2)) divergence = min(divergence, -real(pairs%value(m), wp))
+      end associate
+    end do
+    self%divergence = divergence
     work = new_band_work(matrix)
     do m = 1, size(kept)
       self%value(m) = pairs%value(kept(m))
@@ -145,25 +157,6 @@ contains
     allocate (self%value(modes), self%undamped(modes), self%x(matrix%coordinates, modes), &
               self%twist(size(self%slopes%stiffness), modes), self%angle(machine%bodies, modes))
   end subroutine set_sizes
-
-  !> The growth of what does not oscillate, by a negative stiffness or a strong negative damping: of positive real eigenvalues
-  !> whose motion has elastic energy. A motion of the whole machine is held.
-  pure real(wp) function divergence_of(linear, pairs) result(divergence)
-    type(linearisation_t), intent(in) :: linear
-    type(eigenpairs_t), intent(in) :: pairs
-    real(wp), parameter :: least = 0.05_wp   ! of the kinetic energy
-    integer :: m
-    real(wp) :: elastic
-
-    divergence = min(0.0_wp, minval(linear%natural))
-    do m = 1, size(pairs%value)
-      if (aimag(pairs%value(m)) > 0 .or. .not. real(pairs%value(m), wp) > 0 .or. pairs%internal(m) > 0) cycle
-      associate (n => size(linear%natural))
-        elastic = sum(abs(pairs%vector(n + 1:n + size(linear%flexible), m))**2)
-        if (elastic > least * sum(abs(pairs%vector(:n, m))**2)) divergence = min(divergence, -real(pairs%value(m), wp))
-      end associate
-    end do
-  end function divergence_of
 
   pure function ascending(values) result(order)
     real(wp), intent(in) :: values(:)

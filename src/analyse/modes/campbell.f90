@@ -106,13 +106,24 @@ contains
     real(wp), intent(out) :: failed_speed
     integer, parameter :: rounds = 3
     real(wp), allocatable :: more(:)
-    integer :: round
+    integer :: l, round
 
     failed_speed = self%settings%speeds(1)
     do round = 1, rounds
       call new_speed_modes(self%response, self%modes, error)
       if (allocated(error)) return
-      call set_frequencies(self)
+      ! sets the arrays over all points
+      self%speed = self%response%speeds()
+      self%is_of_grid = self%response%points%is_of_grid
+      if (size(self%response%lines) > 0) then
+        self%frequency = self%response%frequencies()
+      else
+        if (allocated(self%frequency)) deallocate (self%frequency)
+        allocate (self%frequency(size(self%order), size(self%speed)))
+        do l = 1, size(self%order)
+          self%frequency(l, :) = self%order(l) * abs(self%speed)
+        end do
+      end if
       call find_crossings(self%speed, self%frequency, self%modes, self%crossings)
       if (self%modes%is_constant .or. round == rounds .or. size(self%crossings) == 0) return
       more = self%crossings%speed
@@ -122,23 +133,5 @@ contains
       if (allocated(error)) return
     end do
   end subroutine follow_modes
-
-  !> Sets the arrays over all points.
-  subroutine set_frequencies(self)
-    type(campbell_t), intent(inout) :: self
-    integer :: l
-
-    self%speed = self%response%speeds()
-    self%is_of_grid = self%response%points%is_of_grid
-    if (size(self%response%lines) > 0) then
-      self%frequency = self%response%frequencies()
-    else
-      if (allocated(self%frequency)) deallocate (self%frequency)
-      allocate (self%frequency(size(self%order), size(self%speed)))
-      do l = 1, size(self%order)
-        self%frequency(l, :) = self%order(l) * abs(self%speed)
-      end do
-    end if
-  end subroutine set_frequencies
 
 end module nocdyn_campbell

@@ -92,54 +92,38 @@ contains
     end associate
     call json%open_list('modes')
     do i = 1, self%modes%modes
-      call put_branch(json, self, i)
+      ! frequencies at both ends of the range, and the shape at the lowest speed
+      call json%open()
+      call put_mode(json, self%response%machine, self%modes, i)
+      associate (ends => [1, size(self%speed)])
+        call json%put('frequency_Hz', from_si(self%modes%frequency(i, ends), unit_hz))
+        if (self%modes%internal(i) == 0) then
+          call json%put('undamped_frequency_Hz', from_si(self%modes%undamped(i, ends), unit_hz))
+        end if
+      end associate
+      call json%put('shape', self%modes%shape(:size(self%modes%shape, 1) - self%response%machine%nodes, i))
+      call json%close()
     end do
     call json%close_list()
     call json%open_list('crossings')
     do i = 1, size(self%crossings)
-      call put_crossing(json, self, i)
+      associate (crossing => self%crossings(i))
+        call json%open()
+        call put_mode(json, self%response%machine, self%modes, crossing%mode)
+        if (self%is_order(crossing%line)) then
+          call json%put('order', self%order(crossing%line))
+        else
+          call json%put('line', crossing%line)
+        end if
+        call json%put('speed_rad_s', crossing%speed)
+        call json%put('frequency_Hz', from_si(crossing%frequency, unit_hz))
+        call json%put('damping_ratio', crossing%damping_ratio)
+        call put_margin(json, self%settings, self%modes, crossing%mode, self%distance(i))
+        call json%close()
+      end associate
     end do
     call json%close_list()
     call json%close()
   end subroutine put_campbell
-
-  subroutine put_crossing(json, self, i)
-    type(json_t), intent(inout) :: json
-    type(campbell_t), intent(in) :: self
-    integer, intent(in) :: i   !! number of the crossing
-
-    associate (crossing => self%crossings(i))
-      call json%open()
-      call put_mode(json, self%response%machine, self%modes, crossing%mode)
-      if (self%is_order(crossing%line)) then
-        call json%put('order', self%order(crossing%line))
-      else
-        call json%put('line', crossing%line)
-      end if
-      call json%put('speed_rad_s', crossing%speed)
-      call json%put('frequency_Hz', from_si(crossing%frequency, unit_hz))
-      call json%put('damping_ratio', crossing%damping_ratio)
-      call put_margin(json, self%settings, self%modes, crossing%mode, self%distance(i))
-      call json%close()
-    end associate
-  end subroutine put_crossing
-
-  !> Frequencies at both ends of the range, and the shape at the lowest speed.
-  subroutine put_branch(json, self, mode)
-    type(json_t), intent(inout) :: json
-    type(campbell_t), intent(in) :: self
-    integer, intent(in) :: mode
-
-    call json%open()
-    call put_mode(json, self%response%machine, self%modes, mode)
-    associate (ends => [1, size(self%speed)])
-      call json%put('frequency_Hz', from_si(self%modes%frequency(mode, ends), unit_hz))
-      if (self%modes%internal(mode) == 0) then
-        call json%put('undamped_frequency_Hz', from_si(self%modes%undamped(mode, ends), unit_hz))
-      end if
-    end associate
-    call json%put('shape', self%modes%shape(:size(self%modes%shape, 1) - self%response%machine%nodes, mode))
-    call json%close()
-  end subroutine put_branch
 
 end module nocdyn_campbell_files

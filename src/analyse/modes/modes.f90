@@ -48,11 +48,18 @@ contains
     type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
     complex(wp), allocatable :: twists(:, :)
     type(eigenpairs_t) :: pairs
-    integer :: i
+    integer :: i, n
+    real(wp), allocatable :: angles(:, :)
 
     call find_eigenpairs(linear, pairs, error)
     if (allocated(error)) return
-    call find_twists(linear, elastic, pairs%vector, twists)
+    ! twists of the elastic elements, from the eigenvectors (p, e, internal states)
+    n = size(linear%natural)
+    allocate (angles(size(elastic), size(linear%flexible)))
+    do i = 1, size(linear%flexible)
+      angles(:, i) = linear%twists(elastic, linear%flexible(i)) / abs(linear%natural(linear%flexible(i)))
+    end do
+    twists = matmul(cmplx(angles, kind=wp), pairs%vector(n + 1:n + size(linear%flexible), :))
     allocate (modes(size(pairs%value)))
     do i = 1, size(modes)
       call fill_mode(linear, elastic, pairs%value(i), pairs%vector(:, i), twists(:, i), modes(i))
@@ -62,23 +69,6 @@ contains
     end do
     modes = modes(order_of(modes))
   end subroutine find_modes
-
-  !> Twists of the elastic elements, from the eigenvectors (p, e, internal states).
-  subroutine find_twists(linear, elastic, vectors, twists)
-    type(linearisation_t), intent(in) :: linear
-    integer, intent(in) :: elastic(:)
-    complex(wp), intent(in) :: vectors(:, :)                !! [first-order states, modes]
-    complex(wp), allocatable, intent(out) :: twists(:, :)   !! [elastic, modes]
-    real(wp), allocatable :: angles(:, :)
-    integer :: i, n
-
-    n = size(linear%natural)
-    allocate (angles(size(elastic), size(linear%flexible)))
-    do i = 1, size(linear%flexible)
-      angles(:, i) = linear%twists(elastic, linear%flexible(i)) / abs(linear%natural(linear%flexible(i)))
-    end do
-    twists = matmul(cmplx(angles, kind=wp), vectors(n + 1:n + size(linear%flexible), :))
-  end subroutine find_twists
 
   !> Sets the kind and the potential energies of a mode.
   subroutine fill_mode(linear, elastic, eigenvalue, vector, twist, mode)

@@ -106,21 +106,7 @@ contains
     call json%put('about', self%point)
     if (self%t < t_infinity) call json%put('time_s', self%t)
     call json%put('notes', self%notes)
-    call put_drivetrain(json, self)
-    call json%open_list('modes')
-    do i = 1, size(self%modes)
-      call put_mode(json, self, i)
-    end do
-    call json%close_list()
-    call json%close()
-  end subroutine put_modes
-
-  !> The topology: bodies, elastic couplings, and gears with the ratio of the second body's speed to the first one's.
-  subroutine put_drivetrain(json, self)
-    type(json_t), intent(inout) :: json
-    type(modes_report_t), intent(in) :: self
-    integer :: i
-
+    ! the topology: bodies, elastic couplings, and gears with the ratio of the second body's speed to the first one's
     call json%put('bodies', self%body_names)
     call json%put('inertia_kg_m2', self%machine%inertia(1, :size(self%body_names)))
     call json%put('speed_rad_s', self%omega(:size(self%body_names)))
@@ -147,7 +133,13 @@ contains
       end do
     end associate
     call json%close_list()
-  end subroutine put_drivetrain
+    call json%open_list('modes')
+    do i = 1, size(self%modes)
+      call put_mode(json, self, i)
+    end do
+    call json%close_list()
+    call json%close()
+  end subroutine put_modes
 
   !> The unit of the stiffness of a coupling, shaft or mesh.
   function stiffness_key(self, number) result(key)

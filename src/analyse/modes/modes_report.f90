@@ -85,7 +85,14 @@ contains
     allocate (self%notes, source=point%notes)
     call note_stand_ins(self%machine, self%linear, self%notes)
     self%shapes = min(size(self%modes), max_values / (3 * size(self%kinetic_names) + size(self%elastic_names)))
-    if (allocated(self%shaft_errors)) call note_shaft_errors(self)
+    if (allocated(self%shaft_errors)) then
+      ! notes how many modes the nodes of the shafts do not resolve
+      associate (poor => count(self%shaft_errors > noted_error), all => count(self%modes%kind == mode_oscillating))
+        if (poor > 0) call append(self%notes, 'the nodes of shafts resolve ' // to_text(all - poor) // ' of the ' // &
+                                  to_text(all) // ' oscillating modes; the others are marked with their error; ' // &
+                                  'more nodes of &shaft resolve more')
+      end associate
+    end if
     if (self%shapes < size(self%modes)) then
       call append(self%notes, 'of the ' // to_text(size(self%modes)) // ' modes, modes.csv and modes.json have the ' // &
                               'shapes and energies of the first ' // to_text(self%shapes))
@@ -110,17 +117,6 @@ contains
       end do
     end associate
   end subroutine find_shaft_errors
-
-  !> Notes how many modes the nodes of the shafts do not resolve.
-  subroutine note_shaft_errors(self)
-    type(modes_report_t), intent(inout) :: self
-
-    associate (poor => count(self%shaft_errors > noted_error), all => count(self%modes%kind == mode_oscillating))
-      if (poor > 0) call append(self%notes, 'the nodes of shafts resolve ' // to_text(all - poor) // ' of the ' // &
-                                to_text(all) // ' oscillating modes; the others are marked with their error; ' // &
-                                'more nodes of &shaft resolve more')
-    end associate
-  end subroutine note_shaft_errors
 
   !> Adds up the energies of the nodes and of the slices of each shaft.
   subroutine join_parts(stiffness, self)
@@ -155,9 +151,10 @@ contains
     character(len=*), intent(in) :: file
     type(modes_report_t), intent(in) :: self
     integer, intent(in) :: wanted(:)   !! indices of `units`: with that of rpm, frequencies are printed in it too
-    character(len=:), allocatable :: text
+    character(len=:), allocatable :: line, text
     type(text_buffer_t) :: report
-    integer :: i
+    integer :: b, first, i, last, width
+    integer, allocatable :: chosen(:)
 
     do i = 1, size(self%notes)
       call report%append_line(file // ': note: ' // self%notes(i)%text)
@@ -169,7 +166,24 @@ contains
     call put_real(self, mode_diverging, report)
     call put_real(self, mode_internal, report)
     if (count(self%modes%kind == mode_oscillating) <= max_shapes .and. size(self%body_names) <= max_shapes) then
-      call put_shapes(self, report)
+      ! appends the shapes as columns: the part in phase with the largest motion
+      allocate (chosen, source=modes_of(self, mode_oscillating))
+      width = max(len('shape of mode'), maxval([(text_width(self%body_names(b)%text), b=1, size(self%body_names))]))
+      do first = 1, size(chosen), shapes_per_row
+        last = min(first + shapes_per_row - 1, size(chosen))
+        line = '  ' // padded('shape of mode', width)
+        do i = first, last
+          line = line // cell(to_text(i))
+        end do
+        call report%append_line(line)
+        do b = 1, size(self%body_names)
+          line = '  ' // padded(self%body_names(b)%text, width)
+          do i = first, last
+            line = line // cell(rounded_text(real(self%modes(chosen(i))%shape(b), wp), 5))
+          end do
+          call report%append_line(line)
+        end do
+      end do
     end if
     text = report%text()
   end function modes_text
@@ -316,32 +330,5 @@ contains
     text = rounded_text(100.0_wp * share, merge(2, 1, abs(share) >= 0.01_wp)) // ' %'
     if (abs(share) > 0.995_wp) text = to_text(nint(100.0_wp * share)) // ' %'
   end function percent
-
-  !> Appends the shapes as columns: the part in phase with the largest motion.
-  subroutine put_shapes(self, report)
-    type(modes_report_t), intent(in) :: self
-    type(text_buffer_t), intent(inout) :: report
-    integer, allocatable :: chosen(:)
-    character(len=:), allocatable :: line
-    integer :: b, first, i, last, width
-
-    allocate (chosen, source=modes_of(self, mode_oscillating))
-    width = max(len('shape of mode'), maxval([(text_width(self%body_names(b)%text), b=1, size(self%body_names))]))
-    do first = 1, size(chosen), shapes_per_row
-      last = min(first + shapes_per_row - 1, size(chosen))
-      line = '  ' // padded('shape of mode', width)
-      do i = first, last
-        line = line // cell(to_text(i))
-      end do
-      call report%append_line(line)
-      do b = 1, size(self%body_names)
-        line = '  ' // padded(self%body_names(b)%text, width)
-        do i = first, last
-          line = line // cell(rounded_text(real(self%modes(chosen(i))%shape(b), wp), 5))
-        end do
-        call report%append_line(line)
-      end do
-    end do
-  end subroutine put_shapes
 
 end module nocdyn_modes_report

@@ -53,7 +53,12 @@ contains
     case ('equilibrium')
       call use_equilibrium(machine, point, error)
     case ('rest')
-      call use_rest(machine, point)
+      ! takes the start angles without speeds, and the mean torques
+      call mean_formulation(machine, point%formulation)
+      point%y = point%formulation%start()
+      point%y(1, :machine%coordinates%freedoms) = 0.0_wp
+      point%t = t_infinity
+      point%text = 'rest'
     case default
       call read_time(input, run, at, time, error)
       if (.not. allocated(error)) call use_time(input, machine, time, point, error)
@@ -105,18 +110,6 @@ contains
                              trim(merge('stable one', 'one       ', any(equilibria%stability == 'stable'))) // &
                              ' nearest to the start: nocdyn equilibrium shows all')
   end subroutine use_equilibrium
-
-  !> Takes the start angles without speeds, and the mean torques.
-  subroutine use_rest(machine, point)
-    type(machine_t), intent(in) :: machine
-    type(operating_point_t), intent(inout) :: point
-
-    call mean_formulation(machine, point%formulation)
-    point%y = point%formulation%start()
-    point%y(1, :machine%coordinates%freedoms) = 0.0_wp
-    point%t = t_infinity
-    point%text = 'rest'
-  end subroutine use_rest
 
   !> Takes the state at a time of the run, by its method and tolerances.
   subroutine use_time(input, machine, time, point, error)

@@ -29,10 +29,22 @@ contains
     character(len=:), allocatable :: speeds, steady
     real(wp) :: speed
     integer :: i
+    type(held_speeds_t) :: held
+    type(held_state_t) :: state
+    type(error_t), allocatable :: failure
+    logical :: drives_backward
 
     if (.not. response%held%has_drive()) return
     if (any([(response%points(i)%state%is_driven(), i=1, size(response%points))])) return
-    if (.not. drives_backward(machine, settings)) return
+    ! whether motors or engines drive at the first or the last speed with the other sign
+    drives_backward = .false.
+    call new_held_speeds(machine, settings%body, held, failure)
+    do i = 1, size(settings%speeds), max(1, size(settings%speeds) - 1)
+      if (allocated(failure)) deallocate (failure)
+      call held%hold(-settings%speeds(i), state, failure)
+      drives_backward = drives_backward .or. .not. allocated(failure) .and. state%is_driven()
+    end do
+    if (.not. drives_backward) return
     speed = steady_speed(machine, settings)
     if (speed * settings%speeds(1) > 0) return
     associate (group => input%groups(settings%group), range => input%groups(settings%group)%numbers('speed'))
@@ -45,24 +57,6 @@ contains
                  ' in the other direction' // steady // '; allowed: speeds of the other sign, e.g. ' // speeds)
     end associate
   end subroutine refuse_backward_speeds
-
-  !> Whether motors or engines drive at the first or the last speed with the other sign.
-  logical function drives_backward(machine, settings)
-    type(machine_t), intent(in) :: machine
-    type(response_settings_t), intent(in) :: settings
-    type(held_speeds_t) :: held
-    type(held_state_t) :: state
-    type(error_t), allocatable :: failure
-    integer :: i
-
-    drives_backward = .false.
-    call new_held_speeds(machine, settings%body, held, failure)
-    do i = 1, size(settings%speeds), max(1, size(settings%speeds) - 1)
-      if (allocated(failure)) deallocate (failure)
-      call held%hold(-settings%speeds(i), state, failure)
-      drives_backward = drives_backward .or. .not. allocated(failure) .and. state%is_driven()
-    end do
-  end function drives_backward
 
   !> The fastest steady speed of the body, in the direction of the range if there is one; 0 if none is known [rad/s].
   real(wp) function steady_speed(machine, settings) result(speed)

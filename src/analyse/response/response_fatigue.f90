@@ -55,13 +55,33 @@ contains
     real(wp), intent(out) :: failed_speed   !! as in `add_points`
     integer, allocatable :: groups(:)
     real(wp), allocatable :: speeds(:)
-    integer :: i
+    integer :: i, kind, q
 
     failed_speed = 0.0_wp
     allocate (groups, source=input%groups_named('fatigue'))
     allocate (fatigue(size(groups)), speeds(0))
     do i = 1, size(groups)
-      call read_item(input, groups(i), response%quantities, fatigue(i))
+      ! what a group asks for
+      kind = kind_moment
+      associate (group => input%groups(groups(i)))
+        fatigue(i)%name = group%name
+        fatigue(i)%element = group%text(trim(element_kind(group)))
+        fatigue(i)%curve = read_curve(group)
+        fatigue(i)%speeds = group%numbers('profile_speeds')
+        fatigue(i)%hours = group%numbers('profile_hours')
+        if (fatigue_symbol(group) == 'stress') kind = kind_stress
+        if (fatigue_symbol(group) == 'reaction') kind = kind_reaction
+      end associate
+      allocate (fatigue(i)%quantities(0))
+      do q = 1, size(response%quantities)
+        if (response%quantities(q)%kind == kind .and. response%quantities(q)%element == fatigue(i)%element .and. &
+            response%quantities(q)%element_kind == trim(element_kind(input%groups(groups(i))))) fatigue(i)%quantities = &
+            [fatigue(i)%quantities, q]
+      end do
+      if (size(fatigue(i)%quantities) == 0) error stop 'nocdyn_response_fatigue: a checked group has a quantity'
+      associate (first => response%quantities(fatigue(i)%quantities(1)))
+        fatigue(i)%quantity = first%name // ' [' // first%unit // ']'
+      end associate
       speeds = [speeds, fatigue(i)%speeds]
     end do
     call keep_new(response, speeds)
@@ -71,35 +91,6 @@ contains
       call find_rates(response, fatigue(i))
     end do
   end subroutine find_response_fatigue
-
-  !> What a group asks for.
-  subroutine read_item(input, index, quantities, item)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: index   !! of the group
-    type(moment_form_t), intent(in) :: quantities(:)
-    type(response_fatigue_t), intent(inout) :: item
-    integer :: kind, q
-
-    kind = kind_moment
-    associate (group => input%groups(index))
-      item%name = group%name
-      item%element = group%text(trim(element_kind(group)))
-      item%curve = read_curve(group)
-      item%speeds = group%numbers('profile_speeds')
-      item%hours = group%numbers('profile_hours')
-      if (fatigue_symbol(group) == 'stress') kind = kind_stress
-      if (fatigue_symbol(group) == 'reaction') kind = kind_reaction
-    end associate
-    allocate (item%quantities(0))
-    do q = 1, size(quantities)
-      if (quantities(q)%kind == kind .and. quantities(q)%element == item%element .and. &
-          quantities(q)%element_kind == trim(element_kind(input%groups(index)))) item%quantities = [item%quantities, q]
-    end do
-    if (size(item%quantities) == 0) error stop 'nocdyn_response_fatigue: a checked group has a quantity'
-    associate (first => quantities(item%quantities(1)))
-      item%quantity = first%name // ' [' // first%unit // ']'
-    end associate
-  end subroutine read_item
 
   !> The damage per hour at all speeds.
   subroutine find_rates(response, item)

@@ -292,7 +292,24 @@ contains
     call json%close_list()
     call json%open_list('critical_speeds')
     do i = 1, size(summary%criticals)
-      call put_critical(json, analysis, summary%criticals(i))
+      call json%open()
+      call put_mode(json, analysis%response%machine, analysis%modes, summary%criticals(i)%crossing%mode)
+      call put_line(json, analysis, summary%criticals(i)%crossing%line)
+      call json%put('speed_rad_s', summary%criticals(i)%crossing%speed)
+      call json%put('frequency_Hz', summary%criticals(i)%crossing%frequency / turn)
+      call json%put('damping_ratio', summary%criticals(i)%crossing%damping_ratio)
+      if (summary%criticals(i)%quantity > 0) then
+        call json%put('coupling', analysis%response%quantities(summary%criticals(i)%quantity)%element)
+        if (.not. summary%criticals(i)%is_unbounded) then
+          call json%put('peak_speed_rad_s', summary%criticals(i)%speed)
+          call json%put('moment_N_m', summary%criticals(i)%amplitude)
+          if (summary%criticals(i)%stress > 0) call json%put('stress_Pa', summary%criticals(i)%stress)
+          call json%put('half_range_N_m', summary%criticals(i)%half_range)
+          if (summary%criticals(i)%ratio > 0) call json%put('ratio_to_limit', summary%criticals(i)%ratio)
+        end if
+      end if
+      call put_margin(json, analysis%settings, analysis%modes, summary%criticals(i)%crossing%mode, summary%criticals(i)%margin)
+      call json%close()
     end do
     call json%close_list()
     call put_largest(json, analysis, summary)
@@ -316,31 +333,6 @@ contains
       end if
     end associate
   end subroutine put_line
-
-  subroutine put_critical(json, analysis, critical)
-    type(json_t), intent(inout) :: json
-    type(response_analysis_t), intent(in) :: analysis
-    type(critical_t), intent(in) :: critical
-
-    call json%open()
-    call put_mode(json, analysis%response%machine, analysis%modes, critical%crossing%mode)
-    call put_line(json, analysis, critical%crossing%line)
-    call json%put('speed_rad_s', critical%crossing%speed)
-    call json%put('frequency_Hz', critical%crossing%frequency / turn)
-    call json%put('damping_ratio', critical%crossing%damping_ratio)
-    if (critical%quantity > 0) then
-      call json%put('coupling', analysis%response%quantities(critical%quantity)%element)
-      if (.not. critical%is_unbounded) then
-        call json%put('peak_speed_rad_s', critical%speed)
-        call json%put('moment_N_m', critical%amplitude)
-        if (critical%stress > 0) call json%put('stress_Pa', critical%stress)
-        call json%put('half_range_N_m', critical%half_range)
-        if (critical%ratio > 0) call json%put('ratio_to_limit', critical%ratio)
-      end if
-    end if
-    call put_margin(json, analysis%settings, analysis%modes, critical%crossing%mode, critical%margin)
-    call json%close()
-  end subroutine put_critical
 
   subroutine put_largest(json, analysis, summary)
     type(json_t), intent(inout) :: json

@@ -127,34 +127,29 @@ contains
     character(len=*), intent(in) :: kind
     type(response_limit_t), intent(inout) :: limit
     type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: groups(:)
+    integer :: i
+    real(wp) :: diameter
 
     associate (group => input%groups(index))
       limit%has_rule = .true.
       limit%tensile_strength = group%number('tensile_strength')
       limit%c_k = group%number('c_k')
-      limit%diameter = group%number('diameter', absent=diameter_of(input, kind, group%text(kind)))
+      ! the diameter of a coupling, or the smallest one of a shaft [m]; 0 if it is not given
+      diameter = 0.0_wp
+      allocate (groups, source=input%groups_named(kind))
+      do i = 1, size(groups)
+        if (input%groups(groups(i))%name /= group%text(kind)) cycle
+        if (kind == 'coupling') diameter = input%groups(groups(i))%number('diameter', absent=0.0_wp)
+        if (kind == 'shaft') diameter = minval(input%groups(groups(i))%numbers('diameters'))
+      end do
+      limit%diameter = group%number('diameter', absent=diameter)
       limit%rated = abs(group%number('rated_speed'))
       if (limit%diameter > 0) return
       call raise(error, exit_input, input%location(index, 'rule') // ': the rule iacs_m68 needs a diameter [m], of &limit ' // &
                  'or of &' // kind // ' ' // quoted(group%text(kind)))
     end associate
   end subroutine set_rule
-
-  !> The diameter of a coupling, or the smallest one of a shaft [m]; 0 if it is not given.
-  pure real(wp) function diameter_of(input, kind, name) result(diameter)
-    type(input_t), intent(in) :: input
-    character(len=*), intent(in) :: kind, name
-    integer, allocatable :: groups(:)
-    integer :: i
-
-    diameter = 0.0_wp
-    allocate (groups, source=input%groups_named(kind))
-    do i = 1, size(groups)
-      if (input%groups(groups(i))%name /= name) cycle
-      if (kind == 'coupling') diameter = input%groups(groups(i))%number('diameter', absent=0.0_wp)
-      if (kind == 'shaft') diameter = minval(input%groups(groups(i))%numbers('diameters'))
-    end do
-  end function diameter_of
 
   !> The limit of the half range in continuous operation at a speed, in the unit of the quantity.
   elemental real(wp) function continuous_limit(self, speed) result(limit)

@@ -33,9 +33,18 @@ contains
   subroutine note_simplifications(machine, notes)
     type(machine_t), intent(in) :: machine
     type(string_t), allocatable, intent(out) :: notes(:)
+    integer :: e, i
 
     allocate (notes, source=machine%simplifications)
-    call note_ended_excitations(machine, notes)
+    ! excitations that are over in a steady state
+    do i = 1, size(machine%banks)
+      associate (bank => machine%banks(i)%bank)
+        do e = 1, bank%count
+          if (bank%has_ended(e)) call append(notes, 'excitation ' // quoted(bank%names(e)%text) // &
+                                             ' ends or decays, and has no part in the response')
+        end do
+      end associate
+    end do
   end subroutine note_simplifications
 
   !> Modes that the nodes of shafts do not resolve, and critical speeds of these.
@@ -68,30 +77,31 @@ contains
     call append(notes, text // '; more nodes of &shaft resolve more')
   end subroutine note_shaft_modes
 
-  !> Excitations that are over in a steady state.
-  subroutine note_ended_excitations(machine, notes)
-    type(machine_t), intent(in) :: machine
-    type(string_t), allocatable, intent(inout) :: notes(:)
-    integer :: e, i
-
-    do i = 1, size(machine%banks)
-      associate (bank => machine%banks(i)%bank)
-        do e = 1, bank%count
-          if (bank%has_ended(e)) call append(notes, 'excitation ' // quoted(bank%names(e)%text) // &
-                                             ' ends or decays, and has no part in the response')
-        end do
-      end associate
-    end do
-  end subroutine note_ended_excitations
-
   !> Notes on the speeds and the steady states: what nocdyn campbell has too.
   subroutine note_steady_states(settings, response, notes)
     type(response_settings_t), intent(in) :: settings
     type(forced_response_t), intent(in) :: response
     type(string_t), allocatable, intent(inout) :: notes(:)
-    integer :: held, i
+    real(wp), parameter :: rounding = 1.0e-9_wp
+    integer :: e, held, i, open
+    real(wp) :: factor(size(response%points)), supply(size(response%points)), computed(2), needed(2)
+    integer, allocatable :: elastic(:)
+    type(string_t), allocatable :: names(:)
 
-    call note_open_gaps(response, notes)
+    ! adds a note on each elastic element whose moment does not change with its twist at some speeds
+
+    allocate (elastic, source=response%machine%elastic())
+    allocate (names, source=element_names(response%machine, elastic))
+    do e = 1, size(elastic)
+      open = 0
+      do i = 1, size(response%points)
+        if (abs(response%points(i)%state%slopes%stiffness(elastic(e))) <= 0) open = open + 1
+      end do
+      if (open == 0) cycle
+      call append(notes, quoted(names(e)%text) // ' has no stiffness at ' // to_text(open) // ' of ' // &
+                         to_text(size(response%points)) // ' speeds: it is inside its gap, whose edge counts as inside, ' // &
+                         'or its law is level there')
+    end do
     call note_mean_slopes(response%machine, steepest_slopes(response), notes)
     held = 0
     do i = 1, size(response%points)
@@ -103,9 +113,30 @@ contains
                          'speed, the column drive_torque')
     end if
     call note_losses(response, notes)
-    call note_drive(response, notes)
+    ! drives that would have to be stronger than they are, and supplies that follow the speed
+    factor = [(response%points(i)%state%factor, i=1, size(factor))]
+    supply = [(response%points(i)%state%supply, i=1, size(supply))]
+    if (any(factor > 1.0_wp + rounding)) then
+      call append(notes, 'the drive of the input is too weak at ' // to_text(count(factor > 1.0_wp + rounding)) // ' of ' // &
+                         to_text(size(factor)) // ' speeds: the load there needs up to ' // rounded_text(maxval(factor), 4) // &
+                         ' times its torque, which is taken as given')
+    end if
+    if (any(supply > 0)) then
+      call append(notes, 'the supplies of the induction motors are taken to follow the speeds, with the flux of the mains: ' // &
+                         'from ' // rounded_text(minval(supply, mask=supply > 0), 4) // ' to ' // &
+                         rounded_text(maxval(supply), 4) // ' times their frequency')
+    end if
     call note_damping(response, notes)
-    call note_range(settings, notes)
+    ! critical speeds within the margin of operation are not found beyond the speeds that are computed
+    if (size(settings%operating) == 0) return
+    computed = abs([settings%speeds(1), settings%speeds(size(settings%speeds))])
+    needed = abs(settings%operating) * [1.0_wp - settings%margin, 1.0_wp + settings%margin]
+    if (computed(1) <= needed(1) .and. computed(2) >= needed(2)) return
+    computed = from_si(computed, unit_rpm)
+    needed = from_si(needed, unit_rpm)
+    call append(notes, 'operation with its margin is from ' // rounded_text(needed(1), 5) // ' to ' // &
+                       rounded_text(needed(2), 5) // ' rpm: critical speeds in it are sought only from ' // &
+                       rounded_text(computed(1), 5) // ' to ' // rounded_text(computed(2), 5) // ' rpm, the speeds of &response')
   end subroutine note_steady_states
 
   !> Notes on the damping of the modes of a run at the highest speed.
@@ -190,67 +221,6 @@ contains
     end associate
     lost = abs(share * torque)
   end function lost_torque
-
-  !> Drives that would have to be stronger than they are, and supplies that follow the speed.
-  subroutine note_drive(response, notes)
-    type(forced_response_t), intent(in) :: response
-    type(string_t), allocatable, intent(inout) :: notes(:)
-    real(wp), parameter :: rounding = 1.0e-9_wp
-    real(wp) :: factor(size(response%points)), supply(size(response%points))
-    integer :: i
-
-    factor = [(response%points(i)%state%factor, i=1, size(factor))]
-    supply = [(response%points(i)%state%supply, i=1, size(supply))]
-    if (any(factor > 1.0_wp + rounding)) then
-      call append(notes, 'the drive of the input is too weak at ' // to_text(count(factor > 1.0_wp + rounding)) // ' of ' // &
-                         to_text(size(factor)) // ' speeds: the load there needs up to ' // rounded_text(maxval(factor), 4) // &
-                         ' times its torque, which is taken as given')
-    end if
-    if (any(supply > 0)) then
-      call append(notes, 'the supplies of the induction motors are taken to follow the speeds, with the flux of the mains: ' // &
-                         'from ' // rounded_text(minval(supply, mask=supply > 0), 4) // ' to ' // &
-                         rounded_text(maxval(supply), 4) // ' times their frequency')
-    end if
-  end subroutine note_drive
-
-  !> Adds a note on each elastic element whose moment does not change with its twist at some speeds.
-  subroutine note_open_gaps(response, notes)
-    type(forced_response_t), intent(in) :: response
-    type(string_t), allocatable, intent(inout) :: notes(:)
-    integer, allocatable :: elastic(:)
-    type(string_t), allocatable :: names(:)
-    integer :: e, i, open
-
-    allocate (elastic, source=response%machine%elastic())
-    allocate (names, source=element_names(response%machine, elastic))
-    do e = 1, size(elastic)
-      open = 0
-      do i = 1, size(response%points)
-        if (abs(response%points(i)%state%slopes%stiffness(elastic(e))) <= 0) open = open + 1
-      end do
-      if (open == 0) cycle
-      call append(notes, quoted(names(e)%text) // ' has no stiffness at ' // to_text(open) // ' of ' // &
-                         to_text(size(response%points)) // ' speeds: it is inside its gap, whose edge counts as inside, ' // &
-                         'or its law is level there')
-    end do
-  end subroutine note_open_gaps
-
-  !> Critical speeds within the margin of operation are not found beyond the speeds that are computed.
-  subroutine note_range(settings, notes)
-    type(response_settings_t), intent(in) :: settings
-    type(string_t), allocatable, intent(inout) :: notes(:)
-    real(wp) :: computed(2), needed(2)
-
-    if (size(settings%operating) == 0) return
-    computed = abs([settings%speeds(1), settings%speeds(size(settings%speeds))])
-    needed = abs(settings%operating) * [1.0_wp - settings%margin, 1.0_wp + settings%margin]
-    if (computed(1) <= needed(1) .and. computed(2) >= needed(2)) return
-    computed = from_si(computed, unit_rpm)
-    needed = from_si(needed, unit_rpm)
-    call append(notes, 'operation with its margin is from ' // rounded_text(needed(1), 5) // ' to ' // &
-                       rounded_text(needed(2), 5) // ' rpm: critical speeds in it are sought only from ' // &
-                       rounded_text(computed(1), 5) // ' to ' // rounded_text(computed(2), 5) // ' rpm, the speeds of &response')
-  end subroutine note_range
 
   !> Couplings and meshes with a gap whose oscillation is larger than their mean: they leave contact, which no linear response
   !> has.

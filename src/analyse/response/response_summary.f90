@@ -77,10 +77,25 @@ contains
     type(response_analysis_t), intent(in) :: analysis
     type(critical_t), intent(inout) :: critical
     real(wp), parameter :: near = 0.02_wp   ! of the critical speed, without damping
-    integer :: i, k, start
-    real(wp) :: speed(size(analysis%response%points))
+    integer :: coupling, e, i, j, k, start
+    real(wp) :: speed(size(analysis%response%points)), energy, most
 
-    critical%quantity = main_coupling(analysis, critical%crossing%mode)
+    ! the coupling with most of the potential energy of a mode, 0 if no coupling has any
+    coupling = 0
+    most = 0.0_wp
+    do j = 1, size(analysis%response%quantities)
+      if (analysis%response%quantities(j)%kind /= kind_moment) cycle
+      energy = 0.0_wp
+      do k = 1, size(analysis%response%quantities(j)%elements)
+        e = analysis%response%quantities(j)%elements(k)
+        energy = energy + abs(analysis%response%points(1)%state%slopes%stiffness(e)) * &
+                 abs(analysis%modes%twists(e, critical%crossing%mode))**2
+      end do
+      if (energy <= most) cycle
+      coupling = j
+      most = energy
+    end do
+    critical%quantity = coupling
     critical%speed = critical%crossing%speed
     critical%is_unbounded = critical%crossing%damping_ratio <= undamped
     if (critical%quantity == 0 .or. critical%is_unbounded) return
@@ -113,28 +128,6 @@ contains
       end do
     end associate
   end subroutine find_peak
-
-  !> The coupling with most of the potential energy of a mode, 0 if no coupling has any.
-  integer function main_coupling(analysis, mode) result(coupling)
-    type(response_analysis_t), intent(in) :: analysis
-    integer, intent(in) :: mode
-    integer :: e, k, q
-    real(wp) :: energy, most
-
-    coupling = 0
-    most = 0.0_wp
-    do q = 1, size(analysis%response%quantities)
-      if (analysis%response%quantities(q)%kind /= kind_moment) cycle
-      energy = 0.0_wp
-      do k = 1, size(analysis%response%quantities(q)%elements)
-        e = analysis%response%quantities(q)%elements(k)
-        energy = energy + abs(analysis%response%points(1)%state%slopes%stiffness(e)) * abs(analysis%modes%twists(e, mode))**2
-      end do
-      if (energy <= most) cycle
-      coupling = q
-      most = energy
-    end do
-  end function main_coupling
 
   !> The largest half range, peak and ratio of every quantity.
   subroutine find_largest(analysis, largest)

@@ -93,7 +93,13 @@ contains
       allocate (self%cubic(padded, size(wanted)), source=0.0_wp)
       call add_accumulators(self, size(wanted))
       do i = 1, size(self%accumulators)
-        call allocate_accumulator(self%accumulators(i), padded)
+        allocate (self%accumulators(i)%highest(padded), source=0.0_wp)
+        allocate (self%accumulators(i)%first, self%accumulators(i)%lowest, self%accumulators(i)%highest_time, &
+          self%accumulators(i)%lowest_time, self%accumulators(i)%integral, self%accumulators(i)%square, &
+          source=self%accumulators(i)%highest)
+        allocate (self%accumulators(i)%bound(padded), source=-huge(0.0_wp))
+        allocate (self%accumulators(i)%no_highest, self%accumulators(i)%no_lowest, source=self%accumulators(i)%bound)
+        allocate (self%accumulators(i)%history(padded))
       end do
     end associate
     call add_damages(self, lanes)
@@ -128,7 +134,13 @@ contains
             found(k)%column = c
             found(k)%from = statistic%from
             self%acc(i) = k
-            call add_need(found(k), statistic%kind)
+            found(k)%has_max = found(k)%has_max .or. statistic%kind == statistic_max .or. statistic%kind == statistic_time_of_max
+            found(k)%has_min = found(k)%has_min .or. statistic%kind == statistic_min .or. statistic%kind == statistic_time_of_min
+            found(k)%has_max_abs = found(k)%has_max_abs .or. statistic%kind == statistic_max_abs .or. &
+                                   statistic%kind == statistic_time_of_max_abs
+            found(k)%has_time = found(k)%has_time .or. is_time_of_extreme(statistic%kind)
+            found(k)%has_sums = found(k)%has_sums .or. statistic%kind == statistic_mean .or. statistic%kind == statistic_rms
+            found(k)%has_history = found(k)%has_history .or. statistic%kind == statistic_settling_time
           end if
         end associate
         i = next(i)
@@ -166,29 +178,6 @@ contains
       end associate
     end do
   end subroutine add_damages
-
-  pure subroutine add_need(acc, kind)
-    type(accumulator_t), intent(inout) :: acc
-    integer, intent(in) :: kind   !! statistic_...
-
-    acc%has_max = acc%has_max .or. kind == statistic_max .or. kind == statistic_time_of_max
-    acc%has_min = acc%has_min .or. kind == statistic_min .or. kind == statistic_time_of_min
-    acc%has_max_abs = acc%has_max_abs .or. kind == statistic_max_abs .or. kind == statistic_time_of_max_abs
-    acc%has_time = acc%has_time .or. is_time_of_extreme(kind)
-    acc%has_sums = acc%has_sums .or. kind == statistic_mean .or. kind == statistic_rms
-    acc%has_history = acc%has_history .or. kind == statistic_settling_time
-  end subroutine add_need
-
-  pure subroutine allocate_accumulator(acc, lanes)
-    type(accumulator_t), intent(inout) :: acc
-    integer, intent(in) :: lanes
-
-    allocate (acc%highest(lanes), source=0.0_wp)
-    allocate (acc%first, acc%lowest, acc%highest_time, acc%lowest_time, acc%integral, acc%square, source=acc%highest)
-    allocate (acc%bound(lanes), source=-huge(0.0_wp))
-    allocate (acc%no_highest, acc%no_lowest, source=acc%bound)
-    allocate (acc%history(lanes))
-  end subroutine allocate_accumulator
 
   !> Starts a variant in a lane, of which `linear` and `cubic` have been set.
   pure subroutine start_accumulators(self, lane)

@@ -87,7 +87,7 @@ contains
   type(linear_columns_t) function new_linear_columns(block, columns) result(self)
     class(formulation_t), intent(in) :: block
     type(signal_source_t), intent(in) :: columns(:)
-    integer :: i, strips
+    integer :: i, k, strips
 
     self%count = size(columns)
     strips = strip_of(block%lanes)
@@ -99,7 +99,18 @@ contains
     allocate (self%direction(self%count), source=1.0_wp)
     do i = 1, self%count
       call set_column(self, i, block%machine, columns(i))
-      call add_entries(self, i, block%machine)
+      if (self%element(i) == 0) then
+        call add_body(self, block%machine%coordinates, self%body(i), 1.0_wp, self%is_speed(i))
+      else
+        associate (rows => block%machine%elements%rows, e => self%element(i))
+          do k = rows%first(e + 1) - 1, rows%first(e), -1
+            call add_body(self, block%machine%coordinates, rows%body(k), rows%coefficient(k), .false.)
+            if (self%bank(i) > 0) call add_body(self, block%machine%coordinates, rows%body(k), rows%coefficient(k), .true.)
+          end do
+        end associate
+      end if
+      if (modulo(self%entries, 2) == 1) call add_entry(self, 0, 0.0_wp, self%component(self%entries), .false.)
+      self%first(i + 1) = self%entries + 1
     end do
     call resize(self, self%entries)
     allocate (self%factor(width, size(self%component), strips), self%offset(width, self%count, strips), source=0.0_wp)
@@ -120,26 +131,6 @@ contains
     self%bank(number) = column%bank
     self%divisor(number) = column%divisor
   end subroutine set_column
-
-  subroutine add_entries(self, number, machine)
-    type(linear_columns_t), intent(inout) :: self
-    integer, intent(in) :: number
-    type(machine_t), intent(in) :: machine
-    integer :: k
-
-    if (self%element(number) == 0) then
-      call add_body(self, machine%coordinates, self%body(number), 1.0_wp, self%is_speed(number))
-    else
-      associate (rows => machine%elements%rows, e => self%element(number))
-        do k = rows%first(e + 1) - 1, rows%first(e), -1
-          call add_body(self, machine%coordinates, rows%body(k), rows%coefficient(k), .false.)
-          if (self%bank(number) > 0) call add_body(self, machine%coordinates, rows%body(k), rows%coefficient(k), .true.)
-        end do
-      end associate
-    end if
-    if (modulo(self%entries, 2) == 1) call add_entry(self, 0, 0.0_wp, self%component(self%entries), .false.)
-    self%first(number + 1) = self%entries + 1
-  end subroutine add_entries
 
   subroutine add_body(self, coordinates, body, coefficient, is_rate)
     type(linear_columns_t), intent(inout) :: self

@@ -104,12 +104,31 @@ contains
     type(step_block_t), intent(in) :: steps
     real(wp), contiguous, intent(in) :: y(:, :), y_new(:, :)   !! starts and ends of the steps, [lanes, padded components]
     real(wp), contiguous, intent(in) :: c(:, :, :)             !! coefficients of the steps, [lanes, padded components, degree]
-    integer :: column, i, number
+    integer :: before, column, i, number, place
 
     if (size(self%accumulators) + size(self%damages) == 0) return
     if (.not. allocated(self%chord_gap)) call allocate_work(self, size(c, 2), size(c, 3))
     if (size(c, 1) == 1) then
-      call add_single_step(self, steps, y, y_new, c)
+      ! adds the last step of a block of one lane: its columns are put side by side in strips, instead of lanes
+      self%strip%before = 0
+      self%strip%t_end(:) = steps%t_new(1)
+      self%strip%scale(:) = steps%scale(1)
+      do before = 0, size(self%accumulators) - 1, width
+        do place = 1, min(width, size(self%accumulators) - before)
+          call place_column(self, self%accumulators(before + place)%column, place, y, y_new, c)
+        end do
+        call widen_side_by_side(self, before, steps, size(c, 3))
+      end do
+      self%strip%lanes = 1
+      do i = 1, size(self%accumulators)
+        if (.not. self%accumulators(i)%has_sums) cycle
+        call place_column(self, self%accumulators(i)%column, 1, y, y_new, c)
+        call integrate_strip(self, self%accumulators(i), steps, size(c, 3))
+      end do
+      do i = 1, size(self%damages)
+        call place_column(self, self%damages(i)%column, 1, y, y_new, c)
+        call count_strip(self, self%damages(i), steps, size(c, 3))
+      end do
       return
     end if
     do number = 1, strip_of(size(c, 1))
@@ -133,34 +152,6 @@ contains
       end do
     end do
   end subroutine add_steps
-
-  !> Adds the last step of a block of one lane: its columns are put side by side in strips, instead of lanes.
-  subroutine add_single_step(self, steps, y, y_new, c)
-    class(linear_statistics_t), intent(inout) :: self
-    type(step_block_t), intent(in) :: steps
-    real(wp), contiguous, intent(in) :: y(:, :), y_new(:, :), c(:, :, :)
-    integer :: before, i, place
-
-    self%strip%before = 0
-    self%strip%t_end(:) = steps%t_new(1)
-    self%strip%scale(:) = steps%scale(1)
-    do before = 0, size(self%accumulators) - 1, width
-      do place = 1, min(width, size(self%accumulators) - before)
-        call place_column(self, self%accumulators(before + place)%column, place, y, y_new, c)
-      end do
-      call widen_side_by_side(self, before, steps, size(c, 3))
-    end do
-    self%strip%lanes = 1
-    do i = 1, size(self%accumulators)
-      if (.not. self%accumulators(i)%has_sums) cycle
-      call place_column(self, self%accumulators(i)%column, 1, y, y_new, c)
-      call integrate_strip(self, self%accumulators(i), steps, size(c, 3))
-    end do
-    do i = 1, size(self%damages)
-      call place_column(self, self%damages(i)%column, 1, y, y_new, c)
-      call count_strip(self, self%damages(i), steps, size(c, 3))
-    end do
-  end subroutine add_single_step
 
   !> Computes x of a column of a single lane in its last step, in a place of the strip.
   subroutine place_column(self, column, place, y, y_new, c)

@@ -77,10 +77,11 @@ contains
     type(eliminated_balance_t), intent(inout) :: reduced
     logical, intent(in) :: is_downwards   !! whether it begins at the highest speed
     type(block_solutions_t), intent(inout) :: block
+    real(wp), parameter :: equal = 1.0e-9_wp   ! relative difference
     integer, parameter :: points_alone = 100, points = 25   ! per decade; of a speed alone, or with others to be found
     integer, parameter :: few_points = 5   ! with two others or more beside joints, whose sets are scanned one after the other
     type(scan_t) :: found
-    real(wp) :: start, unit(size(reduced%balance%motions%free))
+    real(wp) :: start, unit(size(reduced%balance%motions%free)), least
     integer :: density, i, k
 
     start = dot_product(reduced%row, reduced%z(reduced%speeds))
@@ -98,7 +99,14 @@ contains
       found%is_balanced(i) = reduced%is_balanced
       found%speeds(:, i) = reduced%z(reduced%speeds)
     end do
-    call find_least(found, block)
+    if (any(found%is_balanced)) then
+      ! the smallest imbalance of a scan; of equal ones that at the lowest speed
+      least = minval(abs(found%torque), mask=found%is_balanced)
+      i = minloc(abs(found%grid), dim=1, mask=found%is_balanced .and. abs(found%torque) <= (1.0_wp + equal) * least)
+      block%least_torque = found%torque(i)
+      block%least_speed = found%grid(i)
+      block%is_level = maxval(abs(found%torque - found%torque(i)), mask=found%is_balanced) <= equal * least
+    end if
     block%is_unloaded = all(abs(found%torque) <= 0.0_wp .and. found%is_balanced)
     do i = 1, merge(1, size(found%grid), block%is_unloaded)
       if (.not. found%is_balanced(i)) cycle
@@ -107,22 +115,6 @@ contains
     end do
     block%is_range = block%is_range .and. .not. block%is_unloaded
   end subroutine scan
-
-  !> The smallest imbalance of a scan; of equal ones that at the lowest speed.
-  subroutine find_least(found, block)
-    type(scan_t), intent(in) :: found
-    type(block_solutions_t), intent(inout) :: block
-    real(wp), parameter :: equal = 1.0e-9_wp   ! relative difference
-    real(wp) :: least
-    integer :: i
-
-    if (.not. any(found%is_balanced)) return
-    least = minval(abs(found%torque), mask=found%is_balanced)
-    i = minloc(abs(found%grid), dim=1, mask=found%is_balanced .and. abs(found%torque) <= (1.0_wp + equal) * least)
-    block%least_torque = found%torque(i)
-    block%least_speed = found%grid(i)
-    block%is_level = maxval(abs(found%torque - found%torque(i)), mask=found%is_balanced) <= equal * least
-  end subroutine find_least
 
   !> Finds the solutions between a point of the grid and the next, and near a minimum at the point.
   subroutine search_interval(reduced, found, i, start, block)

@@ -126,48 +126,35 @@ contains
     type(torque_balance_t), intent(inout) :: balance
     real(wp), intent(inout) :: z(:)   !! start, then the end, [unknowns]
     type(block_solutions_t), intent(in) :: block
+    real(wp), parameter :: highest = 1.0e12_wp   ! rad/s
+    real(wp), parameter :: converged = 1.0e-9_wp, least = 1.0e-12_wp   ! change, relative or in rad/s
+    integer, parameter :: most_iterations = 8
     integer, parameter :: most_steps = 400
     real(wp), parameter :: first_step = 1.0e-6_wp, longest = 1.0e12_wp   ! s
     real(wp), allocatable :: inertia(:, :)
-    real(wp) :: ahead(size(z)), step
-    integer :: i
+    real(wp) :: ahead(size(z)), step, change(size(block%members)), slopes(size(z), size(z))
+    integer :: i, j
     logical :: is_solved
 
     allocate (inertia, source=balance%inertia(block%members))
     step = first_step
     do i = 1, most_steps
       ahead = z
-      call solve_step(balance, block%members, inertia, z, step, ahead, is_solved)
+      ! one step of Euler's implicit method: inertia (ahead - z) / step = torques (ahead)
+      is_solved = .false.
+      do j = 1, most_iterations
+        call balance%evaluate(ahead)
+        call balance%differentiate(slopes)
+        change = matmul(pseudo_inverse(inertia / step - slopes(block%members, block%members), singular), &
+                        balance%residual(block%members) - matmul(inertia, ahead(block%members) - z(block%members)) / step)
+        ahead(block%members) = ahead(block%members) + change
+        is_solved = all(abs(change) <= converged * abs(ahead(block%members)) + least)
+        if (is_solved .or. any(abs(ahead(block%members)) > highest)) exit
+      end do
       if (is_solved) z = ahead
       step = merge(2.0_wp, 0.25_wp, is_solved) * step
       if (step > longest .or. step < epsilon(1.0_wp) * first_step) exit
     end do
   end subroutine follow_motion
-
-  !> One step of Euler's implicit method: inertia (ahead - z) / step = torques (ahead).
-  subroutine solve_step(balance, members, inertia, z, step, ahead, is_solved)
-    type(torque_balance_t), intent(inout) :: balance
-    integer, intent(in) :: members(:)          !! unknowns of the block
-    real(wp), intent(in) :: inertia(:, :)      !! [kg m2], 1 of the internal states, [members, members]
-    real(wp), intent(in) :: z(:), step         !! unknowns before the step; its length [s]
-    real(wp), intent(inout) :: ahead(:)        !! guess, then unknowns after it
-    logical, intent(out) :: is_solved
-    integer, parameter :: most_iterations = 8
-    real(wp), parameter :: converged = 1.0e-9_wp, least = 1.0e-12_wp   ! change, relative or in rad/s
-    real(wp), parameter :: highest = 1.0e12_wp                         ! rad/s
-    real(wp) :: change(size(members)), slopes(size(z), size(z))
-    integer :: i
-
-    is_solved = .false.
-    do i = 1, most_iterations
-      call balance%evaluate(ahead)
-      call balance%differentiate(slopes)
-      change = matmul(pseudo_inverse(inertia / step - slopes(members, members), singular), &
-                      balance%residual(members) - matmul(inertia, ahead(members) - z(members)) / step)
-      ahead(members) = ahead(members) + change
-      is_solved = all(abs(change) <= converged * abs(ahead(members)) + least)
-      if (is_solved .or. any(abs(ahead(members)) > highest)) exit
-    end do
-  end subroutine solve_step
 
 end module nocdyn_balance_starts

@@ -73,7 +73,12 @@ contains
     rises = rises .and. maxval(abs(rows), dim=2) > 0.0_wp
     self%row(1) = 1.0_wp
     if (any(rises)) then
-      call find_choices(rows, rises, choices)
+      ! the elements with rising torques that have speeds of their own
+      allocate (choices(0))
+      do e = 1, size(rises)
+        if (.not. rises(e)) cycle
+        if (.not. any([(is_parallel(rows(e, :), rows(choices(i), :)), i=1, size(choices))])) choices = [choices, e]
+      end do
       self%choices = size(choices)
       i = 1
       if (present(choice)) i = choice
@@ -85,20 +90,6 @@ contains
     end do
     call collect_rising(self, pack(elements, rises), rows(pack([(e, e=1, size(rises))], rises), :))
   end subroutine new_eliminated_balance
-
-  !> The elements with rising torques that have speeds of their own.
-  pure subroutine find_choices(rows, rises, choices)
-    real(wp), intent(in) :: rows(:, :)                !! speeds of the elements, [elements, speeds]
-    logical, intent(in) :: rises(:)                   !! [elements]
-    integer, allocatable, intent(out) :: choices(:)   !! elements
-    integer :: e, i
-
-    allocate (choices(0))
-    do e = 1, size(rises)
-      if (.not. rises(e)) cycle
-      if (.not. any([(is_parallel(rows(e, :), rows(choices(i), :)), i=1, size(choices))])) choices = [choices, e]
-    end do
-  end subroutine find_choices
 
   !> Collects the speeds of the elements whose torques rise, in which the solutions may be several.
   subroutine collect_rising(self, elements, rows)

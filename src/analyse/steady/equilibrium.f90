@@ -61,7 +61,9 @@ contains
     call mean_formulation(machine, formulation)
     allocate (notes(0), equilibria(0), refusals(0))
     if (allocated(machine%simplifications)) notes = machine%simplifications
-    call refuse_moving_rows(formulation, error)
+    if (formulation%joints%motions%count /= 0) then
+      call raise(error, exit_failed, 'joints move in this machine, which has no steady state but that of means over a turn')
+    end if
     if (allocated(error)) return
     call set_up_balance(formulation, t, balance)
     call list_resting_sets(balance, sets, is_complete)
@@ -86,15 +88,6 @@ contains
       call move_alloc(first_error, error)
     end if
   end subroutine find_equilibria
-
-  !> Refuses joints that move: how they do is not known at a time after all changes.
-  subroutine refuse_moving_rows(formulation, error)
-    class(formulation_t), intent(in) :: formulation
-    type(error_t), allocatable, intent(out) :: error
-
-    if (formulation%joints%motions%count == 0) return
-    call raise(error, exit_failed, 'joints move in this machine, which has no steady state but that of means over a turn')
-  end subroutine refuse_moving_rows
 
   !> Orders the states by their speeds, and says which joints hold in each.
   subroutine complete_states(formulation, t, equilibria, notes)

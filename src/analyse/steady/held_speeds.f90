@@ -130,36 +130,6 @@ contains
     end do
   end function sources_of
 
-  !> Solves for the frequency of the supplies, by Newton's method from the last slip, and from no slip if that fails: the torque
-  !> over the slip is concave up to the largest one.
-  subroutine balance_supplies(self, speed, z, share, is_found)
-    type(held_speeds_t), intent(inout) :: self
-    real(wp), intent(in) :: speed   !! [rad/s]
-    real(wp), intent(out) :: z(:)   !! rigid motions and internal states
-    real(wp), intent(out) :: share
-    logical, intent(out) :: is_found
-    integer :: attempt
-
-    do attempt = 1, 2
-      z = self%z
-      if (abs(self%last_speed) > 0) z(:size(self%ratio)) = z(:size(self%ratio)) * (speed / self%last_speed)
-      call impose(self, maxloc(abs(self%ratio), dim=1), speed, z)
-      call set_supplies(self%balance, 1.0_wp)
-      call self%balance%settle(z)
-      call self%balance%evaluate(z)
-      share = idle_share(self%balance, self%sources)
-      if (attempt == 1) share = share + self%slip
-      call iterate_supplies(self, speed, z, share, is_found)
-      if (is_found) exit
-    end do
-    if (is_found) then
-      self%slip = share - idle_share(self%balance, self%sources)
-    else
-      call set_supplies(self%balance, idle_share(self%balance, self%sources))
-      self%slip = 0.0_wp
-    end if
-  end subroutine balance_supplies
-
   subroutine iterate_supplies(self, speed, z, share, is_found)
     type(held_speeds_t), intent(inout) :: self
     real(wp), intent(in) :: speed   !! [rad/s]
@@ -221,11 +191,31 @@ contains
     type(error_t), allocatable, intent(out) :: error   !! without the speed, which the caller knows
     real(wp) :: z(size(self%z)), held
     logical :: is_found
+    integer :: attempt
 
     self%motors_hold = size(self%sources) > 0
     is_found = .false.
     if (self%supply_holds) then
-      call balance_supplies(self, speed, z, state%supply, is_found)
+      ! Solves for the frequency of the supplies, by Newton's method from the last slip, and from no slip if that fails: the
+      ! torque over the slip is concave up to the largest one.
+      do attempt = 1, 2
+        z = self%z
+        if (abs(self%last_speed) > 0) z(:size(self%ratio)) = z(:size(self%ratio)) * (speed / self%last_speed)
+        call impose(self, maxloc(abs(self%ratio), dim=1), speed, z)
+        call set_supplies(self%balance, 1.0_wp)
+        call self%balance%settle(z)
+        call self%balance%evaluate(z)
+        state%supply = idle_share(self%balance, self%sources)
+        if (attempt == 1) state%supply = state%supply + self%slip
+        call iterate_supplies(self, speed, z, state%supply, is_found)
+        if (is_found) exit
+      end do
+      if (is_found) then
+        self%slip = state%supply - idle_share(self%balance, self%sources)
+      else
+        call set_supplies(self%balance, idle_share(self%balance, self%sources))
+        self%slip = 0.0_wp
+      end if
       self%motors_hold = is_found
       held = 1.0_wp
       if (.not. is_found) state%supply = 0.0_wp

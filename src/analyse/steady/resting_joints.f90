@@ -161,10 +161,12 @@ contains
     class(resting_joints_t), intent(inout) :: self
     type(torque_balance_t), intent(inout) :: balance
     type(joint_choices_t) :: choices
-    real(wp) :: applied(balance%formulation%machine%elements%count)
+    real(wp) :: applied(balance%formulation%machine%elements%count), moment
     real(wp), dimension(size(self%mobility, 1)) :: acceleration, scale, torque
     logical :: holds
     integer :: e, j
+    integer, allocatable :: resting(:)
+    real(wp), allocatable :: inverse(:, :), moments(:)
 
     self%overloaded = 0
     associate (joints => balance%joints, elements => balance%formulation%machine%elements)
@@ -194,7 +196,12 @@ contains
       self%least = choices%least(self%overloaded)
       self%most = choices%most(self%overloaded)
     end associate
-    self%needed = locked_moment(choices, self%overloaded)
+    ! the moment of a joint if all at rest are locked, with the least norm
+    resting = pack([(j, j=1, size(choices%mode))], choices%is_at_rest)
+    allocate (inverse, source=pseudo_inverse(choices%w(resting, resting), singular))
+    moments = -matmul(inverse, choices%rate(resting))
+    moment = sum(pack(moments, resting == self%overloaded))
+    self%needed = moment
   end subroutine hold
 
   !> Adds the torques of moments along the rigid motions, and the sums of their absolute terms.
@@ -209,20 +216,6 @@ contains
       scale(m) = scale(m) + sum(abs(rates(:, m) * moment))
     end do
   end subroutine add_torques
-
-  !> The moment of a joint if all at rest are locked, with the least norm.
-  real(wp) function locked_moment(choices, joint) result(moment)
-    type(joint_choices_t), intent(in) :: choices
-    integer, intent(in) :: joint
-    integer, allocatable :: resting(:)
-    real(wp), allocatable :: inverse(:, :), moments(:)
-    integer :: j
-
-    resting = pack([(j, j=1, size(choices%mode))], choices%is_at_rest)
-    allocate (inverse, source=pseudo_inverse(choices%w(resting, resting), singular))
-    moments = -matmul(inverse, choices%rate(resting))
-    moment = sum(pack(moments, resting == joint))
-  end function locked_moment
 
   !> The complementarity problem of the joints.
   subroutine gather(self, balance, rate, applied, choices)

@@ -53,6 +53,7 @@ contains
     type(error_t), allocatable, intent(out) :: error   !! if the stiffness matrix is too large
     real(wp), intent(in), optional :: weight(:)        !! factors on the moments of the inelastic elements, [elements]; absent: 1
     real(wp), intent(in), optional :: torque(:)        !! more torques on the coordinates [N m], [coordinates]; absent: none
+    real(wp), parameter :: rounding = 1.0e-12_wp
     integer, parameter :: most_steps = 500
     real(wp), parameter :: stalled = 1.0e3_wp   ! residuals up to this many tolerances are rounding if they stop falling
     real(wp) :: damping, energy, excess, last_excess, new_q(size(q)), step(size(q))
@@ -68,7 +69,10 @@ contains
     damping = 0.0_wp
     last_excess = huge(1.0_wp)
     do i = 1, most_steps
-      excess = torque_excess(self)
+      ! the largest residual, in units of its tolerance
+      associate (torque => abs(self%torque(self%unknown)))
+        excess = max(0.0_wp, maxval(torque / self%tolerance(self%unknown), mask=torque > 0.0_wp))
+      end associate
       is_found = excess <= 1.0_wp .or. (excess <= stalled .and. excess > 0.5_wp * last_excess)
       if (is_found) exit
       last_excess = excess
@@ -76,7 +80,7 @@ contains
       call solve(balance, damping, self, step, is_singular)
       new_q = q + step
       if (.not. is_singular) call evaluate_angles(balance, new_q, self)
-      if (.not. is_singular .and. lowers_energy(self, energy, step)) then
+      if (.not. is_singular .and. (self%energy <= energy + rounding * (abs(energy) + sum(abs(self%external_torque * step))))) then
         q = new_q
         damping = merge(0.0_wp, 0.1_wp * damping, damping < 1.0e-8_wp)
         is_found = all(abs(step) <= 4 * spacing(abs(q)))
@@ -128,25 +132,6 @@ contains
     is_twisted = any(abs(rate) > rounding * scale)
   end function is_twisted
 
-  !> The largest residual, in units of its tolerance.
-  pure real(wp) function torque_excess(self)
-    type(twist_problem_t), intent(in) :: self
-
-    associate (torque => abs(self%torque(self%unknown)))
-      torque_excess = max(0.0_wp, maxval(torque / self%tolerance(self%unknown), mask=torque > 0.0_wp))
-    end associate
-  end function torque_excess
-
-  !> Whether a step has lowered the energy, or changed it by rounding only.
-  pure logical function lowers_energy(self, energy, step)
-    type(twist_problem_t), intent(in) :: self
-    real(wp), intent(in) :: energy    !! before the step
-    real(wp), intent(in) :: step(:)   !! [rad], [coordinates]
-    real(wp), parameter :: rounding = 1.0e-12_wp
-
-    lowers_energy = self%energy <= energy + rounding * (abs(energy) + sum(abs(self%external_torque * step)))
-  end function lowers_energy
-
   !> Sets the order of the coordinates.
   subroutine set_up(balance, self, error)
     type(torque_balance_t), intent(in) :: balance
@@ -154,37 +139,13 @@ contains
     type(error_t), allocatable, intent(out) :: error   !! if the band is too large
     type(entries_t) :: entries
     integer :: number(balance%coordinates), order(balance%coordinates - size(balance%loose%free))
-    integer :: c, upper
+    integer :: c, e, i, k, n, upper
 
     number = 1
     number(balance%loose%free) = 0
     self%unknown = pack([(c, c=1, size(number))], number == 1)
     number(self%unknown) = [(c, c=1, size(self%unknown))]
-    entries = joined_coordinates(balance, number)
-    order = reverse_cuthill_mckee(size(order), entries%row, entries%column)
-    call half_bandwidths(order, entries, self%width, upper)
-    if ((3.0_wp * self%width + 1.0_wp) * size(order) > real(largest_matrix, wp)**2) then
-      call raise(error, exit_input, 'the twists need a matrix of ' // to_text(3 * self%width + 1) // ' x ' // &
-                 to_text(size(order)) // ' entries for this machine, whose couplings leave no narrower band; at most ' // &
-                 to_text(largest_matrix) // ' x ' // to_text(largest_matrix) // ' are allowed')
-      deallocate (self%unknown)
-      return
-    end if
-    self%unknown = self%unknown(order)
-    allocate (self%position(size(number)), source=0)
-    self%position(self%unknown) = [(c, c=1, size(self%unknown))]
-    allocate (self%band(3 * self%width + 1, size(self%unknown)), self%diagonal_scale(size(self%unknown)), source=0.0_wp)
-    allocate (self%external_torque(size(number)), self%torque(size(number)), source=0.0_wp)
-    allocate (self%external_scale, self%tolerance, source=self%external_torque)
-    allocate (self%pivots(size(self%unknown)))
-  end subroutine set_up
-
-  !> Pairs of coordinates that an elastic element couples.
-  type(entries_t) function joined_coordinates(balance, number) result(entries)
-    type(torque_balance_t), intent(in) :: balance
-    integer, intent(in) :: number(:)   !! of each coordinate in the matrix, 0 if it has none
-    integer :: e, i, k, n
-
+    ! pairs of coordinates that an elastic element couples
     associate (first => balance%incidence%first, coordinate => balance%incidence%coordinate)
       n = sum((first(balance%elastic + 1) - first(balance%elastic))**2)
       allocate (entries%row(n), entries%column(n))
@@ -203,7 +164,23 @@ contains
     end associate
     entries%row = entries%row(:n)
     entries%column = entries%column(:n)
-  end function joined_coordinates
+    order = reverse_cuthill_mckee(size(order), entries%row, entries%column)
+    call half_bandwidths(order, entries, self%width, upper)
+    if ((3.0_wp * self%width + 1.0_wp) * size(order) > real(largest_matrix, wp)**2) then
+      call raise(error, exit_input, 'the twists need a matrix of ' // to_text(3 * self%width + 1) // ' x ' // &
+                 to_text(size(order)) // ' entries for this machine, whose couplings leave no narrower band; at most ' // &
+                 to_text(largest_matrix) // ' x ' // to_text(largest_matrix) // ' are allowed')
+      deallocate (self%unknown)
+      return
+    end if
+    self%unknown = self%unknown(order)
+    allocate (self%position(size(number)), source=0)
+    self%position(self%unknown) = [(c, c=1, size(self%unknown))]
+    allocate (self%band(3 * self%width + 1, size(self%unknown)), self%diagonal_scale(size(self%unknown)), source=0.0_wp)
+    allocate (self%external_torque(size(number)), self%torque(size(number)), source=0.0_wp)
+    allocate (self%external_scale, self%tolerance, source=self%external_torque)
+    allocate (self%pivots(size(self%unknown)))
+  end subroutine set_up
 
   !> Computes the torques of the inelastic elements, and the part of the elastic ones that does not depend on the twist.
   subroutine find_external(balance, self, weight, torque)

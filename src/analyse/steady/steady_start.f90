@@ -37,35 +37,26 @@ contains
     machine%start_speed(1, :) = formulation%omega(1, 1:)
     machine%start_angle(1, :) = formulation%phi(1, 1:)
     allocate (machine%steady_internal, source=formulation%machine%elements%internal%value)
-    call describe_choice(equilibria, nearest, any(is_given), name)
+    ! "steady state 3 of 3, of 2 stable ones the nearest to the given speeds"
+    associate (alike => count(equilibria%stability == equilibria(nearest)%stability))
+      if (size(equilibria) == 1) then
+        name = 'the steady state, which is ' // trim(equilibria(1)%stability)
+        if (equilibria(1)%stability == 'not determined') name = 'the steady state, of which the stability is not determined'
+      else
+        name = 'steady state ' // to_text(nearest) // ' of ' // to_text(size(equilibria)) // ', '
+        if (alike == 1) then
+          name = name // 'the only one that is ' // trim(equilibria(nearest)%stability)
+        else
+          name = name // 'of ' // to_text(alike) // ' ' // trim(equilibria(nearest)%stability) // ' ones the ' // &
+                 trim(merge('nearest to the given speeds  ', 'fastest, as no speed is given', any(is_given)))
+        end if
+      end if
+    end associate
     call describe_state_speeds(formulation, speeds)
     call append(machine%start_notes, 'the start is ' // name // ', at ' // speeds)
     do i = 1, size(notes)
       call append(machine%start_notes, notes(i)%text)
     end do
   end subroutine start_steadily
-
-  !> "steady state 3 of 3, of 2 stable ones the nearest to the given speeds".
-  subroutine describe_choice(equilibria, number, is_near, text)
-    type(equilibrium_t), intent(in) :: equilibria(:)
-    integer, intent(in) :: number
-    logical, intent(in) :: is_near   !! to given speeds; else it is the fastest
-    character(len=:), allocatable, intent(out) :: text
-
-    associate (alike => count(equilibria%stability == equilibria(number)%stability))
-      if (size(equilibria) == 1) then
-        text = 'the steady state, which is ' // trim(equilibria(1)%stability)
-        if (equilibria(1)%stability == 'not determined') text = 'the steady state, of which the stability is not determined'
-      else
-        text = 'steady state ' // to_text(number) // ' of ' // to_text(size(equilibria)) // ', '
-        if (alike == 1) then
-          text = text // 'the only one that is ' // trim(equilibria(number)%stability)
-        else
-          text = text // 'of ' // to_text(alike) // ' ' // trim(equilibria(number)%stability) // ' ones the ' // &
-                 trim(merge('nearest to the given speeds  ', 'fastest, as no speed is given', is_near))
-        end if
-      end if
-    end associate
-  end subroutine describe_choice
 
 end module nocdyn_steady_start

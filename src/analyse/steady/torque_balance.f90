@@ -58,6 +58,7 @@ contains
     type(torque_balance_t), intent(out) :: self
     logical, intent(in), optional :: is_at_rest(:)   !! joints that are; absent: none, and teeth lose nothing
     integer :: e
+    integer, allocatable :: rigid(:)   ! elements
 
     call move_alloc(formulation, self%formulation)
     associate (machine => self%formulation%machine)
@@ -74,27 +75,21 @@ contains
     self%t = t
     allocate (self%start_twist, source=pack(self%formulation%machine%start_twist(), .true.))
     self%joints = new_joint_balance(self%formulation%joints)
-    if (present(is_at_rest)) call hold_joints(self, is_at_rest)
+    if (present(is_at_rest)) then
+      ! holds joints at rest, and finds what the teeth carry
+      self%joints%is_at_rest = is_at_rest
+      rigid = [self%elastic, pack(self%joints%element, is_at_rest)]
+      if (any(is_at_rest)) self%motions = new_rigid_motions(self%coordinates, self%incidence, rigid)
+      call self%differentiate_at_start()
+      associate (joints => self%joints, machine => self%formulation%machine)
+        joints%by_moment = loads_by_moments(joints%teeth, machine, self%incidence, self%motions, rigid)
+      end associate
+    end if
     call gather_ratios(self)
     allocate (self%y(1, self%formulation%states), source=0.0_wp)
     allocate (self%rate, source=self%y)
     allocate (self%residual(self%unknowns()), self%scale(self%unknowns()), source=0.0_wp)
   end subroutine set_up_balance
-
-  !> Holds joints at rest, and finds what the teeth carry.
-  subroutine hold_joints(self, is_at_rest)
-    type(torque_balance_t), intent(inout) :: self
-    logical, intent(in) :: is_at_rest(:)   !! [joints]
-    integer, allocatable :: rigid(:)       ! elements
-
-    self%joints%is_at_rest = is_at_rest
-    rigid = [self%elastic, pack(self%joints%element, is_at_rest)]
-    if (any(is_at_rest)) self%motions = new_rigid_motions(self%coordinates, self%incidence, rigid)
-    call self%differentiate_at_start()
-    associate (joints => self%joints, machine => self%formulation%machine)
-      joints%by_moment = loads_by_moments(joints%teeth, machine, self%incidence, self%motions, rigid)
-    end associate
-  end subroutine hold_joints
 
   !> Differentiates the laws of the elements at the start twists, without speeds.
   subroutine differentiate_at_start(self)
@@ -345,7 +340,7 @@ contains
   subroutine differentiate(self, matrix)
     class(torque_balance_t), intent(inout) :: self
     real(wp), intent(out) :: matrix(:, :)   !! [unknowns, unknowns]
-    integer :: i, j, k
+    integer :: column, i, j, k, m, x
 
     matrix = 0.0_wp
     call self%formulation%machine%differentiate_elements(self%t)
@@ -365,7 +360,21 @@ contains
         matrix(:r, :r) = matrix(:r, :r) - self%drag
       end associate
     end if
-    call differentiate_internal(self, matrix)
+    ! fills the rows and columns of the internal states x
+    associate (states => self%formulation%machine%elements%internal, r => size(self%motions%free))
+      do x = 1, self%internal
+        do m = 1, states%members(x)
+          column = r + states%first(x) + m - 1
+          matrix(r + x, column) = states%rate_internal(1, m, x)
+        end do
+        i = findloc(self%inelastic, states%element(x), dim=1)
+        if (i == 0) cycle   ! an elastic coupling, which does not turn
+        do k = self%first(i), self%first(i + 1) - 1
+          matrix(self%freedom(k), r + x) = matrix(self%freedom(k), r + x) + self%ratio(k) * states%applied(1, x)
+          matrix(r + x, self%freedom(k)) = matrix(r + x, self%freedom(k)) + self%ratio(k) * states%rate_speed(1, x)
+        end do
+      end do
+    end associate
     if (allocated(self%joints%by_moment) .and. self%joints%teeth%count > 0) call self%differentiate_losses(matrix)
   end subroutine differentiate
 
@@ -402,33 +411,12 @@ contains
     end associate
   end subroutine differentiate_losses
 
-  !> Fills the rows and columns of the internal states x.
-  subroutine differentiate_internal(self, matrix)
-    type(torque_balance_t), intent(in) :: self
-    real(wp), intent(inout) :: matrix(:, :)   !! [unknowns, unknowns]
-    integer :: column, i, k, m, x
-
-    associate (states => self%formulation%machine%elements%internal, r => size(self%motions%free))
-      do x = 1, self%internal
-        do m = 1, states%members(x)
-          column = r + states%first(x) + m - 1
-          matrix(r + x, column) = states%rate_internal(1, m, x)
-        end do
-        i = findloc(self%inelastic, states%element(x), dim=1)
-        if (i == 0) cycle   ! an elastic coupling, which does not turn
-        do k = self%first(i), self%first(i + 1) - 1
-          matrix(self%freedom(k), r + x) = matrix(self%freedom(k), r + x) + self%ratio(k) * states%applied(1, x)
-          matrix(r + x, self%freedom(k)) = matrix(r + x, self%freedom(k)) + self%ratio(k) * states%rate_speed(1, x)
-        end do
-      end do
-    end associate
-  end subroutine differentiate_internal
-
   !> Numbers of the blocks of unknowns, [unknowns]. Unknowns of different blocks have no common equation.
   function blocks(self) result(block_of)
     class(torque_balance_t), intent(in) :: self
+    real(wp), parameter :: rounding = 1.0e-9_wp
     integer :: block_of(self%unknowns())
-    integer :: i, k, root, x
+    integer :: i, k, l, place, root, x
 
     block_of = [(i, i=1, size(block_of))]
     do i = 1, size(self%inelastic)
@@ -436,7 +424,20 @@ contains
         call join_components(self%freedom(self%first(i)), self%freedom(k), block_of)
       end do
     end do
-    call join_by_losses(self, block_of)
+    if (allocated(self%joints%by_moment)) then
+      ! joins what teeth that turn join: their losses depend on the moments of other elements
+      associate (joints => self%joints, first => self%first)
+        do l = 1, joints%teeth%count
+          place = findloc(self%inelastic, joints%element(joints%teeth%joint(l)), dim=1)
+          if (first(place) == first(place + 1)) cycle
+          do i = 1, size(self%inelastic)
+            if (first(i) == first(i + 1)) cycle
+            if (abs(joints%by_moment(l, self%inelastic(i))) <= rounding * maxval(abs(joints%by_moment(l, :)))) cycle
+            call join_components(self%freedom(first(place)), self%freedom(first(i)), block_of)
+          end do
+        end do
+      end associate
+    end if
     associate (states => self%formulation%machine%elements%internal, r => size(self%motions%free))
       do x = 1, self%internal
         call join_components(r + states%first(x), r + x, block_of)
@@ -450,26 +451,5 @@ contains
       block_of(i) = root
     end do
   end function blocks
-
-  !> Joins what teeth that turn join: their losses depend on the moments of other elements.
-  subroutine join_by_losses(self, block_of)
-    class(torque_balance_t), intent(in) :: self
-    integer, intent(inout) :: block_of(:)
-    real(wp), parameter :: rounding = 1.0e-9_wp
-    integer :: i, l, place
-
-    if (.not. allocated(self%joints%by_moment)) return
-    associate (joints => self%joints, first => self%first)
-      do l = 1, joints%teeth%count
-        place = findloc(self%inelastic, joints%element(joints%teeth%joint(l)), dim=1)
-        if (first(place) == first(place + 1)) cycle
-        do i = 1, size(self%inelastic)
-          if (first(i) == first(i + 1)) cycle
-          if (abs(joints%by_moment(l, self%inelastic(i))) <= rounding * maxval(abs(joints%by_moment(l, :)))) cycle
-          call join_components(self%freedom(first(place)), self%freedom(first(i)), block_of)
-        end do
-      end do
-    end associate
-  end subroutine join_by_losses
 
 end module nocdyn_torque_balance

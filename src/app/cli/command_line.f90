@@ -148,7 +148,11 @@ contains
     case ('--set')
       call append(arguments%overrides, value)
     case ('--threads')
-      call parse_threads(value, arguments%threads, error)
+      if (digits_value(value) < 1 .or. digits_value(value) > max_threads) then
+        call raise(error, exit_input, '--threads ' // value // ': allowed: a number from 1 to ' // to_text(max_threads))
+      else
+        arguments%threads = digits_value(value)
+      end if
     case ('--out')
       if (is_too_long(value)) call raise(error, exit_input, '--out ' // shortened(value) // ' is too long for a folder; ' // &
         'allowed: ' // to_text(longest_path) // ' bytes, ' // to_text(longest_file_name) // ' from slash to slash')
@@ -160,18 +164,6 @@ contains
     call append(arguments%names, trim(option%name))
     call append(arguments%values, value)
   end subroutine add_option
-
-  subroutine parse_threads(value, threads, error)
-    character(len=*), intent(in) :: value
-    integer, intent(inout) :: threads
-    type(error_t), allocatable, intent(out) :: error
-
-    if (digits_value(value) < 1 .or. digits_value(value) > max_threads) then
-      call raise(error, exit_input, '--threads ' // value // ': allowed: a number from 1 to ' // to_text(max_threads))
-    else
-      threads = digits_value(value)
-    end if
-  end subroutine parse_threads
 
   !> K/N: part K of N equal parts.
   subroutine parse_shard(value, shard, shards, error)

@@ -49,7 +49,8 @@ contains
     class(trajectory_file_t), intent(in), optional :: netcdf   !! not open
     type(reading_t), allocatable :: readings(:)
     type(error_t), allocatable :: error
-    integer :: i
+    integer :: i, k
+    type(string_t), allocatable :: files(:), folders(:)
 
     code = exit_done
     allocate (readings(size(arguments%operands)))
@@ -65,22 +66,7 @@ contains
     do i = 1, size(readings)
       if (allocated(readings(i)%error)) call report_error(readings(i)%error, code)
     end do
-    call refuse_folders(arguments, readings, error)
-    if (allocated(error)) then
-      call report_error(error, code)
-    else
-      call run_all(arguments, readings, code, netcdf)
-    end if
-  end subroutine run_inputs
-
-  !> Refuses folders of results that two files or load cases would share.
-  subroutine refuse_folders(arguments, readings, error)
-    type(arguments_t), intent(in) :: arguments
-    type(reading_t), intent(in) :: readings(:)
-    type(error_t), allocatable, intent(out) :: error
-    type(string_t), allocatable :: files(:), folders(:)
-    integer :: i, k
-
+    ! refuses folders of results that two files or load cases would share
     allocate (files(0), folders(0))
     do i = 1, size(readings)
       do k = 1, size(readings(i)%inputs)
@@ -89,7 +75,12 @@ contains
       end do
     end do
     call refuse_shared_folders(files, folders, error)
-  end subroutine refuse_folders
+    if (allocated(error)) then
+      call report_error(error, code)
+    else
+      call run_all(arguments, readings, code, netcdf)
+    end if
+  end subroutine run_inputs
 
   subroutine run_all(arguments, readings, code, netcdf)
     type(arguments_t), intent(in) :: arguments
@@ -163,7 +154,8 @@ contains
     type(reading_t), intent(inout) :: reading
     type(input_t) :: machine
     type(input_t), allocatable :: load_cases(:)
-    integer :: bytes, chosen
+    integer :: bytes, c, chosen, k
+    type(error_t), allocatable :: own
 
     allocate (reading%inputs(0), reading%folders(0))
     associate (file => arguments%operands(number)%text)
@@ -184,16 +176,7 @@ contains
         end if
       end if
     end associate
-    call take_inputs(machine, load_cases, chosen, reading)
-  end subroutine read_one
-
-  !> Takes what is to be run, each with the folder of its results.
-  subroutine take_inputs(machine, load_cases, chosen, reading)
-    type(input_t), intent(in) :: machine, load_cases(:)
-    integer, intent(in) :: chosen   !! the only load case that is wanted, 0: all
-    type(reading_t), intent(inout) :: reading
-    integer :: c, k
-
+    ! takes what is to be run, each with the folder of its results
     deallocate (reading%inputs)
     allocate (reading%inputs(merge(1, size(load_cases), chosen > 0 .or. size(load_cases) == 0)))
     if (size(load_cases) == 0) reading%inputs(1) = machine
@@ -205,16 +188,8 @@ contains
       reading%inputs(k) = load_cases(c)
       call append(reading%folders, reading%folder // '/' // load_cases(c)%load_case%name)
     end do
-    call check_cases(reading)
-  end subroutine take_inputs
-
-  !> Refuses a file with mistakes in the machine or any of the load cases that are wanted, and load cases whose folders hold other
-  !> results.
-  subroutine check_cases(reading)
-    type(reading_t), intent(inout) :: reading
-    type(error_t), allocatable :: own
-    integer :: c
-
+    ! Refuses a file with mistakes in the machine or any of the load cases that are wanted, and load cases whose folders hold
+    ! other results.
     do c = 1, size(reading%inputs)
       call check_input(reading%inputs(c), own)
       if (allocated(reading%inputs(c)%load_case) .and. .not. allocated(own)) then
@@ -225,7 +200,7 @@ contains
     if (.not. allocated(reading%error)) return
     deallocate (reading%inputs)
     allocate (reading%inputs(0))
-  end subroutine check_cases
+  end subroutine read_one
 
   !> Whether an input is to be run, but not by a program that cannot write NetCDF.
   logical function needs_companion(reading)

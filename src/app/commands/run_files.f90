@@ -107,6 +107,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(result_files_t) :: files   ! but for the rows
     type(string_t), allocatable :: names(:)
+    character(len=:), allocatable :: name
 
     allocate (names, source=[string_t(input_file)])
     call append(names, columns_file)
@@ -119,7 +120,14 @@ contains
     call files%files(size(names))%put(summary_json(input, summary))
     call writer%file%complete(trim(trajectory_names(1, writer%form)), error)
     if (.not. allocated(error)) call files%complete(error)
-    if (.not. allocated(error)) call name_files(writer, summary, files, error)
+    if (.not. allocated(error)) then
+      ! Removes the trajectories of an earlier run under other names. summary.json goes first and comes last: without it there are
+      ! no results, if a file in between cannot take its name.
+      name = trim(trajectory_names(state_of(summary), writer%form))
+      call remove_run(writer%folder, name)
+      call writer%file%finish(name, error)
+      if (.not. allocated(error)) call files%finish(error)
+    end if
     if (.not. allocated(error)) return
     call writer%file%discard()
     call files%discard()
@@ -131,21 +139,6 @@ contains
 
     state = merge(1, 2, summary%status == 'done')
   end function state_of
-
-  !> Removes the trajectories of an earlier run under other names. summary.json goes first and comes last: without it there are no
-  !> results, if a file in between cannot take its name.
-  subroutine name_files(writer, summary, files, error)
-    type(trajectory_writer_t), intent(inout) :: writer
-    type(run_summary_t), intent(in) :: summary
-    type(result_files_t), intent(inout) :: files
-    type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: name
-
-    name = trim(trajectory_names(state_of(summary), writer%form))
-    call remove_run(writer%folder, name)
-    call writer%file%finish(name, error)
-    if (.not. allocated(error)) call files%finish(error)
-  end subroutine name_files
 
   !> Removes the results of a run in a folder, but for input.nml.
   subroutine remove_run(folder, kept)

@@ -32,12 +32,18 @@ contains
     type(arguments_t), intent(in) :: arguments
     integer, intent(out) :: code   !! 0 on all ranks but the root
     type(error_t), allocatable :: error
-    integer :: rank
+    integer :: provided, rank
 
     code = exit_done
     call catch_interrupts()
     call mpi_comm_rank(mpi_comm_world, rank)
-    call check_arguments(arguments, error)
+    ! refuses --shard, and threads that the MPI library does not support
+    call mpi_query_thread(provided)
+    if (arguments%shards > 0) then
+      call raise(error, exit_input, '--shard is an option of nocdyn sweep; nocdyn-mpi distributes the variants itself')
+    else if (arguments%threads > 1 .and. provided < mpi_thread_serialized) then
+      call raise(error, exit_input, '--threads above 1 needs an MPI library with MPI_THREAD_SERIALIZED')
+    end if
     if (allocated(error)) then
       if (rank == root) call report_error(error, code)
     else if (rank == root) then
@@ -46,20 +52,6 @@ contains
       call run_worker(rank, usable_threads(max(1, arguments%threads)), code)
     end if
   end subroutine mpi_command
-
-  !> Refuses --shard, and threads that the MPI library does not support.
-  subroutine check_arguments(arguments, error)
-    type(arguments_t), intent(in) :: arguments
-    type(error_t), allocatable, intent(out) :: error
-    integer :: provided
-
-    call mpi_query_thread(provided)
-    if (arguments%shards > 0) then
-      call raise(error, exit_input, '--shard is an option of nocdyn sweep; nocdyn-mpi distributes the variants itself')
-    else if (arguments%threads > 1 .and. provided < mpi_thread_serialized) then
-      call raise(error, exit_input, '--threads above 1 needs an MPI library with MPI_THREAD_SERIALIZED')
-    end if
-  end subroutine check_arguments
 
   !> Rank 0: reads the input, hands out the variants, computes like the other ranks, and makes the results of all journals.
   subroutine run_root(arguments, threads, code)

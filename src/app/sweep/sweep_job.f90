@@ -167,6 +167,8 @@ contains
     type(string_t), intent(in) :: names(:)   !! that of this process first, which is created if it does not exist
     type(sweep_header_t), intent(in) :: header
     type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: file
+    integer :: i
 
     allocate (job%journals(size(names)))
     call continue_journal(job%folder, names(1)%text, header, job%journals(1), error)
@@ -175,7 +177,18 @@ contains
     if (.not. job%arguments%is_given('--resume')) then
       call refuse_unfinished(job%journals, error)
     else if (.not. job%arguments%is_given('--quiet')) then
-      call print_journal_state(job)
+      ! Prints how many variants of a resumed journal are reused. Those of an entry that was not completely written, or is
+      ! damaged, are computed again.
+      file = job%plan%input%shown_file()
+      associate (journals => job%journals, header => job%journals(1)%header)
+        do i = 1, size(journals)
+          if (journals(i)%damaged_bytes == 0) cycle
+          call print_text(file // ': note: ' // shown_path(journals(i)%file%path) // &
+                          ' has damaged entries; their variants are computed again')
+        end do
+        call print_text(file // ': reusing ' // to_text(sum(journals%done + journals%refused + journals%failed)) // ' of ' // &
+                        to_text(header%last - header%first + 1) // ' variants from ' // journals_text(journals))
+      end associate
     end if
   end subroutine resume_journals
 
@@ -218,25 +231,6 @@ contains
       call print_text(message)
     end if
   end subroutine check_finished_results
-
-  !> Prints how many variants of a resumed journal are reused. Those of an entry that was not completely written, or is
-  !> damaged, are computed again.
-  subroutine print_journal_state(job)
-    type(sweep_job_t), intent(in) :: job
-    character(len=:), allocatable :: file
-    integer :: i
-
-    file = job%plan%input%shown_file()
-    associate (journals => job%journals, header => job%journals(1)%header)
-      do i = 1, size(journals)
-        if (journals(i)%damaged_bytes == 0) cycle
-        call print_text(file // ': note: ' // shown_path(journals(i)%file%path) // &
-                        ' has damaged entries; their variants are computed again')
-      end do
-      call print_text(file // ': reusing ' // to_text(sum(journals%done + journals%refused + journals%failed)) // ' of ' // &
-                      to_text(header%last - header%first + 1) // ' variants from ' // journals_text(journals))
-    end associate
-  end subroutine print_journal_state
 
   !> Writes and prints the results, or says why there are none.
   subroutine finish_job(job, scheduler, threads, ranks, code)

@@ -45,6 +45,9 @@ contains
     type(sweep_summary_t), intent(inout) :: summary   !! with the effort, but for a merge
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: began, now, rate
+    type(string_t), allocatable :: names(:)
+    integer :: i
+    logical :: is_of_variant
 
     call system_clock(began, rate)
     summary%done = sum(journals%done)
@@ -52,7 +55,22 @@ contains
     summary%failed = sum(journals%failed)
     call find_order_statistics(journals, summary%statistics, error)
     if (.not. allocated(error)) call write_sweep_netcdf(folder, journals, error)
-    if (.not. allocated(error)) call remove_other_results(folder, keeps_table=arguments%is_given('--csv'))
+    if (.not. allocated(error)) then
+      ! Removes results of an earlier sweep or run. Other files stay, and so do the folders with other files.
+      call remove_run(folder, '')
+      if (.not. arguments%is_given('--csv')) call remove_file(folder // '/' // sweep_csv_name)
+      allocate (names, source=folder_names(folder))
+      do i = 1, size(names)
+        associate (name => names(i)%text)
+          is_of_variant = index(name, variant_folder) == 1 .and. len(name) > len(variant_folder)
+          if (is_of_variant) is_of_variant = verify(name(len(variant_folder) + 1:), '0123456789') == 0
+          if (.not. is_of_variant) cycle
+          call remove_run(folder // '/' // name, '')
+          call remove_file(folder // '/' // name // '/' // input_file)
+          call remove_empty_folder(folder // '/' // name)
+        end associate
+      end do
+    end if
     if (.not. allocated(error) .and. arguments%is_given('--csv')) call write_sweep_csv(folder, journals, error)
     if (.not. allocated(error)) call write_trajectories(plan, folder, journals, arguments, summary%without_trajectory, error)
     if (.not. allocated(error)) call write_file(folder, input_file, input_text(plan%input), error)
@@ -62,34 +80,6 @@ contains
     if (.not. allocated(error)) call write_file(folder, summary_file, sweep_json(plan%input, journals(1)%header, summary), error)
     if (summary%done == 0 .and. .not. allocated(error)) call find_first_reason(journals, summary%first_reason, error)
   end subroutine write_results
-
-  !> Removes results of an earlier sweep or run. Other files stay, and so do the folders with other files.
-  subroutine remove_other_results(folder, keeps_table)
-    character(len=*), intent(in) :: folder
-    logical, intent(in) :: keeps_table   !! whether sweep.csv stays, because it is replaced next
-    type(string_t), allocatable :: names(:)
-    integer :: i
-
-    call remove_run(folder, '')
-    if (.not. keeps_table) call remove_file(folder // '/' // sweep_csv_name)
-    allocate (names, source=folder_names(folder))
-    do i = 1, size(names)
-      associate (name => names(i)%text)
-        if (.not. is_of_variant(name)) cycle
-        call remove_run(folder // '/' // name, '')
-        call remove_file(folder // '/' // name // '/' // input_file)
-        call remove_empty_folder(folder // '/' // name)
-      end associate
-    end do
-  end subroutine remove_other_results
-
-  !> Whether a name is that of a folder of a variant, e.g. 'variant-17'.
-  pure logical function is_of_variant(name)
-    character(len=*), intent(in) :: name   !! of a file or folder
-
-    is_of_variant = index(name, variant_folder) == 1 .and. len(name) > len(variant_folder)
-    if (is_of_variant) is_of_variant = verify(name(len(variant_folder) + 1:), '0123456789') == 0
-  end function is_of_variant
 
   !> Prints the summary. A sweep without any variant done is a failure.
   subroutine print_results(plan, folder, header, arguments, summary, code)

@@ -246,7 +246,7 @@ contains
         do k = 1, size(self%array(s)%value, 3)
           do i = 1, size(self%array(s)%value, 1)
             index = parameter_index_t(s, i, k)
-            if (have_same_bits(self%value(index, lane), other%value(index, other_lane))) cycle
+            if (transfer(self%value(index, lane), 0_int64) == transfer(other%value(index, other_lane), 0_int64)) cycle
             found = found + 1
             if (pass == 2) indices(found) = index
           end do
@@ -255,12 +255,6 @@ contains
       if (pass == 1) allocate (indices(found))
     end do
   end function differences
-
-  pure logical function have_same_bits(a, b)
-    real(wp), intent(in) :: a, b
-
-    have_same_bits = transfer(a, 0_int64) == transfer(b, 0_int64)
-  end function have_same_bits
 
   !> Whether a lane has the same curves as a lane of another list, which has the same structure.
   pure logical function has_same_curves(self, lane, other, other_lane)

@@ -52,7 +52,7 @@ contains
     logical, intent(in), optional :: without_bands    !! whether all rows are stored as CSR; absent: .false.
     type(sparse_map_t) :: self
     logical :: has_bands
-    integer :: order(size(column)), entries, rows
+    integer :: order(size(column)), entries, rows, band_rows(size(first) - 1), begin, width, r, s
 
     rows = size(first) - 1
     self%lanes = size(coefficient, 1)
@@ -65,24 +65,14 @@ contains
     allocate (self%rows(rows / short), self%width(rows / short), self%is_toeplitz(rows / short))
     allocate (self%has_offset(rows / short), source=.true.)
     self%first(1) = 1
-    call append_rows(first, column, coefficient, has_bands, order, self)
-    call append_bands(first, order, entries, self)
-    if (present(has_offset)) call mark_offsets(has_offset, self)
-    allocate (self%column(entries), self%coefficient(self%lanes, entries))
-    self%column(:) = column(order(:entries))
-    self%coefficient(:, :) = coefficient(:, order(:entries))
-  end function new_sparse_map
-
-  !> Sorts the rows into bands and CSR rows.
-  subroutine append_rows(first, column, coefficient, has_bands, order, self)
-    integer, intent(in) :: first(:), column(:)
-    real(wp), intent(in) :: coefficient(:, :)
-    logical, intent(in) :: has_bands      !! whether bands are allowed
-    integer, intent(inout) :: order(:)    !! of the entries of the CSR rows
-    type(sparse_map_t), intent(inout) :: self
-    integer :: band_rows(size(first) - 1), begin, width
-
-    band_rows = band_lengths(first, column)
+    ! sorts the rows into bands and CSR rows
+    ! number of consecutive rows from each row on whose columns advance by one from row to row
+    band_rows = 1
+    do r = size(band_rows) - 1, 1, -1
+      width = first(r + 1) - first(r)
+      if (first(r + 2) - first(r + 1) /= width) cycle
+      if (all(column(first(r + 1):first(r + 2) - 1) == column(first(r):first(r + 1) - 1) + 1)) band_rows(r) = band_rows(r + 1) + 1
+    end do
     begin = 1
     do while (begin <= self%all_rows)
       width = first(begin + 1) - first(begin)
@@ -97,21 +87,17 @@ contains
       end if
       begin = begin + band_rows(begin)
     end do
-  end subroutine append_rows
-
-  !> Number of consecutive rows from each row on whose columns advance by one from row to row.
-  pure function band_lengths(first, column) result(band_rows)
-    integer, intent(in) :: first(:), column(:)
-    integer :: band_rows(size(first) - 1)
-    integer :: r, width
-
-    band_rows = 1
-    do r = size(band_rows) - 1, 1, -1
-      width = first(r + 1) - first(r)
-      if (first(r + 2) - first(r + 1) /= width) cycle
-      if (all(column(first(r + 1):first(r + 2) - 1) == column(first(r):first(r + 1) - 1) + 1)) band_rows(r) = band_rows(r + 1) + 1
-    end do
-  end function band_lengths
+    call append_bands(first, order, entries, self)
+    if (present(has_offset)) then
+      ! marks the bands that have offsets
+      do s = 1, self%bands
+        self%has_offset(s) = any(has_offset(self%first_row(s):self%first_row(s) + self%rows(s) - 1))
+      end do
+    end if
+    allocate (self%column(entries), self%coefficient(self%lanes, entries))
+    self%column(:) = column(order(:entries))
+    self%coefficient(:, :) = coefficient(:, order(:entries))
+  end function new_sparse_map
 
   !> Whether consecutive rows of equal width have equal coefficients in all lanes.
   pure logical function has_constant_diagonals(first, width, rows, coefficient)
@@ -159,17 +145,6 @@ contains
       end do
     end do
   end subroutine append_bands
-
-  !> Marks the bands that have offsets.
-  pure subroutine mark_offsets(has_offset, self)
-    logical, intent(in) :: has_offset(:)   !! [rows]
-    type(sparse_map_t), intent(inout) :: self
-    integer :: s
-
-    do s = 1, self%bands
-      self%has_offset(s) = any(has_offset(self%first_row(s):self%first_row(s) + self%rows(s) - 1))
-    end do
-  end subroutine mark_offsets
 
   !> The transposed structure: the order of entries sorted by column, and the first entry of each column in that order.
   pure subroutine transposed_order(column, columns, order, first)

@@ -16,14 +16,9 @@ contains
     type(law_tape_t), intent(in) :: tape
     integer :: i
 
-    has_waves = any([(is_wave(tape%node(i)%operation) .and. .not. tape%node(i)%is_constant, i=1, tape%count)])
+    has_waves = any([(any(tape%node(i)%operation == [op_wave, op_sine, op_cosine, op_harmonics]) .and. &
+                .not. tape%node(i)%is_constant, i=1, tape%count)])
   end function has_waves
-
-  pure logical function is_wave(operation)
-    integer, intent(in) :: operation
-
-    is_wave = any(operation == [op_wave, op_sine, op_cosine, op_harmonics])
-  end function is_wave
 
   !> The largest rate of the arguments of its sines [rad/s], in which harmonics count with their largest multiple. Arguments are
   !> sums of multiples of the time and of angles; other forms do not count.

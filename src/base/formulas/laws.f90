@@ -121,7 +121,8 @@ contains
     integer, intent(in) :: branch(:)                !! of the switches of the element, 1 to the number of choices
     logical, intent(in) :: is_branch_only           !! whether the parameters are as before
     type(curve_t), intent(in), optional :: curve    !! of the element, on the segment branch(1)
-    integer :: at, copies, i
+    integer :: a, at, copies, i
+    real(wp) :: constant_of, value, x, y
 
     at = self%slot(lane, element)
     copies = self%copies(lane, element)
@@ -132,13 +133,26 @@ contains
         case (op_literal)
           constant = node%value
         case (op_parameter)
-          constant = parameter_value(self%tape, node, parameters, lane, element)
+          ! value of a parameter
+          value = 0.0_wp
+          associate (column => self%tape%list(node%first - 1 + element))
+            if (column > 0) value = parameters(node%a)%value(lane, column)
+          end associate
+          constant = value
         case (op_pick)
           constant = self%constant(at, self%column(self%tape%list(node%first - 1 + branch(node%a))))
         case (op_segment)
           constant = curve%segment_number(branch(1), node%a)
         case default
-          constant = constant_of(self, self%constants(i), at)
+          ! A constant computed from others of its slot
+          associate (node => self%tape%node(self%constants(i)))
+            a = merge(self%constants(i) - 1, node%a, node%operation == op_sech_squared)
+            x = self%constant(at, self%column(a))
+            y = 0.0_wp
+            if (node%b > 0) y = self%constant(at, self%column(node%b))
+            constant_of = value_of(node%operation, x, y)
+          end associate
+          constant = constant_of
         end select
         self%constant(at + 1:at + copies, i) = constant
       end associate
@@ -147,35 +161,6 @@ contains
       call stack_harmonics(self, i, is_branch_only)
     end do
   end subroutine refresh
-
-  !> Value of a parameter.
-  pure real(wp) function parameter_value(tape, node, parameters, lane, element) result(value)
-    type(law_tape_t), intent(in) :: tape
-    type(law_node_t), intent(in) :: node
-    type(law_parameter_t), intent(in) :: parameters(:)
-    integer, intent(in) :: lane, element
-
-    value = 0.0_wp
-    associate (column => tape%list(node%first - 1 + element))
-      if (column > 0) value = parameters(node%a)%value(lane, column)
-    end associate
-  end function parameter_value
-
-  !> A constant computed from others of its slot.
-  pure real(wp) function constant_of(self, number, at) result(value)
-    type(law_t), intent(in) :: self
-    integer, intent(in) :: number, at   !! node, slot
-    real(wp) :: x, y
-    integer :: a
-
-    associate (node => self%tape%node(number))
-      a = merge(number - 1, node%a, node%operation == op_sech_squared)
-      x = self%constant(at, self%column(a))
-      y = 0.0_wp
-      if (node%b > 0) y = self%constant(at, self%column(node%b))
-      value = value_of(node%operation, x, y)
-    end associate
-  end function constant_of
 
   !> Copies the coefficients of harmonics in a slot to where they follow one another.
   pure subroutine stack_harmonics(self, at, is_branch_only)

@@ -106,42 +106,34 @@ contains
     real(wp), intent(in) :: h(:), secant(:)   !! widths and slopes of the segments
     real(wp), intent(inout) :: c(0:, :)
     real(wp) :: bend(size(h) + 1)             ! second derivatives
+    real(wp), dimension(size(h)) :: corner, correction, diagonal, right, solution
+    integer :: i
 
-    call find_periodic_bends(h, secant, bend)
-    associate (m => size(h))
-      c(1, :) = secant - h * (2.0_wp * bend(:m) + bend(2:)) / 6.0_wp
-      c(2, :) = 0.5_wp * bend(:m)
-      c(3, :) = (bend(2:) - bend(:m)) / (6.0_wp * h)
-    end associate
-  end subroutine set_periodic
-
-  !> The second derivatives of a periodic spline: a tridiagonal system with two corners, which is one without them and a product
-  !> of two vectors (Sherman and Morrison).
-  subroutine find_periodic_bends(h, secant, bend)
-    real(wp), intent(in) :: h(:), secant(:)   !! widths and slopes of the segments
-    real(wp), intent(out) :: bend(:)          !! [segments + 1], the last is the first
-    real(wp), dimension(size(h)) :: corner, diagonal, right
-    real(wp), dimension(size(h)) :: solution, correction
-    integer :: m
-
-    m = size(h)
+    ! The second derivatives of a periodic spline: a tridiagonal system with two corners, which is one without them and a product
+    ! of two vectors (Sherman and Morrison).
+    i = size(h)
     diagonal = 2.0_wp * (cshift(h, -1) + h)
     right = 6.0_wp * (secant - cshift(secant, -1))
-    if (m == 2) then   ! both neighbours of a point are the other point
+    if (i == 2) then   ! both neighbours of a point are the other point
       associate (total => sum(h))
         bend(1) = (2.0_wp * right(1) - right(2)) / (3.0_wp * total)
         bend(2) = (2.0_wp * right(2) - right(1)) / (3.0_wp * total)
       end associate
     else
       corner = 0.0_wp
-      corner([1, m]) = h(m)
-      diagonal([1, m]) = diagonal([1, m]) - h(m)
-      call solve_tridiagonal(diagonal, h(:m - 1), right, solution)
-      call solve_tridiagonal(diagonal, h(:m - 1), corner, correction)
-      bend(:m) = solution - correction * (solution(1) + solution(m)) / (1.0_wp + correction(1) + correction(m))
+      corner([1, i]) = h(i)
+      diagonal([1, i]) = diagonal([1, i]) - h(i)
+      call solve_tridiagonal(diagonal, h(:i - 1), right, solution)
+      call solve_tridiagonal(diagonal, h(:i - 1), corner, correction)
+      bend(:i) = solution - correction * (solution(1) + solution(i)) / (1.0_wp + correction(1) + correction(i))
     end if
-    bend(m + 1) = bend(1)
-  end subroutine find_periodic_bends
+    bend(i + 1) = bend(1)
+    associate (m => size(h))
+      c(1, :) = secant - h * (2.0_wp * bend(:m) + bend(2:)) / 6.0_wp
+      c(2, :) = 0.5_wp * bend(:m)
+      c(3, :) = (bend(2:) - bend(:m)) / (6.0_wp * h)
+    end associate
+  end subroutine set_periodic
 
   !> Solves a symmetric positive definite tridiagonal system (DPTSV).
   subroutine solve_tridiagonal(diagonal, beside, right, solution)

@@ -27,32 +27,13 @@ contains
     integer, intent(in) :: nodes                !! rows of the matrix
     integer, intent(in) :: row(:), column(:)    !! of the entries, each at most once, in any order
     integer :: order(nodes)
-    type(groups_t) :: graph
+    type(groups_t) :: double, graph
     type(groups_t) :: by_degree   ! all nodes, those with the fewest neighbours first
     type(search_t) :: search
-    integer :: i
-
-    graph = neighbours(nodes, row, column)
-    by_degree = grouped(nodes, graph%start(2:) - graph%start(:nodes) + 1, [(i, i=1, nodes)])
-    graph = sorted_neighbours(graph, by_degree%member)
-    allocate (search%reached_in(nodes), search%reached(nodes), source=0)
-    do i = 1, nodes
-      if (search%reached_in(by_degree%member(i)) > 0) cycle
-      search%first = search%last + 1
-      call search_from_periphery(graph, by_degree%member(i), search)
-    end do
-    order = search%reached(nodes:1:-1)
-  end function reverse_cuthill_mckee
-
-  !> The graph of A + A^T without its diagonal; each neighbour occurs once.
-  pure function neighbours(nodes, row, column) result(graph)
-    integer, intent(in) :: nodes
-    integer, intent(in) :: row(:), column(:)
-    type(groups_t) :: graph
-    type(groups_t) :: double
+    integer :: filled, i, node
     integer, allocatable :: seen_by(:)
-    integer :: node, i, filled
 
+    ! the graph of A + A^T without its diagonal; each neighbour occurs once
     double = grouped(nodes, [row, column], [column, row])
     allocate (graph%start(nodes + 1), graph%member(size(double%member)), seen_by(nodes), source=0)
     filled = 0
@@ -67,7 +48,16 @@ contains
       end do
     end do
     graph%start(nodes + 1) = filled + 1
-  end function neighbours
+    by_degree = grouped(nodes, graph%start(2:) - graph%start(:nodes) + 1, [(i, i=1, nodes)])
+    graph = sorted_neighbours(graph, by_degree%member)
+    allocate (search%reached_in(nodes), search%reached(nodes), source=0)
+    do i = 1, nodes
+      if (search%reached_in(by_degree%member(i)) > 0) cycle
+      search%first = search%last + 1
+      call search_from_periphery(graph, by_degree%member(i), search)
+    end do
+    order = search%reached(nodes:1:-1)
+  end function reverse_cuthill_mckee
 
   !> The graph with the neighbours of each node in the order of `nodes`.
   pure function sorted_neighbours(graph, nodes) result(sorted)

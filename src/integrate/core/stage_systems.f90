@@ -87,7 +87,7 @@ contains
     real(wp), intent(in) :: gamma                    !! of the tableau
     real(wp), contiguous, intent(in) :: r(:, :)      !! [lanes, components]
     real(wp), contiguous, intent(inout) :: k(:, :)   !! [lanes, components]
-    integer :: lane
+    integer :: lane, p, w
 
     if (attempt%states > 0) then
       do lane = 1, attempt%lanes
@@ -95,38 +95,28 @@ contains
       end do
     end if
     if (attempt%components > attempt%states) then
-      call solve_quadratures(stage_system%quadratures, stage_system%dfdy, attempt, gamma, r, k)
+      ! solves the rows of the quadratures: k_w / gamma - h dfw/dy k_y = r_w
+      do w = attempt%states + 1, attempt%components
+        do lane = 1, attempt%lanes
+          k(lane, w) = 0.0_wp
+        end do
+      end do
+      do p = 1, size(stage_system%quadratures%position)
+        do lane = 1, attempt%lanes
+          k(lane, stage_system%quadratures%row(p)) = k(lane, stage_system%quadratures%row(p)) + &
+                                        stage_system%dfdy(lane, stage_system%quadratures%position(p)) * &
+                                        k(lane, stage_system%quadratures%column(p))
+        end do
+      end do
+      do w = attempt%states + 1, attempt%components
+        do lane = 1, attempt%lanes
+          k(lane, w) = gamma * (r(lane, w) + attempt%h(lane) * k(lane, w))
+        end do
+      end do
     end if
     do lane = 1, attempt%lanes
       if (.not. attempt%active(lane)) k(lane, :) = 0.0_wp
     end do
   end subroutine solve
-
-  !> Solves the rows of the quadratures: k_w / gamma - h dfw/dy k_y = r_w.
-  pure subroutine solve_quadratures(entries, dfdy, attempt, gamma, r, k)
-    type(entries_t), intent(in) :: entries
-    real(wp), contiguous, intent(in) :: dfdy(:, :)
-    type(step_attempt_t), intent(in) :: attempt
-    real(wp), intent(in) :: gamma
-    real(wp), intent(in) :: r(attempt%lanes, attempt%components)
-    real(wp), intent(inout) :: k(attempt%lanes, attempt%components)
-    integer :: lane, p, w
-
-    do w = attempt%states + 1, attempt%components
-      do lane = 1, attempt%lanes
-        k(lane, w) = 0.0_wp
-      end do
-    end do
-    do p = 1, size(entries%position)
-      do lane = 1, attempt%lanes
-        k(lane, entries%row(p)) = k(lane, entries%row(p)) + dfdy(lane, entries%position(p)) * k(lane, entries%column(p))
-      end do
-    end do
-    do w = attempt%states + 1, attempt%components
-      do lane = 1, attempt%lanes
-        k(lane, w) = gamma * (r(lane, w) + attempt%h(lane) * k(lane, w))
-      end do
-    end do
-  end subroutine solve_quadratures
 
 end module nocdyn_stage_systems

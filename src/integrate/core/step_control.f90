@@ -108,27 +108,20 @@ contains
     real(wp), intent(inout) :: h(lanes)       !! step sizes [s]
     real(wp), intent(inout) :: t_new(lanes)   !! ends of the steps [s]
     integer :: lane
+    real(wp) :: overshoot, rest, step
 
     associate (longest => control%longest, t_end => control%t_end, wanted => control%h)
       do lane = 1, lanes
-        call propose_one(longest(lane), t_end, t(lane), wanted(lane), h(lane), t_new(lane))
+        ! the step of one lane, whose controller wants the size `wanted`
+        rest = t_end - t(lane)
+        step = max(min(wanted(lane), longest(lane)), smallest_step(t(lane)))
+        overshoot = min((t(lane) + final_stretch * step) - t_end, longest(lane) - rest)
+        h(lane) = merge(rest, step, overshoot >= 0)
+        t_new(lane) = merge(t_end, t(lane) + step, overshoot >= 0)
       end do
       control%ends_at_t_end(:) = t_new >= t_end
     end associate
   end subroutine propose_steps
-
-  !> The step of one lane, whose controller wants the size `wanted`.
-  pure subroutine propose_one(longest, t_end, t, wanted, h, t_new)
-    real(wp), intent(in) :: longest, t_end, t, wanted
-    real(wp), intent(out) :: h, t_new
-    real(wp) :: overshoot, rest, step
-
-    rest = t_end - t
-    step = max(min(wanted, longest), smallest_step(t))
-    overshoot = min((t + final_stretch * step) - t_end, longest - rest)
-    h = merge(rest, step, overshoot >= 0)
-    t_new = merge(t_end, t + step, overshoot >= 0)
-  end subroutine propose_one
 
   !> The next step sizes of lanes after attempts of size h, unless they are given: PI control where the attempt was accepted, a
   !> shorter step where it was rejected. All logarithms are to base 2.
@@ -140,10 +133,19 @@ contains
     real(wp), intent(in) :: max_growth(lanes)   !! largest ratio of the next step size to h
     real(wp), intent(in) :: h(lanes)   !! sizes of the attempts [s]
     integer :: lane
+    real(wp) :: most, present_exponent
 
     if (all_true(lanes, control%is_given)) return
-    call find_step_factors(lanes, accepted, error_order, control%mean_square, control%log_error, control%log_ratio, &
-                           control%factor)
+    ! the logarithms of the error norms, and the factors of the step sizes
+    control%log_ratio = max(control%mean_square, no_error)
+    call log2s(lanes, control%log_ratio)
+    do lane = 1, lanes
+      present_exponent = 1.0_wp / (error_order(lane) + 1) - pi_correction * beta
+      control%log_ratio(lane) = 0.5_wp * control%log_ratio(lane)
+      control%factor(lane) = merge(beta, 0.0_wp, accepted(lane)) * control%log_error(lane) - present_exponent * &
+                             control%log_ratio(lane)
+    end do
+    call exp2s(lanes, control%factor)
     if (lanes > 1) then
       if (all_true(lanes, accepted) .and. .not. any_true(lanes, control%was_rejected) &
           .and. .not. any_true(lanes, control%is_given)) then
@@ -156,44 +158,16 @@ contains
     end if
     do lane = 1, lanes
       if (control%is_given(lane)) cycle
-      if (accepted(lane) .or. rejected(lane)) call set_next_step(control, lane, accepted(lane), max_growth(lane), h(lane))
+      if (accepted(lane) .or. rejected(lane)) then
+        ! multiplies the step size h of a lane by its factor, within the limits; no growth right after a rejection
+        most = max_growth(lane)
+        if (control%was_rejected(lane)) most = min(most, 1.0_wp)
+        control%h(lane) = max(min_factor, min(safety * control%factor(lane), most)) * h(lane)
+        control%was_rejected(lane) = .not. accepted(lane)
+        if (accepted(lane)) control%log_error(lane) = max(control%log_ratio(lane), min_log_error)
+      end if
     end do
   end subroutine adapt_steps
-
-  !> The logarithms of the error norms, and the factors of the step sizes.
-  pure subroutine find_step_factors(lanes, accepted, error_order, mean_square, log_error, log_ratio, factor)
-    integer, intent(in) :: lanes
-    logical, intent(in) :: accepted(lanes)
-    integer, intent(in) :: error_order(lanes)
-    real(wp), intent(in) :: mean_square(lanes), log_error(lanes)
-    real(wp), intent(inout) :: log_ratio(lanes), factor(lanes)
-    real(wp) :: present_exponent
-    integer :: lane
-
-    log_ratio = max(mean_square, no_error)
-    call log2s(lanes, log_ratio)
-    do lane = 1, lanes
-      present_exponent = 1.0_wp / (error_order(lane) + 1) - pi_correction * beta
-      log_ratio(lane) = 0.5_wp * log_ratio(lane)
-      factor(lane) = merge(beta, 0.0_wp, accepted(lane)) * log_error(lane) - present_exponent * log_ratio(lane)
-    end do
-    call exp2s(lanes, factor)
-  end subroutine find_step_factors
-
-  !> Multiplies the step size h of a lane by its factor, within the limits; no growth right after a rejection.
-  pure subroutine set_next_step(control, lane, is_accepted, max_growth, h)
-    type(step_control_t), intent(inout) :: control
-    integer, intent(in) :: lane
-    logical, intent(in) :: is_accepted
-    real(wp), intent(in) :: max_growth, h
-    real(wp) :: most
-
-    most = max_growth
-    if (control%was_rejected(lane)) most = min(most, 1.0_wp)
-    control%h(lane) = max(min_factor, min(safety * control%factor(lane), most)) * h
-    control%was_rejected(lane) = .not. is_accepted
-    if (is_accepted) control%log_error(lane) = max(control%log_ratio(lane), min_log_error)
-  end subroutine set_next_step
 
   !> Sets a shorter step after an attempt of size h that failed before its error was known.
   pure subroutine shorten_step(control, lane, h)

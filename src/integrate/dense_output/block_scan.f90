@@ -49,7 +49,7 @@ contains
     real(wp), contiguous, intent(in) :: coefficients(:, :, :)   !! of the dense output, [lanes, padded columns, degree]
     logical, intent(in) :: taken(:)                             !! [lanes]
     integer, intent(in) :: side(:, :)                           !! signs at the starts of the steps, [lanes, functions]
-    integer :: columns, i, part, parts
+    integer :: columns, function, i, l, part, parts
 
     columns = size(scan%y, 2)
     scan%parts(:) = parts_of(attempt%degree)
@@ -66,7 +66,12 @@ contains
       end do
     end do
     call find_near(attempt%lanes, size(side, 2), parts, taken, side, scan%g, scan%is_near)
-    call keep_ends(scan, parts, taken)
+    ! the ends of the steps of lanes that cross nothing are the starts of their next ones
+    do function = 1, size(scan%g, 2)
+      do l = 1, size(taken)
+        if (taken(l) .and. .not. scan%is_near(l)) scan%g(l, function, 0) = scan%g(l, function, parts)
+      end do
+    end do
   end subroutine scan_block
 
   !> Finds the lanes that may cross a boundary: all others have positive indicators, none of which is at the lowest point of a
@@ -105,19 +110,5 @@ contains
 
     has_minimum = abs(after - before) < 2 * ((after - middle) - (middle - before))
   end function has_minimum
-
-  !> The ends of the steps of lanes that cross nothing are the starts of their next ones.
-  pure subroutine keep_ends(scan, parts, taken)
-    type(block_scan_t), intent(inout) :: scan
-    integer, intent(in) :: parts
-    logical, intent(in) :: taken(:)
-    integer :: function, l
-
-    do function = 1, size(scan%g, 2)
-      do l = 1, size(taken)
-        if (taken(l) .and. .not. scan%is_near(l)) scan%g(l, function, 0) = scan%g(l, function, parts)
-      end do
-    end do
-  end subroutine keep_ends
 
 end module nocdyn_block_scan

@@ -49,6 +49,7 @@ contains
     real(wp), intent(in) :: theta_end              !! end of the step: 1, or less where it has been cut
     real(wp) :: root
     integer :: function, part
+    logical :: is_event
 
     events%found = 0
     call scan_step(events%roots, system, observer, dense, theta_end)
@@ -56,7 +57,11 @@ contains
       do function = 1, size(events%directions)
         associate (side => events%roots%side(dense%lane, function), g => events%roots%values(function, part))
           if (.not. is_finite(g)) cycle
-          if (is_event(side, g, events%directions(function))) then
+          ! whether a function with the sign `side` has reached or passed zero in the direction that counts
+          is_event = side /= 0 .and. sign_of(g) /= side
+          if (events%directions(function) == event_rising) is_event = is_event .and. side < 0
+          if (events%directions(function) == event_falling) is_event = is_event .and. side > 0
+          if (is_event) then
             call find_root(events%roots, system, observer, dense, part_bracket(events%roots, function, part, theta_end), root)
             call insert(events, function, root)
           end if
@@ -65,16 +70,6 @@ contains
       end do
     end do
   end subroutine find_events
-
-  !> Whether a function with the sign `side` has reached or passed zero in the direction that counts.
-  pure logical function is_event(side, g, direction)
-    integer, intent(in) :: side, direction
-    real(wp), intent(in) :: g
-
-    is_event = side /= 0 .and. sign_of(g) /= side
-    if (direction == event_rising) is_event = is_event .and. side < 0
-    if (direction == event_falling) is_event = is_event .and. side > 0
-  end function is_event
 
   !> Inserts an event after those that happen before it.
   pure subroutine insert(events, function, theta)

@@ -99,7 +99,8 @@ contains
     type(step_block_t), intent(in) :: steps
     type(step_attempt_t), intent(in) :: attempt
     real(wp), contiguous, intent(in) :: c(:, :, :)   !! coefficients of the dense output, [lanes, padded columns, degree]
-    integer :: i
+    integer :: i, lane
+    logical :: has_moved
 
     extremes%degree(:) = attempt%degree
     do i = 1, size(extremes%from)
@@ -107,10 +108,47 @@ contains
       if (i > 1) extremes%active(:) = extremes%active .and. steps%t < extremes%from(i)   ! else it is the part of the first
       if (.not. any(extremes%active)) cycle
       extremes%start(:) = max(steps%t, extremes%from(i))
-      call begin_parts(extremes, observer, steps, attempt, c)
+      ! begins the parts of the steps of the active lanes with their first pieces
+      where (extremes%active .and. extremes%start > steps%t) extremes%is_known = .false.
+      if (any(extremes%active .and. .not. extremes%is_known)) then
+        extremes%t(:) = extremes%start
+        call observe(extremes, observer, steps, attempt, c)
+      end if
+      do lane = 1, size(extremes%active)
+        if (.not. extremes%active(lane)) cycle
+        if (.not. extremes%is_known(lane)) then
+          extremes%y_lane(:) = extremes%y(lane, :)
+          call observer%tracked_values(lane, extremes%t(lane), extremes%y_lane, extremes%last(:, lane))
+          call observer%find_pace(lane, extremes%fastest(lane), extremes%scale(lane))
+        end if
+        if (.not. extremes%have_begun(lane)) then
+          ! sets the ranges to the values of a single time
+          extremes%ranges(lane)%lowest(:) = extremes%last(:, lane)
+          extremes%ranges(lane)%highest(:) = extremes%last(:, lane)
+          extremes%ranges(lane)%lowest_time(:) = extremes%start(lane)
+          extremes%ranges(lane)%highest_time(:) = extremes%start(lane)
+        end if
+        extremes%have_begun(lane) = .true.
+        call extremes%pieces(lane)%start_step(extremes%start(lane), steps%t_new(lane), extremes%fastest(lane), &
+                                              extremes%degree(lane))
+      end do
       do while (any(extremes%active))
         call sample_pieces(extremes, observer, steps, attempt, c)
-        call take_pieces(extremes, observer, steps)
+        ! takes the polynomials in the pieces that have been sampled, and goes on to the next pieces
+        do lane = 1, size(extremes%active)
+          if (.not. extremes%active(lane)) cycle
+          associate (pieces => extremes%pieces(lane))
+            call find_replaced(extremes, lane)
+            call take_piece(extremes, observer, lane, piece_t(pieces%begin, pieces%end, extremes%start(lane), steps%t(lane), &
+                                                              steps%t_new(lane)))
+            call pieces%advance(has_moved)
+            if (has_moved) extremes%last(:, lane) = extremes%values(:, extremes%degree(lane) + 1, lane)
+            if (.not. pieces%is_done) cycle
+            extremes%active(lane) = .false.
+            extremes%is_known(lane) = .true.
+            call observer%find_pace(lane, extremes%fastest(lane), extremes%scale(lane))
+          end associate
+        end do
       end do
     end do
   end subroutine update_extremes
@@ -136,46 +174,6 @@ contains
     call take_piece(extremes, observer, lane, piece_t(attempt%t(lane), attempt%t(lane), attempt%t(lane), attempt%t(lane), &
                                                       attempt%t(lane)))
   end subroutine end_extremes
-
-  !> Begins the parts of the steps of the active lanes with their first pieces.
-  subroutine begin_parts(extremes, observer, steps, attempt, c)
-    type(extremes_t), intent(inout) :: extremes
-    class(observer_t), intent(inout) :: observer
-    type(step_block_t), intent(in) :: steps
-    type(step_attempt_t), intent(in) :: attempt
-    real(wp), contiguous, intent(in) :: c(:, :, :)
-    integer :: lane
-
-    where (extremes%active .and. extremes%start > steps%t) extremes%is_known = .false.
-    if (any(extremes%active .and. .not. extremes%is_known)) then
-      extremes%t(:) = extremes%start
-      call observe(extremes, observer, steps, attempt, c)
-    end if
-    do lane = 1, size(extremes%active)
-      if (.not. extremes%active(lane)) cycle
-      if (.not. extremes%is_known(lane)) then
-        extremes%y_lane(:) = extremes%y(lane, :)
-        call observer%tracked_values(lane, extremes%t(lane), extremes%y_lane, extremes%last(:, lane))
-        call observer%find_pace(lane, extremes%fastest(lane), extremes%scale(lane))
-      end if
-      if (.not. extremes%have_begun(lane)) call start_ranges(extremes%ranges(lane), extremes%last(:, lane), extremes%start(lane))
-      extremes%have_begun(lane) = .true.
-      call extremes%pieces(lane)%start_step(extremes%start(lane), steps%t_new(lane), extremes%fastest(lane), &
-                                            extremes%degree(lane))
-    end do
-  end subroutine begin_parts
-
-  !> Sets the ranges to the values of a single time.
-  pure subroutine start_ranges(ranges, values, t)
-    type(ranges_t), intent(inout) :: ranges
-    real(wp), contiguous, intent(in) :: values(:)   !! [functions]
-    real(wp), intent(in) :: t
-
-    ranges%lowest(:) = values
-    ranges%highest(:) = values
-    ranges%lowest_time(:) = t
-    ranges%highest_time(:) = t
-  end subroutine start_ranges
 
   !> Brings the active lanes to the times `t`, the other lanes to where their steps start.
   subroutine observe(extremes, observer, steps, attempt, c)
@@ -235,14 +233,20 @@ contains
     type(step_attempt_t), intent(in) :: attempt
     real(wp), contiguous, intent(in) :: c(:, :, :)
     integer :: i, lane
+    real(wp) :: half, t
 
     do i = 1, maxval(extremes%degree, mask=extremes%active)
       extremes%t(:) = steps%t
       do lane = 1, attempt%lanes
         if (.not. extremes%active(lane)) cycle
         associate (piece => extremes%pieces(lane), degree => extremes%degree(lane))
-          extremes%t(lane) = time_of_node(piece%begin, piece%end, extremes%rules(degree)%nodes(min(i, degree)), &
-                                          steps%crosses(lane), steps%t_new(lane))
+          ! The time of a node in a piece [s]. If the step ends at a crossing, it is before that: a function may jump there, which
+          ! would spoil the polynomial.
+          half = 0.5_wp * (piece%end - piece%begin)
+          t = piece%begin + half + (extremes%rules(degree)%nodes(min(i, degree))) * half
+          if (steps%crosses(lane) .and. piece%end >= steps%t_new(lane)) t = &
+              max(piece%begin, min(t, steps%t_new(lane) - before_jump * spacing(steps%t_new(lane))))
+          extremes%t(lane) = t
         end associate
       end do
       call observe(extremes, observer, steps, attempt, c)
@@ -253,44 +257,6 @@ contains
       end do
     end do
   end subroutine sample_pieces
-
-  !> The time of a node in a piece [s]. If the step ends at a crossing, it is before that: a function may jump there, which would
-  !> spoil the polynomial.
-  pure real(wp) function time_of_node(begin, end, node, crosses, t_new) result(t)
-    real(wp), intent(in) :: begin, end   !! of the piece [s]
-    real(wp), intent(in) :: node         !! -1 to 1
-    logical, intent(in) :: crosses       !! whether the step ends at a crossing
-    real(wp), intent(in) :: t_new        !! end of the step [s]
-    real(wp) :: half
-
-    half = 0.5_wp * (end - begin)
-    t = begin + half + node * half
-    if (crosses .and. end >= t_new) t = max(begin, min(t, t_new - before_jump * spacing(t_new)))
-  end function time_of_node
-
-  !> Takes the polynomials in the pieces that have been sampled, and goes on to the next pieces.
-  subroutine take_pieces(extremes, observer, steps)
-    type(extremes_t), intent(inout) :: extremes
-    class(observer_t), intent(inout) :: observer
-    type(step_block_t), intent(in) :: steps
-    logical :: has_moved
-    integer :: lane
-
-    do lane = 1, size(extremes%active)
-      if (.not. extremes%active(lane)) cycle
-      associate (pieces => extremes%pieces(lane))
-        call find_replaced(extremes, lane)
-        call take_piece(extremes, observer, lane, piece_t(pieces%begin, pieces%end, extremes%start(lane), steps%t(lane), &
-                                                          steps%t_new(lane)))
-        call pieces%advance(has_moved)
-        if (has_moved) extremes%last(:, lane) = extremes%values(:, extremes%degree(lane) + 1, lane)
-        if (.not. pieces%is_done) cycle
-        extremes%active(lane) = .false.
-        extremes%is_known(lane) = .true.
-        call observer%find_pace(lane, extremes%fastest(lane), extremes%scale(lane))
-      end associate
-    end do
-  end subroutine take_pieces
 
   !> Gives the polynomials in a piece to the observer, or widens the ranges of a lane by them.
   subroutine take_piece(extremes, observer, lane, piece)

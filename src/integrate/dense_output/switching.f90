@@ -93,6 +93,9 @@ contains
     type(dense_output_t), intent(inout) :: dense    !! of the lane
     real(wp), intent(out) :: theta                  !! of the crossing, 1 if there is none
     integer :: function, part
+    type(bracket_t) :: bracket
+    real(wp) :: root
+    logical :: found, may_graze
 
     theta = 1.0_wp
     switching%known = -1.0_wp
@@ -102,7 +105,11 @@ contains
       return
     end if
     if (switching%scan%is_used) then
-      call take_scan(switching%scan, dense%lane, switching%roots)
+      ! takes the values of one lane
+      switching%roots%parts = switching%scan%parts(dense%lane)
+      do part = 0, switching%roots%parts
+        switching%roots%values(:, part) = switching%scan%g(dense%lane, :, part)
+      end do
     else
       call scan_step(switching%roots, system, observer, dense, 1.0_wp)
     end if
@@ -121,22 +128,23 @@ contains
       end do
       if (switching%pending(dense%lane) > 0) exit
     end do
-    call find_grazing_crossings(switching, system, observer, dense, theta)
+    ! finds crossings from which an indicator returns before the end of a part, as at a grazing contact
+    do part = 1, switching%roots%parts - 1
+      if (part_end(switching%roots, part - 1, 1.0_wp) >= theta) exit
+      do function = 1, size(switching%g)
+        associate (g => switching%roots%values)
+          may_graze = min(sign_of(g(function, part - 1)), sign_of(g(function, part)), sign_of(g(function, part + 1))) > 0
+          if (may_graze) may_graze = has_minimum(g(function, part - 1), g(function, part), g(function, part + 1))
+          if (.not. may_graze) cycle
+        end associate
+        call find_grazing(switching%roots, system, observer, dense, function, part, bracket, found)
+        if (.not. found) cycle
+        call find_root(switching%roots, system, observer, dense, bracket, root)
+        call keep_first(switching, dense%lane, function, root, theta)
+      end do
+    end do
     if (switching%scan%is_used) switching%scan%g(dense%lane, :, 0) = switching%roots%values(:, switching%roots%parts)
   end subroutine find_crossing
-
-  !> Takes the values of one lane.
-  pure subroutine take_scan(scan, lane, roots)
-    type(block_scan_t), intent(in) :: scan
-    integer, intent(in) :: lane
-    type(root_functions_t), intent(inout) :: roots
-    integer :: part
-
-    roots%parts = scan%parts(lane)
-    do part = 0, roots%parts
-      roots%values(:, part) = scan%g(lane, :, part)
-    end do
-  end subroutine take_scan
 
   !> Replaces the crossing at theta by the crossing of one indicator in a bracket, if it is earlier. Of many indicators with a
   !> crossing in one part of a step, most are still positive at the first crossing so far, so that few roots have to be found.
@@ -154,7 +162,12 @@ contains
     if (switching%pending(dense%lane) > 0) then
       if (theta <= bracket%before) return
       if (theta < bracket%after) then
-        call find_indicators(switching, system, dense, theta)
+        if (abs(switching%known - theta) > 0) then
+          ! the indicators at the first crossing so far, evaluated once
+          switching%known = theta
+          call sample(dense, theta, switching%y)
+          call system%indicator_values(dense%lane, dense%t + theta * dense%h, switching%y, switching%g)
+        end if
         associate (g => switching%g(bracket%function))
           if (is_finite(g)) then
             if (g > 0) return
@@ -167,53 +180,6 @@ contains
     call find_root(switching%roots, system, observer, dense, bracket, root)
     call keep_first(switching, dense%lane, bracket%function, root, theta)
   end subroutine find_earlier_crossing
-
-  !> The indicators at the first crossing so far, evaluated once.
-  subroutine find_indicators(switching, system, dense, theta)
-    type(switching_t), intent(inout) :: switching
-    class(system_t), intent(inout) :: system
-    type(dense_output_t), intent(inout) :: dense
-    real(wp), intent(in) :: theta
-
-    if (.not. abs(switching%known - theta) > 0) return
-    switching%known = theta
-    call sample(dense, theta, switching%y)
-    call system%indicator_values(dense%lane, dense%t + theta * dense%h, switching%y, switching%g)
-  end subroutine find_indicators
-
-  !> Finds crossings from which an indicator returns before the end of a part, as at a grazing contact.
-  subroutine find_grazing_crossings(switching, system, observer, dense, theta)
-    type(switching_t), intent(inout) :: switching
-    class(system_t), intent(inout) :: system
-    class(observer_t), intent(inout) :: observer
-    type(dense_output_t), intent(inout) :: dense
-    real(wp), intent(inout) :: theta
-    type(bracket_t) :: bracket
-    real(wp) :: root
-    integer :: function, part
-    logical :: found
-
-    do part = 1, switching%roots%parts - 1
-      if (part_end(switching%roots, part - 1, 1.0_wp) >= theta) exit
-      do function = 1, size(switching%g)
-        associate (g => switching%roots%values)
-          if (.not. may_graze(g(function, part - 1), g(function, part), g(function, part + 1))) cycle
-        end associate
-        call find_grazing(switching%roots, system, observer, dense, function, part, bracket, found)
-        if (.not. found) cycle
-        call find_root(switching%roots, system, observer, dense, bracket, root)
-        call keep_first(switching, dense%lane, function, root, theta)
-      end do
-    end do
-  end subroutine find_grazing_crossings
-
-  !> Whether three values are positive, and their parabola has its minimum between them.
-  pure logical function may_graze(before, middle, after)
-    real(wp), intent(in) :: before, middle, after
-
-    may_graze = min(sign_of(before), sign_of(middle), sign_of(after)) > 0
-    if (may_graze) may_graze = has_minimum(before, middle, after)
-  end function may_graze
 
   !> Replaces the crossing at theta by one at `root`, if that is earlier.
   pure subroutine keep_first(switching, lane, function, root, theta)
@@ -237,6 +203,7 @@ contains
     type(solver_status_t), intent(inout) :: solver_status
     real(wp) :: limit
     logical :: crossed
+    integer :: function
 
     if (attempt%t(lane) - switching%last_time(lane) > switching%least_progress) switching%repeats(lane, :) = 0
     switching%y(:) = attempt%y(lane, :attempt%components)
@@ -247,7 +214,16 @@ contains
       limit = 0.0_wp
     end if
     do
-      call cross_reached(switching, system, attempt%t(lane), lane, limit, crossed, solver_status)
+      ! changes the branches of all indicators that are not above a limit
+      crossed = .false.
+      do function = 1, size(switching%g)
+        if (.not. is_finite(switching%g(function))) cycle
+        if (switching%g(function) > limit) cycle
+        call system%change_branch(lane, function, attempt%t(lane), switching%y)
+        call count_crossing(solver_status, lane, function)
+        switching%repeats(lane, function) = switching%repeats(lane, function) + 1
+        crossed = .true.
+      end do
       if (.not. crossed .or. any(switching%repeats(lane, :) >= max_repeats)) exit
       switching%last_time(lane) = attempt%t(lane)
       call system%indicator_values(lane, attempt%t(lane), switching%y, switching%g)
@@ -259,27 +235,5 @@ contains
     call set_start(switching%roots, lane, switching%g)
     if (switching%scan%is_used) switching%scan%g(lane, :, 0) = switching%g
   end subroutine cross_boundaries
-
-  !> Changes the branches of all indicators that are not above a limit.
-  subroutine cross_reached(switching, system, t, lane, limit, crossed, solver_status)
-    type(switching_t), intent(inout) :: switching
-    class(system_t), intent(inout) :: system
-    real(wp), intent(in) :: t
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: limit
-    logical, intent(out) :: crossed   !! whether there were any
-    type(solver_status_t), intent(inout) :: solver_status
-    integer :: function
-
-    crossed = .false.
-    do function = 1, size(switching%g)
-      if (.not. is_finite(switching%g(function))) cycle
-      if (switching%g(function) > limit) cycle
-      call system%change_branch(lane, function, t, switching%y)
-      call count_crossing(solver_status, lane, function)
-      switching%repeats(lane, function) = switching%repeats(lane, function) + 1
-      crossed = .true.
-    end do
-  end subroutine cross_reached
 
 end module nocdyn_switching

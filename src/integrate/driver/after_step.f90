@@ -31,7 +31,9 @@ contains
     class(observer_t), intent(inout) :: observer
     type(solver_status_t), intent(inout) :: solver_status
     logical :: crosses   ! whether the lane may cross a boundary
-    integer :: lane
+    integer :: i, lane
+    real(wp) :: t
+    logical :: is_terminal
 
     associate (steps => integrator%steps)
       steps%theta_end(:) = 1.0_wp
@@ -47,7 +49,7 @@ contains
         if (.not. integrator%accepted(lane)) cycle
         crosses = .false.
         if (integrator%has_switches) crosses = may_cross(integrator%switching, lane)
-        if (crosses .or. is_sampled(integrator, lane)) then
+        if (crosses .or. (integrator%has_events .or. integrator%next_time(lane) < integrator%t_new(lane))) then
           call load_lane(integrator%dense, integrator%attempt, integrator%coefficients, lane)
         end if
         if (crosses) then
@@ -55,7 +57,22 @@ contains
           steps%crosses(lane) = integrator%switching%pending(lane) > 0
         end if
         if (integrator%has_events) then
-          call process_events(integrator, system, lane, steps%theta_end(lane), times, observer, solver_status)
+          ! Passes the events of a lane to the observer in their order, with the output times between them. A terminal event ends
+          ! the step and the lane.
+          call find_events(integrator%events, system, observer, integrator%dense, steps%theta_end(lane))
+          do i = 1, integrator%events%found
+            t = min(integrator%attempt%t(lane) + integrator%events%theta(i) * integrator%attempt%h(lane), integrator%t_new(lane))
+            call output_until(integrator, lane, t, times, observer)
+            call sample(integrator%dense, integrator%events%theta(i), integrator%sample)
+            call observer%on_event(lane, integrator%events%which(i), t, integrator%sample, is_terminal)
+            if (.not. is_terminal) cycle
+            solver_status%code(lane) = integration_stopped
+            steps%theta_end(lane) = integrator%events%theta(i)
+            integrator%t_new(lane) = t
+            integrator%attempt%y_new(lane, :integrator%attempt%components) = integrator%sample
+            integrator%steps%crosses(lane) = .false.
+            exit
+          end do
         end if
         if (integrator%next_time(lane) <= integrator%t_new(lane)) then
           call output_until(integrator, lane, integrator%t_new(lane), times, observer)
@@ -67,14 +84,6 @@ contains
       end if
     end associate
   end subroutine process_steps
-
-  !> Whether the dense output of a lane is sampled for anything but its crossings.
-  pure logical function is_sampled(integrator, lane)
-    type(integrator_t), intent(in) :: integrator
-    integer, intent(in) :: lane
-
-    is_sampled = integrator%has_events .or. integrator%next_time(lane) < integrator%t_new(lane)
-  end function is_sampled
 
   !> Describes the steps of the whole block.
   subroutine describe_steps(integrator)
@@ -114,36 +123,6 @@ contains
     solver_status%code(lane) = merge(integration_too_many_steps, integration_running, &
                                      solver_status%steps(lane) >= integrator%max_steps)
   end subroutine end_at_crossing
-
-  !> Passes the events of a lane to the observer in their order, with the output times between them. A terminal event ends the
-  !> step and the lane.
-  subroutine process_events(integrator, system, lane, theta_end, times, observer, solver_status)
-    type(integrator_t), intent(inout) :: integrator
-    class(system_t), intent(inout) :: system
-    integer, intent(in) :: lane
-    real(wp), intent(inout) :: theta_end   !! end of the step: 1, or less where it has been cut
-    real(wp), contiguous, intent(in) :: times(:)
-    class(observer_t), intent(inout) :: observer
-    type(solver_status_t), intent(inout) :: solver_status
-    real(wp) :: t
-    logical :: is_terminal
-    integer :: i
-
-    call find_events(integrator%events, system, observer, integrator%dense, theta_end)
-    do i = 1, integrator%events%found
-      t = min(integrator%attempt%t(lane) + integrator%events%theta(i) * integrator%attempt%h(lane), integrator%t_new(lane))
-      call output_until(integrator, lane, t, times, observer)
-      call sample(integrator%dense, integrator%events%theta(i), integrator%sample)
-      call observer%on_event(lane, integrator%events%which(i), t, integrator%sample, is_terminal)
-      if (.not. is_terminal) cycle
-      solver_status%code(lane) = integration_stopped
-      theta_end = integrator%events%theta(i)
-      integrator%t_new(lane) = t
-      integrator%attempt%y_new(lane, :integrator%attempt%components) = integrator%sample
-      integrator%steps%crosses(lane) = .false.
-      exit
-    end do
-  end subroutine process_events
 
   !> Passes the output times up to t that are due to the observer. Rows at a crossing where joints may
   !> change wait until the lane is on its next branch.

@@ -34,9 +34,22 @@ contains
     is_plain = .false.
     if (integrator%attempt%lanes > 1) is_plain = is_plain_step(integrator, solver_status)
     if (is_plain) then
-      call accept_all(integrator, wanted)
+      ! accepts the steps of all lanes
+      integrator%accepted(:) = .true.
+      integrator%rejected(:) = .false.
+      integrator%inspected(:) = .false.
+      integrator%wanted(:) = integrator%wants_dense_steps
+      wanted = merge(integrator%attempt%lanes, 0, integrator%wants_dense_steps)
     else
-      call find_wanted(integrator, wanted)
+      ! finds the lanes whose errors are within the tolerances, and among them the lanes whose dense output is needed
+      wanted = 0
+      do lane = 1, integrator%attempt%lanes
+        integrator%accepted(lane) = integrator%attempt%active(lane) .and. integrator%control%mean_square(lane) <= 1
+        integrator%inspected(lane) = integrator%accepted(lane) &
+                                     .and. (integrator%inspects .or. integrator%next_time(lane) < integrator%t_new(lane))
+        integrator%wanted(lane) = integrator%inspected(lane) .or. (integrator%accepted(lane) .and. integrator%wants_dense_steps)
+        if (integrator%wanted(lane)) wanted = wanted + 1
+      end do
     end if
     if (wanted > 0) then
       call choose_columns(integrator, observer)
@@ -64,58 +77,25 @@ contains
   pure logical function is_plain_step(integrator, solver_status)
     type(integrator_t), intent(in) :: integrator
     type(solver_status_t), intent(in) :: solver_status
+    real(wp) :: most(width), excess
+    integer :: i
 
     is_plain_step = .false.
     associate (attempt => integrator%attempt)
       if (modulo(attempt%lanes, width) /= 0 .or. integrator%inspects) return
-      if (largest_excess(attempt%lanes, integrator%control%mean_square, integrator%t_new, integrator%next_time) > 0) return
+      ! the largest excess over the lanes: of the squared error norm over 1, or of the time over the next output time
+      most = -1.0_wp
+      do i = 1, attempt%lanes, width
+        most = max(most, max(integrator%control%mean_square(i:i + width - 1) - 1.0_wp, integrator%t_new(i:i + width - 1) - &
+               integrator%next_time(i:i + width - 1)))
+      end do
+      excess = max(max(most(1), most(2)), max(most(3), most(4)))
+      if (excess > 0) return
       if (maxval(solver_status%steps) >= integrator%max_steps) return
       if (any_true(attempt%lanes, attempt%implicit) .or. any_true(attempt%lanes, solver_status%implicit)) return
       is_plain_step = all_true(attempt%lanes, attempt%active)
     end associate
   end function is_plain_step
-
-  !> The largest excess over the lanes: of the squared error norm over 1, or of the time over the next output time.
-  pure real(wp) function largest_excess(lanes, mean_square, t_new, next_time) result(excess)
-    integer, intent(in) :: lanes
-    real(wp), intent(in), dimension(lanes) :: mean_square, t_new, next_time
-    real(wp) :: most(width)
-    integer :: i
-
-    most = -1.0_wp
-    do i = 1, lanes, width
-      most = max(most, max(mean_square(i:i + width - 1) - 1.0_wp, t_new(i:i + width - 1) - next_time(i:i + width - 1)))
-    end do
-    excess = max(max(most(1), most(2)), max(most(3), most(4)))
-  end function largest_excess
-
-  !> Accepts the steps of all lanes.
-  pure subroutine accept_all(integrator, wanted)
-    type(integrator_t), intent(inout) :: integrator
-    integer, intent(out) :: wanted
-
-    integrator%accepted(:) = .true.
-    integrator%rejected(:) = .false.
-    integrator%inspected(:) = .false.
-    integrator%wanted(:) = integrator%wants_dense_steps
-    wanted = merge(integrator%attempt%lanes, 0, integrator%wants_dense_steps)
-  end subroutine accept_all
-
-  !> Finds the lanes whose errors are within the tolerances, and among them the lanes whose dense output is needed.
-  pure subroutine find_wanted(integrator, wanted)
-    type(integrator_t), intent(inout) :: integrator
-    integer, intent(out) :: wanted   !! how many
-    integer :: lane
-
-    wanted = 0
-    do lane = 1, integrator%attempt%lanes
-      integrator%accepted(lane) = integrator%attempt%active(lane) .and. integrator%control%mean_square(lane) <= 1
-      integrator%inspected(lane) = integrator%accepted(lane) &
-                                   .and. (integrator%inspects .or. integrator%next_time(lane) < integrator%t_new(lane))
-      integrator%wanted(lane) = integrator%inspected(lane) .or. (integrator%accepted(lane) .and. integrator%wants_dense_steps)
-      if (integrator%wanted(lane)) wanted = wanted + 1
-    end do
-  end subroutine find_wanted
 
   !> Chooses the columns of the state whose dense output is needed: those that the observer reads, or all if a lane is inspected.
   pure subroutine choose_columns(integrator, observer)

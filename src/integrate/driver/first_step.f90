@@ -28,7 +28,7 @@ contains
     integer, intent(in) :: order
     class(system_t), intent(inout) :: system
     type(step_attempt_t), intent(inout) :: attempt   !! reads t, y, slope and active; overwrites h, y_new and error_estimate
-    real(wp) :: steepest, longer
+    real(wp) :: h, longer, position, steepest
     integer :: component, lane
 
     associate (slope => control%factor, curvature => control%log_ratio)   ! work space, [lanes]
@@ -37,7 +37,17 @@ contains
       do lane = 1, attempt%lanes
         attempt%h(lane) = 0.0_wp
         if (.not. attempt%active(lane)) cycle
-        attempt%h(lane) = euler_step(control, system, attempt, lane, slope(lane))
+        ! A step over which y changes by about 1 % if the slope stays as it is
+        if (system%measures > 0) then
+          position = rms_ratio(control, control%size(lane, :counted(system)), control%size(lane, :counted(system)))
+        else
+          position = rms_ratio(control, attempt%y(lane, :attempt%states), attempt%y(lane, :attempt%states))
+        end if
+        h = small_step
+        if (min(position, slope(lane)) >= negligible) h = small_change * position / slope(lane)
+        h = min(h, control%longest(lane), control%t_end - attempt%t(lane))
+        h = max(h, smallest_step(attempt%t(lane)))
+        attempt%h(lane) = h
         control%h(lane) = retreat * attempt%h(lane)
       end do
       call begin_attempt(attempt)
@@ -61,26 +71,6 @@ contains
       end do
     end associate
   end subroutine guess_first_steps
-
-  !> A step over which y changes by about 1 % if the slope stays as it is.
-  pure real(wp) function euler_step(control, system, attempt, lane, slope) result(h)
-    type(step_control_t), intent(in) :: control
-    class(system_t), intent(in) :: system
-    type(step_attempt_t), intent(in) :: attempt
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: slope   !! its weighted size [1/s]
-    real(wp) :: position
-
-    if (system%measures > 0) then
-      position = rms_ratio(control, control%size(lane, :counted(system)), control%size(lane, :counted(system)))
-    else
-      position = rms_ratio(control, attempt%y(lane, :attempt%states), attempt%y(lane, :attempt%states))
-    end if
-    h = small_step
-    if (min(position, slope) >= negligible) h = small_change * position / slope
-    h = min(h, control%longest(lane), control%t_end - attempt%t(lane))
-    h = max(h, smallest_step(attempt%t(lane)))
-  end function euler_step
 
   !> The number of measured quantities without the phases: the speed of a rotation is no error and sets no time scale.
   pure integer function counted(system)

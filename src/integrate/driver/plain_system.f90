@@ -121,11 +121,19 @@ contains
     real(wp), intent(in) :: t
     real(wp), intent(in) :: y(:)
     real(wp), intent(out) :: dfdt(:)
-    real(wp) :: h, shift
+    real(wp) :: h, rate, shift
     integer :: i
 
     call self%f(t, y, self%dydt)
-    call update_step(self, t, y)
+    ! sets `last_step`; at the start, to the time in which the fastest component changes by its size
+    if (self%last_step > 0) then
+      if (t > self%t_last) self%last_step = t - self%t_last
+    else
+      rate = maxval(abs(self%dydt) / max(abs(y), self%threshold))
+      self%last_step = self%t_end - t
+      if (rate > 1 / self%last_step) self%last_step = 1 / rate
+    end if
+    self%t_last = t
     h = self%last_step
     do i = 1, self%states
       shift = share * max(abs(y(i)), h * abs(self%dydt(i)), self%threshold)
@@ -138,23 +146,6 @@ contains
     call self%f(t + 2 * shift, y, self%far_dydt)
     dfdt(:) = slope_of(self%dydt, self%near_dydt, self%far_dydt, (t + shift) - t, (t + 2 * shift) - t)
   end subroutine take_differences
-
-  !> Sets `last_step`; at the start, to the time in which the fastest component changes by its size.
-  subroutine update_step(self, t, y)
-    type(plain_system_t), intent(inout) :: self
-    real(wp), intent(in) :: t
-    real(wp), intent(in) :: y(:)
-    real(wp) :: rate
-
-    if (self%last_step > 0) then
-      if (t > self%t_last) self%last_step = t - self%t_last
-    else
-      rate = maxval(abs(self%dydt) / max(abs(y), self%threshold))
-      self%last_step = self%t_end - t
-      if (rate > 1 / self%last_step) self%last_step = 1 / rate
-    end if
-    self%t_last = t
-  end subroutine update_step
 
   !> Sets column i of dfdy by the values of f at y and where y(i) is shifted once and twice.
   subroutine differ_by_state(self, t, y, i, shift)

@@ -142,38 +142,28 @@ contains
       integrator%is_exhausted = .not. integrator%starting(lane)
       if (.not. integrator%starting(lane)) cycle
       integrator%free = integrator%free - 1
-      call set_start(integrator, lane, t, times, solver_status)
+      ! sets the start of a lane: the state in `sample` at the time t, all counts zero
+      associate (attempt => integrator%attempt)
+        attempt%t(lane) = t
+        attempt%y(lane, :attempt%components) = integrator%sample
+        attempt%evaluations(lane) = 0
+        attempt%jacobians(lane) = 0
+        attempt%factorisations(lane) = 0
+        attempt%implicit(lane) = .false.
+      end associate
+      if (.not. (t >= times(1) .and. t < times(size(times)))) then
+        error stop 'nocdyn_time_stepping: a variant must start within the times'
+      end if
+      integrator%next(lane) = 2
+      do while (times(integrator%next(lane)) <= t)
+        integrator%next(lane) = integrator%next(lane) + 1
+      end do
+      integrator%next_time(lane) = times(integrator%next(lane))
+      call reset_control(integrator%control, lane)
+      call reset_solver_status(solver_status, lane)
     end do
     if (any(integrator%starting)) call start_lanes(integrator, stepper, system, times, observer, solver_status)
   end subroutine fill_lanes
-
-  !> Sets the start of a lane: the state in `sample` at the time t, all counts zero.
-  subroutine set_start(integrator, lane, t, times, solver_status)
-    type(integrator_t), intent(inout) :: integrator
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: t
-    real(wp), contiguous, intent(in) :: times(:)
-    type(solver_status_t), intent(inout) :: solver_status
-
-    associate (attempt => integrator%attempt)
-      attempt%t(lane) = t
-      attempt%y(lane, :attempt%components) = integrator%sample
-      attempt%evaluations(lane) = 0
-      attempt%jacobians(lane) = 0
-      attempt%factorisations(lane) = 0
-      attempt%implicit(lane) = .false.
-    end associate
-    if (.not. (t >= times(1) .and. t < times(size(times)))) then
-      error stop 'nocdyn_time_stepping: a variant must start within the times'
-    end if
-    integrator%next(lane) = 2
-    do while (times(integrator%next(lane)) <= t)
-      integrator%next(lane) = integrator%next(lane) + 1
-    end do
-    integrator%next_time(lane) = times(integrator%next(lane))
-    call reset_control(integrator%control, lane)
-    call reset_solver_status(solver_status, lane)
-  end subroutine set_start
 
   !> Starts the lanes in `starting`: lets the system choose their branches, tells the observer, evaluates the slope, passes the
   !> start to the observer if it is an output time, and chooses the first step.
@@ -237,6 +227,7 @@ contains
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(inout) :: system
     type(solver_status_t), intent(inout) :: solver_status
+    integer :: lane
 
     associate (attempt => integrator%attempt)
       integrator%running(:) = integrator%occupied .and. solver_status%code == integration_running
@@ -252,25 +243,15 @@ contains
         end if
       end if
       call propose_steps(integrator%control, attempt%lanes, attempt%t, attempt%h, integrator%t_new)
-      call count_attempts(attempt%lanes, integrator%running, attempt%h, solver_status%h, solver_status%steps)
+      ! counts the attempts of the running lanes and stores their sizes; the other lanes get the step size 0
+      do lane = 1, attempt%lanes
+        solver_status%h(lane) = merge(attempt%h(lane), solver_status%h(lane), integrator%running(lane))
+        attempt%h(lane) = merge(attempt%h(lane), 0.0_wp, integrator%running(lane))
+        solver_status%steps(lane) = solver_status%steps(lane) + merge(1, 0, integrator%running(lane))
+      end do
       call begin_attempt(attempt)
     end associate
   end subroutine begin_attempts
-
-  !> Counts the attempts of the running lanes and stores their sizes; the other lanes get the step size 0.
-  pure subroutine count_attempts(lanes, running, h, h_stored, steps)
-    integer, intent(in) :: lanes
-    logical, intent(in) :: running(lanes)
-    real(wp), intent(inout) :: h(lanes), h_stored(lanes)
-    integer, intent(inout) :: steps(lanes)
-    integer :: lane
-
-    do lane = 1, lanes
-      h_stored(lane) = merge(h(lane), h_stored(lane), running(lane))
-      h(lane) = merge(h(lane), 0.0_wp, running(lane))
-      steps(lane) = steps(lane) + merge(1, 0, running(lane))
-    end do
-  end subroutine count_attempts
 
   !> Moves the accepted lanes to the ends of their steps.
   subroutine advance_lanes(integrator, times)

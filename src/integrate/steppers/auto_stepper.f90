@@ -124,6 +124,9 @@ contains
     type(step_attempt_t), intent(inout) :: attempt
     type(step_control_t), intent(inout) :: control
     integer :: lane
+    logical :: is_new   ! the estimate of the eigenvalue
+    logical :: is_over
+    integer :: tried   ! the kind of the attempt
 
     call choose_calm_steps(self, system, attempt, control)
     if (self%are_calm) return
@@ -131,7 +134,21 @@ contains
       call end_calm(self%calm, lane, self%choice(lane))
       self%expanded(lane) = .false.
       if (.not. attempt%active(lane)) cycle
-      if (self%was_tried(lane)) call judge_attempt(self, attempt, control, lane)
+      if (self%was_tried(lane)) then
+        ! draws the conclusions from the last attempt of a lane
+        associate (choice => self%choice(lane))
+          tried = choice%kind
+          if (choice%kind == by_series .and. .not. self%has_moved(lane)) call settle(choice, self%data, by_stages, by_series)
+          is_new = choice%kind == by_systems .or. modulo(choice%steps, stride) == 0
+          call count_attempt(choice, self%data, self%has_moved(lane), attempt%t(lane), &
+                             min(control%h(lane), control%longest(lane)), is_over)
+          if (is_over) control%h(lane) = choice%h
+          if (choice%kind /= tried) call change_kind(self, control, lane)
+          if (self%has_moved(lane) .and. choice%before == 0 .and. choice%kind /= by_series .and. is_new) then
+            call note_stiffness(choice, self%data, attempt%t(lane), control%h(lane))
+          end if
+        end associate
+      end if
       if (self%choice(lane)%kind == by_series .or. control%h(lane) >= control%longest(lane)) cycle
       self%expanded(lane) = wants_trial(self%choice(lane), self%data, by_series)
     end do
@@ -141,7 +158,15 @@ contains
     end if
     do lane = 1, attempt%lanes
       if (.not. attempt%active(lane)) cycle
-      call try_kinds(self, attempt, control, lane)
+      ! begins a trial in a lane, if it is time for one
+      associate (choice => self%choice(lane))
+        if (choice%kind == by_series) then
+          choice%lambda = self%lambda(lane)
+          if (self%has_moved(lane)) call note_stiffness(choice, self%data, attempt%t(lane), control%h(lane))
+        end if
+      end associate
+      call try_kind(self, attempt, control, lane, by_systems)
+      call try_kind(self, attempt, control, lane, by_stages)
       self%was_tried(lane) = .true.
       self%has_moved(lane) = .false.
       call begin_calm(self%calm, lane, self%choice(lane), self%data)
@@ -180,30 +205,6 @@ contains
     control%is_given(:) = control%is_given .or. attempt%active
     control%mean_square(:) = merge(0.0_wp, control%mean_square, attempt%active)
   end subroutine choose_calm_steps
-
-  !> Draws the conclusions from the last attempt of a lane.
-  subroutine judge_attempt(self, attempt, control, lane)
-    type(auto_stepper_t), intent(inout) :: self
-    type(step_attempt_t), intent(in) :: attempt
-    type(step_control_t), intent(inout) :: control
-    integer, intent(in) :: lane
-    logical :: is_new   ! the estimate of the eigenvalue
-    logical :: is_over
-    integer :: tried   ! the kind of the attempt
-
-    associate (choice => self%choice(lane))
-      tried = choice%kind
-      if (choice%kind == by_series .and. .not. self%has_moved(lane)) call settle(choice, self%data, by_stages, by_series)
-      is_new = choice%kind == by_systems .or. modulo(choice%steps, stride) == 0
-      call count_attempt(choice, self%data, self%has_moved(lane), attempt%t(lane), min(control%h(lane), control%longest(lane)), &
-                         is_over)
-      if (is_over) control%h(lane) = choice%h
-      if (choice%kind /= tried) call change_kind(self, control, lane)
-      if (self%has_moved(lane) .and. choice%before == 0 .and. choice%kind /= by_series .and. is_new) then
-        call note_stiffness(choice, self%data, attempt%t(lane), control%h(lane))
-      end if
-    end associate
-  end subroutine judge_attempt
 
   !> Prepares a lane for a kind of step that it did not take last.
   subroutine change_kind(self, control, lane)
@@ -251,23 +252,6 @@ contains
       end associate
     end do
   end subroutine expand_lanes
-
-  !> Begins a trial in a lane, if it is time for one.
-  subroutine try_kinds(self, attempt, control, lane)
-    type(auto_stepper_t), intent(inout) :: self
-    type(step_attempt_t), intent(in) :: attempt
-    type(step_control_t), intent(inout) :: control
-    integer, intent(in) :: lane
-
-    associate (choice => self%choice(lane))
-      if (choice%kind == by_series) then
-        choice%lambda = self%lambda(lane)
-        if (self%has_moved(lane)) call note_stiffness(choice, self%data, attempt%t(lane), control%h(lane))
-      end if
-    end associate
-    call try_kind(self, attempt, control, lane, by_systems)
-    call try_kind(self, attempt, control, lane, by_stages)
-  end subroutine try_kinds
 
   !> Tries one kind of step.
   subroutine try_kind(self, attempt, control, lane, kind)

@@ -102,9 +102,20 @@ contains
     class(rosenbrock_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
     type(step_attempt_t), intent(inout) :: attempt
-    integer :: stage
+    integer :: lane, stage
 
-    call renew_derivatives(self, system, attempt)
+    ! evaluates f and its derivatives at the start of the step; after a rejected step they are kept
+    if (any(self%no_slope .and. attempt%active)) then
+      call evaluate_start(attempt, system, self%no_slope, self%slope)
+      self%no_slope(:) = self%no_slope .and. .not. attempt%active
+    end if
+    if (any(self%no_jacobian .and. attempt%active)) then
+      do lane = 1, attempt%lanes
+        if (self%no_jacobian(lane) .and. attempt%active(lane)) attempt%jacobians(lane) = attempt%jacobians(lane) + 1
+      end do
+      call renew_jacobian(self%stage_system, system, attempt)
+      self%no_jacobian(:) = self%no_jacobian .and. .not. attempt%active
+    end if
     call factor(self%stage_system, attempt, self%gamma)
     call solve_stage(self, attempt, 1, self%slope)
     do stage = 2, self%stages%step
@@ -119,26 +130,6 @@ contains
     call count_evaluations(attempt)
   end subroutine take_step
 
-  !> Evaluates f and its derivatives at the start of the step; after a rejected step they are kept.
-  subroutine renew_derivatives(self, system, attempt)
-    class(rosenbrock_stepper_t), intent(inout) :: self
-    class(system_t), intent(inout) :: system
-    type(step_attempt_t), intent(inout) :: attempt
-    integer :: lane
-
-    if (any(self%no_slope .and. attempt%active)) then
-      call evaluate_start(attempt, system, self%no_slope, self%slope)
-      self%no_slope(:) = self%no_slope .and. .not. attempt%active
-    end if
-    if (any(self%no_jacobian .and. attempt%active)) then
-      do lane = 1, attempt%lanes
-        if (self%no_jacobian(lane) .and. attempt%active(lane)) attempt%jacobians(lane) = attempt%jacobians(lane) + 1
-      end do
-      call renew_jacobian(self%stage_system, system, attempt)
-      self%no_jacobian(:) = self%no_jacobian .and. .not. attempt%active
-    end if
-  end subroutine renew_derivatives
-
   !> Solves (1/gamma - h J) k_i = f_i + sum c_ij k_j + gamma_i h df/dt.
   subroutine solve_stage(self, attempt, stage, f)
     class(rosenbrock_stepper_t), intent(inout) :: self
@@ -146,27 +137,17 @@ contains
     integer, intent(in) :: stage
     real(wp), intent(in) :: f(attempt%length)
     logical :: all_finite
+    integer :: component
 
     call sum_stages(self%coupling(stage), self%stages%k, attempt%length, f, size(self%one), self%one, self%r, all_finite)
     if (abs(self%gamma_sum(stage)) > 0) then
-      call add_time_derivative(attempt%lanes, attempt%components, self%gamma_sum(stage), attempt%h, &
-                               self%stage_system%dfdt, self%r)
+      ! r = r + gamma_sum h df/dt
+      do component = 1, attempt%components
+        self%r(:, component) = self%r(:, component) + attempt%h * (self%gamma_sum(stage) * self%stage_system%dfdt(:, component))
+      end do
     end if
     call solve(self%stage_system, attempt, self%gamma, self%r, self%stages%k(:, :, stage))
   end subroutine solve_stage
-
-  !> r = r + gamma_sum h df/dt.
-  pure subroutine add_time_derivative(lanes, components, gamma_sum, h, dfdt, r)
-    integer, intent(in) :: lanes, components
-    real(wp), intent(in) :: gamma_sum
-    real(wp), intent(in) :: h(lanes), dfdt(lanes, components)
-    real(wp), intent(inout) :: r(lanes, components)
-    integer :: component
-
-    do component = 1, components
-      r(:, component) = r(:, component) + h * (gamma_sum * dfdt(:, component))
-    end do
-  end subroutine add_time_derivative
 
   subroutine interpolate(self, system, attempt, wanted, coefficients)
     class(rosenbrock_stepper_t), intent(inout) :: self

@@ -111,6 +111,7 @@ contains
     type(step_attempt_t), intent(inout) :: attempt
     type(step_control_t), intent(inout) :: control
     logical :: are_finite, have_all_moved
+    integer :: lane
 
     have_all_moved = all_true(attempt%lanes, self%moved) .and. all_true(attempt%lanes, attempt%active)
     if (.not. have_all_moved) then
@@ -128,50 +129,17 @@ contains
     if (system%hides_bends) self%chosen(:) = self%moved .and. attempt%active
     if (have_all_moved .and. are_finite .and. .not. any_differs(attempt%lanes, attempt%rhs_status, evaluation_ok)) then
       if (.not. any_too_small(attempt%lanes, attempt%t, self%last_norm)) then
-        call take_all_steps(attempt%lanes, self%last_norm, self%moved, self%step_status, self%component, attempt%evaluations, &
-                            control%h)
+        ! sets the step sizes where all lanes have moved and have finite series
+        self%moved = .false.
+        self%step_status = attempt_ok
+        self%component = 0
+        attempt%evaluations = attempt%evaluations + 1
+        control%h = self%last_norm
         if (system%hides_bends) call shorten_steps(self, system, attempt, control)
         return
       end if
     end if
-    call take_steps(self, attempt, control)
-    attempt%rhs_status(:) = evaluation_ok
-    if (system%hides_bends) call shorten_steps(self, system, attempt, control)
-  end subroutine choose_steps
-
-  !> Shortens new steps whose series do not show what happens in them.
-  subroutine shorten_steps(self, system, attempt, control)
-    type(taylor_stepper_t), intent(inout) :: self
-    class(system_t), intent(inout) :: system
-    type(step_attempt_t), intent(inout) :: attempt
-    type(step_control_t), intent(inout) :: control
-
-    self%chosen(:) = self%chosen .and. self%step_status == attempt_ok
-    call self%defects%shorten_steps(system, attempt, control, self%series, self%chosen)
-  end subroutine shorten_steps
-
-  !> Sets the step sizes where all lanes have moved and have finite series.
-  pure subroutine take_all_steps(lanes, steps, moved, step_status, component, evaluations, h)
-    integer, intent(in) :: lanes
-    real(wp), intent(in) :: steps(lanes)
-    logical, intent(inout) :: moved(lanes)
-    integer, intent(inout), dimension(lanes) :: step_status, component, evaluations
-    real(wp), intent(inout) :: h(lanes)
-
-    moved = .false.
-    step_status = attempt_ok
-    component = 0
-    evaluations = evaluations + 1
-    h = steps
-  end subroutine take_all_steps
-
-  !> Sets the status of the lanes that have moved, and the step sizes of those with finite series.
-  subroutine take_steps(self, attempt, control)
-    class(taylor_stepper_t), intent(inout) :: self
-    type(step_attempt_t), intent(inout) :: attempt
-    type(step_control_t), intent(inout) :: control
-    integer :: lane
-
+    ! sets the status of the lanes that have moved, and the step sizes of those with finite series
     do lane = 1, attempt%lanes
       if (.not. (self%moved(lane) .and. attempt%active(lane))) cycle
       self%moved(lane) = .false.
@@ -192,7 +160,20 @@ contains
       self%series(lane, :, 1:) = 0.0_wp
     end do
     self%infinite(:) = 0
-  end subroutine take_steps
+    attempt%rhs_status(:) = evaluation_ok
+    if (system%hides_bends) call shorten_steps(self, system, attempt, control)
+  end subroutine choose_steps
+
+  !> Shortens new steps whose series do not show what happens in them.
+  subroutine shorten_steps(self, system, attempt, control)
+    type(taylor_stepper_t), intent(inout) :: self
+    class(system_t), intent(inout) :: system
+    type(step_attempt_t), intent(inout) :: attempt
+    type(step_control_t), intent(inout) :: control
+
+    self%chosen(:) = self%chosen .and. self%step_status == attempt_ok
+    call self%defects%shorten_steps(system, attempt, control, self%series, self%chosen)
+  end subroutine shorten_steps
 
   !> Clears series that are not finite, and stores the first component that is not.
   subroutine clear_infinities(self)

@@ -34,6 +34,7 @@ contains
     type(parts_t) :: before, after
     integer, allocatable :: partner(:)   ! in the new input, 0: none
     integer :: g
+    integer :: last(size(group_rules))   ! old group seen last in each name space
 
     allocate (sentences(0))
     call take_apart(old, before)
@@ -55,7 +56,18 @@ contains
       if (any(partner == g)) cycle
       call append(sentences, 'the new input has ' // after%labels(g)%text)
     end do
-    call compare_order(before, partner, sentences)
+    ! compares the order of the groups of each name space
+    last = 0
+    do g = 1, size(partner)
+      if (partner(g) == 0 .or. before%name_space(g) == 0) cycle
+      associate (earlier => last(before%name_space(g)))
+        if (earlier > 0) then
+          if (partner(earlier) > partner(g)) call append(sentences, before%labels(g)%text // ' was after ' // &
+                                                         before%labels(earlier)%text // ', is before it')
+        end if
+        earlier = g
+      end associate
+    end do
   end subroutine find_differences
 
   !> Scans an input and labels its groups.
@@ -180,26 +192,5 @@ contains
       text = text // namelist%as_written(namelist%items(i))
     end do
   end function values_of
-
-  !> Compares the order of the groups of each name space.
-  subroutine compare_order(before, partner, sentences)
-    type(parts_t), intent(in) :: before
-    integer, intent(in) :: partner(:)   !! of each old group in the new input
-    type(string_t), allocatable, intent(inout) :: sentences(:)
-    integer :: last(size(group_rules))   ! old group seen last in each name space
-    integer :: g
-
-    last = 0
-    do g = 1, size(partner)
-      if (partner(g) == 0 .or. before%name_space(g) == 0) cycle
-      associate (earlier => last(before%name_space(g)))
-        if (earlier > 0) then
-          if (partner(earlier) > partner(g)) call append(sentences, before%labels(g)%text // ' was after ' // &
-                                                         before%labels(earlier)%text // ', is before it')
-        end if
-        earlier = g
-      end associate
-    end do
-  end subroutine compare_order
 
 end module nocdyn_input_differences

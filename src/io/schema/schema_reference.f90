@@ -52,7 +52,16 @@ contains
       if (key_rules(key)%only_if == '') call append_key(buffer, key_rules(key))
     end do
     do k = 1, size(kind_rules)
-      if (kind_rules(k)%group == group_rules(rule)%name) call append_kind(buffer, k, rule)
+      if (kind_rules(k)%group == group_rules(rule)%name) then
+        ! A kind with its keys
+        call buffer%append_line('')
+        call buffer%append_line('`' // selector_name(rule) // ' = ' // quoted(trim(kind_rules(k)%word)) // '`: ' // &
+                                trim(kind_rules(k)%help) // '.')
+        call append_head(buffer)
+        do key = first_key(rule), last_key(rule)
+          if (has_word(key_rules(key)%only_if, kind_rules(k)%word)) call append_key(buffer, key_rules(key))
+        end do
+      end if
     end do
     allocate (sentences, source=sentences_on(rule))
     if (size(sentences) > 0) call buffer%append_line('')
@@ -64,21 +73,6 @@ contains
     call append_examples(buffer, rule, .false.)
     call buffer%append_line('```')
   end subroutine append_group
-
-  !> A kind with its keys.
-  subroutine append_kind(buffer, kind, rule)
-    type(text_buffer_t), intent(inout) :: buffer
-    integer, intent(in) :: kind, rule   !! rows of `kind_rules` and `group_rules`
-    integer :: key
-
-    call buffer%append_line('')
-    call buffer%append_line('`' // selector_name(rule) // ' = ' // quoted(trim(kind_rules(kind)%word)) // '`: ' // &
-                            trim(kind_rules(kind)%help) // '.')
-    call append_head(buffer)
-    do key = first_key(rule), last_key(rule)
-      if (has_word(key_rules(key)%only_if, kind_rules(kind)%word)) call append_key(buffer, key_rules(key))
-    end do
-  end subroutine append_kind
 
   subroutine append_head(buffer)
     type(text_buffer_t), intent(inout) :: buffer

@@ -43,12 +43,54 @@ contains
     type(sweep_journal_t), intent(inout) :: journals(:)   !! of all shards
     type(error_t), allocatable, intent(out) :: error
     type(sweep_file_t) :: file
+    integer :: i, longest
 
     call check_sweep(journals, error)
     if (allocated(error)) return
     allocate (file%reserved, source=strings(own_names))
     call create(file, folder, sweep_netcdf_name)
-    if (.not. allocated(file%failure)) call define_all(file, journals)
+    if (.not. allocated(file%failure)) then
+      ! defines dimensions, variables and attributes
+      longest = max(1, maxval(journals%longest_reason))
+      associate (header => journals(1)%header)
+        call put_text(file, nf90_global, 'Conventions', 'CF-1.8')
+        call put_text(file, nf90_global, 'title', header%title)
+        ! characters, for `nocdyn_sweep_provenance`
+        call check(file, nf90_put_att(file%id, nf90_global, 'source', header%source))
+        call put_text(file, nf90_global, 'design', header%design)
+        call check(file, nf90_put_att(file%id, nf90_global, 'seed', header%seed))
+        call check(file, nf90_put_att(file%id, nf90_global, 'input', header%input_text))
+        if (header%list_checksum /= '') call put_text(file, nf90_global, 'list_checksum', header%list_checksum)
+        call check(file, nf90_def_dim(file%id, 'variant', header%variants, file%variant_dimension))
+        call check(file, nf90_def_dim(file%id, 'failure', nf90_unlimited, file%failure_dimension))
+        call check(file, nf90_def_dim(file%id, 'reason_length', longest, file%reason_dimension))
+        call define(file, 'variant', nf90_int, file%variant_dimension, 'number of the variant', file%variant)
+        call define_quantities(file, header%parameters, 'parameter', file%parameters)
+        call define_quantities(file, header%results, 'result', file%results)
+      end associate
+      ! defines the variables for the status of the variants and for the reasons of those that are not done
+      call define(file, 'status', nf90_byte, file%variant_dimension, 'how the variant ended', file%status)
+      call check(file, nf90_put_att(file%id, file%status, 'flag_values', [integer(int8) :: 0, 1, 2]))
+      call put_text(file, file%status, 'flag_meanings', &
+                    trim(status_words(0)) // ' ' // trim(status_words(1)) // ' ' // trim(status_words(2)))
+      call define(file, 'steps', nf90_int, file%variant_dimension, 'steps of the integration', file%steps)
+      call define(file, 'failed_variant', nf90_int, file%failure_dimension, 'number of a variant that is not done', &
+                  file%failed_variant)
+      ! by default the cache of the library would hold many chunks that are never read again
+      call check(file, nf90_def_var(file%id, 'reason', nf90_char, [file%reason_dimension, file%failure_dimension], file%reason, &
+                                   chunksizes=[longest, chunk_failures], deflate_level=1, &
+                                   cache_size=1 + longest * chunk_failures / megabyte))
+      call put_text(file, file%reason, 'long_name', 'why that variant is not done')
+      call put_text(file, file%reason, '_Encoding', 'utf-8')
+      call check(file, nf90_def_var_chunking(file%id, file%failed_variant, nf90_chunked, [chunk_failures]))
+      ! every variant is written, so that filling the variables before would double the work
+      associate (of_variants => [file%variant, file%parameters, file%results, file%status, file%steps])
+        do i = 1, size(of_variants)
+          call check(file, nf90_def_var_fill(file%id, of_variants(i), 1, 0))
+        end do
+      end associate
+      if (.not. allocated(file%failure)) call check(file, nf90_enddef(file%id))
+    end if
     if (.not. allocated(file%failure)) call write_rows(file, journals, error)
     if (allocated(error)) then
       call file%discard()
@@ -56,38 +98,6 @@ contains
       call file%finish(sweep_netcdf_name, error)
     end if
   end subroutine write_sweep_netcdf
-
-  !> Defines dimensions, variables and attributes.
-  subroutine define_all(file, journals)
-    type(sweep_file_t), intent(inout) :: file
-    type(sweep_journal_t), intent(in) :: journals(:)
-    integer :: i, longest
-
-    longest = max(1, maxval(journals%longest_reason))
-    associate (header => journals(1)%header)
-      call put_text(file, nf90_global, 'Conventions', 'CF-1.8')
-      call put_text(file, nf90_global, 'title', header%title)
-      call check(file, nf90_put_att(file%id, nf90_global, 'source', header%source))   ! characters, for `nocdyn_sweep_provenance`
-      call put_text(file, nf90_global, 'design', header%design)
-      call check(file, nf90_put_att(file%id, nf90_global, 'seed', header%seed))
-      call check(file, nf90_put_att(file%id, nf90_global, 'input', header%input_text))
-      if (header%list_checksum /= '') call put_text(file, nf90_global, 'list_checksum', header%list_checksum)
-      call check(file, nf90_def_dim(file%id, 'variant', header%variants, file%variant_dimension))
-      call check(file, nf90_def_dim(file%id, 'failure', nf90_unlimited, file%failure_dimension))
-      call check(file, nf90_def_dim(file%id, 'reason_length', longest, file%reason_dimension))
-      call define(file, 'variant', nf90_int, file%variant_dimension, 'number of the variant', file%variant)
-      call define_quantities(file, header%parameters, 'parameter', file%parameters)
-      call define_quantities(file, header%results, 'result', file%results)
-    end associate
-    call define_status_variables(file, longest)
-    ! every variant is written, so that filling the variables before would double the work
-    associate (of_variants => [file%variant, file%parameters, file%results, file%status, file%steps])
-      do i = 1, size(of_variants)
-        call check(file, nf90_def_var_fill(file%id, of_variants(i), 1, 0))
-      end do
-    end associate
-    if (.not. allocated(file%failure)) call check(file, nf90_enddef(file%id))
-  end subroutine define_all
 
   !> Defines a variable for each quantity. Its name is the label as far as NetCDF allows; the attribute `label` has all of it.
   subroutine define_quantities(file, quantities, role, variables)
@@ -108,27 +118,6 @@ contains
     end do
   end subroutine define_quantities
 
-  !> Defines the variables for the status of the variants and for the reasons of those that are not done.
-  subroutine define_status_variables(file, longest)
-    type(sweep_file_t), intent(inout) :: file
-    integer, intent(in) :: longest   !! length of a reason [characters]
-
-    call define(file, 'status', nf90_byte, file%variant_dimension, 'how the variant ended', file%status)
-    call check(file, nf90_put_att(file%id, file%status, 'flag_values', [integer(int8) :: 0, 1, 2]))
-    call put_text(file, file%status, 'flag_meanings', &
-                  trim(status_words(0)) // ' ' // trim(status_words(1)) // ' ' // trim(status_words(2)))
-    call define(file, 'steps', nf90_int, file%variant_dimension, 'steps of the integration', file%steps)
-    call define(file, 'failed_variant', nf90_int, file%failure_dimension, 'number of a variant that is not done', &
-                file%failed_variant)
-    ! by default the cache of the library would hold many chunks that are never read again
-    call check(file, nf90_def_var(file%id, 'reason', nf90_char, [file%reason_dimension, file%failure_dimension], file%reason, &
-                                 chunksizes=[longest, chunk_failures], deflate_level=1, &
-                                 cache_size=1 + longest * chunk_failures / megabyte))
-    call put_text(file, file%reason, 'long_name', 'why that variant is not done')
-    call put_text(file, file%reason, '_Encoding', 'utf-8')
-    call check(file, nf90_def_var_chunking(file%id, file%failed_variant, nf90_chunked, [chunk_failures]))
-  end subroutine define_status_variables
-
   !> Copies the chunks of the journals into the file.
   subroutine write_rows(file, journals, error)
     type(sweep_file_t), intent(inout) :: file
@@ -138,6 +127,7 @@ contains
     type(chunk_t) :: chunk
     type(rows_t) :: rows
     logical :: is_there
+    integer :: done, part
 
     allocate (rows%parameters(block_variants, size(file%parameters)), rows%results(block_variants, size(file%results)))
     allocate (rows%steps(block_variants), rows%status(block_variants))
@@ -145,32 +135,23 @@ contains
     do
       call cursor%next_chunk(journals, chunk, is_there, error)
       if (allocated(error) .or. allocated(file%failure) .or. .not. is_there) exit
-      call add_chunk(file, rows, chunk)
+      done = 0
+      do while (done < chunk%count)
+        part = min(chunk%count - done, block_variants - rows%count)
+        associate (to => rows%count)
+          rows%parameters(to + 1:to + part, :) = transpose(chunk%parameters(:, done + 1:done + part))
+          rows%results(to + 1:to + part, :) = transpose(chunk%results(:, done + 1:done + part))
+          rows%steps(to + 1:to + part) = chunk%steps(done + 1:done + part)
+          rows%status(to + 1:to + part) = chunk%status(done + 1:done + part)
+        end associate
+        rows%count = rows%count + part
+        done = done + part
+        if (rows%count == block_variants) call write_block(file, rows)
+      end do
       call write_failures(file, chunk)
     end do
     call write_block(file, rows)
   end subroutine write_rows
-
-  subroutine add_chunk(file, rows, chunk)
-    type(sweep_file_t), intent(inout) :: file
-    type(rows_t), intent(inout) :: rows
-    type(chunk_t), intent(in) :: chunk
-    integer :: done, part
-
-    done = 0
-    do while (done < chunk%count)
-      part = min(chunk%count - done, block_variants - rows%count)
-      associate (to => rows%count)
-        rows%parameters(to + 1:to + part, :) = transpose(chunk%parameters(:, done + 1:done + part))
-        rows%results(to + 1:to + part, :) = transpose(chunk%results(:, done + 1:done + part))
-        rows%steps(to + 1:to + part) = chunk%steps(done + 1:done + part)
-        rows%status(to + 1:to + part) = chunk%status(done + 1:done + part)
-      end associate
-      rows%count = rows%count + part
-      done = done + part
-      if (rows%count == block_variants) call write_block(file, rows)
-    end do
-  end subroutine add_chunk
 
   subroutine write_block(file, rows)
     type(sweep_file_t), intent(inout) :: file

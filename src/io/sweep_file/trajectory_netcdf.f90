@@ -34,7 +34,7 @@ contains
     type(string_t), intent(in) :: labels(:)
     integer, intent(in) :: rows
     character(len=*), intent(in) :: title, input
-    integer :: block, blocks, dimension, i
+    integer :: block, blocks, bracket, dimension, i
 
     call create(self%file, folder, 'trajectory.nc')
     blocks = (rows - 1) / max(least_rows, block_numbers / size(labels)) + 1
@@ -46,25 +46,17 @@ contains
     call put_text(self%file, nf90_global, 'input', input)
     call check(self%file, nf90_def_dim(self%file%id, 't', nf90_unlimited, dimension))
     do i = 1, size(labels)
-      call define_column(self%file, labels(i)%text, dimension, block, self%variables(i))
+      if (.not. allocated(self%file%failure)) then
+        bracket = index(labels(i)%text, ' [', back=.true.)
+        call define(self%file, new_name(self%file, labels(i)%text(:bracket - 1)), nf90_double, dimension, &
+                    labels(i)%text(:bracket - 1), self%variables(i))
+        call check(self%file, nf90_def_var_chunking(self%file%id, self%variables(i), nf90_chunked, [block]))
+        call check(self%file, nf90_def_var_fill(self%file%id, self%variables(i), 1, 0))
+        call put_text(self%file, self%variables(i), 'units', labels(i)%text(bracket + 2:len(labels(i)%text) - 1))
+      end if
     end do
     if (.not. allocated(self%file%failure)) call check(self%file, nf90_enddef(self%file%id))
   end subroutine open_netcdf
-
-  subroutine define_column(file, label, dimension, block, variable)
-    type(netcdf_file_t), intent(inout) :: file
-    character(len=*), intent(in) :: label      !! e.g. 'omega_motor [rad/s]'
-    integer, intent(in) :: dimension, block    !! of the rows; rows of one write
-    integer, intent(inout) :: variable
-    integer :: bracket
-
-    if (allocated(file%failure)) return
-    bracket = index(label, ' [', back=.true.)
-    call define(file, new_name(file, label(:bracket - 1)), nf90_double, dimension, label(:bracket - 1), variable)
-    call check(file, nf90_def_var_chunking(file%id, variable, nf90_chunked, [block]))
-    call check(file, nf90_def_var_fill(file%id, variable, 1, 0))
-    call put_text(file, variable, 'units', label(bracket + 2:len(label) - 1))
-  end subroutine define_column
 
   subroutine put_row(self, row)
     class(netcdf_trajectory_t), intent(inout) :: self

@@ -27,7 +27,7 @@ contains
     type(chunk_cursor_t) :: cursor
     type(chunk_t) :: chunk
     integer :: i
-    logical :: is_there
+    logical :: is_done, is_there
 
     call check_sweep(journals, error)
     if (allocated(error)) return
@@ -38,7 +38,17 @@ contains
       call cursor%next_chunk(journals, chunk, is_there, error)
       if (allocated(error) .or. allocated(file%failure) .or. .not. is_there) exit
       do i = 1, chunk%count
-        call write_variant(file, chunk, i)
+        is_done = chunk%status(i) == status_done
+        call file%put(to_text(chunk%first - 1 + i))
+        call write_numbers(file, chunk%parameters(:, i), ',')
+        if (is_done) then
+          call write_numbers(file, chunk%results(:, i), ',')
+        else
+          call file%put(repeat(',', size(chunk%results, 1)))
+        end if
+        call file%put(',' // trim(status_words(chunk%status(i))) // ',' // to_text(chunk%steps(i)) // ',')
+        if (.not. is_done) call file%put(in_quotes(chunk%reasons(i)%text, '"'))
+        call file%put(new_line('a'))
       end do
     end do
     if (allocated(error)) then
@@ -74,24 +84,5 @@ contains
       end if
     end do
   end subroutine append_quantities
-
-  subroutine write_variant(file, chunk, position)
-    type(output_file_t), intent(inout) :: file
-    type(chunk_t), intent(in) :: chunk
-    integer, intent(in) :: position   !! in the chunk
-    logical :: is_done
-
-    is_done = chunk%status(position) == status_done
-    call file%put(to_text(chunk%first - 1 + position))
-    call write_numbers(file, chunk%parameters(:, position), ',')
-    if (is_done) then
-      call write_numbers(file, chunk%results(:, position), ',')
-    else
-      call file%put(repeat(',', size(chunk%results, 1)))
-    end if
-    call file%put(',' // trim(status_words(chunk%status(position))) // ',' // to_text(chunk%steps(position)) // ',')
-    if (.not. is_done) call file%put(in_quotes(chunk%reasons(position)%text, '"'))
-    call file%put(new_line('a'))
-  end subroutine write_variant
 
 end module nocdyn_sweep_csv

@@ -24,10 +24,15 @@ contains
     character(len=*), intent(in) :: text
     real(wp), intent(out) :: value   !! 0 if the text is not a number
     integer, intent(out) :: status   !! `literal_ok` ... `literal_too_large`
+    character(len=:), allocatable :: word
+    logical :: is_not_finite
 
     value = 0.0_wp
     status = literal_malformed
-    if (is_not_finite(text)) then
+    word = lower_case(text(sign_end(text) + 1:))
+    is_not_finite = word == 'nan' .or. word == 'inf' .or. word == 'infinity'
+    if (len(word) > 4) is_not_finite = is_not_finite .or. word(1:4) == 'nan('
+    if (is_not_finite) then
       status = literal_not_finite
     else if (is_decimal(text)) then
       status = merge(literal_too_large, literal_ok, overflows(text))
@@ -111,15 +116,6 @@ contains
     sign_end = 0
     if (len(text) > 0) sign_end = merge(1, 0, scan(text(1:1), '+-') == 1)
   end function sign_end
-
-  pure logical function is_not_finite(text)
-    character(len=*), intent(in) :: text
-    character(len=:), allocatable :: word
-
-    word = lower_case(text(sign_end(text) + 1:))
-    is_not_finite = word == 'nan' .or. word == 'inf' .or. word == 'infinity'
-    if (len(word) > 4) is_not_finite = is_not_finite .or. word(1:4) == 'nan('
-  end function is_not_finite
 
   pure logical function is_decimal(text)
     character(len=*), intent(in) :: text

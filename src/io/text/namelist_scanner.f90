@@ -29,7 +29,18 @@ contains
       if (cursor%group_begins()) then
         call scan_group(cursor, namelist, diagnostics)
       else
-        call refuse_text_outside(cursor, namelist, diagnostics)
+        ! adds one error for all text between two groups, and skips it
+        if (cursor%is_first_of_line() .or. namelist%group_count == 0) then
+          call diagnostics%add(cursor%line, 0, 'text outside groups: ' // cursor%excerpt() // '; a group is written &NAME ... /')
+        else
+          call diagnostics%add(cursor%line, namelist%group_count, &
+            'text after the end of the group: ' // cursor%excerpt() // "; a value that holds '/' needs quotes")
+        end if
+
+        do while (.not. (cursor%at_end() .or. cursor%group_begins()))
+          call cursor%move_to(cursor%token_end('!') + 1)
+          call cursor%skip_blanks()
+        end do
       end if
       call cursor%skip_blanks()
     end do
@@ -80,25 +91,6 @@ contains
       call diagnostics%add(line, 0, 'a control character (code ' // to_text(code) // ') does not belong in an input file')
     end do
   end subroutine blank_control_characters
-
-  !> Adds one error for all text between two groups, and skips it.
-  subroutine refuse_text_outside(cursor, namelist, diagnostics)
-    type(cursor_t), intent(inout) :: cursor
-    type(namelist_t), intent(in) :: namelist
-    type(diagnostics_t), intent(inout) :: diagnostics
-
-    if (cursor%is_first_of_line() .or. namelist%group_count == 0) then
-      call diagnostics%add(cursor%line, 0, 'text outside groups: ' // cursor%excerpt() // '; a group is written &NAME ... /')
-    else
-      call diagnostics%add(cursor%line, namelist%group_count, &
-        'text after the end of the group: ' // cursor%excerpt() // "; a value that holds '/' needs quotes")
-    end if
-
-    do while (.not. (cursor%at_end() .or. cursor%group_begins()))
-      call cursor%move_to(cursor%token_end('!') + 1)
-      call cursor%skip_blanks()
-    end do
-  end subroutine refuse_text_outside
 
   !> Scans a group from & or $ to its end mark, or to where the end mark is missing.
   subroutine scan_group(cursor, namelist, diagnostics)

@@ -185,7 +185,7 @@ contains
     character(len=*), intent(in) :: text   !! the subscript without its parentheses
     type(assignment_t), intent(inout) :: assignment   !! `is_malformed` if the text is neither
     character(len=:), allocatable :: rest
-    integer :: bounds(3), colon, part
+    integer :: bounds(3), colon, part, status
     logical :: is_valid
 
     assignment%is_whole = .false.
@@ -194,7 +194,10 @@ contains
     rest = text
     do part = 1, 3
       colon = index(rest // ':', ':')
-      call read_bound(rest(:colon - 1), bounds(part), is_valid)
+      if (len_trim(rest(:colon - 1)) /= 0) then
+        call read_integer(trim(adjustl(rest(:colon - 1))), bounds(part), status)
+        is_valid = is_valid .and. status == literal_ok .and. bounds(part) >= 1 .and. bounds(part) <= longest_list
+      end if
       if (colon > len(rest)) exit
       rest = rest(colon + 1:)
     end do
@@ -205,17 +208,5 @@ contains
     assignment%stride = bounds(3)
     assignment%is_malformed = part > 3 .or. .not. is_valid .or. (bounds(2) > 0 .and. bounds(2) < bounds(1))
   end subroutine read_subscript
-
-  !> Reads one bound; an empty text leaves it as it is.
-  subroutine read_bound(text, bound, is_valid)
-    character(len=*), intent(in) :: text
-    integer, intent(inout) :: bound
-    logical, intent(inout) :: is_valid   !! becomes false if the text is not a bound
-    integer :: status
-
-    if (len_trim(text) == 0) return
-    call read_integer(trim(adjustl(text)), bound, status)
-    is_valid = is_valid .and. status == literal_ok .and. bound >= 1 .and. bound <= longest_list
-  end subroutine read_bound
 
 end module nocdyn_namelist_values

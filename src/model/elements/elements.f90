@@ -79,6 +79,8 @@ contains
     integer, intent(in) :: internal(:)      !! internal states of each element, [elements]
     integer, intent(in), optional :: phase(:)   !! the phase of each element, an element as well, or 0; absent: none
     type(elements_t) :: self
+    integer :: e, next
+    type(internal_states_t) :: new_internal_states
 
     self%count = rows%count()
     self%rows = rows
@@ -88,7 +90,22 @@ contains
     allocate (self%restoring_angle, self%restoring_curvature, source=self%angle)
     allocate (self%applied_angle, self%applied_speed, self%applied_time, source=self%angle)
     allocate (self%stored, self%kept, self%secant, self%damping, source=self%angle)
-    self%internal = new_internal_states(lanes, internal)
+    ! states with the value 0
+    new_internal_states%count = sum(internal)
+    allocate (new_internal_states%element(new_internal_states%count), new_internal_states%first(new_internal_states%count), &
+      new_internal_states%members(new_internal_states%count))
+    next = 1
+    do e = 1, size(internal)
+      new_internal_states%element(next:next + internal(e) - 1) = e
+      new_internal_states%first(next:next + internal(e) - 1) = next
+      new_internal_states%members(next:next + internal(e) - 1) = internal(e)
+      next = next + internal(e)
+    end do
+    allocate (new_internal_states%value(lanes, new_internal_states%count), source=0.0_wp)
+    allocate (new_internal_states%rate, new_internal_states%applied, new_internal_states%rate_speed, &
+      new_internal_states%rate_time, source=new_internal_states%value)
+    allocate (new_internal_states%rate_internal(lanes, maxval([0, internal]), new_internal_states%count), source=0.0_wp)
+    self%internal = new_internal_states
     self%cross = new_cross_slopes(lanes, [integer ::])
     if (present(phase)) self%cross = new_cross_slopes(lanes, phase)
   end function new_elements
@@ -143,27 +160,6 @@ contains
     mover = element
     if (pair > 0) mover = merge(self%by(pair), 0, self%element(pair) == element)
   end function mover
-
-  !> States with the value 0.
-  function new_internal_states(lanes, members) result(self)
-    integer, intent(in) :: lanes
-    integer, intent(in) :: members(:)   !! number of states of each element of the machine, [elements]
-    type(internal_states_t) :: self
-    integer :: e, next
-
-    self%count = sum(members)
-    allocate (self%element(self%count), self%first(self%count), self%members(self%count))
-    next = 1
-    do e = 1, size(members)
-      self%element(next:next + members(e) - 1) = e
-      self%first(next:next + members(e) - 1) = next
-      self%members(next:next + members(e) - 1) = members(e)
-      next = next + members(e)
-    end do
-    allocate (self%value(lanes, self%count), source=0.0_wp)
-    allocate (self%rate, self%applied, self%rate_speed, self%rate_time, source=self%value)
-    allocate (self%rate_internal(lanes, maxval([0, members]), self%count), source=0.0_wp)
-  end function new_internal_states
 
   !> Leaves the mixed derivatives of the pairs of some elements, where `mixed` has half of the second derivatives along both
   !> angles.

@@ -164,33 +164,26 @@ contains
   subroutine evaluate(self, elements)
     class(polynomial_laws_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements   !! angles and speeds are set
+    integer :: part
 
     if (self%is_divided) then
-      call evaluate_parts(self, elements)
+      do part = 1, self%parts
+        associate (e => self%first(part), n => size(self%rest, 1) * (self%first(part + 1) - self%first(part)))
+          if (self%is_plain(part)) then
+            call plain_moments(n, self%linear(1, e), self%cubic(1, e), self%by_speed(1, e), elements%angle(1, e), &
+                              elements%speed(1, e), elements%restoring(1, e), elements%applied(1, e))
+          else
+            call moments(n, self%rest(1, e), self%linear(1, e), self%cubic(1, e), self%constant(1, e), self%by_speed(1, e), &
+                         self%by_speed_squared(1, e), elements%angle(1, e), elements%speed(1, e), elements%restoring(1, e), &
+                         elements%applied(1, e))
+          end if
+        end associate
+      end do
     else
       call moments(self%values, self%rest, self%linear, self%cubic, self%constant, self%by_speed, self%by_speed_squared, &
                    elements%angle, elements%speed, elements%restoring, elements%applied)
     end if
   end subroutine evaluate
-
-  subroutine evaluate_parts(self, elements)
-    type(polynomial_laws_t), intent(in) :: self
-    type(elements_t), intent(inout) :: elements
-    integer :: part
-
-    do part = 1, self%parts
-      associate (e => self%first(part), n => size(self%rest, 1) * (self%first(part + 1) - self%first(part)))
-        if (self%is_plain(part)) then
-          call plain_moments(n, self%linear(1, e), self%cubic(1, e), self%by_speed(1, e), elements%angle(1, e), &
-                            elements%speed(1, e), elements%restoring(1, e), elements%applied(1, e))
-        else
-          call moments(n, self%rest(1, e), self%linear(1, e), self%cubic(1, e), self%constant(1, e), self%by_speed(1, e), &
-                       self%by_speed_squared(1, e), elements%angle(1, e), elements%speed(1, e), elements%restoring(1, e), &
-                       elements%applied(1, e))
-        end if
-      end associate
-    end do
-  end subroutine evaluate_parts
 
   pure subroutine moments(n, rest, linear, cubic, constant, by_speed, by_speed_squared, angle, speed, restoring, applied)
     integer, intent(in) :: n   !! values of the part

@@ -66,7 +66,8 @@ contains
   subroutine list_signals(machine, signals)
     type(machine_t), intent(in) :: machine
     type(signal_t), allocatable, intent(out) :: signals(:)
-    integer :: b, count, kind
+    integer :: b, count, kind, member, row
+    type(quantity_t) :: one
 
     allocate (signals(3 * machine%bodies + size(energy_names) + 8))
     count = 0
@@ -81,7 +82,27 @@ contains
     do b = 1, size(machine%banks)
       call add_bank(machine, b, signals, count)
     end do
-    call add_reactions(machine, signals, count)
+    ! The multiplier of each row, followed by the torques on its members that have a signal. The multiplier of a row that
+    ! holds a joint, such as a clutch, is its torque on the second body.
+    member = 1
+    associate (rows => machine%constraints, members => machine%constraints%members)
+      do row = 1, rows%rows()
+        one = quantity_t(symbol='torque', unit=rows%units(row)%text, caption='torque', positive='on the second body', &
+                         rank=rank_torque)
+        if (rows%is_of_teeth(row)) one = quantity_t(symbol='reaction', unit=rows%units(row)%text, caption='reaction', &
+                                                    positive='in the positive direction of both', rank=rank_reaction)
+        call add_signal(signals, count, signal_source_t(signal_reaction, index=row), one, rows%kinds(row)%text, &
+                        rows%names(row)%text, '')
+        do while (member <= size(members%row))
+          if (members%row(member) /= row) exit
+          one = quantity_t(symbol='reaction', unit='N m', caption='torque on a member', positive='with a positive speed', &
+                           rank=rank_reaction)
+          call add_signal(signals, count, signal_source_t(signal_member, index=member), one, rows%kinds(row)%text, &
+                          rows%names(row)%text, members%names(member)%text)
+          member = member + 1
+        end do
+      end do
+    end associate
     do kind = signal_kinetic, signal_residual
       call add_signal(signals, count, signal_source_t(kind), quantity_t(symbol=energy_names(kind), unit='J', &
                       caption=energy_captions(kind), rank=rank_detail), '', '', '')
@@ -210,36 +231,6 @@ contains
       if (machine%constraints%names(row)%text == bank%names(element)%text) kind = machine%constraints%kinds(row)%text
     end do
   end function group_kind
-
-  !> The multiplier of each row, followed by the torques on its members that have a signal. The multiplier of a row that
-  !> holds a joint, such as a clutch, is its torque on the second body.
-  subroutine add_reactions(machine, signals, count)
-    type(machine_t), intent(in) :: machine
-    type(signal_t), allocatable, intent(inout) :: signals(:)
-    integer, intent(inout) :: count
-    type(quantity_t) :: one
-    integer :: member, row
-
-    member = 1
-    associate (rows => machine%constraints, members => machine%constraints%members)
-      do row = 1, rows%rows()
-        one = quantity_t(symbol='torque', unit=rows%units(row)%text, caption='torque', positive='on the second body', &
-                         rank=rank_torque)
-        if (rows%is_of_teeth(row)) one = quantity_t(symbol='reaction', unit=rows%units(row)%text, caption='reaction', &
-                                                    positive='in the positive direction of both', rank=rank_reaction)
-        call add_signal(signals, count, signal_source_t(signal_reaction, index=row), one, rows%kinds(row)%text, &
-                        rows%names(row)%text, '')
-        do while (member <= size(members%row))
-          if (members%row(member) /= row) exit
-          one = quantity_t(symbol='reaction', unit='N m', caption='torque on a member', positive='with a positive speed', &
-                           rank=rank_reaction)
-          call add_signal(signals, count, signal_source_t(signal_member, index=member), one, rows%kinds(row)%text, &
-                          rows%names(row)%text, members%names(member)%text)
-          member = member + 1
-        end do
-      end do
-    end associate
-  end subroutine add_reactions
 
   !> Appends a signal of an element; what it is, `quantity` says.
   pure subroutine add_signal(signals, count, source, quantity, element_kind, element, point)

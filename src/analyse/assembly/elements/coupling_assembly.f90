@@ -198,13 +198,18 @@ contains
     end do
   end function loss_damping
 
-  !> Section moduli against torsion pi (D^4 - d^4) / (16 D) [m3], 0 where the diameter is unknown, [lanes, couplings].
-  function section_moduli(groups) result(modulus)
+  !> What the constructors of all forms take.
+  type(coupling_common_t) function common_of(groups) result(shared)
     type(element_groups_t), intent(in) :: groups
-    real(wp) :: modulus(groups%lanes, size(groups%indices))
     real(wp), parameter :: pi = acos(-1.0_wp)
+    real(wp), dimension(groups%lanes, size(groups%indices)) :: friction, modulus
     integer :: i
 
+    allocate (shared%names, source=groups%names)
+    shared%rows = rows_between(groups%bodies('bodies', 1), groups%bodies('bodies', 2))
+    allocate (shared%damping, source=groups%values('damping') + loss_damping(groups))
+    allocate (shared%rest_twist, source=groups%values('rest_twist'))
+    ! section moduli against torsion pi (D^4 - d^4) / (16 D) [m3], 0 where the diameter is unknown, [lanes, couplings]
     modulus = groups%values('section_modulus')
     do i = 1, size(groups%indices)
       associate (group => groups%input%groups(groups%indices(i)))
@@ -215,18 +220,6 @@ contains
         end if
       end associate
     end do
-  end function section_moduli
-
-  !> What the constructors of all forms take.
-  type(coupling_common_t) function common_of(groups) result(shared)
-    type(element_groups_t), intent(in) :: groups
-    real(wp), dimension(groups%lanes, size(groups%indices)) :: friction, modulus
-
-    allocate (shared%names, source=groups%names)
-    shared%rows = rows_between(groups%bodies('bodies', 1), groups%bodies('bodies', 2))
-    allocate (shared%damping, source=groups%values('damping') + loss_damping(groups))
-    allocate (shared%rest_twist, source=groups%values('rest_twist'))
-    modulus = section_moduli(groups)
     if (any(modulus > 0)) allocate (shared%section_modulus, source=modulus)
     friction = groups%values('friction')
     if (.not. any(friction > 0)) return

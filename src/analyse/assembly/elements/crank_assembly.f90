@@ -136,15 +136,26 @@ contains
     type(crank_rows_t) :: rows
     real(wp), allocatable :: masses(:)
     real(wp), dimension(samples) :: change, gas, inertia
-    real(wp) :: mean, mean_inertia
-    integer :: k
+    real(wp) :: mean, mean_inertia, angle, g(0:3)
+    integer :: i, k
 
     call find_masses(group, body, machine, masses)
     rows = new_crank_rows(1, spread(name, 1, size(masses)), [(0, k=1, size(masses))], crank_of(group))
     force%base = 1.0_wp
     allocate (force%sine(0), force%cosine(0))
     if (group%has_value('crank_angles')) force = force_of(group)
-    call sample_turn(rows, masses, force, group%number('phase'), inertia, change, gas)
+    ! inertia, its torque over the square of the speed, and torque of the force of a crank over one cycle of the force
+    inertia = 0.0_wp
+    change = 0.0_wp
+    do i = 1, samples
+      angle = 2.0_wp * pi / force%base * (i - 1) / samples
+      do k = size(masses), 1, -1   ! the piston comes last
+        call rows%motion(k, angle, g)
+        inertia(i) = inertia(i) + masses(k) * g(1)**2
+        change(i) = change(i) - masses(k) * g(1) * g(2)
+      end do
+      gas(i) = g(1) * force%value(angle + group%number('phase'))
+    end do
     associate (n => nint(most_orders / force%base))
       torque%square_order = [(k * force%base, k=1, n)]
       allocate (torque%square_sine(n), torque%square_cosine(n))
@@ -160,29 +171,6 @@ contains
     bank%is_engine = .true.
     call append_bank(machine%banks, bank)
   end subroutine add_mean_crank
-
-  !> Inertia, its torque over the square of the speed, and torque of the force of a crank over one cycle of the force.
-  subroutine sample_turn(rows, masses, force, phase, inertia, change, gas)
-    type(crank_rows_t), intent(in) :: rows
-    real(wp), intent(in) :: masses(:)            !! of each row [kg], [kg m2]
-    type(periodic_force_t), intent(in) :: force
-    real(wp), intent(in) :: phase                !! angle of the crank where that of its body is zero [rad]
-    real(wp), intent(out), dimension(samples) :: inertia, change, gas   !! [kg m2], [kg m2], [N m]
-    real(wp) :: angle, g(0:3)
-    integer :: i, k
-
-    inertia = 0.0_wp
-    change = 0.0_wp
-    do i = 1, samples
-      angle = 2.0_wp * pi / force%base * (i - 1) / samples
-      do k = size(masses), 1, -1   ! the piston comes last
-        call rows%motion(k, angle, g)
-        inertia(i) = inertia(i) + masses(k) * g(1)**2
-        change(i) = change(i) - masses(k) * g(1) * g(2)
-      end do
-      gas(i) = g(1) * force%value(angle + phase)
-    end do
-  end subroutine sample_turn
 
   type(slider_crank_t) function crank_of(group) result(crank)
     type(group_t), intent(in) :: group

@@ -29,7 +29,7 @@ contains
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     real(wp), dimension(groups%lanes, size(body)) :: direction, poles
     real(wp) :: values(groups%lanes, size(body), size(circuit_keys))
-    integer :: i, k
+    integer :: i, k, lane
     type(schedule_t), allocatable :: schedule(:, :)
     logical :: are_keys
 
@@ -44,7 +44,15 @@ contains
         if (.not. are_keys) values(:, i, :) = spread(fitted_values(group), 1, groups%lanes)
       end associate
     end do
-    if (groups%input%groups(groups%indices(1))%has_value('supply_times')) call find_schedules(groups, schedule)
+    if (groups%input%groups(groups%indices(1))%has_value('supply_times')) then
+      ! the shares of the voltage over the time, the same in every lane
+      allocate (schedule(groups%lanes, size(groups%indices)))
+      do i = 1, size(groups%indices)
+        do lane = 1, groups%lanes
+          call schedule_supply(groups%input%groups(groups%indices(i)), schedule(lane, i))
+        end do
+      end do
+    end if
     call append_bank(banks, new_flux_motors(groups%names, body, values, poles, direction, are_keys, schedule))
   end subroutine add_flux_motors
 
@@ -121,20 +129,6 @@ contains
                   rounded_text(found, 3) // ' with the circuit, which knows no skin effect in the bars')
     end associate
   end subroutine compare_start
-
-  !> The shares of the voltage over the time, the same in every lane.
-  subroutine find_schedules(groups, schedule)
-    type(element_groups_t), intent(in) :: groups
-    type(schedule_t), allocatable, intent(out) :: schedule(:, :)   !! [lanes, motors]
-    integer :: i, lane
-
-    allocate (schedule(groups%lanes, size(groups%indices)))
-    do i = 1, size(groups%indices)
-      do lane = 1, groups%lanes
-        call schedule_supply(groups%input%groups(groups%indices(i)), schedule(lane, i))
-      end do
-    end do
-  end subroutine find_schedules
 
   !> The share of the voltage of one motor: at each of its times a change to the next factor, within a ramp. Before the first one,
   !> and with the factor 0, the motor is disconnected.

@@ -72,7 +72,15 @@ contains
     if (form > 2 * forms_of_friction) then
       allocate (over_slip, source=group_curve(groups%input%groups(groups%indices(1)), 'table_slip', 'table_capacity', 'constant'))
     end if
-    ranges = clutch_ranges(groups, form)
+    ! the ranges of the moments of clutches of one form
+    ranges = rest_ranges(groups)
+    allocate (ranges%sliding_most, source=0.0_wp * ranges%most)
+    if (form <= forms_of_friction .or. form > 2 * forms_of_friction) then
+      do i = 1, size(groups%indices)
+        ranges%sliding_most(:, i) = sliding_capacity(groups%input%groups(groups%indices(i)))
+      end do
+    end if
+    ranges%sliding_least = -ranges%sliding_most
     if (modulo(form - engaged, forms_of_friction) + engaged == with_engagement) then
       allocate (engagement(groups%lanes, size(groups%indices)))
       do i = 1, size(groups%indices)
@@ -84,22 +92,6 @@ contains
     call append_bank(banks, new_friction_joints(role_clutch, groups%names, groups%bodies('bodies', 1), &
                                                 groups%bodies('bodies', 2), ranges, engagement, over_slip))
   end subroutine add_clutches
-
-  !> The ranges of the moments of clutches of one form.
-  type(joint_ranges_t) function clutch_ranges(groups, form) result(ranges)
-    type(element_groups_t), intent(in) :: groups
-    integer, intent(in) :: form
-    integer :: i
-
-    ranges = rest_ranges(groups)
-    allocate (ranges%sliding_most, source=0.0_wp * ranges%most)
-    if (form <= forms_of_friction .or. form > 2 * forms_of_friction) then
-      do i = 1, size(groups%indices)
-        ranges%sliding_most(:, i) = sliding_capacity(groups%input%groups(groups%indices(i)))
-      end do
-    end if
-    ranges%sliding_least = -ranges%sliding_most
-  end function clutch_ranges
 
   !> The ranges at rest of joints of one kind; those of slip are not allocated.
   type(joint_ranges_t) function rest_ranges(groups) result(ranges)

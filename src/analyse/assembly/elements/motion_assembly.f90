@@ -42,9 +42,12 @@ contains
     integer, intent(in) :: index   !! of the group
     type(error_t), allocatable, intent(inout) :: error   !! names file, line, group and key
     character(len=:), allocatable :: text
+    logical :: is
 
     associate (group => input%groups(index))
-      if (is_polygon_of_angles(group)) then
+      is = group%text('kind') == 'angle' .and. group%has_value('interpolation')
+      if (is) is = group%text('interpolation') == 'linear'
+      if (is) then
         call add_mistake(error, input%location(index, 'interpolation') // ": interpolation = 'linear' with kind = " // &
                    "'angle': the speed would jump at the points, which needs an infinite torque; allowed: spline, dwells, cubic")
         return
@@ -53,13 +56,6 @@ contains
       if (text /= '') call add_mistake(error, input%location(index, 'table_time') // ': table_time' // text)
     end associate
   end subroutine check_drive
-
-  pure logical function is_polygon_of_angles(group) result(is)
-    type(group_t), intent(in) :: group   !! &drive
-
-    is = group%text('kind') == 'angle' .and. group%has_value('interpolation')
-    if (is) is = group%text('interpolation') == 'linear'
-  end function is_polygon_of_angles
 
   !> What is wrong with the times of a drive, '' if nothing is.
   pure subroutine find_jump(group, text)

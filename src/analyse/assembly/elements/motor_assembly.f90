@@ -37,7 +37,17 @@ contains
     case ('induction_dq')
       call check_flux_motor(input, index, error)
     case ('inverter')
-      call check_inverter(input, index, error)
+      ! refuses a motor without a set speed, a gain that turns it away from that, and an odd number of poles
+      associate (group => input%groups(index))
+        if (.not. (group%has_value('governor_speed') .or. group%has_value('set_times'))) then
+          call add_mistake(error, input%location(index, 'kind') // ": kind = 'inverter' needs a set speed; " // &
+                     'required: governor_speed [rad/s], or set_times and set_speeds')
+        else if (.not. group%number('governor_gain') > 0) then
+          call add_mistake(error, input%location(index, 'governor_gain') // ': governor_gain = ' // &
+                     to_text(group%number('governor_gain')) // "; allowed with kind = 'inverter': > 0 [s/rad]")
+        end if
+        if (group%has_value('poles')) call check_poles(input, index, error)
+      end associate
     case ('synchronous')
       call check_synchronous(input, index, error)
     case default
@@ -56,24 +66,6 @@ contains
                  ' must have the sign of synchronous_speed = ' // to_text(speed))
     end associate
   end subroutine check_induction
-
-  !> Refuses a motor without a set speed, a gain that turns it away from that, and an odd number of poles.
-  subroutine check_inverter(input, index, error)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error
-
-    associate (group => input%groups(index))
-      if (.not. (group%has_value('governor_speed') .or. group%has_value('set_times'))) then
-        call add_mistake(error, input%location(index, 'kind') // ": kind = 'inverter' needs a set speed; " // &
-                   'required: governor_speed [rad/s], or set_times and set_speeds')
-      else if (.not. group%number('governor_gain') > 0) then
-        call add_mistake(error, input%location(index, 'governor_gain') // ': governor_gain = ' // &
-                   to_text(group%number('governor_gain')) // "; allowed with kind = 'inverter': > 0 [s/rad]")
-      end if
-      if (group%has_value('poles')) call check_poles(input, index, error)
-    end associate
-  end subroutine check_inverter
 
   !> Refuses an odd number of poles, and curves over the slip of which one is missing.
   subroutine check_synchronous(input, index, error)

@@ -81,15 +81,8 @@ contains
     case default
       excitation_form = timed
     end select
-    if (has_window(group)) excitation_form = excitation_form + 1
+    if (group%has_value('start') .or. group%has_value('end') .or. group%has_value('decay')) excitation_form = excitation_form + 1
   end function excitation_form
-
-  !> Whether an excitation starts, ends or decays.
-  pure logical function has_window(group)
-    type(group_t), intent(in) :: group
-
-    has_window = group%has_value('start') .or. group%has_value('end') .or. group%has_value('decay')
-  end function has_window
 
   !> Adds the bank of the excitations of one form, or its banks.
   subroutine add_excitation_form(groups, form, banks)

@@ -24,12 +24,35 @@ contains
     type(body_index_t), intent(in) :: body_index
     type(constraints_t), intent(in) :: constraints
     real(wp), allocatable :: speeds(:)
-    real(wp) :: given(size(body_index%names)), from_one(size(body_index%names))
+    real(wp) :: given(size(body_index%names)), from_one(size(body_index%names)), speed
     type(links_t) :: links
-    integer :: source
+    integer :: i, source
+    integer, allocatable :: bodies(:)
 
     allocate (speeds(size(given)), source=0.0_wp)
-    given = given_speeds(input, body_index)
+    ! the largest speed that groups give to each body
+    given = 0.0_wp
+    allocate (bodies, source=input%groups_named('body'))
+    do i = 1, size(bodies)
+      given(i) = abs(input%groups(bodies(i))%number('speed', absent=0.0_wp))
+    end do
+    do i = 1, size(input%groups)
+      associate (group => input%groups(i))
+        select case (group%kind)
+        case ('motor')
+          speed = top_speed(group)
+        case ('drive')
+          speed = abs(group%number('speed', absent=0.0_wp)) + abs(group%number('speed_amplitude', absent=0.0_wp))
+          speed = max(speed, maxval([0.0_wp, abs(group%numbers('table_speed'))]))
+        case ('response')
+          speed = maxval(abs([group%numbers('speed'), group%numbers('operating')]))
+        case default
+          cycle
+        end select
+        bodies = bodies_of(group, 'body', body_index)
+        if (bodies(1) > 0) given(bodies(1)) = max(given(bodies(1)), speed)
+      end associate
+    end do
     if (.not. any(given > 0)) return
     links = all_links(input, body_index, constraints)
     do
@@ -65,39 +88,6 @@ contains
       end do
     end do
   end subroutine spread_speed
-
-  !> The largest speed that groups give to each body.
-  function given_speeds(input, body_index) result(speeds)
-    type(input_t), intent(in) :: input
-    type(body_index_t), intent(in) :: body_index
-    real(wp) :: speeds(size(body_index%names))
-    integer, allocatable :: bodies(:)
-    integer :: i
-    real(wp) :: speed
-
-    speeds = 0.0_wp
-    allocate (bodies, source=input%groups_named('body'))
-    do i = 1, size(bodies)
-      speeds(i) = abs(input%groups(bodies(i))%number('speed', absent=0.0_wp))
-    end do
-    do i = 1, size(input%groups)
-      associate (group => input%groups(i))
-        select case (group%kind)
-        case ('motor')
-          speed = top_speed(group)
-        case ('drive')
-          speed = abs(group%number('speed', absent=0.0_wp)) + abs(group%number('speed_amplitude', absent=0.0_wp))
-          speed = max(speed, maxval([0.0_wp, abs(group%numbers('table_speed'))]))
-        case ('response')
-          speed = maxval(abs([group%numbers('speed'), group%numbers('operating')]))
-        case default
-          cycle
-        end select
-        bodies = bodies_of(group, 'body', body_index)
-        if (bodies(1) > 0) speeds(bodies(1)) = max(speeds(bodies(1)), speed)
-      end associate
-    end do
-  end function given_speeds
 
   !> The speed of a motor without load or by its governor [rad/s]; 0 if it has none.
   pure real(wp) function top_speed(group) result(speed)

@@ -34,10 +34,26 @@ contains
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
     type(error_t), allocatable, intent(inout) :: error
+    integer :: k
 
     call check_material(input, index, 'shear_modulus', error)
     call check_material(input, index, 'density', error)
-    call check_sizes(input, index, error)
+    associate (group => input%groups(index))
+      associate (bores => group%numbers('bores'), diameters => group%numbers('diameters'))
+        do k = 1, size(bores)
+          if (bores(k) < diameters(k)) cycle
+          call add_mistake(error, input%location(index, 'bores') // ': bores(' // to_text(k) // ') = ' // &
+                     to_text(bores(k)) // ' m is not less than diameters(' // to_text(k) // ') = ' // to_text(diameters(k)) // &
+                     ' m; allowed: 0 to below the diameter')
+          return
+        end do
+        if (.not. group%has_value('nodes') .or. .not. has_inertia(group)) return
+        if (group%whole_number('nodes') >= size(bores) - 1) return
+        call add_mistake(error, input%location(index, 'nodes') // ': nodes = ' // &
+                   to_text(group%whole_number('nodes')) // ' is out of range; allowed: from ' // to_text(size(bores) - 1) // &
+                   ', one between two segments, to ' // to_text(most_nodes))
+      end associate
+    end associate
   end subroutine check_shaft
 
   subroutine check_material(input, index, key, error)
@@ -56,30 +72,6 @@ contains
       end if
     end associate
   end subroutine check_material
-
-  subroutine check_sizes(input, index, error)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: index
-    type(error_t), allocatable, intent(inout) :: error
-    integer :: k
-
-    associate (group => input%groups(index))
-      associate (bores => group%numbers('bores'), diameters => group%numbers('diameters'))
-        do k = 1, size(bores)
-          if (bores(k) < diameters(k)) cycle
-          call add_mistake(error, input%location(index, 'bores') // ': bores(' // to_text(k) // ') = ' // &
-                     to_text(bores(k)) // ' m is not less than diameters(' // to_text(k) // ') = ' // to_text(diameters(k)) // &
-                     ' m; allowed: 0 to below the diameter')
-          return
-        end do
-        if (.not. group%has_value('nodes') .or. .not. has_inertia(group)) return
-        if (group%whole_number('nodes') >= size(bores) - 1) return
-        call add_mistake(error, input%location(index, 'nodes') // ': nodes = ' // &
-                   to_text(group%whole_number('nodes')) // ' is out of range; allowed: from ' // to_text(size(bores) - 1) // &
-                   ', one between two segments, to ' // to_text(most_nodes))
-      end associate
-    end associate
-  end subroutine check_sizes
 
   !> The segments of a group &shaft.
   pure function segments_of(group) result(segments)

@@ -73,6 +73,7 @@ contains
     integer, intent(in) :: variant   !! 1 to `variants`
     real(wp), intent(out) :: x(:)    !! [varied]
     integer :: i
+    real(wp) :: probability
 
     select case (self%word)
     case ('grid')
@@ -81,7 +82,19 @@ contains
       x = self%list(:, variant)
     case default
       do i = 1, self%varied
-        x(i) = self%distributions(i)%quantile(probability(self, variant, i))
+        ! the probability of values below that of a factor in a variant
+        select case (self%word)
+        case ('random')
+          probability = random_number_at(self%seed, stream_values, i, variant)
+        case ('latin')
+          probability = (self%strata(i)%image(variant - 1) + &
+                         min(random_number_at(self%seed, stream_offsets, i, variant), last_offset)) / self%variants
+        case ('sobol')
+          probability = self%points%coordinate(variant - 1, i)
+        case default
+          error stop 'nocdyn_designs: there is no such design'
+        end select
+        x(i) = self%distributions(i)%quantile(probability)
       end do
     end select
   end subroutine values
@@ -132,24 +145,6 @@ contains
     end do
     if (word == 'sobol') design%points = sobol_points(size(factors), seed)
   end function sampled_design
-
-  !> The probability of values below that of a factor in a variant.
-  pure real(wp) function probability(design, variant, i)
-    type(design_t), intent(in) :: design
-    integer, intent(in) :: variant, i   !! `i` is the number of the factor
-
-    select case (design%word)
-    case ('random')
-      probability = random_number_at(design%seed, stream_values, i, variant)
-    case ('latin')
-      probability = (design%strata(i)%image(variant - 1) + &
-                     min(random_number_at(design%seed, stream_offsets, i, variant), last_offset)) / design%variants
-    case ('sobol')
-      probability = design%points%coordinate(variant - 1, i)
-    case default
-      error stop 'nocdyn_designs: there is no such design'
-    end select
-  end function probability
 
   !> A list of values.
   type(design_t) function list_design(values) result(design)

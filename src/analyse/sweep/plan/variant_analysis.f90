@@ -100,8 +100,8 @@ contains
     real(wp), intent(out) :: value   !! in SI
     type(error_t), allocatable, intent(inout) :: error
     integer, allocatable :: quantities(:)
-    real(wp) :: amplitude(size(analysis%response%points))
-    integer :: i, line, peak
+    real(wp) :: amplitude(size(analysis%response%points)), largest
+    integer :: i, k, line, peak
 
     value = 0.0_wp
     allocate (quantities, source=matching_quantities(analysis%response%quantities, one%quantity, recorded_kinds))
@@ -113,7 +113,15 @@ contains
     end if
     if (allocated(error)) return
     do i = 1, size(amplitude)
-      amplitude(i) = largest_amplitude(analysis, i, line, quantities)
+      ! the largest amplitude of some quantities at a speed
+      largest = 0.0_wp
+      associate (at => analysis%response%points(i))
+        do k = 1, size(quantities)
+          if (line > 0) largest = max(largest, abs(at%quantity(line, quantities(k))))
+          if (line == 0) largest = max(largest, at%half_range(quantities(k)))
+        end do
+      end associate
+      amplitude(i) = largest
     end do
     peak = maxloc(amplitude, dim=1)
     associate (speed => analysis%response%points(peak)%state%speed)
@@ -153,23 +161,6 @@ contains
       end associate
     end do
   end function critical_speed
-
-  !> The largest amplitude of some quantities at a speed.
-  pure real(wp) function largest_amplitude(analysis, point, line, quantities) result(largest)
-    type(response_analysis_t), intent(in) :: analysis
-    integer, intent(in) :: point
-    integer, intent(in) :: line            !! 0 stands for the half range of all
-    integer, intent(in) :: quantities(:)
-    integer :: k
-
-    largest = 0.0_wp
-    associate (at => analysis%response%points(point))
-      do k = 1, size(quantities)
-        if (line > 0) largest = max(largest, abs(at%quantity(line, quantities(k))))
-        if (line == 0) largest = max(largest, at%half_range(quantities(k)))
-      end do
-    end associate
-  end function largest_amplitude
 
   !> The largest ratio of some quantities to their limits for continuous operation over the speed.
   pure real(wp) function largest_ratio(analysis, line, quantities) result(ratio)

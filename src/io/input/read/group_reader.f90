@@ -36,11 +36,29 @@ contains
     type(group_t), intent(inout) :: group          !! `rule`, `kind` and `line` are set
     type(diagnostics_t), intent(inout) :: diagnostics
     type(raw_group_t), allocatable :: raw
-    integer :: i, k
+    integer :: i, k, key, unit
     logical :: has_number
+    character(len=:), allocatable :: message
 
     allocate (raw, source=new_raw_group(index, group%rule, group%line, source%is_malformed))
-    call take_assignments(namelist, source, raw, diagnostics)
+    ! takes over the assignments of the file
+    do i = source%first_assignment, source%last_assignment
+      associate (assignment => namelist%assignments(i))
+        call find_key(raw%rule, assignment%key, key, unit)
+        if (key == 0) then
+          call refuse_key(assignment, raw, diagnostics)
+          cycle
+        end if
+        call raw%keys(raw%position(key))%assign(namelist, assignment, unit, message)
+        if (message == '') cycle
+        call find_key_without_equals(namelist, assignment, raw%rule, key, unit)
+        if (key > 0) then
+          message = message // "; is '=' missing after " // name_in_unit(key_rules(key), unit) // '?'
+          raw%keys(raw%position(key))%may_be_missing = .true.
+        end if
+        call diagnostics%add(assignment%line, raw%index, message)
+      end associate
+    end do
     group%name = ''
     do i = 1, size(raw%keys)
       if (key_rules(raw%keys(i)%rule)%value_type /= a_name .or. raw%keys(i)%count_given() /= 1) cycle
@@ -70,34 +88,6 @@ contains
     call check_documents(folder, raw, group, diagnostics)
     call check_group(raw, relations, group, diagnostics)
   end subroutine read_group
-
-  !> Takes over the assignments of the file.
-  subroutine take_assignments(namelist, source, raw, diagnostics)
-    type(namelist_t), intent(in) :: namelist
-    type(namelist_group_t), intent(in) :: source
-    type(raw_group_t), intent(inout) :: raw
-    type(diagnostics_t), intent(inout) :: diagnostics
-    character(len=:), allocatable :: message
-    integer :: i, key, unit
-
-    do i = source%first_assignment, source%last_assignment
-      associate (assignment => namelist%assignments(i))
-        call find_key(raw%rule, assignment%key, key, unit)
-        if (key == 0) then
-          call refuse_key(assignment, raw, diagnostics)
-          cycle
-        end if
-        call raw%keys(raw%position(key))%assign(namelist, assignment, unit, message)
-        if (message == '') cycle
-        call find_key_without_equals(namelist, assignment, raw%rule, key, unit)
-        if (key > 0) then
-          message = message // "; is '=' missing after " // name_in_unit(key_rules(key), unit) // '?'
-          raw%keys(raw%position(key))%may_be_missing = .true.
-        end if
-        call diagnostics%add(assignment%line, raw%index, message)
-      end associate
-    end do
-  end subroutine take_assignments
 
   !> The keys that were probably meant are not reported as missing in addition. After many errors they are not searched.
   subroutine refuse_key(assignment, raw, diagnostics)

@@ -126,6 +126,9 @@ contains
     type(error_t), allocatable, intent(out) :: error   !! there are no groups
     type(namelist_t) :: namelist
     type(override_t), allocatable :: parsed(:)
+    integer :: first(size(group_rules)), g, rule
+    logical :: is_misspelt(size(group_rules))
+    type(string_t), allocatable :: names(:)
 
     if (index(text, achar(0)) > 0) then
       call raise(error, exit_input, input%shown_file() // ': not a text file')
@@ -139,7 +142,32 @@ contains
 
     call read_overrides(input%overrides, parsed, diagnostics)
     call read_groups(namelist, parsed, input, diagnostics)
-    call check_occurrences(input%groups, diagnostics)
+    ! checks how often each group occurs
+    allocate (names, source=group_names())
+    first = 0
+    is_misspelt = .false.
+    do g = 1, size(input%groups)
+      rule = input%groups(g)%rule
+      if (rule == 0) then
+        rule = nearest_word(input%groups(g)%kind, names)
+        if (rule > 0) is_misspelt(rule) = .true.
+      else if (first(rule) == 0) then
+        first(rule) = g
+      else if (is_run_of_case(input%groups(g))) then
+        cycle
+      else if (is_run_of_case(input%groups(first(rule)))) then
+        first(rule) = g
+      else if (is_single(rule)) then
+        call diagnostics%add(input%groups(g)%line, g, 'given twice, first on line ' // to_text(input%groups(first(rule))%line) &
+          // '; allowed: ' // trim(occurrence_texts(group_rules(rule)%occurrence)))
+      end if
+    end do
+    do rule = 1, size(group_rules)
+      if (first(rule) > 0 .or. is_misspelt(rule)) cycle
+      if (all(group_rules(rule)%occurrence /= [exactly_once, at_least_once])) cycle
+      call diagnostics%add(no_line, 0, 'there is no &' // trim(group_rules(rule)%name) // '; needed: ' &
+        // trim(occurrence_texts(group_rules(rule)%occurrence)))
+    end do
     call refuse_unused(input%groups, parsed, diagnostics)
     call check_duplicate_names(input%groups, diagnostics)
     call check_references(input%groups, bodies_are_known(input%groups), diagnostics)
@@ -156,14 +184,21 @@ contains
     type(namelist_group_t) :: source
     type(relations_t) :: relations(size(group_rules))
     integer :: numbers(size(group_rules))   ! of groups so far
-    integer :: g, n
+    integer :: g, n, rule
 
     do g = 1, size(relations)
       relations(g) = relations_of(g)
     end do
     numbers = 0
     folder = input%file(:index(input%file, '/', back=.true.))
-    call find_absent_groups(namelist, overrides, added)
+    ! rows of the single groups that the file does not have, but that have only defaults or overrides
+    allocate (added(0))
+    do rule = 1, size(group_rules)
+      if (.not. is_single(rule)) cycle
+      if (any([(namelist%groups(g)%name == group_rules(rule)%name, g=1, namelist%group_count)])) cycle
+      if (any(key_rules(first_key(rule):last_key(rule))%default == required) .and. all(overrides%group_rule /= rule)) cycle
+      added = [added, rule]
+    end do
     n = namelist%group_count
     allocate (input%groups(n + size(added)))
     do g = 1, n + size(added)
@@ -191,58 +226,6 @@ contains
       end associate
     end do
   end subroutine read_groups
-
-  !> Rows of the single groups that the file does not have, but that have only defaults or overrides.
-  subroutine find_absent_groups(namelist, overrides, rules)
-    type(namelist_t), intent(in) :: namelist
-    type(override_t), intent(in) :: overrides(:)
-    integer, allocatable, intent(out) :: rules(:)   !! rows of `group_rules`
-    integer :: g, rule
-
-    allocate (rules(0))
-    do rule = 1, size(group_rules)
-      if (.not. is_single(rule)) cycle
-      if (any([(namelist%groups(g)%name == group_rules(rule)%name, g=1, namelist%group_count)])) cycle
-      if (any(key_rules(first_key(rule):last_key(rule))%default == required) .and. all(overrides%group_rule /= rule)) cycle
-      rules = [rules, rule]
-    end do
-  end subroutine find_absent_groups
-
-  !> Checks how often each group occurs.
-  subroutine check_occurrences(groups, diagnostics)
-    type(group_t), intent(in) :: groups(:)
-    type(diagnostics_t), intent(inout) :: diagnostics
-    integer :: first(size(group_rules))
-    integer :: g, rule
-    logical :: is_misspelt(size(group_rules))
-    type(string_t), allocatable :: names(:)
-
-    allocate (names, source=group_names())
-    first = 0
-    is_misspelt = .false.
-    do g = 1, size(groups)
-      rule = groups(g)%rule
-      if (rule == 0) then
-        rule = nearest_word(groups(g)%kind, names)
-        if (rule > 0) is_misspelt(rule) = .true.
-      else if (first(rule) == 0) then
-        first(rule) = g
-      else if (is_run_of_case(groups(g))) then
-        cycle
-      else if (is_run_of_case(groups(first(rule)))) then
-        first(rule) = g
-      else if (is_single(rule)) then
-        call diagnostics%add(groups(g)%line, g, 'given twice, first on line ' // to_text(groups(first(rule))%line) &
-          // '; allowed: ' // trim(occurrence_texts(group_rules(rule)%occurrence)))
-      end if
-    end do
-    do rule = 1, size(group_rules)
-      if (first(rule) > 0 .or. is_misspelt(rule)) cycle
-      if (all(group_rules(rule)%occurrence /= [exactly_once, at_least_once])) cycle
-      call diagnostics%add(no_line, 0, 'there is no &' // trim(group_rules(rule)%name) // '; needed: ' &
-        // trim(occurrence_texts(group_rules(rule)%occurrence)))
-    end do
-  end subroutine check_occurrences
 
   !> Refuses overrides of elements that do not exist.
   subroutine refuse_unused(groups, overrides, diagnostics)

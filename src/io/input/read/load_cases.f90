@@ -42,7 +42,7 @@ contains
     logical, allocatable, intent(out) :: machine_lacks(:)   !! [groups]
     type(diagnostics_t), intent(inout) :: diagnostics
     type(members_t) :: members
-    integer :: c, g
+    integer :: c, g, i
 
     allocate (members%groups, source=input%groups_named('load_case'))
     allocate (machine_lacks(size(input%groups)), source=.false.)
@@ -53,7 +53,17 @@ contains
     allocate (members%has(size(members%groups), size(input%groups)), source=.false.)
     allocate (members%lacks, source=members%has)
     do c = 1, size(members%groups)
-      call check_folder(input, members%groups(c), diagnostics)
+      ! the name of a load case is that of a folder
+      associate (name => input%groups(members%groups(c))%name)   ! without commas
+        if (any([(index(lower_case(name) // ',', trim(file_endings(i)) // ',') > 0, i=1, size(file_endings))])) then
+          call input%report(members%groups(c), 'name', 'name = ' // quoted(shortened(name)) // &
+                            ' is that of a file of results; allowed: ' // &
+                            'a name without such an ending, for it is that of a folder', diagnostics)
+        else if (index(name, '/') > 0 .or. index(name, '.') == 1) then
+          call input%report(members%groups(c), 'name', 'name = ' // quoted(shortened(name)) // &
+                            ' is no name of a folder; allowed: a name without / and without a dot at its beginning', diagnostics)
+        end if
+      end associate
       call find_members(input, members%groups(c), 'with', members%has(c, :), diagnostics)
       call find_members(input, members%groups(c), 'without', members%lacks(c, :), diagnostics)
       do g = 1, size(input%groups)
@@ -153,24 +163,6 @@ contains
         'load_case = ' // quoted(shortened(names(c)%text)) // ', or one without load_case, for all', diagnostics)
     end do
   end subroutine find_runs
-
-  !> The name of a load case is that of a folder.
-  subroutine check_folder(input, group, diagnostics)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: group   !! the &load_case
-    type(diagnostics_t), intent(inout) :: diagnostics
-    integer :: i
-
-    associate (name => input%groups(group)%name)   ! without commas
-      if (any([(index(lower_case(name) // ',', trim(file_endings(i)) // ',') > 0, i=1, size(file_endings))])) then
-        call input%report(group, 'name', 'name = ' // quoted(shortened(name)) // ' is that of a file of results; allowed: ' // &
-                          'a name without such an ending, for it is that of a folder', diagnostics)
-      else if (index(name, '/') > 0 .or. index(name, '.') == 1) then
-        call input%report(group, 'name', 'name = ' // quoted(shortened(name)) // &
-                          ' is no name of a folder; allowed: a name without / and without a dot at its beginning', diagnostics)
-      end if
-    end associate
-  end subroutine check_folder
 
   !> Refuses values of a load case that are not those of its machine, its run or its output.
   subroutine check_values(input, group, diagnostics)

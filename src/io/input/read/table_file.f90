@@ -84,14 +84,40 @@ contains
     type(string_t), allocatable, intent(out) :: messages(:)   !! sentences that begin with file and line; empty: the file is valid
     type(table_reader_t) :: reading
     real(wp), allocatable :: lines(:, :)
-    integer :: rows, start
+    integer :: columns, comma, first, i, last, rows, start
+    character :: separator
 
     allocate (reading%messages(0))
     reading%file = shown_path(file)
     reading%is_list = .true.
     reading%separator = separator_of(text)
     start = first_position(text)
-    call read_names(text, start, reading, names)
+    ! reads the names of the columns of a list, with or without quotes; none if all lines are comments
+    last = start - 2
+    first = start
+    do while (start <= len(text) .and. last < first)
+      first = start
+      last = line_last(text, first)
+      start = last + 2
+      reading%line = reading%line + 1
+      if (content_end(text, first, last) < first) last = first - 1
+    end do
+    columns = merge(1, 0, last >= first)
+    last = first - 1 + len_trim(text(first:last))
+    separator = reading%separator
+    if (separator == ',' .and. index(text(first:last), ',') == 0 .and. index(text(first:last), tab) > 0) separator = tab
+    if (columns > 0) last = last - merge(1, 0, text(last:last) == separator)   ! nothing after the last one is no column
+    do i = first, last
+      if (text(i:i) == separator) columns = columns + 1
+    end do
+    allocate (names(columns))
+    do i = 1, size(names)
+      comma = first + index(text(first:last), separator) - 1
+      if (comma < first) comma = last + 1
+      names(i)%text = text(first - 1 + verify(text(first:comma - 1) // '.', blanks // quotes): &
+                           first - 1 + verify(text(first:comma - 1), blanks // quotes // carriage_return, back=.true.))
+      first = comma + 1
+    end do
     line = reading%line
     call check_names(reading, names)
     reading%columns = size(names)
@@ -174,42 +200,6 @@ contains
     line_last = start - 2 + index(text(start:), line_end)
     if (line_last < start - 1) line_last = len(text)
   end function line_last
-
-  !> Reads the names of the columns of a list, with or without quotes; none if all lines are comments.
-  subroutine read_names(text, start, reading, names)
-    character(len=*), intent(in) :: text
-    integer, intent(inout) :: start   !! position of the first line; on return, of the line after the names
-    type(table_reader_t), intent(inout) :: reading
-    type(string_t), allocatable, intent(out) :: names(:)
-    character :: separator
-    integer :: columns, comma, first, i, last
-
-    last = start - 2
-    first = start
-    do while (start <= len(text) .and. last < first)
-      first = start
-      last = line_last(text, first)
-      start = last + 2
-      reading%line = reading%line + 1
-      if (content_end(text, first, last) < first) last = first - 1
-    end do
-    columns = merge(1, 0, last >= first)
-    last = first - 1 + len_trim(text(first:last))
-    separator = reading%separator
-    if (separator == ',' .and. index(text(first:last), ',') == 0 .and. index(text(first:last), tab) > 0) separator = tab
-    if (columns > 0) last = last - merge(1, 0, text(last:last) == separator)   ! nothing after the last one is no column
-    do i = first, last
-      if (text(i:i) == separator) columns = columns + 1
-    end do
-    allocate (names(columns))
-    do i = 1, size(names)
-      comma = first + index(text(first:last), separator) - 1
-      if (comma < first) comma = last + 1
-      names(i)%text = text(first - 1 + verify(text(first:comma - 1) // '.', blanks // quotes): &
-                           first - 1 + verify(text(first:comma - 1), blanks // quotes // carriage_return, back=.true.))
-      first = comma + 1
-    end do
-  end subroutine read_names
 
   !> Refuses names of a file with another format; then there are none.
   subroutine check_names(reading, names)

@@ -27,6 +27,7 @@ contains
     type(key_path_t), intent(out) :: path
     integer, intent(out) :: position   !! in the list of the key
     character(len=:), allocatable, intent(out) :: message   !! what is wrong and allowed, '' if nothing is wrong
+    integer :: count
 
     group = 0
     position = 1
@@ -41,7 +42,27 @@ contains
     call find_group(input, path, group, message)
     if (message /= '') call suggest_path(input, text, .true., message)
     if (message == '') call check_law(input%groups(group), key_rules(path%key_rule), message)
-    if (message == '') call find_position(input%groups(group), text, path, position, message)
+    if (message == '') then
+      ! Index of the value in the list of the key. Only a list has a subscript; a list of one value needs none.
+      position = path%target%first
+      count = input%groups(group)%values(path%key_rule - first_key(path%group_rule) + 1)%count()
+      associate (rule => key_rules(path%key_rule))
+        if (rule%count == 1) then
+          if (.not. path%target%is_whole) message = path%target%key // ' is a single value and takes no subscript'
+        else if (count == 0) then
+          message = path%target%key // ' has no values in the input'
+        else if (path%target%is_whole .and. count == 1) then
+          position = 1
+        else if (path%target%is_whole) then
+          message = path%target%key // ' is a list; allowed: one of its values, ' // value_paths(text, count)
+        else if (path%target%last /= position) then
+          message = 'several values of ' // path%target%key // '; allowed: one, ' // &
+                    value_paths(text(:index(text, '(', back=.true.) - 1), count)
+        else if (position < 1 .or. position > count) then
+          message = 'the subscript of ' // path%target%key // ' is out of range; allowed: 1 to ' // to_text(count)
+        end if
+      end associate
+    end if
   end subroutine search_target
 
   !> Replaces the suggestion of a message by a path of the input, if only the group of the text is missing or wrong.
@@ -164,35 +185,6 @@ contains
     if (.not. has_word(rule%only_if, law)) message = trim(rule%name) // ' belongs to ' // selector_name(group%rule) // ' = ' // &
       only_if_text(rule) // '; here ' // selector_name(group%rule) // ' = ' // quoted(law)
   end subroutine check_law
-
-  !> Index of the value in the list of the key. Only a list has a subscript; a list of one value needs none.
-  subroutine find_position(group, text, path, position, message)
-    type(group_t), intent(in) :: group
-    character(len=*), intent(in) :: text   !! the path
-    type(key_path_t), intent(in) :: path
-    integer, intent(out) :: position   !! if the message is empty
-    character(len=:), allocatable, intent(inout) :: message
-    integer :: count
-
-    position = path%target%first
-    count = group%values(path%key_rule - first_key(path%group_rule) + 1)%count()
-    associate (rule => key_rules(path%key_rule))
-      if (rule%count == 1) then
-        if (.not. path%target%is_whole) message = path%target%key // ' is a single value and takes no subscript'
-      else if (count == 0) then
-        message = path%target%key // ' has no values in the input'
-      else if (path%target%is_whole .and. count == 1) then
-        position = 1
-      else if (path%target%is_whole) then
-        message = path%target%key // ' is a list; allowed: one of its values, ' // value_paths(text, count)
-      else if (path%target%last /= position) then
-        message = 'several values of ' // path%target%key // '; allowed: one, ' // &
-                  value_paths(text(:index(text, '(', back=.true.) - 1), count)
-      else if (position < 1 .or. position > count) then
-        message = 'the subscript of ' // path%target%key // ' is out of range; allowed: 1 to ' // to_text(count)
-      end if
-    end associate
-  end subroutine find_position
 
   !> "gear.reducer.radii(1) or gear.reducer.radii(2)", "... to ...".
   pure function value_paths(path, count) result(text)

@@ -77,11 +77,21 @@ contains
     type(phase_t) :: phase
     real(wp) :: excess, lowest, highest, ratio, x
     logical :: is_possible, starts_above
+    real(wp) :: losses   ! without those of the rotor [W]
 
     limit = 1.0_wp - rating%slip()
     status = rating_too_efficient
     if (.not. rating%efficiency < limit) return
-    phase = rated_phase(rating)
+    ! what does not depend on the reactances
+    phase%slip = rating%slip()
+    phase%power = rating%power / (1.0_wp - phase%slip) / 3.0_wp
+    phase%voltage = rating%voltage / sqrt(3.0_wp)
+    losses = rating%power / rating%efficiency - 3.0_wp * phase%power
+    associate (share => rating%stator_share, factor => rating%power_factor)
+      phase%current = rating%current() * cmplx(factor, -sqrt(1.0_wp - factor**2), wp) &
+                      - (1.0_wp - share) * losses / (3.0_wp * phase%voltage)
+      phase%resistance = share * losses / (3.0_wp * abs(phase%current)**2)
+    end associate
     x = least * phase%voltage / abs(phase%current)
     call set_leakage(rating, phase, x, circuit, excess, is_possible)
     status = rating_impossible
@@ -132,22 +142,6 @@ contains
       end if
     end do
   end subroutine bisect
-
-  !> What does not depend on the reactances.
-  pure type(phase_t) function rated_phase(rating) result(phase)
-    type(rating_t), intent(in) :: rating
-    real(wp) :: losses   ! without those of the rotor [W]
-
-    phase%slip = rating%slip()
-    phase%power = rating%power / (1.0_wp - phase%slip) / 3.0_wp
-    phase%voltage = rating%voltage / sqrt(3.0_wp)
-    losses = rating%power / rating%efficiency - 3.0_wp * phase%power
-    associate (share => rating%stator_share, factor => rating%power_factor)
-      phase%current = rating%current() * cmplx(factor, -sqrt(1.0_wp - factor**2), wp) &
-                      - (1.0_wp - share) * losses / (3.0_wp * phase%voltage)
-      phase%resistance = share * losses / (3.0_wp * abs(phase%current)**2)
-    end associate
-  end function rated_phase
 
   !> The circuit with a leakage reactance, and by how much its breakdown ratio is too large.
   pure subroutine set_leakage(rating, phase, x, circuit, excess, is_possible)
