@@ -40,7 +40,7 @@ module nocdyn_machine_parts
 
 contains
 
-  !> Builds the machine of a checked input, at the start that the input gives. Errors are those of `assemble_machine`.
+  !> Builds the machine of a checked input, at the start that the input gives. Errors are the ones of `assemble_machine`.
   subroutine build_machine(input, view, machine, error, lanes)
     type(input_t), target, intent(in) :: input
     type(steady_view_t), intent(in) :: view
@@ -179,7 +179,7 @@ contains
   end subroutine set_bodies
 
   !> Analyses the constraints, chooses the coordinates and makes the start speeds consistent. A message begins with file, line and
-  !> group: those of a constraint row, or of `independent`.
+  !> group: the ones of a constraint row, or of `independent`.
   subroutine analyse_machine_constraints(input, view, body_index, machine, error)
     type(input_t), intent(in) :: input
     type(steady_view_t), intent(in) :: view

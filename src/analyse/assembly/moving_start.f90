@@ -1,7 +1,7 @@
 !> The start of rows that move (cardan joints, cranks, relations, drives): their rank there, and start speeds that fulfil them.
 !>
 !> Speeds that are not given follow from the others. Speeds that contradict a row are refused, or replaced by the nearest that
-!> satisfy all rows, as after an impact; those of `nocdyn_start_speeds` come before.
+!> satisfy all rows, as after an impact; the ones of `nocdyn_start_speeds` come before.
 module nocdyn_moving_start
   use nocdyn_bank, only: role_drive, role_names
   use nocdyn_errors, only: error_t, exit_input, raise
@@ -62,7 +62,7 @@ contains
     real(wp) :: row(machine%bodies), twist(machine%lanes, machine%elements%count)
     integer :: i
 
-    call machine%choose_branches(spread(t, 1, machine%lanes))   ! those of tables over the time
+    call machine%choose_branches(spread(t, 1, machine%lanes))   ! the ones of tables over the time
     twist = machine%start_twist()
     associate (motions => start%motions, rows => machine%elements%rows)
       call motions%set_start(machine%banks, twist(1, :))

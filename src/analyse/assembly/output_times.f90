@@ -115,7 +115,7 @@ contains
   !> The requested times: a row at t_start, one every `interval`, and one at t_end; or `points` rows evenly spaced.
   pure function output_times(input, rows) result(times)
     type(input_t), intent(in) :: input         !! that `check_output_times` accepts
-    integer, intent(in) :: rows                !! their number; an interval of the input has its own, that of `row_count`
+    integer, intent(in) :: rows                !! their number; an interval of the input has its own, the one of `row_count`
     real(wp), allocatable :: times(:)
     type(group_t) :: output, run
     integer :: i

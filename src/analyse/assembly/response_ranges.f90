@@ -25,7 +25,7 @@ contains
     end associate
   end subroutine check_response_range
 
-  !> Two speeds are the lowest and the highest one, in the same direction. Those of a response may be one.
+  !> Two speeds are the lowest and the highest one, in the same direction. The ones of a response may be one.
   subroutine check_range(input, group, key, range, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: group

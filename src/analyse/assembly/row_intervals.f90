@@ -71,8 +71,8 @@ contains
     end associate
   end subroutine choose_row_count
 
-  !> The fastest oscillation of an excitation at any of the speeds, with an amplitude that counts among those of its element, or
-  !> of the transients of a motor.
+  !> The fastest oscillation of an excitation at any of the speeds, with an amplitude that counts among the ones of its element,
+  !> or of the transients of a motor.
   type(oscillation_t) function fastest_oscillation(machine, lowest, highest) result(fastest)
     type(machine_t), intent(in) :: machine
     real(wp), intent(in) :: lowest(:), highest(:)   !! [rad/s], [bodies]

@@ -63,7 +63,7 @@ contains
     type(input_t), intent(in) :: input
     class(formulation_t), intent(in) :: formulation
     type(integration_settings_t), intent(out) :: settings
-    type(string_t), allocatable, intent(out) :: notes(:)   !! for the user; empty if the method is that of the input
+    type(string_t), allocatable, intent(out) :: notes(:)   !! for the user; empty if the method is the one of the input
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: obstacle, place
     type(entries_t) :: entries

@@ -25,7 +25,7 @@ module nocdyn_start_speeds
 
 contains
 
-  !> Completes and checks the start speeds of a machine. If they may be projected, projects those of the groups with violated
+  !> Completes and checks the start speeds of a machine. If they may be projected, projects the ones of the groups with violated
   !> rows; speeds that are not given count as 0 then.
   subroutine fit_start_speeds(machine, is_given, may_project, unit, offending_row, error)
     type(machine_t), intent(inout) :: machine

@@ -1,4 +1,4 @@
-!> Every matrix and vector of the paper for a machine at its start, labelled with equation numbers: those of
+!> Every matrix and vector of the paper for a machine at its start, labelled with equation numbers: the ones of
 !> `nocdyn_paper_matrices`, and alpha, eqs. (41), (42), and beta, eqs. (45), (46), with phi' = omega, eqs. (32), (33).
 module nocdyn_matrix_report
   use nocdyn_bank, only: role_coupling, role_excitation, role_motor, role_names, role_phase
@@ -51,7 +51,7 @@ contains
     call equations%report%append_line('Coordinates: ' // joined(selected(machine%names, machine%coordinates%body), ', '))
     call equations%report%append_line('At the start: t = ' // rounded_text(t_start, digits) // ' s')
     if (.not. all([(equations%machine%banks(i)%bank%has_paper_law, i=1, size(equations%machine%banks))])) then
-      ! lists the elements whose laws are not those of the paper, and says what the matrices contain for them
+      ! lists the elements whose laws are not the ones of the paper, and says what the matrices contain for them
       do role = 1, size(role_names)
         call collect_other_laws(equations%machine, role, names)
         if (size(names) == 0) cycle

@@ -16,7 +16,7 @@ module nocdyn_critical_speeds
 
   public :: find_crossings, keep_new, refine_peaks
 
-  real(wp), parameter :: most_refined = 4.0e6_wp   ! numbers at the speeds between those of the grid: 0.06 GB
+  real(wp), parameter :: most_refined = 4.0e6_wp   ! numbers at the speeds between the ones of the grid: 0.06 GB
   real(wp), parameter, public :: undamped = 1.0e-9_wp   !! a mode with a smaller damping ratio has no finite response
 
   !> Where a line crosses a mode.

@@ -39,7 +39,7 @@ module nocdyn_excitation_lines
 
 contains
 
-  !> What a table calls a line: its order, 'fixed', or 'slip' if its frequency is that of the slip.
+  !> What a table calls a line: its order, 'fixed', or 'slip' if its frequency is the one of the slip.
   function word(self) result(text)
     class(line_t), intent(in) :: self
     character(len=:), allocatable :: text

@@ -234,7 +234,7 @@ contains
     end associate
   end subroutine solve_point
 
-  !> One quantity of all lines, and its synthesis. If it has several points, they are those of the point with the largest half
+  !> One quantity of all lines, and its synthesis. If it has several points, they are the ones of the point with the largest half
   !> range.
   pure subroutine find_quantity(self, q, point, work)
     type(forced_response_t), intent(in) :: self

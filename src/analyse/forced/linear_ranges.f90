@@ -179,7 +179,7 @@ contains
     machine%elements%speed(1, :) = point%state%rate
   end subroutine set_mean
 
-  !> The slopes of the laws at the mean, and those of the first harmonics over the oscillations.
+  !> The slopes of the laws at the mean, and the ones of the first harmonics over the oscillations.
   subroutine find_equivalent(machine, t, element, is_elastic, amplitude, equivalent, tangent)
     type(machine_t), intent(inout) :: machine   !! at its mean
     real(wp), contiguous, intent(in) :: t(:)

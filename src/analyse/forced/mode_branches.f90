@@ -44,7 +44,7 @@ module nocdyn_mode_branches
 
   !> What is found so far.
   type :: branches_t
-    type(held_speeds_t), allocatable :: held              ! for speeds between those of the grid
+    type(held_speeds_t), allocatable :: held              ! for speeds between the ones of the grid
     integer :: left = most_speeds_between                 ! speeds that may still be computed
     integer :: branches = 0
     complex(wp), allocatable :: value(:, :)               ! 0 where a branch is none, [branches, points]
@@ -105,7 +105,7 @@ contains
     pairs%speed = state%speed
   end subroutine find_pairs_at
 
-  !> Connects the modes of two points, and finds those of all points between.
+  !> Connects the modes of two points, and finds the ones of all points between.
   recursive subroutine connect(response, tracks, a, b, error)
     type(forced_response_t), intent(in) :: response
     type(branches_t), intent(inout) :: tracks

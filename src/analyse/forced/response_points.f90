@@ -8,8 +8,8 @@ module nocdyn_response_points
 
   public :: keep_points, merge_points
 
-  !> The response at one speed. Amplitudes are those of amplitude exp(i Omega t), where the angle of the reference body is zero at
-  !> t = 0 and its orders are sines of its angle.
+  !> The response at one speed. Amplitudes are the ones of amplitude exp(i Omega t), where the angle of the reference body is zero
+  !> at t = 0 and its orders are sines of its angle.
   type, public :: response_point_t
     logical :: is_of_grid = .true.                 !! whether it is one of the speeds that were asked for
     type(held_state_t), allocatable :: state

@@ -52,7 +52,7 @@ contains
   !> Marks unstable points between those with known modes.
   subroutine mark_between(response, is_unstable)
     type(forced_response_t), intent(in) :: response
-    logical, intent(out) :: is_unstable(:)   !! [points]; false for those of the grid
+    logical, intent(out) :: is_unstable(:)   !! [points]; false for the ones of the grid
     type(error_t), allocatable :: error
     type(mode_pairs_t) :: pairs
     integer :: i

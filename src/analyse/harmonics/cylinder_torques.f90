@@ -106,7 +106,7 @@ contains
     torque = sampled_gas_torque(slider_crank(group), cycle_of(group), angle, pressure)
   end function sampled_torque
 
-  !> The points of one cycle, with the pressure above that of the crankcase.
+  !> The points of one cycle, with the pressure above the one of the crankcase.
   pure subroutine take_pressures(group, pressures, angle, pressure)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: pressures   !! key of the pressures

@@ -84,7 +84,8 @@ contains
     if (is_resynchronisation) is_resynchronisation = group%text('fault') == 'resynchronisation'
   end function is_resynchronisation
 
-  !> The terms of a checked group. The torque of a fault brakes a rotor that turns forwards; that of given terms is as they are.
+  !> The terms of a checked group. The torque of a fault brakes a rotor that turns forwards; the one of given terms is as they
+  !> are.
   subroutine find_fault_terms(group, terms, has_failed)
     type(group_t), intent(in) :: group
     type(fault_terms_t), intent(out) :: terms

@@ -146,7 +146,7 @@ contains
     end if
   end subroutine check_loads
 
-  !> The crank angles are those of one cycle.
+  !> The crank angles are the ones of one cycle.
   subroutine check_crank_angles(group, key, text)
     type(group_t), intent(in) :: group
     character(len=:), allocatable, intent(out) :: key, text   !! which key is wrong, and what about it, '' if nothing

@@ -1,7 +1,7 @@
 !> Torques of short circuits and faulty synchronisations by the fluxes of the machine, as sums of decaying sines.
 !>
 !> The machine has the same circuits in both axes of its rotor. In units of the rated ones, its current is
-!> i = Y(p) (psi - psi_0), with the flux linkage psi of the stator, psi_0 = 1 that of no load, seen from the rotor, and the
+!> i = Y(p) (psi - psi_0), with the flux linkage psi of the stator, psi_0 = 1 the one of no load, seen from the rotor, and the
 !> operational admittance
 !>
 !>   Y(p) = 1 / x'' - sum of s_k / (1 + p T_k),   s = 1 / x'' - 1 / x', 1 / x' - 1 / x,   T = T'', T'
@@ -72,7 +72,7 @@ contains
       do k = 1, size(machine%share)
         z = rotor + 2 * (k - 1)
         model%matrix(z + 1, :) = machine%rate(k) * model%flux(1, :)
-        model%matrix(z + 1, driving + 1) = 0.0_wp   ! the change of the flux, without that of no load
+        model%matrix(z + 1, driving + 1) = 0.0_wp   ! the change of the flux, without the one of no load
         model%matrix(z + 2, stator + 2) = machine%rate(k)
         model%matrix(z + 2, driving + 2) = -machine%rate(k)
         model%matrix(z + 1, z + 1) = model%matrix(z + 1, z + 1) - machine%rate(k)
@@ -97,7 +97,7 @@ contains
     integer :: a, k, z
 
     model = empty_model(size(machine%share))
-    model%start(driving + 1) = 1.0_wp   ! it stays: the flux of no load, to which those of the network are in proportion
+    model%start(driving + 1) = 1.0_wp   ! it stays: the flux of no load, to which the ones of the network are in proportion
     model%start(stator + 1) = 1.0_wp
     do a = 1, 2
       model%flux(a, stator + a) = 1.0_wp

@@ -10,8 +10,8 @@ module nocdyn_pressure_notes
 
 contains
 
-  !> Adds a note on each engine and crank whose lowest pressure is about that of the atmosphere while the crankcase has 0: the
-  !> piston would have a vacuum below it. Absolute pressures need that of the crankcase, and pressures above the atmosphere are
+  !> Adds a note on each engine and crank whose lowest pressure is about the one of the atmosphere while the crankcase has 0: the
+  !> piston would have a vacuum below it. Absolute pressures need the one of the crankcase, and pressures above the atmosphere are
   !> not so high throughout.
   subroutine note_pressures(input, notes)
     type(input_t), intent(in) :: input

@@ -9,7 +9,7 @@ module nocdyn_shared_loads
 
 contains
 
-  !> The load of an excitation with `share_of_load`: the one on its body, or that of its key `load`.
+  !> The load of an excitation with `share_of_load`: the one on its body, or the one of its key `load`.
   subroutine find_shared_load(input, excitation, load, text)
     type(input_t), intent(in) :: input
     integer, intent(in) :: excitation   !! index of the group

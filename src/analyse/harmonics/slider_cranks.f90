@@ -63,7 +63,7 @@ contains
     type(slider_crank_t), intent(in) :: crank
     real(wp), intent(in) :: cycle                     !! 2 pi or 4 pi [rad]
     real(wp), intent(in) :: theta(:)                  !! points of less than a cycle, ascending; 0: top dead centre [rad]
-    real(wp), intent(in) :: pressure(:)               !! at the points, above that of the crankcase [Pa]
+    real(wp), intent(in) :: pressure(:)               !! at the points, above the one of the crankcase [Pa]
     real(wp), intent(out) :: mean                     !! [N m]
     real(wp), intent(out) :: sine(:), cosine(:)       !! [N m], [harmonics]
 

@@ -72,7 +72,7 @@ contains
     end do
   end function fatigue_text
 
-  !> Writes cycles.csv: the classes of cycles of every item, those of a shaft where the damage is largest.
+  !> Writes cycles.csv: the classes of cycles of every item, the ones of a shaft where the damage is largest.
   subroutine put_cycles_csv(fatigue, file)
     type(run_fatigue_t), intent(in) :: fatigue
     type(output_file_t), intent(inout) :: file

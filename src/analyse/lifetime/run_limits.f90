@@ -1,6 +1,6 @@
 !> The limits of moments, by &limit, in a run: the largest magnitudes of the columns against `moment`.
 !>
-!> Limits of half ranges and stresses are those of a steady oscillation; `nocdyn response` compares with them.
+!> Limits of half ranges and stresses are the ones of a steady oscillation; `nocdyn response` compares with them.
 module nocdyn_run_limits
   use nocdyn_input, only: group_t, input_t
   use nocdyn_json, only: json_t

@@ -255,7 +255,8 @@ contains
     end do
     do e = 1, size(stiffness)
       if (self%unknown(e) == 0) cycle
-      ! A power of two above the entries beside a moment: the pivots are those of rigid rows, whose sums around a ring are exact
+      ! A power of two above the entries beside a moment: the pivots are the ones of rigid rows, whose sums around a ring are
+      ! exact
       moment_scale = tiny(1.0_wp)
       do k = self%incidence%first(e), self%incidence%first(e + 1) - 1
         associate (diagonal => (3 * self%width + 1) * (self%position(self%incidence%coordinate(k)) - 1) + 2 * self%width + 1)

@@ -5,8 +5,8 @@
 !> frequencies. Their error is a rounding of the highest frequency; with the eigenvalues of K and M the squares would have such an
 !> error. The symmetric eigenproblem is solved only if a stiffness is negative.
 !>
-!> Joints that hold are rows u' = 0: the modes are those of the motions that leave these joints at rest. The moments of teeth with
-!> losses that turn follow from those of all elements; with them the first-order matrix is made of the Jacobian of a run.
+!> Joints that hold are rows u' = 0: the modes are the ones of the motions that leave these joints at rest. The moments of teeth
+!> with losses that turn follow from the ones of all elements; with them the first-order matrix is made of the Jacobian of a run.
 !>
 !> The first-order states are p, the rates of the modal coordinates; e = natural frequency * modal coordinate, for the modes that
 !> are not rigid; and the internal states. So |p|^2 and |e|^2 are twice the energies, and rigid rotation is not a state.

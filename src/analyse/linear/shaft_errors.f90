@@ -1,8 +1,8 @@
-!> How far the modes of a machine are from those of its continuous shafts, whose nodes resolve the lower ones only.
+!> How far the modes of a machine are from the ones of its continuous shafts, whose nodes resolve the lower ones only.
 !>
 !> In each spectral element the continuous shaft that begins with the angle and moment of the mode ends with others. To first
 !> order the square of the frequency is wrong by the work of these differences, angle times moment, over the modal mass (Green's
-!> identity for the mode and that of the continuous shaft).
+!> identity for the mode and the one of the continuous shaft).
 module nocdyn_shaft_errors
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t

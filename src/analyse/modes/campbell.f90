@@ -58,12 +58,12 @@ contains
     self%response%has_oscillations = .false.
     if (.not. allocated(error)) call choose_lines(self, error)
     if (.not. allocated(error)) call self%response%add_points(self%settings%speeds, .true., error, failed_speed)
+    call place_error(input, self%settings, failed_speed, error)
     if (.not. allocated(error)) call refuse_backward_speeds(input, self%settings, machine, self%response, error)
-    if (.not. allocated(error)) call follow_modes(self, error, failed_speed)
-    if (allocated(error)) then
-      call place_error(input, self%settings, failed_speed, error)
-      return
-    end if
+    if (allocated(error)) return
+    call follow_modes(self, error, failed_speed)
+    call place_error(input, self%settings, failed_speed, error)
+    if (allocated(error)) return
     call note_simplifications(machine, self%notes)
     if (self%response%matrix%coordinates > self%modes%modes .and. self%modes%modes >= most_modes) then
       call append(self%notes, 'the highest modes are left out: there are ' // to_text(self%modes%modes) // ', for ' // &

@@ -45,7 +45,7 @@ contains
     class(formulation_t), intent(in) :: formulation
     type(equilibrium_t), intent(in) :: equilibria(:)
     type(string_t), intent(in) :: notes(:)
-    integer, intent(in) :: wanted(:)   !! units of the columns: indices of `units`; others are those of SI
+    integer, intent(in) :: wanted(:)   !! units of the columns: indices of `units`; others are the ones of SI
     type(equilibrium_report_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error   !! a number of a steady state is not finite
     type(trajectory_table_t) :: table

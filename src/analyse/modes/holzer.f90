@@ -28,7 +28,7 @@ module nocdyn_holzer
     integer :: number = 0               !! of the element or of the constraint row
     real(wp) :: stiffness = 0.0_wp      !! of a coupling [N m/rad]
     real(wp) :: to_ground = 0.0_wp      !! stiffness of couplings between the body and the ground [N m/rad]
-    real(wp) :: ratio = 1.0_wp          !! angle of `next` by that of the body, of a gear or joint
+    real(wp) :: ratio = 1.0_wp          !! angle of `next` by the one of the body, of a gear or joint
   contains
     procedure :: name => edge_name
   end type holzer_line_t

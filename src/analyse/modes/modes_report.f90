@@ -150,7 +150,7 @@ contains
   function modes_text(file, self, wanted) result(text)
     character(len=*), intent(in) :: file
     type(modes_report_t), intent(in) :: self
-    integer, intent(in) :: wanted(:)   !! indices of `units`: with that of rpm, frequencies are printed in it too
+    integer, intent(in) :: wanted(:)   !! indices of `units`: with the one of rpm, frequencies are printed in it too
     character(len=:), allocatable :: line, text
     type(text_buffer_t) :: report
     integer :: b, first, i, last, width

@@ -60,16 +60,21 @@ contains
     associate (speeds => self%settings%speeds)
       failed_speed = speeds(1)
       call new_forced_response(machine, self%settings%body, speeds, self%response, error)
+      call place_error(input, self%settings, failed_speed, error)
       if (.not. allocated(error)) call choose_lines(input, self%settings, self%response%lines, error)
       if (.not. allocated(error)) call read_limits(input, self%response%quantities, self%limits, error)
       if (.not. allocated(error)) then
         call prepare_synthesis(self%response)
         call self%response%add_points(speeds, .true., error, failed_speed)
+        call place_error(input, self%settings, failed_speed, error)
       end if
     end associate
     if (.not. allocated(error)) call refuse_backward_speeds(input, self%settings, machine, self%response, error)
-    if (.not. allocated(error)) call find_peaks(self, error, failed_speed)
-    if (.not. allocated(error)) then
+    if (allocated(error)) return
+    call find_peaks(self, error, failed_speed)
+    if (allocated(error)) then
+      call place_error(input, self%settings, failed_speed, error)
+    else
       call note_speeds(self%response, self%unstable, 'they are left out', self%notes)
       call note_steady_states(self%settings, self%response, self%notes)
       if (self%modes%modes > 0) call note_shaft_modes(machine, self%modes, self%crossings, .false., self%notes)
@@ -78,7 +83,6 @@ contains
       call note_overloads(self%response, self%notes)
       call note_rated_speeds(input, self%settings, self%notes)
     end if
-    if (allocated(error)) call place_error(input, self%settings, failed_speed, error)
     call system_clock(ended)
     self%wall_time = real(ended - began, wp) / real(rate, wp)
   end subroutine analyse_response
@@ -93,7 +97,7 @@ contains
 
     call system_clock(began, rate)
     call find_response_fatigue(input, self%response, self%fatigue, error, failed_speed)
-    if (allocated(error)) call place_error(input, self%settings, failed_speed, error)
+    call place_error(input, self%settings, failed_speed, error)
     call system_clock(ended)
     self%wall_time = self%wall_time + real(ended - began, wp) / real(rate, wp)
   end subroutine add_fatigue

@@ -1,4 +1,4 @@
-!> The damage that the oscillations of a forced response do per hour, by &fatigue, and that of a profile of speeds and hours.
+!> The damage that the oscillations of a forced response do per hour, by &fatigue, and the one of a profile of speeds and hours.
 !>
 !> At each speed the cycles of the synthesis of all lines with the mean are counted. Lines with whole ratios repeat after a
 !> period, which has whole cycles only. Others are counted over many periods of the slowest one.
@@ -25,7 +25,7 @@ module nocdyn_response_fatigue
   !> The damage by one group &fatigue.
   type, public :: response_fatigue_t
     character(len=:), allocatable :: name, element
-    character(len=:), allocatable :: quantity          !! label and unit; a shaft's moment is that of its first end
+    character(len=:), allocatable :: quantity          !! label and unit; a shaft's moment is the one of its first end
     real(wp), allocatable :: rate(:)                   !! damage per hour [1/h], [points]
     logical :: exceeds_strength = .false.              !! whether a mean leaves no strength at some speed
     integer :: largest = 1                             !! point with the largest rate

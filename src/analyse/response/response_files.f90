@@ -385,7 +385,7 @@ contains
     call json%close_list()
   end subroutine put_barred
 
-  !> The damage per hour and that of profiles, of all groups &fatigue; nothing without them.
+  !> The damage per hour and the one of profiles, of all groups &fatigue; nothing without them.
   subroutine put_fatigue(json, analysis)
     type(json_t), intent(inout) :: json
     type(response_analysis_t), intent(in) :: analysis

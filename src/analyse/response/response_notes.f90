@@ -324,7 +324,7 @@ contains
     end select
   end function has_gap
 
-  !> Rated speeds of the rule iacs_m68 that are far from those of the body of &response, to which they belong.
+  !> Rated speeds of the rule iacs_m68 that are far from the ones of the body of &response, to which they belong.
   subroutine note_rated_speeds(input, settings, notes)
     type(input_t), intent(in) :: input
     type(response_settings_t), intent(in) :: settings

@@ -18,7 +18,7 @@ module nocdyn_response_settings
     integer :: group = 0                        !! &response in the input
     integer :: body = 0                         !! whose speed is held
     real(wp), allocatable :: speeds(:)          !! of the grid, from `speed(1)` to `speed(2)` [rad/s]
-    real(wp), allocatable :: orders(:)          !! oscillations per turn of the body; empty: those of the excitations
+    real(wp), allocatable :: orders(:)          !! oscillations per turn of the body; empty: the ones of the excitations
     real(wp), allocatable :: operating(:)       !! lowest and highest speed in operation [rad/s]; empty: unknown
     real(wp) :: margin = 0.0_wp                 !! as a share of the speed
   end type response_settings_t
@@ -89,14 +89,14 @@ contains
     if (is_in_file) is_in_file = input%groups(groups(1))%ordinal > 0
   end function is_in_file
 
-  !> Begins a message with the place in the input and, where a computation failed, with the speed.
+  !> Begins the message of a response with the place in the input and, where a computation failed, with the speed.
   subroutine place_error(input, settings, speed, error)
     type(input_t), intent(in) :: input
     type(response_settings_t), intent(in) :: settings
     real(wp), intent(in) :: speed   !! at which it failed [rad/s]
-    type(error_t), intent(inout) :: error
+    type(error_t), allocatable, intent(inout) :: error
 
-    if (index(error%message, input%shown_file()) == 1 .or. index(error%message, '--set ') == 1) return
+    if (.not. allocated(error)) return
     if (error%code == exit_failed) then
       error%message = input%location(settings%group, 'speed') // ': at ' // rounded_text(from_si(speed, unit_rpm), 6) // &
                       ' rpm (' // rounded_text(speed, 6) // ' rad/s): ' // error%message

@@ -218,7 +218,7 @@ contains
     end do
   end subroutine find_barred
 
-  !> The speed between two points at which a limit is reached; that of the first one if there is no other point [rad/s].
+  !> The speed between two points at which a limit is reached; the one of the first one if there is no other point [rad/s].
   pure real(wp) function edge(speed, excess, inside, outside)
     real(wp), intent(in) :: speed(:), excess(:)   !! [points]
     integer, intent(in) :: inside, outside        !! the point outside may be none

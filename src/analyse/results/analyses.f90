@@ -12,7 +12,7 @@ module nocdyn_analyses
 
   !> What the command line asks for beside the input.
   type, public :: analysis_options_t
-    character(len=:), allocatable :: at       !! state about which the machine is linearised; '': that of the analysis
+    character(len=:), allocatable :: at       !! state about which the machine is linearised; '': the one of the analysis
     logical :: has_holzer = .false.           !! whether tables of Holzer are wanted
     logical :: writes_files = .false.         !! whether files are written
     character(len=:), allocatable :: folder   !! of the results of a run of the input

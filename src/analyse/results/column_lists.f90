@@ -45,7 +45,7 @@ contains
     class(column_list_t), intent(inout) :: self
     type(signal_t), intent(in) :: signal
     character(len=*), intent(in), optional :: statistic   !! such as 'half_range'; absent: the signal itself
-    character(len=*), intent(in), optional :: unit        !! in SI; absent: that of the signal
+    character(len=*), intent(in), optional :: unit        !! in SI; absent: as for the signal
     type(column_t), allocatable :: longer(:)
     integer :: i
 
@@ -101,7 +101,7 @@ contains
   subroutine list_columns(self, labels, unit)
     class(column_list_t), intent(in) :: self
     type(string_t), allocatable, intent(out) :: labels(:)
-    integer, allocatable, intent(out) :: unit(:)   !! of each: index of `units`, 0: that of SI
+    integer, allocatable, intent(out) :: unit(:)   !! of each: index of `units`, 0: SI
     integer :: i
 
     allocate (labels(self%count))

@@ -18,8 +18,8 @@ module nocdyn_column_names
 
 contains
 
-  !> The columns that &output asks for, ascending: the time, and those of the patterns of `columns`; all but those of inner nodes
-  !> if there are none.
+  !> The columns that &output asks for, ascending: the time, and the ones of the patterns of `columns`; all but the ones of inner
+  !> nodes if there are none.
   subroutine choose_columns(input, signals, labels, chosen, notes, error)
     type(input_t), intent(in) :: input
     type(signal_t), intent(in) :: signals(:)                     !! the time first, in the units of the table

@@ -31,7 +31,7 @@ contains
   pure subroutine turn_units(signals, wanted, unit)
     type(signal_t), intent(inout) :: signals(:)            !! in SI
     integer, intent(in) :: wanted(:)                       !! indices of `units`
-    integer, allocatable, intent(out) :: unit(:)           !! of each: index of `units`, 0: that of SI
+    integer, allocatable, intent(out) :: unit(:)           !! of each: index of `units`, 0: SI
     integer :: i
 
     allocate (unit(size(signals)))
@@ -47,7 +47,7 @@ contains
     character(len=*), intent(in) :: text   !! as a user writes it
     integer, intent(in) :: wanted(:)       !! units of a quantity without one: indices of `units`
     logical, intent(out) :: matches
-    integer, intent(out) :: unit           !! of the text: index of `units`, 0: that of SI
+    integer, intent(out) :: unit           !! of the text: index of `units`, 0: SI
     logical, intent(out) :: is_former      !! whether it is the former name
     character(len=:), allocatable :: former
     integer :: n

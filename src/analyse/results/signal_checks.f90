@@ -61,7 +61,7 @@ contains
     end do
   end subroutine refuse_unknown_quantities
 
-  !> Refuses names by which two signals of a machine have the same label, as those of a shaft 's' and of a coupling 's_1' have.
+  !> Refuses names by which two signals of a machine have the same label, as the ones of a shaft 's' and of a coupling 's_1' have.
   subroutine refuse_equal_labels(input, signals, error)
     type(input_t), intent(in) :: input
     type(signal_t), intent(in) :: signals(:)

@@ -97,7 +97,7 @@ contains
   function number_cell(value) result(text)
     real(wp), intent(in) :: value
     character(len=cell_width) :: text
-    integer, parameter :: all_digits = 10   ! of whole numbers, e.g. that of a variant
+    integer, parameter :: all_digits = 10   ! of whole numbers, e.g. the one of a variant
 
     text = text_cell(rounded_text(value, merge(all_digits, cell_digits, abs(value - anint(value)) <= 0)))
   end function number_cell

@@ -1,7 +1,7 @@
 !> Statistics of columns in the lanes of a block, from their polynomials in the steps; an extension finds these.
 !>
 !> Each column is a function (linear + cubic x^2) x of an x, whose range is accumulated. As x is continuous, the largest value of
-!> the column is that of the function between the smallest and the largest x.
+!> the column is the one of the function between the smallest and the largest x.
 module nocdyn_column_statistics
   use nocdyn_chebyshev, only: interpolation_t, max_degree, raise_to_maximum, time_at
   use nocdyn_damage_counters, only: damage_counter_t

@@ -231,7 +231,7 @@ contains
     end associate
   end subroutine scale_column
 
-  !> Sets the coefficients of the moments of a lane; those of other columns remain.
+  !> Sets the coefficients of the moments of a lane; the ones of other columns remain.
   pure subroutine find_laws(self, machine, lane, linear, cubic)
     class(linear_columns_t), intent(in) :: self
     type(machine_t), intent(in) :: machine

@@ -227,7 +227,7 @@ contains
     allocate (self%y_last(width, columns), self%y_new_last(width, columns), self%c_last(width, columns, degree), source=0.0_wp)
   end subroutine allocate_work
 
-  !> Loads the steps of the lanes of a strip. Those of an incomplete last strip are copied to padded arrays.
+  !> Loads the steps of the lanes of a strip. The ones of an incomplete last strip are copied to padded arrays.
   subroutine load_strip(self, number, steps, y, y_new, c)
     class(linear_statistics_t), intent(inout) :: self
     integer, intent(in) :: number

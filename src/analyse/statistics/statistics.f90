@@ -49,7 +49,7 @@ module nocdyn_statistics
     logical :: is_stress = .false.                   !! whether that is its stress, not its moment
     character(len=:), allocatable :: label           !! e.g. 'moment_shaft_max_abs_from_2'
     character(len=:), allocatable :: unit            !! e.g. 'N m'
-    integer :: in_unit = 0                           !! the same: index of `units`, 0: that of SI
+    integer :: in_unit = 0                           !! the same: index of `units`, 0: SI
     character(len=:), allocatable :: long_name       !! a description
   end type statistic_t
 
@@ -62,8 +62,8 @@ contains
     real(wp), intent(in) :: t_start             !! [s]
     real(wp), intent(in), optional :: from      !! [s]; t_start if absent
     real(wp), intent(in), optional :: band      !! of a settling time; `default_band` if absent
-    integer, intent(in), optional :: unit       !! of its values: index of `units`; absent: that of SI
-    logical, intent(in), optional :: of_magnitude   !! whether `time_of_max` is that of the largest magnitude; absent: it is not
+    integer, intent(in), optional :: unit       !! of its values: index of `units`; absent: SI
+    logical, intent(in), optional :: of_magnitude   !! whether `time_of_max` is of the largest magnitude; absent: it is not
 
     self%signal = signals(column)
     self%column = column
@@ -93,7 +93,7 @@ contains
     end if
   end function new_statistic
 
-  !> The damage or the number of cycles of a &fatigue. The curve is that of a variant.
+  !> The damage or the number of cycles of a &fatigue. The curve is the one of a variant.
   type(statistic_t) function new_fatigue_statistic(name, fatigue, signal, kind, from) result(self)
     character(len=*), intent(in) :: name       !! of the &fatigue
     integer, intent(in) :: fatigue             !! its index in the input

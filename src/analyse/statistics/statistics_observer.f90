@@ -26,7 +26,7 @@ module nocdyn_statistics_observer
   !> The requested times must be, or contain, the start and the end of the variants. After the first `on_start` the observer must
   !> stay where it is.
   !>
-  !> The values of the tracked columns are those of `recorded`, if an extension does not override what gives them.
+  !> The values of the tracked columns are the ones of `recorded`, if an extension does not override what gives them.
   !>
   !> A statistic is computed by `linear` if its column allows it, else by `sampled`. A torque that the machine of the block does
   !> not have is 0 at all times. A statistic of a whole shaft has a part for each of its points, of which the worst one counts.
@@ -43,7 +43,7 @@ module nocdyn_statistics_observer
     real(wp), allocatable, private :: default_value(:)        !! where a statistic has no column, [statistics]
     integer, allocatable, private :: kind(:)                  !! statistic_..., [statistics]
     logical, allocatable, private :: is_along(:)              !! extremes of the largest moment or stress along a shaft
-    type(signal_source_t), allocatable :: points(:)                  !! of shafts: columns after those of the table
+    type(signal_source_t), allocatable :: points(:)                  !! of shafts: columns after the ones of the table
     type(signal_values_t), private :: recorded             !! the tracked columns
     logical, private :: has_recorded = .false.                !! whether it has any
     real(wp), allocatable, private :: t(:), y(:, :)   !! where lanes start and end, [lanes], [lanes, components]
@@ -124,8 +124,8 @@ contains
     end associate
   end subroutine record_columns
 
-  !> The parts of all statistics. The points of shafts become columns after those of the table. An extreme of the largest moment
-  !> or stress along a shaft has its column as the first part, then the extremes at the points, and the times of these.
+  !> The parts of all statistics. The points of shafts become columns after the ones of the table. An extreme of the largest
+  !> moment or stress along a shaft has its column as the first part, then the extremes at the points, and the times of these.
   subroutine list_parts(self, statistics, columns, parts)
     type(statistics_observer_t), intent(inout) :: self
     type(statistic_t), intent(in) :: statistics(:)
@@ -226,8 +226,8 @@ contains
     if (.not. is_along) allocate (points(0))
   end subroutine find_points
 
-  !> Chooses how each statistic is computed. The time of the largest moment is not that of the largest twist in a coupling that
-  !> softens. A value at the end is that of the row of a run, to the last bit.
+  !> Chooses how each statistic is computed. The time of the largest moment is not the one of the largest twist in a coupling that
+  !> softens. A value at the end is the one of the row of a run, to the last bit.
   subroutine distribute(self, statistics, columns, may_bend, tracked)
     type(statistics_observer_t), intent(inout) :: self
     type(statistic_t), intent(in) :: statistics(:)
@@ -357,8 +357,8 @@ contains
 
   !> An extreme of the largest moment or stress along a shaft. Its value of largest magnitude jumps from one section to another,
   !> often between a positive and a negative one, and so is no polynomial in a step; those at the points of the shaft are. The
-  !> extreme is that of the points; where all of these have one sign,
-  !> the smaller end of the range is that of the column itself, which does not jump then.
+  !> extreme is the one of the points; where all of these have one sign,
+  !> the smaller end of the range is the one of the column itself, which does not jump then.
   real(wp) function value_along(self, statistic, lane) result(value)
     class(statistics_observer_t), intent(in) :: self
     integer, intent(in) :: statistic, lane

@@ -62,7 +62,7 @@ contains
     integer, intent(in) :: states, degree
     integer, intent(in) :: entries   !! even
     integer, intent(in) :: component(entries)
-    real(wp), intent(in) :: factor(width, entries), offset   !! those of the first lane
+    real(wp), intent(in) :: factor(width, entries), offset   !! the ones of the first lane
     real(wp), intent(in) :: y(states), y_new(states), c(states, degree)
     integer, intent(in) :: place
     type(strip_t), intent(inout) :: strip

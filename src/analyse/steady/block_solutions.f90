@@ -15,7 +15,7 @@ module nocdyn_block_solutions
     integer, allocatable :: members(:)        !! unknowns
     real(wp), allocatable :: values(:, :)     !! [members, solutions]
     logical, allocatable :: is_range(:)       !! whether a solution represents a range of solutions, [solutions]
-    logical :: is_unloaded = .false.          !! no torque acts: any speed is steady, and that of the start is taken
+    logical :: is_unloaded = .false.          !! no torque acts: any speed is steady, and the one of the start is taken
     logical :: is_complete = .true.           !! whether a scan of one speed has found all solutions
     integer :: starts = 0                     !! of Newton's method, if the scan has not
     logical :: is_level = .false.             !! whether the imbalance is the same at every speed
@@ -86,7 +86,7 @@ contains
     is_same = all(abs(one - other) <= same * max(abs(one), abs(other), same))
   end function is_same
 
-  !> Whether the residuals at some unknowns are rounding: that of their terms, and what roundings of the unknowns change.
+  !> Whether the residuals at some unknowns are rounding: the one of their terms, and what roundings of the unknowns change.
   logical function is_nearly_balanced(balance, members, z)
     type(torque_balance_t), intent(inout) :: balance
     integer, intent(in) :: members(:)   !! unknowns of the block

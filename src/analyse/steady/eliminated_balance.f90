@@ -1,9 +1,9 @@
 !> The torque balance of speeds that depend on each other, with all of them but one eliminated.
 !>
-!> Most torques never rise with their speed: those of loads, of slipping couplings, of motors with a falling curve. They are the
-!> gradient of a concave function of the speeds. So one speed is set, which is that of the elements whose torques rise somewhere,
-!> or jump; the others follow, and what is left over along the first speed is a function of it alone. Where elements with
-!> rising torques have speeds of their own, the speeds that follow need not be the only ones.
+!> Most torques never rise with their speed: the ones of loads, of slipping couplings, of motors with a falling curve. They are
+!> the gradient of a concave function of the speeds. So one speed is set, which is the one of the elements whose torques rise
+!> somewhere, or jump; the others follow, and what is left over along the first speed is a function of it alone. Where elements
+!> with rising torques have speeds of their own, the speeds that follow need not be the only ones.
 !>
 !> Internal states are those that do not change at the speeds.
 module nocdyn_eliminated_balance
@@ -24,7 +24,7 @@ module nocdyn_eliminated_balance
   integer, parameter :: knee_points = 6        ! per decade
   integer, parameter :: most_dense_knees = 30  ! of more, only the knees themselves are added
 
-  !> Knees of the elements whose torques rise somewhere, or jump, and whose speed is that of a column of the basis.
+  !> Knees of the elements whose torques rise somewhere, or jump, and whose speed is the one of a column of the basis.
   type, public :: rising_speed_t
     real(wp), allocatable :: knees(:)   !! [rad/s]
   end type rising_speed_t
@@ -38,7 +38,7 @@ module nocdyn_eliminated_balance
     real(wp), allocatable :: knees(:)      !! values of the speed that is set at which a law bends [rad/s]
     integer :: choices = 1                 !! speeds with rising torques; of one, the other speeds are determined by it
     type(rising_speed_t), allocatable :: rising(:)   !! for each column of the basis
-    real(wp), allocatable :: z(:)          !! all unknowns; those of the block after `solve`
+    real(wp), allocatable :: z(:)          !! all unknowns; the ones of the block after `solve`
     real(wp) :: torque = 0.0_wp            !! left over along the speed that is set, 0 if it is rounding, after `solve` [N m]
     logical :: is_balanced = .true.        !! whether the torques along the other speeds balance, after `solve`
     real(wp), private :: reach = 0.0_wp    !! how far another speed moved last [rad/s]
@@ -55,8 +55,8 @@ contains
     integer, intent(in) :: members(:)   !! unknowns of the block
     type(eliminated_balance_t), intent(out) :: self
     integer, intent(in), optional :: choice   !! number of the speed to be set, 1 to `choices`; absent: 1
-    integer, allocatable :: elements(:)   ! those of the block, numbered among the inelastic ones
-    real(wp), allocatable :: rows(:, :)   ! their speeds by those of the block, [elements, speeds]
+    integer, allocatable :: elements(:)   ! the ones of the block, numbered among the inelastic ones
+    real(wp), allocatable :: rows(:, :)   ! their speeds by the ones of the block, [elements, speeds]
     logical, allocatable :: rises(:)
     integer, allocatable :: choices(:)
     integer :: e, i
@@ -95,7 +95,7 @@ contains
   subroutine collect_rising(self, elements, rows)
     type(eliminated_balance_t), intent(inout) :: self
     integer, intent(in) :: elements(:)   !! those whose torques rise, numbered among the inelastic ones
-    real(wp), intent(in) :: rows(:, :)   !! their speeds by those of the block, [elements, speeds]
+    real(wp), intent(in) :: rows(:, :)   !! their speeds by the ones of the block, [elements, speeds]
     real(wp) :: ratios(size(self%speeds))
     integer :: e, k
 
@@ -110,12 +110,12 @@ contains
     end do
   end subroutine collect_rising
 
-  !> The inelastic elements whose speeds depend on those of a block.
+  !> The inelastic elements whose speeds depend on the ones of a block.
   subroutine gather_rows(balance, speeds, elements, rows)
     type(torque_balance_t), intent(in) :: balance
     integer, intent(in) :: speeds(:)                       !! unknowns
     integer, allocatable, intent(out) :: elements(:)       !! numbered among the inelastic ones
-    real(wp), allocatable, intent(out) :: rows(:, :)       !! their speeds by those of the block, [elements, speeds]
+    real(wp), allocatable, intent(out) :: rows(:, :)       !! their speeds by the ones of the block, [elements, speeds]
     integer :: column_of(size(balance%motions%free))
     integer :: e, i, k
 
@@ -134,7 +134,7 @@ contains
     end associate
   end subroutine gather_rows
 
-  !> Finds the elements whose torques rise somewhere with the speed, or jump. Those of friction jump downwards only.
+  !> Finds the elements whose torques rise somewhere with the speed, or jump. The ones of friction jump downwards only.
   subroutine find_rising_laws(balance, elements, rises)
     type(torque_balance_t), intent(inout) :: balance
     integer, intent(in) :: elements(:)   !! numbered among the inelastic ones
@@ -188,7 +188,7 @@ contains
   pure function knees_along(self, knees, row) result(speeds)
     type(eliminated_balance_t), intent(in) :: self
     real(wp), intent(in) :: knees(:)   !! of the element [rad/s]
-    real(wp), intent(in) :: row(:)     !! its speed by those of the block, [speeds]
+    real(wp), intent(in) :: row(:)     !! its speed by the ones of the block, [speeds]
     real(wp), allocatable :: speeds(:)
     real(wp) :: ratio
 
@@ -224,7 +224,7 @@ contains
     is_parallel = norms - dot_product(one, other)**2 <= near * norms
   end function is_parallel
 
-  !> Sets the first speed and finds the others, from those of the last call.
+  !> Sets the first speed and finds the others, from the ones of the last call.
   subroutine solve(self, speed, holds_rising)
     class(eliminated_balance_t), intent(inout) :: self
     real(wp), intent(in) :: speed   !! to be set [rad/s]

@@ -34,7 +34,7 @@ module nocdyn_equilibrium
   type, public :: equilibrium_t
     real(wp), allocatable :: y(:, :)   !! state of the reduced formulation without work integrals, [1, states]
     character(len=14) :: stability = 'not determined'   !! stable, unstable, neutral, not determined
-    real(wp) :: growth = 0.0_wp   !! largest real part of the eigenvalues without those of free rigid motions [1/s]
+    real(wp) :: growth = 0.0_wp   !! largest real part of the eigenvalues without the ones of free rigid motions [1/s]
     integer :: free_modes = 0   !! number of rigid motions without torques, or in a range of steady speeds
     logical :: is_at_rest = .false.   !! whether nothing turns, as joints hold
     logical :: is_fixed = .false.     !! whether they hold all that could move

@@ -50,7 +50,7 @@ contains
   end function idle_share
 
   !> Gives the governors of the motors that drive the throttles at which these have their torques. A throttle beyond its limits
-  !> stays open; so does that of a motor with an armature current of its own.
+  !> stays open; so does the one of a motor with an armature current of its own.
   subroutine close_speed_loops(balance, sources, factor, z, weight)
     type(torque_balance_t), intent(inout) :: balance
     integer, intent(in) :: sources(:)      !! elements that drive

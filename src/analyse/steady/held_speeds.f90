@@ -31,7 +31,7 @@ module nocdyn_held_speeds
     real(wp) :: supply = 0.0_wp   !! share of the frequency of the supplies that holds it; 0 if they do not follow
     real(wp) :: torque = 0.0_wp   !! on the reference body that holds the speed [N m]; 0 if the motors do
     real(wp), allocatable :: omega(:)       !! speeds of the bodies [rad/s], [bodies]
-    real(wp), allocatable :: phi(:)         !! angles of the bodies when that of the reference body is zero [rad], [bodies]
+    real(wp), allocatable :: phi(:)         !! angles of the bodies when the one of the reference body is zero [rad], [bodies]
     real(wp), allocatable :: twist(:)       !! of the elements [rad], [elements]
     real(wp), allocatable :: rate(:)        !! of twist [rad/s], [elements]
     real(wp), allocatable :: mean(:)        !! moments of the elements [N m], [elements] as all that follow
@@ -341,7 +341,7 @@ contains
       call residuals(self, moved, shifted, sources, residual)
       matrix(:, k) = (shifted + held * sources + missing) / change
     end do
-    if (size(missing) > 1) call residuals(self, z, residual, sources, shifted)   ! the state of the elements is that of z
+    if (size(missing) > 1) call residuals(self, z, residual, sources, shifted)   ! the state of the elements is the one of z
   end subroutine differentiate
 
   !> Torques along the rigid motions without what holds the speed, the torques per unit of that, and the sums of their terms.

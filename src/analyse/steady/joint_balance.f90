@@ -1,10 +1,10 @@
 !> The joints of a machine in a balance of its torques: bearings with friction, clutches, freewheels and teeth with losses.
 !>
 !> Of the joints some are at rest; the others slip, and have the moment of slip in the direction of their speed. Teeth with losses
-!> that turn have M = -s T, and T follows from the moments of all elements (`nocdyn_tooth_loads`). Those of elastic elements and
-!> of joints at rest are the ones with which the rigid motions take the accelerations that all moments give them (d'Alembert): in
-!> a steady state there are none, so that they are the true ones. Where the twists are statically indeterminate, the moments are
-!> those of springs with the stiffness of the start, and `offset` corrects T.
+!> that turn have M = -s T, and T follows from the moments of all elements (`nocdyn_tooth_loads`). The ones of elastic elements
+!> and of joints at rest are the ones with which the rigid motions take the accelerations that all moments give them (d'Alembert):
+!> in a steady state there are none, so that they are the true ones. Where the twists are statically indeterminate, the moments
+!> are the ones of springs with the stiffness of the start, and `offset` corrects T.
 module nocdyn_joint_balance
   use nocdyn_element_coordinates, only: element_coordinates_t
   use nocdyn_friction_joints, only: friction_joints_t
@@ -127,7 +127,7 @@ contains
       rows(i, :) = weight(i) * rows(i, :)
     end do
     allocate (inverse, source=pseudo_inverse(transpose(rows), singular))
-    torque = matmul(inverse, torque)   ! moments of `rigid` by those of all
+    torque = matmul(inverse, torque)   ! moments of `rigid` by the ones of all
     by_moment = by_moment + matmul(teeth%by_moment(:, rigid), spread(weight, 2, size(torque, 2)) * torque)
     by_moment(:, rigid) = 0.0_wp
   end function loads_by_moments
@@ -146,7 +146,7 @@ contains
     end do
   end subroutine choose_modes
 
-  !> Adds the moments of teeth that turn to those of the elements, which are evaluated.
+  !> Adds the moments of teeth that turn to the ones of the elements, which are evaluated.
   subroutine add_losses(self, machine)
     class(joint_balance_t), intent(inout) :: self
     type(machine_t), intent(inout) :: machine
@@ -245,7 +245,7 @@ contains
     end do
   end function loss_matrix
 
-  !> The derivatives of the moments of the losses by an unknown, from those of the other moments and of the speeds.
+  !> The derivatives of the moments of the losses by an unknown, from the ones of the other moments and of the speeds.
   function change_of_losses(self, by_moments, by_speeds) result(change)
     class(joint_balance_t), intent(in) :: self
     real(wp), intent(in) :: by_moments(:), by_speeds(:)   !! [elements]

@@ -1,9 +1,9 @@
 !> Joints at rest in a steady state: which sets of them can be at rest together, and the moments with which they hold.
 !>
-!> A set is the joints whose speeds are zero where those of some are; in a machine with one rigid motion these are all joints or
-!> none. They hold if moments between their bounds leave the rigid motions no acceleration: the complementarity problem of a run
-!> (`nocdyn_joint_choices`), with twists that stay. Where several joints share what is to be held, each takes a part as the square
-!> of what it can hold.
+!> A set is the joints whose speeds are zero where the ones of some are; in a machine with one rigid motion these are all joints
+!> or none. They hold if moments between their bounds leave the rigid motions no acceleration: the complementarity problem of a
+!> run (`nocdyn_joint_choices`), with twists that stay. Where several joints share what is to be held, each takes a part as the
+!> square of what it can hold.
 module nocdyn_resting_joints
   use nocdyn_friction_joints, only: friction_joints_t, locked, slips_backwards, slips_forwards
   use nocdyn_joint_balance, only: dense_motions, loads_by_moments, rates_of_elements
@@ -22,7 +22,7 @@ module nocdyn_resting_joints
   real(wp), parameter :: singular = 1.0e-11_wp   ! relative to the largest singular value
   real(wp), parameter :: rounding = 1.0e-9_wp    ! of accelerations, relative to their terms
 
-  !> What moments do to the joints, of which those of a set are at rest.
+  !> What moments do to the joints, of which the ones of a set are at rest.
   type, public :: resting_joints_t
     real(wp), allocatable :: mobility(:, :)    !! accelerations of the rigid motions by torques along them, [motions, motions]
     real(wp), allocatable :: rates(:, :)       !! of the joints by the rigid motions, [joints, motions]
@@ -97,7 +97,7 @@ contains
     end associate
   end subroutine look_at_bounds
 
-  !> Adds the joints that have no speed where those of a set have none.
+  !> Adds the joints that have no speed where the ones of a set have none.
   pure subroutine close_set(rates, is_at_rest)
     real(wp), intent(in) :: rates(:, :)            !! [joints, motions]
     logical, intent(inout) :: is_at_rest(:)        !! [joints]
@@ -258,7 +258,7 @@ contains
     end associate
   end subroutine gather
 
-  !> Shares what is to be held between joints with friction, if no teeth are among those of the machine.
+  !> Shares what is to be held between joints with friction, if no teeth are among the ones of the machine.
   subroutine share_friction(self, choices, holds)
     class(resting_joints_t), intent(in) :: self
     type(joint_choices_t), intent(inout) :: choices

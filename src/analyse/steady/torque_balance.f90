@@ -21,7 +21,7 @@ module nocdyn_torque_balance
     class(formulation_t), allocatable :: formulation   !! reduced, one lane, without work integrals
     type(element_coordinates_t) :: incidence
     type(rigid_motions_t) :: motions        !! of which `s` are the speeds
-    type(rigid_motions_t) :: loose          !! those of which the joints at rest slip too
+    type(rigid_motions_t) :: loose          !! the ones of which the joints at rest slip too
     type(joint_balance_t) :: joints
     logical, allocatable :: is_elastic(:)   !! whether an element can have a restoring moment, [elements]
     integer, allocatable :: elastic(:)      !! elements that the rigid motions do not twist
@@ -181,7 +181,8 @@ contains
     end do
   end function mean_motion
 
-  !> Inertias of some unknowns: those of rigid motions, N^T L_tau^T J L_tau N [kg m2]; 1 of internal states, [members, members].
+  !> Inertias of some unknowns: the ones of rigid motions, N^T L_tau^T J L_tau N [kg m2]; 1 of internal states, [members,
+  !> members].
   function inertia(self, members) result(matrix)
     class(torque_balance_t), intent(in) :: self
     integer, intent(in) :: members(:)   !! unknowns

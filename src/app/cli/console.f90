@@ -40,7 +40,7 @@ contains
   !> Prints the message of an error to standard error, every line with the program's name before it, and raises the exit code.
   subroutine report_error(error, code)
     type(error_t), intent(in) :: error
-    integer, intent(inout) :: code   !! becomes that of the error if that is higher
+    integer, intent(inout) :: code   !! becomes the one of the error if that is higher
     integer :: first, last
 
     first = 1

@@ -44,7 +44,7 @@ contains
     if (size(arguments%operands) > 1) folder = folder // '/' // stem(file)
   end function out_folder
 
-  !> The folder for the results of an input: that of --out, else &output directory, else results/<name of the file>.
+  !> The folder for the results of an input: the one of --out, else &output directory, else results/<name of the file>.
   function result_folder(arguments, input) result(folder)
     type(arguments_t), intent(in) :: arguments
     type(input_t), intent(in) :: input

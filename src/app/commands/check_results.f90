@@ -98,7 +98,7 @@ contains
     text = self%report
   end subroutine printed
 
-  !> What the sweep of a machine is. With load cases it may be that of another one.
+  !> What the sweep of a machine is. With load cases it may be the one of another one.
   subroutine add_sweep_lines(folder, input, plan, lines, error)
     character(len=*), intent(in) :: folder   !! of the results
     type(input_t), intent(in) :: input

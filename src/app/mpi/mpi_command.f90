@@ -129,7 +129,7 @@ contains
     end if
   end subroutine run_worker
 
-  !> The journal of a rank above 0, beside that of rank 0.
+  !> The journal of a rank above 0, beside the one of rank 0.
   subroutine open_rank_journal(rank, folder, header, journal, error)
     integer, intent(in) :: rank
     character(len=*), intent(in) :: folder

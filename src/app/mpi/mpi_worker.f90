@@ -50,7 +50,7 @@ contains
     self%is_stopped = .true.
   end subroutine poll
 
-  !> Closes the journal, sends the last message and waits for that of rank 0. A message to stop may arrive before it.
+  !> Closes the journal, sends the last message and waits for the one of rank 0. A message to stop may arrive before it.
   subroutine finalise(self)
     class(mpi_worker_t), intent(inout) :: self
     integer :: tag

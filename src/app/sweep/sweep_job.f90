@@ -44,7 +44,7 @@ module nocdyn_sweep_job
     type(sweep_plan_t) :: plan
     character(len=:), allocatable :: folder
     type(sweep_setup_t) :: setup
-    type(sweep_journal_t), allocatable :: journals(:)   !! the first one is that of this process, the others are of ranks
+    type(sweep_journal_t), allocatable :: journals(:)   !! the first one is the one of this process, the others are of ranks
     type(hand_out_t) :: variants                        !! that no journal holds
     type(sweep_counts_t) :: counts                      !! of the journals
     type(console_sweep_progress_t) :: progress
@@ -87,7 +87,7 @@ contains
     job%progress%line = new_status_line(arguments%is_given('--quiet'), shows_in_logs=.true.)
   end subroutine start_job
 
-  !> Reads the machine of the sweep, or that of its load case, and finds the folder of the results.
+  !> Reads the machine of the sweep, or the one of its load case, and finds the folder of the results.
   subroutine read_machine(arguments, input, folder, error)
     type(arguments_t), intent(in) :: arguments
     type(input_t), intent(out) :: input
@@ -140,7 +140,7 @@ contains
   subroutine find_journals(folder, own, names, bytes)
     character(len=*), intent(in) :: folder
     character(len=*), intent(in) :: own                    !! journal of this process
-    type(string_t), allocatable, intent(out) :: names(:)   !! that one first, though it may not exist, then those of ranks
+    type(string_t), allocatable, intent(out) :: names(:)   !! that one first, though it may not exist, then the ones of ranks
     real(wp), intent(out) :: bytes                         !! of all of them
     type(string_t), allocatable :: others(:)
     integer(int64) :: size_of_file
@@ -164,7 +164,7 @@ contains
   !> Opens the journals of a sweep to continue it.
   subroutine resume_journals(job, names, header, error)
     type(sweep_job_t), intent(inout) :: job
-    type(string_t), intent(in) :: names(:)   !! that of this process first, which is created if it does not exist
+    type(string_t), intent(in) :: names(:)   !! the one of this process first, which is created if it does not exist
     type(sweep_header_t), intent(in) :: header
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: file
@@ -177,7 +177,7 @@ contains
     if (.not. job%arguments%is_given('--resume')) then
       call refuse_unfinished(job%journals, error)
     else if (.not. job%arguments%is_given('--quiet')) then
-      ! Prints how many variants of a resumed journal are reused. Those of an entry that was not completely written, or is
+      ! Prints how many variants of a resumed journal are reused. The ones of an entry that was not completely written, or is
       ! damaged, are computed again.
       file = job%plan%input%shown_file()
       associate (journals => job%journals, header => job%journals(1)%header)
@@ -192,7 +192,7 @@ contains
     end if
   end subroutine resume_journals
 
-  !> Opens the journals of ranks, and closes them again: their ranks append to them. Those of another sweep are an error.
+  !> Opens the journals of ranks, and closes them again: their ranks append to them. The ones of another sweep are an error.
   subroutine open_rank_journals(job, names, header, error)
     type(sweep_job_t), intent(inout) :: job                !! with the journal of this process
     type(string_t), intent(in) :: names(:)                 !! that one first

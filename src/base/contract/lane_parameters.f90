@@ -1,6 +1,6 @@
 !> The parameters of the lanes of one formulation: all numbers that may differ between the variants of a machine.
 !>
-!> A formulation lists its parameter arrays in a fixed order, those of the machine and those derived from them. It also adds
+!> A formulation lists its parameter arrays in a fixed order, the ones of the machine and those derived from them. It also adds
 !> the integers that describe its structure: which elements are in which bank, which entries the sparse maps have. Two lists
 !> with the same structure differ in numbers only, so copying the numbers of a lane makes it the same variant.
 module nocdyn_lane_parameters
@@ -87,7 +87,7 @@ contains
     class(lane_parameters_t), intent(inout) :: self
     character(len=*), intent(in) :: key
     real(wp), contiguous, target, intent(inout) :: value(:, :)   !! in the unit of the key
-    integer, intent(in), optional :: element(:)   !! of the bank in each column; absent: column k is that of element k
+    integer, intent(in), optional :: element(:)   !! of the bank in each column; absent: column k is the one of element k
     integer :: k
 
     call self%add_matrix(key, value)

@@ -13,7 +13,7 @@ module nocdyn_sparse_map
 
   public :: new_sparse_map, transposed_order
 
-  !> With one lane, consecutive rows whose columns all advance by one from row to row, as those of a chain do, form a band:
+  !> With one lane, consecutive rows whose columns all advance by one from row to row, as the ones of a chain do, form a band:
   !> its entries are stored diagonal by diagonal, and the loop over its rows is a vector loop without indices. A band whose
   !> rows all have the same coefficients is Toeplitz, and only the entries of its first row are stored. All other rows are
   !> stored row by row (CSR). With several lanes all rows are, and the loops over the lanes are the vector loops.
@@ -127,7 +127,7 @@ contains
     end do
   end subroutine append_csr_rows
 
-  !> The entries of the bands follow those of the CSR rows.
+  !> The entries of the bands follow the ones of the CSR rows.
   subroutine append_bands(first, order, entries, self)
     integer, intent(in) :: first(:)
     integer, intent(inout) :: order(:)

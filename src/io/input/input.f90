@@ -23,12 +23,12 @@ module nocdyn_input
   !> A whole input file with the overrides of the command line: the machine itself, or one of its load cases.
   type, public :: input_t
     character(len=:), allocatable :: file
-    type(string_t), allocatable :: overrides(:)   !! PATH=VALUE, as given; those of a load case come first
-    type(load_case_t), allocatable :: load_case       !! that of this input; not allocated: the machine itself
-    type(load_case_t), allocatable :: load_cases(:)   !! those of the file; of the machine itself
+    type(string_t), allocatable :: overrides(:)   !! PATH=VALUE, as given; the ones of a load case come first
+    type(load_case_t), allocatable :: load_case       !! the one of this input; not allocated: the machine itself
+    type(load_case_t), allocatable :: load_cases(:)   !! the ones of the file; of the machine itself
     type(group_t), allocatable :: groups(:)       !! single groups that the file does not have come last
   contains
-    procedure :: groups_named   !! indices of the groups with a name, perhaps only those of one law
+    procedure :: groups_named   !! indices of the groups with a name, perhaps only the ones of one law
     procedure :: position       !! index of the group of a kind that occurs once
     procedure :: single         !! that group
     procedure :: title

@@ -6,12 +6,12 @@ module nocdyn_input_group
   implicit none (type, external)
   private
 
-  !> The value of one key. One of the four arrays is allocated, that of the type of the key; none if the key has no value.
+  !> The value of one key. One of the four arrays is allocated, the one of the type of the key; none if the key has no value.
   type, public :: value_t
     logical :: is_given = .false.   !! by the file or by an override, not by default
     integer :: line = 0             !! of the key in the file
     integer :: override = 0         !! index of the override that sets it, 0: none
-    integer :: unit = 0             !! in which numbers are written: index of `units`, 0: that of the schema
+    integer :: unit = 0             !! in which numbers are written: index of `units`, 0: the one of the schema
     real(wp), allocatable :: numbers(:)
     integer, allocatable :: whole_numbers(:)
     logical, allocatable :: flags(:)

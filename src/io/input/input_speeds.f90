@@ -17,8 +17,8 @@ module nocdyn_input_speeds
 
 contains
 
-  !> The numbers in rad/s that an input gives, but for those of bodies, which may follow from gears. Of lists these are the first
-  !> and the last number. Zeros are left out.
+  !> The numbers in rad/s that an input gives, but for the ones of bodies, which may follow from gears. Of lists these are the
+  !> first and the last number. Zeros are left out.
   function given_speeds(input) result(found)
     type(input_t), intent(in) :: input
     type(named_speeds_t) :: found

@@ -17,9 +17,9 @@ module nocdyn_key_path
   type, public :: key_path_t
     integer :: group_rule = 0               !! row of `group_rules`, 0: there is no such group
     integer :: key_rule = 0                 !! row of `key_rules`, 0: there is no such key
-    integer :: unit = 0                     !! of its numbers: index of `units`, 0: that of the schema
+    integer :: unit = 0                     !! of its numbers: index of `units`, 0: the one of the schema
     character(len=:), allocatable :: name   !! of the element, '' for groups without names
-    integer :: number = 0                   !! of a group without name among those of its kind, 0: the path has none
+    integer :: number = 0                   !! of a group without name among the ones of its kind, 0: the path has none
     type(assignment_t) :: target            !! key and subscript
     logical :: is_out_of_range = .false.    !! the subscript is a whole number that is not an index of any list
   end type key_path_t

@@ -103,7 +103,7 @@ contains
     if (unit > 0) text = rounded_text(from_si(speed, unit), digits) // ' ' // units(unit)%name
   end function speed_text
 
-  !> The unit in which all groups of a kind that give a key write it: index of `units`, 0: that of the schema, or several.
+  !> The unit in which all groups of a kind that give a key write it: index of `units`, 0: the one of the schema, or several.
   pure integer function shared_unit(input, kind, key) result(unit)
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: kind, key
@@ -122,7 +122,7 @@ contains
     end do
   end function shared_unit
 
-  !> The unit in which a key is written: index of `units`, 0: that of the schema.
+  !> The unit in which a key is written: index of `units`, 0: the one of the schema.
   pure integer function unit_of(group, key)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: key

@@ -52,7 +52,7 @@ contains
     end if
   end subroutine open_object
 
-  !> Begins the outermost object, that of a report: the program, how a computation ended, the input.
+  !> Begins the outermost object, the one of a report: the program, how a computation ended, the input.
   subroutine open_report(self, input, title, status, message)
     class(json_t), intent(inout) :: self
     character(len=*), intent(in) :: input, title                !! path and title of the input

@@ -26,7 +26,7 @@ module nocdyn_trajectory_file
       import :: string_t, trajectory_file_t
       class(trajectory_file_t), intent(inout) :: self
       character(len=*), intent(in) :: folder
-      type(string_t), intent(in) :: labels(:)   !! of the columns, e.g. 'omega_motor [rad/s]', that of the time first
+      type(string_t), intent(in) :: labels(:)   !! of the columns, e.g. 'omega_motor [rad/s]', the one of the time first
       integer, intent(in) :: rows               !! their number, if the run does not fail
       character(len=*), intent(in) :: title     !! of the input
       character(len=*), intent(in) :: input     !! the text of input.nml

@@ -36,7 +36,7 @@ contains
     text = buffer%text()
   end function input_template
 
-  !> A group with its keys: those up to the selector key, those of each kind, those of every kind.
+  !> A group with its keys: those up to the selector key, the ones of each kind, the ones of every kind.
   subroutine append_group(buffer, rule, prefix)
     type(text_buffer_t), intent(inout) :: buffer
     integer, intent(in) :: rule              !! row of `group_rules`
@@ -147,7 +147,7 @@ contains
   subroutine append_examples(buffer, rule, only_template)
     type(text_buffer_t), intent(inout) :: buffer
     integer, intent(in) :: rule            !! row of `group_rules`
-    logical, intent(in) :: only_template   !! only those of the template
+    logical, intent(in) :: only_template   !! only the ones of the template
     integer :: bar, first, i
 
     do i = 1, size(examples)

@@ -12,7 +12,7 @@ module nocdyn_schema_rules
 
   !> A topic of the help on an input.
   type, public :: topic_t
-    character(len=12) :: name   !! the word of 'nocdyn help input', not that of a group
+    character(len=12) :: name   !! the word of 'nocdyn help input', not the one of a group
     character(len=56) :: help
   end type topic_t
 
@@ -42,7 +42,7 @@ module nocdyn_schema_rules
     'text', 'name', 'body', 'body', 'word', 'number', 'whole number', 'logical', 'word', 'file', 'folder', 'file']
 
   ! Relations between two sets of keys, `first` and `second`.
-  integer, parameter, public :: exactly_one = 1    !! keys of one set are given; those of the other lose their defaults
+  integer, parameter, public :: exactly_one = 1    !! keys of one set are given; the ones of the other lose their defaults
   integer, parameter, public :: at_most_one = 2    !! the same, or neither set is given
   integer, parameter, public :: requires = 3       !! `first` has values and defaults only beside one of `second`, but for a 0
   integer, parameter, public :: equal_lengths = 4  !! of the lists `first`; `second`: a file with two of them as columns, or ''

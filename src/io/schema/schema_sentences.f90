@@ -35,7 +35,7 @@ contains
     end do
   end function default_text
 
-  !> What may stand in place of a key: keys of the other set, and those of its own that exclude it.
+  !> What may stand in place of a key: keys of the other set, and the ones of its own that exclude it.
   pure function others(rule, other_set, own_set) result(text)
     type(key_rule_t), intent(in) :: rule
     character(len=*), intent(in) :: other_set, own_set   !! keys, separated by blanks

@@ -22,7 +22,7 @@ contains
   !> "> 0 [kg m2]", "'rk45', 'rosenbrock'", ".true., .false." ...; never empty.
   function allowed_text(rule, unit) result(text)
     type(key_rule_t), intent(in) :: rule
-    integer, intent(in), optional :: unit   !! of the numbers: index of `units`; that of the schema if absent or 0
+    integer, intent(in), optional :: unit   !! of the numbers: index of `units`; the one of the schema if absent or 0
     character(len=:), allocatable :: text
     integer :: number_unit
 

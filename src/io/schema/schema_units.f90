@@ -12,7 +12,7 @@ module nocdyn_schema_units
 
 contains
 
-  !> The unit beside that of SI in which a key may be written: index of `units`, 0 if there is none.
+  !> The unit beside the one of SI in which a key may be written: index of `units`, 0 if there is none.
   elemental integer function other_unit(rule) result(unit)
     type(key_rule_t), intent(in) :: rule
 

@@ -36,7 +36,7 @@ module nocdyn_netcdf_file
 
 contains
 
-  !> Keeps the reason of the first failure. The reason that the disk gives is clearer than that of the library.
+  !> Keeps the reason of the first failure. The reason that the disk gives is clearer than the one of the library.
   subroutine check(file, status)
     class(netcdf_file_t), intent(inout) :: file
     integer, intent(in) :: status               !! of a call of the library

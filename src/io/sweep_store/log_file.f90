@@ -26,7 +26,7 @@ module nocdyn_log_file
   type, public :: log_file_t
     character(len=:), allocatable :: path
     integer(int64) :: end = 0                      !! bytes up to the end of the last whole entry
-    character(len=:), allocatable :: buffer        !! the entry that `read` found; its bytes follow those of the frame
+    character(len=:), allocatable :: buffer        !! the entry that `read` found; its bytes follow the ones of the frame
     type(checksum_table_t), allocatable, private :: table
     integer(int64), private :: flushed = 0         !! count of the system clock at the last flush
     integer, private :: descriptor = -1

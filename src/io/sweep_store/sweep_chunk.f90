@@ -72,7 +72,7 @@ contains
     bytes = bytes(:used)
   end subroutine pack_chunk
 
-  !> Unpacks a chunk. Bytes that are not those of a chunk are a fault of the program: checksums have been compared before.
+  !> Unpacks a chunk. Bytes that are not the ones of a chunk are a fault of the program: checksums have been compared before.
   subroutine unpack_chunk(bytes, chunk)
     character(len=*), intent(in) :: bytes
     type(chunk_t), intent(inout) :: chunk        !! arrays of the right shape are reused

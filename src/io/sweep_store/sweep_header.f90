@@ -78,7 +78,7 @@ contains
   subroutine unpack_header(bytes, header, is_whole)
     character(len=*), intent(in) :: bytes
     type(sweep_header_t), intent(out) :: header
-    logical, intent(out) :: is_whole              !! whether the bytes are those of a header
+    logical, intent(out) :: is_whole              !! whether the bytes are the ones of a header
     type(byte_reader_t) :: reader
     integer :: numbers(6)
 

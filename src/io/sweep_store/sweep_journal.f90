@@ -234,7 +234,7 @@ contains
     call gaps(held, range_t(shard%first, shard%last), open_ranges)
   end subroutine missing_variants
 
-  !> Whether a journal is of a shard: that of a whole sweep is the only one.
+  !> Whether a journal is of a shard: the one of a whole sweep is the only one.
   elemental logical function is_of_shard(journal, shard)
     type(sweep_journal_t), intent(in) :: journal
     type(sweep_header_t), intent(in) :: shard

@@ -57,7 +57,7 @@ contains
     end associate
   end subroutine add
 
-  !> Indices in the list, sorted by line; errors on one line stay in their order, those of overrides come last.
+  !> Indices in the list, sorted by line; errors on one line stay in their order, the ones of overrides come last.
   subroutine sort_by_line(self, order)
     class(diagnostics_t), intent(in) :: self
     integer, allocatable, intent(out) :: order(:)   !! indices of `list`

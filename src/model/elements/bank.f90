@@ -53,7 +53,7 @@ module nocdyn_bank
     integer :: role = role_coupling               !! role_...: term of eq. (12) to which the bank belongs
     integer :: first_value = 1                    !! index of lane 1 of `first` in the flat arrays of the machine
     logical :: has_polynomial_potential = .true.  !! whether `polynomials` gives its whole restoring moment
-    logical :: has_paper_law = .true.             !! whether its law is that of eqs. (3), (5), (17) or (20)
+    logical :: has_paper_law = .true.             !! whether its law is the one of eqs. (3), (5), (17) or (20)
     logical :: is_silent = .false.                !! after `to_mean_torque`: whether the torque is zero in every state
     logical :: is_engine = .false.                !! whether its elements are excitations whose means drive
     logical :: follows_mean_speed = .false.       !! whether its torque changes with the speed from cycle to cycle, not within one
@@ -155,7 +155,7 @@ contains
     last = self%first + self%count - 1
   end function last
 
-  !> The kind of its elements as the input calls it: that of the role, 'shaft' or 'mesh'.
+  !> The kind of its elements as the input calls it: the one of the role, 'shaft' or 'mesh'.
   pure character(len=10) function kind_name(self)
     class(bank_t), intent(in) :: self
 
@@ -190,7 +190,7 @@ contains
   end subroutine to_mean_torque
 
   !> The harmonics of the torque, or of a twist in series, of an element in the first lane, which turns with a constant speed;
-  !> `to_mean_torque` removes them. By default there are none. Those of an element that `has_ended` do not count.
+  !> `to_mean_torque` removes them. By default there are none. The ones of an element that `has_ended` do not count.
   subroutine list_harmonics(self, element, speed, list)
     class(bank_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
@@ -242,7 +242,7 @@ contains
   end function follows_supply
 
   !> Gives the supply of the motors in the first lane a frequency: the slip of a motor is this share minus its speed over the
-  !> synchronous one. Its flux stays that of the mains, and so does the stator with its transients.
+  !> synchronous one. Its flux stays the one of the mains, and so does the stator with its transients.
   subroutine set_supply(self, share)
     class(bank_t), intent(inout) :: self
     real(wp), intent(in) :: share   !! of the frequency in the input

@@ -176,7 +176,7 @@ contains
     self%terms = [self%terms, polynomial_term_t(self%number_of(parameter), coefficient, factor)]
   end subroutine add_term
 
-  !> A parameter in the formulas of a law: of each element its own column, or that of a list.
+  !> A parameter in the formulas of a law: of each element its own column, or the one of a list.
   function parameter(self, tape, name, columns)
     class(described_elements_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape
@@ -209,7 +209,7 @@ contains
   !> Records the law and computes its constants. Every constructor of a bank that overrides `describe` calls it at the end.
   subroutine prepare_law(self, elements)
     class(described_elements_t), intent(inout) :: self
-    integer, intent(in), optional :: elements   !! of the machine; absent: those of the bank
+    integer, intent(in), optional :: elements   !! of the machine; absent: as for the bank
     type(law_tape_t), target :: tape
     integer :: all_elements, lane
 
@@ -278,7 +278,7 @@ contains
     end associate
   end subroutine list_parameters
 
-  !> Sets the coefficients of its elements among those of the machine, which are zero before, in some lanes.
+  !> Sets the coefficients of its elements among the ones of the machine, which are zero before, in some lanes.
   pure subroutine polynomials(self, first_lane, last_lane, laws)
     class(described_elements_t), intent(in) :: self
     integer, intent(in) :: first_lane, last_lane
@@ -308,7 +308,7 @@ contains
   end subroutine describe
 
   !> Adds the part of the law that is not polynomial to the moments of the elements, and sets the rates of the internal
-  !> states. All arrays but `time` are flat: the lanes of its first element, then those of its second, and so on.
+  !> states. All arrays but `time` are flat: the lanes of its first element, then the ones of its second, and so on.
   subroutine evaluate(self, time, angle, speed, internal, restoring, applied, rate)
     class(described_elements_t), intent(inout) :: self
     real(wp), intent(in) :: time(self%lanes)                                      !! t [s]
@@ -365,7 +365,7 @@ contains
     call refresh_element(self, lane, self%switch_element(switch), .true.)
   end subroutine set_branch
 
-  !> Number of a switch among those of its element.
+  !> Number of a switch among the ones of its element.
   pure integer function number_in_element(self, switch)
     class(described_elements_t), intent(in) :: self
     integer, intent(in) :: switch   !! numbered within the bank
@@ -398,7 +398,8 @@ contains
     call self%law%lowest_guards(self%branch, time, angle, speed, internal, distance)
   end subroutine block_indicators
 
-  !> The largest rate at which the moments of one lane oscillate with the time or an angle [rad/s]: that of the sines of the law.
+  !> The largest rate at which the moments of one lane oscillate with the time or an angle [rad/s]: the one of the sines of the
+  !> law.
   pure real(wp) function fastest_wave(self, lane, speed)
     class(described_elements_t), intent(in) :: self
     integer, intent(in) :: lane

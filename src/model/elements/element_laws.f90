@@ -149,7 +149,7 @@ contains
     end do
   end subroutine load_inputs
 
-  !> Adds the derivatives of the moments, and sets those of the internal states.
+  !> Adds the derivatives of the moments, and sets the ones of the internal states.
   subroutine differentiate(self, first, first_internal, first_cross, elements)
     class(element_law_t), intent(inout) :: self
     integer, intent(in) :: first, first_internal   !! first element and internal state of the bank in the machine
@@ -211,7 +211,7 @@ contains
     end associate
   end subroutine differentiate_by_motion
 
-  !> Derivatives of the moments of the elements by the motion of their phases, and of those of the phases, in a strip, after
+  !> Derivatives of the moments of the elements by the motion of their phases, and of the ones of the phases, in a strip, after
   !> `walk` for the values. The mixed second derivative is that along both angles, less those along each (`subtract_curvatures`).
   subroutine differentiate_phases(self, strip, first, cross, to)
     class(element_law_t), intent(inout) :: self

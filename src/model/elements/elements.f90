@@ -23,8 +23,8 @@ module nocdyn_elements
     real(wp), allocatable :: rate_internal(:, :, :)   !! derivatives of the rate by the element's states, [lanes, members, states]
   end type internal_states_t
 
-  !> Derivatives of the moment of one element by the motion of another: of an element that has a phase by that of its phase, and
-  !> the other way round, one after the other. By `differentiate`; [lanes, pairs of an element with another] all.
+  !> Derivatives of the moment of one element by the motion of another: of an element that has a phase by the one of its phase,
+  !> and the other way round, one after the other. By `differentiate`; [lanes, pairs of an element with another] all.
   type, public :: cross_slopes_t
     integer :: count = 0
     integer, allocatable :: element(:)              !! whose moment, [pairs]
@@ -175,7 +175,7 @@ contains
     end do
   end subroutine subtract_curvatures
 
-  !> Relative angles and speeds of the elements from those of the bodies.
+  !> Relative angles and speeds of the elements from the ones of the bodies.
   subroutine gather(self, phi, omega)
     class(elements_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: phi(:, 0:)     !! [lanes, ground and bodies] [rad]

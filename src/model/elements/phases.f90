@@ -1,4 +1,4 @@
-!> Elements that belong to those of the bank before: their phases or drivers, which have no columns and no names of their own.
+!> Elements that belong to the ones of the bank before: their phases or drivers, which have no columns and no names of their own.
 module nocdyn_phases
   use nocdyn_bank, only: bank_t, role_phase
   use nocdyn_element_rows, only: rows_between
@@ -40,7 +40,7 @@ contains
     self%elastic = [integer ::]
   end subroutine connect_phases
 
-  !> There are none, as the columns are those of the bank before.
+  !> There are none, as the columns are the ones of the bank before.
   subroutine quantities(self, columns)
     class(phases_t), intent(in) :: self
     type(quantity_t), allocatable, intent(out) :: columns(:)

@@ -1,4 +1,4 @@
-!> What the elements of a bank put out: names, units, captions, and how the values follow from those of the elements.
+!> What the elements of a bank put out: names, units, captions, and how the values follow from the ones of the elements.
 module nocdyn_quantities
   use nocdyn_kinds, only: wp
   implicit none (type, external)
@@ -6,7 +6,7 @@ module nocdyn_quantities
 
   public :: new_quantity
 
-  !> How the value follows from those of the element, which `quantity_t%factor` multiplies.
+  !> How the value follows from the ones of the element, which `quantity_t%factor` multiplies.
   integer, parameter, public :: form_observed = 0   !! by `observe` of the bank
   integer, parameter, public :: form_angle = 1      !! u
   integer, parameter, public :: form_speed = 2      !! u'

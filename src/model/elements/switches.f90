@@ -13,7 +13,7 @@ module nocdyn_switches
     integer, allocatable :: element(:)       !! element of each switch, numbered in the machine, [switches]
     integer, allocatable :: moving(:)        !! elements whose motion they look at: bank by bank its elements, then their phases
     integer, allocatable :: place(:)         !! of the element of each switch in `moving`, [switches]
-    integer, allocatable :: phase_place(:)   !! of its phase; that of the element itself if it has none, [switches]
+    integer, allocatable :: phase_place(:)   !! of its phase; the one of the element itself if it has none, [switches]
     real(wp), allocatable :: phase_order(:)  !! most oscillations per turn of the phase; 0 if it has none
     integer, allocatable, private :: first_internal(:)   !! first internal state of that element in the machine, [switches]
     integer, allocatable, private :: last_internal(:)    !! last internal state of that element, [switches]

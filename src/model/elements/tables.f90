@@ -96,7 +96,7 @@ contains
     integral = segment_part(tape, segment_area) + d * integral
   end function curve_integral
 
-  !> The ends of the segment are the boundaries of the branch. Those of a time are not shifted: it does not go back.
+  !> The ends of the segment are the boundaries of the branch. The ones of a time are not shifted: it does not go back.
   subroutine guard_segment(tape, x, is_time)
     type(law_tape_t), target, intent(inout) :: tape
     type(expression_t), intent(in) :: x

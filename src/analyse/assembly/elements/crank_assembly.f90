@@ -26,7 +26,7 @@ module nocdyn_crank_assembly
 
 contains
 
-  !> Refuses cranks that cannot turn, and forces that are not those of one cycle.
+  !> Refuses cranks that cannot turn, and forces that are not the ones of one cycle.
   subroutine check_crank(input, index, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group

@@ -108,7 +108,7 @@ contains
     end do
   end subroutine add_banks
 
-  !> Those of the groups that a mask selects.
+  !> The ones of the groups that a mask selects.
   type(element_groups_t) function some(groups, mask)
     class(element_groups_t), intent(in) :: groups
     logical, intent(in) :: mask(:)   !! [groups]
@@ -166,7 +166,7 @@ contains
   function curves(self, x, y, extrapolation)
     class(element_groups_t), intent(in) :: self
     character(len=*), intent(in) :: x, y                      !! keys of the lists
-    character(len=*), intent(in), optional :: extrapolation   !! that of the group if absent
+    character(len=*), intent(in), optional :: extrapolation   !! the one of the group if absent
     type(curve_t), allocatable :: curves(:, :)
     integer :: i, lane
 
@@ -183,7 +183,7 @@ contains
   type(curve_t) function group_curve(group, x, y, extrapolation) result(curve)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: x, y                      !! keys of the lists
-    character(len=*), intent(in), optional :: extrapolation   !! that of the group if absent
+    character(len=*), intent(in), optional :: extrapolation   !! the one of the group if absent
     character(len=:), allocatable :: beyond
     integer :: inside, outside
 

@@ -93,7 +93,7 @@ contains
                                                 groups%bodies('bodies', 2), ranges, engagement, over_slip))
   end subroutine add_clutches
 
-  !> The ranges at rest of joints of one kind; those of slip are not allocated.
+  !> The ranges at rest of joints of one kind; the ones of slip are not allocated.
   type(joint_ranges_t) function rest_ranges(groups) result(ranges)
     type(element_groups_t), intent(in) :: groups
     real(wp) :: least, most

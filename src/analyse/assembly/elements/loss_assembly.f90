@@ -1,4 +1,4 @@
-!> The banks of the losses of teeth of an input: those of gears and planetary sets, and of elastic meshes.
+!> The banks of the losses of teeth of an input: the ones of gears and planetary sets, and of elastic meshes.
 module nocdyn_loss_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
   use nocdyn_curves, only: curve_t, extrapolation_constant, interpolation_linear, new_curve
@@ -112,7 +112,7 @@ contains
     real(wp) :: radii(2)
 
     torque_factor = 1.0_wp
-    if (group%kind == 'planetary') return   ! its row is that of the torque on the sun
+    if (group%kind == 'planetary') return   ! its row is the one of the torque on the sun
     if (group%kind == 'gear') then
       if (.not. group%has_value('radii')) return
     end if

@@ -78,7 +78,7 @@ contains
 
   subroutine add_meshes(groups, form, banks)
     type(element_groups_t), intent(in) :: groups
-    integer, intent(in) :: form   !! without that of the error
+    integer, intent(in) :: form   !! without the one of the error
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     real(wp), dimension(groups%lanes, size(groups%indices)) :: stiffness, zero
     integer :: bodies(2, size(groups%indices)), i

@@ -124,7 +124,7 @@ contains
     end if
   end function holds_still
 
-  !> Adds the bank of the relations and that of their drivers.
+  !> Adds the bank of the relations and the one of their drivers.
   subroutine add_relations(groups, banks)
     type(element_groups_t), intent(in) :: groups
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
@@ -149,7 +149,7 @@ contains
     call append_bank(banks, new_phases(groups%lanes, groups%names, groups%bodies('bodies', 1)))
   end subroutine add_relations
 
-  !> Adds the bank of the cardan joints and that of their drivers.
+  !> Adds the bank of the cardan joints and the one of their drivers.
   subroutine add_cardans(groups, banks)
     type(element_groups_t), intent(in) :: groups
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)

@@ -217,7 +217,7 @@ contains
     end do
   end function in_lanes
 
-  !> Adds banks of shares of loads, one for each: their loads may have switches that those of others do not have.
+  !> Adds banks of shares of loads, one for each: their loads may have switches that the ones of others do not have.
   subroutine add_shares(groups, body, banks)
     type(element_groups_t), intent(in) :: groups
     integer, intent(in) :: body(:)

@@ -150,7 +150,7 @@ contains
     links%ratio = [links%ratio, ratio]
   end subroutine add_link
 
-  !> |speed of the second body| over that of the first one.
+  !> |speed of the second body| over the one of the first one.
   pure real(wp) function ratio_of(group) result(ratio)
     type(group_t), intent(in) :: group
 

@@ -1,6 +1,6 @@
-!> The shafts of an input: their nodes, which become bodies after those of the input, and the bank of their slices.
+!> The shafts of an input: their nodes, which become bodies after the ones of the input, and the bank of their slices.
 !>
-!> The orders of the spectral elements are such that frequencies up to a highest one are those of the continuous shaft.
+!> The orders of the spectral elements are such that frequencies up to a highest one are the ones of the continuous shaft.
 module nocdyn_shaft_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
   use nocdyn_constraints, only: constraints_t
@@ -27,7 +27,7 @@ module nocdyn_shaft_assembly
   !> All shafts of an input.
   type, public :: shaft_set_t
     type(shaft_t), allocatable :: shafts(:)
-    ! the nodes, numbered from the first body after those of the input:
+    ! the nodes, numbered from the first body after the ones of the input:
     type(string_t), allocatable :: notes(:)    !! on nodes that do not suffice
     type(string_t), allocatable :: names(:)
     integer, allocatable :: ends(:, :)         !! bodies at the ends of its shaft, [2, nodes]
@@ -275,7 +275,7 @@ contains
     machine%banks(size(machine%banks))%bank%loss_damping = set%loss_damping
   end subroutine add_shafts
 
-  !> Sets the start of the nodes, as that of a massless shaft between its ends.
+  !> Sets the start of the nodes, as the one of a massless shaft between its ends.
   subroutine place_nodes(self, machine)
     class(shaft_set_t), intent(in) :: self
     type(machine_t), intent(inout) :: machine
@@ -288,7 +288,7 @@ contains
     end do
   end subroutine place_nodes
 
-  !> A value between those of the two ends, of which the ground has 0, [lanes].
+  !> A value between the ones of the two ends, of which the ground has 0, [lanes].
   pure function between(values, ends, share) result(value)
     real(wp), intent(in) :: values(:, :)   !! [lanes, bodies]
     integer, intent(in) :: ends(2)

@@ -1,4 +1,4 @@
-!> The highest frequency up to which shafts have to be those of the continuum.
+!> The highest frequency up to which shafts have to be the ones of the continuum.
 module nocdyn_shaft_frequencies
   use nocdyn_constraints, only: constraints_t
   use nocdyn_electrical_faults, only: find_fault_terms
@@ -92,7 +92,7 @@ contains
 
   contains
 
-    !> The highest speed of the bodies that group i names under a key; of two that it joins that of the first one.
+    !> The highest speed of the bodies that group i names under a key; of two that it joins the one of the first one.
     real(wp) function speed_of(key)
       character(len=*), intent(in) :: key
       integer, allocatable :: bodies(:)

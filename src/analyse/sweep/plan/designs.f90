@@ -82,7 +82,7 @@ contains
       x = self%list(:, variant)
     case default
       do i = 1, self%varied
-        ! the probability of values below that of a factor in a variant
+        ! the probability of values below the one of a factor in a variant
         select case (self%word)
         case ('random')
           probability = random_number_at(self%seed, stream_values, i, variant)

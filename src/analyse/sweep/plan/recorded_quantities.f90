@@ -146,14 +146,14 @@ contains
   end subroutine add_fatigue
 
   !> The column of the quantity of a &record, with or without its unit; 0 if there is none. The unit may be one of the field;
-  !> without one it is that of trajectory.csv.
+  !> without one it is the one of trajectory.csv.
   subroutine find_column(input, record, signals, column, diagnostics, unit)
     type(input_t), intent(in) :: input
     integer, intent(in) :: record
     type(signal_t), intent(in) :: signals(:)
     integer, intent(out) :: column
     type(diagnostics_t), intent(inout) :: diagnostics
-    integer, intent(out), optional :: unit   !! of its statistics: index of `units`, 0: that of SI
+    integer, intent(out), optional :: unit   !! of its statistics: index of `units`, 0: SI
     character(len=:), allocatable :: quantity, reason
     integer :: quantity_unit
 
@@ -171,7 +171,7 @@ contains
     character(len=*), intent(in) :: quantity
     type(signal_t), intent(in) :: signals(:)
     integer, intent(in) :: wanted(:)         !! units of a quantity without one: indices of `units`
-    integer, intent(out) :: column, unit     !! 0 if there is none; index of `units`, 0: that of SI
+    integer, intent(out) :: column, unit     !! 0 if there is none; index of `units`, 0: SI
     logical, intent(out), optional :: is_former
     integer :: i, other_unit
     logical :: has_former, matches

@@ -123,7 +123,7 @@ contains
   !> Refuses overrides of numbers that vary: they would have no effect. What a load case sets is for its run.
   subroutine refuse_overrides(input, varied, numbers, diagnostics)
     type(input_t), intent(in) :: input
-    integer, intent(in) :: varied(:)   !! index of the &vary of each number; empty if they are those of a list
+    integer, intent(in) :: varied(:)   !! index of the &vary of each number; empty if they are the ones of a list
     type(varied_numbers_t), intent(in) :: numbers
     type(diagnostics_t), intent(inout) :: diagnostics
     character(len=:), allocatable :: source
@@ -197,7 +197,7 @@ contains
     end do
   end subroutine find_varied
 
-  !> The numbers of a sweep that has been planned before: those of its &vary, or of the columns of its list.
+  !> The numbers of a sweep that has been planned before: the ones of its &vary, or of the columns of its list.
   subroutine find_planned_numbers(input, labels, numbers)
     type(input_t), intent(in) :: input
     type(string_t), intent(in) :: labels(:)   !! of the numbers

@@ -111,7 +111,7 @@ contains
     call merge_errors(input, diagnostics, failure, error)
   end subroutine add_plan_diagnostics
 
-  !> The numbers of a variant: those of the design, rounded where they are integers.
+  !> The numbers of a variant: the ones of the design, rounded where they are integers.
   pure subroutine values(self, variant, x)
     class(sweep_plan_t), intent(in) :: self
     integer, intent(in) :: variant   !! 1 to `design%variants`

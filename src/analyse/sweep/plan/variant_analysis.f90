@@ -188,7 +188,7 @@ contains
     end do
   end function largest_ratio
 
-  !> The quantities that a name stands for: a column, or those of some kinds of an element; else a column that had this name.
+  !> The quantities that a name stands for: a column, or the ones of some kinds of an element; else a column that had this name.
   pure function matching_quantities(quantities, name, kinds) result(matching)
     type(moment_form_t), intent(in) :: quantities(:)
     character(len=*), intent(in) :: name

@@ -62,7 +62,7 @@ contains
     type(group_t), intent(in) :: group
     integer, intent(in) :: position   !! of the key
     integer, intent(in) :: i          !! 2 to the length of the list
-    integer, intent(in) :: unit       !! of the message: index of `units`, 0: that of the schema
+    integer, intent(in) :: unit       !! of the message: index of `units`, 0: the one of the schema
     character(len=:), allocatable :: message
 
     message = ''

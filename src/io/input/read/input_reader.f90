@@ -29,7 +29,7 @@ contains
     type(string_t), intent(in) :: overrides(:)   !! PATH=VALUE
     type(input_t), intent(out) :: input
     type(error_t), allocatable, intent(out) :: error            !! the file or an override is wrong
-    type(diagnostics_t), intent(out), optional :: diagnostics   !! those of the error
+    type(diagnostics_t), intent(out), optional :: diagnostics   !! the ones of the error
     type(input_t), allocatable, intent(out), optional :: load_cases(:)   !! as of `read_input_text`
     character(len=*), intent(in), optional :: only_case                  !! likewise
     character(len=:), allocatable :: text
@@ -46,7 +46,7 @@ contains
     type(string_t), intent(in) :: overrides(:)   !! PATH=VALUE
     type(input_t), intent(out) :: input
     type(error_t), allocatable, intent(out) :: error                !! the text or an override is wrong
-    type(diagnostics_t), intent(out), optional :: all_diagnostics   !! those of the error, but for those of load cases
+    type(diagnostics_t), intent(out), optional :: all_diagnostics   !! the ones of the error, but for the ones of load cases
     type(input_t), allocatable, intent(out), optional :: load_cases(:)
     character(len=*), intent(in), optional :: only_case   !! the load case that is read; the others stay empty; '': all are read
     type(diagnostics_t) :: diagnostics

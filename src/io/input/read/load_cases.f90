@@ -53,7 +53,7 @@ contains
     allocate (members%has(size(members%groups), size(input%groups)), source=.false.)
     allocate (members%lacks, source=members%has)
     do c = 1, size(members%groups)
-      ! the name of a load case is that of a folder
+      ! the name of a load case is the one of a folder
       associate (name => input%groups(members%groups(c))%name)   ! without commas
         if (any([(index(lower_case(name) // ',', trim(file_endings(i)) // ',') > 0, i=1, size(file_endings))])) then
           call input%report(members%groups(c), 'name', 'name = ' // quoted(shortened(name)) // &
@@ -164,7 +164,7 @@ contains
     end do
   end subroutine find_runs
 
-  !> Refuses values of a load case that are not those of its machine, its run or its output.
+  !> Refuses values of a load case that are not the ones of its machine, its run or its output.
   subroutine check_values(input, group, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: group   !! the &load_case
@@ -229,7 +229,7 @@ contains
     if (is_element) is_element = all(group_rules(group%rule)%name_space /= [character(len=9) :: 'body', 'load_case'])
   end function is_element
 
-  !> Leaves the groups of a load case or of the machine itself. Its &run is that of an input without load cases then.
+  !> Leaves the groups of a load case or of the machine itself. Its &run is the one of an input without load cases then.
   subroutine keep_groups(input, lacks)
     type(input_t), intent(inout) :: input
     logical, intent(in) :: lacks(:)   !! whether a group is left out, of the first groups of the input

@@ -21,7 +21,7 @@ module nocdyn_raw_group
     logical :: is_quoted = .false.
     logical :: is_assigned = .false.           !! by an assignment, perhaps with a null value
     integer :: line = 0
-    integer :: unit = 0                        !! of a number: index of `units`, 0: that of the schema
+    integer :: unit = 0                        !! of a number: index of `units`, 0: the one of the schema
   end type raw_value_t
 
   !> One key.
@@ -29,7 +29,7 @@ module nocdyn_raw_group
     integer :: rule = 0                   !! its row of `key_rules`
     integer :: line = 0                   !! of its first assignment in the file
     integer :: override = 0               !! the last override that sets it, 0: none
-    integer :: unit = 0                   !! in which it is written last: index of `units`, 0: that of the schema
+    integer :: unit = 0                   !! in which it is written last: index of `units`, 0: the one of the schema
     integer :: length = 0                 !! number of values that a default has
     integer :: last = 0                   !! index of the last value that is assigned
     logical :: is_written = .false.       !! the key occurs in the file or in an override
@@ -98,7 +98,7 @@ contains
     class(raw_key_t), intent(inout) :: self
     type(namelist_t), intent(in) :: namelist
     type(assignment_t), intent(in) :: assignment
-    integer, intent(in) :: unit                             !! of the numbers: index of `units`, 0: that of the schema
+    integer, intent(in) :: unit                             !! of the numbers: index of `units`, 0: the one of the schema
     character(len=:), allocatable, intent(out) :: message   !! '': the assignment is valid
     integer :: last
 
@@ -131,7 +131,7 @@ contains
     class(raw_key_t), intent(inout) :: self
     type(namelist_t), intent(in) :: namelist
     type(assignment_t), intent(in) :: assignment
-    integer, intent(in) :: unit                             !! of the numbers: index of `units`, 0: that of the schema
+    integer, intent(in) :: unit                             !! of the numbers: index of `units`, 0: the one of the schema
     integer, intent(in) :: override                         !! index of the override
     character(len=:), allocatable, intent(out) :: message   !! '': the override is valid
     integer :: last
@@ -339,7 +339,7 @@ contains
     position = rule - first_key(self%rule) + 1
   end function position
 
-  !> The first of these positions whose key is given, 0 if none is; keys of overrides come before those of the file.
+  !> The first of these positions whose key is given, 0 if none is; keys of overrides come before the ones of the file.
   pure integer function first_given(self, positions) result(given)
     class(raw_group_t), intent(in) :: self
     integer, intent(in) :: positions(:)   !! of the keys

@@ -110,7 +110,7 @@ contains
     character(len=*), intent(in) :: name
     type(key_rule_t), intent(in) :: rules(:)   !! of the lists
     integer, intent(out) :: list               !! 0 if there is none
-    integer, intent(out) :: unit               !! index of `units`, 0: that of the schema
+    integer, intent(out) :: unit               !! index of `units`, 0: the one of the schema
 
     do list = 1, size(rules)
       unit = 0
@@ -130,7 +130,7 @@ contains
     column%name = rule%name(:len_trim(rule%name) - 1)
   end function column
 
-  !> The names of columns, those of angles and speeds in degrees and in rpm.
+  !> The names of columns, the ones of angles and speeds in degrees and in rpm.
   pure function column_names(rules) result(names)
     type(key_rule_t), intent(in) :: rules(:)   !! of their lists
     type(string_t) :: names(size(rules))
@@ -145,7 +145,7 @@ contains
   subroutine convert_column(label, rule, unit, numbers, messages)
     character(len=*), intent(in) :: label       !! file and name, for messages
     type(key_rule_t), intent(in) :: rule
-    integer, intent(in) :: unit                 !! index of `units`, 0: that of the schema
+    integer, intent(in) :: unit                 !! index of `units`, 0: the one of the schema
     real(wp), intent(inout) :: numbers(:)
     type(string_t), allocatable, intent(inout) :: messages(:)
     character(len=:), allocatable :: message, written

@@ -24,7 +24,7 @@ module nocdyn_table_file
     character(len=:), allocatable :: file        !! its name in messages
     integer :: columns = 2
     logical :: is_list = .false.                 !! a list of variants, else the table of an element
-    character :: separator = ','                 !! of columns; ';' or a tab: commas are those of decimals
+    character :: separator = ','                 !! of columns; ';' or a tab: commas are the ones of decimals
     integer :: line = 0                          !! of the text that is being read
     integer :: last_row_line = 0                 !! line of the last row
     integer :: errors = 0                        !! number of wrong lines
@@ -313,7 +313,7 @@ contains
   !> What columns are separated by.
   pure function separation(separator, has_commas) result(text)
     character, intent(in) :: separator
-    logical, intent(in) :: has_commas   !! which may be those of decimals
+    logical, intent(in) :: has_commas   !! which may be the ones of decimals
     character(len=:), allocatable :: text
 
     select case (separator)

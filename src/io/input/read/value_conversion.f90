@@ -159,7 +159,7 @@ contains
   !> Converts a number to the unit of the schema and checks it.
   subroutine convert_number(rule, unit, number, message)
     type(key_rule_t), intent(in) :: rule
-    integer, intent(in) :: unit        !! in which it is given: index of `units`, 0: that of the schema
+    integer, intent(in) :: unit        !! in which it is given: index of `units`, 0: the one of the schema
     real(wp), intent(inout) :: number  !! then in the unit of the schema, unless it is wrong
     character(len=:), allocatable, intent(out) :: message   !! text after 'KEY = VALUE'; '': the number is valid
     character(len=:), allocatable :: limit
@@ -177,7 +177,7 @@ contains
   !> Checks the text of a name, a body, a word, a file or a folder.
   subroutine check_text(rule, value, message)
     type(key_rule_t), intent(in) :: rule
-    type(string_t), intent(inout) :: value   !! a word, in any case, becomes that of the schema
+    type(string_t), intent(inout) :: value   !! a word, in any case, becomes the one of the schema
     character(len=:), allocatable, intent(inout) :: message
     type(string_t), allocatable :: words(:)
     integer :: i

@@ -180,7 +180,7 @@ contains
     call self%prepare_law()
   end subroutine to_mean_torque
 
-  !> Adds the damping of eq. (5) to the polynomial part of the law; that of a mesh with a transmission error is not in it.
+  !> Adds the damping of eq. (5) to the polynomial part of the law; the one of a mesh with a transmission error is not in it.
   subroutine add_damping(self)
     class(couplings_t), intent(inout) :: self
 
@@ -199,7 +199,8 @@ contains
     tape%damping = node_of(self%parameter(tape, 'damping'))
   end subroutine describe
 
-  !> The moments on the phase, from those of the mesh, which are described: M times the derivative -e' of the twist by the phase.
+  !> The moments on the phase, from the ones of the mesh, which are described: M times the derivative -e' of the twist by the
+  !> phase.
   subroutine describe_phase(self, tape)
     class(couplings_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape

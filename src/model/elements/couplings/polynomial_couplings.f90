@@ -50,7 +50,7 @@ contains
     coefficient(3) = coefficient(3) + cubic_stiffness
   end function elastic_coefficients
 
-  !> Adds the coefficients as parameters, without those of high order that are zero everywhere.
+  !> Adds the coefficients as parameters, without the ones of high order that are zero everywhere.
   subroutine add_coefficients(bank, coefficient, order, stiffness)
     class(bank_t), intent(inout) :: bank
     real(wp), intent(in) :: coefficient(:, :, :)   !! p_k [N m/rad^k], shape [order, lanes, couplings]

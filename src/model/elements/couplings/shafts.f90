@@ -1,7 +1,7 @@
 !> Elastic shafts: uniform segments of spectral elements (`nocdyn_spectral_elements`), whose internal nodes are bodies.
 !>
 !> Each Gauss point of a segment is an element of the bank, a slice: its angle is the twist of the part of the shaft that it
-!> stands for, and its moment that of the shaft there. Between the Gauss points of a segment the moment is a polynomial.
+!> stands for, and its moment the one of the shaft there. Between the Gauss points of a segment the moment is a polynomial.
 module nocdyn_shafts
   use nocdyn_couplings, only: coupling_common_t, couplings_t
   use nocdyn_elements, only: elements_t
@@ -27,7 +27,7 @@ module nocdyn_shafts
     integer :: first_point = 1, last_point = 0
     integer, allocatable :: ends(:)              !! its two bodies, 0 = ground
     type(shaft_element_t), allocatable :: elements(:)   !! none if it has no inertia
-    real(wp), allocatable :: moments(:, :)       !! moments at the points from those of the slices there, [most slices, points]
+    real(wp), allocatable :: moments(:, :)       !! moments at the points from the ones of the slices there, [most slices, points]
     integer, allocatable :: before(:)            !! slices of the shaft before these, [points]
     integer, allocatable :: slices(:)            !! their number, [points]
   contains
@@ -48,7 +48,7 @@ module nocdyn_shafts
 
 contains
 
-  !> The moments at the points from those of all slices, [points, slices].
+  !> The moments at the points from the ones of all slices, [points, slices].
   pure function all_moments(self) result(moments)
     class(shaft_t), intent(in) :: self
     real(wp), allocatable :: moments(:, :)
@@ -133,7 +133,7 @@ contains
 
   !> The twist of the second end against the first one [rad], the moment in the shaft [N m], elastic and of its damping, positive
   !> with the twist, the shear stress at the surface [Pa], and the moment that a speed multiplies to the power [N m]. The values
-  !> of a shaft are those of its first slice.
+  !> of a shaft are the ones of its first slice.
   pure subroutine observe(self, elements, quantity, lane, values)
     class(shafts_t), intent(in) :: self
     type(elements_t), intent(in) :: elements

@@ -2,7 +2,7 @@
 !> fork of the first shaft lies in the plane of both shafts.
 !>
 !> The second shaft then leads by an angle that oscillates twice in a turn; its speed lies between cos(angle) and 1 / cos(angle)
-!> times that of the first: H. Chr. Seherr-Thoss, F. Schmelz, E. Aucktor, Universal Joints and Driveshafts, section 1.2.
+!> times the one of the first: H. Chr. Seherr-Thoss, F. Schmelz, E. Aucktor, Universal Joints and Driveshafts, section 1.2.
 module nocdyn_cardan_rows
   use nocdyn_bank, only: role_cardan
   use nocdyn_element_rows, only: rows_between

@@ -4,7 +4,7 @@
 !>
 !> A rod with an inertia of its own has three rows more: the position of its centre of mass along the line and across, and its
 !> angle asin(p / l). Without one its mass is on its two ends; the part at the piston has one more row with the motion of the
-!> piston. The force of the first row is therefore that of the rod on the pin of the piston, however the rod is given.
+!> piston. The force of the first row is therefore the one of the rod on the pin of the piston, however the rod is given.
 module nocdyn_crank_rows
   use nocdyn_bank, only: role_crank
   use nocdyn_element_rows, only: rows_between
@@ -45,7 +45,7 @@ contains
   !> The rows of one slider-crank; the crank is the driver of all.
   function new_crank_rows(lanes, names, driven, crank) result(bank)
     integer, intent(in) :: lanes
-    type(string_t), intent(in) :: names(:)           !! that of the crank, [elements]
+    type(string_t), intent(in) :: names(:)           !! the one of the crank, [elements]
     integer, intent(in) :: driven(:)                 !! piston, and what stands for the rod; [elements], 1, 2 or 4
     type(slider_crank_t), intent(in) :: crank
     type(crank_rows_t) :: bank

@@ -110,7 +110,7 @@ contains
     end associate
   end function table_motion
 
-  !> That of the sines.
+  !> The one of the sines.
   pure real(wp) function fastest_wave(self, lane, speed)
     class(drives_t), intent(in) :: self
     integer, intent(in) :: lane

@@ -83,7 +83,7 @@ contains
     type(joint_ranges_t), intent(in) :: ranges
     type(curve_t), intent(in), optional :: engagement(:, :)   !! over the time [s], shape [lanes, joints]; absent: 1
     type(curve_t), intent(in), optional :: over_slip          !! friction of all while they slip [N m], over the speed
-                                                              !! [rad/s] from 0 on; absent: that of the ranges
+                                                              !! [rad/s] from 0 on; absent: as for the ranges
     type(friction_joints_t) :: bank
     integer :: e
 
@@ -116,7 +116,7 @@ contains
     self%elastic = [integer ::]
   end subroutine connect_joints
 
-  !> Gives every joint the switch of its mode, after that of an engagement.
+  !> Gives every joint the switch of its mode, after the one of an engagement.
   subroutine add_modes(self)
     class(friction_joints_t), intent(inout) :: self
     integer :: e

@@ -96,7 +96,7 @@ contains
                               rank_force, form_total, 1.0_wp)
   end subroutine quantities
 
-  !> Its name is that of the crank.
+  !> Its name is the one of the crank.
   pure integer function named_count(self)
     class(piston_forces_t), intent(in) :: self
 

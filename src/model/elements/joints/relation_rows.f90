@@ -1,4 +1,4 @@
-!> Tables of the angle of one body over that of another: cams, non-circular gears, levers; splines through their points.
+!> Tables of the angle of one body over the one of another: cams, non-circular gears, levers; splines through their points.
 module nocdyn_relation_rows
   use nocdyn_bank, only: role_relation
   use nocdyn_element_rows, only: rows_between

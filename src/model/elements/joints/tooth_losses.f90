@@ -7,7 +7,7 @@
 !> second wheel. In planetary sets the first wheel is the sun and moves against the carrier. C. Pelchen, C. Schweiger,
 !> M. Otter, Modeling and Simulating the Efficiency of Gearboxes and of Planetary Gearboxes, Modelica Conference 2002.
 !>
-!> M depends on all torques of the machine by way of T: it is found with those of the joints that hold (`nocdyn_tooth_loads`).
+!> M depends on all torques of the machine by way of T: it is found with the ones of the joints that hold (`nocdyn_tooth_loads`).
 module nocdyn_tooth_losses
   use nocdyn_bank, only: role_loss
   use nocdyn_curves, only: curve_t
@@ -28,7 +28,7 @@ module nocdyn_tooth_losses
     integer, allocatable :: row(:)                       !! constraint row of each gear; 0 of a mesh, [losses]
     real(wp), allocatable :: factor(:)                   !! of its multiplier, or of the moment of the mesh, in T
     real(wp), allocatable :: forward(:, :), backward(:, :)   !! efficiencies, [lanes, losses]
-    type(curve_t), allocatable :: forward_over_speed, backward_over_speed   !! those of all losses, over the speed of the
+    type(curve_t), allocatable :: forward_over_speed, backward_over_speed   !! the ones of all losses, over the speed of the
                                                          !! first wheel [rad/s] from 0 on; not allocated: the constants hold
   end type teeth_t
 

@@ -77,7 +77,7 @@ contains
     end associate
   end subroutine steady_internal
 
-  !> The speed without torque, and that of the governor.
+  !> The speed without torque, and the one of the governor.
   function knees(self, element, t) result(speeds)
     class(dc_motors_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank

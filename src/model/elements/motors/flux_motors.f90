@@ -35,7 +35,7 @@ module nocdyn_flux_motors
   real(wp), parameter, public :: arc_time = 1.0e-3_wp   !! time constant of the currents in opening contacts [s]
   real(wp), parameter :: amplitude = sqrt(2.0_wp / 3.0_wp)   ! of a phase of the star, per rms voltage between lines
 
-  !> The internal states of a motor are the flux linkages d and q of its stator, then those of its rotor [V s].
+  !> The internal states of a motor are the flux linkages d and q of its stator, then the ones of its rotor [V s].
   type, extends(bank_t), public :: flux_motors_t
     logical, private :: has_schedule = .false.   !! whether the supply follows the time
     logical, private :: is_held = .false.        !! whether the supply may have another frequency, after `hold_speed`
@@ -193,7 +193,7 @@ contains
     end associate
   end subroutine steady_internal
 
-  !> The torque swings with the mains after a change of the supply, which at the start is that of switching on.
+  !> The torque swings with the mains after a change of the supply, which at the start is the one of switching on.
   pure real(wp) function transient_frequency(self, element, is_steady)
     class(flux_motors_t), intent(in) :: self
     integer, intent(in) :: element     !! numbered within the bank
@@ -238,7 +238,7 @@ contains
     end associate
   end function idle_supply
 
-  !> The synchronous speed, and those of the largest steady torque as a motor and as a generator.
+  !> The synchronous speed, and the ones of the largest steady torque as a motor and as a generator.
   function knees(self, element, t) result(speeds)
     class(flux_motors_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
@@ -270,7 +270,7 @@ contains
     type(elements_t), intent(in) :: elements
     integer, intent(in) :: quantity   !! index in `quantities`
     integer, intent(in) :: lane
-    real(wp), intent(out) :: values(:)   !! [elements of the bank]; the current is that of a line, rms
+    real(wp), intent(out) :: values(:)   !! [elements of the bank]; the current is the one of a line, rms
     real(wp) :: z(4)
     type(induction_circuit_t) :: circuit
     integer :: e

@@ -1,5 +1,5 @@
 !> Banks of motors that a PI governor may throttle: y = clip(z + gain (set_speed - omega)) between 0 and 1, z' = (y - z) / time.
-!> That of an inverter is between -1 and 1. The set speed may follow the time.
+!> The one of an inverter is between -1 and 1. The set speed may follow the time.
 !>
 !> Between the limits z' = gain (set_speed - omega) / time, the integral of a PI controller. At a limit z tends to the limit.
 !> Stopping the integration there (clamping) would make the state slide along the limit when the governor leaves it.

@@ -224,7 +224,7 @@ contains
     end if
   end function quadratic_knees
 
-  !> The synchronous speed, and those of the largest torque as a motor and as a generator.
+  !> The synchronous speed, and the ones of the largest torque as a motor and as a generator.
   function induction_knees(self, element, t) result(speeds)
     class(induction_motors_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank

@@ -1,14 +1,14 @@
 !> The equivalent circuit of an induction motor from the values on its name plate and its breakdown torque.
 !>
 !> The circuit has, at the rated speed, the rated torque in the air gap, the rated power factor and the losses of the rated
-!> efficiency, and the given largest steady torque. The losses beside those of the rotor, which follow from the slip, are shared:
-!> `stator_share` of them in the resistance of the stator, the others, of the iron, in a resistance at the terminals, which has no
-!> part in torques. With it as 0.4 stator and rotor resistance are about the same in cage motors (L. Pedra, IEEE Transactions on
-!> Energy Conversion 19, 2004, takes them as equal). The leakage reactances of stator and rotor are equal.
+!> efficiency, and the given largest steady torque. The losses beside the ones of the rotor, which follow from the slip, are
+!> shared: `stator_share` of them in the resistance of the stator, the others, of the iron, in a resistance at the terminals,
+!> which has no part in torques. With it as 0.4 stator and rotor resistance are about the same in cage motors (L. Pedra, IEEE
+!> Transactions on Energy Conversion 19, 2004, takes them as equal). The leakage reactances of stator and rotor are equal.
 !>
 !> For a given leakage reactance X the other elements have closed forms: with the voltage E behind the stator's impedance and the
-!> power P of the air gap of a phase, R_r / s = (E^2 + sqrt(E^4 - 4 P^2 X^2)) / (2 P), and the reactive power that is left over
-!> is that of the magnetising reactance. X is the least one that gives the breakdown torque: the first change of sign in steps of
+!> power P of the air gap of a phase, R_r / s = (E^2 + sqrt(E^4 - 4 P^2 X^2)) / (2 P), and the reactive power that is left over is
+!> the one of the magnetising reactance. X is the least one that gives the breakdown torque: the first change of sign in steps of
 !> 2 %, then bisection, as the largest torque does not fall with X everywhere.
 module nocdyn_rated_circuits
   use nocdyn_induction_circuits, only: induction_circuit_t
@@ -46,7 +46,7 @@ module nocdyn_rated_circuits
     real(wp) :: power = 0.0_wp           ! of the air gap [W]
     real(wp) :: slip = 0.0_wp
     real(wp) :: resistance = 0.0_wp      ! of the stator [Ohm]
-    complex(wp) :: current = 0.0_wp      ! of the stator without that of the terminal resistance, rms [A]
+    complex(wp) :: current = 0.0_wp      ! of the stator without the one of the terminal resistance, rms [A]
   end type phase_t
 
   real(wp), parameter :: growth = 1.02_wp      ! of the reactance in a step of the search
@@ -77,7 +77,7 @@ contains
     type(phase_t) :: phase
     real(wp) :: excess, lowest, highest, ratio, x
     logical :: is_possible, starts_above
-    real(wp) :: losses   ! without those of the rotor [W]
+    real(wp) :: losses   ! without the ones of the rotor [W]
 
     limit = 1.0_wp - rating%slip()
     status = rating_too_efficient

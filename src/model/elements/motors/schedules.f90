@@ -16,7 +16,7 @@ module nocdyn_schedules
 
   !> One schedule. The first stretch is that before the first point.
   type, public :: schedule_t
-    real(wp), allocatable :: begin(:)   !! of each stretch, ascending; that of the first one is of no use [s]
+    real(wp), allocatable :: begin(:)   !! of each stretch, ascending; the one of the first one is of no use [s]
     real(wp), allocatable :: value(:)   !! at the begin of each stretch
     real(wp), allocatable :: slope(:)   !! [1/s]
     logical, allocatable :: flag(:)     !! what else holds on a stretch

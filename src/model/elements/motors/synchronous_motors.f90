@@ -178,7 +178,7 @@ contains
 
   end subroutine list_harmonics
 
-  !> The synchronous speed, and those of the points of the table.
+  !> The synchronous speed, and the ones of the points of the table.
   function knees(self, element, t) result(speeds)
     class(synchronous_motors_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank

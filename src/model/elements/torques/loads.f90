@@ -70,7 +70,7 @@ contains
   !> The moment that resists, without its viscous part: a formula of a bank with the parameters and switches of such loads.
   function resistance(bank, has_quadratic, tape) result(moment)
     class(bank_t), intent(in) :: bank
-    logical, intent(in) :: has_quadratic   !! whether its last switch is that of `quadratic`
+    logical, intent(in) :: has_quadratic   !! whether its last switch is the one of `quadratic`
     type(law_tape_t), target, intent(inout) :: tape
     type(expression_t) :: moment, speed, speed_scale
     integer :: switch

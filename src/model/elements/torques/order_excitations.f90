@@ -2,7 +2,7 @@
 !>
 !> The torque is M + sum of S sin(order u) + C cos(order u), plus a sum of the same form times u'^2 for reciprocating masses.
 !> M, S and C are known at some speeds, linear between them, and constant below the lowest and above the highest one. They are
-!> those of a cycle at a constant speed: fuel is metered by the cycle. Their slopes over the speed belong to its mean.
+!> the ones of a cycle at a constant speed: fuel is metered by the cycle. Their slopes over the speed belong to its mean.
 module nocdyn_order_excitations
   use nocdyn_bank, only: harmonic_t, role_excitation
   use nocdyn_described_elements, only: boundary_width
@@ -111,7 +111,7 @@ contains
 
     i = 0
     do k = 1, size(owner)
-      i = 1 + merge(i, 0, any(owner(max(1, k - 1):k - 1) == owner(k)))   ! its number among those of the excitation
+      i = 1 + merge(i, 0, any(owner(max(1, k - 1):k - 1) == owner(k)))   ! its number among the ones of the excitation
       do lane = 1, bank%lanes
         associate (one => torque(lane, owner(k)))
           call divide(one%speed, numbers_of(one, name, i), start(lane, k, :), slope(lane, k, :))
@@ -236,7 +236,7 @@ contains
     end subroutine add
   end function harmonic_sum
 
-  !> A parameter in the formulas; that of the present segment if it follows the speed.
+  !> A parameter in the formulas; the one of the present segment if it follows the speed.
   function picked(self, tape, name, columns) result(number)
     class(order_excitations_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape

@@ -1,4 +1,4 @@
-!> The terms of excitations that are sines of the angle of a body, sorted for their formulas: those of one excitation that are
+!> The terms of excitations that are sines of the angle of a body, sorted for their formulas: the ones of one excitation that are
 !> whole multiples of one order follow from one sine and one cosine.
 module nocdyn_order_terms
   use nocdyn_kinds, only: wp

@@ -1,7 +1,7 @@
 !> Excitations that are sums of sines of the time and of the angle u of their body: sum of A sin(f t + order u + phase).
 !>
-!> Engine orders have f = 0; those of one excitation that are whole multiples of one order follow from one sine and one cosine. A
-!> synchronous motor with p pole pairs pulsates during its start at twice the slip frequency: f = 2 omega_mains, order = -2 p.
+!> Engine orders have f = 0; the ones of one excitation that are whole multiples of one order follow from one sine and one cosine.
+!> A synchronous motor with p pole pairs pulsates during its start at twice the slip frequency: f = 2 omega_mains, order = -2 p.
 module nocdyn_wave_excitations
   use nocdyn_bank, only: harmonic_t, role_excitation, sine_harmonic
   use nocdyn_excitation_banks, only: excitation_bank_t
