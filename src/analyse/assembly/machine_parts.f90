@@ -6,31 +6,31 @@ module nocdyn_machine_parts
   use nocdyn_coordinates, only: build_coordinates
   use nocdyn_coupling_assembly, only: add_coupling_form, check_coupling, coupling_form
   use nocdyn_crank_assembly, only: add_cranks, check_crank
+  use nocdyn_electrical_faults, only: check_fault
   use nocdyn_element_groups, only: add_banks, bodies_of, body_index_t, element_groups_t, new_body_index, new_element_groups
   use nocdyn_engine_checks, only: check_engine, check_order_torques
-  use nocdyn_errors, only: add_error, error_t, exit_input, raise
-  use nocdyn_electrical_faults, only: check_fault
+  use nocdyn_errors, only: add_error, add_mistake, error_t, exit_input, raise
   use nocdyn_fatigue_groups, only: check_fatigue
   use nocdyn_input, only: input_t
   use nocdyn_joint_assembly, only: add_bearings, add_clutch_form, add_freewheels, check_clutch, clutch_form
   use nocdyn_joint_simplifications, only: list_simplifications
+  use nocdyn_kinds, only: wp
   use nocdyn_limit_groups, only: check_limit
   use nocdyn_loss_assembly, only: add_losses, check_loss
   use nocdyn_machine, only: machine_t
   use nocdyn_massless_motion, only: massless_bodies
   use nocdyn_mesh_assembly, only: add_mesh_form, check_mesh, mesh_form
-  use nocdyn_motion_assembly, only: add_cardans, add_drive_form, add_relations, check_drive, check_relation, &
-    drive_form
+  use nocdyn_motion_assembly, only: add_cardans, add_drive_form, add_relations, check_drive, check_relation, drive_form
   use nocdyn_motor_assembly, only: add_motor_form, check_motor, motor_form
   use nocdyn_moving_start, only: fit_moving_rows
-  use nocdyn_response_ranges, only: check_response_range
   use nocdyn_shaft_assembly, only: add_shafts, new_shaft_set, shaft_set_t
   use nocdyn_shaft_segments, only: check_shaft
   use nocdyn_start_speeds, only: fit_start_speeds
   use nocdyn_steady_views, only: steady_view_t
-  use nocdyn_text, only: append, joined, selected
+  use nocdyn_text, only: append, joined, rounded_text, selected, to_text
   use nocdyn_torque_assembly, only: add_engines, add_excitation_form, add_load_form, excitation_form, load_form
-  use nocdyn_written_values, only: shared_unit
+  use nocdyn_units, only: from_si, unit_rpm
+  use nocdyn_written_values, only: shared_unit, unit_of, written_key, written_number
   implicit none (type, external)
   private
 
@@ -245,5 +245,45 @@ contains
       is_given(b) = input%groups(bodies(b))%is_given('speed')
     end do
   end function given_speeds
+
+  !> Refuses ranges that begin with the faster speed, or whose ends differ in direction.
+  subroutine check_response_range(input, index, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    type(error_t), allocatable, intent(inout) :: error
+
+    associate (group => input%groups(index))
+      call check_range(input, index, 'speed', group%numbers('speed'), error)
+      call check_range(input, index, 'operating', group%numbers('operating'), error)
+    end associate
+  end subroutine check_response_range
+
+  !> Two speeds are the lowest and the highest one, in the same direction. The ones of a response may be one.
+  subroutine check_range(input, group, key, range, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: group
+    character(len=*), intent(in) :: key
+    real(wp), intent(in) :: range(:)   !! [rad/s], or empty
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: text
+
+    if (size(range) == 0) return
+    if (size(range) == 1 .and. key == 'speed') return
+    if (size(range) > 2) then
+      call add_mistake(error, input%location(group, key) // ': ' // to_text(size(range)) // ' speeds; allowed: one, ' // &
+                 'or the slowest and the fastest one')
+      return
+    end if
+    if (range(1) * range(2) > 0 .and. abs(range(1)) < abs(range(2))) return
+    if (key == 'speed' .and. .not. abs(range(1) - range(2)) > 0) return
+    associate (written => input%groups(group))
+      text = written_key(written, key) // ' = ' // written_number(written, key, range(1)) // ', ' // &
+             written_number(written, key, range(2))
+      if (unit_of(written, key) == 0) text = text // ' rad/s, which is ' // rounded_text(from_si(range(1), unit_rpm), 6) // &
+                                             ', ' // rounded_text(from_si(range(2), unit_rpm), 6) // ' rpm'
+    end associate
+    call add_mistake(error, input%location(group, key) // ': ' // text // '; allowed: first the slower speed, then ' // &
+               'the faster one, both with one sign')
+  end subroutine check_range
 
 end module nocdyn_machine_parts

@@ -2,15 +2,20 @@
 module nocdyn_campbell_results
   use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_campbell, only: analyse_campbell, campbell_t
-  use nocdyn_campbell_files, only: put_campbell, put_campbell_csv
-  use nocdyn_campbell_report, only: campbell_text
+  use nocdyn_column_lists, only: column_list_t
+  use nocdyn_csv, only: write_header, write_row
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
+  use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_margins, only: margin_text, mode_text, put_margin, put_mode
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: output_units
-  use nocdyn_text, only: string_t
+  use nocdyn_table_text, only: cell
+  use nocdyn_text, only: counted, rounded_text, string_t, to_text
+  use nocdyn_text_buffer, only: text_buffer_t
+  use nocdyn_units, only: from_si, unit_hz, unit_rpm
   implicit none (type, external)
   private
 
@@ -20,6 +25,8 @@ module nocdyn_campbell_results
   contains
     procedure :: solve, list_tables, put_table, put_report, text => printed
   end type campbell_results_t
+
+  integer, parameter :: most_modes = 20, most_crossings = 60   ! that are printed; all are in campbell.json
 
 contains
 
@@ -65,5 +72,200 @@ contains
 
     text = campbell_text(input%shown_file(), self%body, self%campbell)
   end subroutine printed
+
+  !> Writes campbell.csv: a row for every speed with natural frequencies, damping ratios and frequencies of the lines.
+  subroutine put_campbell_csv(self, body, wanted, file)
+    type(campbell_t), intent(in) :: self
+    character(len=*), intent(in) :: body   !! whose speed is held
+    integer, intent(in) :: wanted(:)       !! units of speeds: indices of `units`
+    type(output_file_t), intent(inout) :: file
+    type(column_list_t) :: list
+    type(string_t), allocatable :: labels(:)
+    integer, allocatable :: unit(:)
+    real(wp), allocatable :: row(:)
+    integer :: i, l, m
+
+    call list%start('campbell.csv', wanted)
+    call list%add_named('omega', 'rad/s', 'speed that is held', 'body', body)
+    do m = 1, self%modes%modes
+      call list%add_named('frequency_' // to_text(m), 'Hz', 'damped natural frequency')
+    end do
+    do m = 1, self%modes%modes
+      call list%add_named('damping_ratio_' // to_text(m), '1', 'damping ratio')
+    end do
+    do m = 1, self%modes%modes
+      if (self%modes%internal(m) > 0) cycle
+      call list%add_named('undamped_frequency_' // to_text(m), 'Hz', 'undamped natural frequency')
+    end do
+    do l = 1, size(self%order)
+      call list%add_named(line_name(self, l), 'Hz', 'frequency of the line')
+    end do
+    call list%list_columns(labels, unit)
+    allocate (row(size(labels)))
+    call write_header(file, labels)
+    do i = 1, size(self%speed)
+      row(1) = self%speed(i)
+      row(2:) = [from_si(self%modes%frequency(:, i), unit_hz), self%modes%damping_ratio(:, i), &
+                 from_si(pack(self%modes%undamped(:, i), self%modes%internal == 0), unit_hz), &
+                 from_si(self%frequency(:, i), unit_hz)]
+      call write_row(file, from_si(row, unit))
+    end do
+  end subroutine put_campbell_csv
+
+  !> "order_2.5"; a line with a fixed frequency has its number.
+  function line_name(self, line) result(name)
+    type(campbell_t), intent(in) :: self
+    integer, intent(in) :: line
+    character(len=:), allocatable :: name
+
+    name = 'line_' // to_text(line)
+    if (self%is_order(line)) name = 'order_' // rounded_text(self%order(line), 8)
+  end function line_name
+
+  !> The members of campbell.json.
+  subroutine put_campbell(json, input, body, self)
+    type(json_t), intent(inout) :: json
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: body
+    type(campbell_t), intent(in) :: self
+    real(wp), allocatable :: unstable(:)
+    integer :: i
+
+    call json%open_report(input%file, input%title())
+    call json%put('notes', self%notes)
+    if (size(self%unstable) > 0) then
+      unstable = self%unstable%speed
+      call json%put('unstable_speeds_rad_s', unstable)
+    end if
+    call json%put('body', body)
+    call json%put('speed_rad_s', [self%speed(1), self%speed(size(self%speed))])
+    if (size(self%settings%operating) > 0) then
+      call json%put('operating_rad_s', self%settings%operating)
+      call json%put('margin', self%settings%margin)
+    end if
+    associate (machine => self%response%machine)
+      call json%put('bodies', machine%names(:machine%bodies - machine%nodes))
+    end associate
+    call json%open_list('modes')
+    do i = 1, self%modes%modes
+      ! frequencies at both ends of the range, and the shape at the lowest speed
+      call json%open()
+      call put_mode(json, self%response%machine, self%modes, i)
+      associate (ends => [1, size(self%speed)])
+        call json%put('frequency_Hz', from_si(self%modes%frequency(i, ends), unit_hz))
+        if (self%modes%internal(i) == 0) then
+          call json%put('undamped_frequency_Hz', from_si(self%modes%undamped(i, ends), unit_hz))
+        end if
+      end associate
+      call json%put('shape', self%modes%shape(:size(self%modes%shape, 1) - self%response%machine%nodes, i))
+      call json%close()
+    end do
+    call json%close_list()
+    call json%open_list('crossings')
+    do i = 1, size(self%crossings)
+      associate (crossing => self%crossings(i))
+        call json%open()
+        call put_mode(json, self%response%machine, self%modes, crossing%mode)
+        if (self%is_order(crossing%line)) then
+          call json%put('order', self%order(crossing%line))
+        else
+          call json%put('line', crossing%line)
+        end if
+        call json%put('speed_rad_s', crossing%speed)
+        call json%put('frequency_Hz', from_si(crossing%frequency, unit_hz))
+        call json%put('damping_ratio', crossing%damping_ratio)
+        call put_margin(json, self%settings, self%modes, crossing%mode, self%distance(i))
+        call json%close()
+      end associate
+    end do
+    call json%close_list()
+    call json%close()
+  end subroutine put_campbell
+
+  !> All tables.
+  function campbell_text(file, body, self) result(text)
+    character(len=*), intent(in) :: file, body
+    type(campbell_t), intent(in) :: self
+    character(len=:), allocatable :: text
+    type(text_buffer_t) :: report
+    integer :: i, last, m
+
+    do i = 1, size(self%notes)
+      call report%append_line(file // ': note: ' // self%notes(i)%text)
+    end do
+    last = size(self%speed)
+    call report%append_line(file // ': natural frequencies from ' // rpm(self%speed(1)) // ' to ' // rpm(self%speed(last)) // &
+                            ' rpm of ' // body // ', ' // counted(size(self%order), 'order', 'orders'))
+    call report%append_line('  mode' // cell(rpm(self%speed(1)) // ' rpm') // cell(rpm(self%speed(last)) // ' rpm') // &
+                            cell('lowest [Hz]') // cell('highest [Hz]') // cell('damping ratio') // cell('highest') &
+                            // cell('undamped [Hz]') // cell('highest'))
+    do m = 1, min(self%modes%modes, most_modes)
+      associate (natural => from_si(self%modes%frequency(m, :), unit_hz), exists => self%modes%exists(m, :))
+        call report%append_line('  ' // repeat(' ', 4 - len(to_text(m))) // to_text(m) // cell(natural(1)) // &
+                                cell(natural(last)) // cell(minval(natural, mask=exists)) // cell(maxval(natural)) // &
+                                cell(rounded_text(minval(self%modes%damping_ratio(m, :), mask=exists), 3)) // &
+                                cell(rounded_text(maxval(self%modes%damping_ratio(m, :), mask=exists), 3)) // &
+                                undamped_cells(self, m) // &
+                                mode_text(self%response%machine, self%modes, m))
+      end associate
+    end do
+    if (self%modes%modes > most_modes) then
+      call report%append_line('  (' // to_text(self%modes%modes - most_modes) // ' more in campbell.csv)')
+    end if
+    call put_crossings(self, report)
+    text = report%text()
+  end function campbell_text
+
+  !> The lowest and highest undamped frequency of a mode; empty for one that is mostly an internal state.
+  function undamped_cells(self, mode) result(text)
+    type(campbell_t), intent(in) :: self
+    integer, intent(in) :: mode
+    character(len=:), allocatable :: text
+
+    text = cell('') // cell('')
+    if (self%modes%internal(mode) > 0) return
+    associate (undamped => from_si(self%modes%undamped(mode, :), unit_hz), exists => self%modes%exists(mode, :))
+      text = cell(minval(undamped, mask=exists)) // cell(maxval(undamped, mask=exists))
+    end associate
+  end function undamped_cells
+
+  function rpm(speed) result(text)
+    real(wp), intent(in) :: speed   !! [rad/s]
+    character(len=:), allocatable :: text
+
+    text = rounded_text(from_si(speed, unit_rpm), 6)
+  end function rpm
+
+  subroutine put_crossings(self, report)
+    type(campbell_t), intent(in) :: self
+    type(text_buffer_t), intent(inout) :: report
+    character(len=:), allocatable :: line
+    integer :: i
+
+    if (size(self%crossings) == 0) then
+      call report%append_line('  no order meets a natural frequency in this range')
+      return
+    end if
+    line = '  mode' // cell('order') // cell('critical [rpm]') // cell('frequency [Hz]')
+    if (size(self%settings%operating) > 0) line = line // '  distance to operation'
+    call report%append_line(line)
+    do i = 1, min(size(self%crossings), most_crossings)
+      associate (crossing => self%crossings(i))
+        line = '  ' // repeat(' ', 4 - len(to_text(crossing%mode))) // to_text(crossing%mode)
+        if (self%is_order(crossing%line)) then
+          line = line // cell(rounded_text(self%order(crossing%line), 6))
+        else
+          line = line // cell(self%response%lines(crossing%line)%word())
+        end if
+        line = line // cell(rpm(crossing%speed)) // cell(from_si(crossing%frequency, unit_hz))
+        line = line // margin_text(self%settings, self%modes, crossing%mode, self%distance(i)) // &
+               mode_text(self%response%machine, self%modes, crossing%mode)
+        call report%append_line(line)
+      end associate
+    end do
+    if (size(self%crossings) > most_crossings) then
+      call report%append_line('  (' // to_text(size(self%crossings) - most_crossings) // ' more in campbell.json)')
+    end if
+  end subroutine put_crossings
 
 end module nocdyn_campbell_results

@@ -2,7 +2,6 @@
 module nocdyn_run_command
   use nocdyn_arguments, only: arguments_t
   use nocdyn_case_choice, only: choose_case, wanted_case
-  use nocdyn_cases_files, only: remove_cases_files, write_cases_files
   use nocdyn_companion_command, only: become_companion
   use nocdyn_console, only: print_text, report_error
   use nocdyn_errors, only: add_error, error_t, exit_done, exit_failed, exit_input, raise
@@ -10,8 +9,9 @@ module nocdyn_run_command
   use nocdyn_input_reader, only: read_input
   use nocdyn_load_case_checks, only: check_input
   use nocdyn_load_case_peaks, only: case_run_t
-  use nocdyn_load_case_report, only: load_cases_text
-  use nocdyn_posix, only: is_interrupted, catch_interrupts
+  use nocdyn_load_case_report, only: load_cases_json, load_cases_text, put_load_cases_csv
+  use nocdyn_posix, only: catch_interrupts, is_interrupted, remove_file
+  use nocdyn_result_files, only: result_files_t
   use nocdyn_result_folders, only: refuse_shared_folders, refuse_sweep_folder, result_folder
   use nocdyn_run_files, only: partial_file, run_to_files, wants_netcdf
   use nocdyn_run_limits, only: run_limits_text
@@ -31,6 +31,8 @@ module nocdyn_run_command
     character(len=:), allocatable :: folder    !! of the file
     type(error_t), allocatable :: error
   end type reading_t
+
+  character(len=*), parameter :: json_file = 'cases.json', csv_file = 'cases.csv'
 
 contains
 
@@ -253,5 +255,27 @@ contains
 
     shows_table = size(arguments%operands) == 1 .and. (arguments%is_given('--case') .or. .not. allocated(input%load_case))
   end function shows_table
+
+  !> Removes the files of an earlier call from the folder of an input.
+  subroutine remove_cases_files(folder)
+    character(len=*), intent(in) :: folder
+
+    call remove_file(folder // '/' // json_file)
+    call remove_file(folder // '/' // csv_file)
+  end subroutine remove_cases_files
+
+  !> Writes both; cases.json comes last.
+  subroutine write_cases_files(input, runs, folder, error)
+    type(input_t), intent(in) :: input   !! of one of the cases
+    type(case_run_t), intent(in) :: runs(:)
+    character(len=*), intent(in) :: folder
+    type(error_t), allocatable, intent(out) :: error
+    type(result_files_t) :: files
+
+    call files%open(folder, [string_t(csv_file), string_t(json_file)])
+    call put_load_cases_csv(runs, files%files(1))
+    call files%files(2)%put(load_cases_json(input, runs))
+    call files%finish(error)
+  end subroutine write_cases_files
 
 end module nocdyn_run_command

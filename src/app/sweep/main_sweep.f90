@@ -5,8 +5,7 @@ program nocdyn_sweep_program
   use nocdyn_commands, only: command_index, command_t, remove_procedures
   use nocdyn_merge_command, only: merge_command
   use nocdyn_program, only: run_program
-  use nocdyn_run_netcdf_command, only: run_netcdf_command
-  use nocdyn_sweep_command, only: sweep_command
+  use nocdyn_sweep_command, only: run_netcdf_command, sweep_command
   implicit none (type, external)
 
   type(command_t), allocatable :: commands(:)

@@ -3,16 +3,19 @@ module nocdyn_sweep_command
   use nocdyn_arguments, only: arguments_t
   use nocdyn_console, only: report_error
   use nocdyn_errors, only: error_t, exit_done
+  use nocdyn_journal_scheduler, only: initialise_scheduler, journal_scheduler_t
   use nocdyn_posix, only: catch_interrupts
+  use nocdyn_run_command, only: run_inputs
   use nocdyn_sweep, only: compute_variants
   use nocdyn_sweep_job, only: start_job, finish_job, sweep_job_t
-  use nocdyn_journal_scheduler, only: initialise_scheduler, journal_scheduler_t
   use nocdyn_sweep_threads, only: usable_threads, refuse_ranks, print_thread_note
+  use nocdyn_trajectory_netcdf, only: netcdf_trajectory_t
   use omp_lib, only: omp_get_max_threads
   implicit none (type, external)
   private
 
-  public :: sweep_command
+  public :: run_netcdf_command, sweep_command
+
 
 contains
 
@@ -49,5 +52,13 @@ contains
     thread_count = arguments%threads
     if (thread_count == 0) thread_count = omp_get_max_threads()
   end function thread_count
+
+  !> Runs all files.
+  subroutine run_netcdf_command(arguments, code)
+    type(arguments_t), intent(in) :: arguments
+    integer, intent(out) :: code   !! the highest exit code of all files
+
+    call run_inputs(arguments, code, netcdf_trajectory_t())
+  end subroutine run_netcdf_command
 
 end module nocdyn_sweep_command

@@ -2,15 +2,16 @@
 module nocdyn_recorded_quantities
   use nocdyn_analysis_results, only: analysis_result_t
   use nocdyn_column_names, only: explain_no_signal, note_former_name
+  use nocdyn_diagnostics, only: diagnostics_t
+  use nocdyn_fatigue_statistics, only: fatigue_statistic
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_output_units, only: match_signal, output_units
   use nocdyn_recorded_analyses, only: analysis_reader_t
-  use nocdyn_recorded_fatigue, only: list_fatigue_statistics
+  use nocdyn_schema_text, only: suggestion
   use nocdyn_signals, only: former_name, signal_t
   use nocdyn_statistics, only: is_of_fatigue, new_statistic, statistic_names, statistic_t
-  use nocdyn_text, only: quoted, string_t, to_text
+  use nocdyn_text, only: quoted, shortened, string_t, to_text
   use nocdyn_variant_analysis, only: matching_quantities, recorded_kinds
   implicit none (type, external)
   private
@@ -291,5 +292,60 @@ contains
                        ' is out of range; allowed: 1 to ' // to_text(variants) // ', the number of variants', diagnostics)
     end do
   end subroutine check_trajectories
+
+  !> The statistics of a &record with a &fatigue.
+  subroutine list_fatigue_statistics(input, record, t_start, list, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record      !! index of the &record
+    real(wp), intent(in) :: t_start    !! [s]
+    type(statistic_t), allocatable, intent(out) :: list(:)
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(string_t), allocatable :: words(:)
+    integer :: fatigue, i, k
+
+    allocate (list(0))
+    call find_fatigue(input, record, fatigue, diagnostics)
+    if (fatigue == 0) return
+    allocate (words, source=input%groups(record)%texts('statistic'))
+    deallocate (list)
+    allocate (list(count([(is_of_fatigue(findloc(statistic_names == words(i)%text, .true., dim=1)), i=1, size(words))])))
+    k = 0
+    do i = 1, size(words)
+      associate (kind => findloc(statistic_names == words(i)%text, .true., dim=1))
+        if (is_of_fatigue(kind)) then
+          k = k + 1
+          list(k) = fatigue_statistic(input, fatigue, kind, t_start)
+        else
+          call input%report(record, 'statistic', 'statistic = ' // quoted(words(i)%text) // ' does not belong to fatigue; ' // &
+                            "allowed: 'damage', 'cycles'", diagnostics)
+        end if
+      end associate
+    end do
+  end subroutine list_fatigue_statistics
+
+  !> The &fatigue that a &record names, 0 if there is none.
+  subroutine find_fatigue(input, record, fatigue, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record
+    integer, intent(out) :: fatigue   !! index in the input
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(string_t), allocatable :: names(:)
+    integer, allocatable :: groups(:)
+    integer :: i
+
+    allocate (groups, source=input%groups_named('fatigue'))
+    allocate (names(size(groups)))
+    associate (name => input%groups(record)%values(input%groups(record)%key_position('fatigue'))%texts(1)%text)
+      do i = 1, size(groups)
+        names(i)%text = input%groups(groups(i))%name
+        if (names(i)%text /= name) cycle
+        fatigue = groups(i)
+        return
+      end do
+      fatigue = 0
+      call input%report(record, 'fatigue', 'fatigue: there is no &fatigue ' // quoted(shortened(name)) // &
+                        suggestion(name, names), diagnostics)
+    end associate
+  end subroutine find_fatigue
 
 end module nocdyn_recorded_quantities
