@@ -120,7 +120,11 @@ contains
     case ('limit')
       call check_limit(input, g, error)
     case ('response')
-      call check_response_range(input, g, error)
+      ! refuses ranges that begin with the faster speed, or whose ends differ in direction
+      associate (group => input%groups(g))
+        call check_range(input, g, 'speed', group%numbers('speed'), error)
+        call check_range(input, g, 'operating', group%numbers('operating'), error)
+      end associate
     case ('fatigue')
       call check_fatigue(input, g, error)
     case default
@@ -245,18 +249,6 @@ contains
       is_given(b) = input%groups(bodies(b))%is_given('speed')
     end do
   end function given_speeds
-
-  !> Refuses ranges that begin with the faster speed, or whose ends differ in direction.
-  subroutine check_response_range(input, index, error)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error
-
-    associate (group => input%groups(index))
-      call check_range(input, index, 'speed', group%numbers('speed'), error)
-      call check_range(input, index, 'operating', group%numbers('operating'), error)
-    end associate
-  end subroutine check_response_range
 
   !> Two speeds are the lowest and the highest one, in the same direction. The ones of a response may be one.
   subroutine check_range(input, group, key, range, error)

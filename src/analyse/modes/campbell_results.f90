@@ -53,8 +53,38 @@ contains
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: name
     type(output_file_t), intent(inout) :: file
+    type(column_list_t) :: list
+    type(string_t), allocatable :: labels(:)
+    integer, allocatable :: unit(:)
+    real(wp), allocatable :: row(:)
+    integer :: i, l, m
 
-    call put_campbell_csv(self%campbell, self%body, output_units(input), file)
+    ! writes campbell.csv: a row for every speed with natural frequencies, damping ratios and frequencies of the lines
+    call list%start('campbell.csv', output_units(input))
+    call list%add_named('omega', 'rad/s', 'speed that is held', 'body', self%body)
+    do m = 1, self%campbell%modes%modes
+      call list%add_named('frequency_' // to_text(m), 'Hz', 'damped natural frequency')
+    end do
+    do m = 1, self%campbell%modes%modes
+      call list%add_named('damping_ratio_' // to_text(m), '1', 'damping ratio')
+    end do
+    do m = 1, self%campbell%modes%modes
+      if (self%campbell%modes%internal(m) > 0) cycle
+      call list%add_named('undamped_frequency_' // to_text(m), 'Hz', 'undamped natural frequency')
+    end do
+    do l = 1, size(self%campbell%order)
+      call list%add_named(line_name(self%campbell, l), 'Hz', 'frequency of the line')
+    end do
+    call list%list_columns(labels, unit)
+    allocate (row(size(labels)))
+    call write_header(file, labels)
+    do i = 1, size(self%campbell%speed)
+      row(1) = self%campbell%speed(i)
+      row(2:) = [from_si(self%campbell%modes%frequency(:, i), unit_hz), self%campbell%modes%damping_ratio(:, i), &
+                 from_si(pack(self%campbell%modes%undamped(:, i), self%campbell%modes%internal == 0), unit_hz), &
+                 from_si(self%campbell%frequency(:, i), unit_hz)]
+      call write_row(file, from_si(row, unit))
+    end do
   end subroutine put_table
 
   subroutine put_report(self, input, json)
@@ -72,45 +102,6 @@ contains
 
     text = campbell_text(input%shown_file(), self%body, self%campbell)
   end subroutine printed
-
-  !> Writes campbell.csv: a row for every speed with natural frequencies, damping ratios and frequencies of the lines.
-  subroutine put_campbell_csv(self, body, wanted, file)
-    type(campbell_t), intent(in) :: self
-    character(len=*), intent(in) :: body   !! whose speed is held
-    integer, intent(in) :: wanted(:)       !! units of speeds: indices of `units`
-    type(output_file_t), intent(inout) :: file
-    type(column_list_t) :: list
-    type(string_t), allocatable :: labels(:)
-    integer, allocatable :: unit(:)
-    real(wp), allocatable :: row(:)
-    integer :: i, l, m
-
-    call list%start('campbell.csv', wanted)
-    call list%add_named('omega', 'rad/s', 'speed that is held', 'body', body)
-    do m = 1, self%modes%modes
-      call list%add_named('frequency_' // to_text(m), 'Hz', 'damped natural frequency')
-    end do
-    do m = 1, self%modes%modes
-      call list%add_named('damping_ratio_' // to_text(m), '1', 'damping ratio')
-    end do
-    do m = 1, self%modes%modes
-      if (self%modes%internal(m) > 0) cycle
-      call list%add_named('undamped_frequency_' // to_text(m), 'Hz', 'undamped natural frequency')
-    end do
-    do l = 1, size(self%order)
-      call list%add_named(line_name(self, l), 'Hz', 'frequency of the line')
-    end do
-    call list%list_columns(labels, unit)
-    allocate (row(size(labels)))
-    call write_header(file, labels)
-    do i = 1, size(self%speed)
-      row(1) = self%speed(i)
-      row(2:) = [from_si(self%modes%frequency(:, i), unit_hz), self%modes%damping_ratio(:, i), &
-                 from_si(pack(self%modes%undamped(:, i), self%modes%internal == 0), unit_hz), &
-                 from_si(self%frequency(:, i), unit_hz)]
-      call write_row(file, from_si(row, unit))
-    end do
-  end subroutine put_campbell_csv
 
   !> "order_2.5"; a line with a fixed frequency has its number.
   function line_name(self, line) result(name)

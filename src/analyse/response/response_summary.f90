@@ -57,7 +57,8 @@ contains
   !> Sums up a response.
   type(response_summary_t) function summarise_response(analysis) result(self)
     type(response_analysis_t), intent(in) :: analysis
-    integer :: i
+    integer :: i, q
+    real(wp) :: half_range, peak, ratio
 
     allocate (self%criticals(size(analysis%crossings)), self%largest(size(analysis%response%quantities)), self%barred(0))
     do i = 1, size(self%criticals)
@@ -65,7 +66,36 @@ contains
       call find_peak(analysis, self%criticals(i))
       self%criticals(i)%margin = operating_distance(analysis%settings, analysis%crossings(i)%speed)
     end do
-    call find_largest(analysis, self%largest)
+    ! the largest half range, peak and ratio of every quantity
+    do i = 1, size(analysis%response%points)
+      associate (point => analysis%response%points(i))
+        do q = 1, size(self%largest)
+          half_range = point%half_range(q)
+          peak = point%peak(q)
+          if (half_range > self%largest(q)%half_range .or. i == 1) then
+            self%largest(q)%half_range = half_range
+            self%largest(q)%half_point = i
+          end if
+          if (peak > self%largest(q)%peak .or. i == 1) then
+            self%largest(q)%peak = peak
+            self%largest(q)%peak_point = i
+          end if
+          ratio = worst_ratio(analysis%limits, point, q)
+          if (ratio > self%largest(q)%ratio) then
+            self%largest(q)%ratio = ratio
+            self%largest(q)%ratio_point = i
+          end if
+        end do
+      end associate
+    end do
+    do q = 1, size(self%largest)
+      do i = 1, size(analysis%limits)
+        associate (limit => analysis%limits(i))
+          if (limit%quantity /= q .or. limit%peak_limit() >= no_limit) cycle
+          self%largest(q)%peak_ratio = max(self%largest(q)%peak_ratio, self%largest(q)%peak / limit%peak_limit())
+        end associate
+      end do
+    end do
     do i = 1, size(analysis%limits)
       call find_barred(analysis%response%points, analysis%limits(i), i, self%barred)
     end do
@@ -128,44 +158,6 @@ contains
       end do
     end associate
   end subroutine find_peak
-
-  !> The largest half range, peak and ratio of every quantity.
-  subroutine find_largest(analysis, largest)
-    type(response_analysis_t), intent(in) :: analysis
-    type(largest_t), intent(inout) :: largest(:)
-    integer :: i, q
-    real(wp) :: half_range, peak, ratio
-
-    do i = 1, size(analysis%response%points)
-      associate (point => analysis%response%points(i))
-        do q = 1, size(largest)
-          half_range = point%half_range(q)
-          peak = point%peak(q)
-          if (half_range > largest(q)%half_range .or. i == 1) then
-            largest(q)%half_range = half_range
-            largest(q)%half_point = i
-          end if
-          if (peak > largest(q)%peak .or. i == 1) then
-            largest(q)%peak = peak
-            largest(q)%peak_point = i
-          end if
-          ratio = worst_ratio(analysis%limits, point, q)
-          if (ratio > largest(q)%ratio) then
-            largest(q)%ratio = ratio
-            largest(q)%ratio_point = i
-          end if
-        end do
-      end associate
-    end do
-    do q = 1, size(largest)
-      do i = 1, size(analysis%limits)
-        associate (limit => analysis%limits(i))
-          if (limit%quantity /= q .or. limit%peak_limit() >= no_limit) cycle
-          largest(q)%peak_ratio = max(largest(q)%peak_ratio, largest(q)%peak / limit%peak_limit())
-        end associate
-      end do
-    end do
-  end subroutine find_largest
 
   !> The largest ratio of a quantity to its limits for continuous operation at a speed, 0 without limits.
   pure real(wp) function worst_ratio(limits, point, quantity) result(ratio)

@@ -97,7 +97,8 @@ contains
     left = count([(size(readings(i)%inputs) > 0, i=1, size(readings))])
     do i = 1, size(readings)
       if (size(readings(i)%inputs) == 0) cycle
-      call remove_cases_files(readings(i)%folder)
+      call remove_file(readings(i)%folder // '/' // json_file)
+      call remove_file(readings(i)%folder // '/' // csv_file)
       if (allocated(readings(i)%inputs(1)%load_case)) then
         call run_load_cases(arguments, readings(i), code, netcdf)
       else
@@ -255,14 +256,6 @@ contains
 
     shows_table = size(arguments%operands) == 1 .and. (arguments%is_given('--case') .or. .not. allocated(input%load_case))
   end function shows_table
-
-  !> Removes the files of an earlier call from the folder of an input.
-  subroutine remove_cases_files(folder)
-    character(len=*), intent(in) :: folder
-
-    call remove_file(folder // '/' // json_file)
-    call remove_file(folder // '/' // csv_file)
-  end subroutine remove_cases_files
 
   !> Writes both; cases.json comes last.
   subroutine write_cases_files(input, runs, folder, error)

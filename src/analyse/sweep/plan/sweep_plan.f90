@@ -213,6 +213,7 @@ contains
     type(sweep_plan_t), intent(in) :: plan
     integer, intent(in) :: shard, shards   !! 1 of 1 is the whole sweep
     type(group_t) :: group
+    integer :: i
 
     header%title = plan%input%title()
     header%source = 'nocdyn ' // version // ' (' // compiler_text // ')'
@@ -225,21 +226,6 @@ contains
     header%variants = plan%design%variants
     header%first = first_of_shard(header%variants, shard, shards)
     header%last = first_of_shard(header%variants, shard + 1, shards) - 1
-    call name_quantities(plan, header)
-  end function new_sweep_header
-
-  !> The first variant of a shard. Shards are equal, but for one variant more in the first ones if there is a remainder.
-  pure integer function first_of_shard(variants, shard, shards) result(first)
-    integer, intent(in) :: variants, shard, shards
-
-    first = (shard - 1) * (variants / shards) + min(shard - 1, mod(variants, shards)) + 1
-  end function first_of_shard
-
-  subroutine name_quantities(plan, header)
-    type(sweep_plan_t), intent(in) :: plan
-    type(sweep_header_t), intent(inout) :: header
-    integer :: i
-
     allocate (header%parameters(size(plan%numbers%list)), header%results(plan%results()))
     do i = 1, size(plan%numbers%list)
       associate (one => plan%numbers%list(i))
@@ -269,7 +255,14 @@ contains
         end if
       end associate
     end do
-  end subroutine name_quantities
+  end function new_sweep_header
+
+  !> The first variant of a shard. Shards are equal, but for one variant more in the first ones if there is a remainder.
+  pure integer function first_of_shard(variants, shard, shards) result(first)
+    integer, intent(in) :: variants, shard, shards
+
+    first = (shard - 1) * (variants / shards) + min(shard - 1, mod(variants, shards)) + 1
+  end function first_of_shard
 
   subroutine set_quantity(label, unit, long_name, quantity)
     character(len=*), intent(in) :: label, unit, long_name
