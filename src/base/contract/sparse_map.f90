@@ -65,7 +65,6 @@ contains
     allocate (self%rows(rows / short), self%width(rows / short), self%is_toeplitz(rows / short))
     allocate (self%has_offset(rows / short), source=.true.)
     self%first(1) = 1
-    ! sorts the rows into bands and CSR rows
     ! number of consecutive rows from each row on whose columns advance by one from row to row
     band_rows = 1
     do r = size(band_rows) - 1, 1, -1
@@ -89,7 +88,6 @@ contains
     end do
     call append_bands(first, order, entries, self)
     if (present(has_offset)) then
-      ! marks the bands that have offsets
       do s = 1, self%bands
         self%has_offset(s) = any(has_offset(self%first_row(s):self%first_row(s) + self%rows(s) - 1))
       end do
@@ -216,8 +214,7 @@ contains
   end subroutine multiply_pair
 
   pure subroutine pair_of_rows(rows, all_rows, columns, entries, row, first, column, coefficient, offset, x, y, u, v)
-    integer, intent(in) :: rows, all_rows, columns, entries
-    integer, intent(in) :: row(rows), first(rows + 1), column(entries)
+    integer, intent(in) :: rows, all_rows, columns, entries, row(rows), first(rows + 1), column(entries)
     real(wp), intent(in) :: coefficient(entries), offset(all_rows), x(columns), y(columns)
     real(wp), intent(inout) :: u(all_rows), v(all_rows)
     real(wp) :: sum_of_x, sum_of_y
@@ -236,8 +233,7 @@ contains
   end subroutine pair_of_rows
 
   pure subroutine pair_on_lanes(lanes, rows, columns, entries, first, column, coefficient, offset, x, y, u, v)
-    integer, intent(in) :: lanes, rows, columns, entries
-    integer, intent(in) :: first(rows + 1), column(entries)
+    integer, intent(in) :: lanes, rows, columns, entries, first(rows + 1), column(entries)
     real(wp), intent(in) :: coefficient(lanes, entries), offset(lanes, rows), x(lanes, columns), y(lanes, columns)
     real(wp), intent(inout) :: u(lanes, rows), v(lanes, rows)
     integer :: c, i, k, l

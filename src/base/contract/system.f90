@@ -281,8 +281,7 @@ contains
   subroutine block_indicators(self, columns, t, y, g)
     class(system_t), intent(inout) :: self
     integer, intent(in) :: columns   !! at least `states`
-    real(wp), intent(in) :: t(self%lanes)
-    real(wp), intent(in) :: y(self%lanes, columns)
+    real(wp), intent(in) :: t(self%lanes), y(self%lanes, columns)
     real(wp), intent(inout) :: g(self%lanes, self%switches)
 
     error stop 'nocdyn_system: a system with block indicators overrides block_indicators'

@@ -37,9 +37,7 @@ contains
 
   !> Whether any number differs from `usual`.
   pure logical function any_differs(n, numbers, usual)
-    integer, intent(in) :: n
-    integer, intent(in) :: numbers(n)
-    integer, intent(in) :: usual
+    integer, intent(in) :: n, numbers(n), usual
     integer :: differences, i
 
     differences = 0

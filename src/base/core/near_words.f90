@@ -14,8 +14,7 @@ contains
   pure function nearest_word(word, candidates) result(nearest)
     character(len=*), intent(in) :: word
     type(string_t), intent(in) :: candidates(:)
-    integer :: nearest
-    integer :: i, distance, smallest
+    integer :: nearest, i, distance, smallest
 
     nearest = 0
     if (len(word) > longest_word) return
@@ -33,9 +32,7 @@ contains
   !> Optimal string alignment distance, which counts insertions, deletions, substitutions and swaps of neighbours.
   pure function edit_distance(a, b) result(distance)
     character(len=*), intent(in) :: a, b
-    integer :: distance
-    integer :: d(0:len(a), 0:len(b))
-    integer :: h, i, j, k
+    integer :: distance, d(0:len(a), 0:len(b)), h, i, j, k
 
     d(:, 0) = [(i, i=0, len(a))]
     d(0, :) = [(j, j=0, len(b))]

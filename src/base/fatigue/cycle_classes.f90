@@ -24,31 +24,45 @@ contains
     real(wp), intent(in) :: count    !! of the cycles
     real(wp), intent(in) :: damage   !! of all of them
     integer :: i, k
-    real(wp) :: merged(4, classes, -classes / 2:classes / 2 - 1)
 
     if (.not. self%range_width > 0) self%range_width = max(range, tiny(range)) / classes
     do while (range > classes * self%range_width)
-      ! doubles the width of the classes of ranges
-      do i = 1, classes / 2
-        self%sums(:, i, :) = self%sums(:, 2 * i - 1, :) + self%sums(:, 2 * i, :)
-      end do
-      self%sums(:, classes / 2 + 1:, :) = 0.0_wp
-      self%range_width = 2 * self%range_width
+      call merge_ranges(self)
     end do
     if (.not. self%mean_width > 0) self%mean_width = max(2 * abs(mean), range, tiny(range)) / classes
     do while (.not. abs(mean) < (classes / 2) * self%mean_width)
-      ! doubles the width of the classes of means
-      merged = 0.0_wp
-      do k = -classes / 4, classes / 4 - 1
-        merged(:, :, k) = self%sums(:, :, 2 * k) + self%sums(:, :, 2 * k + 1)
-      end do
-      self%sums = merged
-      self%mean_width = 2 * self%mean_width
+      call merge_means(self)
     end do
     i = max(1, min(classes, ceiling(range / self%range_width)))
     k = max(-classes / 2, min(classes / 2 - 1, floor(mean / self%mean_width)))
     self%sums(:, i, k) = self%sums(:, i, k) + [count * range, count * mean, count, damage]
   end subroutine add
+
+  !> Doubles the width of the classes of ranges.
+  pure subroutine merge_ranges(self)
+    type(cycle_classes_t), intent(inout) :: self
+    integer :: i
+
+    do i = 1, classes / 2
+      self%sums(:, i, :) = self%sums(:, 2 * i - 1, :) + self%sums(:, 2 * i, :)
+    end do
+    self%sums(:, classes / 2 + 1:, :) = 0.0_wp
+    self%range_width = 2 * self%range_width
+  end subroutine merge_ranges
+
+  !> Doubles the width of the classes of means.
+  pure subroutine merge_means(self)
+    type(cycle_classes_t), intent(inout) :: self
+    real(wp) :: merged(4, classes, -classes / 2:classes / 2 - 1)
+    integer :: k
+
+    merged = 0.0_wp
+    do k = -classes / 4, classes / 4 - 1
+      merged(:, :, k) = self%sums(:, :, 2 * k) + self%sums(:, :, 2 * k + 1)
+    end do
+    self%sums = merged
+    self%mean_width = 2 * self%mean_width
+  end subroutine merge_means
 
   !> The classes that have cycles, the largest ranges first: mean values of range and mean, number of cycles, damage.
   pure function list(self) result(rows)

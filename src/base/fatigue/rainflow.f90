@@ -45,8 +45,17 @@ contains
   pure subroutine add_point(self, value)
     class(rainflow_t), intent(inout) :: self
     real(wp), intent(in) :: value
+    real(wp) :: kept
+    integer :: i
 
-    if (self%depth == most_points) call make_room(self)
+    if (self%depth == most_points) then   ! raises the tolerance, so that at most half of the points stay
+      self%tolerance = max(2 * self%tolerance, 2 * abs(self%points(2) - self%points(1)) / most_points)
+      self%depth = 0
+      do i = 1, most_points
+        kept = self%points(i)
+        call push(self, kept)
+      end do
+    end if
     call push(self, value)
   end subroutine add_point
 
@@ -75,21 +84,6 @@ contains
     end do
   end subroutine push
 
-  !> Raises the tolerance, so that at most half of the points stay.
-  pure subroutine make_room(self)
-    class(rainflow_t), intent(inout) :: self
-    real(wp) :: value
-    integer :: i, points
-
-    points = self%depth
-    self%tolerance = max(2 * self%tolerance, 2 * abs(self%points(2) - self%points(1)) / most_points)
-    self%depth = 0
-    do i = 1, points
-      value = self%points(i)
-      call push(self, value)
-    end do
-  end subroutine make_room
-
   !> Counts the residue as half cycles; the end of the signal was the last point.
   pure subroutine finish_count(self)
     class(rainflow_t), intent(inout) :: self
@@ -104,8 +98,7 @@ contains
   !> Counts the cycle between two turning points.
   pure subroutine count_between(self, a, b, weight)
     class(rainflow_t), intent(inout) :: self
-    real(wp), intent(in) :: a, b
-    real(wp), intent(in) :: weight
+    real(wp), intent(in) :: a, b, weight
 
     call self%count_cycle(abs(b - a), 0.5_wp * (a + b), weight)
   end subroutine count_between

@@ -64,7 +64,8 @@ contains
     class(sn_curve_t), intent(in) :: self
     real(wp), intent(in) :: range   !! twice the amplitude
     real(wp), intent(in) :: mean
-    real(wp) :: amplitude
+    real(wp) :: amplitude, level, log_life
+    integer :: i, n
 
     damage = 1.0_wp
     if (self%fails_at_once(mean)) return
@@ -72,28 +73,19 @@ contains
     if (self%mean_kind == mean_strength) amplitude = amplitude / (1.0_wp - abs(mean) / self%strength)
     damage = 0.0_wp
     if (amplitude <= self%endurance .or. amplitude <= tiny(amplitude)) return
-    damage = exp(-max(-longest, min(longest, log_life(self, log(amplitude)))))
-  end function damage_of
-
-  !> The logarithm of the cycles to failure.
-  pure real(wp) function log_life(curve, level)
-    type(sn_curve_t), intent(in) :: curve
-    real(wp), intent(in) :: level   !! logarithm of the amplitude
-    integer :: i, n
-
-    n = size(curve%log_cycles)
-    if (level >= curve%log_amplitude(1)) then
-      log_life = curve%log_cycles(1) - curve%first_slope * (level - curve%log_amplitude(1))
-      return
-    end if
-    do i = 1, n - 1
-      if (level >= curve%log_amplitude(i + 1)) exit
+    level = log(amplitude)
+    n = size(self%log_cycles)
+    do i = 0, n - 1
+      if (level >= self%log_amplitude(i + 1)) exit
     end do
-    if (i >= n) then
-      log_life = curve%log_cycles(n) + curve%last_slope * (curve%log_amplitude(n) - level)
+    if (i == 0) then
+      log_life = self%log_cycles(1) - self%first_slope * (level - self%log_amplitude(1))
+    else if (i >= n) then
+      log_life = self%log_cycles(n) + self%last_slope * (self%log_amplitude(n) - level)
     else
-      log_life = curve%log_cycles(i) + slope_between(curve, i) * (curve%log_amplitude(i) - level)
+      log_life = self%log_cycles(i) + slope_between(self, i) * (self%log_amplitude(i) - level)
     end if
-  end function log_life
+    damage = exp(-max(-longest, min(longest, log_life)))
+  end function damage_of
 
 end module nocdyn_sn_curves

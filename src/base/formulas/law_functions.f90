@@ -127,8 +127,7 @@ contains
 
   !> Coefficients(1) x + coefficients(2) x^2 + ...
   function polynomial(coefficients, x) result(value)
-    type(expression_t), intent(in) :: coefficients(:)
-    type(expression_t), intent(in) :: x
+    type(expression_t), intent(in) :: coefficients(:), x
     type(expression_t) :: value
     integer :: k
 

@@ -23,8 +23,7 @@ contains
 
   !> The factors n^j / j! of derivatives, with the signs of a sine's derivatives.
   pure function harmonic_factors(order, n) result(factors)
-    integer, intent(in) :: order
-    integer, intent(in) :: n(:)
+    integer, intent(in) :: order, n(:)
     real(wp) :: factors(size(n), 0:order)
     integer :: j
 

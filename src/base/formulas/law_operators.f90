@@ -128,8 +128,7 @@ contains
   function power_with_number(x, y) result(power)
     type(expression_t), intent(in) :: x
     real(wp), intent(in) :: y
-    type(expression_t) :: power
-    type(expression_t) :: exponent
+    type(expression_t) :: power, exponent
 
     exponent = literal(x%tape, y)
     power = apply(x%tape, op_power, x%node, exponent%node)

@@ -98,14 +98,9 @@ contains
     type(law_node_t), intent(in) :: node
     integer, intent(out) :: number
     type(law_node_t), allocatable :: longer(:)
-    logical :: are_equal
 
     do number = 1, self%count
-      are_equal = self%node(number)%operation == node%operation .and. self%node(number)%a == node%a .and. &
-                  self%node(number)%b == node%b .and. .not. abs(self%node(number)%value - node%value) > 0
-      if (are_equal) are_equal = self%node(number)%last - self%node(number)%first == node%last - node%first
-      if (are_equal) are_equal = all(self%list(self%node(number)%first:self%node(number)%last) == self%list(node%first:node%last))
-      if (are_equal) return
+      if (are_equal(self, self%node(number), node)) return
     end do
     if (self%count == size(self%node)) then
       allocate (longer(2 * self%count))
@@ -117,6 +112,15 @@ contains
     call find_properties(self, self%node(self%count))
     number = self%count
   end subroutine append
+
+  pure logical function are_equal(self, x, y)
+    type(law_tape_t), intent(in) :: self
+    type(law_node_t), intent(in) :: x, y
+
+    are_equal = x%operation == y%operation .and. x%a == y%a .and. x%b == y%b .and. .not. abs(x%value - y%value) > 0
+    if (are_equal) are_equal = x%last - x%first == y%last - y%first
+    if (are_equal) are_equal = all(self%list(x%first:x%last) == self%list(y%first:y%last))
+  end function are_equal
 
   !> What a node depends on, and where its series ends.
   pure subroutine find_properties(self, node)

@@ -81,17 +81,6 @@ contains
       value = 1.0_wp / x
     case (op_wave)
       value = y * sine_of(x)
-    case default
-      value = function_value(operation, x, y)
-    end select
-  end function value_of
-
-  !> The value of a function.
-  pure real(wp) function function_value(operation, x, y) result(value)
-    integer, intent(in) :: operation
-    real(wp), intent(in) :: x, y   !! as in `value_of`
-
-    select case (operation)
     case (op_sine)
       value = sine_of(x)
     case (op_cosine)
@@ -121,6 +110,6 @@ contains
       value = 0.0_wp
       error stop 'nocdyn_law_values: no such operation'
     end select
-  end function function_value
+  end function value_of
 
 end module nocdyn_law_values

@@ -18,8 +18,7 @@ module nocdyn_law_work
     integer, allocatable :: first(:)        !! of each node; 0 for constants, and for variables that are not needed
     integer, allocatable :: work_first(:)   !! of the work space of harmonics, which follows
     integer, allocatable :: table_first(:)  !! of the factors of harmonics in `table`
-    real(wp), allocatable :: pool(:)
-    real(wp), allocatable :: table(:)
+    real(wp), allocatable :: pool(:), table(:)
   contains
     procedure :: address
   end type law_work_t

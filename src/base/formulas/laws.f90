@@ -122,7 +122,7 @@ contains
     logical, intent(in) :: is_branch_only           !! whether the parameters are as before
     type(curve_t), intent(in), optional :: curve    !! of the element, on the segment branch(1)
     integer :: a, at, copies, i
-    real(wp) :: constant_of, value, x, y
+    real(wp) :: y
 
     at = self%slot(lane, element)
     copies = self%copies(lane, element)
@@ -133,26 +133,19 @@ contains
         case (op_literal)
           constant = node%value
         case (op_parameter)
-          ! value of a parameter
-          value = 0.0_wp
+          constant = 0.0_wp
           associate (column => self%tape%list(node%first - 1 + element))
-            if (column > 0) value = parameters(node%a)%value(lane, column)
+            if (column > 0) constant = parameters(node%a)%value(lane, column)
           end associate
-          constant = value
         case (op_pick)
           constant = self%constant(at, self%column(self%tape%list(node%first - 1 + branch(node%a))))
         case (op_segment)
           constant = curve%segment_number(branch(1), node%a)
         case default
-          ! A constant computed from others of its slot
-          associate (node => self%tape%node(self%constants(i)))
-            a = merge(self%constants(i) - 1, node%a, node%operation == op_sech_squared)
-            x = self%constant(at, self%column(a))
-            y = 0.0_wp
-            if (node%b > 0) y = self%constant(at, self%column(node%b))
-            constant_of = value_of(node%operation, x, y)
-          end associate
-          constant = constant_of
+          a = merge(self%constants(i) - 1, node%a, node%operation == op_sech_squared)
+          y = 0.0_wp
+          if (node%b > 0) y = self%constant(at, self%column(node%b))
+          constant = value_of(node%operation, self%constant(at, self%column(a)), y)
         end select
         self%constant(at + 1:at + copies, i) = constant
       end associate

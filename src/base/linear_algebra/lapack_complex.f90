@@ -13,8 +13,7 @@ module nocdyn_lapack_complex
       import :: wp
       integer, intent(in) :: m, n, kl, ku, ldab
       complex(wp), intent(inout) :: ab(ldab, n)
-      integer, intent(out) :: ipiv(n)
-      integer, intent(out) :: info
+      integer, intent(out) :: ipiv(n), info
     end subroutine zgbtrf
 
     pure subroutine zgbtrs(trans, n, kl, ku, nrhs, ab, ldab, ipiv, b, ldb, info)
@@ -32,8 +31,7 @@ module nocdyn_lapack_complex
       integer, intent(in) :: n
       complex(wp), intent(inout) :: dl(n - 1), d(n), du(n - 1)
       complex(wp), intent(out) :: du2(n - 2)
-      integer, intent(out) :: ipiv(n)
-      integer, intent(out) :: info
+      integer, intent(out) :: ipiv(n), info
     end subroutine zgttrf
 
     pure subroutine zgttrs(trans, n, nrhs, dl, d, du, du2, ipiv, b, ldb, info)
@@ -50,8 +48,7 @@ module nocdyn_lapack_complex
       import :: wp
       integer, intent(in) :: n, nrhs, lda, ldb
       complex(wp), intent(inout) :: a(lda, n), b(ldb, nrhs)
-      integer, intent(out) :: ipiv(n)
-      integer, intent(out) :: info
+      integer, intent(out) :: ipiv(n), info
     end subroutine zgesv
   end interface
 

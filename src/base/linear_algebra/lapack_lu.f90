@@ -20,8 +20,7 @@ module nocdyn_lapack_lu
       import :: wp
       integer, intent(in) :: m, n, lda
       real(wp), intent(inout) :: a(lda, n)
-      integer, intent(out) :: ipiv(n)
-      integer, intent(out) :: info
+      integer, intent(out) :: ipiv(n), info
     end subroutine dgetrf
 
     subroutine dgetrs(trans, n, nrhs, a, lda, ipiv, b, ldb, info)
@@ -38,8 +37,7 @@ module nocdyn_lapack_lu
       import :: wp
       integer, intent(in) :: m, n, kl, ku, ldab
       real(wp), intent(inout) :: ab(ldab, n)
-      integer, intent(out) :: ipiv(n)
-      integer, intent(out) :: info
+      integer, intent(out) :: ipiv(n), info
     end subroutine dgbtrf
 
     subroutine dgbtrs(trans, n, kl, ku, nrhs, ab, ldab, ipiv, b, ldb, info)

@@ -19,7 +19,8 @@ contains
     real(wp), intent(out) :: z(:)            !! [n]
     logical, intent(out) :: is_basic(:)      !! whether it is w(i) that is zero, [n]
     logical, intent(out) :: is_solved        !! not where z0 may grow for ever; there may be a solution still
-    integer :: basis(size(q)), change, entering, leaving, row
+    integer :: basis(size(q)), change, entering, i, leaving, row
+    real(wp) :: factor(size(q))
     real(wp), allocatable :: table(:, :)     ! of w, z, z0 and the constants, [n, 2 n + 2]
 
     associate (n => size(q))
@@ -37,7 +38,13 @@ contains
         call choose_row(table, basis, entering, change == 1, row)
         if (row == 0) exit
         leaving = basis(row)
-        call pivot(table, row, entering)
+        table(row, :) = table(row, :) / table(row, entering)
+        factor = table(:, entering)
+        do i = 1, n
+          if (i /= row .and. abs(factor(i)) > 0) table(i, :) = table(i, :) - factor(i) * table(row, :)
+        end do
+        table(:, entering) = 0.0_wp
+        table(row, entering) = 1.0_wp
         basis(row) = entering
         is_solved = leaving == 2 * n + 1
         if (is_solved) exit
@@ -57,8 +64,7 @@ contains
   !> of the inverse of the basis; 0: none does.
   pure subroutine choose_row(table, basis, entering, is_first, row)
     real(wp), intent(in) :: table(:, :)
-    integer, intent(in) :: basis(:)
-    integer, intent(in) :: entering
+    integer, intent(in) :: basis(:), entering
     logical, intent(in) :: is_first   !! whether z0 enters, which grows until no variable is negative
     integer, intent(out) :: row
     real(wp), parameter :: least_pivot = 1.0e-10_wp, tie = 1.0e-12_wp   ! relative to the column, and to the ratios
@@ -84,21 +90,5 @@ contains
       end do
     end associate
   end subroutine choose_row
-
-  !> Turns a column into the unit vector of a row.
-  pure subroutine pivot(table, row, column)
-    real(wp), intent(inout) :: table(:, :)
-    integer, intent(in) :: row, column
-    integer :: i
-    real(wp) :: factor(size(table, 1))
-
-    table(row, :) = table(row, :) / table(row, column)
-    factor = table(:, column)
-    do i = 1, size(table, 1)
-      if (i /= row .and. abs(factor(i)) > 0) table(i, :) = table(i, :) - factor(i) * table(row, :)
-    end do
-    table(:, column) = 0.0_wp
-    table(row, column) = 1.0_wp
-  end subroutine pivot
 
 end module nocdyn_linear_complementarity

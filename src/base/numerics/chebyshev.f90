@@ -67,12 +67,17 @@ contains
     real(wp), intent(out) :: position               !! of the maximum, -1 to 1
     logical, intent(out) :: found                   !! whether `highest` has been raised
     real(wp), dimension(0:max_degree) :: whole, part_values, c, slopes, bends
-    real(wp) :: middle, half, rounding, sizes, x
+    real(wp) :: middle, half, rounding, sizes, turn, x
     type(parts_t) :: parts
     logical, dimension(2) :: has_none, has_one   ! of maxima, of minima
-    integer :: bottom, part, top
+    integer :: bottom, i, part, top
 
-    call find_range(rule%degree, values, top, bottom)
+    top = 0
+    bottom = 0
+    do i = 1, rule%degree
+      if (values(i) > values(top)) top = i
+      if (values(i) < values(bottom)) bottom = i
+    end do
     position = rule%nodes(top)
     found = values(top) > highest
     if (found) highest = values(top)
@@ -91,39 +96,17 @@ contains
       if (has_none(1)) cycle
       x = 0.0_wp
       if (has_one(1)) call find_turn(rule, part_values, slopes, bends, x)
-      call raise(middle + half * x, value(rule%degree, c, x), highest, position, found)
+      turn = value(rule%degree, c, x)
+      if (turn > highest) then
+        highest = turn
+        position = middle + half * x
+        found = .true.
+      end if
       if (has_one(1) .or. half <= least_half) cycle
       call add_part(parts, middle + 0.5_wp * half, 0.5_wp * half)
       call add_part(parts, middle - 0.5_wp * half, 0.5_wp * half)
     end do
   end subroutine raise_to_maximum
-
-  !> The nodes of the largest and of the smallest value.
-  pure subroutine find_range(n, values, top, bottom)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: values(0:n)
-    integer, intent(out) :: top, bottom
-    integer :: i
-
-    top = 0
-    bottom = 0
-    do i = 1, n
-      if (values(i) > values(top)) top = i
-      if (values(i) < values(bottom)) bottom = i
-    end do
-  end subroutine find_range
-
-  !> Raises `highest` to a value of which x is the argument.
-  pure subroutine raise(x, x_value, highest, position, found)
-    real(wp), intent(in) :: x, x_value
-    real(wp), intent(inout) :: highest, position
-    logical, intent(inout) :: found
-
-    if (.not. x_value > highest) return
-    highest = x_value
-    position = x
-    found = .true.
-  end subroutine raise
 
   !> The last position at which |p| > tolerance.
   pure subroutine find_last_exit(rule, values, tolerance, position, found)
@@ -208,8 +191,7 @@ contains
     type(interpolation_t), intent(in) :: rule
     real(wp), intent(in) :: whole_values(0:rule%degree), whole(0:max_degree)   !! of the whole polynomial: values, coefficients
     type(parts_t), intent(inout) :: parts
-    real(wp), intent(out) :: middle, half
-    real(wp), intent(out) :: values(0:max_degree), c(0:max_degree)
+    real(wp), intent(out) :: middle, half, values(0:max_degree), c(0:max_degree)
     integer :: i
 
     middle = parts%middle(parts%count)

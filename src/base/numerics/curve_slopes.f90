@@ -150,8 +150,7 @@ contains
   !> Slopes of a monotone cubic: weighted harmonic means of the adjacent secants, 0 at extremes.
   pure function monotone_slopes(h, secant) result(slope)
     real(wp), intent(in) :: h(:), secant(:)   !! widths and slopes of the segments, [points - 1], at least 2
-    real(wp) :: slope(size(h) + 1)
-    real(wp) :: after, before
+    real(wp) :: slope(size(h) + 1), after, before
     integer :: i, n
 
     n = size(h)

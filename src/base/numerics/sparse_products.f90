@@ -16,8 +16,7 @@ contains
 
   !> u = A x for rows with coefficients of their own.
   pure subroutine multiply_band(rows, width, columns, column, coefficient, x, u)
-    integer, intent(in) :: rows, width, columns
-    integer, intent(in) :: column(rows, width)
+    integer, intent(in) :: rows, width, columns, column(rows, width)
     real(wp), intent(in) :: coefficient(rows, width), x(columns)
     real(wp), intent(inout) :: u(rows)
     integer :: begin, c, i, k
@@ -38,8 +37,7 @@ contains
 
   !> u = A x for rows with equal coefficients.
   pure subroutine multiply_toeplitz(rows, width, columns, column, coefficient, x, u)
-    integer, intent(in) :: rows, width, columns
-    integer, intent(in) :: column(width)
+    integer, intent(in) :: rows, width, columns, column(width)
     real(wp), intent(in) :: coefficient(width), x(columns)
     real(wp), intent(inout) :: u(rows)
     real(wp) :: a, b
@@ -71,8 +69,7 @@ contains
 
   !> u = offset + A x and v = A y.
   pure subroutine pair_of_band(rows, width, columns, column, coefficient, offset, x, y, u, v)
-    integer, intent(in) :: rows, width, columns
-    integer, intent(in) :: column(rows, width)
+    integer, intent(in) :: rows, width, columns, column(rows, width)
     real(wp), intent(in) :: coefficient(rows, width), offset(rows), x(columns), y(columns)
     real(wp), intent(inout) :: u(rows), v(rows)
     integer :: begin, c, i, k
@@ -95,8 +92,7 @@ contains
 
   !> u = offset + A x and v = A y for rows with equal coefficients.
   pure subroutine pair_of_toeplitz(rows, width, columns, column, coefficient, without_offset, offset, x, y, u, v)
-    integer, intent(in) :: rows, width, columns
-    integer, intent(in) :: column(width)
+    integer, intent(in) :: rows, width, columns, column(width)
     logical, intent(in) :: without_offset   !! whether `offset` is zero
     real(wp), intent(in) :: coefficient(width), offset(rows), x(columns), y(columns)
     real(wp), intent(inout) :: u(rows), v(rows)
@@ -124,8 +120,7 @@ contains
 
   !> The pair of products with two diagonals, as in a chain: nothing is read twice.
   pure subroutine pair_of_chain(rows, columns, column, coefficient, without_offset, offset, x, y, u, v)
-    integer, intent(in) :: rows, columns
-    integer, intent(in) :: column(2)
+    integer, intent(in) :: rows, columns, column(2)
     logical, intent(in) :: without_offset   !! whether `offset` is zero
     real(wp), intent(in) :: coefficient(2), offset(rows), x(columns), y(columns)
     real(wp), intent(inout) :: u(rows), v(rows)
@@ -151,8 +146,7 @@ contains
 
   !> u = A x in some rows in CSR form, one lane.
   pure subroutine multiply_rows(rows, all_rows, columns, entries, row, first, column, coefficient, x, u)
-    integer, intent(in) :: rows, all_rows, columns, entries
-    integer, intent(in) :: row(rows), first(rows + 1), column(entries)
+    integer, intent(in) :: rows, all_rows, columns, entries, row(rows), first(rows + 1), column(entries)
     real(wp), intent(in) :: coefficient(entries), x(columns)
     real(wp), intent(inout) :: u(all_rows)
     real(wp) :: sum
@@ -169,8 +163,7 @@ contains
 
   !> u = A x in every lane, in CSR form.
   pure subroutine multiply_lanes(lanes, rows, columns, entries, first, column, coefficient, x, u)
-    integer, intent(in) :: lanes, rows, columns, entries
-    integer, intent(in) :: first(rows + 1), column(entries)
+    integer, intent(in) :: lanes, rows, columns, entries, first(rows + 1), column(entries)
     real(wp), intent(in) :: coefficient(lanes, entries), x(lanes, columns)
     real(wp), intent(inout) :: u(lanes, rows)
     integer :: c, i, k, l

@@ -40,10 +40,11 @@ contains
     logical, intent(in) :: repeats
     integer, intent(in), optional :: shape   !! spline_..., smooth if absent
     type(spline_t) :: self
-    real(wp), dimension(size(x) - 1) :: h, secant
-    integer :: kind, n
+    real(wp) :: bend(size(x)), h(size(x) - 1), longer(size(x) + 2), secant(size(x) - 1), slope(size(x))
+    integer :: kind, m, n
 
     n = size(x)
+    m = n - 1
     kind = spline_smooth
     if (present(shape)) kind = shape
     h = x(2:) - x(:n - 1)
@@ -56,84 +57,58 @@ contains
     allocate (self%c(0:3, n - 1))
     self%c(0, :) = y(:n - 1)
     if (repeats .and. kind == spline_smooth) then
-      call set_periodic(h, secant, self%c)
-    else
-      call set_slopes(h, secant, slopes_of(kind, h, secant, repeats), self%c)
+      call find_periodic_bends(h, secant, bend)
+      self%c(1, :) = secant - h * (2.0_wp * bend(:m) + bend(2:)) / 6.0_wp
+      self%c(2, :) = 0.5_wp * bend(:m)
+      self%c(3, :) = (bend(2:) - bend(:m)) / (6.0_wp * h)
+      return
     end if
-  end function new_spline
-
-  !> The slopes at the points, but for smooth splines that repeat.
-  pure function slopes_of(kind, h, secant, repeats) result(slope)
-    integer, intent(in) :: kind
-    real(wp), intent(in) :: h(:), secant(:)   !! widths and slopes of the segments
-    logical, intent(in) :: repeats
-    real(wp) :: slope(size(h) + 1)
-    real(wp) :: longer(size(h) + 3)
-
     select case (kind)
     case (spline_smooth)
       slope = spline_slopes(h, secant, [.false., .false.])
     case (spline_dwells)
       slope = dwell_slopes(h, secant, repeats)
     case default
-      associate (m => size(h))
-        if (repeats) then
-          longer = monotone_slopes([h(m), h, h(1)], [secant(m), secant, secant(1)])
-          slope = longer(2:m + 2)
-        else if (m > 1) then
-          slope = monotone_slopes(h, secant)
-        else
-          slope = secant(1)
-        end if
-      end associate
+      if (repeats) then
+        longer = monotone_slopes([h(m), h, h(1)], [secant(m), secant, secant(1)])
+        slope = longer(2:m + 2)
+      else if (m > 1) then
+        slope = monotone_slopes(h, secant)
+      else
+        slope = secant(1)
+      end if
     end select
-  end function slopes_of
+    self%c(1, :) = slope(:m)   ! Hermite's cubics
+    self%c(2, :) = (3.0_wp * secant - 2.0_wp * slope(:m) - slope(2:)) / h
+    self%c(3, :) = (slope(:m) + slope(2:) - 2.0_wp * secant) / h**2
+  end function new_spline
 
-  !> Hermite's cubics.
-  pure subroutine set_slopes(h, secant, slope, c)
+  !> The second derivatives of a periodic spline: a tridiagonal system with two corners, which is one without them and a product
+  !> of two vectors (Sherman and Morrison).
+  subroutine find_periodic_bends(h, secant, bend)
     real(wp), intent(in) :: h(:), secant(:)   !! widths and slopes of the segments
-    real(wp), intent(in) :: slope(:)          !! at the points
-    real(wp), intent(inout) :: c(0:, :)
+    real(wp), intent(out) :: bend(:)          !! [segments + 1], the last is the first
+    real(wp), dimension(size(h)) :: corner, diagonal, right, solution, correction
+    integer :: m
 
-    associate (m => size(h))
-      c(1, :) = slope(:m)
-      c(2, :) = (3.0_wp * secant - 2.0_wp * slope(:m) - slope(2:)) / h
-      c(3, :) = (slope(:m) + slope(2:) - 2.0_wp * secant) / h**2
-    end associate
-  end subroutine set_slopes
-
-  subroutine set_periodic(h, secant, c)
-    real(wp), intent(in) :: h(:), secant(:)   !! widths and slopes of the segments
-    real(wp), intent(inout) :: c(0:, :)
-    real(wp) :: bend(size(h) + 1)             ! second derivatives
-    real(wp), dimension(size(h)) :: corner, correction, diagonal, right, solution
-    integer :: i
-
-    ! The second derivatives of a periodic spline: a tridiagonal system with two corners, which is one without them and a product
-    ! of two vectors (Sherman and Morrison).
-    i = size(h)
+    m = size(h)
     diagonal = 2.0_wp * (cshift(h, -1) + h)
     right = 6.0_wp * (secant - cshift(secant, -1))
-    if (i == 2) then   ! both neighbours of a point are the other point
+    if (m == 2) then   ! both neighbours of a point are the other point
       associate (total => sum(h))
         bend(1) = (2.0_wp * right(1) - right(2)) / (3.0_wp * total)
         bend(2) = (2.0_wp * right(2) - right(1)) / (3.0_wp * total)
       end associate
     else
       corner = 0.0_wp
-      corner([1, i]) = h(i)
-      diagonal([1, i]) = diagonal([1, i]) - h(i)
-      call solve_tridiagonal(diagonal, h(:i - 1), right, solution)
-      call solve_tridiagonal(diagonal, h(:i - 1), corner, correction)
-      bend(:i) = solution - correction * (solution(1) + solution(i)) / (1.0_wp + correction(1) + correction(i))
+      corner([1, m]) = h(m)
+      diagonal([1, m]) = diagonal([1, m]) - h(m)
+      call solve_tridiagonal(diagonal, h(:m - 1), right, solution)
+      call solve_tridiagonal(diagonal, h(:m - 1), corner, correction)
+      bend(:m) = solution - correction * (solution(1) + solution(m)) / (1.0_wp + correction(1) + correction(m))
     end if
-    bend(i + 1) = bend(1)
-    associate (m => size(h))
-      c(1, :) = secant - h * (2.0_wp * bend(:m) + bend(2:)) / 6.0_wp
-      c(2, :) = 0.5_wp * bend(:m)
-      c(3, :) = (bend(2:) - bend(:m)) / (6.0_wp * h)
-    end associate
-  end subroutine set_periodic
+    bend(m + 1) = bend(1)
+  end subroutine find_periodic_bends
 
   !> Solves a symmetric positive definite tridiagonal system (DPTSV).
   subroutine solve_tridiagonal(diagonal, beside, right, solution)
@@ -155,8 +130,7 @@ contains
   pure function derivatives(self, x) result(y)
     class(spline_t), intent(in) :: self
     real(wp), intent(in) :: x
-    real(wp) :: y(0:3)
-    real(wp) :: d, turns
+    real(wp) :: y(0:3), d, turns
     integer :: first, last, middle
 
     turns = 0.0_wp

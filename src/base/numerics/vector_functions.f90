@@ -225,49 +225,60 @@ contains
   pure subroutine log2s(n, x)
     integer, intent(in) :: n
     real(wp), intent(inout) :: x(n)
-    real(wp), parameter :: c1 = 2.8853900817779268_wp, c3 = c1 / 3.0_wp, c5 = c1 / 5.0_wp, c7 = c1 / 7.0_wp, c9 = c1 / 9.0_wp
-    real(wp), parameter :: root_2 = 1.4142135623730950_wp
-    real(wp), parameter :: bias = 2.0_wp**52 + 1023.0_wp
-    integer(int64), parameter :: exponent_of_one = shiftl(1023_int64, 52), exponent_of_whole = shiftl(1075_int64, 52)
-    integer(int64), parameter :: mantissa = shiftl(1_int64, 52) - 1
     integer :: i
-    integer(int64) :: bits
-    real(wp) :: k, log2_of, m, s, s2, s4
 
     do i = 1, n
-      bits = transfer(x(i), bits)
-      k = transfer(ior(shiftr(bits, 52), exponent_of_whole), k) - bias
-      m = transfer(ior(iand(bits, mantissa), exponent_of_one), m)
-      s = (m - root_2) / (m + root_2)
-      s2 = s * s
-      s4 = s2 * s2
-      log2_of = (k + 0.5_wp) + s * ((c1 + c3 * s2) + ((c5 + c7 * s2) + c9 * s4) * s4)
-      x(i) = log2_of
+      x(i) = log2_of(x(i))
     end do
   end subroutine log2s
+
+  pure real(wp) function log2_of(x)
+    real(wp), intent(in) :: x
+    integer(int64), parameter :: mantissa = shiftl(1_int64, 52) - 1
+    integer(int64), parameter :: exponent_of_one = shiftl(1023_int64, 52), exponent_of_whole = shiftl(1075_int64, 52)
+    real(wp), parameter :: bias = 2.0_wp**52 + 1023.0_wp
+    real(wp), parameter :: root_2 = 1.4142135623730950_wp
+    real(wp), parameter :: c1 = 2.8853900817779268_wp, c3 = c1 / 3.0_wp, c5 = c1 / 5.0_wp, c7 = c1 / 7.0_wp, c9 = c1 / 9.0_wp
+    integer(int64) :: bits
+    real(wp) :: k, m, s, s2, s4
+
+    bits = transfer(x, bits)
+    k = transfer(ior(shiftr(bits, 52), exponent_of_whole), k) - bias
+    m = transfer(ior(iand(bits, mantissa), exponent_of_one), m)
+    s = (m - root_2) / (m + root_2)
+    s2 = s * s
+    s4 = s2 * s2
+    log2_of = (k + 0.5_wp) + s * ((c1 + c3 * s2) + ((c5 + c7 * s2) + c9 * s4) * s4)
+  end function log2_of
 
   !> Replaces each x by 2^x with a relative error below 1e-8; x is limited to -1000 to 1000.
   pure subroutine exp2s(n, x)
     integer, intent(in) :: n
     real(wp), intent(inout) :: x(n)
-    real(wp), parameter :: b6 = 0.00015403530393381606_wp, b7 = 1.5252733804059838e-05_wp
-    real(wp), parameter :: b4 = 0.0096181291076284769_wp, b5 = 0.0013333558146428441_wp
-    real(wp), parameter :: b1 = 0.69314718055994531_wp, b2 = 0.24022650695910069_wp, b3 = 0.055504108664821576_wp
-    real(wp), parameter :: to_exponent = to_whole + 1023.0_wp   ! leaves the bits of the exponent at the end
-    real(wp), parameter :: largest_exponent = 1000.0_wp
     integer :: i
-    real(wp) :: exp2_of, moderate, r, r2, r4, shifted, two_to_k
 
     do i = 1, n
-      moderate = max(-largest_exponent, min(x(i), largest_exponent))
-      shifted = moderate + to_exponent
-      r = moderate - (shifted - to_exponent)
-      r2 = r * r
-      r4 = r2 * r2
-      two_to_k = transfer(shiftl(transfer(shifted, 1_int64), 52), two_to_k)
-      exp2_of = (((1.0_wp + b1 * r) + (b2 + b3 * r) * r2) + ((b4 + b5 * r) + (b6 + b7 * r) * r2) * r4) * two_to_k
-      x(i) = exp2_of
+      x(i) = exp2_of(x(i))
     end do
   end subroutine exp2s
+
+  pure real(wp) function exp2_of(x)
+    real(wp), intent(in) :: x
+    real(wp), parameter :: largest_exponent = 1000.0_wp
+    real(wp), parameter :: to_exponent = to_whole + 1023.0_wp   ! leaves the bits of the exponent at the end
+    ! ln(2)^n / n!, written out: compilers round powers of constants differently
+    real(wp), parameter :: b1 = 0.69314718055994531_wp, b2 = 0.24022650695910069_wp, b3 = 0.055504108664821576_wp
+    real(wp), parameter :: b4 = 0.0096181291076284769_wp, b5 = 0.0013333558146428441_wp
+    real(wp), parameter :: b6 = 0.00015403530393381606_wp, b7 = 1.5252733804059838e-05_wp
+    real(wp) :: moderate, r, r2, r4, shifted, two_to_k
+
+    moderate = max(-largest_exponent, min(x, largest_exponent))
+    shifted = moderate + to_exponent
+    r = moderate - (shifted - to_exponent)
+    r2 = r * r
+    r4 = r2 * r2
+    two_to_k = transfer(shiftl(transfer(shifted, 1_int64), 52), two_to_k)
+    exp2_of = (((1.0_wp + b1 * r) + (b2 + b3 * r) * r2) + ((b4 + b5 * r) + (b6 + b7 * r) * r2) * r4) * two_to_k
+  end function exp2_of
 
 end module nocdyn_vector_functions

@@ -51,8 +51,7 @@ contains
   !> Philox4x32-10.
   pure function philox_4x32(counter, key) result(words)
     integer(int64), intent(in) :: counter(4), key(2)   !! words from 0 to 2^32 - 1
-    integer(int64) :: words(4)
-    integer(int64) :: high(2), low(2), round_key(2)
+    integer(int64) :: words(4), high(2), low(2), round_key(2)
     integer :: i
 
     words = counter

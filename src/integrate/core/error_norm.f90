@@ -73,9 +73,7 @@ contains
       end do
     end if
     control%mean_square(:) = control%mean_square / max(measured(system), 1)
-    if (attempt%components > attempt%states) then
-      call limit_by_quadratures(attempt, attempt%y, attempt%y_new, attempt%error_estimate, attempt%low_order_estimate, control)
-    end if
+    if (attempt%components > attempt%states) call limit_by_quadratures(attempt, control)
     if (.not. are_some_given) return
     do lane = 1, attempt%lanes
       if (.not. control%is_given(lane)) cycle
@@ -127,9 +125,8 @@ contains
 
   !> Raises `mean_square` where the largest error of the quadratures exceeds what `quadrature_tolerance` allows. Nothing else
   !> limits steps over which the states have no error, e.g. polynomials of the time. Two estimates are combined as for the states.
-  pure subroutine limit_by_quadratures(attempt, y, y_new, error_estimate, low_order_estimate, control)
+  pure subroutine limit_by_quadratures(attempt, control)
     type(step_attempt_t), intent(in) :: attempt
-    real(wp), intent(in), dimension(attempt%lanes, attempt%components) :: y, y_new, error_estimate, low_order_estimate
     type(step_control_t), intent(inout) :: control
     real(wp) :: low_order, error, largest, change
     integer :: i, lane
@@ -140,10 +137,10 @@ contains
       largest = 0.0_wp
       change = 0.0_wp
       do i = attempt%states + 1, attempt%components
-        error = max(error, abs(error_estimate(lane, i)))
-        if (attempt%has_low_order_estimate) low_order = max(low_order, abs(low_order_estimate(lane, i)))
-        largest = max(largest, abs(y(lane, i)), abs(y_new(lane, i)))
-        change = max(change, abs(y_new(lane, i) - y(lane, i)))
+        error = max(error, abs(attempt%error_estimate(lane, i)))
+        if (attempt%has_low_order_estimate) low_order = max(low_order, abs(attempt%low_order_estimate(lane, i)))
+        largest = max(largest, abs(attempt%y(lane, i)), abs(attempt%y_new(lane, i)))
+        change = max(change, abs(attempt%y_new(lane, i) - attempt%y(lane, i)))
       end do
       error = min(error, largest_ratio)
       if (error > 0) error = error * (error / hypot(error, sqrt(low_order_share) * low_order))
@@ -167,8 +164,7 @@ contains
   !> Replaces each error by (error / (atol + rtol max(|y|, |y_new|)))^2.
   pure subroutine square_scaled_errors(n, rtol, atol, y, y_new, error_estimate)
     integer, intent(in) :: n   !! lanes * states
-    real(wp), intent(in) :: rtol, atol
-    real(wp), intent(in) :: y(n), y_new(n)
+    real(wp), intent(in) :: rtol, atol, y(n), y_new(n)
     real(wp), intent(inout) :: error_estimate(n)
     integer :: i
 

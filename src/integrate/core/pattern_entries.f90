@@ -14,8 +14,7 @@ module nocdyn_pattern_entries
   !> Some entries of a pattern.
   type, public :: entries_t
     integer, allocatable :: position(:)   !! indices in the pattern
-    integer, allocatable :: row(:)
-    integer, allocatable :: column(:)
+    integer, allocatable :: row(:), column(:)
   end type entries_t
 
 contains
@@ -25,6 +24,8 @@ contains
     type(pattern_t), intent(in) :: pattern
     integer, intent(in) :: states, quadratures
     character(len=message_length) :: pattern_message
+    type(groups_t) :: rows_of
+    integer :: seen_in(states + quadratures), i, column
 
     pattern_message = ''
     if (size(pattern%row) /= size(pattern%column)) then
@@ -33,30 +34,17 @@ contains
       pattern_message = 'the rows of a pattern are states or quadratures'
     else if (any(pattern%column < 1 .or. pattern%column > states)) then
       pattern_message = 'the columns of a pattern are states'
-    else if (has_duplicates(pattern, states, states + quadratures)) then
-      pattern_message = 'a pattern has each position at most once'
     end if
-  end function pattern_error
-
-  !> Whether a pattern has a position more than once.
-  pure function has_duplicates(pattern, columns, rows)
-    type(pattern_t), intent(in) :: pattern
-    integer, intent(in) :: columns, rows
-    logical :: has_duplicates
-    type(groups_t) :: rows_of
-    integer :: seen_in(rows)
-    integer :: i, column
-
-    rows_of = grouped(columns, pattern%column, pattern%row)
-    has_duplicates = .false.
+    if (pattern_message /= '') return
+    rows_of = grouped(states, pattern%column, pattern%row)
     seen_in = 0
-    do column = 1, columns
+    do column = 1, states
       do i = rows_of%start(column), rows_of%start(column + 1) - 1
-        has_duplicates = has_duplicates .or. seen_in(rows_of%member(i)) == column
+        if (seen_in(rows_of%member(i)) == column) pattern_message = 'a pattern has each position at most once'
         seen_in(rows_of%member(i)) = column
       end do
     end do
-  end function has_duplicates
+  end function pattern_error
 
   !> The entries of a pattern in the rows from `first` to `last`.
   pure function entries_in_rows(pattern, first, last) result(entries)

@@ -29,11 +29,9 @@ module nocdyn_solver_status
     integer, allocatable :: component(:)        !! that caused a failure, 0 if none did
     integer, allocatable :: measure(:)          !! measured quantity whose error did, 0 if none did
     integer, allocatable :: steps(:)            !! attempts, accepted or rejected
-    integer, allocatable :: accepted(:)
-    integer, allocatable :: rejected(:)
+    integer, allocatable :: accepted(:), rejected(:)
     integer, allocatable :: evaluations(:)      !! of f
-    integer, allocatable :: jacobians(:)
-    integer, allocatable :: factorisations(:)
+    integer, allocatable :: jacobians(:), factorisations(:)
     integer, allocatable :: implicit_steps(:)   !! accepted steps of an implicit method without trials
     integer, allocatable :: switches(:)         !! changes between explicit and implicit method
     real(wp), allocatable :: switch_times(:, :) !! times of the first such changes [s], [max_switch_times, lanes]
@@ -113,8 +111,7 @@ contains
     integer, intent(in) :: lane
     class(system_t), intent(in) :: system
     real(wp), intent(in) :: rtol, atol   !! tolerances of the integration
-    character(len=:), allocatable :: sentence
-    character(len=:), allocatable :: reason, when
+    character(len=:), allocatable :: sentence, reason, when
 
     when = 't = ' // rounded_text(solver_status%t(lane), digits) // ' s'
     select case (solver_status%code(lane))
@@ -123,11 +120,33 @@ contains
     case (integration_step_too_small)
       sentence = too_small_sentence(solver_status, lane, system, rtol, atol, when)
     case (integration_too_many_steps)
-      sentence = too_many_sentence(solver_status, lane, system, when)
+      sentence = 'the integration stopped at ' // when // ' after ' // to_text(solver_status%steps(lane)) // &
+        ' steps, the most that max_steps allows (last step ' // rounded_text(solver_status%h(lane), digits) // ' s): '
+      if (2 * solver_status%crossings(lane) > solver_status%steps(lane)) then
+        sentence = sentence // to_text(solver_status%crossings(lane)) // ' changes of branches have ended steps, ' // &
+          'the last at the ' // system%switch_name(solver_status%last_crossing(lane)) // '; '
+      end if
+      sentence = sentence // 'raise max_steps, or loosen rtol and atol'
+      if (solver_status%jacobians(lane) == 0) sentence = sentence // ', or, if the system is stiff, take an implicit method'
     case (integration_chattering)
-      sentence = chattering_sentence(solver_status, lane, system, when)
+      reason = system%evaluation_obstacle()
+      if (reason /= '') then
+        sentence = 'no motion fits all joints beyond ' // when // ': ' // reason
+      else
+        sentence = 'the solution chatters at ' // when // ', at the ' // &
+          system%switch_name(solver_status%last_crossing(lane)) // ' (' // to_text(solver_status%crossings(lane)) // &
+          ' changes of branches so far): the equations on both sides of the boundary drive it back; make the change smooth'
+      end if
     case (integration_not_finite)
-      sentence = not_finite_sentence(solver_status, lane, system, when)
+      reason = 'Jacobian'
+      if (solver_status%component(lane) > 0) reason = system%component_name(solver_status%component(lane))
+      if (solver_status%steps(lane) == 0) then
+        sentence = 'the derivative of the ' // reason // ' at the start, ' // when // &
+          ', is not a finite number: check the start values and the parameters'
+      else
+        sentence = 'the ' // reason // ' stops being a finite number right after ' // when // &
+          ', however short the step (h = ' // rounded_text(solver_status%h(lane), digits) // ' s): look for a singularity there'
+      end if
     case (integration_rhs_failed)
       sentence = 'the equations cannot be evaluated beyond ' // when // ', and a shorter step does not help'
       if (solver_status%steps(lane) == 0) sentence = 'the equations cannot be evaluated at the start, ' // when
@@ -146,42 +165,6 @@ contains
     end select
   end function failure_message
 
-  !> The message about a lane that changes its branches without end.
-  function chattering_sentence(solver_status, lane, system, when) result(sentence)
-    type(solver_status_t), intent(in) :: solver_status
-    integer, intent(in) :: lane
-    class(system_t), intent(in) :: system
-    character(len=*), intent(in) :: when
-    character(len=:), allocatable :: sentence
-
-    sentence = system%evaluation_obstacle()
-    if (sentence /= '') then
-      sentence = 'no motion fits all joints beyond ' // when // ': ' // sentence
-      return
-    end if
-    sentence = 'the solution chatters at ' // when // ', at the ' // system%switch_name(solver_status%last_crossing(lane)) // &
-      ' (' // to_text(solver_status%crossings(lane)) // ' changes of branches so far): the equations on both sides of the ' // &
-      'boundary drive it back; make the change smooth'
-  end function chattering_sentence
-
-  !> The message about a lane that has taken `max_steps` steps.
-  function too_many_sentence(solver_status, lane, system, when) result(sentence)
-    type(solver_status_t), intent(in) :: solver_status
-    integer, intent(in) :: lane
-    class(system_t), intent(in) :: system
-    character(len=*), intent(in) :: when
-    character(len=:), allocatable :: sentence
-
-    sentence = 'the integration stopped at ' // when // ' after ' // to_text(solver_status%steps(lane)) // &
-      ' steps, the most that max_steps allows (last step ' // rounded_text(solver_status%h(lane), digits) // ' s): '
-    if (2 * solver_status%crossings(lane) > solver_status%steps(lane)) then
-      sentence = sentence // to_text(solver_status%crossings(lane)) // ' changes of branches have ended steps, ' // &
-        'the last at the ' // system%switch_name(solver_status%last_crossing(lane)) // '; '
-    end if
-    sentence = sentence // 'raise max_steps, or loosen rtol and atol'
-    if (solver_status%jacobians(lane) == 0) sentence = sentence // ', or, if the system is stiff, take an implicit method'
-  end function too_many_sentence
-
   !> The message about a lane whose step size has become too small.
   function too_small_sentence(solver_status, lane, system, rtol, atol, when) result(sentence)
     type(solver_status_t), intent(in) :: solver_status
@@ -189,8 +172,7 @@ contains
     class(system_t), intent(in) :: system
     real(wp), intent(in) :: rtol, atol
     character(len=*), intent(in) :: when
-    character(len=:), allocatable :: sentence
-    character(len=:), allocatable :: what
+    character(len=:), allocatable :: sentence, what
 
     what = ''
     if (solver_status%component(lane) > 0) what = system%component_name(solver_status%component(lane))
@@ -206,25 +188,5 @@ contains
       sentence = sentence // 'the equations cannot be evaluated beyond this time; look for a limit that is reached there'
     end if
   end function too_small_sentence
-
-  !> The message about a lane with a value that is not finite.
-  function not_finite_sentence(solver_status, lane, system, when) result(sentence)
-    type(solver_status_t), intent(in) :: solver_status
-    integer, intent(in) :: lane
-    class(system_t), intent(in) :: system
-    character(len=*), intent(in) :: when
-    character(len=:), allocatable :: sentence
-    character(len=:), allocatable :: what
-
-    what = 'Jacobian'
-    if (solver_status%component(lane) > 0) what = system%component_name(solver_status%component(lane))
-    if (solver_status%steps(lane) == 0) then
-      sentence = 'the derivative of the ' // what // ' at the start, ' // when // &
-        ', is not a finite number: check the start values and the parameters'
-    else
-      sentence = 'the ' // what // ' stops being a finite number right after ' // when // &
-        ', however short the step (h = ' // rounded_text(solver_status%h(lane), digits) // ' s): look for a singularity there'
-    end if
-  end function not_finite_sentence
 
 end module nocdyn_solver_status

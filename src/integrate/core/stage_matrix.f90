@@ -92,8 +92,7 @@ contains
     integer, intent(in) :: order(:)          !! state of each row of the band
     type(entries_t), intent(in) :: entries   !! in the rows of states
     integer, intent(in) :: lanes
-    integer :: index_of(size(order))
-    integer :: i
+    integer :: index_of(size(order)), i
 
     matrix%is_banded = .true.
     matrix%entries = entries
@@ -121,8 +120,7 @@ contains
     integer, intent(in) :: order(:)
     type(entries_t), intent(in) :: entries
     integer, intent(out) :: lower, upper
-    integer :: index_of(size(order))
-    integer :: i
+    integer :: index_of(size(order)), i
 
     index_of(order) = [(i, i=1, size(order))]
     lower = max(0, maxval(index_of(entries%row) - index_of(entries%column)))

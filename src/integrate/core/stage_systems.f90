@@ -96,18 +96,15 @@ contains
     end if
     if (attempt%components > attempt%states) then
       ! solves the rows of the quadratures: k_w / gamma - h dfw/dy k_y = r_w
-      do w = attempt%states + 1, attempt%components
-        do lane = 1, attempt%lanes
-          k(lane, w) = 0.0_wp
+      k(:, attempt%states + 1:attempt%components) = 0.0_wp
+      associate (row => stage_system%quadratures%row, column => stage_system%quadratures%column, &
+                 position => stage_system%quadratures%position, dfdy => stage_system%dfdy)
+        do p = 1, size(position)
+          do lane = 1, attempt%lanes
+            k(lane, row(p)) = k(lane, row(p)) + dfdy(lane, position(p)) * k(lane, column(p))
+          end do
         end do
-      end do
-      do p = 1, size(stage_system%quadratures%position)
-        do lane = 1, attempt%lanes
-          k(lane, stage_system%quadratures%row(p)) = k(lane, stage_system%quadratures%row(p)) + &
-                                        stage_system%dfdy(lane, stage_system%quadratures%position(p)) * &
-                                        k(lane, stage_system%quadratures%column(p))
-        end do
-      end do
+      end associate
       do w = attempt%states + 1, attempt%components
         do lane = 1, attempt%lanes
           k(lane, w) = gamma * (r(lane, w) + attempt%h(lane) * k(lane, w))

@@ -19,8 +19,7 @@ module nocdyn_step_attempt
 
   !> A lane that fails is disabled: its step size becomes zero, so that it keeps its state y while the other lanes go on.
   type, public :: step_attempt_t
-    integer :: lanes
-    integer :: states
+    integer :: lanes, states
     integer :: components                               !! states and quadratures
     integer :: length                                   !! of a state array: whole vectors, with zeros after the components
     integer :: h_length                                 !! of h_spread: `length`, of one lane at most `large_tile`
@@ -45,8 +44,7 @@ module nocdyn_step_attempt
     integer, allocatable :: rhs_status(:)               !! status of the last evaluation; `evaluation_ok` between evaluations
     integer :: uncounted = 0                            !! evaluations not yet added to `evaluations`
     integer, allocatable :: evaluations(:)              !! counts over the whole integration, [lanes]
-    integer, allocatable :: jacobians(:)
-    integer, allocatable :: factorisations(:)
+    integer, allocatable :: jacobians(:), factorisations(:)
   end type step_attempt_t
 
 contains

@@ -112,7 +112,6 @@ contains
 
     associate (longest => control%longest, t_end => control%t_end, wanted => control%h)
       do lane = 1, lanes
-        ! the step of one lane, whose controller wants the size `wanted`
         rest = t_end - t(lane)
         step = max(min(wanted(lane), longest(lane)), smallest_step(t(lane)))
         overshoot = min((t(lane) + final_stretch * step) - t_end, longest(lane) - rest)
@@ -137,13 +136,13 @@ contains
 
     if (all_true(lanes, control%is_given)) return
     ! the logarithms of the error norms, and the factors of the step sizes
-    control%log_ratio = max(control%mean_square, no_error)
+    control%log_ratio(:) = max(control%mean_square, no_error)
     call log2s(lanes, control%log_ratio)
     do lane = 1, lanes
       present_exponent = 1.0_wp / (error_order(lane) + 1) - pi_correction * beta
       control%log_ratio(lane) = 0.5_wp * control%log_ratio(lane)
-      control%factor(lane) = merge(beta, 0.0_wp, accepted(lane)) * control%log_error(lane) - present_exponent * &
-                             control%log_ratio(lane)
+      control%factor(lane) = merge(beta, 0.0_wp, accepted(lane)) * control%log_error(lane) &
+                             - present_exponent * control%log_ratio(lane)
     end do
     call exp2s(lanes, control%factor)
     if (lanes > 1) then
@@ -159,8 +158,7 @@ contains
     do lane = 1, lanes
       if (control%is_given(lane)) cycle
       if (accepted(lane) .or. rejected(lane)) then
-        ! multiplies the step size h of a lane by its factor, within the limits; no growth right after a rejection
-        most = max_growth(lane)
+        most = max_growth(lane)   ! no growth right after a rejection
         if (control%was_rejected(lane)) most = min(most, 1.0_wp)
         control%h(lane) = max(min_factor, min(safety * control%factor(lane), most)) * h(lane)
         control%was_rejected(lane) = .not. accepted(lane)

@@ -111,8 +111,7 @@ contains
   !> Horner's scheme for several arguments x.
   pure subroutine evaluate_batch(n, degree, x, c, y)
     integer, intent(in) :: n, degree
-    real(wp), intent(in) :: x(batch)
-    real(wp), intent(in) :: c(n, 0:degree)
+    real(wp), intent(in) :: x(batch), c(n, 0:degree)
     real(wp), intent(inout) :: y(n, batch)
     real(wp) :: sum(width, batch)
     integer :: b, i, p
@@ -135,8 +134,7 @@ contains
   !> Horner's scheme.
   pure subroutine evaluate(n, degree, x, c, y)
     integer, intent(in) :: n, degree
-    real(wp), intent(in) :: x
-    real(wp), intent(in) :: c(n, 0:degree)
+    real(wp), intent(in) :: x, c(n, 0:degree)
     real(wp), intent(inout) :: y(n)
     real(wp) :: sum(long)
     integer :: i, p

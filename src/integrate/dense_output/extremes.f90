@@ -122,7 +122,6 @@ contains
           call observer%find_pace(lane, extremes%fastest(lane), extremes%scale(lane))
         end if
         if (.not. extremes%have_begun(lane)) then
-          ! sets the ranges to the values of a single time
           extremes%ranges(lane)%lowest(:) = extremes%last(:, lane)
           extremes%ranges(lane)%highest(:) = extremes%last(:, lane)
           extremes%ranges(lane)%lowest_time(:) = extremes%start(lane)
@@ -134,7 +133,6 @@ contains
       end do
       do while (any(extremes%active))
         call sample_pieces(extremes, observer, steps, attempt, c)
-        ! takes the polynomials in the pieces that have been sampled, and goes on to the next pieces
         do lane = 1, size(extremes%active)
           if (.not. extremes%active(lane)) cycle
           associate (pieces => extremes%pieces(lane))
@@ -240,12 +238,12 @@ contains
       do lane = 1, attempt%lanes
         if (.not. extremes%active(lane)) cycle
         associate (piece => extremes%pieces(lane), degree => extremes%degree(lane))
-          ! The time of a node in a piece [s]. If the step ends at a crossing, it is before that: a function may jump there, which
-          ! would spoil the polynomial.
+          ! a node is before a crossing that ends the step: a function may jump there, which would spoil the polynomial
           half = 0.5_wp * (piece%end - piece%begin)
-          t = piece%begin + half + (extremes%rules(degree)%nodes(min(i, degree))) * half
-          if (steps%crosses(lane) .and. piece%end >= steps%t_new(lane)) t = &
-              max(piece%begin, min(t, steps%t_new(lane) - before_jump * spacing(steps%t_new(lane))))
+          t = piece%begin + half + extremes%rules(degree)%nodes(min(i, degree)) * half
+          if (steps%crosses(lane) .and. piece%end >= steps%t_new(lane)) then
+            t = max(piece%begin, min(t, steps%t_new(lane) - before_jump * spacing(steps%t_new(lane))))
+          end if
           extremes%t(lane) = t
         end associate
       end do

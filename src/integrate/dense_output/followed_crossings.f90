@@ -158,8 +158,7 @@ contains
       associate (side => roots%side(dense%lane, function), g => values(function, 2))
         if (.not. is_finite(g)) cycle
         if (side > 0 .and. g <= 0) then
-          call find_root(roots, system, observer, dense, bracket_t(function, theta(1), theta(2), values(function, 1), g), &
-                         root)
+          call find_root(roots, system, observer, dense, bracket_t(function, theta(1), theta(2), values(function, 1), g), root)
           if (first%function == 0 .or. root < first%theta) first = crossing_t(function, root)
         else if (side == 0 .and. g < 0) then
           if (first%function == 0 .or. theta(1) < first%theta) first = crossing_t(function, theta(1))

@@ -1,13 +1,12 @@
 !> Switching of branches. Steps end where an indicator function falls through zero; there the system changes its branch.
 module nocdyn_switching
-  use nocdyn_block_scan, only: allocate_block_scan, block_scan_t, has_minimum, scan_block
-  use nocdyn_dense_output, only: dense_output_t, sample
+  use nocdyn_dense_output, only: batch, dense_output_t, sample, sample_lanes, strip
   use nocdyn_finite, only: is_finite
   use nocdyn_followed_crossings, only: find_followed_crossing
   use nocdyn_kinds, only: wp
   use nocdyn_observer, only: observer_t
   use nocdyn_root_functions, only: allocate_root_functions, bracket_t, find_grazing, find_root, part_bracket, &
-    part_end, root_functions_t, scan_step, set_start, sign_of
+    part_end, parts_of, root_functions_t, scan_step, set_start, sign_of
   use nocdyn_solver_status, only: count_crossing, integration_chattering, solver_status_t
   use nocdyn_step_attempt, only: step_attempt_t
   use nocdyn_system, only: system_t
@@ -19,6 +18,18 @@ module nocdyn_switching
   integer, parameter :: max_repeats = 100   ! crossings of one boundary without progress in time; more are chattering
   real(wp), parameter :: negligible = 1.0e-10_wp          ! of the duration: a shorter time between crossings is no progress
   real(wp), parameter :: no_time = -huge(1.0_wp)
+
+  !> The indicators at the ends of the parts of a step, for all lanes of a block at once. Few lanes come near a boundary in a
+  !> step; the others are left out of the search for crossings, which goes lane by lane.
+  type :: block_scan_t
+    logical :: is_used = .false.               !! whether the system evaluates its indicators for blocks
+    logical, allocatable :: is_near(:)         !! whether a lane may cross a boundary in the step, [lanes]
+    integer, allocatable :: parts(:)           !! of the step of each lane
+    real(wp), allocatable :: g(:, :, :)        !! [lanes, functions, 0:parts]; part 0 stays from step to step
+    real(wp), allocatable :: t(:)              !! [s], [lanes]
+    real(wp), allocatable :: theta(:, :)       !! [lanes, batch]
+    real(wp), allocatable :: y(:, :, :)        !! [lanes, padded columns, batch]
+  end type block_scan_t
 
   type, public :: switching_t
     integer, allocatable :: pending(:)                     !! indicator that ended the last step of each lane, 0 if none did
@@ -48,7 +59,14 @@ contains
     allocate (switching%repeats(attempt%lanes, system%switches), source=0)
     allocate (switching%g(system%switches), switching%y(attempt%components), source=0.0_wp)
     call allocate_root_functions(switching%roots, system%switches, .true., degree, attempt)
-    call allocate_block_scan(switching%scan, system, degree, attempt)
+    switching%scan%is_used = system%has_block_indicators .and. system%lanes >= strip
+    if (.not. switching%scan%is_used) return
+    associate (lanes => attempt%lanes, scan => switching%scan)
+      allocate (scan%is_near(lanes), source=.true.)
+      allocate (scan%parts(lanes), source=1)
+      allocate (scan%g(lanes, system%switches, 0:parts_of(degree)), scan%t(lanes), scan%theta(lanes, batch), &
+                scan%y(lanes, size(attempt%y, 2), batch), source=0.0_wp)
+    end associate
   end subroutine allocate_switching
 
   !> Starts a lane on the branches that the system has chosen; branches that do not hold there change at once.
@@ -71,9 +89,70 @@ contains
     type(step_attempt_t), intent(in) :: attempt
     real(wp), contiguous, intent(in) :: coefficients(:, :, :)   !! of the dense output, [lanes, padded columns, degree]
     logical, intent(in) :: taken(:)                             !! whether the lane has taken a step, [lanes]
+    integer :: columns, function, i, l, part, parts
 
-    if (switching%scan%is_used) call scan_block(switching%scan, system, attempt, coefficients, taken, switching%roots%side)
+    if (.not. switching%scan%is_used) return
+    associate (scan => switching%scan)
+      columns = size(scan%y, 2)
+      scan%parts(:) = parts_of(attempt%degree)
+      parts = maxval(scan%parts, mask=taken)
+      do part = 0, parts - 1, batch
+        do i = 1, batch
+          scan%theta(:, i) = 1.0_wp * min(part + i, scan%parts) / scan%parts
+        end do
+        call sample_lanes(attempt%lanes, columns, maxval(attempt%degree, mask=taken), attempt%y, coefficients, taken, &
+                          scan%theta, scan%y)
+        do i = 1, min(batch, parts - part)
+          scan%t(:) = attempt%t + scan%theta(:, i) * attempt%h
+          call system%block_indicators(columns, scan%t, scan%y(:, :, i), scan%g(:, :, part + i))
+        end do
+      end do
+      call find_near(attempt%lanes, size(switching%g), parts, taken, switching%roots%side, scan%g, scan%is_near)
+      ! the ends of the steps of lanes that cross nothing are the starts of their next ones
+      do function = 1, size(scan%g, 2)
+        do l = 1, size(taken)
+          if (taken(l) .and. .not. scan%is_near(l)) scan%g(l, function, 0) = scan%g(l, function, parts)
+        end do
+      end do
+    end associate
   end subroutine scan_for_crossings
+
+  !> Finds the lanes that may cross a boundary: all others have positive indicators, none of which is at the lowest point of a
+  !> parabola between two parts.
+  pure subroutine find_near(lanes, functions, parts, taken, side, g, is_near)
+    integer, intent(in) :: lanes, functions, parts
+    logical, intent(in) :: taken(lanes)
+    integer, intent(in) :: side(lanes, functions)
+    real(wp), intent(in) :: g(lanes, functions, 0:parts)
+    logical, intent(inout) :: is_near(lanes)
+    integer :: function, l, part
+
+    is_near = .false.
+    do function = 1, functions
+      do l = 1, lanes
+        is_near(l) = is_near(l) .or. side(l, function) < 1
+      end do
+      do part = 1, parts
+        do l = 1, lanes
+          is_near(l) = is_near(l) .or. .not. g(l, function, part) > 0
+        end do
+      end do
+      do part = 1, parts - 1
+        do l = 1, lanes
+          associate (before => g(l, function, part - 1), middle => g(l, function, part), after => g(l, function, part + 1))
+            if (taken(l)) is_near(l) = is_near(l) .or. has_minimum(before, middle, after)
+          end associate
+        end do
+      end do
+    end do
+  end subroutine find_near
+
+  !> Whether the parabola through three equidistant values has its minimum between them.
+  pure logical function has_minimum(before, middle, after)
+    real(wp), intent(in) :: before, middle, after
+
+    has_minimum = abs(after - before) < 2 * ((after - middle) - (middle - before))
+  end function has_minimum
 
   !> Whether a lane may have crossed a boundary in its last step.
   pure logical function may_cross(switching, lane)
@@ -93,9 +172,6 @@ contains
     type(dense_output_t), intent(inout) :: dense    !! of the lane
     real(wp), intent(out) :: theta                  !! of the crossing, 1 if there is none
     integer :: function, part
-    type(bracket_t) :: bracket
-    real(wp) :: root
-    logical :: found, may_graze
 
     theta = 1.0_wp
     switching%known = -1.0_wp
@@ -128,21 +204,7 @@ contains
       end do
       if (switching%pending(dense%lane) > 0) exit
     end do
-    ! finds crossings from which an indicator returns before the end of a part, as at a grazing contact
-    do part = 1, switching%roots%parts - 1
-      if (part_end(switching%roots, part - 1, 1.0_wp) >= theta) exit
-      do function = 1, size(switching%g)
-        associate (g => switching%roots%values)
-          may_graze = min(sign_of(g(function, part - 1)), sign_of(g(function, part)), sign_of(g(function, part + 1))) > 0
-          if (may_graze) may_graze = has_minimum(g(function, part - 1), g(function, part), g(function, part + 1))
-          if (.not. may_graze) cycle
-        end associate
-        call find_grazing(switching%roots, system, observer, dense, function, part, bracket, found)
-        if (.not. found) cycle
-        call find_root(switching%roots, system, observer, dense, bracket, root)
-        call keep_first(switching, dense%lane, function, root, theta)
-      end do
-    end do
+    call find_grazing_crossings(switching, system, observer, dense, theta)
     if (switching%scan%is_used) switching%scan%g(dense%lane, :, 0) = switching%roots%values(:, switching%roots%parts)
   end subroutine find_crossing
 
@@ -180,6 +242,40 @@ contains
     call find_root(switching%roots, system, observer, dense, bracket, root)
     call keep_first(switching, dense%lane, bracket%function, root, theta)
   end subroutine find_earlier_crossing
+
+  !> Finds crossings from which an indicator returns before the end of a part, as at a grazing contact.
+  subroutine find_grazing_crossings(switching, system, observer, dense, theta)
+    type(switching_t), intent(inout) :: switching
+    class(system_t), intent(inout) :: system
+    class(observer_t), intent(inout) :: observer
+    type(dense_output_t), intent(inout) :: dense
+    real(wp), intent(inout) :: theta
+    type(bracket_t) :: bracket
+    real(wp) :: root
+    integer :: function, part
+    logical :: found
+
+    do part = 1, switching%roots%parts - 1
+      if (part_end(switching%roots, part - 1, 1.0_wp) >= theta) exit
+      do function = 1, size(switching%g)
+        associate (g => switching%roots%values)
+          if (.not. may_graze(g(function, part - 1), g(function, part), g(function, part + 1))) cycle
+        end associate
+        call find_grazing(switching%roots, system, observer, dense, function, part, bracket, found)
+        if (.not. found) cycle
+        call find_root(switching%roots, system, observer, dense, bracket, root)
+        call keep_first(switching, dense%lane, function, root, theta)
+      end do
+    end do
+  end subroutine find_grazing_crossings
+
+  !> Whether three values are positive, and their parabola has its minimum between them.
+  pure logical function may_graze(before, middle, after)
+    real(wp), intent(in) :: before, middle, after
+
+    may_graze = min(sign_of(before), sign_of(middle), sign_of(after)) > 0
+    if (may_graze) may_graze = has_minimum(before, middle, after)
+  end function may_graze
 
   !> Replaces the crossing at theta by one at `root`, if that is earlier.
   pure subroutine keep_first(switching, lane, function, root, theta)

@@ -49,7 +49,7 @@ contains
         if (.not. integrator%accepted(lane)) cycle
         crosses = .false.
         if (integrator%has_switches) crosses = may_cross(integrator%switching, lane)
-        if (crosses .or. (integrator%has_events .or. integrator%next_time(lane) < integrator%t_new(lane))) then
+        if (crosses .or. integrator%has_events .or. integrator%next_time(lane) < integrator%t_new(lane)) then
           call load_lane(integrator%dense, integrator%attempt, integrator%coefficients, lane)
         end if
         if (crosses) then
@@ -57,8 +57,7 @@ contains
           steps%crosses(lane) = integrator%switching%pending(lane) > 0
         end if
         if (integrator%has_events) then
-          ! Passes the events of a lane to the observer in their order, with the output times between them. A terminal event ends
-          ! the step and the lane.
+          ! events in their order, with the output times between them; a terminal event ends the step and the lane
           call find_events(integrator%events, system, observer, integrator%dense, steps%theta_end(lane))
           do i = 1, integrator%events%found
             t = min(integrator%attempt%t(lane) + integrator%events%theta(i) * integrator%attempt%h(lane), integrator%t_new(lane))
@@ -70,7 +69,7 @@ contains
             steps%theta_end(lane) = integrator%events%theta(i)
             integrator%t_new(lane) = t
             integrator%attempt%y_new(lane, :integrator%attempt%components) = integrator%sample
-            integrator%steps%crosses(lane) = .false.
+            steps%crosses(lane) = .false.
             exit
           end do
         end if

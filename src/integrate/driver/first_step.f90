@@ -37,7 +37,7 @@ contains
       do lane = 1, attempt%lanes
         attempt%h(lane) = 0.0_wp
         if (.not. attempt%active(lane)) cycle
-        ! A step over which y changes by about 1 % if the slope stays as it is
+        ! an Euler step over which y changes by about 1 %
         if (system%measures > 0) then
           position = rms_ratio(control, control%size(lane, :counted(system)), control%size(lane, :counted(system)))
         else
@@ -92,8 +92,7 @@ contains
     do lane = 1, attempt%lanes
       if (.not. attempt%active(lane)) cycle
       if (system%measures > 0) then
-        control%log_ratio(lane) = rms_ratio(control, control%error(lane, :counted(system)), &
-                                            control%size(lane, :counted(system)))
+        control%log_ratio(lane) = rms_ratio(control, control%error(lane, :counted(system)), control%size(lane, :counted(system)))
       else
         control%log_ratio(lane) = rms_ratio(control, x(lane, :attempt%states), attempt%y(lane, :attempt%states))
       end if

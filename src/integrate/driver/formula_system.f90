@@ -185,8 +185,7 @@ contains
 
   subroutine derivative(self, t, y, dydt, status)
     class(formula_system_t), intent(inout) :: self
-    real(wp), intent(in) :: t(self%lanes)
-    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+    real(wp), intent(in) :: t(self%lanes), y(self%lanes, self%states + self%quadratures)
     real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)
     integer, intent(inout) :: status(self%lanes)
     integer :: i, strip
@@ -229,8 +228,7 @@ contains
 
   subroutine jacobian(self, t, y, dfdy, dfdt, status)
     class(formula_system_t), intent(inout) :: self
-    real(wp), intent(in) :: t(self%lanes)
-    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+    real(wp), intent(in) :: t(self%lanes), y(self%lanes, self%states + self%quadratures)
     real(wp), contiguous, intent(inout) :: dfdy(:, :)
     real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)
     integer, intent(inout) :: status(self%lanes)

@@ -16,18 +16,15 @@ module nocdyn_plain_system
     !> dydt = f(t, y)
     subroutine plain_derivative_interface(t, y, dydt)
       import :: wp
-      real(wp), intent(in) :: t
-      real(wp), intent(in) :: y(:)
+      real(wp), intent(in) :: t, y(:)
       real(wp), intent(out) :: dydt(:)
     end subroutine plain_derivative_interface
 
     !> The partial derivatives of f: dfdy(i, j) by y(j), dfdt by t.
     subroutine plain_jacobian_interface(t, y, dfdy, dfdt)
       import :: wp
-      real(wp), intent(in) :: t
-      real(wp), intent(in) :: y(:)
-      real(wp), intent(out) :: dfdy(:, :)
-      real(wp), intent(out) :: dfdt(:)
+      real(wp), intent(in) :: t, y(:)
+      real(wp), intent(out) :: dfdy(:, :), dfdt(:)
     end subroutine plain_jacobian_interface
 
   end interface
@@ -41,8 +38,7 @@ module nocdyn_plain_system
     real(wp), private :: t_end = huge(1.0_wp)    !! of the integration [s]
     real(wp), private :: t_last = 0.0_wp       !! time of the last differences [s]
     real(wp), private :: last_step = 0.0_wp    !! between the last two [s], 0 at the start
-    real(wp), allocatable, private :: dydt(:), near_dydt(:), far_dydt(:), shifted_y(:)
-    real(wp), allocatable, private :: dfdy(:, :)
+    real(wp), allocatable, private :: dydt(:), near_dydt(:), far_dydt(:), shifted_y(:), dfdy(:, :)
   contains
     procedure :: derivative
     procedure :: jacobian
@@ -67,8 +63,7 @@ contains
 
   subroutine derivative(self, t, y, dydt, status)
     class(plain_system_t), intent(inout) :: self
-    real(wp), intent(in) :: t(self%lanes)
-    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+    real(wp), intent(in) :: t(self%lanes), y(self%lanes, self%states + self%quadratures)
     real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)
     integer, intent(inout) :: status(self%lanes)
 
@@ -77,8 +72,7 @@ contains
 
   subroutine jacobian(self, t, y, dfdy, dfdt, status)
     class(plain_system_t), intent(inout) :: self
-    real(wp), intent(in) :: t(self%lanes)
-    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+    real(wp), intent(in) :: t(self%lanes), y(self%lanes, self%states + self%quadratures)
     real(wp), contiguous, intent(inout) :: dfdy(:, :)
     real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)
     integer, intent(inout) :: status(self%lanes)
@@ -96,8 +90,7 @@ contains
 
   subroutine prepare_integration(self, rtol, atol, t_end)
     class(plain_system_t), intent(inout) :: self
-    real(wp), intent(in) :: rtol, atol
-    real(wp), intent(in) :: t_end
+    real(wp), intent(in) :: rtol, atol, t_end
 
     self%threshold = max(min(atol, most * rtol) / rtol, 1 / most)
     self%t_end = t_end
@@ -118,8 +111,7 @@ contains
   !> curvature meet, times the largest of a component's value, its change over a step, and what the tolerances tell from zero.
   subroutine take_differences(self, t, y, dfdt)
     type(plain_system_t), intent(inout) :: self
-    real(wp), intent(in) :: t
-    real(wp), intent(in) :: y(:)
+    real(wp), intent(in) :: t, y(:)
     real(wp), intent(out) :: dfdt(:)
     real(wp) :: h, rate, shift
     integer :: i
@@ -150,8 +142,7 @@ contains
   !> Sets column i of dfdy by the values of f at y and where y(i) is shifted once and twice.
   subroutine differ_by_state(self, t, y, i, shift)
     type(plain_system_t), intent(inout) :: self
-    real(wp), intent(in) :: t
-    real(wp), intent(in) :: y(:)
+    real(wp), intent(in) :: t, y(:)
     integer, intent(in) :: i
     real(wp), intent(in) :: shift
     real(wp) :: near

@@ -82,7 +82,18 @@ contains
     integrator%control%is_given(:) = .not. stepper%estimates_errors
     integrator%first_step = settings%first_step
     integrator%max_steps = settings%max_steps
-    call allocate_lanes(integrator, system%lanes, system%states + system%quadratures, stepper%degree, times(1))
+    associate (lanes => system%lanes)
+      integrator%free = lanes
+      allocate (integrator%occupied(lanes), integrator%running(lanes), integrator%starting(lanes), integrator%accepted(lanes), &
+                integrator%rejected(lanes), integrator%wanted(lanes), integrator%inspected(lanes), integrator%far(lanes), &
+                integrator%steps%taken(lanes), integrator%steps%crosses(lanes), source=.false.)
+      allocate (integrator%t_new(lanes), integrator%next_time(lanes), source=times(1))
+      allocate (integrator%steps%t(lanes), integrator%steps%h(lanes), integrator%steps%scale(lanes), &
+                integrator%steps%theta_end(lanes), integrator%steps%t_new(lanes), source=0.0_wp)
+      allocate (integrator%next(lanes), source=2)
+      allocate (integrator%sample(integrator%attempt%components), source=0.0_wp)
+      allocate (integrator%coefficients(lanes, size(integrator%attempt%y, 2), stepper%degree), source=0.0_wp)
+    end associate
     call allocate_dense_output(integrator%dense, integrator%attempt%components, stepper%degree)
     integrator%wants_steps = observer%wants_steps
     integrator%wants_dense_steps = integrator%wants_steps .and. .not. stepper%passes_series
@@ -100,25 +111,6 @@ contains
     integrator%has_events = size(observer%directions) > 0
     if (integrator%has_events) call allocate_events(integrator%events, observer, stepper%degree, integrator%attempt)
   end subroutine prepare_integrator
-
-  !> Allocates the data of each lane; no lane holds a variant.
-  pure subroutine allocate_lanes(integrator, lanes, components, degree, t_start)
-    type(integrator_t), intent(inout) :: integrator
-    integer, intent(in) :: lanes, components, degree
-    real(wp), intent(in) :: t_start
-
-    integrator%free = lanes
-    allocate (integrator%occupied(lanes), integrator%running(lanes), integrator%starting(lanes), integrator%accepted(lanes), &
-              integrator%rejected(lanes), integrator%wanted(lanes), integrator%inspected(lanes), integrator%far(lanes), &
-              integrator%steps%taken(lanes), &
-              integrator%steps%crosses(lanes), source=.false.)
-    allocate (integrator%t_new(lanes), integrator%next_time(lanes), source=t_start)
-    allocate (integrator%steps%t(lanes), integrator%steps%h(lanes), integrator%steps%scale(lanes), &
-              integrator%steps%theta_end(lanes), integrator%steps%t_new(lanes), source=0.0_wp)
-    allocate (integrator%next(lanes), source=2)
-    allocate (integrator%sample(components), source=0.0_wp)
-    allocate (integrator%coefficients(lanes, size(integrator%attempt%y, 2), degree), source=0.0_wp)
-  end subroutine allocate_lanes
 
   !> Fills the free lanes with the next variants of the ensemble and starts them.
   subroutine fill_lanes(integrator, stepper, system, ensemble, times, observer, solver_status)

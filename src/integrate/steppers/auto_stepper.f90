@@ -3,12 +3,12 @@
 !>
 !> Each lane chooses by itself. A lane of a system without a series begins with explicit steps.
 module nocdyn_auto_stepper
-  use nocdyn_calm_lanes, only: allocate_calm_lanes, begin_calm, calm_lanes_t, end_calm, go_on, may_go_on
   use nocdyn_explicit_stepper, only: explicit_stepper
   use nocdyn_explicit_tables, only: explicit_table_t
   use nocdyn_kinds, only: wp
-  use nocdyn_method_choice, only: begin_trial, by_series, by_stages, by_systems, choice_t, count_attempt, kind_data_t, &
-    longest_shared_period, needed_step, note_stiffness, restart_choice, settle, shared_period, wants_trial
+  use nocdyn_method_choice, only: begin_trial, by_series, by_stages, by_systems, choice_t, count_attempt, count_steps, &
+    kind_data_t, longest_shared_period, near_limit, needed_step, note_stiffness, restart_choice, settle, shared_period, &
+    stiff_signs, wants_trial, weak_sign
   use nocdyn_rosenbrock_stepper, only: rosenbrock_stepper
   use nocdyn_rosenbrock_tables, only: rosenbrock_table_t
   use nocdyn_step_attempt, only: step_attempt_t
@@ -24,12 +24,21 @@ module nocdyn_auto_stepper
 
   integer, parameter :: stride = 3   !! explicit steps for each estimate of the dominant eigenvalue
 
+  !> Lanes that step by series and have nothing to decide: their steps are counted together, and their choices are left alone.
+  type :: calm_lane_t
+    integer :: steps = 0               !! accepted steps without a decision, unless they show signs of stiffness
+    integer :: uncounted = 0           !! of these, those that have been made
+    integer :: signs = 0               !! as in `choice_t`, of implicit steps
+    logical :: is_in_doubt = .false.   !! the same
+    logical :: waits = .false.         !! whether signs lead to nothing yet
+  end type calm_lane_t
+
   type, extends(stepper_t), public :: auto_stepper_t
     private
     type(stepper_kinds_t) :: steppers
     type(kind_data_t) :: data
     type(choice_t), allocatable :: choice(:)   !! [lanes]
-    type(calm_lanes_t) :: calm
+    type(calm_lane_t), allocatable :: calm(:)  !! [lanes]
     logical :: are_calm = .false.              !! all active lanes step by series, and have nothing to decide
     logical, allocatable :: expanded(:)        !! lanes of other kinds whose series is wanted
     logical, allocatable :: active(:)          !! lanes at the start of the attempt
@@ -91,12 +100,11 @@ contains
         data%longest_period(:) = longest_shared_period
       end if
       data%tries(by_stages) = .not. (system%is_shared .and. data%has(by_series))
-      if (allocated(self%choice)) deallocate (self%choice, self%expanded, self%active, self%was_tried, self%has_moved, self%h, &
-                                              self%lambda)
-      allocate (self%choice(lanes))
+      if (allocated(self%choice)) deallocate (self%choice, self%calm, self%expanded, self%active, self%was_tried, &
+                                              self%has_moved, self%h, self%lambda)
+      allocate (self%choice(lanes), self%calm(lanes))
       allocate (self%expanded(lanes), self%active(lanes), self%was_tried(lanes), self%has_moved(lanes), source=.false.)
       allocate (self%h(lanes), self%lambda(lanes), source=0.0_wp)
-      call allocate_calm_lanes(self%calm, lanes)
     end associate
   end subroutine prepare
 
@@ -113,7 +121,7 @@ contains
       call describe_kind(self, attempt, lane)
       self%was_tried(lane) = .false.
       self%has_moved(lane) = .false.
-      call begin_calm(self%calm, lane, self%choice(lane), self%data)
+      call begin_calm(self%calm(lane), self%choice(lane), self%data)
     end do
   end subroutine start
 
@@ -131,11 +139,15 @@ contains
     call choose_calm_steps(self, system, attempt, control)
     if (self%are_calm) return
     do lane = 1, attempt%lanes
-      call end_calm(self%calm, lane, self%choice(lane))
+      if (self%calm(lane)%uncounted > 0) then
+        call count_steps(self%choice(lane), self%calm(lane)%uncounted)
+        self%choice(lane)%signs(by_systems) = self%calm(lane)%signs
+        self%choice(lane)%is_in_doubt = self%calm(lane)%is_in_doubt
+        self%calm(lane)%uncounted = 0
+      end if
       self%expanded(lane) = .false.
       if (.not. attempt%active(lane)) cycle
       if (self%was_tried(lane)) then
-        ! draws the conclusions from the last attempt of a lane
         associate (choice => self%choice(lane))
           tried = choice%kind
           if (choice%kind == by_series .and. .not. self%has_moved(lane)) call settle(choice, self%data, by_stages, by_series)
@@ -158,22 +170,38 @@ contains
     end if
     do lane = 1, attempt%lanes
       if (.not. attempt%active(lane)) cycle
-      ! begins a trial in a lane, if it is time for one
-      associate (choice => self%choice(lane))
-        if (choice%kind == by_series) then
-          choice%lambda = self%lambda(lane)
-          if (self%has_moved(lane)) call note_stiffness(choice, self%data, attempt%t(lane), control%h(lane))
-        end if
-      end associate
+      if (self%choice(lane)%kind == by_series) then
+        self%choice(lane)%lambda = self%lambda(lane)
+        if (self%has_moved(lane)) call note_stiffness(self%choice(lane), self%data, attempt%t(lane), control%h(lane))
+      end if
       call try_kind(self, attempt, control, lane, by_systems)
       call try_kind(self, attempt, control, lane, by_stages)
       self%was_tried(lane) = .true.
       self%has_moved(lane) = .false.
-      call begin_calm(self%calm, lane, self%choice(lane), self%data)
+      call begin_calm(self%calm(lane), self%choice(lane), self%data)
       control%is_given(lane) = self%choice(lane)%kind == by_series
       if (control%is_given(lane)) control%mean_square(lane) = 0.0_wp
     end do
   end subroutine choose_steps
+
+  !> Takes what is counted of a lane, after a decision.
+  pure subroutine begin_calm(calm, choice, data)
+    type(calm_lane_t), intent(out) :: calm
+    type(choice_t), intent(in) :: choice
+    type(kind_data_t), intent(in) :: data
+
+    calm%signs = choice%signs(by_systems)
+    calm%is_in_doubt = choice%is_in_doubt
+    calm%waits = choice%wait(by_systems) > 0
+    if (choice%kind /= by_series .or. choice%before > 0) return
+    calm%steps = huge(calm%steps)
+    if (calm%waits) then
+      calm%steps = choice%wait(by_systems)
+    else if (choice%is_in_doubt) then
+      calm%steps = choice%doubt
+    end if
+    if (data%tries(by_stages)) calm%steps = min(calm%steps, choice%wait(by_stages))
+  end subroutine begin_calm
 
   !> Chooses series for all lanes if none has anything to decide. Otherwise leaves the state unchanged.
   subroutine choose_calm_steps(self, system, attempt, control)
@@ -182,24 +210,45 @@ contains
     type(step_attempt_t), intent(inout) :: attempt
     type(step_control_t), intent(inout) :: control
     logical :: are_calm
+    real(wp) :: near, weak   ! values of |h lambda|
     integer :: lane
 
-    are_calm = self%data%has(by_series)
-    if (are_calm) are_calm = may_go_on(self%calm, attempt%lanes, attempt%active, self%was_tried, self%has_moved)
     self%are_calm = .false.
-    if (.not. are_calm) return
+    if (.not. self%data%has(by_series)) return
+    do lane = 1, attempt%lanes
+      if (.not. attempt%active(lane)) cycle
+      if (self%calm(lane)%uncounted + 1 >= self%calm(lane)%steps) return
+      if (self%was_tried(lane) .and. .not. self%has_moved(lane)) return
+    end do
     self%h(:) = control%h
     call self%steppers%series%choose_steps(system, attempt, control)
     call self%steppers%series%find_eigenvalues(self%lambda)
+    near = near_limit * self%data%limit(by_series)
+    weak = weak_sign * self%data%limit(by_series)
+    are_calm = .true.
     do lane = 1, attempt%lanes
       if (.not. attempt%active(lane)) cycle
-      if (self%steppers%series%plans_step(lane)) cycle
-      are_calm = .false.
-      control%h(lane) = self%h(lane)
+      if (self%steppers%series%plans_step(lane)) then
+        associate (calm => self%calm(lane), size_of_step => control%h(lane) * self%lambda(lane))
+          if (calm%waits) cycle
+          are_calm = are_calm .and. merge(calm%signs + 1, 0, size_of_step > near) < stiff_signs &
+                     .and. (calm%is_in_doubt .or. .not. size_of_step > weak)
+        end associate
+      else
+        are_calm = .false.
+        control%h(lane) = self%h(lane)
+      end if
     end do
-    call go_on(self%calm, self%data, attempt%lanes, attempt%active, self%has_moved, control%h, self%lambda, are_calm)
-    self%are_calm = are_calm
     if (.not. are_calm) return
+    do lane = 1, attempt%lanes
+      if (.not. (attempt%active(lane) .and. self%has_moved(lane))) cycle
+      associate (calm => self%calm(lane), size_of_step => control%h(lane) * self%lambda(lane))
+        calm%uncounted = calm%uncounted + 1
+        calm%signs = merge(calm%signs + 1, 0, size_of_step > near)
+        calm%is_in_doubt = calm%is_in_doubt .or. size_of_step > weak
+      end associate
+    end do
+    self%are_calm = .true.
     self%was_tried(:) = self%was_tried .or. attempt%active
     self%has_moved(:) = self%has_moved .and. .not. attempt%active
     control%is_given(:) = control%is_given .or. attempt%active

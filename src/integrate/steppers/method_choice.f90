@@ -198,8 +198,7 @@ contains
     wants_trial = data%has(kind) .and. data%tries(kind) .and. kind /= choice%kind .and. choice%before == 0 &
                   .and. choice%wait(kind) == 0
     if (kind == by_systems) then
-      wants_trial = wants_trial .and. (choice%signs(kind) >= stiff_signs &
-                                     .or. (choice%is_in_doubt .and. choice%doubt == 0))
+      wants_trial = wants_trial .and. (choice%signs(kind) >= stiff_signs .or. (choice%is_in_doubt .and. choice%doubt == 0))
     else if (choice%kind == by_systems) then
       wants_trial = wants_trial .and. choice%signs(kind) >= nonstiff_signs
     end if

@@ -24,9 +24,7 @@ module nocdyn_rosenbrock_stepper
     type(stage_sum_t), allocatable :: coupling(:)     !! rows of c_ij
     type(stage_system_t) :: stage_system
     type(spectral_radius_t) :: spectrum
-    real(wp), allocatable :: t_stage(:)
-    real(wp), allocatable :: y_stage(:, :)
-    real(wp), allocatable :: f(:, :)
+    real(wp), allocatable :: t_stage(:), y_stage(:, :), f(:, :)
     real(wp), allocatable :: r(:, :)                  !! right-hand side of the stage's linear system
     real(wp), allocatable :: one(:)                   !! ones, as long as a stage or a large tile
     real(wp), allocatable :: slope(:, :)              !! f(t, y) at the start of the step

@@ -22,8 +22,7 @@ module nocdyn_series_defects
     private
     integer :: order = 0, columns = 0            !! of the series, of the states with padding
     real(wp), allocatable :: t(:)                !! [s], [lanes]
-    real(wp), allocatable :: h(:, :), y(:, :), slope(:, :), rate(:, :)
-    real(wp), allocatable :: sizes(:, :), errors(:, :)
+    real(wp), allocatable :: h(:, :), y(:, :), slope(:, :), rate(:, :), sizes(:, :), errors(:, :)
     integer, allocatable :: status(:)            !! evaluation_... of each lane
     logical, allocatable :: is_wrong(:)          !! lanes whose steps are too long
   contains

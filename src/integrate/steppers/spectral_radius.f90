@@ -52,11 +52,16 @@ contains
     real(wp), contiguous, intent(in) :: dfdy(:, :)   !! shape [lanes, positions]
     real(wp), intent(out) :: size_of_eigenvalue   !! [1/s]
     real(wp) :: growth(2)
-    integer :: i
+    integer :: i, p
 
     growth(:) = 0.0_wp
     do i = 1, 2
-      call multiply(spectrum%entries, dfdy, lane, spectrum%vector(:, lane), spectrum%image)
+      spectrum%image(:) = 0.0_wp
+      associate (row => spectrum%entries%row, column => spectrum%entries%column, position => spectrum%entries%position)
+        do p = 1, size(position)
+          spectrum%image(row(p)) = spectrum%image(row(p)) + dfdy(lane, position(p)) * spectrum%vector(column(p), lane)
+        end do
+      end associate
       growth(i) = norm2(spectrum%image)
       if (.not. growth(i) > 0) exit
       spectrum%vector(:, lane) = spectrum%image / growth(i)
@@ -69,22 +74,5 @@ contains
       spectrum%vector(:, lane) = spectrum%start
     end if
   end subroutine estimate_spectral_radius
-
-  !> Multiplies a vector by the Jacobian of a lane.
-  pure subroutine multiply(entries, dfdy, lane, vector, image)
-    type(entries_t), intent(in) :: entries
-    real(wp), contiguous, intent(in) :: dfdy(:, :)
-    integer, intent(in) :: lane
-    real(wp), contiguous, intent(in) :: vector(:)
-    real(wp), contiguous, intent(out) :: image(:)
-    integer :: i
-
-    image(:) = 0.0_wp
-    associate (row => entries%row, column => entries%column, position => entries%position)
-      do i = 1, size(position)
-        image(row(i)) = image(row(i)) + dfdy(lane, position(i)) * vector(column(i))
-      end do
-    end associate
-  end subroutine multiply
 
 end module nocdyn_spectral_radius

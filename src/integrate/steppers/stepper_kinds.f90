@@ -4,10 +4,9 @@ module nocdyn_stepper_kinds
   use nocdyn_explicit_stepper, only: explicit_stepper_t
   use nocdyn_kinds, only: wp
   use nocdyn_method_choice, only: by_series, by_stages, by_systems, kinds
-  use nocdyn_mixed_attempt, only: allocate_mixed_attempt, begin_kinds, end_kinds, keep_lanes, mixed_attempt_t, select_lanes
   use nocdyn_rosenbrock_stepper, only: rosenbrock_stepper_t
   use nocdyn_stage_sums, only: padded_columns
-  use nocdyn_step_attempt, only: step_attempt_t
+  use nocdyn_step_attempt, only: spread_steps, step_attempt_t
   use nocdyn_system, only: system_t
   use nocdyn_taylor_stepper, only: taylor_stepper_t
   implicit none (type, external)
@@ -19,8 +18,11 @@ module nocdyn_stepper_kinds
     type(rosenbrock_stepper_t) :: implicit
     logical :: has_series = .false.
     integer, allocatable, private :: kind(:)                 !! of the step of each lane
-    logical, allocatable, private :: active(:), mask(:)      !! work space
-    type(mixed_attempt_t), private :: mixed
+    integer, private :: degree(kinds)                        !! of the dense output of a kind
+    logical, allocatable, private :: active(:), mask(:)      !! lanes at the start of an attempt, lanes whose turn it is
+    logical, allocatable, private :: succeeded(:)            !! lanes that have not failed so far
+    real(wp), allocatable, private :: h(:)                   !! step sizes at the start of an attempt [s]
+    real(wp), allocatable, private, dimension(:, :) :: y_new, error_estimate, low_order_estimate   !! of lanes that had their turn
     real(wp), allocatable, private :: coefficients(:, :, :)  !! dense output of one kind
   contains
     procedure :: prepare
@@ -43,13 +45,15 @@ contains
     if (self%has_series) call self%series%prepare(system)
     call self%explicit%prepare(system)
     call self%implicit%prepare(system)
-    if (allocated(self%kind)) deallocate (self%kind, self%active, self%mask, self%coefficients)
+    if (allocated(self%kind)) deallocate (self%kind, self%active, self%mask, self%succeeded, self%h, self%y_new, &
+                                          self%error_estimate, self%low_order_estimate, self%coefficients)
+    self%degree(:) = [self%series%degree, self%explicit%degree, self%implicit%degree]
     columns = padded_columns(system%lanes, system%states + system%quadratures)
-    associate (lanes => system%lanes, degree => max(self%series%degree, self%explicit%degree, self%implicit%degree))
+    associate (lanes => system%lanes)
       allocate (self%kind(lanes), source=by_stages)
-      allocate (self%active(lanes), self%mask(lanes), source=.false.)
-      call allocate_mixed_attempt(self%mixed, lanes, columns)
-      allocate (self%coefficients(lanes, columns, degree), source=0.0_wp)
+      allocate (self%active(lanes), self%mask(lanes), self%succeeded(lanes), source=.false.)
+      allocate (self%h(lanes), self%y_new(lanes, columns), self%error_estimate(lanes, columns), &
+                self%low_order_estimate(lanes, columns), self%coefficients(lanes, columns, maxval(self%degree)), source=0.0_wp)
     end associate
   end subroutine prepare
 
@@ -73,30 +77,15 @@ contains
     self%kind(lane) = kind
     attempt%error_order(lane) = merge(self%implicit%error_order, self%explicit%error_order, kind == by_systems)
     attempt%max_growth(lane) = merge(self%implicit%max_growth, self%explicit%max_growth, kind == by_systems)
-    attempt%degree(lane) = degree_of(self, kind)
+    attempt%degree(lane) = self%degree(kind)
   end subroutine set_kind
 
-  !> Degree of the dense output of a kind.
-  pure integer function degree_of(self, kind) result(degree)
-    type(stepper_kinds_t), intent(in) :: self
-    integer, intent(in) :: kind
-
-    select case (kind)
-    case (by_series)
-      degree = self%series%degree
-    case (by_stages)
-      degree = self%explicit%degree
-    case default
-      degree = self%implicit%degree
-    end select
-  end function degree_of
-
-  !> Attempts the steps of the active lanes, one kind of steps after another.
+  !> Attempts the steps of the active lanes, one kind of steps after another; the other lanes are not active meanwhile.
   subroutine take_steps(self, system, attempt)
     class(stepper_kinds_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
     type(step_attempt_t), intent(inout) :: attempt
-    integer :: kind
+    integer :: kind, lane
 
     self%active(:) = attempt%active
     kind = self%kind(maxloc(merge(1, 0, attempt%active), dim=1))
@@ -104,15 +93,29 @@ contains
       call take_steps_of_kind(self, system, attempt, kind)
       return
     end if
-    call begin_kinds(self%mixed, attempt)
+    self%succeeded(:) = attempt%active
+    self%h(:) = attempt%h
     do kind = 1, kinds
       self%mask(:) = self%kind == kind .and. self%active
       if (.not. any(self%mask)) cycle
-      call select_lanes(self%mixed, attempt, self%mask)
+      attempt%active(:) = self%mask
+      attempt%h(:) = merge(self%h, 0.0_wp, self%mask)
+      call spread_steps(attempt)
       call take_steps_of_kind(self, system, attempt, kind)
-      call keep_lanes(self%mixed, attempt, kind /= by_series, kind == by_stages)
+      do lane = 1, attempt%lanes
+        if (.not. self%mask(lane)) cycle
+        self%succeeded(lane) = attempt%active(lane)
+        self%y_new(lane, :) = attempt%y_new(lane, :)
+        self%error_estimate(lane, :) = merge(attempt%error_estimate(lane, :), 0.0_wp, kind /= by_series)
+        self%low_order_estimate(lane, :) = merge(attempt%low_order_estimate(lane, :), 0.0_wp, kind == by_stages)
+      end do
     end do
-    call end_kinds(self%mixed, attempt)
+    attempt%active(:) = self%succeeded
+    attempt%h(:) = merge(self%h, 0.0_wp, self%succeeded)
+    call spread_steps(attempt)
+    attempt%y_new(:, :) = self%y_new
+    attempt%error_estimate(:, :) = self%error_estimate
+    attempt%low_order_estimate(:, :) = self%low_order_estimate
   end subroutine take_steps
 
   !> Attempts the steps of the active lanes, which are of one kind.
@@ -164,7 +167,7 @@ contains
     integer, intent(in) :: kind
     real(wp), contiguous, intent(inout) :: coefficients(:, :, :)
 
-    associate (degree => degree_of(self, kind))
+    associate (degree => self%degree(kind))
       coefficients(:, :, degree + 1:) = 0.0_wp
       select case (kind)
       case (by_series)

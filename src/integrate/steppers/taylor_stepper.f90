@@ -129,12 +129,11 @@ contains
     if (system%hides_bends) self%chosen(:) = self%moved .and. attempt%active
     if (have_all_moved .and. are_finite .and. .not. any_differs(attempt%lanes, attempt%rhs_status, evaluation_ok)) then
       if (.not. any_too_small(attempt%lanes, attempt%t, self%last_norm)) then
-        ! sets the step sizes where all lanes have moved and have finite series
-        self%moved = .false.
-        self%step_status = attempt_ok
-        self%component = 0
-        attempt%evaluations = attempt%evaluations + 1
-        control%h = self%last_norm
+        self%moved(:) = .false.
+        self%step_status(:) = attempt_ok
+        self%component(:) = 0
+        attempt%evaluations(:) = attempt%evaluations + 1
+        control%h(:) = self%last_norm
         if (system%hides_bends) call shorten_steps(self, system, attempt, control)
         return
       end if

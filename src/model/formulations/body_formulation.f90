@@ -48,7 +48,11 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: mechanical            !! number of mechanical states, at least 2 * bodies
     logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
-    integer :: b, l
+    integer :: b, i, k, l
+    type(rigid_motions_t) :: motions
+    integer, allocatable :: body(:), couplings(:), first(:)
+    real(wp), allocatable :: coefficient(:)
+    type(error_measures_t) :: norm
 
     self%word = word
     self%machine = machine
@@ -63,20 +67,7 @@ contains
       self%mobility(:, :, l) = machine%coordinates%mobility(l)
     end do
     allocate (self%zero_twist(self%lanes, machine%elements%count), source=0.0_wp)
-    call self%set_norm(measures_of_bodies(machine, self%states))
-    call self%prepare_joints()
-  end subroutine set_machine
-
-  !> The measures of errors: every state is one body's.
-  function measures_of_bodies(machine, states) result(norm)
-    type(machine_t), intent(in) :: machine
-    integer, intent(in) :: states
-    type(error_measures_t) :: norm
-    type(rigid_motions_t) :: motions
-    integer, allocatable :: body(:), couplings(:), first(:)
-    real(wp), allocatable :: coefficient(:)
-    integer :: i, k
-
+    ! the measures of errors: every state is one body's
     motions = new_rigid_motions(machine%coordinates%freedoms, &
                                 new_element_coordinates(machine%elements, machine%coordinates), machine%elastic())
     allocate (couplings, source=coupling_elements(machine))
@@ -93,8 +84,10 @@ contains
       first(i + 1) = size(body) + 1
     end do
     norm = new_error_measures(couplings, first, body, spread(coefficient, 1, machine%lanes), &
-                              machine%coordinates%body(motions%free), machine%bodies, states, without_bands=.true.)
-  end function measures_of_bodies
+                              machine%coordinates%body(motions%free), machine%bodies, self%states, without_bands=.true.)
+    call self%set_norm(norm)
+    call self%prepare_joints()
+  end subroutine set_machine
 
   !> Start speeds, angles and internal states; further mechanical states and the work integrals are zero.
   function start_of_bodies(self) result(y)

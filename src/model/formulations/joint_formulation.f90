@@ -31,34 +31,25 @@ contains
     class(joint_formulation_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
     real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states], at least
+    real(wp) :: moved(self%states), near(self%states)
 
-    if (self%joints%count > 0) then
-      call observe_joints(self, t(1), y(1, :self%states))
-    else
+    if (self%joints%count == 0) then
       call observe_elements(self, t, y)
+      return
     end if
-  end subroutine observe_with_joints
-
-  !> Evaluates the elements where some joints may be locked, in a block of one lane.
-  subroutine observe_joints(self, t, y)
-    class(joint_formulation_t), intent(inout) :: self
-    real(wp), intent(in) :: t      !! [s]
-    real(wp), intent(in) :: y(:)   !! [states]
-    real(wp) :: moved(size(y)), near(size(y))
-
-    near = y
+    near = y(1, :self%states)
     if (associated(self%joints%leader)) call self%joints%follow(self%machine%banks)
     self%joint_state(1, :) = near
     call self%gather(self%joint_state)
-    call self%machine%choose_branches([t])
-    if (self%joints%motions%count > 0) call self%project(t, near)
+    call self%machine%choose_branches(t)
+    if (self%joints%motions%count > 0) call self%project(t(1), near)
     if (.not. associated(self%joints%leader)) then
       moved = near
-      call self%settle_joints(by_state, t, moved)
+      call self%settle_joints(by_state, t(1), moved)
     end if
-    call self%find_held_moments(t, near)
+    call self%find_held_moments(t(1), near)
     call self%machine%elements%scatter(self%torque)
-  end subroutine observe_joints
+  end subroutine observe_with_joints
 
   !> Prepares a lane that starts at time t and state y.
   subroutine start_with_joints(self, lane, t, y)
@@ -66,21 +57,14 @@ contains
     integer, intent(in) :: lane
     real(wp), intent(in) :: t                  !! [s]
     real(wp), contiguous, intent(in) :: y(:)   !! state, [states + quadratures]
-
-    call start_branches(self, lane, t, y)
-    if (self%joints%count > 0) call start_joints(self, t, y)
-  end subroutine start_with_joints
-
-  !> Decides which joints are locked at the start.
-  subroutine start_joints(self, t, y)
-    class(joint_formulation_t), intent(inout) :: self
-    real(wp), intent(in) :: t      !! [s]
-    real(wp), intent(in) :: y(:)   !! [states] at least
     real(wp) :: moved(size(y))
 
-    moved = y
-    call self%settle_joints(by_state, t, moved)
-  end subroutine start_joints
+    call start_branches(self, lane, t, y)
+    if (self%joints%count > 0) then
+      moved = y
+      call self%settle_joints(by_state, t, moved)
+    end if
+  end subroutine start_with_joints
 
   !> Indicators of all switches of one lane. The moments of locked joints are found once.
   subroutine indicate_all(self, lane, t, y, g)
@@ -153,26 +137,19 @@ contains
     integer, intent(in) :: which                  !! switch, 1 to `switches`
     real(wp), intent(in) :: t                     !! [s]
     real(wp), contiguous, intent(inout) :: y(:)   !! state, [states + quadratures]
+    integer :: joint
 
     if (self%joints%joint_of(which) > 0) then
       call settle_at_event(self, self%joints%joint_of(which), t, y)
     else
       call choose_branch(self, lane, which, t, y)
-      call engage_at_rest(self, findloc(self%joints%element, self%machine%switches%element(which), dim=1), t, y)
+      ! joints are decided anew where the engagement of one changes that others hold at rest
+      joint = findloc(self%joints%element, self%machine%switches%element(which), dim=1)
+      if (joint == 0) return
+      if (self%joints%mode(joint) == locked) return
+      if (abs(self%joint_rate(joint, y)) <= rest_width * speed_scale(self, y)) call settle_at_event(self, joint, t, y)
     end if
   end subroutine change_with_joints
-
-  !> Decides anew which joints are locked where the engagement of one changes that others hold at rest.
-  subroutine engage_at_rest(self, joint, t, y)
-    class(joint_formulation_t), intent(inout) :: self
-    integer, intent(in) :: joint                  !! one of them; nothing happens if it is 0
-    real(wp), intent(in) :: t                     !! [s]
-    real(wp), contiguous, intent(inout) :: y(:)   !! state, [states + quadratures]
-
-    if (joint == 0) return
-    if (self%joints%mode(joint) == locked) return
-    if (abs(self%joint_rate(joint, y)) <= rest_width * speed_scale(self, y)) call settle_at_event(self, joint, t, y)
-  end subroutine engage_at_rest
 
   !> The speed by which slips that are none are measured [rad/s].
   pure real(wp) function speed_scale(self, y)
@@ -223,7 +200,8 @@ contains
     real(wp), intent(in) :: t                   !! [s]
     real(wp), intent(in) :: y(:)                !! [states] at least
     logical, intent(out) :: is_at_rest(:)       !! [joints]
-    logical :: has_stopped, is_solved
+    real(wp), parameter :: near = 1.0e3_wp   ! times the tolerance: from farther off it is not brought
+    logical :: has_stopped, is_changed, is_solved
     real(wp) :: moments, resting(size(y)), slip(self%joints%count), tolerance
     integer :: j
 
@@ -239,7 +217,19 @@ contains
       if (which /= by_state) has_stopped = joints%mode(which) /= locked .and. is_at_rest(which)
       call joints%assume(self%machine%banks, is_at_rest, slip)
       resting = y
-      if (has_stopped) call bring_to_rest(self, tolerance, resting, is_at_rest, slip)
+      if (has_stopped) then
+        ! The state after a joint has stopped, in which those at rest have no slip left, so that no acceleration comes from one.
+        ! Others are at rest as well that they now hold there: of joints that stop at one time, the first one stops them all.
+        call self%hold(joints%motions%speed, resting(:size(self%moving)))
+        is_changed = .false.
+        do j = 1, joints%locking
+          if (is_at_rest(j) .or. abs(slip(j)) > near * tolerance) cycle
+          slip(j) = self%joint_rate(j, resting)
+          is_at_rest(j) = abs(slip(j)) <= tolerance
+          is_changed = is_changed .or. is_at_rest(j)
+        end do
+        if (is_changed) call joints%assume(self%machine%banks, is_at_rest, slip)
+      end if
       call self%find_held_moments(t, resting(:self%states))
       call self%clean_rates()
       moments = sum(abs(elements%applied(1, :))) + sum(abs(elements%restoring(1, :)))
@@ -247,31 +237,6 @@ contains
       call joints%decide(self%machine%banks, t, is_at_rest, slip, is_solved)
     end associate
   end subroutine decide_at
-
-  !> The state after a joint has stopped, in which those at rest have no slip left, so that no acceleration comes from one.
-  !> Others are at rest as well that they now hold there: of joints that stop at one time, the first one stops them all.
-  subroutine bring_to_rest(self, tolerance, y, is_at_rest, slip)
-    class(joint_formulation_t), intent(inout) :: self
-    real(wp), intent(in) :: tolerance             !! of a slip that is none [rad/s]
-    real(wp), intent(inout) :: y(:)               !! [states] at least
-    logical, intent(inout) :: is_at_rest(:)       !! [joints], assumed
-    real(wp), intent(inout) :: slip(:)            !! [rad/s], [joints]
-    real(wp), parameter :: near = 1.0e3_wp        ! times the tolerance: from farther off it is not brought
-    integer :: j
-    logical :: is_changed
-
-    associate (joints => self%joints)
-      call self%hold(joints%motions%speed, y(:size(self%moving)))
-      is_changed = .false.
-      do j = 1, joints%locking
-        if (is_at_rest(j) .or. abs(slip(j)) > near * tolerance) cycle
-        slip(j) = self%joint_rate(j, y)
-        is_at_rest(j) = abs(slip(j)) <= tolerance
-        is_changed = is_changed .or. is_at_rest(j)
-      end do
-      if (is_changed) call joints%assume(self%machine%banks, is_at_rest, slip)
-    end associate
-  end subroutine bring_to_rest
 
   !> Changes the speeds where joints lock with a slip. The energy that is lost is work of these joints.
   subroutine strike(self, t, tolerance, y, is_struck)

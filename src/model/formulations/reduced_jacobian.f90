@@ -58,40 +58,59 @@ contains
     type(elements_t), intent(in) :: elements   !! whose internal states stand between the coordinates and the work integrals
     type(reduced_jacobian_t) :: self
     integer, allocatable :: row(:), column(:), work(:), work_column(:)   ! `work` is the number of a work integral
-    integer :: c, products
+    integer :: c, products, b, e, element_of(size(incidence%coordinate)), pair, begin, i, k, n
+    integer, allocatable :: entry(:)   ! of each part
+    integer :: position(freedoms)   ! position of each coordinate in the present work integral, if not below `begin`
 
     self%freedoms = freedoms
-    products = product_count(incidence, elements%cross)
+    ! the number of products
+    element_of = incidence%entry_elements()
+    products = 0
+    do b = 1, size(element_of)
+      if (.not. incidence%has_ratio(b)) cycle
+      do pair = 0, elements%cross%count
+        e = elements%cross%moved(pair, element_of(b))
+        if (e > 0) products = products + incidence%first(e + 1) - incidence%first(e)
+      end do
+    end do
     allocate (self%element(products), self%pair(products), self%position(products), row(products), column(products))
     allocate (self%response_entry(products), self%ratio_entry(products))
     call form_products(freedoms, incidence, elements%cross, row, column, self)
     row = row(:self%pairs)
     column = column(:self%pairs)
     allocate (self%product, source=incidence%response(:, self%response_entry) * incidence%ratio(:, self%ratio_entry))
-    call form_works(freedoms, incidence, with_work, elements%cross, work, work_column, self)
+    ! The parts of the derivatives of the work integrals: each coordinate of an element, and those of others on which its moment
+    ! depends.
+    n = sum(incidence%first(with_work + 1) - incidence%first(with_work)) &
+        + sum(incidence%first(elements%cross%by + 1) - incidence%first(elements%cross%by))   ! at most
+    allocate (self%work_position(n), self%work_element(n), self%work_pair(n), entry(n), work(n), work_column(n))
+    position = 0
+    n = 0
+    do i = 1, size(with_work)
+      begin = self%works + 1
+      do pair = 0, elements%cross%count
+        e = elements%cross%mover(pair, with_work(i))
+        if (e == 0) cycle
+        do k = incidence%first(e), incidence%first(e + 1) - 1
+          call find_position(i, incidence%coordinate(k), begin, position(incidence%coordinate(k)), self%works, work, work_column)
+          n = n + 1
+          entry(n) = k
+          self%work_position(n) = position(incidence%coordinate(k))
+          self%work_element(n) = with_work(i)
+          self%work_pair(n) = pair
+        end do
+      end do
+    end do
+    self%work_position = self%work_position(:n)
+    self%work_element = self%work_element(:n)
+    self%work_pair = self%work_pair(:n)
+    self%ratio = incidence%ratio(:, entry(:n))
     self%pattern%row = [row, row, (freedoms + c, c=1, freedoms), &
                         (2 * freedoms + elements%internal%count + work((c + 1) / 2), c=1, 2 * self%works)]
     self%pattern%column = [column, freedoms + column, (c, c=1, freedoms), &
                            (work_column(c), freedoms + work_column(c), c=1, self%works)]
     call append_internal(freedoms, incidence, with_work, elements%internal, self)
   end function new_reduced_jacobian
-
-  !> The number of products.
-  pure integer function product_count(incidence, cross) result(products)
-    type(element_coordinates_t), intent(in) :: incidence
-    type(cross_slopes_t), intent(in) :: cross
-    integer :: b, e, element_of(size(incidence%coordinate)), pair
-
-    element_of = incidence%entry_elements()
-    products = 0
-    do b = 1, size(element_of)
-      if (.not. incidence%has_ratio(b)) cycle
-      do pair = 0, cross%count
-        e = cross%moved(pair, element_of(b))
-        if (e > 0) products = products + incidence%first(e + 1) - incidence%first(e)
-      end do
-    end do
-  end function product_count
 
   !> Forms the products of these pairs, column by column, and their distinct positions.
   subroutine form_products(freedoms, incidence, cross, row, column, self)
@@ -143,45 +162,6 @@ contains
     column(position) = column_of
   end subroutine find_position
 
-  !> The parts of the derivatives of the work integrals: each coordinate of an element, and those of others on which its moment
-  !> depends.
-  subroutine form_works(freedoms, incidence, with_work, cross, work, column, self)
-    integer, intent(in) :: freedoms
-    type(element_coordinates_t), intent(in) :: incidence
-    integer, intent(in) :: with_work(:)
-    type(cross_slopes_t), intent(in) :: cross
-    integer, allocatable, intent(out) :: work(:), column(:)   !! number and coordinate of each position
-    type(reduced_jacobian_t), intent(inout) :: self
-    integer, allocatable :: entry(:)   ! of each part
-    integer :: position(freedoms)      ! position of each coordinate in the present work integral, if not below `begin`
-    integer :: begin, e, i, k, n, pair
-
-    n = sum(incidence%first(with_work + 1) - incidence%first(with_work)) &
-        + sum(incidence%first(cross%by + 1) - incidence%first(cross%by))   ! at most
-    allocate (self%work_position(n), self%work_element(n), self%work_pair(n), entry(n), work(n), column(n))
-    position = 0
-    n = 0
-    do i = 1, size(with_work)
-      begin = self%works + 1
-      do pair = 0, cross%count
-        e = cross%mover(pair, with_work(i))
-        if (e == 0) cycle
-        do k = incidence%first(e), incidence%first(e + 1) - 1
-          call find_position(i, incidence%coordinate(k), begin, position(incidence%coordinate(k)), self%works, work, column)
-          n = n + 1
-          entry(n) = k
-          self%work_position(n) = position(incidence%coordinate(k))
-          self%work_element(n) = with_work(i)
-          self%work_pair(n) = pair
-        end do
-      end do
-    end do
-    self%work_position = self%work_position(:n)
-    self%work_element = self%work_element(:n)
-    self%work_pair = self%work_pair(:n)
-    self%ratio = incidence%ratio(:, entry(:n))
-  end subroutine form_works
-
   subroutine append_internal(freedoms, incidence, with_work, internal, self)
     integer, intent(in) :: freedoms
     type(element_coordinates_t), intent(in) :: incidence
@@ -230,7 +210,7 @@ contains
     class(reduced_jacobian_t), intent(in) :: self
     type(elements_t), intent(in) :: elements
     real(wp), contiguous, intent(inout) :: dfdy(:, :)   !! [lanes, positions]
-    integer :: at, e, l, n
+    integer :: at, e, i, j, l, n, s
 
     dfdy(:, :2 * self%pairs) = 0.0_wp
     dfdy(:, 2 * self%pairs + 1:2 * self%pairs + self%freedoms) = 1.0_wp
@@ -253,7 +233,27 @@ contains
     at = 2 * self%pairs + self%freedoms
     call fill_works(self, elements, dfdy(:, at + 1:at + 2 * self%works))
     at = at + 2 * self%works
-    if (elements%internal%count > 0) call fill_internal(self, elements, at, dfdy)
+    if (elements%internal%count > 0) then
+      j = at
+      associate (internal => elements%internal, incidence => self%incidence)
+        do s = 1, internal%count
+          do i = incidence%first(s), incidence%first(s + 1) - 1
+            j = j + 1
+            dfdy(:, j) = incidence%response(:, i) * internal%applied(:, s)
+            if (.not. incidence%has_ratio(i)) cycle
+            j = j + 1
+            dfdy(:, j) = incidence%ratio(:, i) * internal%rate_speed(:, s)
+          end do
+          do i = 1, internal%members(s)
+            dfdy(:, j + i) = internal%rate_internal(:, i, s)
+          end do
+          j = j + internal%members(s)
+          if (.not. self%has_work_integral(s)) cycle
+          j = j + 1
+          dfdy(:, j) = elements%speed(:, internal%element(s)) * internal%applied(:, s)
+        end do
+      end associate
+    end if
   end subroutine fill
 
   !> dW'/dq' and dW'/dq of W' = M u'.
@@ -280,34 +280,6 @@ contains
       end associate
     end do
   end subroutine fill_works
-
-  subroutine fill_internal(self, elements, before, dfdy)
-    class(reduced_jacobian_t), intent(in) :: self
-    type(elements_t), intent(in) :: elements
-    integer, intent(in) :: before   !! number of positions before these
-    real(wp), contiguous, intent(inout) :: dfdy(:, :)
-    integer :: at, i, s
-
-    at = before
-    associate (internal => elements%internal, incidence => self%incidence)
-      do s = 1, internal%count
-        do i = incidence%first(s), incidence%first(s + 1) - 1
-          at = at + 1
-          dfdy(:, at) = incidence%response(:, i) * internal%applied(:, s)
-          if (.not. incidence%has_ratio(i)) cycle
-          at = at + 1
-          dfdy(:, at) = incidence%ratio(:, i) * internal%rate_speed(:, s)
-        end do
-        do i = 1, internal%members(s)
-          dfdy(:, at + i) = internal%rate_internal(:, i, s)
-        end do
-        at = at + internal%members(s)
-        if (.not. self%has_work_integral(s)) cycle
-        at = at + 1
-        dfdy(:, at) = elements%speed(:, internal%element(s)) * internal%applied(:, s)
-      end do
-    end associate
-  end subroutine fill_internal
 
   !> Updates the products and responses of one lane.
   pure subroutine refresh_lane(self, lane, incidence)

@@ -81,18 +81,6 @@ contains
     self%accelerations = new_series_map(accelerations, self%lanes, self%strip, self%freedoms, self%elements)
     allocate (self%law(self%w, self%groups, parameters, (machine%lanes + self%strip - 1) / self%strip), source=0.0_wp)
     allocate (self%terms(self%groups), source=merge(has_applied, 0, self%has_energy_balance))
-    call allocate_work(self)
-    self%banks = new_series_banks(machine, order, self%strip, self%groups)
-    where (self%banks%has_angle) self%terms = ior(self%terms, has_angle)
-    where (self%banks%has_forcing) self%terms = ior(self%terms, has_forcing)
-    do lane = 1, machine%lanes
-      call copy_laws(self, lane, machine%laws)
-    end do
-  end function new_reduced_series
-
-  subroutine allocate_work(self)
-    type(reduced_series_t), intent(inout) :: self
-
     associate (length => self%w * ((self%strip * self%freedoms + self%w - 1) / self%w))
       allocate (self%motion(self%w, 0:self%order, self%groups, 2), self%square(self%w, 0:self%order, self%groups), source=0.0_wp)
       allocate (self%restoring(self%w, self%groups), self%applied(self%w, self%groups), source=0.0_wp)
@@ -101,7 +89,13 @@ contains
       allocate (self%rates(length), self%coordinates(length), self%acceleration(length), source=0.0_wp)
       allocate (self%angles(self%elements), self%speeds(self%elements), source=0.0_wp)
     end associate
-  end subroutine allocate_work
+    self%banks = new_series_banks(machine, order, self%strip, self%groups)
+    where (self%banks%has_angle) self%terms = ior(self%terms, has_angle)
+    where (self%banks%has_forcing) self%terms = ior(self%terms, has_forcing)
+    do lane = 1, machine%lanes
+      call copy_laws(self, lane, machine%laws)
+    end do
+  end function new_reduced_series
 
   !> Updates everything that depends on the parameters of a lane.
   subroutine refresh_lane(self, lane, laws, twists, accelerations)
@@ -121,7 +115,7 @@ contains
     type(reduced_series_t), intent(inout) :: self
     integer, intent(in) :: lane
     type(polynomial_laws_t), intent(in) :: laws
-    integer :: e, first, g, last, slot
+    integer :: e, first, g, last, slot, terms
 
     first = modulo(lane - 1, self%strip) + 1
     last = first
@@ -137,22 +131,16 @@ contains
           law(by_speed_squared) = laws%by_speed_squared(lane, e)
           law(rest) = laws%rest(lane, e)
         end associate
-        self%terms(g) = ior(self%terms(g), terms_of(laws, lane, e))
+        ! the terms that the law of an element has in one lane
+        terms = 0
+        if (abs(laws%linear(lane, e)) > 0) terms = has_angle
+        if (abs(laws%cubic(lane, e)) > 0) terms = has_angle + has_cubic
+        if (abs(laws%constant(lane, e)) > 0 .or. abs(laws%by_speed(lane, e)) > 0) terms = terms + has_applied
+        if (abs(laws%by_speed_squared(lane, e)) > 0) terms = terms + has_square
+        self%terms(g) = ior(self%terms(g), terms)
       end do
     end do
   end subroutine copy_laws
-
-  !> The terms that the law of an element has in one lane.
-  pure integer function terms_of(laws, lane, element) result(terms)
-    type(polynomial_laws_t), intent(in) :: laws
-    integer, intent(in) :: lane, element
-
-    terms = 0
-    if (abs(laws%linear(lane, element)) > 0) terms = has_angle
-    if (abs(laws%cubic(lane, element)) > 0) terms = has_angle + has_cubic
-    if (abs(laws%constant(lane, element)) > 0 .or. abs(laws%by_speed(lane, element)) > 0) terms = terms + has_applied
-    if (abs(laws%by_speed_squared(lane, element)) > 0) terms = terms + has_square
-  end function terms_of
 
   !> Computes the coefficients number 1 to `order` of q', q, the internal states and the work integrals, which follow one another.
   subroutine expand(self, machine, twists, accelerations, twist_at_origin, columns, t, y)
@@ -223,11 +211,19 @@ contains
     real(wp), intent(in) :: twist_at_origin(self%lanes, self%elements)   !! [rad]
     real(wp), intent(in) :: t(self%lanes)                       !! [s]
     real(wp), intent(in) :: y(self%lanes, columns)              !! state
+    integer :: g, last, n
 
     associate (f => self%freedoms)
       call gather(self, strip, f, y, self%rates)
       if (self%lanes == 1) then
-        call begin_one_lane(self, twists, twist_at_origin, y(1, f + 1))
+        ! angles from rest and speeds of the elements of one lane
+        call twists%multiply_pair(twist_at_origin, y(1, f + 1), self%rates, self%angles, self%speeds)
+        do g = 1, self%groups
+          last = min(narrow * g, self%elements)
+          n = last - narrow * (g - 1)
+          self%motion(:n, 0, g, 1) = self%angles(last - n + 1:last) - self%law(:n, g, rest, 1)
+          self%motion(:n, 0, g, 2) = self%speeds(last - n + 1:last)
+        end do
       else
         associate (before => self%strip * (strip - 1))
           if (before + self%strip <= self%lanes) then
@@ -261,23 +257,6 @@ contains
       end if
     end associate
   end subroutine begin_lanes
-
-  !> Angles from rest and speeds of the elements of one lane.
-  subroutine begin_one_lane(self, twists, twist_at_origin, q)
-    type(reduced_series_t), intent(inout) :: self
-    type(sparse_map_t), intent(in) :: twists                   !! U
-    real(wp), intent(in) :: twist_at_origin(self%elements)     !! [rad]
-    real(wp), intent(in) :: q(self%freedoms)                   !! coordinates
-    integer :: g, last, n
-
-    call twists%multiply_pair(twist_at_origin, q, self%rates, self%angles, self%speeds)
-    do g = 1, self%groups
-      last = min(narrow * g, self%elements)
-      n = last - narrow * (g - 1)
-      self%motion(:n, 0, g, 1) = self%angles(last - n + 1:last) - self%law(:n, g, rest, 1)
-      self%motion(:n, 0, g, 2) = self%speeds(last - n + 1:last)
-    end do
-  end subroutine begin_one_lane
 
   !> Copies components of the state of a strip; the last lane to those beyond it, too.
   pure subroutine gather(self, strip, n, y, x)

@@ -47,7 +47,12 @@ contains
       do i = 1, size(numbers)
         associate (bank => machine%banks(numbers(i))%bank)
           call bank%law%prepare_series(order)
-          timed(i) = is_timed(bank)
+          timed(i) = bank%states == 0 .and. bank%law%law%tape%restoring == 0
+          if (timed(i)) then
+            associate (law => bank%law%law%tape%node(bank%law%law%tape%applied))
+              timed(i) = .not. (law%has_angle .or. law%has_speed)
+            end associate
+          end if
           associate (first => strip * (bank%first - 1) / w + 1, &
                      last => (strip * (bank%last() + (bank%ports - 1) * bank%count) - 1) / w + 1)
             self%has_forcing(first:last) = self%has_forcing(first:last) .or. timed(i)
@@ -115,17 +120,6 @@ contains
       end associate
     end do
   end subroutine integrate
-
-  !> Whether the moments of a bank follow from the time alone.
-  pure logical function is_timed(bank)
-    class(bank_t), intent(in) :: bank
-
-    is_timed = .false.
-    if (bank%states > 0 .or. bank%law%law%tape%restoring > 0) return
-    associate (law => bank%law%law%tape%node(bank%law%law%tape%applied))
-      is_timed = .not. (law%has_angle .or. law%has_speed)
-    end associate
-  end function is_timed
 
   !> Sets the time and the internal states at the start of a step.
   subroutine begin_bank(bank, strip, t, internal)
