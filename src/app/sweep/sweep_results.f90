@@ -5,7 +5,7 @@ module nocdyn_sweep_results
   use nocdyn_column_lists, only: columns_file
   use nocdyn_console, only: print_text, report_error
   use nocdyn_errors, only: error_t, exit_done, exit_failed, exit_file, exit_input, raise
-  use nocdyn_folders, only: folder_names, remove_empty_folder
+  use nocdyn_posix_files, only: folder_names, remove_empty_folder
   use nocdyn_input, only: input_t
   use nocdyn_input_text, only: input_text
   use nocdyn_journal_chunks, only: chunk_cursor_t

@@ -43,20 +43,10 @@ module nocdyn_lane_parameters
   contains
     procedure :: clear
     generic :: add => add_matrix, add_stack
-    procedure :: add_key
-    procedure :: add_blocks
-    procedure :: add_curves
+    procedure :: add_key, add_blocks, add_curves
     generic :: add_structure => add_integers, add_flag, add_names
-    procedure :: has_same_structure
-    procedure :: copy_lane
-    procedure :: differences
-    procedure :: has_same_curves
-    procedure :: index_of_key
-    procedure :: value
-    procedure :: set_value
-    procedure, private :: add_matrix, add_stack
-    procedure, private :: add_integers, add_flag, add_names
-    procedure, private :: next_array
+    procedure :: has_same_structure, copy_lane, differences, has_same_curves, index_of_key, value, set_value
+    procedure, private :: add_matrix, add_stack, add_integers, add_flag, add_names, next_array
   end type lane_parameters_t
 
 contains

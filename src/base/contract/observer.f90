@@ -26,15 +26,8 @@ module nocdyn_observer
     integer :: first_read = 1               !! components whose polynomials `on_steps` reads; may change from variant to variant
     integer :: last_read = huge(0)
   contains
-    procedure :: on_start
-    procedure :: on_output
-    procedure :: wants_stop
-    procedure :: event_values
-    procedure :: on_event
-    procedure :: observe_lanes, tracked_values, find_pace
-    procedure :: on_extremes, on_piece
-    procedure :: on_steps
-    procedure :: on_shift
+    procedure :: on_start, on_output, wants_stop, event_values, on_event
+    procedure :: observe_lanes, tracked_values, find_pace, on_extremes, on_piece, on_steps, on_shift
   end type observer_t
 
   !> The steps that the lanes of a block have taken together; [lanes].

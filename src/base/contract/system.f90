@@ -51,29 +51,10 @@ module nocdyn_system
   contains
     procedure(derivative_interface), deferred :: derivative
     procedure(jacobian_interface), deferred :: jacobian
-    procedure :: jacobian_pattern
-    procedure :: component_name
-    procedure :: prepare_integration
-    procedure :: measure
-    procedure :: measure_name
-    procedure :: find_far
-    procedure :: project_state
-    procedure :: evaluation_obstacle
-    procedure :: limit_steps
-    procedure :: shift_state
-    procedure :: restore_state
-    procedure :: series_obstacle
-    procedure :: prepare_series
-    procedure :: series
-    procedure :: evaluation_cost
-    procedure :: series_cost
-    procedure :: start_lane
-    procedure :: indicator_values
-    procedure :: set_indicator
-    procedure :: block_indicators
-    procedure :: find_fastest_wave
-    procedure :: change_branch
-    procedure :: switch_name
+    procedure :: jacobian_pattern, component_name, prepare_integration, measure, measure_name, find_far
+    procedure :: project_state, evaluation_obstacle, limit_steps, shift_state, restore_state, series_obstacle
+    procedure :: prepare_series, series, evaluation_cost, series_cost, start_lane, indicator_values
+    procedure :: set_indicator, block_indicators, find_fastest_wave, change_branch, switch_name
   end type system_t
 
   abstract interface

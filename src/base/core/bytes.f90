@@ -16,9 +16,7 @@ module nocdyn_bytes
     integer :: next = 1            !! position of the next byte
     logical :: is_short = .false.
   contains
-    procedure :: take_integers
-    procedure :: take_reals
-    procedure :: take_text
+    procedure :: take_integers, take_reals, take_text
     procedure, private :: has
   end type byte_reader_t
 

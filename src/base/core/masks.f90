@@ -12,7 +12,7 @@ contains
     integer, intent(in) :: n
     logical, intent(in) :: mask(n)
 
-    all_true = count_true(n, mask) == n
+    all_true = count(mask) == n
   end function all_true
 
   !> Whether any element is true.
@@ -20,20 +20,8 @@ contains
     integer, intent(in) :: n
     logical, intent(in) :: mask(n)
 
-    any_true = count_true(n, mask) > 0
+    any_true = count(mask) > 0
   end function any_true
-
-  !> The number of true elements.
-  pure integer function count_true(n, mask) result(trues)
-    integer, intent(in) :: n
-    logical, intent(in) :: mask(n)
-    integer :: i
-
-    trues = 0
-    do i = 1, n
-      trues = trues + merge(1, 0, mask(i))
-    end do
-  end function count_true
 
   !> Whether any number differs from `usual`.
   pure logical function any_differs(n, numbers, usual)

@@ -23,8 +23,7 @@ module nocdyn_damage_counters
     real(wp), private :: magnitude = 0.0_wp         !! largest so far
     integer, private :: direction = 0               !! in which the signal goes: 1, -1; 0: it has not moved
   contains
-    procedure :: count_cycle
-    procedure :: start, add, finish, hysteresis
+    procedure :: count_cycle, start, add, finish, hysteresis
   end type damage_counter_t
 
 contains

@@ -30,11 +30,7 @@ module nocdyn_law_numbers
     type(law_program_t), private :: motion, energy, curve
     type(guards_t), allocatable, private :: guards(:, :)   !! [branches, switches of an element]
   contains
-    procedure :: set_constants
-    procedure :: evaluate
-    procedure :: evaluate_energies
-    procedure :: lowest_guard
-    procedure :: curve_argument
+    procedure :: set_constants, evaluate, evaluate_energies, lowest_guard, curve_argument
   end type law_numbers_t
 
 contains

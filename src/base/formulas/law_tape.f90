@@ -75,10 +75,7 @@ module nocdyn_law_tape
     integer, allocatable :: guarded_branch(:)  !! ... with this number, 0: every one, [guards]
     integer, allocatable :: guard_shift(:)     !! constants by which boundaries are shifted outwards, [guards]
   contains
-    procedure :: append
-    procedure :: constants
-    procedure :: needed
-    procedure :: inputs
+    procedure :: append, constants, needed, inputs
   end type law_tape_t
 
 contains

@@ -16,8 +16,7 @@ module nocdyn_law_values
     integer :: steps = 0
     integer, allocatable :: node(:), operation(:), a(:), b(:)   !! as in `law_node_t`, [steps]
   contains
-    procedure :: compute
-    procedure :: has_harmonics
+    procedure :: compute, has_harmonics
   end type law_program_t
 
 contains

@@ -36,9 +36,7 @@ module nocdyn_laws
     real(wp), allocatable :: constant(:, :)   !! values of the constants, [slots of all strips, constants]
     real(wp), allocatable :: stacked(:)    !! coefficients of harmonics, [w, terms, groups of all strips] each
   contains
-    procedure :: slot
-    procedure :: copies
-    procedure :: refresh
+    procedure :: slot, copies, refresh
   end type law_t
 
 contains

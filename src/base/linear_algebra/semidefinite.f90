@@ -19,9 +19,7 @@ module nocdyn_semidefinite
     real(wp), allocatable, private :: scale(:)         !! 1 / sqrt(diagonal)
     real(wp), allocatable, private :: work(:, :)       !! right-hand side
   contains
-    procedure :: set_matrix
-    procedure :: solve
-    procedure :: find_rank
+    procedure :: set_matrix, solve, find_rank
   end type semidefinite_t
 
   interface

@@ -19,10 +19,7 @@ module nocdyn_brackets
     integer, private :: moved = 0          ! end that was replaced last
     logical, private :: bisects = .false.
   contains
-    procedure :: next
-    procedure :: narrow
-    procedure :: is_narrow
-    procedure :: root
+    procedure :: next, narrow, is_narrow, root
   end type bracket_t
 
 contains

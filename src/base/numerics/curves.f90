@@ -29,14 +29,7 @@ module nocdyn_curves
     real(wp), allocatable, private :: coefficient(:, :)  !! of the powers of x - origin, [0:3, 0:points]
     real(wp), allocatable, private :: area(:)            !! integral from the first point to the origin, [0:points]
   contains
-    procedure :: points
-    procedure :: knots
-    procedure :: is_same
-    procedure :: segment
-    procedure :: segment_number
-    procedure :: value
-    procedure :: derivatives
-    procedure :: integral_to
+    procedure :: points, knots, is_same, segment, segment_number, value, derivatives, integral_to
   end type curve_t
 
 contains

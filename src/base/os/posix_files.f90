@@ -1,15 +1,16 @@
-!> Files as descriptors of the operating system: read at any offset, written at the end, truncated, locked.
+!> Files as descriptors of the operating system: read at any offset, written at the end, truncated, locked; the names in a folder.
 module nocdyn_posix_files
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_int64_t, c_intptr_t, c_null_char, c_size_t
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_bytes, only: widen
   use nocdyn_posix, only: close_file, descriptor_call, failure_number, is_interrupted_call, last_failure, path_call, &
     path_number_call
+  use nocdyn_text, only: append, string_t
   implicit none (type, external)
   private
 
   public :: is_irregular, open_new, open_existing, file_size, read_at, read_whole, truncate_file, sync_file, sync_path, &
-    lock_file, disk_failure, free_bytes
+    lock_file, disk_failure, free_bytes, folder_names, remove_empty_folder
 
   integer(c_int), parameter :: from_start = 0, from_end = 2      ! SEEK_SET, SEEK_END
   integer(c_int), parameter :: exclusive = 2, without_waiting = 4   ! LOCK_EX, LOCK_NB
@@ -17,6 +18,7 @@ module nocdyn_posix_files
   integer, parameter :: disk_errors(4) = [5, 27, 28, 122]   ! EIO, EFBIG, ENOSPC, EDQUOT
 
   procedure(path_call), bind(c, name='nocdyn_open_new') :: c_open_new
+  procedure(path_call), bind(c, name='rmdir') :: c_rmdir
   procedure(path_number_call), bind(c, name='nocdyn_open_existing') :: c_open_existing
   procedure(descriptor_call), bind(c, name='fdatasync') :: c_fdatasync
   procedure(descriptor_call), bind(c, name='fsync') :: c_fsync
@@ -64,6 +66,15 @@ module nocdyn_posix_files
       import :: c_int
       integer(c_int), value, intent(in) :: descriptor, operation
     end function c_flock
+
+    !> Writes the names, each followed by a null character (folder_names.cpp); returns the length of all.
+    function c_folder_names(path, names, capacity) result(length) bind(c, name='nocdyn_folder_names')
+      import :: c_char, c_size_t
+      character(kind=c_char), intent(in) :: path(*)
+      character(kind=c_char), intent(out) :: names(*)
+      integer(c_size_t), value, intent(in) :: capacity
+      integer(c_size_t) :: length
+    end function c_folder_names
   end interface
 
 contains
@@ -210,5 +221,37 @@ contains
     reason = ''
     if (any(disk_errors == failure_number())) reason = last_failure()
   end function disk_failure
+
+  !> The names of files and folders in a folder, in no particular order; none if it cannot be read.
+  function folder_names(folder) result(names)
+    character(len=*), intent(in) :: folder
+    type(string_t), allocatable :: names(:)
+    character(len=:), allocatable :: bytes
+    integer(c_size_t) :: length
+    integer :: first, last
+
+    length = 0
+    do   ! files may appear between the two calls
+      allocate (character(len=length) :: bytes)
+      length = c_folder_names(folder // c_null_char, bytes, int(len(bytes), c_size_t))
+      if (length <= len(bytes)) exit
+      deallocate (bytes)
+    end do
+    allocate (names(0))
+    first = 1
+    do while (first <= length)
+      last = first + index(bytes(first:), c_null_char) - 2
+      call append(names, bytes(first:last))
+      first = last + 2
+    end do
+  end function folder_names
+
+  !> Removes a folder if it is empty.
+  subroutine remove_empty_folder(path)
+    character(len=*), intent(in) :: path
+    integer(c_int) :: status
+
+    status = c_rmdir(path // c_null_char)
+  end subroutine remove_empty_folder
 
 end module nocdyn_posix_files

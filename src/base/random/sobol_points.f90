@@ -42,8 +42,7 @@ module nocdyn_sobol_points
     integer(int64), allocatable :: directions(:, :)   !! [word_bits, dimensions]
     integer(int64), allocatable :: shift(:)           !! [dimensions]
   contains
-    procedure :: coordinate
-    procedure :: coordinate_bits
+    procedure :: coordinate, coordinate_bits
   end type sobol_points_t
 
 contains

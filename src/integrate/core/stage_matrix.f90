@@ -24,9 +24,7 @@ module nocdyn_stage_matrix
     integer, allocatable, private :: pivots(:, :)       !! [states, lanes]
     real(wp), allocatable, private :: x(:)              !! right-hand side, then solution, of one lane
   contains
-    procedure :: operations
-    procedure :: factor
-    procedure :: solve
+    procedure :: operations, factor, solve
   end type stage_matrix_t
 
 contains

@@ -26,8 +26,7 @@ module nocdyn_stepper
     procedure(take_step_interface), deferred :: take_step
     procedure(interpolate_interface), deferred :: interpolate
     procedure(accept_interface), deferred :: accept
-    procedure :: resume
-    procedure :: pass_steps
+    procedure :: resume, pass_steps
   end type stepper_t
 
   abstract interface

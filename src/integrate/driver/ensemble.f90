@@ -45,8 +45,7 @@ module nocdyn_ensemble
     real(wp), allocatable :: y(:, :)        !! [lanes, components]: initial states, replaced by the last states
     logical, allocatable :: begun(:)
   contains
-    procedure :: next
-    procedure :: finish
+    procedure :: next, finish
   end type initial_states_t
 
 contains

@@ -40,10 +40,7 @@ module nocdyn_plain_system
     real(wp), private :: last_step = 0.0_wp    !! between the last two [s], 0 at the start
     real(wp), allocatable, private :: dydt(:), near_dydt(:), far_dydt(:), shifted_y(:), dfdy(:, :)
   contains
-    procedure :: derivative
-    procedure :: jacobian
-    procedure :: prepare_integration
-    procedure :: start_lane
+    procedure :: derivative, jacobian, prepare_integration, start_lane
   end type plain_system_t
 
 contains

@@ -47,13 +47,7 @@ module nocdyn_auto_stepper
     real(wp), allocatable :: h(:)              !! step sizes before new series change them [s]
     real(wp), allocatable :: lambda(:)         !! dominant eigenvalues by the series [1/s]
   contains
-    procedure :: prepare
-    procedure :: start
-    procedure :: choose_steps
-    procedure :: take_step
-    procedure :: interpolate
-    procedure :: accept
-    procedure :: resume
+    procedure :: prepare, start, choose_steps, take_step, interpolate, accept, resume
   end type auto_stepper_t
 
 contains

@@ -24,14 +24,7 @@ module nocdyn_explicit_stepper
     real(wp), allocatable :: y_stage(:, :)       !! state of a stage, [lanes, padded columns]
     logical, allocatable :: moved(:)             !! lanes whose first stage must be evaluated
   contains
-    procedure :: prepare
-    procedure :: start
-    procedure :: take_step
-    procedure :: interpolate
-    procedure :: accept
-    procedure :: invalidate_first_stage
-    procedure :: stiffness
-    procedure :: cost
+    procedure :: prepare, start, take_step, interpolate, accept, invalidate_first_stage, stiffness, cost
   end type explicit_stepper_t
 
 contains

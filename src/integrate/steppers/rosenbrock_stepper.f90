@@ -31,14 +31,7 @@ module nocdyn_rosenbrock_stepper
     logical, allocatable :: no_slope(:)               !! lanes whose slope must be evaluated
     logical, allocatable :: no_jacobian(:)            !! lanes whose Jacobian must be evaluated
   contains
-    procedure :: prepare
-    procedure :: start
-    procedure :: take_step
-    procedure :: interpolate
-    procedure :: accept
-    procedure :: stiffness
-    procedure :: reset_spectra
-    procedure :: cost
+    procedure :: prepare, start, take_step, interpolate, accept, stiffness, reset_spectra, cost
   end type rosenbrock_stepper_t
 
 contains

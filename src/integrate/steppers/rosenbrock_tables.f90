@@ -27,6 +27,10 @@ contains
   !> Differential Equations II, 2nd ed. (1996), IV.7 and VI.4, and their code RODAS (METH = 1).
   function rodas4() result(table)
     type(rosenbrock_table_t) :: table
+    real(wp), parameter :: r(6) = [10.12623508344586_wp, -7.487995877610167_wp, -34.80091861555747_wp, &
+                                   -7.992771707568823_wp, 1.025137723295662_wp, 0.0_wp]
+    real(wp), parameter :: s(6) = [-0.6762803392801253_wp, 6.087714651680015_wp, 16.43084320892478_wp, &
+                                   24.76722511418386_wp, -6.594389125716872_wp, 0.0_wp]
 
     table%order = 4
     table%error_order = 3
@@ -48,29 +52,27 @@ contains
                        -6.058818238834054_wp]
     table%m(:) = [table%a(6, 1:5), 1.0_wp]
     table%error(:) = [0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp]
-    table%dense(:, :) = rodas_dense(table%m)
+    ! the dense output CONTRO of RODAS in powers of theta: y (1 - theta) + theta (y_new + (1 - theta) (r + theta s)), where r and
+    ! s are sums of the stages with the weights D2i and D3i
+    table%dense(:, 1) = table%m + r
+    table%dense(:, 2) = s - r
+    table%dense(:, 3) = -s
   end function rodas4
-
-  !> The dense output CONTRO of RODAS in powers of theta: y (1 - theta) + theta (y_new + (1 - theta) (r + theta s)), where r and s
-  !> are sums of the stages with the weights D2i and D3i.
-  pure function rodas_dense(m) result(dense)
-    real(wp), intent(in) :: m(6)
-    real(wp) :: dense(6, 3)
-    real(wp), parameter :: r(6) = [10.12623508344586_wp, -7.487995877610167_wp, -34.80091861555747_wp, &
-                                   -7.992771707568823_wp, 1.025137723295662_wp, 0.0_wp]
-    real(wp), parameter :: s(6) = [-0.6762803392801253_wp, 6.087714651680015_wp, 16.43084320892478_wp, &
-                                   24.76722511418386_wp, -6.594389125716872_wp, 0.0_wp]
-
-    dense(:, 1) = m + r
-    dense(:, 2) = s - r
-    dense(:, 3) = -s
-  end function rodas_dense
 
   !> RODAS5P, of order 5(4), stiffly accurate, L-stable, with a dense output of order 4; no loss of order on stiff problems of
   !> Prothero and Robinson's kind: G. Steinebach, Construction of Rosenbrock-Wanner method Rodas5P and numerical benchmarks within
   !> the Julia Differential Equations package, BIT Numer. Math. 63 (2023) 27.
   function rodas5p() result(table)
     type(rosenbrock_table_t) :: table
+    real(wp), parameter :: r(8) = [25.948786856663858_wp, -2.5579724845846235_wp, 10.433815404888879_wp, &
+                                   -2.3679251022685204_wp, 0.524948541321073_wp, 1.1241088310450404_wp, &
+                                   0.4272876194431874_wp, -0.17202221070155493_wp]
+    real(wp), parameter :: s(8) = [-9.91568850695171_wp, -0.9689944594115154_wp, 3.0438037242978453_wp, &
+                                   -24.495224566215796_wp, 20.176138334709044_wp, 15.98066361424651_wp, &
+                                   -6.789040303419874_wp, -6.710236069923372_wp]
+    real(wp), parameter :: q(8) = [11.419903575922262_wp, 2.8879645146136994_wp, 72.92137995996029_wp, &
+                                   80.12511834622643_wp, -52.072871366152654_wp, -59.78993625266729_wp, &
+                                   -0.15582684282751913_wp, 4.883087185713722_wp]
 
     table%order = 5
     table%error_order = 4
@@ -101,29 +103,13 @@ contains
                        -40.06618937091002_wp, -54.66780262877968_wp, -9.48861652309627_wp]
     table%m(:) = [table%a(8, 1:7), 1.0_wp]
     table%error(8) = 1.0_wp
-    table%dense(:, :) = rodas5p_dense(table%m)
+    ! Steinebach's y (1 - theta) + theta (y_new + (1 - theta) (r + theta (s + theta q))), expanded in powers of theta, where
+    ! r, s and q are sums of the stages. The conditions of order 4 do not contain the weights of the last stage, which is y_new
+    ! minus the embedded solution.
+    table%dense(:, 1) = table%m + r
+    table%dense(:, 2) = s - r
+    table%dense(:, 3) = q - s
+    table%dense(:, 4) = -q
   end function rodas5p
-
-  !> Steinebach's y (1 - theta) + theta (y_new + (1 - theta) (r + theta (s + theta q))), expanded in powers of theta, where
-  !> r, s and q are sums of the stages. The conditions of order 4 do not contain the weights of the last stage, which is y_new
-  !> minus the embedded solution.
-  pure function rodas5p_dense(m) result(dense)
-    real(wp), intent(in) :: m(8)
-    real(wp) :: dense(8, 4)
-    real(wp), parameter :: r(8) = [25.948786856663858_wp, -2.5579724845846235_wp, 10.433815404888879_wp, &
-                                   -2.3679251022685204_wp, 0.524948541321073_wp, 1.1241088310450404_wp, &
-                                   0.4272876194431874_wp, -0.17202221070155493_wp]
-    real(wp), parameter :: s(8) = [-9.91568850695171_wp, -0.9689944594115154_wp, 3.0438037242978453_wp, &
-                                   -24.495224566215796_wp, 20.176138334709044_wp, 15.98066361424651_wp, &
-                                   -6.789040303419874_wp, -6.710236069923372_wp]
-    real(wp), parameter :: q(8) = [11.419903575922262_wp, 2.8879645146136994_wp, 72.92137995996029_wp, &
-                                   80.12511834622643_wp, -52.072871366152654_wp, -59.78993625266729_wp, &
-                                   -0.15582684282751913_wp, 4.883087185713722_wp]
-
-    dense(:, 1) = m + r
-    dense(:, 2) = s - r
-    dense(:, 3) = q - s
-    dense(:, 4) = -q
-  end function rodas5p_dense
 
 end module nocdyn_rosenbrock_tables

@@ -25,14 +25,7 @@ module nocdyn_stepper_kinds
     real(wp), allocatable, private, dimension(:, :) :: y_new, error_estimate, low_order_estimate   !! of lanes that had their turn
     real(wp), allocatable, private :: coefficients(:, :, :)  !! dense output of one kind
   contains
-    procedure :: prepare
-    procedure :: start
-    procedure :: set_kind
-    procedure :: take_steps
-    procedure :: interpolate
-    procedure :: accept
-    procedure :: change_kind
-    procedure :: resume
+    procedure :: prepare, start, set_kind, take_steps, interpolate, accept, change_kind, resume
   end type stepper_kinds_t
 
 contains

@@ -2,18 +2,21 @@
 !>
 !> The last two coefficients limit the step size: h is the smaller of ||y_j||^(-1/j), j = p - 1 and p, where the norm is the
 !> largest |y_j| / (atol + rtol |y|) of the states, or of the quantities that the system measures. The terms h^j y_j are then
-!> within the tolerance, and there is no error test after a step; `nocdyn_series_defects` tests the series of systems that have
-!> more than their series show. The last term of the quadratures is kept within theirs. With
+!> within the tolerance, and there is no error test after a step. The last term of the quadratures is kept within theirs. With
 !> p = 1 - ln(tol) / 2 this is the step rho / e^2 of A. Jorba, M. Zou, A software package for the numerical integration of ODEs
 !> by means of high-order Taylor methods, Experimental Mathematics 14 (2005) 99-117. They assume that the work grows as p^2. Here
 !> it grows more slowly at small p, and the order is higher.
+!>
+!> A series may not show what a system has: tanh far from its bend is a constant to all digits, and so is its series, however near
+!> in time the bend is. The series of the solution is then wrong from the bend on. The defect of a series y(t) is y' - f(t, y)
+!> (W. H. Enright, BIT 40 (2000) 629-651). It is computed at some times of a step; the step is shortened until the error to which
+!> the defect adds up is within the tolerance.
 module nocdyn_taylor_stepper
   use nocdyn_error_norm, only: quadrature_tolerance, remember
   use nocdyn_finite, only: all_finite, is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: all_true, any_differs
   use nocdyn_observer, only: observer_t, step_block_t
-  use nocdyn_series_defects, only: new_series_defects, series_defects_t
   use nocdyn_series_sums, only: scale_series, sum_series
   use nocdyn_stage_sums, only: padded_columns
   use nocdyn_step_attempt, only: attempt_not_finite, attempt_ok, attempt_recoverable, disable_lane, disable_non_finite_lanes, &
@@ -32,6 +35,17 @@ module nocdyn_taylor_stepper
 
   real(wp), parameter :: quadrature_share = 0.2_wp   !! of the error allowed to a quadrature, for its last term
 
+  real(wp), parameter :: times(4) = [0.3_wp, 0.6_wp, 0.9_wp, 1.0_wp]   ! of a step, where the defect of a series is computed
+  real(wp), parameter :: ratio = 0.3_wp                                ! by which a step is shortened
+
+  !> Work space for the defects of series; [lanes, columns] or [lanes, measures].
+  type :: series_defects_t
+    real(wp), allocatable :: t(:)                !! [s], [lanes]
+    real(wp), allocatable :: h(:, :), y(:, :), slope(:, :), rate(:, :), sizes(:, :), errors(:, :)
+    integer, allocatable :: status(:)            !! evaluation_... of each lane
+    logical, allocatable :: is_wrong(:)          !! lanes whose steps are too long
+  end type series_defects_t
+
   type, extends(stepper_t), public :: taylor_stepper_t
     private
     real(wp), allocatable :: series(:, :, :)   !! y_0, y_1, ... of each lane, [lanes, padded columns, 0:order]
@@ -46,17 +60,8 @@ module nocdyn_taylor_stepper
     logical, allocatable :: chosen(:)          !! lanes with new step sizes
     type(series_defects_t) :: defects
   contains
-    procedure :: choose_steps
-    procedure :: prepare
-    procedure :: start
-    procedure :: take_step
-    procedure :: interpolate
-    procedure :: accept
-    procedure :: pass_steps
-    procedure :: plans_step
-    procedure :: find_eigenvalues
-    procedure :: stability_limit
-    procedure :: cost
+    procedure :: choose_steps, prepare, start, take_step, interpolate, accept, pass_steps, plans_step
+    procedure :: find_eigenvalues, stability_limit, cost
   end type taylor_stepper_t
 
 contains
@@ -90,11 +95,26 @@ contains
       allocate (self%previous(lanes, system%measures), self%last_norm(lanes), self%previous_norm(lanes), &
                 self%log_growth(lanes), source=0.0_wp)
       allocate (self%moved(lanes), self%chosen(lanes), source=.true.)
-      if (system%hides_bends) self%defects = new_series_defects(system, self%order, size(self%series, 2))
+      if (system%hides_bends) call allocate_defects(self%defects, system, size(self%series, 2))
       allocate (self%step_status(lanes), source=attempt_ok)
       allocate (self%component(lanes), self%infinite(lanes), source=0)
     end associate
   end subroutine prepare
+
+  !> Allocates the work space for the defects of a system.
+  subroutine allocate_defects(defects, system, columns)
+    type(series_defects_t), intent(out) :: defects
+    class(system_t), intent(in) :: system
+    integer, intent(in) :: columns   !! of the states, and padding
+
+    associate (lanes => system%lanes)
+      allocate (defects%t(lanes), defects%h(lanes, columns), defects%y(lanes, columns), defects%slope(lanes, columns), &
+                defects%rate(lanes, columns), source=0.0_wp)
+      allocate (defects%sizes(lanes, system%measures), defects%errors(lanes, system%measures), source=0.0_wp)
+      allocate (defects%status(lanes), source=evaluation_ok)
+      allocate (defects%is_wrong(lanes), source=.false.)
+    end associate
+  end subroutine allocate_defects
 
   subroutine start(self, attempt, starting)
     class(taylor_stepper_t), intent(inout) :: self
@@ -169,10 +189,80 @@ contains
     class(system_t), intent(inout) :: system
     type(step_attempt_t), intent(inout) :: attempt
     type(step_control_t), intent(inout) :: control
+    integer :: i
 
     self%chosen(:) = self%chosen .and. self%step_status == attempt_ok
-    call self%defects%shorten_steps(system, attempt, control, self%series, self%chosen)
+    do
+      self%defects%is_wrong(:) = .false.
+      do i = 1, size(times)
+        call test_defects(self, system, attempt, control, self%series, times(i), merge(self%order + 1, 1, i == size(times)))
+      end do
+      self%defects%is_wrong(:) = self%defects%is_wrong .and. self%chosen .and. ratio * control%h > smallest_step(attempt%t)
+      if (.not. any(self%defects%is_wrong)) return
+      where (self%defects%is_wrong) control%h = ratio * control%h
+    end do
   end subroutine shorten_steps
+
+  !> Adds the lanes whose defects are too large at one time of the step.
+  subroutine test_defects(self, system, attempt, control, series, time, allowed)
+    class(taylor_stepper_t), intent(inout) :: self
+    class(system_t), intent(inout) :: system
+    type(step_attempt_t), intent(inout) :: attempt
+    type(step_control_t), intent(in) :: control
+    real(wp), intent(in) :: series(attempt%length, 0:self%order)   !! of the state
+    real(wp), intent(in) :: time      !! of the step, from 0 to 1
+    integer, intent(in) :: allowed    !! largest error, in multiples of the tolerance
+    integer :: c, columns
+
+    columns = size(self%defects%h, 2)
+    do c = 1, columns
+      self%defects%h(:, c) = time * control%h
+    end do
+    call sum_series(attempt%length, self%order, series, attempt%length, self%defects%h, self%defects%y)
+    call sum_slopes(attempt%length, self%order, series, self%defects%h, self%defects%slope)
+    self%defects%t(:) = attempt%t + time * control%h
+    attempt%uncounted = attempt%uncounted + 1
+    call system%derivative(self%defects%t, self%defects%y, self%defects%rate, self%defects%status)
+    self%defects%is_wrong(:) = self%defects%is_wrong .or. self%defects%status /= evaluation_ok
+    self%defects%status(:) = evaluation_ok
+    do c = 1, columns
+      self%defects%slope(:, c) = control%h * (self%defects%slope(:, c) - self%defects%rate(:, c))
+    end do
+    if (system%measures > 0) then
+      call system%measure(columns, attempt%y, self%defects%slope, self%defects%sizes, self%defects%errors)
+      call compare(attempt%lanes, system%measures, control, allowed, self%defects%sizes, self%defects%errors, &
+                   self%defects%is_wrong)
+    else
+      call compare(attempt%lanes, system%states, control, allowed, attempt%y, self%defects%slope, self%defects%is_wrong)
+    end if
+  end subroutine test_defects
+
+  !> The derivative by h of the sum over k of h^k series(:, k).
+  pure subroutine sum_slopes(n, order, series, h, slope)
+    integer, intent(in) :: n, order
+    real(wp), intent(in) :: series(n, 0:order), h(n)
+    real(wp), intent(inout) :: slope(n)
+    integer :: k
+
+    slope = order * series(:, order)
+    do k = order - 1, 1, -1
+      slope = k * series(:, k) + h * slope
+    end do
+  end subroutine sum_slopes
+
+  !> Adds the lanes with an error that is too large, or no number.
+  pure subroutine compare(lanes, states, control, allowed, sizes, errors, is_wrong)
+    integer, intent(in) :: lanes, states
+    type(step_control_t), intent(in) :: control
+    integer, intent(in) :: allowed   !! largest error, in multiples of the tolerance
+    real(wp), intent(in), dimension(lanes, states) :: sizes, errors
+    logical, intent(inout) :: is_wrong(lanes)
+    integer :: i
+
+    do i = 1, states
+      is_wrong = is_wrong .or. .not. abs(errors(:, i)) <= allowed * (control%atol + control%rtol * abs(sizes(:, i)))
+    end do
+  end subroutine compare
 
   !> Clears series that are not finite, and stores the first component that is not.
   subroutine clear_infinities(self)

@@ -2,7 +2,7 @@
 module nocdyn_sweep_journal
   use, intrinsic :: iso_fortran_env, only: int32, int64
   use nocdyn_errors, only: error_t, exit_file, exit_input, raise
-  use nocdyn_folders, only: folder_names
+  use nocdyn_posix_files, only: folder_names
   use nocdyn_number_ranges, only: gaps, range_t
   use nocdyn_log_file, only: frame_bytes, log_file_t
   use nocdyn_sweep_chunk, only: chunk_summary_t, chunk_t, pack_chunk, read_summary, unpack_chunk

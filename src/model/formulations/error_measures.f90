@@ -22,10 +22,7 @@ module nocdyn_error_measures
     type(sparse_map_t), private :: map                !! from the states to the quantities
     real(wp), allocatable, private :: offset(:, :)    !! of their sizes, [lanes, count]
   contains
-    procedure :: measure
-    procedure :: start_lane
-    procedure :: twist_of, state_of
-    procedure :: list_parameters
+    procedure :: measure, start_lane, twist_of, state_of, list_parameters
   end type error_measures_t
 
   real(wp), parameter :: rounding = 1.0e-6_wp   !! of a large angle within a step: rtol times this is above its rounding

@@ -30,11 +30,7 @@ module nocdyn_moving_origin
     integer, allocatable, private :: elastic(:)           !! elements that must not be twisted
     logical, private :: has_springs_only = .true.         !! whether the laws of these are polynomials
   contains
-    procedure :: find_shift
-    procedure :: move
-    procedure :: start_lane
-    procedure :: move_twists
-    procedure :: list_parameters
+    procedure :: find_shift, move, start_lane, move_twists, list_parameters
   end type moving_origin_t
 
 contains

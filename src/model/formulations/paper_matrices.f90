@@ -35,8 +35,7 @@ module nocdyn_paper_matrices
     real(wp), allocatable :: beta(:)         !! [omega; phi; F], then its derivative
     real(wp), allocatable, private :: term(:)   !! one term of Q, work space
   contains
-    procedure :: assemble
-    procedure :: solve
+    procedure :: assemble, solve
   end type paper_matrices_t
 
 contains

@@ -28,16 +28,8 @@ module nocdyn_reduced
     real(wp), allocatable, private :: moment(:, :)             !! M [N m], [lanes, elements], work space
     real(wp), allocatable, private :: free_jacobian(:, :)      !! without locked joints, if there are joints, [lanes, positions]
   contains
-    procedure :: formulate
-    procedure :: update_inertia
-    procedure :: list_parameters
-    procedure :: refresh_lane
-    procedure :: derivative
-    procedure :: jacobian
-    procedure :: jacobian_pattern
-    procedure :: series_obstacle
-    procedure :: prepare_series
-    procedure :: series
+    procedure :: formulate, update_inertia, list_parameters, refresh_lane, derivative, jacobian
+    procedure :: jacobian_pattern, series_obstacle, prepare_series, series
   end type reduced_t
 
 contains

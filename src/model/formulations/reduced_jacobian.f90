@@ -43,9 +43,7 @@ module nocdyn_reduced_jacobian
     type(element_coordinates_t), private :: incidence       !! entries of the element of each internal state
     logical, allocatable, private :: has_work_integral(:)   !! of the element of each internal state
   contains
-    procedure :: fill
-    procedure :: refresh_lane
-    procedure :: list_parameters
+    procedure :: fill, refresh_lane, list_parameters
   end type reduced_jacobian_t
 
 contains

@@ -2,7 +2,7 @@
 !> whole multiples of one order follow from one sine and one cosine.
 module nocdyn_order_terms
   use nocdyn_kinds, only: wp
-  use nocdyn_law_harmonics, only: most_terms
+  use nocdyn_law_work, only: most_terms
   implicit none (type, external)
   private
 

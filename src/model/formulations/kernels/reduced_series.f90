@@ -50,9 +50,7 @@ module nocdyn_reduced_series
     real(wp), allocatable :: origin(:, :)       !! u where q = 0 [rad], [w, groups]
     real(wp), allocatable :: angles(:), speeds(:)   !! u and u' of the elements of one lane [rad], [rad/s]
   contains
-    procedure :: expand
-    procedure :: derivative
-    procedure :: refresh_lane
+    procedure :: expand, derivative, refresh_lane
   end type reduced_series_t
 
 contains

@@ -23,9 +23,7 @@ module nocdyn_series_banks
     logical, allocatable :: has_forcing(:)      !! whether some moment follows from the time alone, [groups]
     real(wp), allocatable :: forcing(:, :, :)   !! series of these moments [N m], [w, 0:order, groups], or no groups
   contains
-    procedure :: begin
-    procedure :: add
-    procedure :: integrate
+    procedure :: begin, add, integrate
   end type series_banks_t
 
 contains

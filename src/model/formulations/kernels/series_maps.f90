@@ -24,8 +24,7 @@ module nocdyn_series_maps
     real(wp), private, allocatable :: matrix(:, :, :)  !! [narrow, columns, groups of rows], if dense
     real(wp), private, allocatable :: result(:)        !! [rows], if neither
   contains
-    procedure :: multiply
-    procedure :: refresh_lane
+    procedure :: multiply, refresh_lane
   end type series_map_t
 
 contains
