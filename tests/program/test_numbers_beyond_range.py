@@ -100,7 +100,7 @@ def test_a_row_that_is_not_finite_fails_the_run(nocdyn):
             ["matrices"],
             "K12 * rest twist of the couplings, a further term of Q [N m], transposed has an element that is not a finite number",
         ),
-        (["modes", "--at", "rest"], "the stiffness or damping of 'shaft' in this state is not a finite number"),
+        (["modes", "--at", "rest"], "the moment, stiffness or damping of 'shaft' in this state is not a finite number"),
     ],
 )
 def test_an_analysis_of_numbers_that_are_not_finite_fails(nocdyn, command, complaint):

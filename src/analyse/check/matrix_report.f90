@@ -58,8 +58,9 @@ contains
         call equations%report%append_line('Other laws than those of the paper: ' // trim(role_names(role)) // ' ' // &
                                           joined(names, ', '))
       end do
-      call equations%report%append_line('For these K holds the elastic moment divided by the twist, K_4 its derivative, C the')
-      call equations%report%append_line('viscous part, Q the rest, all at the start. Currents and governors are not in beta.')
+      call equations%report%append_line('For these K holds the elastic moment divided by the twist, K_4 its derivative, C minus')
+      call equations%report%append_line('the derivative by the speed, Q the rest, all at the start. Currents and governors are')
+      call equations%report%append_line('not in beta.')
     end if
     ! The bodies before the constraints: eqs. (13)-(22).
     call equations%put_matrix('(13) J [kg m2]', equations%inertias%inertia)
@@ -111,7 +112,6 @@ contains
     call machine%choose_branches([t_start])
     call machine%evaluate_elements([t_start])
     call machine%differentiate_elements([t_start])
-    call machine%evaluate_energies()
   end subroutine set_start_state
 
   subroutine assemble(equations)

@@ -2,11 +2,11 @@
 module nocdyn_law_functions
   use nocdyn_law_expressions, only: add_list, apply, expression_t, node_of, operator(*), operator(+)
   use nocdyn_law_tape, only: law_node_t, op_cosine, op_exponential, op_harmonics, op_larger, op_log_cosh, op_logarithm, &
-    op_ratio, op_sech_squared, op_sine, op_size, op_square_root, op_tanh
+    op_sech_squared, op_sine, op_size, op_square_root, op_tanh
   implicit none (type, external)
   private
 
-  public :: sin, cos, tanh, exp, log, sqrt, log_cosh, larger, ratio, size_of, polynomial, harmonics, add_guard
+  public :: sin, cos, tanh, exp, log, sqrt, log_cosh, larger, size_of, polynomial, harmonics, add_guard
 
   interface sin
     procedure :: sine_of
@@ -91,14 +91,6 @@ contains
 
     value = apply(x%tape, op_larger, node_of(x), node_of(y))
   end function larger
-
-  !> x / y where y is not zero, else 0; it has no series, and is for secant stiffnesses alone.
-  function ratio(x, y) result(value)
-    type(expression_t), intent(in) :: x, y
-    type(expression_t) :: value
-
-    value = apply(x%tape, op_ratio, node_of(x), node_of(y))
-  end function ratio
 
   !> |c| of a constant c.
   function size_of(c) result(value)

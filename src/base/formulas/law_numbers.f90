@@ -25,7 +25,7 @@ module nocdyn_law_numbers
     integer, private :: nodes = 0, elements = 0
     integer, private :: restoring = 0, applied = 0       !! nodes of the results, 0 for none, as in `law_tape_t`
     integer, private :: phase_restoring = 0, phase_applied = 0
-    integer, private :: stored = 0, secant = 0, damping = 0, argument = 0
+    integer, private :: stored = 0, argument = 0
     integer, allocatable, private :: rate(:)
     type(law_program_t), private :: motion, energy, curve
     type(guards_t), allocatable, private :: guards(:, :)   !! [branches, switches of an element]
@@ -50,12 +50,10 @@ contains
       self%phase_restoring = tape%phase_restoring
       self%phase_applied = tape%phase_applied
       self%stored = tape%stored
-      self%secant = tape%secant
-      self%damping = tape%damping
       self%argument = tape%argument
       allocate (self%rate, source=tape%rate)
       self%motion = new_law_program(tape, motion)
-      self%energy = new_law_program(tape, [tape%stored, tape%secant, tape%damping])
+      self%energy = new_law_program(tape, [tape%stored])
       self%curve = new_law_program(tape, [tape%argument])
       self%is_small = law%lanes == 1 .and. law%elements <= few .and. .not. self%motion%has_harmonics()
       slots = 0
@@ -157,11 +155,11 @@ contains
     self%x(0, element) = 0.0_wp
   end subroutine set_phase
 
-  !> Adds the energies of the restoring moments of all elements, their secant stiffnesses and viscous dampings.
-  pure subroutine evaluate_energies(self, angle, stored, secant, damping)
+  !> Adds the energies of the restoring moments of all elements.
+  pure subroutine evaluate_energies(self, angle, stored)
     class(law_numbers_t), intent(inout) :: self
     real(wp), intent(in) :: angle(self%elements, self%ports)                      !! u [rad] of elements and phases
-    real(wp), intent(inout), dimension(self%elements) :: stored, secant, damping  !! [J], [N m/rad], [N m s/rad]
+    real(wp), intent(inout) :: stored(self%elements)                              !! [J]
     integer :: e
 
     associate (x => self%x)
@@ -171,8 +169,6 @@ contains
         x(0, e) = 0.0_wp
         call self%energy%compute(self%nodes, x(:, e))
         stored(e) = stored(e) + x(self%stored, e)
-        secant(e) = secant(e) + x(self%secant, e)
-        damping(e) = damping(e) + x(self%damping, e)
       end do
     end associate
   end subroutine evaluate_energies

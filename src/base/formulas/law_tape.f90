@@ -26,7 +26,7 @@ module nocdyn_law_tape
   ! ... the natural logarithm; a variable to the power of a constant; ...
   integer, parameter, public :: op_logarithm = 25, op_power = 26
   ! ... and values without a series: the larger of two, a quotient that is 0 where the divisor is 0, and the size of a constant.
-  integer, parameter, public :: op_larger = 27, op_ratio = 28, op_size = 29
+  integer, parameter, public :: op_larger = 27, op_size = 28
 
   public :: new_law_tape
 
@@ -66,8 +66,6 @@ module nocdyn_law_tape
     integer :: phase_restoring = 0             !! part of the conservative moment that acts on the phase [N m]
     integer :: phase_applied = 0               !! the same of the other moment
     integer :: stored = 0                      !! potential energy of `restoring` [J]
-    integer :: secant = 0                      !! K12 of eq. (3): -K12 u is a part of `restoring` [N m/rad]
-    integer :: damping = 0                     !! viscous c: -c u' is a part of `applied` [N m s/rad]
     integer, allocatable :: rate(:)            !! derivatives of the internal states by the time, [states]
     integer :: argument = 0                    !! of the curve of an element
     integer, allocatable :: guard(:)           !! functions that are positive inside a branch ...

@@ -6,7 +6,7 @@ module nocdyn_formula_system
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, node_of, parameter_of, state_of, time_of
   use nocdyn_law_strips, only: fill, load, load_lanes, unload
-  use nocdyn_law_tape, only: law_tape_t, new_law_tape, op_angle, op_larger, op_pick, op_ratio, op_segment, op_size, &
+  use nocdyn_law_tape, only: law_tape_t, new_law_tape, op_angle, op_larger, op_pick, op_segment, op_size, &
     op_speed, op_state, op_tanh
   use nocdyn_law_values, only: law_program_t, new_law_program
   use nocdyn_law_walk, only: walk
@@ -92,7 +92,7 @@ contains
     type(law_tape_t), target, intent(inout) :: tape
     integer, intent(in) :: parameters
     procedure(formulas_interface) :: formulas
-    integer, parameter :: refused(*) = [op_angle, op_speed, op_pick, op_segment, op_larger, op_ratio, op_size]
+    integer, parameter :: refused(*) = [op_angle, op_speed, op_pick, op_segment, op_larger, op_size]
     type(expression_t) :: dydt(system%states + system%quadratures), p(parameters), t, y(system%states)
     integer :: i
 

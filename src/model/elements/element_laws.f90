@@ -66,7 +66,7 @@ contains
     associate (tape => self%law%tape, w => self%law%w, groups => self%law%groups)
       self%values = new_law_work(tape, tape%needed(motion(tape), .false.), 0, w, groups)
       self%tangents = new_law_work(tape, tape%needed(motion(tape), .true.), 2, w, groups)
-      self%energies = new_law_work(tape, tape%needed([tape%stored, tape%secant, tape%damping], .false.), 0, w, groups)
+      self%energies = new_law_work(tape, tape%needed([tape%stored], .false.), 0, w, groups)
       if (self%law%strip > 1 .and. size(tape%guard) > 0) then
         self%guards = new_law_work(tape, tape%needed(tape%guard, .false.), 0, w, groups)
       end if
@@ -304,7 +304,7 @@ contains
     end do
   end subroutine turn
 
-  !> Adds the energies of the restoring moments, their secant stiffnesses and viscous dampings.
+  !> Adds the energies of the restoring moments.
   subroutine evaluate_energies(self, first, elements)
     class(element_law_t), intent(inout) :: self
     integer, intent(in) :: first   !! element of the bank in the machine
@@ -315,7 +315,7 @@ contains
       if (tape%stored == 0) return
       if (.not. self%is_ready) call make_ready(self)
       if (self%numbers%is_small) then
-        call self%numbers%evaluate_energies(to%angle(1, first), to%stored(1, first), to%secant(1, first), to%damping(1, first))
+        call self%numbers%evaluate_energies(to%angle(1, first), to%stored(1, first))
         return
       end if
       do strip = 1, law%strips
@@ -323,8 +323,6 @@ contains
         call load(law, work, self%phase, 0, strip, 1, 1, to%angle(1, first + law%elements * (self%ports - 1)))
         call walk(law, work, 0, law%groups * (strip - 1) + 1)
         call unload(law, work, tape%stored, 0, strip, 1, 1, to%stored(1, first))
-        call unload(law, work, tape%secant, 0, strip, 1, 1, to%secant(1, first))
-        call unload(law, work, tape%damping, 0, strip, 1, 1, to%damping(1, first))
       end do
     end associate
   end subroutine evaluate_energies

@@ -61,8 +61,6 @@ module nocdyn_elements
     ! by `evaluate_energies`:
     real(wp), allocatable :: stored(:, :)          !! potential energy of `restoring`, and what is kept [J]
     real(wp), allocatable :: kept(:, :)            !! energy that internal states keep: a part of the work of `applied` [J]
-    real(wp), allocatable :: secant(:, :)          !! secant stiffness K12 of eq. (3): -K12 u is a part of `restoring` [N m/rad]
-    real(wp), allocatable :: damping(:, :)         !! viscous c: -c u' is a part of `applied` [N m s/rad]
     type(internal_states_t) :: internal
     type(cross_slopes_t) :: cross
   contains
@@ -89,7 +87,7 @@ contains
     allocate (self%speed, self%restoring, self%applied, source=self%angle)
     allocate (self%restoring_angle, self%restoring_curvature, source=self%angle)
     allocate (self%applied_angle, self%applied_speed, self%applied_time, source=self%angle)
-    allocate (self%stored, self%kept, self%secant, self%damping, source=self%angle)
+    allocate (self%stored, self%kept, source=self%angle)
     ! states with the value 0
     new_internal_states%count = sum(internal)
     allocate (new_internal_states%element(new_internal_states%count), new_internal_states%first(new_internal_states%count), &

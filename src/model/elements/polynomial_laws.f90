@@ -15,7 +15,7 @@ module nocdyn_polynomial_laws
 
   !> Names of the coefficients.
   integer, parameter, public :: coefficient_rest = 1, coefficient_linear = 2, coefficient_cubic = 3, coefficient_constant = 4
-  integer, parameter, public :: coefficient_by_speed = 5, coefficient_by_speed_squared = 6, coefficient_damping = 7
+  integer, parameter, public :: coefficient_by_speed = 5, coefficient_by_speed_squared = 6
 
   !> The coefficients of all elements, shape [lanes, elements]; zero where a law has no such term.
   type, public :: polynomial_laws_t
@@ -25,7 +25,6 @@ module nocdyn_polynomial_laws
     real(wp), allocatable :: constant(:, :)           !! [N m]
     real(wp), allocatable :: by_speed(:, :)           !! [N m s/rad]
     real(wp), allocatable :: by_speed_squared(:, :)   !! [N m s2/rad2]
-    real(wp), allocatable :: damping(:, :)            !! part of -by_speed that is in C, eq. (22) [N m s/rad]
     integer, private :: values = 0                    !! lanes * elements
     logical, private :: is_divided = .false.          !! whether some parts are plain springs
     integer, private :: parts = 0
@@ -51,7 +50,7 @@ contains
     type(polynomial_laws_t) :: self
 
     allocate (self%rest(lanes, elements), source=0.0_wp)
-    allocate (self%linear, self%cubic, self%constant, self%by_speed, self%by_speed_squared, self%damping, source=self%rest)
+    allocate (self%linear, self%cubic, self%constant, self%by_speed, self%by_speed_squared, source=self%rest)
     self%values = lanes * elements
     allocate (self%first(elements + 1), source=1)
     allocate (self%is_plain(0:elements), source=.true.)
@@ -77,8 +76,6 @@ contains
       self%by_speed(lane, element) = value
     case (coefficient_by_speed_squared)
       self%by_speed_squared(lane, element) = value
-    case (coefficient_damping)
-      self%damping(lane, element) = value
     case default
       error stop 'nocdyn_polynomial_laws: no such coefficient'
     end select
@@ -142,7 +139,6 @@ contains
     call parameters%add('laws: constant', self%constant)
     call parameters%add('laws: by_speed', self%by_speed)
     call parameters%add('laws: by_speed_squared', self%by_speed_squared)
-    call parameters%add('laws: damping', self%damping)
   end subroutine list_parameters
 
   !> Number of consecutive elements from `first` on that are plain springs in all lanes.
@@ -231,7 +227,7 @@ contains
     end do
   end subroutine differentiate
 
-  !> Sets the stored energies linear w^2 / 2 + cubic w^4 / 4, the secant stiffnesses K12 of eq. (3) and the dampings.
+  !> Sets the stored energies linear w^2 / 2 + cubic w^4 / 4.
   subroutine evaluate_energies(self, elements)
     class(polynomial_laws_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements
@@ -241,9 +237,7 @@ contains
     do e = 1, size(self%rest, 2)
       do l = 1, size(self%rest, 1)
         w2 = (elements%angle(l, e) - self%rest(l, e))**2
-        elements%secant(l, e) = self%linear(l, e) + self%cubic(l, e) * w2
         elements%stored(l, e) = (0.5_wp * self%linear(l, e) + 0.25_wp * self%cubic(l, e) * w2) * w2
-        elements%damping(l, e) = self%damping(l, e)
       end do
     end do
   end subroutine evaluate_energies

@@ -99,7 +99,6 @@ contains
     n = self%machine%bodies
     call self%set_state(y)
     call self%machine%evaluate(t, self%phi, self%omega, self%torque)
-    call self%machine%evaluate_energies()
     call self%machine%differentiate_elements(t)
     do l = 1, self%lanes
       call self%work%assemble(self%machine, l, self%complement(:, :, l))

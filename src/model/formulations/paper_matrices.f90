@@ -1,11 +1,12 @@
 !> The matrices and vectors of the paper, eqs. (13)-(72), for any machine of n bodies.
 !>
-!> They are those of one lane, at the state at which `evaluate`, `differentiate` and `evaluate_energies` of the machine were last
-!> called. The parts of a law beyond -K12 u - c u' (the rest twist of a coupling, the torque of a motor) are terms of Q. Every
-!> procedure overwrites its last argument and allocates nothing.
+!> They are those of one lane, at the state at which `evaluate` and `differentiate` of the machine were last called. The parts of a
+!> law beyond -K12 u - c u' (the rest twist of a coupling, the torque of a motor) are terms of Q. Every procedure overwrites its
+!> last argument and allocates nothing.
 module nocdyn_paper_matrices
-  use nocdyn_bank, only: role_bearing, role_clutch, role_coupling, role_crank, role_excitation, role_freewheel, role_load, &
+  use nocdyn_bank, only: bank_t, role_bearing, role_clutch, role_coupling, role_crank, role_excitation, role_freewheel, role_load, &
     role_loss, role_motor, role_phase
+  use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_solve
   use nocdyn_machine, only: machine_t
@@ -141,9 +142,10 @@ contains
       associate (bank => machine%banks(i)%bank, elements => machine%elements)
         if (bank%role /= role) cycle
         do e = bank%first, bank%last()
-          call elements%rows%add_moment(e, (elements%restoring(lane, e) + elements%secant(lane, e) * elements%angle(lane, e)) &
-                                        + (elements%applied(lane, e) + elements%damping(lane, e) * elements%speed(lane, e)), &
-                                        torque)
+          call elements%rows%add_moment(e, (elements%restoring(lane, e) + secant(bank, elements, lane, e) &
+                                                                          * elements%angle(lane, e)) &
+                                        + (elements%applied(lane, e) + viscous(bank, elements, lane, e) &
+                                                                       * elements%speed(lane, e)), torque)
         end do
       end associate
     end do
@@ -154,19 +156,61 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
     real(wp), intent(inout) :: stiffness(:, :)   !! K [N m/rad]
+    real(wp) :: of_elements(machine%elements%count)
+    integer :: e, i
 
+    do i = 1, size(machine%banks)
+      associate (bank => machine%banks(i)%bank)
+        of_elements(bank%first:bank%last()) = [(secant(bank, machine%elements, lane, e), e=bank%first, bank%last())]
+      end associate
+    end do
     stiffness = 0.0_wp
-    call machine%elements%rows%add_coefficients(1.0_wp, machine%elements%secant(lane, :), stiffness)
+    call machine%elements%rows%add_coefficients(1.0_wp, of_elements, stiffness)
   end subroutine stiffness_matrix
 
-  !> C of eq. (22) from viscous loads and the damping of couplings, [n, n].
+  !> K12 of eq. (3) of an element of a bank: the elastic moment of a coupling over its twist from rest; the derivative at rest, and
+  !> of meshes whose teeth have errors [N m/rad].
+  pure real(wp) function secant(bank, elements, lane, e)
+    class(bank_t), intent(in) :: bank
+    type(elements_t), intent(in) :: elements   !! of the machine
+    integer, intent(in) :: lane, e             !! number of the element in the machine
+    integer :: rest
+    real(wp) :: twist
+
+    secant = 0.0_wp
+    if (bank%role /= role_coupling) return
+    secant = -elements%restoring_angle(lane, e)
+    rest = bank%number_of('rest_twist')
+    twist = elements%angle(lane, e)
+    if (rest > 0) twist = twist - bank%parameters(rest)%value(lane, e - bank%first + 1)
+    if (abs(twist) > 0.0_wp .and. bank%ports == 1) secant = -elements%restoring(lane, e) / twist
+  end function secant
+
+  !> c of eq. (5) of an element of a bank: minus the derivative of the moment of a coupling or load by the speed [N m s/rad].
+  pure real(wp) function viscous(bank, elements, lane, e)
+    class(bank_t), intent(in) :: bank
+    type(elements_t), intent(in) :: elements   !! of the machine
+    integer, intent(in) :: lane, e             !! number of the element in the machine
+
+    viscous = 0.0_wp
+    if (any(bank%role == [role_coupling, role_load])) viscous = -elements%applied_speed(lane, e)
+  end function viscous
+
+  !> C of eq. (22) from loads and the damping of couplings, [n, n].
   subroutine damping_matrix(machine, lane, damping)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
     real(wp), intent(inout) :: damping(:, :)   !! C [N m s/rad]
+    real(wp) :: of_elements(machine%elements%count)
+    integer :: e, i
 
+    do i = 1, size(machine%banks)
+      associate (bank => machine%banks(i)%bank)
+        of_elements(bank%first:bank%last()) = [(viscous(bank, machine%elements, lane, e), e=bank%first, bank%last())]
+      end associate
+    end do
     damping = 0.0_wp
-    call machine%elements%rows%add_coefficients(1.0_wp, machine%elements%damping(lane, :), damping)
+    call machine%elements%rows%add_coefficients(1.0_wp, of_elements, damping)
   end subroutine damping_matrix
 
   !> K_4 of eqs. (62)-(72) from the tangent stiffnesses K1 + 3 k1 w^2, [n, n]; the derivative of the elastic moments is

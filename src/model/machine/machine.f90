@@ -382,7 +382,7 @@ contains
     end do
   end subroutine differentiate_elements
 
-  !> Stored energies, secant stiffnesses and secant dampings of all elements, from the angles and speeds in `elements`.
+  !> Stored energies of all elements, from the angles and speeds in `elements`.
   subroutine evaluate_energies(self)
     class(machine_t), intent(inout) :: self
     integer :: i

@@ -15,7 +15,7 @@ module nocdyn_couplings
     phase_of, phase_speed_of, speed_of
   use nocdyn_law_functions, only: cos, sin, tanh
   use nocdyn_law_tape, only: at_phase, law_tape_t
-  use nocdyn_polynomial_laws, only: coefficient_by_speed, coefficient_cubic, coefficient_damping, coefficient_linear, &
+  use nocdyn_polynomial_laws, only: coefficient_by_speed, coefficient_cubic, coefficient_linear, &
     coefficient_rest
   use nocdyn_quantities, only: form_angle, form_applied, form_elastic, form_total, new_quantity, quantity_t, rank_detail, &
     rank_force, rank_moment, rank_stress, rank_twist
@@ -186,7 +186,6 @@ contains
 
     if (self%error_orders > 0) return
     call self%add_term('damping', coefficient_by_speed, -1.0_wp)
-    call self%add_term('damping', coefficient_damping, 1.0_wp)
   end subroutine add_damping
 
   subroutine describe(self, tape)
@@ -196,7 +195,6 @@ contains
     if (self%has_friction) tape%applied = node_of(self%friction(tape))
     if (self%error_orders == 0) return
     tape%applied = node_of(-(self%parameter(tape, 'damping') * self%twist_speed(tape)))
-    tape%damping = node_of(self%parameter(tape, 'damping'))
   end subroutine describe
 
   !> The moments on the phase, from the ones of the mesh, which are described: M times the derivative -e' of the twist by the

@@ -9,7 +9,7 @@ module nocdyn_gap_couplings
   use nocdyn_described_elements, only: boundary_width
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), operator(+), operator(-), pick
-  use nocdyn_law_functions, only: add_guard, larger, polynomial, ratio, size_of
+  use nocdyn_law_functions, only: add_guard, larger, polynomial, size_of
   use nocdyn_law_tape, only: law_tape_t
   use nocdyn_polynomial_couplings, only: add_coefficients, coefficients_of
   implicit none (type, external)
@@ -84,8 +84,6 @@ contains
     end if
     tape%stored = node_of(by_branch(tape, [0, 1, 1, 1, 1, 1, 1]) * x &
                           * polynomial([((1.0_wp / (k + 1)) * p(k), k=1, self%order)], x))
-    tape%secant = node_of(ratio(moment, w))
-    tape%damping = node_of(damped)
     call self%describe_phase(tape)
     call guard_branches(self, tape, w, half, p)
   end subroutine describe

@@ -96,8 +96,6 @@ contains
     p = coefficients_of(self, tape, self%order)
     tape%restoring = node_of(-polynomial(p, w))
     tape%stored = node_of(w * polynomial([((1.0_wp / (k + 1)) * p(k), k=1, self%order)], w))
-    tape%secant = node_of(p(1))
-    if (self%order > 1) tape%secant = node_of(p(1) + polynomial(p(2:), w))
     call self%describe_phase(tape)
   end subroutine describe
 

@@ -3,7 +3,7 @@ module nocdyn_saturated_couplings
   use nocdyn_couplings, only: coupling_common_t, couplings_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, node_of, operator(*), operator(-), operator(/)
-  use nocdyn_law_functions, only: log_cosh, ratio, tanh
+  use nocdyn_law_functions, only: log_cosh, tanh
   use nocdyn_law_tape, only: law_tape_t
   implicit none (type, external)
   private
@@ -47,7 +47,6 @@ contains
     moment = s * tanh(x)
     tape%restoring = node_of(-moment)
     tape%stored = node_of(s * s / k1 * log_cosh(x))
-    tape%secant = node_of(ratio(moment, w))
   end subroutine describe
 
 end module nocdyn_saturated_couplings

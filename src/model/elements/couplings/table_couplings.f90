@@ -3,7 +3,6 @@ module nocdyn_table_couplings
   use nocdyn_couplings, only: coupling_common_t, couplings_t
   use nocdyn_curves, only: curve_t
   use nocdyn_law_expressions, only: expression_t, node_of, operator(-)
-  use nocdyn_law_functions, only: ratio
   use nocdyn_law_tape, only: law_tape_t
   use nocdyn_tables, only: add_table, curve_integral, curve_value, guard_segment
   implicit none (type, external)
@@ -43,7 +42,6 @@ contains
     moment = curve_value(tape, w)
     tape%restoring = node_of(-moment)
     tape%stored = node_of(curve_integral(tape, w))
-    tape%secant = node_of(ratio(moment, w))
     call guard_segment(tape, w)
   end subroutine describe
 

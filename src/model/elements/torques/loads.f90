@@ -9,7 +9,7 @@ module nocdyn_loads
     pick, speed_of
   use nocdyn_law_functions, only: add_guard, tanh
   use nocdyn_law_tape, only: law_tape_t
-  use nocdyn_polynomial_laws, only: coefficient_by_speed, coefficient_damping
+  use nocdyn_polynomial_laws, only: coefficient_by_speed
   use nocdyn_tables, only: add_table, curve_value, guard_segment
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -35,7 +35,6 @@ contains
     call bank%connect(role_load, size(viscous, 1), names, body)
     call bank%add_parameter('viscous', viscous)
     call bank%add_term('viscous', coefficient_by_speed, -1.0_wp)
-    call bank%add_term('viscous', coefficient_damping, 1.0_wp)   ! they are in C, eq. (22)
   end function new_loads
 
   !> A bank of loads with all these terms, each on one body.
