@@ -18,7 +18,6 @@ module nocdyn_body_formulation
   type, abstract, extends(joint_formulation_t), public :: body_formulation_t
     character(len=10) :: word = ''               !! name of the formulation in the input
     real(wp), allocatable :: slope(:, :)         !! y' at the last observed state, [lanes, states + quadratures]
-    real(wp), allocatable, private :: near(:, :) !! the state that is observed, [lanes, states]
     integer, allocatable :: status(:)            !! evaluation_... of that evaluation, [lanes]
     real(wp), allocatable :: mobility(:, :, :)   !! matrix of omega' = mobility T [1/(kg m2)], [bodies, bodies, lanes]
     ! work space of the Jacobian, one lane:
@@ -55,7 +54,6 @@ contains
     call self%allocate_state([(b, b=1, machine%bodies)], mechanical, with_energy_balance)
     allocate (self%slope(self%lanes, self%states + self%quadratures), source=0.0_wp)
     allocate (self%status(self%lanes), source=evaluation_ok)
-    allocate (self%near(self%lanes, self%states), source=0.0_wp)
     allocate (self%mobility(machine%bodies, machine%bodies, self%lanes))
     allocate (self%by_angle(machine%bodies, machine%bodies), self%by_speed(machine%bodies, machine%bodies))
     allocate (self%by_time(machine%bodies), self%by_state(machine%bodies))
@@ -121,15 +119,14 @@ contains
   end subroutine set_state
 
   !> Evaluates the right-hand side at a state and keeps it in `slope`.
-  subroutine observe_bodies(self, t, y)
+  subroutine observe_bodies(self, t, y, in_motion)
     class(body_formulation_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
     real(wp), contiguous, intent(in) :: y(:, :)   !! state, [lanes, states], at least
+    logical, intent(in), optional :: in_motion    !! as in `observe_elements`
 
     if (self%joints%count > 0) then
-      call observe_with_joints(self, t, y)
-      self%near(:, :) = y(:, :self%states)
-      if (self%projects) call self%project(t(1), self%near(1, :))
+      call observe_with_joints(self, t, y, in_motion)
       call self%derivative(t, self%near, self%slope, self%status)
       call self%machine%elements%scatter(self%torque)
       return

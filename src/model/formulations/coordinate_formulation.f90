@@ -31,7 +31,6 @@ module nocdyn_coordinate_formulation
     procedure :: gather
     procedure :: find_far
     procedure :: shift_state
-    procedure :: move_origin
     procedure :: restore_state
     procedure :: reset_origin
     procedure :: angle_at_zero
@@ -176,21 +175,11 @@ contains
       shift(:) = 0.0_wp
       call self%origin%find_shift(lane, y(lane, first:last), shift(first:last))
       y(lane, first:last) = y(lane, first:last) - shift(first:last)
-    end associate
-    call self%move_origin(lane, shift)
-  end subroutine shift_state
-
-  subroutine move_origin(self, lane, shift)
-    class(coordinate_formulation_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: shift(:)   !! [states], at least
-
-    associate (f => self%machine%coordinates%freedoms)
-      call self%origin%move(lane, shift(f + 1:2 * f))
+      call self%origin%move(lane, shift(first:last))
     end associate
     self%twist_at_origin(lane, :) = self%zero_twist(lane, :)
     call self%origin%move_twists(lane, self%incidence, self%twist_at_origin)
-  end subroutine move_origin
+  end subroutine shift_state
 
   subroutine restore_state(self, lane, y)
     class(coordinate_formulation_t), intent(inout) :: self

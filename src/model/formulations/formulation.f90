@@ -35,7 +35,6 @@ module nocdyn_formulation
     procedure :: allocate_state
     procedure :: set_norm
     procedure :: gather
-    procedure :: move_origin
     procedure :: reset_origin
     procedure :: angle_at_zero
     procedure :: twist_at_zero
@@ -138,11 +137,12 @@ contains
 
   !> Evaluates bodies, elements and torques at a state, so that they and the reactions can be read.
   !>
-  !> The branches of the laws are chosen by the state. So the formulation must be another one than that of the integrator.
-  subroutine observe_elements(self, t, y)
+  !> The branches of the laws are chosen by the state: `keep_branches` of the machine keeps those of an integration.
+  subroutine observe_elements(self, t, y, in_motion)
     class(formulation_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
-    real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states], at least
+    real(wp), contiguous, intent(in) :: t(:)          !! [s], [lanes]
+    real(wp), contiguous, intent(in) :: y(:, :)       !! [lanes, states], at least
+    logical, intent(in), optional :: in_motion        !! whether joints keep their modes; absent or false: by the state
 
     call self%gather(y)
     if (self%switches > 0) call self%machine%choose_branches(t)
@@ -158,13 +158,6 @@ contains
     call self%set_state(y)
     call self%machine%elements%gather(self%phi, self%omega)
   end subroutine gather
-
-  !> Takes a shift of the state (`shift_state`) that another copy of this formulation has made. By default there are none.
-  subroutine move_origin(self, lane, shift)
-    class(formulation_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: shift(:)   !! [states], at least
-  end subroutine move_origin
 
   !> Forgets the shifts of a lane, before it starts. By default there are none.
   subroutine reset_origin(self, lane)

@@ -27,36 +27,36 @@ module nocdyn_joint_formulation
 contains
 
   !> Evaluates bodies, elements and torques at a state, as `observe` of `formulation_t`.
-  subroutine observe_with_joints(self, t, y)
+  subroutine observe_with_joints(self, t, y, in_motion)
     class(joint_formulation_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
     real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states], at least
+    logical, intent(in), optional :: in_motion    !! as in `observe_elements`
+    logical :: by_modes
 
+    by_modes = .false.
+    if (present(in_motion)) by_modes = in_motion
     if (self%joints%count > 0) then
-      call observe_joints(self, t(1), y(1, :self%states))
+      call observe_joints(self, t(1), y(1, :self%states), by_modes)
     else
       call observe_elements(self, t, y)
     end if
   end subroutine observe_with_joints
 
   !> Evaluates the elements where some joints may be locked, in a block of one lane.
-  subroutine observe_joints(self, t, y)
+  subroutine observe_joints(self, t, y, in_motion)
     class(joint_formulation_t), intent(inout) :: self
-    real(wp), intent(in) :: t      !! [s]
-    real(wp), intent(in) :: y(:)   !! [states]
-    real(wp) :: moved(size(y)), near(size(y))
+    real(wp), intent(in) :: t            !! [s]
+    real(wp), intent(in) :: y(:)         !! [states]
+    logical, intent(in) :: in_motion     !! as in `observe_elements`
 
-    near = y
-    if (associated(self%joints%leader)) call self%joints%follow(self%machine%banks)
-    self%joint_state(1, :) = near
+    self%joint_state(1, :) = y
     call self%gather(self%joint_state)
     call self%machine%choose_branches([t])
-    if (self%joints%motions%count > 0) call self%project(t, near)
-    if (.not. associated(self%joints%leader)) then
-      moved = near
-      call self%settle_joints(by_state, t, moved)
-    end if
-    call self%find_held_moments(t, near)
+    self%near(:) = y
+    if (self%joints%motions%count > 0) call self%project(t, self%near)
+    if (.not. in_motion) call start_joints(self, t, self%near)
+    call self%find_held_moments(t, self%near)
     call self%machine%elements%scatter(self%torque)
   end subroutine observe_joints
 

@@ -163,14 +163,15 @@ contains
   !>
   !> Where the couplings form no loop, F determines their moments. Elsewhere the moments are those nearest to the laws' among all
   !> that add up to F on the bodies.
-  subroutine observe(self, t, y)
+  subroutine observe(self, t, y, in_motion)
     class(paper_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
     real(wp), contiguous, intent(in) :: y(:, :)   !! state, [lanes, states], at least
+    logical, intent(in), optional :: in_motion    !! as in `observe_elements`
     integer :: b, i, l, n
 
     n = self%machine%bodies
-    call observe_bodies(self, t, y)
+    call observe_bodies(self, t, y, in_motion)
     do l = 1, self%lanes
       call elastic_moments(self%machine, l, self%term)
       do i = 1, size(self%couplings)

@@ -8,7 +8,7 @@
 module nocdyn_row_formulation
   use nocdyn_formulation, only: formulation_t
   use nocdyn_friction_joints, only: locked
-  use nocdyn_joint_sets, only: joint_sets_t, new_joint_sets
+  use nocdyn_joint_sets, only: new_joint_sets
   use nocdyn_kinds, only: wp
   use nocdyn_row_obstacles, only: describe_obstacle
   use nocdyn_system, only: evaluation_fatal
@@ -17,6 +17,8 @@ module nocdyn_row_formulation
 
   type, abstract, extends(formulation_t), public :: row_formulation_t
     real(wp), allocatable :: acceleration(:)    !! of the first states, work space, [moving]
+    real(wp), allocatable, private :: unit(:)   !! a speed or position that changes, work space, [moving]
+    real(wp), allocatable :: near(:)            !! a state that is observed, back on the rows that move; work space, [states]
     real(wp), allocatable :: joint_state(:, :)  !! work space, [1, states]
     integer, allocatable, private :: work_of(:) !! work integral of each joint whose moment does work, 0 of others, [joints]
   contains
@@ -104,17 +106,16 @@ contains
   subroutine prepare_joints(self)
     class(row_formulation_t), intent(inout) :: self
     real(wp) :: twist(self%lanes, self%machine%elements%count)
-    type(joint_sets_t), pointer :: leader
     integer, allocatable :: elements(:)
     integer :: i, j
 
-    leader => self%joints%leader
     self%joints = new_joint_sets(self%machine%banks, self%machine%switches, self%machine%elements%count)
-    self%joints%leader => leader
     self%projects = self%joints%motions%count > 0
     self%follows_waves = self%joints%count > 0
     if (self%joints%count == 0) return
     self%acceleration = spread(0.0_wp, 1, size(self%moving))
+    self%unit = self%acceleration
+    self%near = spread(0.0_wp, 1, self%states)
     self%joint_state = reshape(spread(0.0_wp, 1, self%states), [1, self%states])
     self%work_of = [(merge(findloc(self%machine%with_work, self%joints%element(j), dim=1), 0, &
                            self%joints%driver(j) == 0 .and. (j > self%joints%locking .or. self%joints%has_teeth(j)) &
@@ -310,10 +311,10 @@ contains
     integer, intent(in) :: column                !! state; 0: derivatives by the time
     real(wp), intent(inout) :: accelerations(:)  !! derivatives of those of the first states without joints that hold, [moving]
     real(wp), intent(inout) :: powers(:)         !! derivatives of those of the elements with work at these moments, [quadratures]
-    real(wp) :: demand(self%joints%motions%count), unit(size(self%moving))
     integer :: i
 
-    associate (motions => self%joints%motions, n => size(self%moving), speed => self%machine%elements%speed)
+    associate (motions => self%joints%motions, n => size(self%moving), speed => self%machine%elements%speed, unit => self%unit, &
+               demand => self%joints%motions%demand)
       unit = 0.0_wp
       if (column > 0 .and. column <= 2 * n) unit(1 + modulo(column - 1, n)) = 1.0_wp
       do i = 1, motions%count
@@ -384,21 +385,21 @@ contains
     integer, parameter :: most_steps = 8
     real(wp), parameter :: rounding = 4.0_wp * epsilon(1.0_wp), far = 1.0e-9_wp   ! relative to the terms of a row
     integer :: step
-    real(wp) :: terms(self%joints%motions%count)
 
     associate (n => size(self%moving), motions => self%joints%motions, elements => self%machine%elements)
       do step = 1, most_steps
         self%joint_state(1, :) = y(:self%states)
         call self%gather(self%joint_state)
         call self%move_rows(t)
-        terms = motions%size_of_terms(elements%angle(1, :))
-        if (all(abs(motions%position) <= rounding * terms)) exit
+        call motions%size_terms(elements%angle(1, :))
+        if (all(abs(motions%position) <= rounding * motions%terms)) exit
         self%acceleration(:) = 0.0_wp
-        call self%hold(-motions%position, self%acceleration)
+        motions%demand(:) = -motions%position
+        call self%hold(motions%demand, self%acceleration)
         y(n + 1:2 * n) = y(n + 1:2 * n) + self%acceleration
       end do
-      if (any(abs(motions%position) > far * terms)) then
-        self%joints%lost = self%joints%locking + maxloc(abs(motions%position) / terms, dim=1)
+      if (any(abs(motions%position) > far * motions%terms)) then
+        self%joints%lost = self%joints%locking + maxloc(abs(motions%position) / motions%terms, dim=1)
       end if
       call self%hold(motions%speed, y(:n))
     end associate
