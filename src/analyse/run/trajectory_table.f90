@@ -79,11 +79,16 @@ contains
     class(trajectory_table_t), intent(inout) :: self
     integer, intent(in) :: place   !! at_start or at_last_row
     real(wp), intent(in) :: y(:)   !! there, [states + quadratures]
+    integer :: i
 
     associate (formulation => self%columns%formulation, machine => self%columns%formulation%machine)
       self%kinetic(place) = self%columns%kinetic_energy(1)
-      self%stored(:, place) = machine%elements%stored(1, self%elastic)
-      self%work(:, place) = y(formulation%states + 1:) + machine%elements%kept(1, machine%with_work)
+      do i = 1, size(self%elastic)   ! without memory for them in every row
+        self%stored(i, place) = machine%elements%stored(1, self%elastic(i))
+      end do
+      do i = 1, size(machine%with_work)
+        self%work(i, place) = y(formulation%states + i) + machine%elements%kept(1, machine%with_work(i))
+      end do
     end associate
   end subroutine keep_energies
 

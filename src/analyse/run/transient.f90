@@ -1,7 +1,7 @@
 !> The motion of a machine over time: integrates an input, hands out the rows of its trajectory, and makes a summary.
 module nocdyn_transient
   use, intrinsic :: iso_fortran_env, only: int64
-  use nocdyn_assembly, only: assemble_machine, new_asked_formulation
+  use nocdyn_assembly, only: allocate_formulation, assemble_machine
   use nocdyn_column_names, only: choose_columns
   use nocdyn_equilibrium, only: mean_formulation, t_infinity
   use nocdyn_errors, only: error_t, exit_failed, raise
@@ -164,20 +164,20 @@ contains
     if (.not. allocated(error)) call note_stand_ins(machine, linear, notes)
   end subroutine note_damping
 
-  !> The equations of motion of an input. Their machine is the only one that stays.
+  !> The equations of motion of an input, whose machine is made in them.
   subroutine build_formulation(input, formulation, settings, notes, error)
     type(input_t), intent(in) :: input
     class(formulation_t), allocatable, intent(out) :: formulation
     type(integration_settings_t), intent(out) :: settings
     type(string_t), allocatable, intent(out) :: notes(:)   !! on the method
     type(error_t), allocatable, intent(out) :: error
-    type(machine_t) :: machine
 
-    call assemble_machine(input, machine, error)
-    if (.not. allocated(error)) call check_size(input, machine, error)
-    if (.not. allocated(error)) call check_signals(input, machine, error)
+    call allocate_formulation(input%groups(input%position('run'))%text('formulation'), formulation)
+    call assemble_machine(input, formulation%machine, error)
+    if (.not. allocated(error)) call check_size(input, formulation%machine, error)
+    if (.not. allocated(error)) call check_signals(input, formulation%machine, error)
     if (allocated(error)) return
-    call new_asked_formulation(input, machine, formulation)
+    call formulation%formulate(.true.)
     call choose_settings(input, formulation, settings, notes, error)
   end subroutine build_formulation
 

@@ -26,7 +26,7 @@ module nocdyn_body_formulation
     real(wp), allocatable :: by_time(:)       !! derivative of T by t [N m/s], [bodies]
     real(wp), allocatable :: by_state(:)      !! derivative of T by an internal state, [bodies]
   contains
-    procedure :: set_machine
+    procedure :: set_bodies
     procedure :: start => start_of_bodies
     procedure :: set_state
     procedure :: observe => observe_bodies
@@ -40,30 +40,28 @@ module nocdyn_body_formulation
 
 contains
 
-  !> Copies the machine, counts the states and allocates the work space.
-  subroutine set_machine(self, word, machine, mechanical, with_energy_balance)
+  !> Counts the states of `machine` and allocates the work space.
+  subroutine set_bodies(self, word, mechanical, with_energy_balance)
     class(body_formulation_t), intent(inout) :: self
     character(len=*), intent(in) :: word   !! name of the formulation in the input
-    type(machine_t), intent(in) :: machine
     integer, intent(in) :: mechanical            !! number of mechanical states, at least 2 * bodies
     logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
     integer :: b, l
 
     self%word = word
-    self%machine = machine
-    call self%allocate_state([(b, b=1, machine%bodies)], mechanical, with_energy_balance)
-    allocate (self%slope(self%lanes, self%states + self%quadratures), source=0.0_wp)
-    allocate (self%status(self%lanes), source=evaluation_ok)
-    allocate (self%mobility(machine%bodies, machine%bodies, self%lanes))
-    allocate (self%by_angle(machine%bodies, machine%bodies), self%by_speed(machine%bodies, machine%bodies))
-    allocate (self%by_time(machine%bodies), self%by_state(machine%bodies))
-    do l = 1, self%lanes
-      self%mobility(:, :, l) = machine%coordinates%mobility(l)
-    end do
-    allocate (self%zero_twist(self%lanes, machine%elements%count), source=0.0_wp)
-    call self%set_norm(measures_of_bodies(machine, self%states))
+    associate (machine => self%machine, n => self%machine%bodies)
+      call self%allocate_state([(b, b=1, n)], mechanical, with_energy_balance)
+      allocate (self%slope(self%lanes, self%states + self%quadratures), source=0.0_wp)
+      allocate (self%status(self%lanes), source=evaluation_ok)
+      allocate (self%mobility(n, n, self%lanes), self%by_angle(n, n), self%by_speed(n, n), self%by_time(n), self%by_state(n))
+      do l = 1, self%lanes
+        self%mobility(:, :, l) = machine%coordinates%mobility(l)
+      end do
+      allocate (self%zero_twist(self%lanes, machine%elements%count), source=0.0_wp)
+      call self%set_norm(measures_of_bodies(machine, self%states))
+    end associate
     call self%prepare_joints()
-  end subroutine set_machine
+  end subroutine set_bodies
 
   !> The measures of errors: every state is one body's.
   function measures_of_bodies(machine, states) result(norm)

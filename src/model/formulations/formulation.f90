@@ -28,6 +28,7 @@ module nocdyn_formulation
     real(wp), allocatable, private :: lane_state(:)   !! the state of one lane, work space, [states]
     real(wp), allocatable :: torque(:, :)    !! torques of the elements on the bodies [N m] after `observe`, [lanes, 0:bodies]
   contains
+    procedure(formulate_interface), deferred :: formulate
     procedure(start_interface), deferred :: start
     procedure(set_state_interface), deferred :: set_state
     procedure(reactions_interface), deferred :: reactions
@@ -53,6 +54,13 @@ module nocdyn_formulation
   end type formulation_t
 
   abstract interface
+
+    !> Forms the equations of `machine`, after any change of its structure.
+    subroutine formulate_interface(self, with_energy_balance)
+      import :: formulation_t
+      class(formulation_t), intent(inout) :: self
+      logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
+    end subroutine formulate_interface
 
     !> The start state of the machine, [lanes, states + quadratures].
     function start_interface(self) result(y)

@@ -11,8 +11,6 @@ module nocdyn_paper
   implicit none (type, external)
   private
 
-  public :: new_paper
-
   !> A machine in the paper's formulation, with the factors of J_3.
   type, extends(body_formulation_t), public :: paper_t
     real(wp), allocatable, private :: complement(:, :, :)      !! L_tau, [n, freedoms, lanes]
@@ -23,6 +21,7 @@ module nocdyn_paper
     real(wp), allocatable, private :: term(:)                  !! moments on the bodies [N m], [n], work space
     type(paper_matrices_t), private :: work
   contains
+    procedure :: formulate
     procedure :: derivative
     procedure :: jacobian
     procedure :: start
@@ -32,38 +31,37 @@ module nocdyn_paper
 
 contains
 
-  !> The formulation of a machine. J_3 is assembled and factored here.
-  function new_paper(machine, with_energy_balance) result(self)
-    type(machine_t), intent(in) :: machine
-    logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
-    type(paper_t) :: self
+  !> Assembles and factors J_3.
+  subroutine formulate(self, with_energy_balance)
+    class(paper_t), intent(inout) :: self
+    logical, intent(in) :: with_energy_balance   !! as in `formulation_t`
     type(inertia_matrices_t) :: inertia
     real(wp), allocatable :: incidence(:, :)   ! moments on the bodies from those of the couplings
     integer :: l, n
     logical :: is_singular
 
-    n = machine%bodies
-    call self%set_machine('paper', machine, 3 * n, with_energy_balance)
+    n = self%machine%bodies
+    call self%set_bodies('paper', 3 * n, with_energy_balance)
     self%work = new_paper_matrices(n)
     allocate (self%term(n), source=0.0_wp)
-    allocate (self%complement(n, machine%coordinates%freedoms, machine%lanes))
-    allocate (self%factors(3 * n, 3 * n, machine%lanes), self%pivots(3 * n, machine%lanes))
-    do l = 1, machine%lanes
-      self%complement(:, :, l) = machine%coordinates%complement(l)
-      call inertia%assemble(machine, l, self%complement(:, :, l))
+    allocate (self%complement(n, self%machine%coordinates%freedoms, self%machine%lanes))
+    allocate (self%factors(3 * n, 3 * n, self%machine%lanes), self%pivots(3 * n, self%machine%lanes))
+    do l = 1, self%machine%lanes
+      self%complement(:, :, l) = self%machine%coordinates%complement(l)
+      call inertia%assemble(self%machine, l, self%complement(:, :, l))
       self%factors(:, :, l) = inertia%inertia_3
       call lu_factor(self%factors(:, :, l), self%pivots(:, l), is_singular)
       if (is_singular) self%factors(:, :, l) = ieee_value(1.0_wp, ieee_quiet_nan)   ! by rounding: the integration does not start
     end do
-    allocate (self%couplings, source=coupling_elements(machine))
+    allocate (self%couplings, source=coupling_elements(self%machine))
     allocate (incidence(n, size(self%couplings)), source=0.0_wp)
     do l = 1, size(self%couplings)
-      associate (elements => machine%elements, e => self%couplings(l))
+      associate (elements => self%machine%elements, e => self%couplings(l))
         call elements%rows%add_moment(e, 1.0_wp, incidence(:, l))
       end associate
     end do
     self%moment_of_bodies = pseudo_inverse(incidence, 1.0e-10_wp)
-  end function new_paper
+  end subroutine formulate
 
   !> beta at the start. F are the elastic moments at the start angles, eqs. (48)-(51).
   function start(self) result(y)

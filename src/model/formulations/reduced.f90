@@ -50,17 +50,16 @@ contains
     type(reduced_t) :: self
 
     self%machine = machine
-    call self%formulate(with_energy_balance, as_block)
+    if (present(as_block)) self%is_block = as_block
+    call self%formulate(with_energy_balance)
   end function new_reduced
 
-  !> Forms the equations of `machine`, after any change of its structure.
-  subroutine formulate(self, with_energy_balance, as_block)
+  !> Forms the equations of `machine`, after any change of its structure; laid out as a block if `is_block`, or of many lanes.
+  subroutine formulate(self, with_energy_balance)
     class(reduced_t), intent(inout) :: self
     logical, intent(in) :: with_energy_balance   !! as in `new_reduced`
-    logical, intent(in), optional :: as_block    !! as in `new_reduced`
 
-    self%is_block = self%machine%lanes > 1
-    if (present(as_block)) self%is_block = self%is_block .or. as_block
+    self%is_block = self%is_block .or. self%machine%lanes > 1
     call self%set_coordinates(with_energy_balance, self%is_block)
     associate (machine => self%machine, incidence => self%incidence, freedoms => self%machine%coordinates%freedoms)
       call form_responses(freedoms, self%is_block, self)

@@ -18,6 +18,7 @@ module nocdyn_row_formulation
   type, abstract, extends(formulation_t), public :: row_formulation_t
     real(wp), allocatable :: acceleration(:)    !! of the first states, work space, [moving]
     real(wp), allocatable, private :: unit(:)   !! a speed or position that changes, work space, [moving]
+    real(wp), allocatable, private :: rates(:)  !! of all elements with it, work space, [elements]
     real(wp), allocatable :: near(:)            !! a state that is observed, back on the rows that move; work space, [states]
     real(wp), allocatable :: joint_state(:, :)  !! work space, [1, states]
     integer, allocatable, private :: work_of(:) !! work integral of each joint whose moment does work, 0 of others, [joints]
@@ -39,7 +40,7 @@ module nocdyn_row_formulation
     procedure :: hold_derivative
     procedure :: hold_columns
     procedure, private :: hold_column
-    procedure, private :: drag_derivative
+    procedure, private :: differentiate_drags
     procedure :: project
     procedure :: project_state
     procedure :: evaluation_obstacle
@@ -115,6 +116,7 @@ contains
     if (self%joints%count == 0) return
     self%acceleration = spread(0.0_wp, 1, size(self%moving))
     self%unit = self%acceleration
+    self%rates = spread(0.0_wp, 1, self%machine%elements%count)
     self%near = spread(0.0_wp, 1, self%states)
     self%joint_state = reshape(spread(0.0_wp, 1, self%states), [1, self%states])
     self%work_of = [(merge(findloc(self%machine%with_work, self%joints%element(j), dim=1), 0, &
@@ -173,7 +175,7 @@ contains
       else
         call teeth%apply(elements)
         call teeth%choose_shares(self%machine%banks, joints%mode, elements%speed(1, :))
-        call self%hold(joints%motions%acceleration, acceleration, teeth%drag())
+        call self%hold(joints%motions%acceleration, acceleration, teeth%drag)
         call teeth%add_moments(joints%moment)
       end if
     end associate
@@ -326,7 +328,8 @@ contains
         demand(i) = demand(i) * self%element_rate(motions%driver(i), unit)
       end do
       if (self%joints%teeth%count > 0) then
-        call self%hold(demand, accelerations, self%drag_derivative(column, unit))
+        call self%differentiate_drags(column)
+        call self%hold(demand, accelerations, self%joints%teeth%drag)
       else
         call self%hold(demand, accelerations)
       end if
@@ -334,17 +337,17 @@ contains
     end associate
   end subroutine hold_column
 
-  !> The derivatives of the drags of teeth without the effect of the joints that hold, by a state or the time.
-  function drag_derivative(self, column, unit) result(drag)
-    class(row_formulation_t), intent(in) :: self
-    integer, intent(in) :: column       !! as in `hold_column`
-    real(wp), intent(in) :: unit(:)     !! the speed or the position that changes, [moving]
-    real(wp) :: drag(self%joints%teeth%count)
-    real(wp), dimension(self%machine%elements%count) :: rates, slope
+  !> Replaces the drags of teeth by their derivatives by a state or the time.
+  subroutine differentiate_drags(self, column)
+    class(row_formulation_t), intent(inout) :: self
+    integer, intent(in) :: column   !! as in `hold_column`, whose `unit` is the speed or the position that changes
     integer :: e
 
-    associate (elements => self%machine%elements, teeth => self%joints%teeth, n => size(self%moving))
-      rates = [(self%element_rate(e, unit), e=1, elements%count)]
+    associate (elements => self%machine%elements, teeth => self%joints%teeth, n => size(self%moving), rates => self%rates, &
+               slope => self%joints%teeth%moment)
+      do e = 1, elements%count
+        rates(e) = self%element_rate(e, self%unit)
+      end do
       slope = 0.0_wp
       if (column == 0) then
         slope = elements%applied_time(1, :)
@@ -361,10 +364,13 @@ contains
           if (column > n) moved = moved + (x%restoring_angle(1, e) + x%applied_angle(1, e)) * by
         end associate
       end do
-      drag = teeth%share * teeth%torques_of(slope)
-      if (column > 0 .and. column <= n) drag = drag + teeth%share_slope * teeth%load * rates(self%joints%element(teeth%joint))
+      teeth%drag(:) = matmul(teeth%by_moment, slope)
+      teeth%drag(:) = teeth%share * teeth%drag
+      do e = 1, merge(teeth%count, 0, column > 0 .and. column <= n)
+        teeth%drag(e) = teeth%drag(e) + teeth%share_slope(e) * teeth%load(e) * rates(self%joints%element(teeth%joint(e)))
+      end do
     end associate
-  end function drag_derivative
+  end subroutine differentiate_drags
 
   !> Puts the state after a step back on the rows that move.
   subroutine project_state(self, lane, t, y)

@@ -207,7 +207,8 @@ contains
       end if
     end do
     if (self%is_singular) then
-      self%moment(:) = matmul(self%factors, self%moment)
+      self%right(:) = self%moment
+      self%moment(:) = matmul(self%factors, self%right)
     else
       call lu_solve(self%factors, self%pivots, self%moment)
     end if

@@ -330,8 +330,7 @@ contains
       call bank%range_under_load(self%number(joint), self%teeth%load(self%teeth%loss_of(joint)), least, most)
       sliding = 0.0_wp
     class is (friction_joints_t)
-      call bank%range_at_rest(self%number(joint), t, least, most)
-      call bank%range_of_slip(self%number(joint), t, sliding(1), sliding(2))
+      call bank%find_range(self%number(joint), t, least, most, sliding)
     class default   ! a row that moves
       least = -huge(least)
       most = huge(most)

@@ -159,7 +159,7 @@ contains
     real(wp), intent(in) :: t                  !! [s]
     real(wp), contiguous, intent(in) :: y(:)   !! of the lane, [states + quadratures]
     real(wp), intent(inout) :: row(:)          !! [columns]
-    integer :: k
+    integer :: k, m
 
     if (self%have_reactions) call self%formulation%reactions(lane, self%lambda)
     if (self%have_energies) call find_energies(self, lane, y)
@@ -181,7 +181,9 @@ contains
           case (signal_reaction)
             row(first:last) = self%lambda(i:j)
           case (signal_member)
-            row(first:last) = members%factor(lane, i:j) * self%lambda(members%row(i:j))
+            do m = i, j
+              row(first + m - i) = members%factor(lane, m) * self%lambda(members%row(m))
+            end do
           case (signal_point_moment, signal_point_stress)
             call fill_points(machine, segment, lane, row(first:last))
           case (signal_kinetic:signal_residual)

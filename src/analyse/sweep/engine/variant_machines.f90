@@ -69,6 +69,7 @@ contains
     self%has_energy_balance = with_energy_balance
     call find_run_values(self)
     allocate (block, self%assembled)
+    self%assembled%is_block = .true.
     is_typical = present(typical)
     if (is_typical) then
       call assemble_variant(self%input, targets, typical, block%machine, message, lanes)
@@ -121,7 +122,8 @@ contains
     type(variant_machines_t), intent(inout) :: self
     type(reduced_t), pointer, intent(in) :: block
 
-    call block%formulate(self%has_energy_balance, as_block=.true.)
+    block%is_block = .true.
+    call block%formulate(self%has_energy_balance)
     block%is_shared = block%joints%count == 0   ! whatever the number of lanes
     call block%list_parameters(self%parameters)
     self%block => block
@@ -205,7 +207,7 @@ contains
     status = variant_needs_own_block
     if (.not. associated(self%block)) return
     if (any(self%is_of_run .and. abs(values - self%base) > 0)) return
-    call self%assembled%formulate(self%has_energy_balance, as_block=.true.)
+    call self%assembled%formulate(self%has_energy_balance)
     call self%assembled%list_parameters(self%assembled_parameters)
     if (.not. self%parameters%has_same_structure(self%assembled_parameters)) return
     status = variant_set
