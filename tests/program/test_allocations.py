@@ -6,13 +6,15 @@ import subprocess
 from itertools import product
 
 import pytest
-from conftest import CASE_2, DATA
+from conftest import CASE_2, DATA, SOURCE
 
 # The buffer of summary.json grows by doubling: another length of its numbers may be one doubling more or less.
 DOUBLINGS = 1
 
 # Where a summary has many numbers, some of other lengths may need another piece of memory each.
 NUMBERS = 5
+
+EXAMPLES = SOURCE / "input/examples"
 
 
 @pytest.fixture(scope="module")
@@ -71,3 +73,17 @@ def test_nothing_is_allocated_by_elements_of_every_kind(nocdyn, counter, kinds, 
     many = allocations(nocdyn, counter, DATA / kinds, *common, f"run.t_end={2 * end}")
     assert nocdyn.summary("out")["counts"]["accepted_steps"] > steps + 100
     assert abs(many - few) <= NUMBERS
+
+
+# Clutches that lock and slip, also beside cardan joints, which move, and teeth that lose.
+@pytest.mark.parametrize("example", ["coupled_clutches", "car_driveline", "winch", "hybrid"])
+@pytest.mark.parametrize("method", ["rk853", "rodas5p"])
+def test_nothing_is_allocated_per_step_where_joints_lock(nocdyn, counter, example, method):
+    path = EXAMPLES / example / f"{example}.nml"
+    few = allocations(nocdyn, counter, path, f"run.method={method}", "run.rtol=1e-6")
+    before = nocdyn.summary("out")
+    many = allocations(nocdyn, counter, path, f"run.method={method}", "run.rtol=1e-8")
+    after = nocdyn.summary("out")
+    assert after["counts"]["accepted_steps"] > 1.3 * before["counts"]["accepted_steps"]
+    assert len(after["joint_events"]) == len(before["joint_events"])  # which decide the modes anew, in work space of their own
+    assert many - few <= NUMBERS

@@ -4,8 +4,8 @@ module nocdyn_test_states
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_multiplier, only: new_multiplier
-  use nocdyn_paper, only: new_paper
+  use nocdyn_multiplier, only: multiplier_t
+  use nocdyn_paper, only: paper_t
   use nocdyn_paper_matrices, only: elastic_moments
   use nocdyn_reduced, only: new_reduced, reduced_t
   use nocdyn_test_random, only: random_stream, random_stream_t
@@ -30,12 +30,14 @@ contains
     if (present(with_energy_balance)) has_works = with_energy_balance
     select case (which)
     case (reduced)
-      formulation = new_reduced(machine, has_works)
+      allocate (reduced_t :: formulation)
     case (paper)
-      formulation = new_paper(machine, has_works)
+      allocate (paper_t :: formulation)
     case default
-      formulation = new_multiplier(machine, has_works)
+      allocate (multiplier_t :: formulation)
     end select
+    formulation%machine = machine
+    call formulation%formulate(has_works)
   end subroutine formulate
 
   !> As `new_reduced`, polymorphic as the machines of `nocdyn_test_machines`.

@@ -171,7 +171,7 @@ contains
     real(wp), intent(in) :: tolerance
     real(wp), contiguous, intent(in) :: times(:)
     real(wp), allocatable, intent(out) :: rows(:, :)   !! [columns, times]
-    class(formulation_t), allocatable :: formulation
+    class(formulation_t), allocatable, target :: formulation
     type(trajectory_table_t) :: table
     type(recorder_t) :: records
     type(solver_status_t) :: solver_status

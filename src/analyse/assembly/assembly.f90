@@ -12,10 +12,10 @@ module nocdyn_assembly
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_parts, only: build_machine, given_speeds
   use nocdyn_motion_notes, only: note_motions
-  use nocdyn_multiplier, only: new_multiplier
-  use nocdyn_paper, only: new_paper
+  use nocdyn_multiplier, only: multiplier_t
+  use nocdyn_paper, only: paper_t
   use nocdyn_pressure_notes, only: note_pressures
-  use nocdyn_reduced, only: new_reduced
+  use nocdyn_reduced, only: reduced_t
   use nocdyn_steady_joints, only: choose_overruns
   use nocdyn_steady_start, only: start_steadily
   use nocdyn_steady_views, only: steady_view_t
@@ -23,7 +23,7 @@ module nocdyn_assembly
   implicit none (type, external)
   private
 
-  public :: assemble_machine, assemble_steady_machine, new_asked_formulation, new_formulation
+  public :: assemble_machine, assemble_steady_machine, allocate_formulation, new_asked_formulation, new_formulation
 
 contains
 
@@ -128,7 +128,7 @@ contains
 
   !> The equations of motion of a machine, a system for an integrator.
   subroutine new_formulation(word, machine, formulation, with_energy_balance)
-    character(len=*), intent(in) :: word   !! 'reduced', 'paper' or 'multiplier'
+    character(len=*), intent(in) :: word   !! as in `allocate_formulation`
     type(machine_t), intent(in) :: machine
     class(formulation_t), allocatable, intent(out) :: formulation
     logical, intent(in), optional :: with_energy_balance   !! whether the work of the elements is integrated; absent: .true.
@@ -136,16 +136,26 @@ contains
 
     has_work_integrals = .true.
     if (present(with_energy_balance)) has_work_integrals = with_energy_balance
+    call allocate_formulation(word, formulation)
+    formulation%machine = machine
+    call formulation%formulate(has_work_integrals)
+  end subroutine new_formulation
+
+  !> A formulation without a machine. With one, `formulate` forms its equations.
+  subroutine allocate_formulation(word, formulation)
+    character(len=*), intent(in) :: word   !! 'reduced', 'paper' or 'multiplier'
+    class(formulation_t), allocatable, intent(out) :: formulation
+
     select case (word)
     case ('reduced')
-      allocate (formulation, source=new_reduced(machine, has_work_integrals))
+      allocate (reduced_t :: formulation)
     case ('paper')
-      allocate (formulation, source=new_paper(machine, has_work_integrals))
+      allocate (paper_t :: formulation)
     case ('multiplier')
-      allocate (formulation, source=new_multiplier(machine, has_work_integrals))
+      allocate (multiplier_t :: formulation)
     case default
       error stop 'nocdyn_assembly: the schema allows an unknown formulation'
     end select
-  end subroutine new_formulation
+  end subroutine allocate_formulation
 
 end module nocdyn_assembly

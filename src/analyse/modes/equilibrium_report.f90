@@ -14,7 +14,7 @@ module nocdyn_equilibrium_report
   use nocdyn_machine_report, only: named_coordinates
   use nocdyn_machine, only: machine_t
   use nocdyn_quantities, only: form_angle
-  use nocdyn_reduced, only: new_reduced
+  use nocdyn_reduced, only: new_reduced, reduced_t
   use nocdyn_signals, only: signal_angle, signal_element, signal_residual, signal_t, signal_time, signal_work_in, &
     signal_work_out
   use nocdyn_table_text, only: append_table, cell, cell_digits, clear_rounding, padded, rounding
@@ -48,6 +48,7 @@ contains
     integer, intent(in) :: wanted(:)   !! units of the columns: indices of `units`; others are the ones of SI
     type(equilibrium_report_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error   !! a number of a steady state is not finite
+    type(reduced_t), target :: with_works
     type(trajectory_table_t) :: table
     real(wp), allocatable :: row(:), watts(:, :), y(:)
     integer, allocatable :: reported(:)                 !! columns
@@ -59,7 +60,8 @@ contains
     associate (machine => formulation%machine)
       allocate (self%coordinates, source=selected(machine%names, named_coordinates(machine)))
     end associate
-    table = new_trajectory_table(new_reduced(formulation%machine, .true.), t_infinity, wanted)
+    with_works = new_reduced(formulation%machine, .true.)
+    table = new_trajectory_table(with_works, t_infinity, wanted)
     reported = pack([(i, i=1, size(table%signals))], &
                     [(is_steady(table%signals(i), formulation%machine), i=1, size(table%signals))])
     call self%columns%start('', [integer ::])
@@ -74,7 +76,7 @@ contains
     do k = 1, size(equilibria)
       y = [equilibria(k)%y(1, :), (0.0_wp, i=1, size(parts))]
       call table%fill(t_infinity, y, row)
-      call table%columns%formulation%machine%power(watts)
+      call with_works%machine%power(watts)
       self%values(:, k) = row(reported)
       self%power(:, k) = whole_sums(parts, watts(1, :))
       i = findloc(is_finite([self%values(:, k), self%power(:, k)]), .false., dim=1)

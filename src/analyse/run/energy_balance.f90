@@ -73,12 +73,21 @@ contains
   subroutine append_energy_balance(report, self)
     type(text_buffer_t), intent(inout) :: report
     type(energy_balance_t), intent(in) :: self
+    real(wp), parameter :: unseen = 1.0e-12_wp   ! share of all energies
     character(len=*), parameter :: last_line = 'energy balance error'
     type(string_t), allocatable :: names(:)
     real(wp), allocatable :: energies(:)
     integer :: i, width
 
-    call list_entries(self, names, energies)
+    ! the works, and the energies that couplings and bodies have released
+    allocate (energies, source=[self%work, self%stored_start - self%stored_end, self%kinetic_start - self%kinetic_end])
+    allocate (names(size(energies)))
+    names(:size(self%work)) = self%work_elements
+    do i = 1, size(self%elastic_elements)
+      names(size(self%work) + i)%text = 'stored in ' // self%elastic_elements(i)%text
+    end do
+    names(size(names))%text = 'kinetic energy'
+    where (abs(energies) <= unseen * sum(abs(energies))) energies = 0.0_wp
     if (all(abs(energies) <= 0.0_wp)) return
     width = len(last_line)
     do i = 1, size(names)
@@ -90,24 +99,6 @@ contains
     call append_side(names, energies, -1.0_wp, width, report)
     call report%append_line(padded(last_line, width) // cell(self%residual()))
   end subroutine append_energy_balance
-
-  !> The works, and the energies that couplings and bodies have released.
-  subroutine list_entries(self, names, energies)
-    type(energy_balance_t), intent(in) :: self
-    type(string_t), allocatable, intent(out) :: names(:)
-    real(wp), allocatable, intent(out) :: energies(:)   !! into the machine, negative if out of it; 0 for rounding [J]
-    real(wp), parameter :: unseen = 1.0e-12_wp   ! share of all energies
-    integer :: i
-
-    allocate (energies, source=[self%work, self%stored_start - self%stored_end, self%kinetic_start - self%kinetic_end])
-    allocate (names(size(energies)))
-    names(:size(self%work)) = self%work_elements
-    do i = 1, size(self%elastic_elements)
-      names(size(self%work) + i)%text = 'stored in ' // self%elastic_elements(i)%text
-    end do
-    names(size(names))%text = 'kinetic energy'
-    where (abs(energies) <= unseen * sum(abs(energies))) energies = 0.0_wp
-  end subroutine list_entries
 
   !> The entries of one side, the largest first.
   subroutine append_side(names, energies, sign, width, report)

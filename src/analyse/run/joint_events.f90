@@ -42,7 +42,13 @@ contains
         events(i)%slip = event%slip
         events(i)%torque = event%torque
         events(i)%impulse = event%impulse
-        if (role == role_bearing .or. role == role_loss) call name_body_first(events(i))
+        if (role == role_bearing .or. role == role_loss) then
+          ! turns an event round where the second body of the joint is what moves: a body in its bearings, the first wheel of
+          ! teeth
+          events(i)%slip = 0.0_wp - events(i)%slip
+          events(i)%from = opposite(events(i)%from)
+          events(i)%to = opposite(events(i)%to)
+        end if
       end associate
     end do
   end subroutine list_joint_events
@@ -64,15 +70,6 @@ contains
       end do
     end associate
   end subroutine describe_shared_joints
-
-  !> Turns an event round where the second body of the joint is what moves: a body in its bearings, the first wheel of teeth.
-  pure subroutine name_body_first(event)
-    type(named_event_t), intent(inout) :: event
-
-    event%slip = 0.0_wp - event%slip
-    event%from = opposite(event%from)
-    event%to = opposite(event%to)
-  end subroutine name_body_first
 
   !> The mode with the opposite slip.
   pure integer function opposite(mode)

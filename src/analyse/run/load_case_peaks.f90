@@ -41,11 +41,23 @@ contains
   subroutine find_peaks(runs, peaks)
     type(case_run_t), intent(in) :: runs(:)
     type(peak_t), allocatable, intent(out) :: peaks(:)
-    type(string_t), allocatable :: labels(:)
+    type(string_t), allocatable :: labels(:), longer(:)
     integer :: c, i, k
     logical :: is_known
+    integer, allocatable :: new(:)
 
-    call list_labels(runs, labels)
+    ! the labels of the columns of all runs that have rows
+    allocate (labels(0))
+    do c = 1, size(runs)
+      if (.not. runs(c)%summary%extremes%have_begun) cycle
+      call find_new(runs(c)%summary, labels, new)
+      allocate (longer(size(labels) + size(new)))
+      longer(:size(labels)) = labels
+      do k = 1, size(new)
+        longer(size(labels) + k)%text = runs(c)%summary%labels(new(k))%text
+      end do
+      call move_alloc(longer, labels)
+    end do
     allocate (peaks(size(labels)))
     do c = 1, size(runs)
       associate (summary => runs(c)%summary)
@@ -73,27 +85,6 @@ contains
     peak%time = time
     peak%load_case = load_case
   end subroutine raise_peak
-
-  !> The labels of the columns of all runs that have rows.
-  subroutine list_labels(runs, labels)
-    type(case_run_t), intent(in) :: runs(:)
-    type(string_t), allocatable, intent(out) :: labels(:)
-    type(string_t), allocatable :: longer(:)
-    integer, allocatable :: new(:)
-    integer :: c, k
-
-    allocate (labels(0))
-    do c = 1, size(runs)
-      if (.not. runs(c)%summary%extremes%have_begun) cycle
-      call find_new(runs(c)%summary, labels, new)
-      allocate (longer(size(labels) + size(new)))
-      longer(:size(labels)) = labels
-      do k = 1, size(new)
-        longer(size(labels) + k)%text = runs(c)%summary%labels(new(k))%text
-      end do
-      call move_alloc(longer, labels)
-    end do
-  end subroutine list_labels
 
   !> The columns of a run that are not yet known.
   subroutine find_new(summary, labels, new)

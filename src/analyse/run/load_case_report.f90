@@ -27,7 +27,8 @@ contains
     type(case_run_t), intent(in) :: runs(:)
     character(len=:), allocatable :: text
     type(json_t) :: json
-    integer :: c
+    integer :: c, i
+    type(peak_t), allocatable :: peaks(:)
 
     call json%open_report(input%file, input%title())
     call json%put('is_complete', is_complete(runs))
@@ -45,26 +46,6 @@ contains
       end associate
     end do
     call json%close_list()
-    call put_peaks(json, runs)
-    call put_lives(json, runs)
-    call json%close()
-    text = json%text()
-  end function load_cases_json
-
-  !> Whether all load cases have been run to their ends.
-  pure logical function is_complete(runs)
-    type(case_run_t), intent(in) :: runs(:)
-    integer :: c
-
-    is_complete = all([(runs(c)%summary%status == 'done', c=1, size(runs))])
-  end function is_complete
-
-  subroutine put_peaks(json, runs)
-    type(json_t), intent(inout) :: json
-    type(case_run_t), intent(in) :: runs(:)
-    type(peak_t), allocatable :: peaks(:)
-    integer :: i
-
     call find_peaks(runs, peaks)
     call json%open_list('peaks')
     do i = 1, size(peaks)
@@ -77,7 +58,18 @@ contains
       call json%close()
     end do
     call json%close_list()
-  end subroutine put_peaks
+    call put_lives(json, runs)
+    call json%close()
+    text = json%text()
+  end function load_cases_json
+
+  !> Whether all load cases have been run to their ends.
+  pure logical function is_complete(runs)
+    type(case_run_t), intent(in) :: runs(:)
+    integer :: c
+
+    is_complete = all([(runs(c)%summary%status == 'done', c=1, size(runs))])
+  end function is_complete
 
   subroutine put_lives(json, runs)
     type(json_t), intent(inout) :: json

@@ -156,23 +156,6 @@ contains
 
     call json%open_report(input%file, input%title(), summary%status, summary%message)
     if (allocated(input%load_case)) call json%put('load_case', input%load_case%name)
-    call put_machine(json, summary)
-    call put_settings(json, input%single('run'))
-    if (allocated(summary%limits)) call put_run_limits(json, summary%limits)
-    if (allocated(summary%fatigue%items)) call put_fatigue(json, summary%fatigue)
-    call put_counts(json, summary)
-    call put_method(json, summary)
-    if (allocated(summary%energy_balance)) call put_energy_balance(json, summary%energy_balance)
-    if (allocated(summary%events)) call put_joint_events(json, summary%events)
-    call put_columns(json, summary)
-    call json%close()
-    text = json%text()
-  end function summary_json
-
-  subroutine put_machine(json, summary)
-    type(json_t), intent(inout) :: json
-    type(run_summary_t), intent(in) :: summary
-
     call json%open('machine')
     call json%put('bodies', summary%bodies)
     call json%put('gears', summary%gears)
@@ -181,12 +164,9 @@ contains
     call json%put('independent', summary%coordinates)
     call json%put('notes', summary%notes)
     call json%close()
-  end subroutine put_machine
-
-  subroutine put_counts(json, summary)
-    type(json_t), intent(inout) :: json
-    type(run_summary_t), intent(in) :: summary
-
+    call put_settings(json, input%single('run'))
+    if (allocated(summary%limits)) call put_run_limits(json, summary%limits)
+    if (allocated(summary%fatigue%items)) call put_fatigue(json, summary%fatigue)
     associate (solver_status => summary%solver_status)
       call json%open('counts')
       call json%put('accepted_steps', solver_status%accepted(1))
@@ -200,7 +180,13 @@ contains
       call json%put('time_reached', solver_status%t(1))
     end associate
     call json%put('wall_time_s', summary%wall_time)
-  end subroutine put_counts
+    call put_method(json, summary)
+    if (allocated(summary%energy_balance)) call put_energy_balance(json, summary%energy_balance)
+    if (allocated(summary%events)) call put_joint_events(json, summary%events)
+    call put_columns(json, summary)
+    call json%close()
+    text = json%text()
+  end function summary_json
 
   !> The method of integration, its explicit and implicit steps, and the first switches between them.
   subroutine put_method(json, summary)

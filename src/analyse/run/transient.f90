@@ -1,7 +1,7 @@
 !> The motion of a machine over time: integrates an input, hands out the rows of its trajectory, and makes a summary.
 module nocdyn_transient
   use, intrinsic :: iso_fortran_env, only: int64
-  use nocdyn_assembly, only: assemble_machine, new_asked_formulation
+  use nocdyn_assembly, only: allocate_formulation, assemble_machine
   use nocdyn_column_names, only: choose_columns
   use nocdyn_equilibrium, only: mean_formulation, t_infinity
   use nocdyn_errors, only: error_t, exit_failed, raise
@@ -30,7 +30,7 @@ module nocdyn_transient
   use nocdyn_start_transient, only: find_start_transient
   use nocdyn_text, only: append, selected, string_t, to_text
   use nocdyn_damping_notes, only: has_stand_ins, note_stand_ins
-  use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
+  use nocdyn_trajectory_table, only: at_last_row, new_trajectory_table, trajectory_table_t
   use nocdyn_vibration_energy, only: new_vibration, vibration_t
   implicit none (type, external)
   private
@@ -86,14 +86,14 @@ module nocdyn_transient
     real(wp) :: largest_moment = 0.0_wp      !! of the elements [N m]
     real(wp) :: atol = 0.0_wp                !! absolute tolerance, at most `rest` [rad]
     real(wp) :: last_time = 0.0_wp           !! of the rows [s]
-    real(wp), allocatable :: last_state(:)   !! at that time, [states + quadratures]
+    real(wp), allocatable :: last_speeds(:)  !! of the bodies at that time [rad/s]
     real(wp), allocatable :: lowest(:), highest(:)   !! speeds of the bodies in the rows [rad/s]
     real(wp) :: first_time, end_time         !! [s]
     integer :: not_finite = 0                !! column of the first row with a number that is not finite, which ends the run
     real(wp) :: failure_time = 0.0_wp        !! of that row [s]
     class(run_output_t), pointer :: output => null()
   contains
-    procedure :: on_output, wants_stop, observe_lanes, tracked_values, find_pace, on_shift
+    procedure :: on_output, wants_stop, observe_lanes, tracked_values, find_pace
   end type run_observer_t
 
 contains
@@ -129,7 +129,7 @@ contains
     if (allocated(error)) return
     observer%output => output
     observer%atol = min(settings%atol, rest)
-    observer%table%columns%formulation%joints%leader => formulation%joints
+    observer%table%columns%in_motion = .true.
     call output%start(selected(observer%table%labels, observer%chosen), size(times), error)
     if (allocated(error)) return
     allocate (summary%signals, source=observer%table%signals)
@@ -143,10 +143,7 @@ contains
     end if
     if (.not. summary%has_run .or. allocated(error) .or. allocated(formulation%machine%steady_internal)) return
     if (formulation%joints%count > 0) return   ! which of them a steady state has locked is not known
-    associate (last => observer%table%columns%formulation)
-      call last%set_state(reshape(observer%last_state, [1, size(observer%last_state)]))
-      call note_missed_state(formulation%machine, observer%last_time, last%omega(1, 1:), summary%notes)
-    end associate
+    call note_missed_state(formulation%machine, observer%last_time, observer%last_speeds, summary%notes)
   end subroutine run_transient
 
   !> Notes on the damping of the modes about the start angles.
@@ -167,20 +164,20 @@ contains
     if (.not. allocated(error)) call note_stand_ins(machine, linear, notes)
   end subroutine note_damping
 
-  !> The equations of motion of an input. Their machine is the only one that stays.
+  !> The equations of motion of an input, whose machine is made in them.
   subroutine build_formulation(input, formulation, settings, notes, error)
     type(input_t), intent(in) :: input
     class(formulation_t), allocatable, intent(out) :: formulation
     type(integration_settings_t), intent(out) :: settings
     type(string_t), allocatable, intent(out) :: notes(:)   !! on the method
     type(error_t), allocatable, intent(out) :: error
-    type(machine_t) :: machine
 
-    call assemble_machine(input, machine, error)
-    if (.not. allocated(error)) call check_size(input, machine, error)
-    if (.not. allocated(error)) call check_signals(input, machine, error)
+    call allocate_formulation(input%groups(input%position('run'))%text('formulation'), formulation)
+    call assemble_machine(input, formulation%machine, error)
+    if (.not. allocated(error)) call check_size(input, formulation%machine, error)
+    if (.not. allocated(error)) call check_signals(input, formulation%machine, error)
     if (allocated(error)) return
-    call new_asked_formulation(input, machine, formulation)
+    call formulation%formulate(.true.)
     call choose_settings(input, formulation, settings, notes, error)
   end subroutine build_formulation
 
@@ -202,8 +199,8 @@ contains
     observer%vibration = new_vibration(formulation%machine)
     allocate (observer%row(observer%tracked), source=0.0_wp)
     allocate (observer%lowest(formulation%machine%bodies), source=huge(0.0_wp))
-    allocate (observer%highest(formulation%machine%bodies), source=-huge(0.0_wp))
-    allocate (observer%last_state(formulation%states + formulation%quadratures), source=0.0_wp)
+    allocate (observer%highest, source=-observer%lowest)
+    allocate (observer%last_speeds, source=0.0_wp * observer%lowest)
     call choose_columns(input, observer%table%signals, observer%table%labels, observer%chosen, notes, error)
     if (.not. allocated(error)) allocate (observer%written(size(observer%chosen)))
   end subroutine start_observer
@@ -259,7 +256,7 @@ contains
                               observer%atol * observer%largest_moment, summary%notes)
     if (summary%extremes%rows > 0) then
       allocate (summary%energy_balance)
-      call observer%table%find_energy_balance(observer%last_time, observer%last_state, summary%energy_balance)
+      call observer%table%find_energy_balance(summary%energy_balance)
     end if
     if (.not. allocated(error)) then
       associate (extremes => summary%extremes)
@@ -292,11 +289,12 @@ contains
       call self%vibration%include_energy(formulation%machine, formulation%omega(1, 1:))
       self%lowest(:) = min(self%lowest, formulation%omega(1, 1:))
       self%highest(:) = max(self%highest, formulation%omega(1, 1:))
+      self%last_speeds(:) = formulation%omega(1, 1:)
     end associate
     self%written(:) = self%row(self%chosen)
     call self%output%write_row(self%written)
     self%last_time = t
-    self%last_state(:) = y
+    call self%table%keep_energies(at_last_row, y)
   end subroutine on_output
 
   subroutine observe_lanes(self, t, y)
@@ -326,15 +324,6 @@ contains
     call self%table%columns%find_pace(lane, fastest, scale)
     self%largest_moment = max(self%largest_moment, scale)
   end subroutine find_pace
-
-  subroutine on_shift(self, lane, shift)
-    class(run_observer_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    real(wp), contiguous, intent(in) :: shift(:)
-
-    call self%statistics_observer_t%on_shift(lane, shift)
-    call self%table%columns%move_origin(lane, shift)
-  end subroutine on_shift
 
   !> Whether the caller wants the run to end.
   logical function wants_stop(self, t)

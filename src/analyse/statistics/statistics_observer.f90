@@ -5,12 +5,10 @@ module nocdyn_statistics_observer
   use nocdyn_damage_counters, only: damage_counter_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_linear_columns, only: has_law, is_linear, is_proportional
   use nocdyn_linear_statistics, only: linear_statistics_t, new_linear_statistics
   use nocdyn_machine, only: machine_t
   use nocdyn_signal_values, only: new_signal_values, signal_values_t
-  use nocdyn_reduced, only: reduced_t
   use nocdyn_sampled_statistics, only: new_sampled_statistics, sampled_statistics_t
   use nocdyn_statistics, only: find_columns, is_of_fatigue, is_time_of_extreme, is_torque, statistic_final, statistic_max, &
     statistic_max_abs, statistic_min, statistic_settling_time, statistic_t, statistic_time_of_max, statistic_time_of_min, &
@@ -23,8 +21,7 @@ module nocdyn_statistics_observer
 
   public :: new_statistics_observer, needs_work_integrals
 
-  !> The requested times must be, or contain, the start and the end of the variants. After the first `on_start` the observer must
-  !> stay where it is.
+  !> The requested times must be, or contain, the start and the end of the variants.
   !>
   !> The values of the tracked columns are the ones of `recorded`, if an extension does not override what gives them.
   !>
@@ -34,7 +31,6 @@ module nocdyn_statistics_observer
     character(len=:), allocatable :: missing                  !! the first quantity without a column that is no torque, or ''
     class(formulation_t), pointer, private :: block => null()
     real(wp), private :: t_start = 0.0_wp, t_end = 0.0_wp     !! of every variant [s]
-    type(lane_parameters_t), private :: parameters            !! of the block; none if its lanes cannot change them
     type(linear_statistics_t), private :: linear
     type(sampled_statistics_t), private :: sampled
     integer, allocatable, private :: first_part(:)            !! of each statistic, [statistics + 1]
@@ -67,7 +63,7 @@ contains
     end do
   end function needs_work_integrals
 
-  !> An observer of a block, which stays where it is. Only the reduced formulation may change the parameters of its lanes.
+  !> An observer of a block, which stays where it is.
   function new_statistics_observer(block, statistics, t_start, t_end, may_bend, tracks_all) result(self)
     class(formulation_t), target, intent(inout) :: block   !! with work integrals if `needs_work_integrals`
     type(statistic_t), intent(inout) :: statistics(:)      !! each with t_start <= from < t_end; get their columns
@@ -104,13 +100,9 @@ contains
     call distribute(self, parts, columns, may_bend, tracked)
     if (tracked == 0) call record_columns(self, columns(self%sampled%columns))
     allocate (self%is_complete(block%lanes), source=.false.)
-    select type (block)
-    class is (reduced_t)
-      if (block%is_block) call block%list_parameters(self%parameters)
-    end select
   end function new_statistics_observer
 
-  !> Evaluates the tracked columns by a copy of the formulation.
+  !> Evaluates the tracked columns by the formulation that is integrated.
   subroutine record_columns(self, columns)
     type(statistics_observer_t), intent(inout) :: self
     type(signal_source_t), intent(in) :: columns(:)
@@ -118,7 +110,7 @@ contains
     self%has_recorded = size(columns) > 0
     if (.not. self%has_recorded) return
     self%recorded = new_signal_values(self%block, columns)
-    self%recorded%formulation%joints%leader => self%block%joints
+    self%recorded%in_motion = .true.
     associate (lanes => self%block%lanes)
       allocate (self%t(lanes), self%y(lanes, self%block%states + self%block%quadratures), source=0.0_wp)
     end associate
@@ -282,7 +274,6 @@ contains
     call self%linear%start_lane(self%block, lane, y)
     call self%sampled%start_accumulators(lane)
     if (.not. self%has_recorded) return
-    if (self%parameters%arrays > 0) call self%recorded%copy_lane(lane, self%parameters)
     call observe_lane(self, lane, t, y)
     call self%recorded%start_lane(lane)
   end subroutine on_start
@@ -445,7 +436,6 @@ contains
     real(wp), contiguous, intent(in) :: shift(:)
 
     call self%linear%columns%copy_lane(self%block, lane)
-    if (self%has_recorded) call self%recorded%move_origin(lane, shift)
   end subroutine on_shift
 
   subroutine on_steps(self, steps, y, y_new, c)

@@ -218,7 +218,7 @@ contains
         call reduced%machine%banks(b)%bank%hold_speed()
       end do
     end if
-    call reduced%formulate(.false., .false.)
+    call reduced%formulate(.false.)
     call move_alloc(reduced, formulation)
   end subroutine mean_formulation
 

@@ -111,7 +111,7 @@ contains
   !> Replaces a right-hand side by the solution; by the one of least norm of the scaled matrix if it is singular.
   subroutine solve(self, x)
     class(semidefinite_t), intent(inout) :: self
-    real(wp), intent(inout) :: x(:)   !! [order]
+    real(wp), intent(inout) :: x(:)   !! [order], at least
     integer :: info
 
     associate (n => self%order)

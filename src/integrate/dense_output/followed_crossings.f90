@@ -9,7 +9,7 @@ module nocdyn_followed_crossings
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_observer, only: observer_t
-  use nocdyn_root_functions, only: bracket_t, find_root, parts_of, root_functions_t, sign_of
+  use nocdyn_root_functions, only: bracket_t, find_root, most_halvings, parts_of, root_functions_t, sign_of
   use nocdyn_system, only: system_t
   implicit none (type, external)
   private
@@ -17,7 +17,6 @@ module nocdyn_followed_crossings
   public :: find_followed_crossing
 
   real(wp), parameter :: part_of_wave = 0.5_wp   ! between two times [rad]
-  integer, parameter :: most_halvings = 14       ! of such a part
   real(wp), parameter :: safety = 2.0_wp         ! factor of the second difference
   real(wp), parameter :: far = 1.0e300_wp        ! a function so large stands for none
   real(wp), parameter :: early = 0.5_wp          ! of a step: an earlier crossing is no sign that there is none before
@@ -41,16 +40,15 @@ contains
     real(wp), intent(out) :: theta                   !! of the crossing, 1 if there is none
     type(crossing_t) :: first, next
     real(wp) :: fastest, searched
-    integer :: side(size(roots%g))
 
-    side = roots%side(dense%lane, :)
+    roots%first_side(:) = roots%side(dense%lane, :)
     call sample(dense, 0.0_wp, roots%y)
     call system%find_fastest_wave(dense%lane, roots%y, fastest)
     searched = 1.0_wp
     call search_step(roots, system, observer, dense, fastest, searched, first)
     do while (first%function > 0 .and. first%theta < early * searched)
       searched = first%theta
-      roots%side(dense%lane, :) = side
+      roots%side(dense%lane, :) = roots%first_side
       call search_step(roots, system, observer, dense, fastest, searched, next)
       if (next%function == 0 .or. next%function == first%function) exit
       if (next%theta < first%theta) first = next
@@ -68,53 +66,53 @@ contains
     real(wp), intent(in) :: fastest   !! [rad/s]
     real(wp), intent(in) :: theta_end
     type(crossing_t), intent(out) :: first
-    real(wp) :: values(size(roots%g), 3)
     integer :: pair, pairs
 
     pairs = (parts_of(dense%degree) + 1) / 2
     pairs = max(pairs, ceiling(min(0.25_wp * huge(1), 0.5_wp * theta_end * dense%h * fastest / part_of_wave)))
-    values(:, 1) = roots%last(:, dense%lane)
+    roots%halves(:, 1, 0) = roots%last(:, dense%lane)
     do pair = 1, pairs
       associate (a => theta_end * (2 * pair - 2) / (2 * pairs), m => theta_end * (2 * pair - 1) / (2 * pairs), &
                  b => theta_end * (2 * pair) / (2 * pairs))
-        call evaluate(roots, system, dense, m, values(:, 2))
-        call evaluate(roots, system, dense, b, values(:, 3))
-        call search_pair(roots, system, observer, dense, [a, m, b], values, most_halvings, first)
+        call evaluate(roots%y, system, dense, m, roots%halves(:, 2, 0))
+        call evaluate(roots%y, system, dense, b, roots%halves(:, 3, 0))
+        call search_pair(roots, system, observer, dense, [a, m, b], 0, first)
       end associate
       if (first%function > 0) return
-      values(:, 1) = values(:, 3)
+      roots%halves(:, 1, 0) = roots%halves(:, 3, 0)
     end do
-    roots%last(:, dense%lane) = values(:, 3)
+    roots%last(:, dense%lane) = roots%halves(:, 3, 0)
   end subroutine search_step
 
-  !> Looks at two parts of a step of equal length, between three times.
-  recursive subroutine search_pair(roots, system, observer, dense, theta, values, halvings, first)
+  !> Looks at two parts of a step of equal length, between three times where `roots%halves` has the functions at this level.
+  recursive subroutine search_pair(roots, system, observer, dense, theta, level, first)
     type(root_functions_t), intent(inout) :: roots
     class(system_t), intent(inout) :: system
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense
     real(wp), intent(in) :: theta(3)
-    real(wp), intent(in) :: values(size(roots%g), 3)   !! of the functions there
-    integer, intent(in) :: halvings                    !! that are left
+    integer, intent(in) :: level   !! halvings so far
     type(crossing_t), intent(inout) :: first
-    real(wp) :: halves(size(roots%g), 3), middle
+    real(wp) :: middle
     integer :: part
+    logical :: is_known   ! where they cross zero
 
-    if (halvings == 0 .or. all(is_settled(values(:, 1), values(:, 2), values(:, 3)))) then
+    associate (values => roots%halves(:, :, level))
+      is_known = level == most_halvings
+      if (.not. is_known) is_known = all(is_settled(values(:, 1), values(:, 2), values(:, 3)))
       do part = 1, 2
-        call cross_part(roots, system, observer, dense, theta(part:part + 1), values(:, part:part + 1), first)
+        if (is_known) then
+          call cross_part(roots, system, observer, dense, theta(part:part + 1), values(:, part:part + 1), first)
+        else
+          middle = theta(part) + 0.5_wp * (theta(part + 1) - theta(part))
+          roots%halves(:, 1, level + 1) = values(:, part)
+          roots%halves(:, 3, level + 1) = values(:, part + 1)
+          call evaluate(roots%y, system, dense, middle, roots%halves(:, 2, level + 1))
+          call search_pair(roots, system, observer, dense, [theta(part), middle, theta(part + 1)], level + 1, first)
+        end if
         if (first%function > 0) return
       end do
-      return
-    end if
-    do part = 1, 2
-      middle = theta(part) + 0.5_wp * (theta(part + 1) - theta(part))
-      halves(:, 1) = values(:, part)
-      halves(:, 3) = values(:, part + 1)
-      call evaluate(roots, system, dense, middle, halves(:, 2))
-      call search_pair(roots, system, observer, dense, [theta(part), middle, theta(part + 1)], halves, halvings - 1, first)
-      if (first%function > 0) return
-    end do
+    end associate
   end subroutine search_pair
 
   !> Whether three values of a function show where it crosses zero.
@@ -169,15 +167,15 @@ contains
   end subroutine cross_part
 
   !> The functions at one theta.
-  subroutine evaluate(roots, system, dense, theta, g)
-    type(root_functions_t), intent(inout) :: roots
+  subroutine evaluate(y, system, dense, theta, g)
+    real(wp), contiguous, intent(inout) :: y(:)   !! the state there, work space
     class(system_t), intent(inout) :: system
     type(dense_output_t), intent(inout) :: dense
     real(wp), intent(in) :: theta
     real(wp), contiguous, intent(inout) :: g(:)
 
-    call sample(dense, theta, roots%y)
-    call system%indicator_values(dense%lane, dense%t + theta * dense%h, roots%y, g)
+    call sample(dense, theta, y)
+    call system%indicator_values(dense%lane, dense%t + theta * dense%h, y, g)
   end subroutine evaluate
 
 end module nocdyn_followed_crossings

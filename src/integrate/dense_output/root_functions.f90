@@ -15,6 +15,7 @@ module nocdyn_root_functions
   public :: allocate_root_functions, start_root_functions, set_start, scan_step, parts_of, part_end, part_bracket, &
     find_root, find_grazing, sign_of
 
+  integer, parameter, public :: most_halvings = 14   !! of a part of a wave
   integer, parameter :: least_parts = 4   !! of a step; more for dense output of higher degree, whose steps are longer
   integer, parameter :: max_grazing_steps = 10
   real(wp), parameter :: promising = 0.5_wp             ! of the least value: a parabola with a higher minimum predicts no root
@@ -27,6 +28,9 @@ module nocdyn_root_functions
     real(wp), allocatable :: values(:, :)               !! at their ends; [functions, 0:most parts]
     real(wp), allocatable :: last(:, :)                 !! values at the end of the last step; [functions, lanes]
     real(wp), allocatable :: g(:)                       !! values at one theta
+    integer, allocatable :: first_side(:)               !! `side` of a lane at the start of its step
+    real(wp), allocatable :: halves(:, :, :)            !! values at the ends of two parts, after so many halvings;
+                                                        !! [functions, 3, 0:most halvings]
     real(wp), allocatable :: y(:)                       !! state at which the functions are evaluated
   end type root_functions_t
 
@@ -49,7 +53,8 @@ contains
 
     roots%of_system = of_system
     roots%parts = parts_of(degree)
-    allocate (roots%side(attempt%lanes, functions), source=0)
+    allocate (roots%side(attempt%lanes, functions), roots%first_side(functions), source=0)
+    allocate (roots%halves(functions, 3, 0:most_halvings))
     allocate (roots%values(functions, 0:roots%parts), roots%last(functions, attempt%lanes), roots%g(functions), &
               roots%y(attempt%components), source=0.0_wp)
   end subroutine allocate_root_functions

@@ -54,6 +54,7 @@ module nocdyn_described_elements
     integer, allocatable :: choices(:)            !! branches of each switch, [switches]; 0: the segments of `curve`; negative:
                                                   !! something else than guards chooses them
     integer, allocatable :: branch(:, :)          !! present branch of each switch, 1 or more, or a segment; [lanes, switches]
+    integer, allocatable, private :: kept_branch(:, :)   !! after `keep_branches`
     type(law_parameter_t), allocatable :: parameters(:)
     type(polynomial_term_t), allocatable :: terms(:)   !! of the polynomial part of the law
     type(curve_t), allocatable :: curve(:, :)     !! of the first switch of each element, [lanes, elements]
@@ -74,6 +75,7 @@ module nocdyn_described_elements
     procedure :: evaluate
     procedure :: choose
     procedure :: set_branch
+    procedure :: keep_branches, restore_branches
     procedure :: indicator
     procedure :: block_indicators
     procedure :: fastest_wave
@@ -364,6 +366,24 @@ contains
     self%branch(lane, switch) = branch
     call refresh_element(self, lane, self%switch_element(switch), .true.)
   end subroutine set_branch
+
+  !> Keeps the present branches, to which `restore_branches` goes back.
+  subroutine keep_branches(self)
+    class(described_elements_t), intent(inout) :: self
+
+    self%kept_branch = self%branch
+  end subroutine keep_branches
+
+  subroutine restore_branches(self)
+    class(described_elements_t), intent(inout) :: self
+    integer :: lane, switch
+
+    do switch = 1, size(self%kept_branch, 2)
+      do lane = 1, size(self%kept_branch, 1)
+        call self%set_branch(switch, lane, self%kept_branch(lane, switch))
+      end do
+    end do
+  end subroutine restore_branches
 
   !> Number of a switch among the ones of its element.
   pure integer function number_in_element(self, switch)

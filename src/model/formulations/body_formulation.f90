@@ -18,7 +18,6 @@ module nocdyn_body_formulation
   type, abstract, extends(joint_formulation_t), public :: body_formulation_t
     character(len=10) :: word = ''               !! name of the formulation in the input
     real(wp), allocatable :: slope(:, :)         !! y' at the last observed state, [lanes, states + quadratures]
-    real(wp), allocatable, private :: near(:, :) !! the state that is observed, [lanes, states]
     integer, allocatable :: status(:)            !! evaluation_... of that evaluation, [lanes]
     real(wp), allocatable :: mobility(:, :, :)   !! matrix of omega' = mobility T [1/(kg m2)], [bodies, bodies, lanes]
     ! work space of the Jacobian, one lane:
@@ -27,21 +26,24 @@ module nocdyn_body_formulation
     real(wp), allocatable :: by_time(:)       !! derivative of T by t [N m/s], [bodies]
     real(wp), allocatable :: by_state(:)      !! derivative of T by an internal state, [bodies]
   contains
-    procedure :: set_machine
+    procedure :: set_bodies
     procedure :: start => start_of_bodies
     procedure :: set_state
     procedure :: observe => observe_bodies
     procedure :: jacobian => jacobian_of_bodies
-    procedure :: series_obstacle, switch_motion, accelerate, element_rate, push_element
+    procedure :: series_obstacle
+    procedure :: switch_motion
+    procedure :: accelerate
+    procedure :: element_rate
+    procedure :: push_element
   end type body_formulation_t
 
 contains
 
-  !> Copies the machine, counts the states and allocates the work space.
-  subroutine set_machine(self, word, machine, mechanical, with_energy_balance)
+  !> Counts the states of `machine` and allocates the work space.
+  subroutine set_bodies(self, word, mechanical, with_energy_balance)
     class(body_formulation_t), intent(inout) :: self
     character(len=*), intent(in) :: word   !! name of the formulation in the input
-    type(machine_t), intent(in) :: machine
     integer, intent(in) :: mechanical            !! number of mechanical states, at least 2 * bodies
     logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
     integer :: b, i, k, l
@@ -51,39 +53,37 @@ contains
     type(error_measures_t) :: norm
 
     self%word = word
-    self%machine = machine
-    call self%allocate_state([(b, b=1, machine%bodies)], mechanical, with_energy_balance)
-    allocate (self%slope(self%lanes, self%states + self%quadratures), source=0.0_wp)
-    allocate (self%status(self%lanes), source=evaluation_ok)
-    allocate (self%near(self%lanes, self%states), source=0.0_wp)
-    allocate (self%mobility(machine%bodies, machine%bodies, self%lanes))
-    allocate (self%by_angle(machine%bodies, machine%bodies), self%by_speed(machine%bodies, machine%bodies))
-    allocate (self%by_time(machine%bodies), self%by_state(machine%bodies))
-    do l = 1, self%lanes
-      self%mobility(:, :, l) = machine%coordinates%mobility(l)
-    end do
-    allocate (self%zero_twist(self%lanes, machine%elements%count), source=0.0_wp)
-    ! the measures of errors: every state is one body's
-    motions = new_rigid_motions(machine%coordinates%freedoms, &
-                                new_element_coordinates(machine%elements, machine%coordinates), machine%elastic())
-    allocate (couplings, source=coupling_elements(machine))
-    allocate (body(0), coefficient(0))
-    allocate (first(size(couplings) + 1), source=1)
-    do i = 1, size(couplings)
-      associate (rows => machine%elements%rows)
-        do k = rows%first(couplings(i) + 1) - 1, rows%first(couplings(i)), -1
-          if (rows%body(k) == 0) cycle
-          body = [body, rows%body(k)]
-          coefficient = [coefficient, rows%coefficient(k)]
-        end do
-      end associate
-      first(i + 1) = size(body) + 1
-    end do
-    norm = new_error_measures(couplings, first, body, spread(coefficient, 1, machine%lanes), &
-                              machine%coordinates%body(motions%free), machine%bodies, self%states, without_bands=.true.)
-    call self%set_norm(norm)
+    associate (machine => self%machine, n => self%machine%bodies)
+      call self%allocate_state([(b, b=1, n)], mechanical, with_energy_balance)
+      allocate (self%slope(self%lanes, self%states + self%quadratures), source=0.0_wp)
+      allocate (self%status(self%lanes), source=evaluation_ok)
+      allocate (self%mobility(n, n, self%lanes), self%by_angle(n, n), self%by_speed(n, n), self%by_time(n), self%by_state(n))
+      do l = 1, self%lanes
+        self%mobility(:, :, l) = machine%coordinates%mobility(l)
+      end do
+      allocate (self%zero_twist(self%lanes, machine%elements%count), source=0.0_wp)
+      ! the measures of errors: every state is one body's
+      motions = new_rigid_motions(machine%coordinates%freedoms, &
+                                  new_element_coordinates(machine%elements, machine%coordinates), machine%elastic())
+      allocate (couplings, source=coupling_elements(machine))
+      allocate (body(0), coefficient(0))
+      allocate (first(size(couplings) + 1), source=1)
+      do i = 1, size(couplings)
+        associate (rows => machine%elements%rows)
+          do k = rows%first(couplings(i) + 1) - 1, rows%first(couplings(i)), -1
+            if (rows%body(k) == 0) cycle
+            body = [body, rows%body(k)]
+            coefficient = [coefficient, rows%coefficient(k)]
+          end do
+        end associate
+        first(i + 1) = size(body) + 1
+      end do
+      norm = new_error_measures(couplings, first, body, spread(coefficient, 1, machine%lanes), &
+                                machine%coordinates%body(motions%free), machine%bodies, self%states, without_bands=.true.)
+      call self%set_norm(norm)
+    end associate
     call self%prepare_joints()
-  end subroutine set_machine
+  end subroutine set_bodies
 
   !> Start speeds, angles and internal states; further mechanical states and the work integrals are zero.
   function start_of_bodies(self) result(y)
@@ -110,15 +110,14 @@ contains
   end subroutine set_state
 
   !> Evaluates the right-hand side at a state and keeps it in `slope`.
-  subroutine observe_bodies(self, t, y)
+  subroutine observe_bodies(self, t, y, in_motion)
     class(body_formulation_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
     real(wp), contiguous, intent(in) :: y(:, :)   !! state, [lanes, states], at least
+    logical, intent(in), optional :: in_motion    !! as in `observe_elements`
 
     if (self%joints%count > 0) then
-      call observe_with_joints(self, t, y)
-      self%near(:, :) = y(:, :self%states)
-      if (self%projects) call self%project(t(1), self%near(1, :))
+      call observe_with_joints(self, t, y, in_motion)
       call self%derivative(t, self%near, self%slope, self%status)
       call self%machine%elements%scatter(self%torque)
       return
@@ -162,19 +161,9 @@ contains
     real(wp), contiguous, intent(inout) :: dfdy(:, :)                             !! [lanes, positions]
     real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)   !! derivative by the time
     integer, intent(inout) :: status(self%lanes)
+    integer :: b, e, l, n
 
-    call fill_of_bodies(self, t, y, size(dfdt, 2), dfdy, dfdt)
-  end subroutine jacobian_of_bodies
-
-  !> The Jacobian as a dense array, as `jacobian_pattern` names all positions.
-  subroutine fill_of_bodies(self, t, y, components, dfdy, dfdt)
-    class(body_formulation_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)                               !! [s], [lanes]
-    real(wp), contiguous, intent(in) :: y(:, :)                            !! state, [lanes, states], at least
-    integer, intent(in) :: components                                      !! states + quadratures
-    real(wp), intent(inout) :: dfdy(self%lanes, components, self%states)   !! derivative by the states
-    real(wp), intent(inout) :: dfdt(self%lanes, components)                !! derivative by the time
-    integer :: b, l, n
+    ! the Jacobian as a dense array, as `jacobian_pattern` names all positions
 
     n = self%machine%bodies
     call self%gather(y)
@@ -187,7 +176,24 @@ contains
       call self%differentiate_rows(self%acceleration)
     end if
     do l = 1, self%lanes
-      call differentiate_torques(self, l)
+      ! derivatives of the torques T of one lane, from those of the elements
+      self%by_angle(:, :) = 0.0_wp
+      self%by_speed(:, :) = 0.0_wp
+      self%by_time(:) = 0.0_wp
+      associate (elements => self%machine%elements)
+        call elements%rows%add_coefficients(-1.0_wp, elements%restoring_angle(l, :), self%by_angle)
+        call elements%rows%add_coefficients(-1.0_wp, elements%applied_angle(l, :), self%by_angle)
+        call elements%rows%add_coefficients(-1.0_wp, elements%applied_speed(l, :), self%by_speed)
+        do e = 1, elements%cross%count
+          associate (x => elements%cross, rows => elements%rows)
+            call rows%add_product(x%element(e), x%by(e), x%restoring_angle(l, e) + x%applied_angle(l, e), self%by_angle)
+            call rows%add_product(x%element(e), x%by(e), x%applied_speed(l, e), self%by_speed)
+          end associate
+        end do
+        do e = 1, elements%count
+          call elements%rows%add_moment(e, elements%applied_time(l, e), self%by_time)
+        end do
+      end associate
       do b = 1, n
         call multiply(self%mobility(:, :, l), self%by_speed(:, b), dfdy(l, :n, b))
         call multiply(self%mobility(:, :, l), self%by_angle(:, b), dfdy(l, :n, n + b))
@@ -198,33 +204,8 @@ contains
       call differentiate_internal(self, l, dfdy(l, :, :))
       dfdt(l, self%mechanical + 1:self%states) = self%machine%elements%internal%rate_time(l, :)
     end do
-    if (self%joints%count > 0) call self%hold_columns(components, dfdy(1, :, :), dfdt(1, :))
-  end subroutine fill_of_bodies
-
-  !> Derivatives of the torques T of one lane, from those of the elements.
-  subroutine differentiate_torques(self, lane)
-    class(body_formulation_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    integer :: e
-
-    self%by_angle(:, :) = 0.0_wp
-    self%by_speed(:, :) = 0.0_wp
-    self%by_time(:) = 0.0_wp
-    associate (elements => self%machine%elements)
-      call elements%rows%add_coefficients(-1.0_wp, elements%restoring_angle(lane, :), self%by_angle)
-      call elements%rows%add_coefficients(-1.0_wp, elements%applied_angle(lane, :), self%by_angle)
-      call elements%rows%add_coefficients(-1.0_wp, elements%applied_speed(lane, :), self%by_speed)
-      do e = 1, elements%cross%count
-        associate (x => elements%cross, rows => elements%rows)
-          call rows%add_product(x%element(e), x%by(e), x%restoring_angle(lane, e) + x%applied_angle(lane, e), self%by_angle)
-          call rows%add_product(x%element(e), x%by(e), x%applied_speed(lane, e), self%by_speed)
-        end associate
-      end do
-      do e = 1, elements%count
-        call elements%rows%add_moment(e, elements%applied_time(lane, e), self%by_time)
-      end do
-    end associate
-  end subroutine differentiate_torques
+    if (self%joints%count > 0) call self%hold_columns(size(dfdt, 2), dfdy(1, :, :), dfdt(1, :))
+  end subroutine jacobian_of_bodies
 
   !> The rows of the work integrals of one lane. The power is M u' with the applied torque M and the relative speed u'.
   subroutine differentiate_powers(self, lane, dfdy, dfdt)

@@ -23,9 +23,24 @@ module nocdyn_coordinate_formulation
     type(moving_origin_t), private :: origin
     real(wp), allocatable, private, dimension(:, :) :: switch_angle, switch_speed   !! their motion, [lanes, elements]
   contains
-    procedure :: set_coordinates, list_coordinates, start, project_start_speeds, set_state, gather, find_far
-    procedure :: shift_state, move_origin, restore_state, reset_origin, angle_at_zero, twist_at_zero
-    procedure :: switch_motion, accelerate, element_rate, push_element, block_indicators, reactions
+    procedure :: set_coordinates
+    procedure :: list_coordinates
+    procedure :: start
+    procedure :: project_start_speeds
+    procedure :: set_state
+    procedure :: gather
+    procedure :: find_far
+    procedure :: shift_state
+    procedure :: restore_state
+    procedure :: reset_origin
+    procedure :: angle_at_zero
+    procedure :: twist_at_zero
+    procedure :: switch_motion
+    procedure :: accelerate
+    procedure :: element_rate
+    procedure :: push_element
+    procedure :: block_indicators
+    procedure :: reactions
   end type coordinate_formulation_t
 
 contains
@@ -160,21 +175,11 @@ contains
       shift(:) = 0.0_wp
       call self%origin%find_shift(lane, y(lane, first:last), shift(first:last))
       y(lane, first:last) = y(lane, first:last) - shift(first:last)
-    end associate
-    call self%move_origin(lane, shift)
-  end subroutine shift_state
-
-  subroutine move_origin(self, lane, shift)
-    class(coordinate_formulation_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: shift(:)   !! [states], at least
-
-    associate (f => self%machine%coordinates%freedoms)
-      call self%origin%move(lane, shift(f + 1:2 * f))
+      call self%origin%move(lane, shift(first:last))
     end associate
     self%twist_at_origin(lane, :) = self%zero_twist(lane, :)
     call self%origin%move_twists(lane, self%incidence, self%twist_at_origin)
-  end subroutine move_origin
+  end subroutine shift_state
 
   subroutine restore_state(self, lane, y)
     class(coordinate_formulation_t), intent(inout) :: self

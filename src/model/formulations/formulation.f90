@@ -28,22 +28,39 @@ module nocdyn_formulation
     real(wp), allocatable, private :: lane_state(:)   !! the state of one lane, work space, [states]
     real(wp), allocatable :: torque(:, :)    !! torques of the elements on the bodies [N m] after `observe`, [lanes, 0:bodies]
   contains
+    procedure(formulate_interface), deferred :: formulate
     procedure(start_interface), deferred :: start
     procedure(set_state_interface), deferred :: set_state
     procedure(reactions_interface), deferred :: reactions
     procedure(motion_interface), deferred :: switch_motion
-    procedure :: allocate_state, set_norm, gather, move_origin, reset_origin, angle_at_zero, twist_at_zero
-    procedure :: component_name, measure, measure_name
+    procedure :: allocate_state
+    procedure :: set_norm
+    procedure :: gather
+    procedure :: reset_origin
+    procedure :: angle_at_zero
+    procedure :: twist_at_zero
+    procedure :: component_name
+    procedure :: measure
+    procedure :: measure_name
     procedure :: observe => observe_elements
     procedure :: refresh_lane
     procedure :: start_lane => start_branches
-    procedure :: limit_steps, fastest_wave, indicator_values
+    procedure :: limit_steps
+    procedure :: fastest_wave
+    procedure :: indicator_values
     procedure :: set_indicator => indicate_branch
     procedure :: change_branch => change_to_branch
     procedure :: switch_name
   end type formulation_t
 
   abstract interface
+
+    !> Forms the equations of `machine`, after any change of its structure.
+    subroutine formulate_interface(self, with_energy_balance)
+      import :: formulation_t
+      class(formulation_t), intent(inout) :: self
+      logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
+    end subroutine formulate_interface
 
     !> The start state of the machine, [lanes, states + quadratures].
     function start_interface(self) result(y)
@@ -128,11 +145,12 @@ contains
 
   !> Evaluates bodies, elements and torques at a state, so that they and the reactions can be read.
   !>
-  !> The branches of the laws are chosen by the state. So the formulation must be another one than that of the integrator.
-  subroutine observe_elements(self, t, y)
+  !> The branches of the laws are chosen by the state: `keep_branches` of the machine keeps those of an integration.
+  subroutine observe_elements(self, t, y, in_motion)
     class(formulation_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
-    real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states], at least
+    real(wp), contiguous, intent(in) :: t(:)          !! [s], [lanes]
+    real(wp), contiguous, intent(in) :: y(:, :)       !! [lanes, states], at least
+    logical, intent(in), optional :: in_motion        !! whether joints keep their modes; absent or false: by the state
 
     call self%gather(y)
     if (self%switches > 0) call self%machine%choose_branches(t)
@@ -148,13 +166,6 @@ contains
     call self%set_state(y)
     call self%machine%elements%gather(self%phi, self%omega)
   end subroutine gather
-
-  !> Takes a shift of the state (`shift_state`) that another copy of this formulation has made. By default there are none.
-  subroutine move_origin(self, lane, shift)
-    class(formulation_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: shift(:)   !! [states], at least
-  end subroutine move_origin
 
   !> Forgets the shifts of a lane, before it starts. By default there are none.
   subroutine reset_origin(self, lane)

@@ -27,28 +27,28 @@ module nocdyn_joint_formulation
 contains
 
   !> Evaluates bodies, elements and torques at a state, as `observe` of `formulation_t`.
-  subroutine observe_with_joints(self, t, y)
+  subroutine observe_with_joints(self, t, y, in_motion)
     class(joint_formulation_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
     real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states], at least
-    real(wp) :: moved(self%states), near(self%states)
+    logical, intent(in), optional :: in_motion    !! as in `observe_elements`
+    logical :: by_modes
 
-    if (self%joints%count == 0) then
+    by_modes = .false.
+    if (present(in_motion)) by_modes = in_motion
+    if (self%joints%count > 0) then
+      ! evaluates the elements where some joints may be locked, in a block of one lane
+      self%joint_state(1, :) = y(1, :self%states)
+      call self%gather(self%joint_state)
+      call self%machine%choose_branches([t(1)])
+      self%near(:) = y(1, :self%states)
+      if (self%joints%motions%count > 0) call self%project(t(1), self%near)
+      if (.not. by_modes) call start_joints(self, t(1), self%near)
+      call self%find_held_moments(t(1), self%near)
+      call self%machine%elements%scatter(self%torque)
+    else
       call observe_elements(self, t, y)
-      return
     end if
-    near = y(1, :self%states)
-    if (associated(self%joints%leader)) call self%joints%follow(self%machine%banks)
-    self%joint_state(1, :) = near
-    call self%gather(self%joint_state)
-    call self%machine%choose_branches(t)
-    if (self%joints%motions%count > 0) call self%project(t(1), near)
-    if (.not. associated(self%joints%leader)) then
-      moved = near
-      call self%settle_joints(by_state, t(1), moved)
-    end if
-    call self%find_held_moments(t(1), near)
-    call self%machine%elements%scatter(self%torque)
   end subroutine observe_with_joints
 
   !> Prepares a lane that starts at time t and state y.
@@ -57,14 +57,21 @@ contains
     integer, intent(in) :: lane
     real(wp), intent(in) :: t                  !! [s]
     real(wp), contiguous, intent(in) :: y(:)   !! state, [states + quadratures]
-    real(wp) :: moved(size(y))
 
     call start_branches(self, lane, t, y)
-    if (self%joints%count > 0) then
-      moved = y
-      call self%settle_joints(by_state, t, moved)
-    end if
+    if (self%joints%count > 0) call start_joints(self, t, y)
   end subroutine start_with_joints
+
+  !> Decides which joints are locked at the start.
+  subroutine start_joints(self, t, y)
+    class(joint_formulation_t), intent(inout) :: self
+    real(wp), intent(in) :: t      !! [s]
+    real(wp), intent(in) :: y(:)   !! [states] at least
+    real(wp) :: moved(size(y))
+
+    moved = y
+    call self%settle_joints(by_state, t, moved)
+  end subroutine start_joints
 
   !> Indicators of all switches of one lane. The moments of locked joints are found once.
   subroutine indicate_all(self, lane, t, y, g)
@@ -137,19 +144,26 @@ contains
     integer, intent(in) :: which                  !! switch, 1 to `switches`
     real(wp), intent(in) :: t                     !! [s]
     real(wp), contiguous, intent(inout) :: y(:)   !! state, [states + quadratures]
-    integer :: joint
 
     if (self%joints%joint_of(which) > 0) then
       call settle_at_event(self, self%joints%joint_of(which), t, y)
     else
       call choose_branch(self, lane, which, t, y)
-      ! joints are decided anew where the engagement of one changes that others hold at rest
-      joint = findloc(self%joints%element, self%machine%switches%element(which), dim=1)
-      if (joint == 0) return
-      if (self%joints%mode(joint) == locked) return
-      if (abs(self%joint_rate(joint, y)) <= rest_width * speed_scale(self, y)) call settle_at_event(self, joint, t, y)
+      call engage_at_rest(self, findloc(self%joints%element, self%machine%switches%element(which), dim=1), t, y)
     end if
   end subroutine change_with_joints
+
+  !> Decides anew which joints are locked where the engagement of one changes that others hold at rest.
+  subroutine engage_at_rest(self, joint, t, y)
+    class(joint_formulation_t), intent(inout) :: self
+    integer, intent(in) :: joint                  !! one of them; nothing happens if it is 0
+    real(wp), intent(in) :: t                     !! [s]
+    real(wp), contiguous, intent(inout) :: y(:)   !! state, [states + quadratures]
+
+    if (joint == 0) return
+    if (self%joints%mode(joint) == locked) return
+    if (abs(self%joint_rate(joint, y)) <= rest_width * speed_scale(self, y)) call settle_at_event(self, joint, t, y)
+  end subroutine engage_at_rest
 
   !> The speed by which slips that are none are measured [rad/s].
   pure real(wp) function speed_scale(self, y)
@@ -220,15 +234,17 @@ contains
       if (has_stopped) then
         ! The state after a joint has stopped, in which those at rest have no slip left, so that no acceleration comes from one.
         ! Others are at rest as well that they now hold there: of joints that stop at one time, the first one stops them all.
-        call self%hold(joints%motions%speed, resting(:size(self%moving)))
-        is_changed = .false.
-        do j = 1, joints%locking
-          if (is_at_rest(j) .or. abs(slip(j)) > near * tolerance) cycle
-          slip(j) = self%joint_rate(j, resting)
-          is_at_rest(j) = abs(slip(j)) <= tolerance
-          is_changed = is_changed .or. is_at_rest(j)
-        end do
-        if (is_changed) call joints%assume(self%machine%banks, is_at_rest, slip)
+        associate (joints => self%joints)
+          call self%hold(joints%motions%speed, resting(:size(self%moving)))
+          is_changed = .false.
+          do j = 1, joints%locking
+            if (is_at_rest(j) .or. abs(slip(j)) > near * tolerance) cycle
+            slip(j) = self%joint_rate(j, resting)
+            is_at_rest(j) = abs(slip(j)) <= tolerance
+            is_changed = is_changed .or. is_at_rest(j)
+          end do
+          if (is_changed) call joints%assume(self%machine%banks, is_at_rest, slip)
+        end associate
       end if
       call self%find_held_moments(t, resting(:self%states))
       call self%clean_rates()

@@ -4,11 +4,8 @@ module nocdyn_multiplier
   use nocdyn_body_formulation, only: body_formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
-  use nocdyn_machine, only: machine_t
   implicit none (type, external)
   private
-
-  public :: new_multiplier
 
   !> A machine in the multiplier formulation, with the factors of its constant matrix.
   type, extends(body_formulation_t), public :: multiplier_t
@@ -17,36 +14,39 @@ module nocdyn_multiplier
     integer, allocatable :: pivots(:, :)        !! of the LU factors, [n + kept, lanes]
     real(wp), allocatable :: solution(:, :)     !! omega' [rad/s2] and lambda of the kept rows, [n + kept, lanes]
   contains
-    procedure :: derivative, reactions
+    procedure :: formulate
+    procedure :: derivative
+    procedure :: reactions
   end type multiplier_t
 
 contains
 
-  !> The formulation of a machine. Its constant matrix is factored here.
-  function new_multiplier(machine, with_energy_balance) result(self)
-    type(machine_t), intent(in) :: machine
-    logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
-    type(multiplier_t) :: self
+  !> Factors the constant matrix.
+  subroutine formulate(self, with_energy_balance)
+    class(multiplier_t), intent(inout) :: self
+    logical, intent(in) :: with_energy_balance   !! as in `formulation_t`
     integer :: b, g, l, order
     logical :: is_singular
 
-    call self%set_machine('multiplier', machine, 2 * machine%bodies, with_energy_balance)
-    self%kept = [(machine%groups(g)%kept, g=1, size(machine%groups))]
-    order = machine%bodies + size(self%kept)
-    allocate (self%factors(order, order, machine%lanes), source=0.0_wp)
-    allocate (self%pivots(order, machine%lanes), self%solution(order, machine%lanes))
-    do l = 1, machine%lanes
-      do b = 1, machine%bodies
-        self%factors(b, b, l) = machine%inertia(l, b)
+    call self%set_bodies('multiplier', 2 * self%machine%bodies, with_energy_balance)
+    associate (machine => self%machine, n => self%machine%bodies)
+      self%kept = [(machine%groups(g)%kept, g=1, size(machine%groups))]
+      order = n + size(self%kept)
+      allocate (self%factors(order, order, machine%lanes), source=0.0_wp)
+      allocate (self%pivots(order, machine%lanes), self%solution(order, machine%lanes))
+      do l = 1, machine%lanes
+        do b = 1, n
+          self%factors(b, b, l) = machine%inertia(l, b)
+        end do
+        associate (constraint => machine%constraints%block(l, self%kept, [(b, b=1, n)]))
+          self%factors(n + 1:, :n, l) = constraint
+          self%factors(:n, n + 1:, l) = -transpose(constraint)
+        end associate
+        call lu_factor(self%factors(:, :, l), self%pivots(:, l), is_singular)
+        if (is_singular) self%factors(:, :, l) = ieee_value(1.0_wp, ieee_quiet_nan)   ! by rounding: it does not start
       end do
-      associate (constraint => machine%constraints%block(l, self%kept, [(b, b=1, machine%bodies)]))
-        self%factors(machine%bodies + 1:, :machine%bodies, l) = constraint
-        self%factors(:machine%bodies, machine%bodies + 1:, l) = -transpose(constraint)
-      end associate
-      call lu_factor(self%factors(:, :, l), self%pivots(:, l), is_singular)
-      if (is_singular) self%factors(:, :, l) = ieee_value(1.0_wp, ieee_quiet_nan)   ! by rounding: the integration does not start
-    end do
-  end function new_multiplier
+    end associate
+  end subroutine formulate
 
   !> Solves for omega' and the multipliers.
   subroutine derivative(self, t, y, dydt, status)

@@ -11,8 +11,6 @@ module nocdyn_paper
   implicit none (type, external)
   private
 
-  public :: new_paper
-
   !> A machine in the paper's formulation, with the factors of J_3.
   type, extends(body_formulation_t), public :: paper_t
     real(wp), allocatable, private :: complement(:, :, :)      !! L_tau, [n, freedoms, lanes]
@@ -23,43 +21,47 @@ module nocdyn_paper
     real(wp), allocatable, private :: term(:)                  !! moments on the bodies [N m], [n], work space
     type(paper_matrices_t), private :: work
   contains
-    procedure :: derivative, jacobian, start, observe, reactions
+    procedure :: formulate
+    procedure :: derivative
+    procedure :: jacobian
+    procedure :: start
+    procedure :: observe
+    procedure :: reactions
   end type paper_t
 
 contains
 
-  !> The formulation of a machine. J_3 is assembled and factored here.
-  function new_paper(machine, with_energy_balance) result(self)
-    type(machine_t), intent(in) :: machine
-    logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
-    type(paper_t) :: self
+  !> Assembles and factors J_3.
+  subroutine formulate(self, with_energy_balance)
+    class(paper_t), intent(inout) :: self
+    logical, intent(in) :: with_energy_balance   !! as in `formulation_t`
     type(inertia_matrices_t) :: inertia
     real(wp), allocatable :: incidence(:, :)   ! moments on the bodies from those of the couplings
     integer :: l, n
     logical :: is_singular
 
-    n = machine%bodies
-    call self%set_machine('paper', machine, 3 * n, with_energy_balance)
+    n = self%machine%bodies
+    call self%set_bodies('paper', 3 * n, with_energy_balance)
     self%work = new_paper_matrices(n)
     allocate (self%term(n), source=0.0_wp)
-    allocate (self%complement(n, machine%coordinates%freedoms, machine%lanes))
-    allocate (self%factors(3 * n, 3 * n, machine%lanes), self%pivots(3 * n, machine%lanes))
-    do l = 1, machine%lanes
-      self%complement(:, :, l) = machine%coordinates%complement(l)
-      call inertia%assemble(machine, l, self%complement(:, :, l))
+    allocate (self%complement(n, self%machine%coordinates%freedoms, self%machine%lanes))
+    allocate (self%factors(3 * n, 3 * n, self%machine%lanes), self%pivots(3 * n, self%machine%lanes))
+    do l = 1, self%machine%lanes
+      self%complement(:, :, l) = self%machine%coordinates%complement(l)
+      call inertia%assemble(self%machine, l, self%complement(:, :, l))
       self%factors(:, :, l) = inertia%inertia_3
       call lu_factor(self%factors(:, :, l), self%pivots(:, l), is_singular)
       if (is_singular) self%factors(:, :, l) = ieee_value(1.0_wp, ieee_quiet_nan)   ! by rounding: the integration does not start
     end do
-    allocate (self%couplings, source=coupling_elements(machine))
+    allocate (self%couplings, source=coupling_elements(self%machine))
     allocate (incidence(n, size(self%couplings)), source=0.0_wp)
     do l = 1, size(self%couplings)
-      associate (elements => machine%elements, e => self%couplings(l))
+      associate (elements => self%machine%elements, e => self%couplings(l))
         call elements%rows%add_moment(e, 1.0_wp, incidence(:, l))
       end associate
     end do
     self%moment_of_bodies = pseudo_inverse(incidence, 1.0e-10_wp)
-  end function new_paper
+  end subroutine formulate
 
   !> beta at the start. F are the elastic moments at the start angles, eqs. (48)-(51).
   function start(self) result(y)
@@ -119,18 +121,10 @@ contains
     real(wp), contiguous, intent(inout) :: dfdy(:, :)                             !! [lanes, positions]
     real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)   !! derivative by the time
     integer, intent(inout) :: status(self%lanes)
-
-    call jacobian_of_bodies(self, t, y, dfdy, dfdt, status)
-    call fill_moment_rows(self, size(dfdt, 2), dfdy)
-  end subroutine jacobian
-
-  !> The derivatives of F' = K_4 omega by omega and phi.
-  subroutine fill_moment_rows(self, components, dfdy)
-    type(paper_t), intent(inout) :: self
-    integer, intent(in) :: components                                      !! states + quadratures
-    real(wp), intent(inout) :: dfdy(self%lanes, components, self%states)   !! derivative by the states
     integer :: e, l, n
 
+    call jacobian_of_bodies(self, t, y, dfdy, dfdt, status)
+    ! the derivatives of F' = K_4 omega by omega and phi
     n = self%machine%bodies
     associate (elements => self%machine%elements)
       do l = 1, self%lanes
@@ -152,20 +146,21 @@ contains
         dfdy(l, 2 * n + 1:3 * n, n + 1:2 * n) = self%work%tangent
       end do
     end associate
-  end subroutine fill_moment_rows
+  end subroutine jacobian
 
   !> Evaluates the machine at a state, with the moments of the couplings from the states F.
   !>
   !> Where the couplings form no loop, F determines their moments. Elsewhere the moments are those nearest to the laws' among all
   !> that add up to F on the bodies.
-  subroutine observe(self, t, y)
+  subroutine observe(self, t, y, in_motion)
     class(paper_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
     real(wp), contiguous, intent(in) :: y(:, :)   !! state, [lanes, states], at least
+    logical, intent(in), optional :: in_motion    !! as in `observe_elements`
     integer :: b, i, l, n
 
     n = self%machine%bodies
-    call observe_bodies(self, t, y)
+    call observe_bodies(self, t, y, in_motion)
     do l = 1, self%lanes
       call elastic_moments(self%machine, l, self%term)
       do i = 1, size(self%couplings)

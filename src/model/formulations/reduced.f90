@@ -42,17 +42,16 @@ contains
     type(reduced_t) :: self
 
     self%machine = machine
-    call self%formulate(with_energy_balance, as_block)
+    if (present(as_block)) self%is_block = as_block
+    call self%formulate(with_energy_balance)
   end function new_reduced
 
-  !> Forms the equations of `machine`, after any change of its structure.
-  subroutine formulate(self, with_energy_balance, as_block)
+  !> Forms the equations of `machine`, after any change of its structure; laid out as a block if `is_block`, or of many lanes.
+  subroutine formulate(self, with_energy_balance)
     class(reduced_t), intent(inout) :: self
     logical, intent(in) :: with_energy_balance   !! as in `new_reduced`
-    logical, intent(in), optional :: as_block    !! as in `new_reduced`
 
-    self%is_block = self%machine%lanes > 1
-    if (present(as_block)) self%is_block = self%is_block .or. as_block
+    self%is_block = self%is_block .or. self%machine%lanes > 1
     call self%set_coordinates(with_energy_balance, self%is_block)
     associate (machine => self%machine, incidence => self%incidence, freedoms => self%machine%coordinates%freedoms)
       call form_responses(freedoms, self%is_block, self)
@@ -255,26 +254,18 @@ contains
         e = machine%with_work(k)
         dfdt(:, self%states + k) = elements%applied_time(:, e) * elements%speed(:, e)
       end do
-      if (self%joints%count > 0) call hold_jacobian(self, self%states + self%quadratures, dfdy, dfdt)
+      if (self%joints%count > 0) then
+        ! the Jacobian where joints hold: each column has the accelerations that these leave
+        dfdy = 0.0_wp
+        associate (pattern => self%element_jacobian%pattern, f => self%machine%coordinates%freedoms)
+          do k = 1, size(pattern%row)
+            dfdy(pattern%row(k), pattern%column(k)) = self%free_jacobian(1, k)
+          end do
+          call self%hold_columns(self%states + self%quadratures, dfdy, dfdt)
+        end associate
+      end if
     end associate
   end subroutine jacobian
-
-  !> The Jacobian where joints hold: each column has the accelerations that these leave.
-  subroutine hold_jacobian(self, components, dfdy, dfdt)
-    class(reduced_t), intent(inout) :: self
-    integer, intent(in) :: components                          !! states + quadratures
-    real(wp), intent(inout) :: dfdy(components, self%states)   !! of the only lane
-    real(wp), intent(inout) :: dfdt(components)
-    integer :: k
-
-    dfdy = 0.0_wp
-    associate (pattern => self%element_jacobian%pattern, f => self%machine%coordinates%freedoms)
-      do k = 1, size(pattern%row)
-        dfdy(pattern%row(k), pattern%column(k)) = self%free_jacobian(1, k)
-      end do
-      call self%hold_columns(self%states + self%quadratures, dfdy, dfdt)
-    end associate
-  end subroutine hold_jacobian
 
   !> All positions where there are joints.
   function jacobian_pattern(self) result(pattern)

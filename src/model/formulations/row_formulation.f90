@@ -8,7 +8,7 @@
 module nocdyn_row_formulation
   use nocdyn_formulation, only: formulation_t
   use nocdyn_friction_joints, only: locked
-  use nocdyn_joint_sets, only: joint_sets_t, new_joint_sets
+  use nocdyn_joint_sets, only: new_joint_sets
   use nocdyn_kinds, only: wp
   use nocdyn_row_obstacles, only: describe_obstacle
   use nocdyn_system, only: evaluation_fatal
@@ -17,17 +17,33 @@ module nocdyn_row_formulation
 
   type, abstract, extends(formulation_t), public :: row_formulation_t
     real(wp), allocatable :: acceleration(:)    !! of the first states, work space, [moving]
+    real(wp), allocatable, private :: unit(:)   !! a speed or position that changes, work space, [moving]
+    real(wp), allocatable, private :: rates(:)  !! of all elements with it, work space, [elements]
+    real(wp), allocatable :: near(:)            !! a state that is observed, back on the rows that move; work space, [states]
     real(wp), allocatable :: joint_state(:, :)  !! work space, [1, states]
     integer, allocatable, private :: work_of(:) !! work integral of each joint whose moment does work, 0 of others, [joints]
   contains
     procedure(accelerate_interface), deferred :: accelerate
     procedure(rate_interface), deferred :: element_rate
     procedure(push_interface), deferred :: push_element
-    procedure :: prepare_joints, joint_rate, push, move_rows, hold, find_accelerations
+    procedure :: prepare_joints
+    procedure :: joint_rate
+    procedure :: push
+    procedure :: move_rows
+    procedure :: hold
+    procedure :: find_accelerations
     procedure, private :: hold_accelerations
-    procedure :: find_held_moments, clean_rates, add_powers, differentiate_rows, hold_derivative, hold_columns
-    procedure, private :: hold_column, drag_derivative
-    procedure :: project, project_state, evaluation_obstacle
+    procedure :: find_held_moments
+    procedure :: clean_rates
+    procedure :: add_powers
+    procedure :: differentiate_rows
+    procedure :: hold_derivative
+    procedure :: hold_columns
+    procedure, private :: hold_column
+    procedure, private :: differentiate_drags
+    procedure :: project
+    procedure :: project_state
+    procedure :: evaluation_obstacle
   end type row_formulation_t
 
   abstract interface
@@ -91,17 +107,17 @@ contains
   subroutine prepare_joints(self)
     class(row_formulation_t), intent(inout) :: self
     real(wp) :: twist(self%lanes, self%machine%elements%count)
-    type(joint_sets_t), pointer :: leader
     integer, allocatable :: elements(:)
     integer :: i, j
 
-    leader => self%joints%leader
     self%joints = new_joint_sets(self%machine%banks, self%machine%switches, self%machine%elements%count)
-    self%joints%leader => leader
     self%projects = self%joints%motions%count > 0
     self%follows_waves = self%joints%count > 0
     if (self%joints%count == 0) return
     self%acceleration = spread(0.0_wp, 1, size(self%moving))
+    self%unit = self%acceleration
+    self%rates = spread(0.0_wp, 1, self%machine%elements%count)
+    self%near = spread(0.0_wp, 1, self%states)
     self%joint_state = reshape(spread(0.0_wp, 1, self%states), [1, self%states])
     self%work_of = [(merge(findloc(self%machine%with_work, self%joints%element(j), dim=1), 0, &
                            self%joints%driver(j) == 0 .and. (j > self%joints%locking .or. self%joints%has_teeth(j)) &
@@ -159,7 +175,7 @@ contains
       else
         call teeth%apply(elements)
         call teeth%choose_shares(self%machine%banks, joints%mode, elements%speed(1, :))
-        call self%hold(joints%motions%acceleration, acceleration, teeth%drag())
+        call self%hold(joints%motions%acceleration, acceleration, teeth%drag)
         call teeth%add_moments(joints%moment)
       end if
     end associate
@@ -297,10 +313,10 @@ contains
     integer, intent(in) :: column                !! state; 0: derivatives by the time
     real(wp), intent(inout) :: accelerations(:)  !! derivatives of those of the first states without joints that hold, [moving]
     real(wp), intent(inout) :: powers(:)         !! derivatives of those of the elements with work at these moments, [quadratures]
-    real(wp) :: demand(self%joints%motions%count), unit(size(self%moving))
     integer :: i
 
-    associate (motions => self%joints%motions, n => size(self%moving), speed => self%machine%elements%speed)
+    associate (motions => self%joints%motions, n => size(self%moving), speed => self%machine%elements%speed, unit => self%unit, &
+               demand => self%joints%motions%demand)
       unit = 0.0_wp
       if (column > 0 .and. column <= 2 * n) unit(1 + modulo(column - 1, n)) = 1.0_wp
       do i = 1, motions%count
@@ -312,7 +328,8 @@ contains
         demand(i) = demand(i) * self%element_rate(motions%driver(i), unit)
       end do
       if (self%joints%teeth%count > 0) then
-        call self%hold(demand, accelerations, self%drag_derivative(column, unit))
+        call self%differentiate_drags(column)
+        call self%hold(demand, accelerations, self%joints%teeth%drag)
       else
         call self%hold(demand, accelerations)
       end if
@@ -320,17 +337,17 @@ contains
     end associate
   end subroutine hold_column
 
-  !> The derivatives of the drags of teeth without the effect of the joints that hold, by a state or the time.
-  function drag_derivative(self, column, unit) result(drag)
-    class(row_formulation_t), intent(in) :: self
-    integer, intent(in) :: column       !! as in `hold_column`
-    real(wp), intent(in) :: unit(:)     !! the speed or the position that changes, [moving]
-    real(wp) :: drag(self%joints%teeth%count)
-    real(wp), dimension(self%machine%elements%count) :: rates, slope
+  !> Replaces the drags of teeth by their derivatives by a state or the time.
+  subroutine differentiate_drags(self, column)
+    class(row_formulation_t), intent(inout) :: self
+    integer, intent(in) :: column   !! as in `hold_column`, whose `unit` is the speed or the position that changes
     integer :: e
 
-    associate (elements => self%machine%elements, teeth => self%joints%teeth, n => size(self%moving))
-      rates = [(self%element_rate(e, unit), e=1, elements%count)]
+    associate (elements => self%machine%elements, teeth => self%joints%teeth, n => size(self%moving), rates => self%rates, &
+               slope => self%joints%teeth%moment)
+      do e = 1, elements%count
+        rates(e) = self%element_rate(e, self%unit)
+      end do
       slope = 0.0_wp
       if (column == 0) then
         slope = elements%applied_time(1, :)
@@ -347,10 +364,13 @@ contains
           if (column > n) moved = moved + (x%restoring_angle(1, e) + x%applied_angle(1, e)) * by
         end associate
       end do
-      drag = teeth%share * teeth%torques_of(slope)
-      if (column > 0 .and. column <= n) drag = drag + teeth%share_slope * teeth%load * rates(self%joints%element(teeth%joint))
+      teeth%drag(:) = matmul(teeth%by_moment, slope)
+      teeth%drag(:) = teeth%share * teeth%drag
+      do e = 1, merge(teeth%count, 0, column > 0 .and. column <= n)
+        teeth%drag(e) = teeth%drag(e) + teeth%share_slope(e) * teeth%load(e) * rates(self%joints%element(teeth%joint(e)))
+      end do
     end associate
-  end function drag_derivative
+  end subroutine differentiate_drags
 
   !> Puts the state after a step back on the rows that move.
   subroutine project_state(self, lane, t, y)
@@ -371,21 +391,21 @@ contains
     integer, parameter :: most_steps = 8
     real(wp), parameter :: rounding = 4.0_wp * epsilon(1.0_wp), far = 1.0e-9_wp   ! relative to the terms of a row
     integer :: step
-    real(wp) :: terms(self%joints%motions%count)
 
     associate (n => size(self%moving), motions => self%joints%motions, elements => self%machine%elements)
       do step = 1, most_steps
         self%joint_state(1, :) = y(:self%states)
         call self%gather(self%joint_state)
         call self%move_rows(t)
-        terms = motions%size_of_terms(elements%angle(1, :))
-        if (all(abs(motions%position) <= rounding * terms)) exit
+        call motions%size_terms(elements%angle(1, :))
+        if (all(abs(motions%position) <= rounding * motions%terms)) exit
         self%acceleration(:) = 0.0_wp
-        call self%hold(-motions%position, self%acceleration)
+        motions%demand(:) = -motions%position
+        call self%hold(motions%demand, self%acceleration)
         y(n + 1:2 * n) = y(n + 1:2 * n) + self%acceleration
       end do
-      if (any(abs(motions%position) > far * terms)) then
-        self%joints%lost = self%joints%locking + maxloc(abs(motions%position) / terms, dim=1)
+      if (any(abs(motions%position) > far * motions%terms)) then
+        self%joints%lost = self%joints%locking + maxloc(abs(motions%position) / motions%terms, dim=1)
       end if
       call self%hold(motions%speed, y(:n))
     end associate

@@ -2,7 +2,7 @@
 !>
 !> The joints that hold are a *set*; each is one more row u' = 0, or u' - g' v' = 0 where it moves. With the response R of the
 !> accelerations to the moments and W = U R, the moments of the set are -W^+ u'', with the accelerations u'' of its rows without
-!> them: q'' is projected on the complement of the rows that hold. W^+ of each set is found once and kept, unless rows move: then
+!> them: q'' is projected on the complement of the rows that hold. W^+ is found where the set changes, unless rows move: then
 !> W is formed from the slopes g' at each position. W is singular where some of the rows are redundant; the least norm shares the
 !> moment between them.
 !>
@@ -17,13 +17,6 @@ module nocdyn_held_rows
   use nocdyn_tooth_loads, only: tooth_loads_t
   implicit none (type, external)
   private
-
-  !> A set with its W^+.
-  type :: joint_set_t
-    logical, allocatable :: is_locked(:)
-    logical :: is_examined = .false.   ! whether `is_shared` knows it
-    real(wp), allocatable :: inverse(:, :)
-  end type joint_set_t
 
   type, public :: held_rows_t
     integer :: count = 0                     !! joints that lock, and rows that move
@@ -45,10 +38,11 @@ module nocdyn_held_rows
     logical :: is_assumed = .false.          !! whether the modes are for a trial only
     logical, private :: is_examined = .false.   !! whether `is_shared` knows the present modes
     logical, private :: is_known = .false.   !! whether the set is that of the present modes and slopes
-    type(joint_set_t), allocatable, private :: sets(:)   !! without rows that move
-    integer, private :: present = 0          !! one of them
-    type(semidefinite_t), private :: system  !! W of the rows that hold, where some move
-    integer, allocatable, private :: holding(:)   !! joints that hold, the first `system%order` are in use
+    integer, private :: order = 0            !! number of rows that hold
+    integer, allocatable, private :: holding(:)      !! these rows, the first `order` are in use
+    real(wp), allocatable, private :: inverse(:, :)  !! their W^+, the first `order` rows and columns, where none move
+    type(semidefinite_t), private :: system          !! their W, where some move
+    real(wp), allocatable, private :: right(:)       !! right-hand side, work space
     integer, private :: rank_at_start = 0    !! of the rows that move
     ! where there are teeth with losses:
     logical, private :: has_factors = .false.      !! whether they are those of the present modes, slopes and shares
@@ -71,7 +65,6 @@ module nocdyn_held_rows
     procedure, private :: factor_with_teeth
     procedure, private :: watch_rank
     procedure, private :: choose_set
-    procedure, private :: add_set
     procedure, private :: examine
     procedure, private :: unit_weights
   end type held_rows_t
@@ -89,7 +82,7 @@ contains
       allocate (self%rate(n), self%moment(n), self%slope(n), source=0.0_wp)
       allocate (self%weight(n, n), self%mutual(2 * n, 2 * n), source=0.0_wp)
       allocate (self%is_shared(n), source=.false.)
-      allocate (self%sets(0), self%holding(n))
+      allocate (self%holding(n), self%inverse(n, n), self%right(n))
       self%system = new_semidefinite(merge(n, 0, self%motions%count > 0))
       if (self%teeth%count == 0) return
       allocate (self%factors(n, n), self%pivots(n), self%share(self%teeth%count))
@@ -148,7 +141,7 @@ contains
   subroutine find_moments(self, drag)
     class(held_rows_t), intent(inout) :: self
     real(wp), intent(in), optional :: drag(:)   !! s T [N m], [losses]; absent: teeth that turn have no moments
-    integer :: i, j, row, column
+    integer :: column, row
 
     if (present(drag) .and. self%teeth%count > 0) then
       call self%find_moments_with_teeth(drag)
@@ -158,46 +151,42 @@ contains
       call self%find_moving_moments()
       return
     end if
-    if (.not. self%is_known) call self%choose_set()
-    associate (set => self%sets(self%present))
-      self%moment(:) = 0.0_wp
-      column = 0
-      do j = 1, self%count
-        if (.not. set%is_locked(j)) cycle
-        column = column + 1
-        row = 0
-        do i = 1, self%count
-          if (.not. set%is_locked(i)) cycle
-          row = row + 1
-          self%moment(i) = self%moment(i) - set%inverse(row, column) * self%rate(j)
-        end do
+    if (.not. self%is_known) then
+      call self%choose_set()
+      associate (which => self%holding(:self%order))
+        self%inverse(:self%order, :self%order) = pseudo_inverse(self%weight(which, which), null_tolerance)
+        call self%examine(which)
+      end associate
+    end if
+    self%moment(:) = 0.0_wp
+    do column = 1, self%order
+      do row = 1, self%order
+        associate (moment => self%moment(self%holding(row)))
+          moment = moment - self%inverse(row, column) * self%rate(self%holding(column))
+        end associate
       end do
-    end associate
+    end do
   end subroutine find_moments
 
   !> Moments of locked joints where rows move.
   subroutine find_moving_moments(self)
     class(held_rows_t), intent(inout) :: self
-    real(wp) :: x(self%count)
-    integer :: j, n
+    integer :: i
 
     if (.not. self%is_known) then
-      n = 0
-      do j = 1, self%count
-        if (self%mode(j) /= locked) cycle
-        n = n + 1
-        self%holding(n) = j
-      end do
-      call self%system%set_matrix(self%weight, self%holding, n)
-      if (self%system%is_singular) call self%examine(self%holding(:n))
+      call self%choose_set()
+      call self%system%set_matrix(self%weight, self%holding, self%order)
+      if (self%system%is_singular) call self%examine(self%holding(:self%order))
       if (self%system%is_singular .or. self%rank_at_start < self%motions%count) call self%watch_rank()
-      self%is_known = .true.
     end if
-    n = self%system%order
-    x(:n) = self%rate(self%holding(:n))
-    call self%system%solve(x(:n))
+    do i = 1, self%order
+      self%right(i) = self%rate(self%holding(i))
+    end do
+    call self%system%solve(self%right)
     self%moment(:) = 0.0_wp
-    self%moment(self%holding(:n)) = -x(:n)
+    do i = 1, self%order
+      self%moment(self%holding(i)) = -self%right(i)
+    end do
   end subroutine find_moving_moments
 
   !> Moments of locked joints beside teeth with losses.
@@ -218,7 +207,8 @@ contains
       end if
     end do
     if (self%is_singular) then
-      self%moment(:) = matmul(self%factors, self%moment)
+      self%right(:) = self%moment
+      self%moment(:) = matmul(self%factors, self%right)
     else
       call lu_solve(self%factors, self%pivots, self%moment)
     end if
@@ -321,43 +311,22 @@ contains
     call self%system%find_rank(self%weight, [(j, j=self%locking + 1, self%count)], rank, dependent)
     if (rank < self%rank_at_start) self%lost = dependent
     if (rank > self%rank_at_start) self%lost = self%count
-    call self%system%set_matrix(self%weight, self%holding, count(self%mode == locked))
+    call self%system%set_matrix(self%weight, self%holding, self%order)
   end subroutine watch_rank
 
-  !> Finds or makes the set of the present modes.
-  subroutine choose_set(self)
+  !> Lists the rows that hold in the present modes.
+  pure subroutine choose_set(self)
     class(held_rows_t), intent(inout) :: self
-    integer :: i
+    integer :: j
 
-    self%is_known = .true.
-    do i = 1, size(self%sets)
-      self%present = i
-      if (all(self%sets(i)%is_locked .eqv. self%mode == locked)) exit
+    self%order = 0
+    do j = 1, self%count
+      if (self%mode(j) /= locked) cycle
+      self%order = self%order + 1
+      self%holding(self%order) = j
     end do
-    if (i > size(self%sets)) call self%add_set()
-    associate (set => self%sets(self%present))
-      if (.not. set%is_examined) call self%examine(pack([(i, i=1, self%count)], set%is_locked))
-      set%is_examined = set%is_examined .or. .not. self%is_assumed
-    end associate
+    self%is_known = .true.
   end subroutine choose_set
-
-  !> Makes the set of the present modes.
-  subroutine add_set(self)
-    class(held_rows_t), intent(inout) :: self
-    type(joint_set_t), allocatable :: longer(:)
-    integer, allocatable :: which(:)
-    integer :: i
-
-    allocate (longer(size(self%sets) + 1))
-    longer(:size(self%sets)) = self%sets
-    call move_alloc(longer, self%sets)
-    self%present = size(self%sets)
-    associate (set => self%sets(self%present))
-      set%is_locked = self%mode == locked
-      which = pack([(i, i=1, self%count)], set%is_locked)
-      set%inverse = pseudo_inverse(self%weight(which, which), null_tolerance)
-    end associate
-  end subroutine add_set
 
   !> Takes note of the joints of a set whose moments are not unique: those in the null vectors of W.
   subroutine examine(self, which)

@@ -25,7 +25,8 @@ contains
     integer, dimension(size(problem%mode)) :: above, below   ! pairs of the lower and the upper bound, 0: there is none
     logical, allocatable :: is_basic(:)
     real(wp), allocatable :: w(:, :), x(:, :), z(:)   ! complements and moments, affine in all z: [pairs or joints, 0:pairs]
-    integer :: pairs
+    integer :: i, pairs
+    logical :: is_above, is_below
 
     call number_pairs(problem, above, below, pairs)
     allocate (x(size(above), 0:pairs), w(pairs, 0:pairs), source=0.0_wp)
@@ -34,7 +35,19 @@ contains
     call find_complements(problem, above, below, x, w)
     allocate (z(pairs), is_basic(pairs))
     call solve_linear_complementarity(w(:, 1:), w(:, 0), z, is_basic, is_found)
-    if (is_found) call take_modes(problem, above, below, is_basic)
+    if (is_found) then
+      ! the modes by the pairs whose z are in the basis
+      do i = 1, size(above)
+        if (max(above(i), below(i)) == 0) cycle
+        is_above = .true.
+        if (above(i) > 0) is_above = is_basic(above(i))
+        is_below = .true.
+        if (below(i) > 0) is_below = is_basic(below(i)) .neqv. above(i) > 0
+        problem%mode(i) = locked
+        if (.not. is_above .and. is_below) problem%mode(i) = slips_forwards
+        if (is_above .and. .not. is_below) problem%mode(i) = slips_backwards
+      end do
+    end if
   end subroutine pivot_modes
 
   !> Numbers the pairs of all joints.
@@ -116,25 +129,5 @@ contains
       end if
     end do
   end subroutine find_complements
-
-  !> The modes by the pairs whose z are in the basis.
-  pure subroutine take_modes(problem, above, below, is_basic)
-    class(joint_problem_t), intent(inout) :: problem
-    integer, intent(in) :: above(:), below(:)
-    logical, intent(in) :: is_basic(:)   ! [pairs]
-    integer :: i
-    logical :: is_above, is_below
-
-    do i = 1, size(above)
-      if (max(above(i), below(i)) == 0) cycle
-      is_above = .true.
-      if (above(i) > 0) is_above = is_basic(above(i))
-      is_below = .true.
-      if (below(i) > 0) is_below = is_basic(below(i)) .neqv. above(i) > 0
-      problem%mode(i) = locked
-      if (.not. is_above .and. is_below) problem%mode(i) = slips_forwards
-      if (is_above .and. .not. is_below) problem%mode(i) = slips_backwards
-    end do
-  end subroutine take_modes
 
 end module nocdyn_joint_pivots

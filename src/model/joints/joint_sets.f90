@@ -28,8 +28,6 @@ module nocdyn_joint_sets
   type, extends(held_rows_t), public :: joint_sets_t
     integer, allocatable :: bank(:), number(:)   !! bank of each joint, and its number there, [joints] as all that follow
     integer, allocatable :: joint_of(:)      !! joint of each switch of the machine, 0 for none, [switches]
-    type(joint_sets_t), pointer :: leader => null()   !! joints of the motion that is observed, which give the modes; null: by
-                                                      !! the state
     real(wp), allocatable :: impulse(:)      !! of the last impact [N m s]; 0 after other events
     real(wp), allocatable :: shift(:)        !! by which the boundary of a slip lies beyond zero [rad/s]
     logical, allocatable :: is_jammed(:)     !! teeth that turn and stop at once, by an impulse
@@ -43,7 +41,6 @@ module nocdyn_joint_sets
     procedure :: note
     procedure :: shift_boundaries
     procedure :: indicator
-    procedure :: follow
     procedure :: is_open
     procedure :: has_teeth, has_stopped, is_moved
   end type joint_sets_t
@@ -99,20 +96,6 @@ contains
       call set_mode(self, banks, j)
     end do
   end subroutine start
-
-  !> Takes the modes of the motion that is observed.
-  subroutine follow(self, banks)
-    class(joint_sets_t), intent(inout) :: self
-    type(bank_slot_t), intent(inout) :: banks(:)
-    integer :: j
-
-    if (all(self%mode == self%leader%mode)) return
-    self%mode(:) = self%leader%mode
-    do j = 1, self%locking
-      call set_mode(self, banks, j)
-    end do
-    call self%change_set()
-  end subroutine follow
 
   !> Whether a joint is one of teeth with losses.
   pure logical function has_teeth(self, joint)
@@ -347,8 +330,7 @@ contains
       call bank%range_under_load(self%number(joint), self%teeth%load(self%teeth%loss_of(joint)), least, most)
       sliding = 0.0_wp
     class is (friction_joints_t)
-      call bank%range_at_rest(self%number(joint), t, least, most)
-      call bank%range_of_slip(self%number(joint), t, sliding(1), sliding(2))
+      call bank%find_range(self%number(joint), t, least, most, sliding)
     class default   ! a row that moves
       least = -huge(least)
       most = huge(most)

@@ -19,13 +19,15 @@ module nocdyn_row_motions
     real(wp), allocatable :: position(:)     !! u - g(v) - constant
     real(wp), allocatable :: speed(:)        !! what u' - g' v' is: 0, or g' of the time
     real(wp), allocatable :: acceleration(:) !! what u'' - g' v'' is: g'' v'^2
+    real(wp), allocatable :: terms(:)        !! sizes of the terms of `position`, of which its rounding errors are parts
+    real(wp), allocatable :: demand(:)       !! of the rates of the rows, work space
     ! for the derivatives of the accelerations:
     real(wp), allocatable :: held(:)         !! moments [N m]
     real(wp), allocatable :: driver_acceleration(:)   !! v''
   contains
     procedure :: set_start
     procedure :: move
-    procedure :: size_of_terms
+    procedure :: size_terms
   end type row_motions_t
 
 contains
@@ -50,7 +52,8 @@ contains
     end do
     self%count = size(self%element)
     allocate (self%constant(self%count), source=0.0_wp)
-    allocate (self%position, self%speed, self%acceleration, self%held, self%driver_acceleration, source=self%constant)
+    allocate (self%position, self%speed, self%acceleration, self%terms, self%demand, self%held, self%driver_acceleration, &
+              source=self%constant)
     allocate (self%g(0:3, self%count), source=0.0_wp)
   end function new_row_motions
 
@@ -92,17 +95,16 @@ contains
     end do
   end subroutine move
 
-  !> The sizes of the terms of u - g(v) - constant, of which its rounding errors are parts.
-  pure function size_of_terms(self, angle) result(terms)
-    class(row_motions_t), intent(in) :: self
+  !> Sets `terms` at the present position.
+  pure subroutine size_terms(self, angle)
+    class(row_motions_t), intent(inout) :: self
     real(wp), intent(in) :: angle(:)   !! of all elements [rad]
-    real(wp) :: terms(self%count)
     integer :: i
 
     do i = 1, self%count
-      terms(i) = 1.0_wp + abs(angle(self%element(i))) + abs(self%constant(i)) + abs(self%g(0, i))
-      if (self%driver(i) > 0) terms(i) = terms(i) + abs(self%g(1, i)) * abs(angle(self%driver(i)))
+      self%terms(i) = 1.0_wp + abs(angle(self%element(i))) + abs(self%constant(i)) + abs(self%g(0, i))
+      if (self%driver(i) > 0) self%terms(i) = self%terms(i) + abs(self%g(1, i)) * abs(angle(self%driver(i)))
     end do
-  end function size_of_terms
+  end subroutine size_terms
 
 end module nocdyn_row_motions

@@ -27,16 +27,17 @@ module nocdyn_tooth_loads
     real(wp), allocatable :: by_joint(:, :)     !! V, T by the moments of the joints at the present slopes, [losses, joints]
     real(wp), allocatable :: applied(:)         !! T without the moments of the joints that hold and the losses [N m]
     real(wp), allocatable :: load(:)            !! T [N m]
+    real(wp), allocatable :: drag(:)            !! -M while the wheels turn, without the effect of the joints that hold and of
+                                                !! other losses, or its derivative [N m]; it is not used for locked wheels
+    real(wp), allocatable :: moment(:)          !! of all elements, or its derivative; work space, [elements]
     real(wp), allocatable :: share(:)           !! share s of T that is lost while the wheels turn
     real(wp), allocatable :: share_slope(:)     !! its derivative by the speed [s/rad]
     real(wp), allocatable :: shift(:)           !! by which the boundary of T lies beyond zero [N m]
   contains
     procedure :: find_coefficients
     procedure :: weigh
-    procedure :: torques_of
     procedure :: apply
     procedure :: choose_shares
-    procedure :: drag
     procedure :: add_moments
     procedure :: shift_boundaries
     procedure :: power_of_driver
@@ -67,7 +68,8 @@ contains
     allocate (self%by_moment(self%count, merge(elements, 0, self%count > 0)), source=0.0_wp)
     allocate (self%by_joint(self%count, size(bank_of_joint)), source=0.0_wp)
     allocate (self%applied(self%count), source=0.0_wp)
-    allocate (self%load, self%share, self%share_slope, self%shift, source=self%applied)
+    allocate (self%load, self%drag, self%share, self%share_slope, self%shift, source=self%applied)
+    allocate (self%moment(size(self%by_moment, 2)), source=0.0_wp)
   end function new_tooth_loads
 
   !> Sets G at the start.
@@ -142,24 +144,16 @@ contains
     end do
   end subroutine weigh
 
-  !> T = G M, or its derivatives by those of M.
-  pure function torques_of(self, moment) result(torque)
-    class(tooth_loads_t), intent(in) :: self
-    real(wp), intent(in) :: moment(:)   !! M of all elements [N m]
-    real(wp) :: torque(self%count)      !! [N m]
-
-    torque = matmul(self%by_moment, moment)
-  end function torques_of
-
   !> Finds T without the moments of the joints that hold and the losses, after the laws of all elements.
   pure subroutine apply(self, elements)
     class(tooth_loads_t), intent(inout) :: self
     type(elements_t), intent(in) :: elements
 
-    self%applied(:) = self%torques_of(elements%restoring(1, :) + elements%applied(1, :))
+    self%moment(:) = elements%restoring(1, :) + elements%applied(1, :)
+    self%applied(:) = matmul(self%by_moment, self%moment)
   end subroutine apply
 
-  !> Sets the shares that are lost at the present modes and speeds.
+  !> Sets the shares that are lost at the present modes and speeds, and the drags.
   pure subroutine choose_shares(self, banks, mode, speed)
     class(tooth_loads_t), intent(inout) :: self
     type(bank_slot_t), intent(in) :: banks(:)
@@ -174,23 +168,16 @@ contains
                         self%share(i), self%share_slope(i))
       end select
     end do
+    self%drag(:) = self%share * self%applied
   end subroutine choose_shares
-
-  !> -M of the losses while the wheels turn, without the effect of the joints that hold and of other losses [N m]; for locked
-  !> wheels it is not used.
-  pure function drag(self)
-    class(tooth_loads_t), intent(in) :: self
-    real(wp) :: drag(self%count)
-
-    drag = self%share * self%applied
-  end function drag
 
   !> Adds what the moments of all joints do to T.
   pure subroutine add_moments(self, moment)
     class(tooth_loads_t), intent(inout) :: self
     real(wp), intent(in) :: moment(:)   !! [N m], [joints]
 
-    self%load(:) = self%applied + matmul(self%by_joint, moment)
+    self%load(:) = matmul(self%by_joint, moment)
+    self%load(:) = self%applied + self%load
   end subroutine add_moments
 
   !> Positive where that wheel of turning teeth drives that the mode says [N m].

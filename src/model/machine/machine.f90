@@ -60,6 +60,7 @@ module nocdyn_machine
     procedure :: internal_name
     procedure :: is_electrical
     procedure :: choose_branches
+    procedure :: keep_branches, restore_branches
     procedure :: settle_internal
     procedure :: evaluate
     procedure :: evaluate_elements
@@ -276,6 +277,25 @@ contains
       end do
     end associate
   end subroutine choose_branches
+
+  !> Keeps the present branches of all laws, to which `restore_branches` goes back.
+  subroutine keep_branches(self)
+    class(machine_t), intent(inout) :: self
+    integer :: i
+
+    do i = 1, merge(size(self%banks), 0, self%switches%count > 0)
+      call self%banks(i)%bank%keep_branches()
+    end do
+  end subroutine keep_branches
+
+  subroutine restore_branches(self)
+    class(machine_t), intent(inout) :: self
+    integer :: i
+
+    do i = 1, merge(size(self%banks), 0, self%switches%count > 0)
+      call self%banks(i)%bank%restore_branches()
+    end do
+  end subroutine restore_branches
 
   !> Replaces the internal states in the first lane of `elements` by those that do not change at the speeds there.
   subroutine settle_internal(self, t)

@@ -3,10 +3,8 @@ module nocdyn_signal_values
   use nocdyn_bank, only: role_coupling
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_machine, only: machine_t
   use nocdyn_quantities, only: form_angle, form_applied, form_elastic, form_speed, form_total
-  use nocdyn_reduced, only: reduced_t
   use nocdyn_shafts, only: shafts_t
   use nocdyn_signals, only: signal_angle, signal_elastic, signal_element, signal_kinetic, signal_member, &
     signal_point_moment, signal_point_stress, signal_reaction, signal_residual, signal_speed, signal_source_t, signal_time, &
@@ -22,12 +20,11 @@ module nocdyn_signal_values
     logical :: has_new_values = .true. !! whether the segment before is of another bank or quantity
   end type segment_t
 
-  !> Evaluates a copy of the formulation, because `observe` chooses branches: the integration's branches must not change. After
-  !> `copy_lane` it must not be moved in memory.
+  !> Evaluates a formulation, which may be that of an integration: nothing is changed on which that depends.
   type, public :: signal_values_t
-    class(formulation_t), allocatable :: formulation
+    class(formulation_t), pointer :: formulation => null()
+    logical :: in_motion = .false.                       !! whether joints have the modes of an integration; else by the state
     type(segment_t), allocatable, private :: segments(:)
-    type(lane_parameters_t), private :: parameters       !! of `formulation`; empty before `copy_lane`
     logical, private :: have_reactions = .false.
     logical, private :: have_energies = .false.          !! whether a column is an energy or a work
     logical, private :: have_elastic = .false., have_works = .false.   !! whether a column needs these
@@ -39,14 +36,14 @@ module nocdyn_signal_values
     real(wp), allocatable, private :: start_energy(:)    !! [J], [lanes]
     real(wp), allocatable, private :: start_kept(:)      !! of this what internal states keep
   contains
-    procedure :: copy_lane, start_lane, move_origin, observe, fill_row, kinetic_energy, find_pace
+    procedure :: start_lane, observe, fill_row, kinetic_energy, find_pace
   end type signal_values_t
 
 contains
 
   !> An evaluator of some columns.
   type(signal_values_t) function new_signal_values(formulation, columns) result(self)
-    class(formulation_t), intent(in) :: formulation   !! with work integrals if a column needs them
+    class(formulation_t), target, intent(inout) :: formulation   !! with work integrals if a column needs them
     type(signal_source_t), intent(in) :: columns(:)
     logical, allocatable :: is_source(:)   ! [quadratures]
     integer :: i
@@ -54,7 +51,7 @@ contains
     if (any(columns%kind >= signal_work_in) .and. .not. formulation%has_energy_balance) then
       error stop 'nocdyn_signal_values: work columns need a formulation with an energy balance'
     end if
-    allocate (self%formulation, source=formulation)
+    self%formulation => formulation
     allocate (self%segments, source=segments_of(columns))
     self%have_reactions = any(columns%kind == signal_reaction .or. columns%kind == signal_member)
     self%have_energies = any(columns%kind >= signal_kinetic)
@@ -126,20 +123,6 @@ contains
     end associate
   end subroutine find_pace
 
-  !> Copies the parameters of a lane from the formulation that is integrated.
-  subroutine copy_lane(self, lane, parameters)
-    class(signal_values_t), target, intent(inout) :: self
-    integer, intent(in) :: lane
-    type(lane_parameters_t), intent(in) :: parameters   !! of that formulation
-
-    select type (formulation => self%formulation)
-    class is (reduced_t)
-      if (self%parameters%arrays == 0) call formulation%list_parameters(self%parameters)
-    end select
-    call self%parameters%copy_lane(lane, parameters, lane)
-    call self%formulation%refresh_lane(lane)
-  end subroutine copy_lane
-
   !> Stores the energy of a lane at its start, after `observe` there.
   subroutine start_lane(self, lane)
     class(signal_values_t), intent(inout) :: self
@@ -152,23 +135,21 @@ contains
     end associate
   end subroutine start_lane
 
-  !> Takes a shift of the state of a lane.
-  subroutine move_origin(self, lane, shift)
-    class(signal_values_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    real(wp), contiguous, intent(in) :: shift(:)   !! [states + quadratures]
-
-    call self%formulation%move_origin(lane, shift)
-  end subroutine move_origin
-
   !> Evaluates the machine of all lanes at a time and state.
   subroutine observe(self, t, y)
     class(signal_values_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
     real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states + quadratures]
+    integer :: lost
 
-    call self%formulation%observe(t, y)
-    if (self%have_elastic) call self%formulation%machine%evaluate_energies()
+    associate (formulation => self%formulation)
+      lost = formulation%joints%lost
+      call formulation%machine%keep_branches()
+      call formulation%observe(t, y, self%in_motion)
+      if (self%have_elastic) call formulation%machine%evaluate_energies()
+      call formulation%machine%restore_branches()
+      formulation%joints%lost = lost
+    end associate
   end subroutine observe
 
   !> The values of a lane's columns, after `observe` at (t, y).
@@ -178,7 +159,7 @@ contains
     real(wp), intent(in) :: t                  !! [s]
     real(wp), contiguous, intent(in) :: y(:)   !! of the lane, [states + quadratures]
     real(wp), intent(inout) :: row(:)          !! [columns]
-    integer :: k
+    integer :: k, m
 
     if (self%have_reactions) call self%formulation%reactions(lane, self%lambda)
     if (self%have_energies) call find_energies(self, lane, y)
@@ -200,7 +181,9 @@ contains
           case (signal_reaction)
             row(first:last) = self%lambda(i:j)
           case (signal_member)
-            row(first:last) = members%factor(lane, i:j) * self%lambda(members%row(i:j))
+            do m = i, j
+              row(first + m - i) = members%factor(lane, m) * self%lambda(members%row(m))
+            end do
           case (signal_point_moment, signal_point_stress)
             call fill_points(machine, segment, lane, row(first:last))
           case (signal_kinetic:signal_residual)

@@ -47,6 +47,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(selection_t), allocatable :: selections(:)
     integer :: i, pass
+    real(wp) :: found(size(quantiles))
 
     allocate (statistics(size(journals(1)%header%results)), selections(size(journals(1)%header%results)))
     do i = 1, size(selections)
@@ -64,7 +65,18 @@ contains
       end do
     end do
     do i = 1, size(selections)
-      call interpolate_quantiles(selections(i), statistics(i))
+      ! interpolates between the neighbours of every quantile
+      if (statistics(i)%count == 0) then
+        found = ieee_value(0.0_wp, ieee_quiet_nan)
+        statistics(i)%minimum = found(1)
+        statistics(i)%maximum = found(1)
+      else
+        found = between(number_of(selections(i)%prefix(1::2)), number_of(selections(i)%prefix(2::2)), &
+                (statistics(i)%count - 1) * quantiles)
+      end if
+      statistics(i)%low = found(1)
+      statistics(i)%median = found(2)
+      statistics(i)%high = found(3)
     end do
   end subroutine find_order_statistics
 
@@ -194,24 +206,6 @@ contains
       selection%groups = max(selection%groups, j)
     end do
   end subroutine resolve_digit
-
-  !> Interpolates between the neighbours of every quantile.
-  pure subroutine interpolate_quantiles(selection, statistics)
-    type(selection_t), intent(in) :: selection
-    type(order_statistics_t), intent(inout) :: statistics
-    real(wp) :: found(size(quantiles))
-
-    if (statistics%count == 0) then
-      found = ieee_value(0.0_wp, ieee_quiet_nan)
-      statistics%minimum = found(1)
-      statistics%maximum = found(1)
-    else
-      found = between(number_of(selection%prefix(1::2)), number_of(selection%prefix(2::2)), (statistics%count - 1) * quantiles)
-    end if
-    statistics%low = found(1)
-    statistics%median = found(2)
-    statistics%high = found(3)
-  end subroutine interpolate_quantiles
 
   !> Linear interpolation from the nearer end.
   elemental real(wp) function between(a, b, position)

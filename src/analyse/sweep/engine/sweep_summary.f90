@@ -41,27 +41,10 @@ contains
     type(sweep_summary_t), intent(in) :: summary
     character(len=:), allocatable :: text
     type(json_t) :: json
+    integer :: i
 
     call json%open_report(input%file, header%title, merge('done  ', 'failed', summary%done > 0))
     call put_settings(json, input%single('run'))
-    call put_design(json, header)
-    call json%open('counts')
-    call json%put('variants', header%variants)
-    call json%put('done', summary%done)
-    call json%put('refused', summary%refused)
-    call json%put('failed', summary%failed)
-    call json%close()
-    if (allocated(summary%effort)) call put_effort(json, summary%effort)
-    call put_statistics(json, header, summary)
-    call json%close()
-    text = json%text()
-  end function sweep_json
-
-  subroutine put_design(json, header)
-    type(json_t), intent(inout) :: json
-    type(sweep_header_t), intent(in) :: header
-    integer :: i
-
     call json%open('design')
     call json%put('design', header%design)
     call json%put('seed', header%seed)
@@ -71,37 +54,23 @@ contains
     end do
     call json%close()
     call json%close()
-  end subroutine put_design
-
-  !> What the computation took.
-  subroutine put_effort(json, effort)
-    type(json_t), intent(inout) :: json
-    type(sweep_effort_t), intent(in) :: effort
-
-    call json%put('wall_time_s', effort%wall_time)
-    call json%put('writing_time_s', effort%writing_time)
-    call json%put('variants_computed', effort%variants)
-    call json%put('variants_per_second', rate(effort))
-    call json%put('threads', effort%threads)
-    call json%put('ranks', effort%ranks)
-    call json%put('lanes', effort%lanes)
-  end subroutine put_effort
-
-  !> Variants per second.
-  pure real(wp) function rate(effort)
-    type(sweep_effort_t), intent(in) :: effort
-
-    rate = 0.0_wp
-    if (effort%wall_time > 0) rate = effort%variants / effort%wall_time
-  end function rate
-
-  !> The order statistics of every result; none if no variant is done.
-  subroutine put_statistics(json, header, summary)
-    type(json_t), intent(inout) :: json
-    type(sweep_header_t), intent(in) :: header
-    type(sweep_summary_t), intent(in) :: summary
-    integer :: i
-
+    call json%open('counts')
+    call json%put('variants', header%variants)
+    call json%put('done', summary%done)
+    call json%put('refused', summary%refused)
+    call json%put('failed', summary%failed)
+    call json%close()
+    if (allocated(summary%effort)) then
+      ! what the computation took
+      call json%put('wall_time_s', summary%effort%wall_time)
+      call json%put('writing_time_s', summary%effort%writing_time)
+      call json%put('variants_computed', summary%effort%variants)
+      call json%put('variants_per_second', rate(summary%effort))
+      call json%put('threads', summary%effort%threads)
+      call json%put('ranks', summary%effort%ranks)
+      call json%put('lanes', summary%effort%lanes)
+    end if
+    ! the order statistics of every result; none if no variant is done
     call json%open('statistics')
     do i = 1, merge(size(summary%statistics), 0, summary%done > 0)
       associate (found => summary%statistics(i))
@@ -118,7 +87,17 @@ contains
       end associate
     end do
     call json%close()
-  end subroutine put_statistics
+    call json%close()
+    text = json%text()
+  end function sweep_json
+
+  !> Variants per second.
+  pure real(wp) function rate(effort)
+    type(sweep_effort_t), intent(in) :: effort
+
+    rate = 0.0_wp
+    if (effort%wall_time > 0) rate = effort%variants / effort%wall_time
+  end function rate
 
   !> The text of columns.json: what the results of the variants are.
   function sweep_columns_json(header) result(text)

@@ -63,12 +63,23 @@ contains
     logical :: is_typical
     type(target_t) :: no_targets(0)
     real(wp) :: no_values(0)
+    integer :: i
 
     self%input = input
     allocate (self%targets, source=targets)
     self%has_energy_balance = with_energy_balance
-    call find_run_values(self)
+    ! which targets are values of &run or &fatigue, and what they are in the input: the block is integrated with them
+    allocate (self%is_of_run(size(self%targets)), source=.false.)
+    allocate (self%base(size(self%targets)), source=0.0_wp)
+    do i = 1, size(self%targets)
+      associate (target => self%targets(i))
+        self%is_of_run(i) = has_word('run fatigue', self%input%groups(target%group)%kind)
+        if (.not. self%is_of_run(i)) cycle
+        self%base(i) = self%input%groups(target%group)%values(target%key)%number_at(target%position)
+      end associate
+    end do
     allocate (block, self%assembled)
+    self%assembled%is_block = .true.
     is_typical = present(typical)
     if (is_typical) then
       call assemble_variant(self%input, targets, typical, block%machine, message, lanes)
@@ -100,28 +111,13 @@ contains
     count_joints = joints%count
   end function count_joints
 
-  !> Which targets are values of &run or &fatigue, and what they are in the input: the block is integrated with them.
-  subroutine find_run_values(self)
-    type(variant_machines_t), intent(inout) :: self
-    integer :: i
-
-    allocate (self%is_of_run(size(self%targets)), source=.false.)
-    allocate (self%base(size(self%targets)), source=0.0_wp)
-    do i = 1, size(self%targets)
-      associate (target => self%targets(i))
-        self%is_of_run(i) = has_word('run fatigue', self%input%groups(target%group)%kind)
-        if (.not. self%is_of_run(i)) cycle
-        self%base(i) = self%input%groups(target%group)%values(target%key)%number_at(target%position)
-      end associate
-    end do
-  end subroutine find_run_values
-
   !> Makes the block of an assembled machine of all lanes.
   subroutine share_block(self, block)
     type(variant_machines_t), intent(inout) :: self
     type(reduced_t), pointer, intent(in) :: block
 
-    call block%formulate(self%has_energy_balance, as_block=.true.)
+    block%is_block = .true.
+    call block%formulate(self%has_energy_balance)
     block%is_shared = block%joints%count == 0   ! whatever the number of lanes
     call block%list_parameters(self%parameters)
     self%block => block
@@ -205,7 +201,7 @@ contains
     status = variant_needs_own_block
     if (.not. associated(self%block)) return
     if (any(self%is_of_run .and. abs(values - self%base) > 0)) return
-    call self%assembled%formulate(self%has_energy_balance, as_block=.true.)
+    call self%assembled%formulate(self%has_energy_balance)
     call self%assembled%list_parameters(self%assembled_parameters)
     if (.not. self%parameters%has_same_structure(self%assembled_parameters)) return
     status = variant_set

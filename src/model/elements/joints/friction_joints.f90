@@ -30,6 +30,8 @@ module nocdyn_friction_joints
   !> Modes of teeth with losses whose first wheel drives; where it is driven they are `slips_...`.
   integer, parameter, public :: driven_forwards = 5, driven_backwards = 6
 
+  integer, parameter :: at_least = 1, at_most = 2, slip_least = 3, slip_most = 4   ! numbers of the parameters
+
   !> The ranges of the moments of joints with full engagement [N m], shape [lanes, joints] all. Those at rest may be huge.
   type, public :: joint_ranges_t
     real(wp), allocatable :: least(:, :), most(:, :)                   !! at rest
@@ -43,8 +45,7 @@ module nocdyn_friction_joints
     procedure :: connect_joints
     procedure :: add_modes
     procedure :: describe
-    procedure :: range_at_rest
-    procedure :: range_of_slip
+    procedure :: find_range
     procedure :: mode_of
     procedure :: set_mode
     procedure :: set_mode_by_slip
@@ -169,42 +170,31 @@ contains
 
   end function friction_over_slip
 
-  !> The range of the moment at rest [N m].
-  pure subroutine range_at_rest(self, element, t, least, most)
+  !> The range of the moment at rest, and the moments of slip forwards and backwards, by the engagement: a range without bounds
+  !> stays so with any.
+  pure subroutine find_range(self, element, t, least, most, sliding)
     class(friction_joints_t), intent(in) :: self
     integer, intent(in) :: element     !! numbered within the bank
     real(wp), intent(in) :: t          !! [s]
-    real(wp), intent(out) :: least, most   !! [N m]
+    real(wp), intent(out) :: least, most              !! [N m]
+    real(wp), intent(out), optional :: sliding(2)     !! [N m]
+    real(wp) :: moments(at_least:slip_most)
+    integer :: k
 
-    least = engaged(self, element, t, self%parameters(self%number_of('least'))%value(1, element))
-    most = engaged(self, element, t, self%parameters(self%number_of('most'))%value(1, element))
-  end subroutine range_at_rest
-
-  !> The moments of slip backwards and forwards [N m].
-  pure subroutine range_of_slip(self, element, t, least, most)
-    class(friction_joints_t), intent(in) :: self
-    integer, intent(in) :: element     !! numbered within the bank
-    real(wp), intent(in) :: t          !! [s]
-    real(wp), intent(out) :: least, most   !! [N m]
-
-    least = engaged(self, element, t, self%parameters(self%number_of('sliding least'))%value(1, element))
-    most = engaged(self, element, t, self%parameters(self%number_of('sliding most'))%value(1, element))
-  end subroutine range_of_slip
-
-  !> A moment by the engagement; one without bounds stays so with any.
-  pure real(wp) function engaged(self, element, t, moment)
-    class(friction_joints_t), intent(in) :: self
-    integer, intent(in) :: element
-    real(wp), intent(in) :: t        !! [s]
-    real(wp), intent(in) :: moment   !! with full engagement [N m]
-
-    engaged = moment
-    if (.not. allocated(self%curve)) return
-    associate (level => self%curve(1, element)%value(t))
-      if (abs(moment) < huge(moment)) engaged = moment * level
-      if (abs(moment) >= huge(moment) .and. level <= 0) engaged = 0.0_wp
-    end associate
-  end function engaged
+    moments = [(self%parameters(k)%value(1, element), k=at_least, slip_most)]
+    if (allocated(self%curve)) then
+      associate (level => self%curve(1, element)%value(t))
+        where (abs(moments) < huge(moments))
+          moments = moments * level
+        else where
+          moments = merge(moments, 0.0_wp, level > 0)
+        end where
+      end associate
+    end if
+    least = moments(at_least)
+    most = moments(at_most)
+    if (present(sliding)) sliding = moments(slip_least:)
+  end subroutine find_range
 
   !> The mode of a joint of the first lane.
   pure integer function mode_of(self, element)
