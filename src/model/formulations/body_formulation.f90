@@ -161,9 +161,19 @@ contains
     real(wp), contiguous, intent(inout) :: dfdy(:, :)                             !! [lanes, positions]
     real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)   !! derivative by the time
     integer, intent(inout) :: status(self%lanes)
-    integer :: b, e, l, n
 
-    ! the Jacobian as a dense array, as `jacobian_pattern` names all positions
+    call fill_of_bodies(self, t, y, size(dfdt, 2), dfdy, dfdt)
+  end subroutine jacobian_of_bodies
+
+  !> The Jacobian as a dense array, as `jacobian_pattern` names all positions.
+  subroutine fill_of_bodies(self, t, y, components, dfdy, dfdt)
+    class(body_formulation_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: t(:)                               !! [s], [lanes]
+    real(wp), contiguous, intent(in) :: y(:, :)                            !! state, [lanes, states], at least
+    integer, intent(in) :: components                                      !! states + quadratures
+    real(wp), intent(inout) :: dfdy(self%lanes, components, self%states)   !! derivative by the states
+    real(wp), intent(inout) :: dfdt(self%lanes, components)                !! derivative by the time
+    integer :: b, l, n
 
     n = self%machine%bodies
     call self%gather(y)
@@ -176,24 +186,7 @@ contains
       call self%differentiate_rows(self%acceleration)
     end if
     do l = 1, self%lanes
-      ! derivatives of the torques T of one lane, from those of the elements
-      self%by_angle(:, :) = 0.0_wp
-      self%by_speed(:, :) = 0.0_wp
-      self%by_time(:) = 0.0_wp
-      associate (elements => self%machine%elements)
-        call elements%rows%add_coefficients(-1.0_wp, elements%restoring_angle(l, :), self%by_angle)
-        call elements%rows%add_coefficients(-1.0_wp, elements%applied_angle(l, :), self%by_angle)
-        call elements%rows%add_coefficients(-1.0_wp, elements%applied_speed(l, :), self%by_speed)
-        do e = 1, elements%cross%count
-          associate (x => elements%cross, rows => elements%rows)
-            call rows%add_product(x%element(e), x%by(e), x%restoring_angle(l, e) + x%applied_angle(l, e), self%by_angle)
-            call rows%add_product(x%element(e), x%by(e), x%applied_speed(l, e), self%by_speed)
-          end associate
-        end do
-        do e = 1, elements%count
-          call elements%rows%add_moment(e, elements%applied_time(l, e), self%by_time)
-        end do
-      end associate
+      call differentiate_torques(self, l)
       do b = 1, n
         call multiply(self%mobility(:, :, l), self%by_speed(:, b), dfdy(l, :n, b))
         call multiply(self%mobility(:, :, l), self%by_angle(:, b), dfdy(l, :n, n + b))
@@ -204,8 +197,33 @@ contains
       call differentiate_internal(self, l, dfdy(l, :, :))
       dfdt(l, self%mechanical + 1:self%states) = self%machine%elements%internal%rate_time(l, :)
     end do
-    if (self%joints%count > 0) call self%hold_columns(size(dfdt, 2), dfdy(1, :, :), dfdt(1, :))
-  end subroutine jacobian_of_bodies
+    if (self%joints%count > 0) call self%hold_columns(components, dfdy(1, :, :), dfdt(1, :))
+  end subroutine fill_of_bodies
+
+  !> Derivatives of the torques T of one lane, from those of the elements.
+  subroutine differentiate_torques(self, lane)
+    class(body_formulation_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    integer :: e
+
+    self%by_angle(:, :) = 0.0_wp
+    self%by_speed(:, :) = 0.0_wp
+    self%by_time(:) = 0.0_wp
+    associate (elements => self%machine%elements)
+      call elements%rows%add_coefficients(-1.0_wp, elements%restoring_angle(lane, :), self%by_angle)
+      call elements%rows%add_coefficients(-1.0_wp, elements%applied_angle(lane, :), self%by_angle)
+      call elements%rows%add_coefficients(-1.0_wp, elements%applied_speed(lane, :), self%by_speed)
+      do e = 1, elements%cross%count
+        associate (x => elements%cross, rows => elements%rows)
+          call rows%add_product(x%element(e), x%by(e), x%restoring_angle(lane, e) + x%applied_angle(lane, e), self%by_angle)
+          call rows%add_product(x%element(e), x%by(e), x%applied_speed(lane, e), self%by_speed)
+        end associate
+      end do
+      do e = 1, elements%count
+        call elements%rows%add_moment(e, elements%applied_time(lane, e), self%by_time)
+      end do
+    end associate
+  end subroutine differentiate_torques
 
   !> The rows of the work integrals of one lane. The power is M u' with the applied torque M and the relative speed u'.
   subroutine differentiate_powers(self, lane, dfdy, dfdt)

@@ -121,10 +121,18 @@ contains
     real(wp), contiguous, intent(inout) :: dfdy(:, :)                             !! [lanes, positions]
     real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)   !! derivative by the time
     integer, intent(inout) :: status(self%lanes)
-    integer :: e, l, n
 
     call jacobian_of_bodies(self, t, y, dfdy, dfdt, status)
-    ! the derivatives of F' = K_4 omega by omega and phi
+    call fill_moment_rows(self, size(dfdt, 2), dfdy)
+  end subroutine jacobian
+
+  !> The derivatives of F' = K_4 omega by omega and phi.
+  subroutine fill_moment_rows(self, components, dfdy)
+    type(paper_t), intent(inout) :: self
+    integer, intent(in) :: components                                      !! states + quadratures
+    real(wp), intent(inout) :: dfdy(self%lanes, components, self%states)   !! derivative by the states
+    integer :: e, l, n
+
     n = self%machine%bodies
     associate (elements => self%machine%elements)
       do l = 1, self%lanes
@@ -146,7 +154,7 @@ contains
         dfdy(l, 2 * n + 1:3 * n, n + 1:2 * n) = self%work%tangent
       end do
     end associate
-  end subroutine jacobian
+  end subroutine fill_moment_rows
 
   !> Evaluates the machine at a state, with the moments of the couplings from the states F.
   !>
