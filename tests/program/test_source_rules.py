@@ -21,14 +21,6 @@ KERNEL = "kernel"
 MANY_ARGUMENTS = {
     "src/analyse/statistics/linear_statistics.f90": (KERNEL, "bound_excess"),
     "src/analyse/statistics/step_strips.f90": (KERNEL, "add_integrals", "add_pair", "expand", "expand_single", "set_pair"),
-    "src/base/numerics/sparse_products.f90": (
-        KERNEL,
-        "multiply_lanes",
-        "multiply_rows",
-        "pair_of_band",
-        "pair_of_chain",
-        "pair_of_toeplitz",
-    ),
     "src/integrate/core/stage_sums.f90": (KERNEL, "sum_few_terms", "sum_many_terms"),
     "src/integrate/dense_output/extremes.f90": (KERNEL, "find_states"),
     "src/model/constraints/coordinates.f90": (
@@ -38,7 +30,16 @@ MANY_ARGUMENTS = {
     "src/model/elements/polynomial_laws.f90": (KERNEL, "moments"),
     "src/model/formulations/kernels/series_kernel.inc": (KERNEL, "accelerate", "begin_motion", "find_moments", "find_values"),
     "src/base/formulas/law_harmonics.inc": (KERNEL, "harmonic_sum"),
-    "src/base/contract/sparse_map.f90": (KERNEL, "pair_of_rows", "pair_on_lanes"),
+    "src/base/contract/sparse_map.f90": (
+        KERNEL,
+        "multiply_lanes",
+        "multiply_rows",
+        "pair_of_band",
+        "pair_of_chain",
+        "pair_of_rows",
+        "pair_of_toeplitz",
+        "pair_on_lanes",
+    ),
 }
 
 # Longer procedures, by file, and why.
