@@ -31,11 +31,7 @@ module nocdyn_body_formulation
     procedure :: set_state
     procedure :: observe => observe_bodies
     procedure :: jacobian => jacobian_of_bodies
-    procedure :: series_obstacle
-    procedure :: switch_motion
-    procedure :: accelerate
-    procedure :: element_rate
-    procedure :: push_element
+    procedure :: series_obstacle, switch_motion, accelerate, element_rate, push_element
   end type body_formulation_t
 
 contains

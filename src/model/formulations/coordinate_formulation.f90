@@ -23,24 +23,9 @@ module nocdyn_coordinate_formulation
     type(moving_origin_t), private :: origin
     real(wp), allocatable, private, dimension(:, :) :: switch_angle, switch_speed   !! their motion, [lanes, elements]
   contains
-    procedure :: set_coordinates
-    procedure :: list_coordinates
-    procedure :: start
-    procedure :: project_start_speeds
-    procedure :: set_state
-    procedure :: gather
-    procedure :: find_far
-    procedure :: shift_state
-    procedure :: restore_state
-    procedure :: reset_origin
-    procedure :: angle_at_zero
-    procedure :: twist_at_zero
-    procedure :: switch_motion
-    procedure :: accelerate
-    procedure :: element_rate
-    procedure :: push_element
-    procedure :: block_indicators
-    procedure :: reactions
+    procedure :: set_coordinates, list_coordinates, start, project_start_speeds, set_state, gather, find_far
+    procedure :: shift_state, restore_state, reset_origin, angle_at_zero, twist_at_zero, switch_motion
+    procedure :: accelerate, element_rate, push_element, block_indicators, reactions
   end type coordinate_formulation_t
 
 contains

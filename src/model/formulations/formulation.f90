@@ -33,21 +33,12 @@ module nocdyn_formulation
     procedure(set_state_interface), deferred :: set_state
     procedure(reactions_interface), deferred :: reactions
     procedure(motion_interface), deferred :: switch_motion
-    procedure :: allocate_state
-    procedure :: set_norm
-    procedure :: gather
-    procedure :: reset_origin
-    procedure :: angle_at_zero
-    procedure :: twist_at_zero
-    procedure :: component_name
-    procedure :: measure
-    procedure :: measure_name
+    procedure :: allocate_state, set_norm, gather, reset_origin, angle_at_zero, twist_at_zero, component_name
+    procedure :: measure, measure_name
     procedure :: observe => observe_elements
     procedure :: refresh_lane
     procedure :: start_lane => start_branches
-    procedure :: limit_steps
-    procedure :: fastest_wave
-    procedure :: indicator_values
+    procedure :: limit_steps, fastest_wave, indicator_values
     procedure :: set_indicator => indicate_branch
     procedure :: change_branch => change_to_branch
     procedure :: switch_name

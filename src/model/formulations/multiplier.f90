@@ -14,9 +14,7 @@ module nocdyn_multiplier
     integer, allocatable :: pivots(:, :)        !! of the LU factors, [n + kept, lanes]
     real(wp), allocatable :: solution(:, :)     !! omega' [rad/s2] and lambda of the kept rows, [n + kept, lanes]
   contains
-    procedure :: formulate
-    procedure :: derivative
-    procedure :: reactions
+    procedure :: formulate, derivative, reactions
   end type multiplier_t
 
 contains

@@ -21,12 +21,7 @@ module nocdyn_paper
     real(wp), allocatable, private :: term(:)                  !! moments on the bodies [N m], [n], work space
     type(paper_matrices_t), private :: work
   contains
-    procedure :: formulate
-    procedure :: derivative
-    procedure :: jacobian
-    procedure :: start
-    procedure :: observe
-    procedure :: reactions
+    procedure :: formulate, derivative, jacobian, start, observe, reactions
   end type paper_t
 
 contains

@@ -26,24 +26,11 @@ module nocdyn_row_formulation
     procedure(accelerate_interface), deferred :: accelerate
     procedure(rate_interface), deferred :: element_rate
     procedure(push_interface), deferred :: push_element
-    procedure :: prepare_joints
-    procedure :: joint_rate
-    procedure :: push
-    procedure :: move_rows
-    procedure :: hold
-    procedure :: find_accelerations
+    procedure :: prepare_joints, joint_rate, push, move_rows, hold, find_accelerations
     procedure, private :: hold_accelerations
-    procedure :: find_held_moments
-    procedure :: clean_rates
-    procedure :: add_powers
-    procedure :: differentiate_rows
-    procedure :: hold_derivative
-    procedure :: hold_columns
-    procedure, private :: hold_column
-    procedure, private :: differentiate_drags
-    procedure :: project
-    procedure :: project_state
-    procedure :: evaluation_obstacle
+    procedure :: find_held_moments, clean_rates, add_powers, differentiate_rows, hold_derivative, hold_columns
+    procedure, private :: hold_column, differentiate_drags
+    procedure :: project, project_state, evaluation_obstacle
   end type row_formulation_t
 
   abstract interface
