@@ -1,11 +1,11 @@
 !> The matrices and vectors of the paper, eqs. (13)-(72), for any machine of n bodies.
 !>
-!> They are those of one lane, at the state at which `evaluate` and `differentiate` of the machine were last called. The parts of a
-!> law beyond -K12 u - c u' (the rest twist of a coupling, the torque of a motor) are terms of Q. Every procedure overwrites its
+!> They are those of one lane, at the state at which `evaluate` and `differentiate` of the machine were last called. The parts of
+!> a law beyond -K12 u - c u' (the rest twist of a coupling, the torque of a motor) are terms of Q. Every procedure overwrites its
 !> last argument and allocates nothing.
 module nocdyn_paper_matrices
-  use nocdyn_bank, only: bank_t, role_bearing, role_clutch, role_coupling, role_crank, role_excitation, role_freewheel, role_load, &
-    role_loss, role_motor, role_phase
+  use nocdyn_bank, only: bank_t, role_bearing, role_clutch, role_coupling, role_crank, role_excitation, role_freewheel, &
+    role_load, role_loss, role_motor, role_phase
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_solve
@@ -168,8 +168,8 @@ contains
     call machine%elements%rows%add_coefficients(1.0_wp, of_elements, stiffness)
   end subroutine stiffness_matrix
 
-  !> K12 of eq. (3) of an element of a bank: the elastic moment of a coupling over its twist from rest; the derivative at rest, and
-  !> of meshes whose teeth have errors [N m/rad].
+  !> K12 of eq. (3) of an element of a bank: the elastic moment of a coupling over its twist from rest; the derivative at rest,
+  !> and of meshes whose teeth have errors [N m/rad].
   pure real(wp) function secant(bank, elements, lane, e)
     class(bank_t), intent(in) :: bank
     type(elements_t), intent(in) :: elements   !! of the machine
