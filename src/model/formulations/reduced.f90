@@ -254,18 +254,26 @@ contains
         e = machine%with_work(k)
         dfdt(:, self%states + k) = elements%applied_time(:, e) * elements%speed(:, e)
       end do
-      if (self%joints%count > 0) then
-        ! the Jacobian where joints hold: each column has the accelerations that these leave
-        dfdy = 0.0_wp
-        associate (pattern => self%element_jacobian%pattern, f => self%machine%coordinates%freedoms)
-          do k = 1, size(pattern%row)
-            dfdy(pattern%row(k), pattern%column(k)) = self%free_jacobian(1, k)
-          end do
-          call self%hold_columns(self%states + self%quadratures, dfdy, dfdt)
-        end associate
-      end if
+      if (self%joints%count > 0) call hold_jacobian(self, self%states + self%quadratures, dfdy, dfdt)
     end associate
   end subroutine jacobian
+
+  !> The Jacobian where joints hold: each column has the accelerations that these leave.
+  subroutine hold_jacobian(self, components, dfdy, dfdt)
+    class(reduced_t), intent(inout) :: self
+    integer, intent(in) :: components                          !! states + quadratures
+    real(wp), intent(inout) :: dfdy(components, self%states)   !! of the only lane
+    real(wp), intent(inout) :: dfdt(components)
+    integer :: k
+
+    dfdy = 0.0_wp
+    associate (pattern => self%element_jacobian%pattern)
+      do k = 1, size(pattern%row)
+        dfdy(pattern%row(k), pattern%column(k)) = self%free_jacobian(1, k)
+      end do
+    end associate
+    call self%hold_columns(components, dfdy, dfdt)
+  end subroutine hold_jacobian
 
   !> All positions where there are joints.
   function jacobian_pattern(self) result(pattern)
