@@ -186,7 +186,7 @@ BARE = RELEASED.replace(" section_modulus=1e-5", "").format(t_end=1)
             ":5: &fatigue 'f': a stress needs a section, but coupling 'c' has none; required: section_modulus [m3] or "
             "diameter [m] of &coupling, or a moment in place of the stress",
         ),
-        (f"coupling='d' {CURVE}", ":5: &fatigue 'f': there is no coupling 'd'\n"),
+        (f"coupling='d' {CURVE}", ":5: &fatigue 'f': there is no coupling 'd'; allowed: 'c'\n"),
         (f"shaft='shaft_1' {CURVE}", ":5: &fatigue 'f': there is no shaft 'shaft_1'"),
         ("coupling='c' reference_moment=1 slope=3", "reference_cycles"),
         ("coupling='c' reference_cycles=1 slope=3", "reference_stress"),

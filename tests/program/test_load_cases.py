@@ -239,7 +239,7 @@ def test_damage_of_cases_that_fail_is_said_to_be_incomplete(nocdyn):
 @pytest.mark.parametrize(
     "case, message",
     [
-        ("name = 'a' without = 'shaft'", "m.nml: load case 'a': m.nml:10: &fatigue 'life': there is no coupling 'shaft'"),
+        ("name = 'a' without = 'shaft'", "m.nml:10: load case 'a': &fatigue 'life': there is no coupling 'shaft'"),
         ("name = 'a' set = 'output.extremes_from=3'", "m.nml:12: &load_case 'a': set 'output.extremes_from=3': &output: "),
         ("name = 'a' set = 'excitation.sc.time=-1' with = 'sc'", "m.nml:12: &load_case 'a': set 'excitation.sc.time=-1': "),
     ],

@@ -18,7 +18,7 @@ SERIAL = "nocdyn_serial_work"  # what one thread at a time does
 # Modules that threads could reach, by `use`, and that have such lengths: in procedures that threads do not call at the same time.
 BEFORE_THREADS = {
     *("sweep_plan", "sweep_design", "input_text", "target_consistency", "table_file", "text_file", "posix", "posix_files"),
-    *("recorded_analyses", "recorded_fatigue", "target_patterns", "column_names", "output_units", "json", "name_checks"),
+    *("recorded_analyses", "target_patterns", "column_names", "output_units", "json", "name_checks"),
     "namelist_values",
 }
 VALUES_OF_A_VARIANT = {

@@ -9,9 +9,9 @@ module nocdyn_machine_parts
   use nocdyn_electrical_faults, only: check_fault
   use nocdyn_element_groups, only: add_banks, bodies_of, body_index_t, element_groups_t, new_body_index, new_element_groups
   use nocdyn_engine_checks, only: check_engine, check_order_torques
-  use nocdyn_errors, only: add_error, add_mistake, error_t, exit_input, raise
+  use nocdyn_errors, only: add_error, error_t, exit_input, raise
   use nocdyn_fatigue_groups, only: check_fatigue
-  use nocdyn_input, only: input_t
+  use nocdyn_input, only: diagnostics_t, input_t
   use nocdyn_joint_assembly, only: add_bearings, add_clutch_form, add_freewheels, check_clutch, clutch_form
   use nocdyn_joint_simplifications, only: list_simplifications
   use nocdyn_kinds, only: wp
@@ -23,6 +23,7 @@ module nocdyn_machine_parts
   use nocdyn_motion_assembly, only: add_cardans, add_drive_form, add_relations, check_drive, check_relation, drive_form
   use nocdyn_motor_assembly, only: add_motor_form, check_motor, motor_form
   use nocdyn_moving_start, only: fit_moving_rows
+  use nocdyn_output_times, only: check_output_times
   use nocdyn_shaft_assembly, only: add_shafts, new_shaft_set, shaft_set_t
   use nocdyn_shaft_segments, only: check_shaft
   use nocdyn_start_speeds, only: fit_start_speeds
@@ -34,7 +35,7 @@ module nocdyn_machine_parts
   implicit none (type, external)
   private
 
-  public :: build_machine, check_groups, given_speeds
+  public :: build_machine, check_input, given_speeds, refuse_mistakes
 
   integer, parameter :: most_names = 12   ! in a message
 
@@ -49,15 +50,15 @@ contains
     integer, intent(in), optional :: lanes   !! 1 if absent
     type(body_index_t), target :: body_index
     type(shaft_set_t) :: shafts
-    type(error_t), allocatable :: mistakes
+    type(diagnostics_t) :: diagnostics
     integer :: i
 
     if (present(lanes)) machine%lanes = lanes
     call set_bodies(input, view, machine)
     body_index = new_body_index(machine%names)
     call assemble_constraints(input, view, body_index, machine%lanes, machine%constraints, error)
-    call check_groups(input, mistakes)
-    call add_error(error, mistakes)
+    call check_groups(input, diagnostics)
+    call input%refuse(diagnostics, error)
     if (allocated(error)) return
     call add_elements(input, view, body_index, machine)
     call new_shaft_set(input, body_index, machine%constraints, shafts)
@@ -73,60 +74,82 @@ contains
     call fit_moving_rows(input, machine, given_speeds(input, machine%nodes), error)
   end subroutine build_machine
 
-  !> Refuses values that do not fit together, which the schema does not know: one mistake of each group, in the order of the file.
-  subroutine check_groups(input, error)
+  !> Adds all mistakes of `check_input` to an error or to none.
+  subroutine refuse_mistakes(input, error, known)
+    type(input_t), intent(in) :: input   !! of a machine or a load case
+    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(in), optional :: known   !! mistakes of the machine, which a load case does not repeat
+    type(diagnostics_t) :: diagnostics
+
+    call check_input(input, diagnostics)
+    if (present(known)) then
+      call input%refuse_new(diagnostics, known, error)
+    else
+      call input%refuse(diagnostics, error)
+    end if
+  end subroutine refuse_mistakes
+
+  !> All mistakes of an input whose groups and keys are right, before anything is computed.
+  subroutine check_input(input, diagnostics)
+    type(input_t), intent(in) :: input   !! of a machine or a load case
+    type(diagnostics_t), intent(inout) :: diagnostics
+
+    call check_groups(input, diagnostics)
+    call check_output_times(input, diagnostics)
+  end subroutine check_input
+
+  !> Refuses values that do not fit together, which the schema does not know.
+  subroutine check_groups(input, diagnostics)
     type(input_t), intent(in) :: input
-    type(error_t), allocatable, intent(out) :: error   !! has a line for each mistake
-    type(error_t), allocatable :: own
+    type(diagnostics_t), intent(inout) :: diagnostics
     integer :: g
 
     do g = 1, size(input%groups)
-      call check_group(input, g, own)
-      call add_error(error, own)
+      call check_group(input, g, diagnostics)
     end do
   end subroutine check_groups
 
   !> Refuses values of one group.
-  subroutine check_group(input, g, error)
+  subroutine check_group(input, g, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: g   !! index of the group
-    type(error_t), allocatable, intent(out) :: error   !! names file, line, group and key
+    type(diagnostics_t), intent(inout) :: diagnostics
 
     select case (input%groups(g)%kind)
     case ('coupling')
-      call check_coupling(input, g, error)
+      call check_coupling(input, g, diagnostics)
     case ('shaft')
-      call check_shaft(input, g, error)
+      call check_shaft(input, g, diagnostics)
     case ('mesh')
-      call check_mesh(input, g, error)
-      if (.not. allocated(error)) call check_loss(input, g, error)
+      call check_mesh(input, g, diagnostics)
+      call check_loss(input, g, diagnostics)
     case ('gear', 'planetary')
-      call check_loss(input, g, error)
+      call check_loss(input, g, diagnostics)
     case ('clutch')
-      if (input%groups(g)%text('kind') == 'friction') call check_clutch(input, g, error)
+      if (input%groups(g)%text('kind') == 'friction') call check_clutch(input, g, diagnostics)
     case ('relation')
-      call check_relation(input, g, error)
+      call check_relation(input, g, diagnostics)
     case ('drive')
-      call check_drive(input, g, error)
+      call check_drive(input, g, diagnostics)
     case ('crank')
-      call check_crank(input, g, error)
+      call check_crank(input, g, diagnostics)
     case ('motor')
-      call check_motor(input, g, error)
+      call check_motor(input, g, diagnostics)
     case ('engine')
-      call check_engine(input, g, error)
+      call check_engine(input, g, diagnostics)
     case ('excitation')
-      if (input%groups(g)%text('kind') == 'orders') call check_order_torques(input, g, error)
-      if (input%groups(g)%text('kind') == 'fault') call check_fault(input, g, error)
+      if (input%groups(g)%text('kind') == 'orders') call check_order_torques(input, g, diagnostics)
+      if (input%groups(g)%text('kind') == 'fault') call check_fault(input, g, diagnostics)
     case ('limit')
-      call check_limit(input, g, error)
+      call check_limit(input, g, diagnostics)
     case ('response')
       ! refuses ranges that begin with the faster speed, or whose ends differ in direction
       associate (group => input%groups(g))
-        call check_range(input, g, 'speed', group%numbers('speed'), error)
-        call check_range(input, g, 'operating', group%numbers('operating'), error)
+        call check_range(input, g, 'speed', group%numbers('speed'), diagnostics)
+        call check_range(input, g, 'operating', group%numbers('operating'), diagnostics)
       end associate
     case ('fatigue')
-      call check_fatigue(input, g, error)
+      call check_fatigue(input, g, diagnostics)
     case default
     end select
   end subroutine check_group
@@ -251,19 +274,19 @@ contains
   end function given_speeds
 
   !> Two speeds are the lowest and the highest one, in the same direction. The ones of a response may be one.
-  subroutine check_range(input, group, key, range, error)
+  subroutine check_range(input, group, key, range, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: group
     character(len=*), intent(in) :: key
     real(wp), intent(in) :: range(:)   !! [rad/s], or empty
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
     character(len=:), allocatable :: text
 
     if (size(range) == 0) return
     if (size(range) == 1 .and. key == 'speed') return
     if (size(range) > 2) then
-      call add_mistake(error, input%location(group, key) // ': ' // to_text(size(range)) // ' speeds; allowed: one, ' // &
-                 'or the slowest and the fastest one')
+      call input%report(group, key, to_text(size(range)) // ' speeds; allowed: one, or the slowest and the fastest one', &
+                 diagnostics)
       return
     end if
     if (range(1) * range(2) > 0 .and. abs(range(1)) < abs(range(2))) return
@@ -274,8 +297,8 @@ contains
       if (unit_of(written, key) == 0) text = text // ' rad/s, which is ' // rounded_text(from_si(range(1), unit_rpm), 6) // &
                                              ', ' // rounded_text(from_si(range(2), unit_rpm), 6) // ' rpm'
     end associate
-    call add_mistake(error, input%location(group, key) // ': ' // text // '; allowed: first the slower speed, then ' // &
-               'the faster one, both with one sign')
+    call input%report(group, key, text // '; allowed: first the slower speed, then the faster one, both with one sign', &
+               diagnostics)
   end subroutine check_range
 
 end module nocdyn_machine_parts

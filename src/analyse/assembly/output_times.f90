@@ -1,7 +1,6 @@
 !> The times of the rows in the table of results.
 module nocdyn_output_times
-  use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: rounded_text, to_text
   implicit none (type, external)
@@ -17,9 +16,9 @@ contains
 
   !> Refuses more than `most_rows` rows, intervals that are so short that rounding makes their times equal, and extremes from a
   !> time that is not in the run.
-  subroutine check_output_times(input, error)
+  subroutine check_output_times(input, diagnostics)
     type(input_t), intent(in) :: input   !! checked
-    type(error_t), allocatable, intent(out) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
     type(group_t) :: output, run
     real(wp) :: rounding, span, step
     character(len=:), allocatable :: message, key
@@ -27,8 +26,7 @@ contains
     output = input%single('output')
     run = input%single('run')
     span = run%number('t_end') - run%number('t_start')
-    call check_extremes_from(input, error)
-    if (allocated(error)) return
+    call check_extremes_from(input, diagnostics)
     rounding = spacing(max(abs(run%number('t_start')), abs(run%number('t_end'))))
     if (output%has_value('interval')) then
       key = 'interval'
@@ -48,13 +46,13 @@ contains
     else
       return
     end if
-    call raise(error, exit_input, input%location(input%position('output'), key) // ': ' // message)
+    call input%report(input%position('output'), key, message, diagnostics)
   end subroutine check_output_times
 
   !> Refuses extremes from a time before the start, or from the end on.
-  subroutine check_extremes_from(input, error)
+  subroutine check_extremes_from(input, diagnostics)
     type(input_t), intent(in) :: input
-    type(error_t), allocatable, intent(out) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
     type(group_t) :: output, run
     character(len=:), allocatable :: allowed
 
@@ -65,8 +63,8 @@ contains
       if (from >= t_start .and. from < t_end) return
       allowed = '< t_end = ' // to_text(t_end)
       if (from < t_start) allowed = '>= t_start = ' // to_text(t_start)
-      call raise(error, exit_input, input%location(input%position('output'), 'extremes_from') // ': extremes_from = ' // &
-                 to_text(from) // ' is out of range; allowed: ' // allowed)
+      call input%report(input%position('output'), 'extremes_from', 'extremes_from = ' // to_text(from) // &
+                        ' is out of range; allowed: ' // allowed, diagnostics)
     end associate
   end subroutine check_extremes_from
 

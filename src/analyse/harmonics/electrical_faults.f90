@@ -1,10 +1,9 @@
 !> The torques of electrical faults on the rotor of a synchronous or an induction machine, as sums of decaying sines: of the
 !> fluxes of the machine, or as they are given. They brake a rotor that turns with the mains, at rated voltage and after no load.
 module nocdyn_electrical_faults
-  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_fault_excitations, only: fault_terms_t
   use nocdyn_fault_fluxes, only: fault_machine_t, find_flux_terms
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: counted, to_text
   implicit none (type, external)
@@ -15,32 +14,34 @@ module nocdyn_electrical_faults
 contains
 
   !> Refuses faults before the start of the run, lists of different lengths, and reactances in the wrong order.
-  subroutine check_fault(input, index, error)
+  subroutine check_fault(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
     type(fault_terms_t) :: terms
     real(wp) :: t_start
+    integer :: before   ! mistakes of the groups before
     logical :: has_failed
 
+    before = diagnostics%count
     t_start = input%groups(input%position('run'))%number('t_start')
     associate (group => input%groups(index))
       if (group%number('time') < t_start) then
-        call add_mistake(error, input%location(index, 'time') // ': time = ' // to_text(group%number('time')) // &
-                   ' is before the run; allowed: >= t_start = ' // to_text(t_start) // ' [s]')
+        call input%report(index, 'time', 'time = ' // to_text(group%number('time')) // &
+                   ' is before the run; allowed: >= t_start = ' // to_text(t_start) // ' [s]', diagnostics)
       end if
       if (group%number('frequency', absent=1.0_wp) <= 0) then
-        call add_mistake(error, input%location(index, 'frequency') // ': frequency = ' // &
-                   to_text(group%number('frequency')) // "; allowed with kind = 'fault': > 0 [rad/s]")
+        call input%report(index, 'frequency', 'frequency = ' // to_text(group%number('frequency')) // &
+                   "; allowed with kind = 'fault': > 0 [rad/s]", diagnostics)
       end if
       if (group%has_value('fault')) then
         call check_order('transient_reactance', 'subtransient_reactance')
         call check_order('synchronous_reactance', &
                          trim(merge('transient_reactance   ', 'subtransient_reactance', group%has_value('transient_reactance'))))
-        if (allocated(error)) return
+        if (diagnostics%count > before) return
         call find_fault_terms(group, terms, has_failed)
-        if (has_failed) call add_mistake(error, input%location(index, 'subtransient_reactance') // &
-                                   ': the reactances and time constants are so far apart that no torque can be computed')
+        if (has_failed) call input%report(index, 'subtransient_reactance', &
+                   'the reactances and time constants are so far apart that no torque can be computed', diagnostics)
       else
         call check_length('term_times')
         call check_length('term_phases')
@@ -56,8 +57,8 @@ contains
       associate (group => input%groups(index))
         if (.not. group%has_value(key) .or. .not. group%has_value(earlier)) return
         if (group%number(key) >= group%number(earlier)) return
-        call add_mistake(error, input%location(index, key) // ': ' // key // ' = ' // to_text(group%number(key)) // &
-                   '; allowed: >= ' // earlier // ' = ' // to_text(group%number(earlier)))
+        call input%report(index, key, key // ' = ' // to_text(group%number(key)) // '; allowed: >= ' // earlier // ' = ' // &
+                   to_text(group%number(earlier)), diagnostics)
       end associate
     end subroutine check_order
 
@@ -68,9 +69,8 @@ contains
       associate (group => input%groups(index))
         associate (terms => size(group%numbers('term_amplitudes')), values => size(group%numbers(key)))
           if (values == 0 .or. values == terms) return
-          call add_mistake(error, input%location(index, key) // ': ' // key // ' has ' // &
-                     counted(values, 'value', 'values') // ' and term_amplitudes has ' // counted(terms, 'value', 'values') // &
-                     '; needed: as many of each')
+          call input%report(index, key, key // ' has ' // counted(values, 'value', 'values') // ' and term_amplitudes has ' // &
+                     counted(terms, 'value', 'values') // '; needed: as many of each', diagnostics)
         end associate
       end associate
     end subroutine check_length

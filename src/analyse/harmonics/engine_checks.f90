@@ -1,9 +1,8 @@
 !> Mistakes in the values of &engine, and of &excitation with orders, that the schema does not know.
 module nocdyn_engine_checks
   use nocdyn_cylinder_torques, only: cycle_of
-  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_harmonic_tables, only: distinct, find_table_obstacle
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_shared_loads, only: find_shared_load
   use nocdyn_text, only: counted, quoted, to_text
@@ -20,10 +19,10 @@ module nocdyn_engine_checks
 contains
 
   !> Refuses engines of which something does not fit: firing angles, orders, pressures, loads, numbers of cylinders.
-  subroutine check_engine(input, index, error)
+  subroutine check_engine(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error   !! names file, line, group and key
+    type(diagnostics_t), intent(inout) :: diagnostics
     character(len=:), allocatable :: key, text
 
     associate (group => input%groups(index))
@@ -43,7 +42,7 @@ contains
 
     !> Takes up what is wrong with a key.
     subroutine note()
-      if (text /= '') call add_mistake(error, input%location(index, key) // ': ' // text)
+      if (text /= '') call input%report(index, key, text, diagnostics)
       text = ''
     end subroutine note
 
@@ -191,20 +190,20 @@ contains
   end subroutine check_names
 
   !> Refuses orders of &excitation with rows that do not fit together, or without their load.
-  subroutine check_order_torques(input, index, error)
+  subroutine check_order_torques(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error   !! names file, line, group and key
+    type(diagnostics_t), intent(inout) :: diagnostics
     character(len=:), allocatable :: key, text
     integer :: load
 
     associate (group => input%groups(index))
       text = ''
       if (group%has_value('speeds')) call find_table_obstacle(group, key, text)
-      if (text /= '') call add_mistake(error, input%location(index, key) // ': ' // text)
+      if (text /= '') call input%report(index, key, text, diagnostics)
       if (.not. group%has_value('share_of_load')) return
       call find_shared_load(input, index, load, text)
-      if (text /= '') call add_mistake(error, input%location(index, 'share_of_load') // ': ' // text)
+      if (text /= '') call input%report(index, 'share_of_load', text, diagnostics)
     end associate
   end subroutine check_order_torques
 

@@ -26,7 +26,7 @@ contains
         if (group%number('crankcase_pressure') > 0 .or. size(group%numbers('pressures')) == 0) cycle
         associate (lowest => minval(group%numbers('pressures')))
           if (lowest < least) cycle
-          call append(notes, input%location(i, 'pressures') // ': the lowest pressure is ' // rounded_text(lowest, 4) // &
+          call append(notes, input%place(i, 'pressures') // ': the lowest pressure is ' // rounded_text(lowest, 4) // &
                              ' Pa, and crankcase_pressure = 0: the piston has a vacuum below it. Absolute pressures need ' // &
                              'crankcase_pressure, about 1e5')
         end associate

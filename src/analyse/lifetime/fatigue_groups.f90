@@ -1,9 +1,8 @@
 !> The groups &fatigue of an input: what they may ask for, and their S-N curves.
 module nocdyn_fatigue_groups
-  use nocdyn_errors, only: add_mistake, error_t
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_near_words, only: nearest_word
+  use nocdyn_schema_text, only: suggest
   use nocdyn_sn_curves, only: mean_strength, new_sn_curve, sn_curve_t
   use nocdyn_text, only: counted, quoted, string_t, to_text
   use nocdyn_written_values, only: written_element, written_number, written_unit
@@ -57,26 +56,28 @@ contains
   end function fatigue_symbol
 
   !> Refuses elements that do not exist or have no such quantity, and values that do not fit together.
-  subroutine check_fatigue(input, index, error)
+  subroutine check_fatigue(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
 
-    call check_element(input, index, error)
-    call check_curve(input, index, error)
-    call check_mean(input, index, error)
-    call check_profile(input, index, error)
+    call check_element(input, index, diagnostics)
+    call check_curve(input, index, diagnostics)
+    call check_mean(input, index, diagnostics)
+    call check_profile(input, index, diagnostics)
   end subroutine check_fatigue
 
   !> The element must exist and have the quantity.
-  subroutine check_element(input, index, error)
+  subroutine check_element(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
     type(string_t), allocatable :: names(:)
     integer, allocatable :: candidates(:)
+    character(len=:), allocatable :: hint
     character(len=8) :: kind
-    integer :: i, near
+    integer :: i
+    logical :: is_near
 
     kind = element_kind(input%groups(index))
     associate (group => input%groups(index))
@@ -85,44 +86,39 @@ contains
       do i = 1, size(candidates)
         names(i)%text = input%groups(candidates(i))%name
         if (names(i)%text /= group%text(trim(kind))) cycle
-        call check_quantity(input, index, input%groups(candidates(i)), error)
+        call check_quantity(input, index, input%groups(candidates(i)), diagnostics)
         return
       end do
-      near = nearest_word(group%text(trim(kind)), names)
-      if (near > 0) then
-        call add_mistake(error, input%location(index, trim(kind)) // ': there is no ' // trim(kind) // ' ' // &
-                   quoted(group%text(trim(kind))) // '; did you mean ' // quoted(names(near)%text) // '?')
-      else
-        call add_mistake(error, input%location(index, trim(kind)) // ': there is no ' // trim(kind) // ' ' // &
-                   quoted(group%text(trim(kind))))
-      end if
+      call suggest(group%text(trim(kind)), names, hint, is_near)
+      call input%report(index, trim(kind), 'there is no ' // trim(kind) // ' ' // quoted(group%text(trim(kind))), diagnostics, &
+                        hint=hint)
     end associate
   end subroutine check_element
 
   !> A coupling has a stress if its section is given, a gear a force if its radii are.
-  subroutine check_quantity(input, index, element, error)
+  subroutine check_quantity(input, index, element, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
     type(group_t), intent(in) :: element
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
 
     if (element%kind == 'coupling' .and. quantity_of(input%groups(index)) == quantity_stress) then
       if (element%has_value('section_modulus') .or. element%has_value('diameter')) return
-      call add_mistake(error, input%location(index, 'coupling') // ': a stress needs a section, but coupling ' // &
-                 quoted(element%name) // ' has none; required: section_modulus [m3] or diameter [m] of &coupling, or ' // &
-                 'a moment in place of the stress')
+      call input%report(index, 'coupling', 'a stress needs a section, but coupling ' // quoted(element%name) // &
+                 ' has none; required: section_modulus [m3] or diameter [m] of &coupling, or ' // &
+                 'a moment in place of the stress', diagnostics)
     else if (element%kind == 'gear') then
       if (element%has_value('radii')) return
-      call add_mistake(error, input%location(index, 'gear') // ': a tooth force needs radii, but gear ' // &
-                 quoted(element%name) // ' has none; required: radii [m] of &gear')
+      call input%report(index, 'gear', 'a tooth force needs radii, but gear ' // quoted(element%name) // &
+                 ' has none; required: radii [m] of &gear', diagnostics)
     end if
   end subroutine check_quantity
 
   !> The lists of a table have the same length, and its half ranges descend.
-  subroutine check_curve(input, index, error)
+  subroutine check_curve(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
     real(wp), allocatable :: cycles(:), half_range(:)
     character(len=18) :: key
     integer :: i
@@ -133,26 +129,26 @@ contains
       allocate (cycles, source=group%numbers('table_cycles'))
       allocate (half_range, source=group%numbers(trim(key)))
       if (size(half_range) /= size(cycles)) then
-        call add_mistake(error, input%location(index, trim(key)) // ': ' // trim(key) // ' has ' // &
-                   counted(size(half_range), 'value', 'values') // ' and table_cycles has ' // &
-                   counted(size(cycles), 'value', 'values') // '; needed: as many of each')
+        call input%report(index, trim(key), trim(key) // ' has ' // counted(size(half_range), 'value', 'values') // &
+                   ' and table_cycles has ' // counted(size(cycles), 'value', 'values') // '; needed: as many of each', &
+                   diagnostics)
         return
       end if
       do i = 2, size(cycles)
         if (half_range(i) < half_range(i - 1)) cycle
-        call add_mistake(error, input%location(index, trim(key)) // ': ' // trim(key) // '(' // to_text(i) // ') = ' // &
-                   to_text(half_range(i)) // ' is not less than the value before, ' // to_text(half_range(i - 1)) // &
-                   '; needed: half ranges that descend')
+        call input%report(index, trim(key), trim(key) // '(' // to_text(i) // ') = ' // to_text(half_range(i)) // &
+                   ' is not less than the value before, ' // to_text(half_range(i - 1)) // &
+                   '; needed: half ranges that descend', diagnostics)
         return
       end do
     end associate
   end subroutine check_curve
 
   !> The influence of the mean needs the strength, in stresses.
-  subroutine check_mean(input, index, error)
+  subroutine check_mean(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
     character(len=15) :: key
 
     associate (group => input%groups(index))
@@ -165,26 +161,26 @@ contains
         key = ''
         if (group%has_value('ultimate_stress')) key = 'ultimate_stress'
         if (group%has_value('yield_stress')) key = 'yield_stress'
-        if (key /= '') call add_mistake(error, input%location(index, trim(key)) // ': ' // trim(key) // &
-                                  " has no effect with mean_stress = 'none'; allowed: goodman with ultimate_stress, " // &
-                                  'soderberg with yield_stress')
+        if (key /= '') call input%report(index, trim(key), trim(key) // &
+                   " has no effect with mean_stress = 'none'; allowed: goodman with ultimate_stress, " // &
+                   'soderberg with yield_stress', diagnostics)
         return
       end select
       if (quantity_of(group) /= quantity_stress) then
-        call add_mistake(error, input%location(index, 'mean_stress') // ': mean_stress = ' // &
-                   quoted(group%text('mean_stress')) // ' needs an S-N curve of stresses, reference_stress or table_stress')
+        call input%report(index, 'mean_stress', 'mean_stress = ' // quoted(group%text('mean_stress')) // &
+                   ' needs an S-N curve of stresses, reference_stress or table_stress', diagnostics)
       else if (.not. group%has_value(trim(key))) then
-        call add_mistake(error, input%location(index, 'mean_stress') // ': mean_stress = ' // &
-                   quoted(group%text('mean_stress')) // ' needs ' // trim(key) // ' [Pa]')
+        call input%report(index, 'mean_stress', 'mean_stress = ' // quoted(group%text('mean_stress')) // ' needs ' // &
+                   trim(key) // ' [Pa]', diagnostics)
       end if
     end associate
   end subroutine check_mean
 
   !> A profile has speeds of &response.
-  subroutine check_profile(input, index, error)
+  subroutine check_profile(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
     integer, allocatable :: responses(:)
     real(wp), allocatable :: range(:), speeds(:)
     integer :: i
@@ -193,18 +189,18 @@ contains
     if (size(speeds) == 0) return
     allocate (responses, source=input%groups_named('response'))
     if (size(responses) == 0) then
-      call add_mistake(error, input%location(index, 'profile_speeds') // ': profile_speeds are those of the body of ' // &
-                 '&response; required: a group &response')
+      call input%report(index, 'profile_speeds', 'profile_speeds are those of the body of ' // &
+                 '&response; required: a group &response', diagnostics)
       return
     end if
     allocate (range, source=input%groups(responses(1))%numbers('speed'))
     do i = 1, size(speeds)
       if (minval(range) <= speeds(i) .and. speeds(i) <= maxval(range)) cycle
       associate (group => input%groups(index))
-        call add_mistake(error, input%location(index, 'profile_speeds') // ': ' // &
-                   written_element(group, 'profile_speeds', i) // ' is outside of the speeds of &response; allowed: ' // &
-                   written_number(group, 'profile_speeds', range(1)) // ' to ' // &
-                   written_number(group, 'profile_speeds', range(2)) // ' [' // written_unit(group, 'profile_speeds') // ']')
+        call input%report(index, 'profile_speeds', written_element(group, 'profile_speeds', i) // &
+                   ' is outside of the speeds of &response; allowed: ' // written_number(group, 'profile_speeds', range(1)) // &
+                   ' to ' // written_number(group, 'profile_speeds', range(2)) // ' [' // written_unit(group, &
+                   'profile_speeds') // ']', diagnostics)
       end associate
       return
     end do

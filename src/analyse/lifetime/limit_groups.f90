@@ -1,7 +1,6 @@
 !> The elements and the signals that groups &limit are of.
 module nocdyn_limit_groups
-  use nocdyn_errors, only: add_mistake, error_t
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_schema_text, only: suggestion
   use nocdyn_signals, only: find_signal, signal_t
   use nocdyn_text, only: quoted, string_t
@@ -42,12 +41,13 @@ contains
   end function limited_signal
 
   !> Refuses limits of elements that there are not.
-  subroutine check_limit(input, index, error)
+  subroutine check_limit(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error   !! names file, line, group and key
+    type(diagnostics_t), intent(inout) :: diagnostics
     character(len=*), parameter :: kinds(*) = [character(len=8) :: 'coupling', 'shaft', 'mesh']
     character(len=8) :: kind
+    character(len=:), allocatable :: name
     type(string_t), allocatable :: names(:)
     integer, allocatable :: groups(:)
     integer :: i
@@ -61,12 +61,13 @@ contains
     end do
     do i = 1, size(kinds)
       if (kinds(i) == kind .or. .not. has_name(input, trim(kinds(i)), input%groups(index)%text(trim(kind)))) cycle
-      call add_mistake(error, input%location(index, trim(kind)) // ': ' // quoted(input%groups(index)%text(trim(kind))) // &
-                 ' is a ' // trim(kinds(i)) // '; needed: ' // trim(kinds(i)) // ' in place of ' // trim(kind))
+      call input%report(index, trim(kind), quoted(input%groups(index)%text(trim(kind))) // ' is a ' // trim(kinds(i)) // &
+                 '; needed: ' // trim(kinds(i)) // ' in place of ' // trim(kind), diagnostics)
       return
     end do
-    call add_mistake(error, input%location(index, trim(kind)) // ': there is no ' // trim(kind) // ' ' // &
-               quoted(input%groups(index)%text(trim(kind))) // suggestion(input%groups(index)%text(trim(kind)), names))
+    name = input%groups(index)%text(trim(kind))
+    call input%report(index, trim(kind), 'there is no ' // trim(kind) // ' ' // quoted(name), diagnostics, &
+                      hint=suggestion(name, names))
   end subroutine check_limit
 
   !> Whether a group of a kind has a name.

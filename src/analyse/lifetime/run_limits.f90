@@ -72,7 +72,7 @@ contains
         ignored = ignored // trim(keys(k))
       end do
       if (ignored == '') cycle
-      call append(notes, input%location(groups(i)) // ': a run compares nothing with ' // ignored // &
+      call append(notes, input%place(groups(i), '') // ': a run compares nothing with ' // ignored // &
                          ', which is for steady oscillations: nocdyn response does')
     end do
   end subroutine note_other_limits

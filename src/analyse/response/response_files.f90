@@ -374,7 +374,7 @@ contains
       associate (range => summary%barred(i), limit => analysis%limits(summary%barred(i)%limit))
         call json%open()
         call json%put('quantity', analysis%response%quantities(limit%quantity)%name)
-        call json%put('limit_at', input%location(limit%group))
+        call json%put('limit_at', input%place(limit%group, ''))
         call json%put('from_rad_s', range%from)
         call json%put('to_rad_s', range%to)
         call json%put('can_be_passed', range%can_be_passed)

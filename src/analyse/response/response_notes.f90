@@ -340,7 +340,7 @@ contains
       if (.not. input%groups(limits(i))%has_value('rated_speed')) cycle
       rated = from_si(abs(input%groups(limits(i))%number('rated_speed')), unit_rpm)
       if (rated >= lowest .and. rated <= 2.0_wp * highest) cycle
-      call append(notes, input%location(limits(i), 'rated_speed') // ': the rated speed of ' // rounded_text(rated, 5) // &
+      call append(notes, input%place(limits(i), 'rated_speed') // ': the rated speed of ' // rounded_text(rated, 5) // &
                          ' rpm is that of the body of &response, which turns with ' // rounded_text(lowest, 5) // ' to ' // &
                          rounded_text(highest, 5) // ' rpm')
     end do

@@ -1,7 +1,7 @@
 !> Names of signals as a person writes them: with or without the unit, and as patterns with *.
 module nocdyn_column_names
   use nocdyn_diagnostics, only: diagnostics_t
-  use nocdyn_errors, only: error_t, raise
+  use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
   use nocdyn_machine, only: machine_t
   use nocdyn_near_words, only: nearest_word
@@ -58,7 +58,7 @@ contains
       call input%report(output, 'columns', 'columns(' // to_text(i) // ') = ' // quoted(pattern) // &
                         ' matches no column of trajectory.csv' // hint, diagnostics)
     end do
-    if (diagnostics%count > 0) call raise(error, diagnostics%worst_code(), input%diagnostics_text(diagnostics))
+    call input%refuse(diagnostics, error)
     allocate (chosen, source=pack([(c, c=1, size(signals))], is_chosen))
   end subroutine choose_columns
 
@@ -69,7 +69,7 @@ contains
     character(len=*), intent(in) :: key, former, name
     type(string_t), allocatable, intent(inout) :: notes(:)
 
-    call append(notes, input%location(group, key) // ': ' // former // ' is called ' // name // &
+    call append(notes, input%place(group, key) // ': ' // former // ' is called ' // name // &
                        ' now; the next release will not know the former name')
   end subroutine note_former_name
 

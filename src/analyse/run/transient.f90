@@ -7,7 +7,7 @@ module nocdyn_transient
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_finite, only: is_finite
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_input, only: input_t
+  use nocdyn_input, only: diagnostics_t, input_t
   use nocdyn_integration, only: integrate
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_joint_events, only: describe_shared_joints, list_joint_events
@@ -108,11 +108,13 @@ contains
     class(formulation_t), allocatable, target :: formulation
     type(run_observer_t), target :: observer
     type(integration_settings_t) :: settings
+    type(diagnostics_t) :: diagnostics
     type(string_t), allocatable :: notes(:)
     real(wp), allocatable :: times(:)
     integer :: i, rows
 
-    call check_output_times(input, error)
+    call check_output_times(input, diagnostics)
+    call input%refuse(diagnostics, error)
     if (.not. allocated(error)) call build_formulation(input, formulation, settings, notes, error)
     if (allocated(error)) return
     call choose_row_count(input, formulation%machine, rows, notes)

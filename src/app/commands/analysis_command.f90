@@ -11,8 +11,8 @@ module nocdyn_analysis_command
   use nocdyn_input_reader, only: read_input
   use nocdyn_json, only: json_t
   use nocdyn_signal_checks, only: check_signals
-  use nocdyn_load_case_checks, only: check_input, name_load_case
   use nocdyn_machine, only: machine_t
+  use nocdyn_machine_parts, only: check_input, refuse_mistakes
   use nocdyn_matrices_results, only: matrices_results_t
   use nocdyn_named_analyses, only: assemble_analysed, new_analysis
   use nocdyn_posix, only: is_interrupted, stop_at_interrupts
@@ -147,19 +147,18 @@ contains
     class(analysis_t), intent(in) :: kind
     type(reading_t), intent(inout) :: reading   !! gets the mistakes of all of them
     type(machine_t) :: machine
+    type(diagnostics_t) :: known   ! of the machine itself
     type(error_t), allocatable :: own
     integer :: c
     logical :: is_right
 
     if (.not. allocated(reading%load_cases)) return
     is_right = .not. allocated(reading%error)
+    call check_input(reading%input, known)
     do c = 1, size(reading%load_cases)
       if (.not. allocated(reading%load_cases(c)%groups)) cycle
-      call check_input(reading%load_cases(c), own, reading%error)
-      if (is_right .and. .not. allocated(own)) then
-        call assemble_analysed('check', kind, reading%load_cases(c), machine, own)
-        if (allocated(own)) call name_load_case(reading%load_cases(c), own)
-      end if
+      call refuse_mistakes(reading%load_cases(c), own, known)
+      if (is_right .and. .not. allocated(own)) call assemble_analysed('check', kind, reading%load_cases(c), machine, own)
       call add_error(reading%error, own)
     end do
     if (.not. allocated(reading%error)) call check_sweep(reading)
@@ -189,7 +188,6 @@ contains
     type(reading_t), intent(inout) :: reading
     character(len=:), allocatable, intent(out) :: folder
     type(diagnostics_t) :: diagnostics
-    type(error_t), allocatable :: own
     integer :: chosen
 
     folder = out_folder(arguments, arguments%operands(number)%text)
@@ -199,8 +197,7 @@ contains
     if (.not. allocated(reading%error)) call choose_case(arguments, reading%input, chosen, reading%error)
     if (allocated(reading%error)) then
       if (arguments%command == 'check' .and. allocated(reading%load_cases)) then   ! the machine itself can be read
-        call check_input(reading%input, own)
-        call add_error(reading%error, own)
+        call refuse_mistakes(reading%input, reading%error)
       end if
       return
     end if
@@ -211,7 +208,7 @@ contains
       deallocate (reading%load_cases)   ! the others are not looked at
       allocate (reading%load_cases(0))
     end if
-    call check_input(reading%input, reading%error)
+    call refuse_mistakes(reading%input, reading%error)
   end subroutine read_one
 
 end module nocdyn_analysis_command

@@ -7,9 +7,9 @@ module nocdyn_run_command
   use nocdyn_errors, only: add_error, error_t, exit_done, exit_failed, exit_input, raise
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
-  use nocdyn_load_case_checks, only: check_input
   use nocdyn_load_case_peaks, only: case_run_t
   use nocdyn_load_case_report, only: load_cases_json, load_cases_text, put_load_cases_csv
+  use nocdyn_machine_parts, only: refuse_mistakes
   use nocdyn_posix, only: catch_interrupts, is_interrupted, remove_file
   use nocdyn_result_files, only: result_files_t
   use nocdyn_result_folders, only: refuse_shared_folders, refuse_sweep_folder, result_folder
@@ -194,7 +194,7 @@ contains
     ! Refuses a file with mistakes in the machine or any of the load cases that are wanted, and load cases whose folders hold
     ! other results.
     do c = 1, size(reading%inputs)
-      call check_input(reading%inputs(c), own)
+      call refuse_mistakes(reading%inputs(c), own)
       if (allocated(reading%inputs(c)%load_case) .and. .not. allocated(own)) then
         call refuse_sweep_folder(reading%inputs(c)%shown_case(), reading%folders(c)%text, own)
       end if

@@ -3,7 +3,7 @@ module nocdyn_errors
   implicit none (type, external)
   private
 
-  public :: add_error, add_mistake, raise
+  public :: add_error, raise
 
   integer, parameter, public :: exit_done = 0     !! success
   integer, parameter, public :: exit_failed = 1   !! the computation failed
@@ -28,16 +28,6 @@ contains
     error%code = code
     error%message = message
   end subroutine raise
-
-  !> Adds a mistake in the input to the mistakes so far.
-  subroutine add_mistake(error, message)
-    type(error_t), allocatable, intent(inout) :: error
-    character(len=*), intent(in) :: message
-    type(error_t), allocatable :: mistake
-
-    call raise(mistake, exit_input, message)
-    call add_error(error, mistake)
-  end subroutine add_mistake
 
   !> Adds the lines of another error, if there is one, to an error or to none; the worst exit code stays.
   subroutine add_error(error, another)

@@ -1,6 +1,7 @@
 !> A checked input: the groups in the order of the file, every key of the schema with its value or default.
 module nocdyn_input
   use nocdyn_diagnostics, only: diagnostics_t, most_shown, no_line
+  use nocdyn_errors, only: add_error, error_t, raise
   use nocdyn_input_group, only: group_t, value_t
   use nocdyn_kinds, only: wp
   use nocdyn_schema, only: group_rules
@@ -9,7 +10,7 @@ module nocdyn_input
   implicit none (type, external)
   private
 
-  public :: group_t, value_t
+  public :: diagnostics_t, group_t, value_t
 
   !> A load case of a file.
   type, public :: load_case_t
@@ -38,7 +39,9 @@ module nocdyn_input
     procedure :: case_overrides !! number of the overrides that the load case gives
     procedure, private :: location_of_group, location_of_key
     generic :: location => location_of_group, location_of_key   !! where they come from, to begin a message with
+    procedure :: place              !! the same for notes
     procedure :: report             !! adds a diagnostic on a key of a group
+    procedure :: refuse, refuse_new   !! make an error of diagnostics
     procedure :: diagnostics_text   !! all messages with their locations
   end type input_t
 
@@ -89,7 +92,7 @@ contains
     title = self%groups(self%position('case'))%text('title')
   end function title
 
-  !> "machine.nml:12: &gear 'reducer'".
+  !> "machine.nml:12: &gear 'reducer'", and the load case after the line.
   pure function location_of_group(self, index) result(text)
     class(input_t), intent(in) :: self
     integer, intent(in) :: index   !! of the group
@@ -106,10 +109,50 @@ contains
     character(len=key_source_length(self, index, key) + 2 + label_length(self, index)) :: text
 
     associate (value => self%groups(index)%values(self%groups(index)%key_position(key)))
-      text = source_text(self, merge(value%line, self%groups(index)%line, value%line > 0), value%override) // ': ' // &
-             self%label(index)
+      text = source_text(self, merge(value%line, self%groups(index)%line, value%line > 0), value%override) // &
+             ': ' // self%label(index)
     end associate
   end function location_of_key
+
+  !> The location of a key without the load case, for what is said of it: notes and its report.
+  pure function place(self, index, key) result(text)
+    class(input_t), intent(in) :: self
+    integer, intent(in) :: index   !! of the group
+    character(len=*), intent(in) :: key   !! '': the group
+    character(len=place_length(self, index, key)) :: text
+    character(len=:), allocatable :: place_text
+
+    call make_place(self, index, key, place_text)
+    text = place_text
+  end function place
+
+  pure integer function place_length(self, index, key) result(length)
+    class(input_t), intent(in) :: self
+    integer, intent(in) :: index
+    character(len=*), intent(in) :: key
+    character(len=:), allocatable :: text
+
+    call make_place(self, index, key, text)
+    length = len(text)
+  end function place_length
+
+  pure subroutine make_place(self, index, key, text)
+    class(input_t), intent(in) :: self
+    integer, intent(in) :: index
+    character(len=*), intent(in) :: key
+    character(len=:), allocatable, intent(out) :: text
+    integer :: line
+
+    line = self%groups(index)%line
+    if (key /= '') then
+      associate (value => self%groups(index)%values(self%groups(index)%key_position(key)))
+        if (value%line > 0) line = value%line
+        if (value%override > 0) text = source_text(self, 0, value%override)
+      end associate
+    end if
+    if (.not. allocated(text)) text = shown_path(self%file) // ':' // to_text(line)
+    text = text // ': ' // self%label(index)
+  end subroutine make_place
 
   pure integer function key_source_length(self, index, key) result(length)
     class(input_t), intent(in) :: self
@@ -121,7 +164,7 @@ contains
     end associate
   end function key_source_length
 
-  !> "machine.nml:12", or "--set PATH=VALUE" of an override.
+  !> "machine.nml:12: load case 'start'", or "--set PATH=VALUE" of an override.
   pure function source_text(input, line, override) result(text)
     class(input_t), intent(in) :: input
     integer, intent(in) :: line       !! 0 or `no_line`: the file as a whole
@@ -147,14 +190,17 @@ contains
     integer, intent(in) :: line, override
     character(len=:), allocatable, intent(out) :: source
 
-    if (override == 0) then
-      source = shown_path(input%file)
-      if (line > 0 .and. line < no_line) source = source // ':' // to_text(line)
+    source = shown_path(input%file)
+    if (override > 0 .and. override <= input%case_overrides()) then
+      source = source // ':' // to_text(input%load_case%line) // ': &load_case ' // &
+               quoted(shortened(input%load_case%name)) // ': set ' // quoted(shortened(input%overrides(override)%text))
       return
     end if
-    if (override <= input%case_overrides()) then
-      source = shown_path(input%file) // ':' // to_text(input%load_case%line) // ': &load_case ' // &
-               quoted(shortened(input%load_case%name)) // ': set ' // quoted(shortened(input%overrides(override)%text))
+    if (override == 0 .and. line > 0 .and. line < no_line) source = source // ':' // to_text(line)
+    if (allocated(input%load_case)) source = source // ': load case ' // quoted(shortened(input%load_case%name))
+    if (override == 0) return
+    if (allocated(input%load_case)) then
+      source = source // ': --set ' // shortened(input%overrides(override)%text)
     else
       source = '--set ' // shortened(input%overrides(override)%text)
     end if
@@ -169,15 +215,20 @@ contains
   end function case_overrides
 
   !> Adds a diagnostic on a key of a group, with the line of the key if it is given.
-  subroutine report(self, group, key, text, diagnostics, code)
+  subroutine report(self, group, key, text, diagnostics, code, hint)
     class(input_t), intent(in) :: self
     integer, intent(in) :: group   !! its index
     character(len=*), intent(in) :: key, text
     type(diagnostics_t), intent(inout) :: diagnostics
     integer, intent(in), optional :: code   !! exit code; exit_input if absent
+    character(len=*), intent(in), optional :: hint   !! on what may have been meant; '' if absent
 
     associate (value => self%groups(group)%values(self%groups(group)%key_position(key)))
-      call diagnostics%add(max(value%line, self%groups(group)%line), group, text, value%override, code)
+      if (value%override > 0) then   ! which may set a key of several groups
+        call diagnostics%add(value%line, group, self%label(group) // ': ' // text, value%override, code, hint)
+      else
+        call diagnostics%add(merge(value%line, self%groups(group)%line, value%line > 0), group, text, code=code, hint=hint)
+      end if
     end associate
   end subroutine report
 
@@ -196,7 +247,7 @@ contains
         if (i > 1) call buffer%append(new_line('a'))
         call buffer%append(source_text(self, diagnostic%line, diagnostic%override) // ': ')
         if (diagnostic%group > 0 .and. diagnostic%override == 0) call buffer%append(self%label(diagnostic%group) // ': ')
-        call buffer%append(diagnostic%text)
+        call buffer%append(diagnostic%text // diagnostic%hint)
       end associate
     end do
     if (size(order) > most_shown) call buffer%append(new_line('a') // self%shown_file() // ': ' // &
@@ -205,21 +256,60 @@ contains
     text = buffer%text()
   end function diagnostics_text
 
+  !> Adds what is wrong, if anything is, to an error or to none.
+  subroutine refuse(self, diagnostics, error)
+    class(input_t), intent(in) :: self
+    type(diagnostics_t), intent(in) :: diagnostics
+    type(error_t), allocatable, intent(inout) :: error
+    type(error_t), allocatable :: own
+
+    if (diagnostics%count == 0) return
+    call raise(own, diagnostics%worst_code(), self%diagnostics_text(diagnostics))
+    call add_error(error, own)
+  end subroutine refuse
+
+  !> Adds those mistakes of a load case to an error or to none that the machine itself does not have.
+  subroutine refuse_new(self, diagnostics, known, error)
+    class(input_t), intent(in) :: self   !! a load case
+    type(diagnostics_t), intent(in) :: diagnostics, known   !! its mistakes, and the ones of the machine
+    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t) :: new
+    integer :: i, k, override
+
+    do i = 1, diagnostics%count
+      associate (own => diagnostics%list(i))
+        override = max(0, own%override - self%case_overrides())   ! in the machine
+        do k = 1, known%count
+          if (own%override > 0 .and. override == 0) exit   ! the load case sets the value
+          if (known%list(k)%line == own%line .and. known%list(k)%override == override .and. known%list(k)%text == own%text) exit
+        end do
+        if (k <= known%count .and. (own%override == 0 .or. override > 0)) cycle
+        call new%add(own%line, own%group, own%text, own%override, own%code, own%hint)
+      end associate
+    end do
+    call self%refuse(new, error)
+  end subroutine refuse_new
+
   !> The path as messages show it.
   pure function shown_file(self) result(text)
     class(input_t), intent(in) :: self
-    character(len=source_length(self, 0, 0)) :: text
+    character(len=shown_length(self)) :: text
 
     text = shown_path(self%file)
   end function shown_file
 
+  pure integer function shown_length(self) result(length)
+    class(input_t), intent(in) :: self
+
+    length = len(shown_path(self%file))
+  end function shown_length
+
   !> "machine.nml", or "machine.nml: load case 'start'".
   pure function shown_case(self) result(text)
     class(input_t), intent(in) :: self
-    character(len=:), allocatable :: text
+    character(len=source_length(self, 0, 0)) :: text
 
-    text = self%shown_file()
-    if (allocated(self%load_case)) text = text // ': load case ' // quoted(shortened(self%load_case%name))
+    text = source_text(self, 0, 0)
   end function shown_case
 
   !> "&gear 'reducer'", for messages.

@@ -5,7 +5,7 @@ module nocdyn_key_path
   use nocdyn_namelist, only: assignment_t
   use nocdyn_namelist_values, only: read_subscript
   use nocdyn_schema, only: group_rule_index, group_rules, is_single
-  use nocdyn_schema_text, only: group_suggestion, key_suggestion
+  use nocdyn_schema_text, only: suggest_group, suggest_key
   use nocdyn_schema_units, only: find_key
   use nocdyn_text, only: lower_case, quoted, shortened
   implicit none (type, external)
@@ -22,6 +22,8 @@ module nocdyn_key_path
     integer :: number = 0                   !! of a group without name among the ones of its kind, 0: the path has none
     type(assignment_t) :: target            !! key and subscript
     logical :: is_out_of_range = .false.    !! the subscript is a whole number that is not an index of any list
+    character(len=:), allocatable :: hint   !! on the group or key that may have been meant, perhaps ''
+    logical :: is_near = .false.            !! it names one
   end type key_path_t
 
 contains
@@ -31,15 +33,17 @@ contains
     character(len=*), intent(in) :: text     !! the path
     character(len=*), intent(in) :: ending   !! text after the path in messages: '=VALUE' or ''
     type(key_path_t), intent(out) :: path
-    character(len=:), allocatable, intent(out) :: message   !! what is wrong, '' if nothing is
+    character(len=:), allocatable, intent(out) :: message   !! what is wrong, '' if nothing is; without the hint of the path
     character(len=:), allocatable :: key
     integer :: first_dot, last_dot
 
     path%name = ''
+    path%hint = ''
     first_dot = index(text, '.')
     last_dot = index(text, '.', back=.true.)
     if (first_dot == 0) then
-      message = 'there is no dot in ' // shortened(text) // '; write GROUP.KEY' // ending // ' or GROUP.NAME.KEY' // ending
+      message = 'there is no dot in ' // shortened(text)
+      path%hint = '; write GROUP.KEY' // ending // ' or GROUP.NAME.KEY' // ending
       return
     end if
     call read_group(text(:first_dot - 1), path, message)
@@ -63,7 +67,8 @@ contains
     path%group_rule = group_rule_index(group)
     message = ''
     if (path%group_rule == 0) then
-      message = 'there is no group ' // quoted(shortened(group)) // group_suggestion(group)
+      message = 'there is no group ' // quoted(shortened(group))
+      call suggest_group(group, path%hint, path%is_near)
     else if (open <= len(text)) then
       call read_subscript(text(open + 1:max(open, len(text) - 1)), subscript)
       path%number = subscript%first
@@ -86,8 +91,8 @@ contains
     call find_key(path%group_rule, key, path%key_rule, path%unit)
     message = ''
     if (path%key_rule == 0) then
-      message = shortened(key) // ' is not a key of &' // trim(group_rules(path%group_rule)%name) // &
-        key_suggestion(path%group_rule, key)
+      message = shortened(key) // ' is not a key of &' // trim(group_rules(path%group_rule)%name)
+      call suggest_key(path%group_rule, key, path%hint, path%is_near)
     else if (open <= len(text)) then
       call read_subscript(text(open + 1:max(open, len(text) - 1)), path%target)
       if (path%target%is_malformed) then

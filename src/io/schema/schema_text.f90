@@ -13,7 +13,7 @@ module nocdyn_schema_text
   private
 
   public :: allowed_text, number_text, type_text, only_if_text, listed_keys, group_names, key_names, similar_keys, key_suggestion
-  public :: group_suggestion, suggestion
+  public :: group_suggestion, suggest, suggest_group, suggest_key, suggestion
 
   integer, parameter :: kept_digits = 14   ! of a number that is converted
 
@@ -201,47 +201,82 @@ contains
     integer, intent(in) :: group_rule      !! row of `group_rules`
     character(len=*), intent(in) :: word   !! in lower case
     character(len=:), allocatable :: text
+    logical :: is_near
+
+    call suggest_key(group_rule, word, text, is_near)
+  end function key_suggestion
+
+  !> As `key_suggestion`, and whether one key is similar.
+  pure subroutine suggest_key(group_rule, word, hint, is_near)
+    integer, intent(in) :: group_rule
+    character(len=*), intent(in) :: word
+    character(len=:), allocatable, intent(out) :: hint
+    logical, intent(out) :: is_near
     type(string_t), allocatable :: keys(:)
 
     allocate (keys, source=similar_keys(group_rule, word))
-    if (size(keys) > 0) then
-      text = '; did you mean ' // quoted_list(keys) // '?'
+    is_near = size(keys) > 0
+    if (is_near) then
+      hint = '; did you mean ' // quoted_list(keys) // '?'
     else
-      text = suggestion(word, key_names(group_rule))
+      call suggest(word, key_names(group_rule), hint, is_near)
     end if
-  end function key_suggestion
+  end subroutine suggest_key
 
   !> "; did you mean 'gear'?", or the group for which a word stands in the field.
   pure function group_suggestion(word) result(text)
     character(len=*), intent(in) :: word   !! in lower case
     character(len=:), allocatable :: text
+    logical :: is_near
+
+    call suggest_group(word, text, is_near)
+  end function group_suggestion
+
+  !> As `group_suggestion`, and whether a group is similar or meant by the word.
+  pure subroutine suggest_group(word, hint, is_near)
+    character(len=*), intent(in) :: word
+    character(len=:), allocatable, intent(out) :: hint
+    logical, intent(out) :: is_near
     integer :: i
 
     do i = 1, size(group_aliases)
       if (.not. has_word(group_aliases(i)%words, word)) cycle
-      text = "; did you mean '" // trim(group_aliases(i)%group) // "'"
-      if (group_aliases(i)%addition /= '') text = text // ' with ' // trim(group_aliases(i)%addition)
-      text = text // '?'
+      hint = "; did you mean '" // trim(group_aliases(i)%group) // "'"
+      if (group_aliases(i)%addition /= '') hint = hint // ' with ' // trim(group_aliases(i)%addition)
+      hint = hint // '?'
+      is_near = .true.
       return
     end do
-    text = suggestion(word, group_names())
-  end function group_suggestion
+    call suggest(word, group_names(), hint, is_near)
+  end subroutine suggest_group
 
   !> "; did you mean 'stiffness'?", or all candidates if none is similar and they are few.
   pure function suggestion(word, candidates) result(text)
     character(len=*), intent(in) :: word
     type(string_t), intent(in) :: candidates(:)
     character(len=:), allocatable :: text
+    logical :: is_near
+
+    call suggest(word, candidates, text, is_near)
+  end function suggestion
+
+  !> As `suggestion`, and whether a candidate is similar.
+  pure subroutine suggest(word, candidates, hint, is_near)
+    character(len=*), intent(in) :: word
+    type(string_t), intent(in) :: candidates(:)
+    character(len=:), allocatable, intent(out) :: hint
+    logical, intent(out) :: is_near
     integer, parameter :: few = 16
     integer :: nearest
 
     nearest = nearest_word(word, candidates)
-    text = ''
-    if (nearest > 0) then
-      text = "; did you mean '" // candidates(nearest)%text // "'?"
+    is_near = nearest > 0
+    hint = ''
+    if (is_near) then
+      hint = "; did you mean '" // candidates(nearest)%text // "'?"
     else if (size(candidates) > 0 .and. size(candidates) <= few) then
-      text = '; allowed: ' // joined(candidates, ', ')
+      hint = '; allowed: ' // joined(candidates, ', ')
     end if
-  end function suggestion
+  end subroutine suggest
 
 end module nocdyn_schema_text

@@ -16,6 +16,7 @@ module nocdyn_diagnostics
     integer :: override = 0        !! index of the wrong override, 0: the file is wrong
     integer :: code = exit_input   !! exit code of the program
     character(len=:), allocatable :: text   !! what is wrong, and what is allowed
+    character(len=:), allocatable :: hint   !! "; did you mean 'motor'?", perhaps ''
   end type diagnostic_t
 
   type, public :: diagnostics_t
@@ -28,11 +29,12 @@ module nocdyn_diagnostics
 contains
 
   !> Adds one error; the arguments are the components of `diagnostic_t`.
-  subroutine add(self, line, group, text, override, code)
+  subroutine add(self, line, group, text, override, code, hint)
     class(diagnostics_t), intent(inout) :: self
     integer, intent(in) :: line, group             !! line of the file or `no_line`, index of the group or 0
     character(len=*), intent(in) :: text
     integer, optional, intent(in) :: override, code   !! if absent, 0 and `exit_input`
+    character(len=*), optional, intent(in) :: hint    !! '' if absent
     type(diagnostic_t), allocatable :: longer(:)
     integer :: i
 
@@ -54,6 +56,8 @@ contains
       if (present(override)) diagnostic%override = override
       if (present(code)) diagnostic%code = code
       diagnostic%text = text
+      diagnostic%hint = ''
+      if (present(hint)) diagnostic%hint = hint
     end associate
   end subroutine add
 

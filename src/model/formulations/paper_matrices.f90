@@ -156,16 +156,16 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
     real(wp), intent(inout) :: stiffness(:, :)   !! K [N m/rad]
-    real(wp) :: of_elements(machine%elements%count)
     integer :: e, i
 
+    stiffness = 0.0_wp
     do i = 1, size(machine%banks)
-      associate (bank => machine%banks(i)%bank)
-        of_elements(bank%first:bank%last()) = [(secant(bank, machine%elements, lane, e), e=bank%first, bank%last())]
+      associate (bank => machine%banks(i)%bank, elements => machine%elements)
+        do e = bank%first, bank%last()
+          call elements%rows%add_coefficient(e, secant(bank, elements, lane, e), stiffness)
+        end do
       end associate
     end do
-    stiffness = 0.0_wp
-    call machine%elements%rows%add_coefficients(1.0_wp, of_elements, stiffness)
   end subroutine stiffness_matrix
 
   !> K12 of eq. (3) of an element of a bank: the elastic moment of a coupling over its twist from rest; the derivative at rest,
@@ -201,16 +201,16 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
     real(wp), intent(inout) :: damping(:, :)   !! C [N m s/rad]
-    real(wp) :: of_elements(machine%elements%count)
     integer :: e, i
 
+    damping = 0.0_wp
     do i = 1, size(machine%banks)
-      associate (bank => machine%banks(i)%bank)
-        of_elements(bank%first:bank%last()) = [(viscous(bank, machine%elements, lane, e), e=bank%first, bank%last())]
+      associate (bank => machine%banks(i)%bank, elements => machine%elements)
+        do e = bank%first, bank%last()
+          call elements%rows%add_coefficient(e, viscous(bank, elements, lane, e), damping)
+        end do
       end associate
     end do
-    damping = 0.0_wp
-    call machine%elements%rows%add_coefficients(1.0_wp, of_elements, damping)
   end subroutine damping_matrix
 
   !> K_4 of eqs. (62)-(72) from the tangent stiffnesses K1 + 3 k1 w^2, [n, n]; the derivative of the elastic moments is

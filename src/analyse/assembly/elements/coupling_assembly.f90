@@ -4,9 +4,8 @@ module nocdyn_coupling_assembly
   use nocdyn_couplings, only: coupling_common_t, new_couplings
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_element_rows, only: rows_between
-  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_gap_couplings, only: new_gap_couplings
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_maxwell_couplings, only: new_maxwell_couplings
   use nocdyn_polynomial_couplings, only: elastic_coefficients, new_polynomial_couplings
@@ -24,24 +23,23 @@ module nocdyn_coupling_assembly
 contains
 
   !> Refuses gaps and saturations without stiffness, and gaps of which a power is beyond all numbers.
-  subroutine check_coupling(input, index, error)
+  subroutine check_coupling(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error   !! names file, line, group and key
+    type(diagnostics_t), intent(inout) :: diagnostics
     character(len=:), allocatable :: obstacle
 
     associate (group => input%groups(index))
-      call check_relative_damping(input, index, error)
+      call check_relative_damping(input, index, diagnostics)
       select case (elastic_form(group))
       case (gap)
         call find_gap_obstacle(coefficients_of(group), group%number('gap'), obstacle)
         if (obstacle == '') return
-        call add_mistake(error, input%location(index, 'gap') // ': gap = ' // &
-                   to_text(group%number('gap')) // obstacle)
+        call input%report(index, 'gap', 'gap = ' // to_text(group%number('gap')) // obstacle, diagnostics)
       case (saturated)
         if (group%number('stiffness') > 0) return
-        call add_mistake(error, input%location(index, 'saturation') // ': saturation = ' // &
-                   to_text(group%number('saturation')) // ' needs stiffness > 0 [N m/rad]')
+        call input%report(index, 'saturation', 'saturation = ' // to_text(group%number('saturation')) // &
+                   ' needs stiffness > 0 [N m/rad]', diagnostics)
       case default
         return
       end select
@@ -71,15 +69,15 @@ contains
   end subroutine find_gap_obstacle
 
   !> Refuses damping over the time in proportion to a stiffness that is not given.
-  subroutine check_relative_damping(input, index, error)
+  subroutine check_relative_damping(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
 
     associate (group => input%groups(index))
       if (.not. group%has_value('damping_frequency') .or. group%number('stiffness', absent=0.0_wp) > 0) return
-      call add_mistake(error, input%location(index, 'damping_frequency') // ': damping_frequency needs stiffness > 0 ' // &
-                 '[N m/rad], in proportion to which relative damping acts over the time')
+      call input%report(index, 'damping_frequency', 'damping_frequency needs stiffness > 0 ' // &
+                 '[N m/rad], in proportion to which relative damping acts over the time', diagnostics)
     end associate
   end subroutine check_relative_damping
 

@@ -6,9 +6,8 @@ module nocdyn_crank_assembly
   use nocdyn_cylinder_torques, only: cycle_of
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_engine_checks, only: check_crank_angles, check_stroke
-  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_fourier, only: fourier_coefficients
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_order_excitations, only: new_order_excitations, order_excitations_t, order_torque_t
@@ -27,27 +26,27 @@ module nocdyn_crank_assembly
 contains
 
   !> Refuses cranks that cannot turn, and forces that are not the ones of one cycle.
-  subroutine check_crank(input, index, error)
+  subroutine check_crank(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
     character(len=:), allocatable :: key, text
 
     associate (group => input%groups(index))
       if (group%number('crank_radius') + abs(group%number('offset')) >= group%number('rod_length')) then
-        call add_mistake(error, input%location(index, 'offset') // ': offset = ' // &
-                   to_text(group%number('offset')) // ' m: the rod of ' // to_text(group%number('rod_length')) // ' m ' // &
-                   'does not reach the piston at all angles; allowed: crank_radius + |offset| below rod_length')
+        call input%report(index, 'offset', 'offset = ' // to_text(group%number('offset')) // ' m: the rod of ' // &
+                   to_text(group%number('rod_length')) // ' m ' // &
+                   'does not reach the piston at all angles; allowed: crank_radius + |offset| below rod_length', diagnostics)
       end if
       if (group%number('rod_mass') > 0 .and. .not. group%has_value('rod_center')) then
-        call add_mistake(error, input%location(index, 'rod_mass') // ': rod_mass = ' // &
-                   to_text(group%number('rod_mass')) // ' kg, but rod_center is missing')
+        call input%report(index, 'rod_mass', 'rod_mass = ' // to_text(group%number('rod_mass')) // &
+                   ' kg, but rod_center is missing', diagnostics)
       end if
       if (.not. group%has_value('crank_angles')) return
       call check_stroke(group, key, text)
       if (text == '') call check_crank_angles(group, key, text)
       if (text == '') return
-      call add_mistake(error, input%location(index, key) // ': ' // text)
+      call input%report(index, key, text, diagnostics)
     end associate
   end subroutine check_crank
 

@@ -4,8 +4,7 @@ module nocdyn_element_groups
   use nocdyn_bank, only: bank_slot_t
   use nocdyn_curves, only: curve_t, extrapolation_constant, extrapolation_linear, interpolation_cubic, interpolation_linear, &
                            new_curve
-  use nocdyn_errors, only: add_mistake, error_t
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_schema_rules, only: ground
   use nocdyn_text, only: selected, string_t
@@ -195,19 +194,18 @@ contains
   end function group_curve
 
   !> Refuses a table over a speed, in either direction, that does not begin at standstill.
-  subroutine check_from_standstill(input, index, key, speeds, error)
+  subroutine check_from_standstill(input, index, key, speeds, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index             !! of the group
     character(len=*), intent(in) :: key      !! of the speeds [rad/s]; they may be unset
     character(len=*), intent(in) :: speeds   !! what they are, e.g. 'slips'
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
     real(wp), allocatable :: x(:)
 
     allocate (x, source=input%groups(index)%numbers(key))
     if (size(x) == 0) return
-    if (x(1) > 0) call add_mistake(error, input%location(index, key) // ': ' // &
-                             written_element(input%groups(index), key, 1) // '; allowed: 0 first, then the ' // speeds // &
-                             ' in either direction')
+    if (x(1) > 0) call input%report(index, key, written_element(input%groups(index), key, 1) // &
+               '; allowed: 0 first, then the ' // speeds // ' in either direction', diagnostics)
   end subroutine check_from_standstill
 
 end module nocdyn_element_groups

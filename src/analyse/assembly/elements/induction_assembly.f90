@@ -2,10 +2,9 @@
 module nocdyn_induction_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
   use nocdyn_element_groups, only: element_groups_t
-  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_flux_motors, only: circuit_keys, new_flux_motors
   use nocdyn_induction_circuits, only: induction_circuit_t
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_rated_circuits, only: fit_circuit, rating_fits, rating_impossible, rating_t, rating_too_efficient, &
                                    rating_too_strong, rating_too_weak
@@ -152,40 +151,41 @@ contains
   end subroutine schedule_supply
 
   !> Refuses an odd number of poles, a voltage that is not positive, and a supply that contradicts itself.
-  subroutine check_flux_motor(input, index, error)
+  subroutine check_flux_motor(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
+    integer :: before   ! mistakes of the groups before
 
+    before = diagnostics%count
     associate (group => input%groups(index))
-      call check_poles(input, index, error)
+      call check_poles(input, index, diagnostics)
       if (.not. group%number('voltage') > 0) then
-        call add_mistake(error, input%location(index, 'voltage') // ': voltage = ' // to_text(group%number('voltage')) // &
-                   '; allowed: > 0 [V]')
-      else if (group%has_value('rated_power') .and. .not. allocated(error)) then   ! the circuit needs poles and voltage
-        call check_rating(input, index, error)
+        call input%report(index, 'voltage', 'voltage = ' // to_text(group%number('voltage')) // '; allowed: > 0 [V]', diagnostics)
+      else if (group%has_value('rated_power') .and. diagnostics%count == before) then   ! the circuit needs poles and voltage
+        call check_rating(input, index, diagnostics)
       end if
-      if (group%has_value('supply_times')) call check_supply(input, index, error)
+      if (group%has_value('supply_times')) call check_supply(input, index, diagnostics)
     end associate
   end subroutine check_flux_motor
 
   !> Refuses an odd number of poles.
-  subroutine check_poles(input, index, error)
+  subroutine check_poles(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
 
     associate (poles => input%groups(index)%whole_number('poles'))
-      if (modulo(poles, 2) == 1) call add_mistake(error, input%location(index, 'poles') // ': poles = ' // &
-                                            to_text(poles) // '; allowed: an even number, twice the pole pairs')
+      if (modulo(poles, 2) == 1) call input%report(index, 'poles', 'poles = ' // to_text(poles) // &
+                 '; allowed: an even number, twice the pole pairs', diagnostics)
     end associate
   end subroutine check_poles
 
   !> Refuses rated values that no circuit has.
-  subroutine check_rating(input, index, error)
+  subroutine check_rating(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
     type(induction_circuit_t) :: circuit
     integer :: status
     real(wp) :: limit
@@ -193,56 +193,56 @@ contains
     associate (group => input%groups(index), rating => rating_of(input%groups(index)))
       if (.not. (rating%slip() > 0 .and. rating%slip() < 0.5_wp)) then
         associate (synchronous => rating%frequency / rating%pole_pairs)
-          call add_mistake(error, input%location(index, 'rated_speed') // ': ' // written_key(group, 'rated_speed') // &
-                     ' = ' // written_number(group, 'rated_speed', rating%speed) // '; allowed: below ' // &
-                     written_number(group, 'rated_speed', synchronous) // ' and above ' // &
-                     written_number(group, 'rated_speed', 0.5_wp * synchronous) // ' [' // written_unit(group, 'rated_speed') // &
-                     '], the synchronous speed with poles = ' // to_text(group%whole_number('poles')) // ' and half of it')
+          call input%report(index, 'rated_speed', written_key(group, 'rated_speed') // ' = ' // written_number(group, &
+                     'rated_speed', rating%speed) // '; allowed: below ' // written_number(group, 'rated_speed', &
+                     synchronous) // ' and above ' // written_number(group, 'rated_speed', 0.5_wp * synchronous) // ' [' // &
+                     written_unit(group, 'rated_speed') // '], the synchronous speed with poles = ' // &
+                     to_text(group%whole_number('poles')) // ' and half of it', diagnostics)
         end associate
         return
       end if
       call fit_circuit(rating, circuit, status, limit)
       select case (status)
       case (rating_too_efficient)
-        call add_mistake(error, input%location(index, 'efficiency') // ': efficiency = ' // to_text(rating%efficiency) // &
-                   '; allowed: < ' // rounded_text(limit, 6) // ', as the slip takes ' // rounded_text(rating%slip(), 4) // &
-                   ' of the power of the air gap')
+        call input%report(index, 'efficiency', 'efficiency = ' // to_text(rating%efficiency) // '; allowed: < ' // &
+                   rounded_text(limit, 6) // ', as the slip takes ' // rounded_text(rating%slip(), 4) // &
+                   ' of the power of the air gap', diagnostics)
       case (rating_too_strong)
-        call add_mistake(error, input%location(index, 'breakdown_ratio') // ': breakdown_ratio = ' // &
-                   to_text(rating%breakdown_ratio) // '; allowed: <= ' // &
-                   to_text(floor(limit * resolution) / resolution) // ' with these losses, slip and power factor')
+        call input%report(index, 'breakdown_ratio', 'breakdown_ratio = ' // to_text(rating%breakdown_ratio) // &
+                   '; allowed: <= ' // to_text(floor(limit * resolution) / resolution) // &
+                   ' with these losses, slip and power factor', diagnostics)
       case (rating_too_weak)
-        call add_mistake(error, input%location(index, 'breakdown_ratio') // ': breakdown_ratio = ' // &
-                   to_text(rating%breakdown_ratio) // '; allowed: >= ' // &
-                   to_text(ceiling(limit * resolution) / resolution) // ' with these losses, slip and power factor')
+        call input%report(index, 'breakdown_ratio', 'breakdown_ratio = ' // to_text(rating%breakdown_ratio) // &
+                   '; allowed: >= ' // to_text(ceiling(limit * resolution) / resolution) // &
+                   ' with these losses, slip and power factor', diagnostics)
       case (rating_impossible)
-        call add_mistake(error, input%location(index, 'power_factor') // ': power_factor = ' // &
-                   to_text(rating%power_factor) // ' leaves no reactive power to magnetise the motor; allowed: smaller values')
+        call input%report(index, 'power_factor', 'power_factor = ' // to_text(rating%power_factor) // &
+                   ' leaves no reactive power to magnetise the motor; allowed: smaller values', diagnostics)
       case default
       end select
     end associate
   end subroutine check_rating
 
   !> Refuses a first factor of 0, and ramps that end after the next change.
-  subroutine check_supply(input, index, error)
+  subroutine check_supply(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
     integer :: k
 
     associate (group => input%groups(index))
       associate (time => group%numbers('supply_times'), factor => group%numbers('supply_factors'), &
                  ramp => group%numbers('supply_ramps'))
         if (.not. factor(1) > 0) then
-          call add_mistake(error, input%location(index, 'supply_factors') // ': ' // &
-                     written_element(group, 'supply_factors', 1) // '; allowed: > 0, as the motor is disconnected before ' // &
-                     written_element(group, 'supply_times', 1))
+          call input%report(index, 'supply_factors', written_element(group, 'supply_factors', 1) // &
+                     '; allowed: > 0, as the motor is disconnected before ' // written_element(group, 'supply_times', 1), &
+                     diagnostics)
         end if
         do k = 1, size(time) - 1
           if (time(k) + ramp(k) <= time(k + 1)) cycle
-          call add_mistake(error, input%location(index, 'supply_ramps') // ': ' // &
-                     written_element(group, 'supply_ramps', k) // ' from ' // written_element(group, 'supply_times', k) // &
-                     ' ends after ' // written_element(group, 'supply_times', k + 1) // '; allowed: ramps that end before')
+          call input%report(index, 'supply_ramps', written_element(group, 'supply_ramps', k) // ' from ' // &
+                     written_element(group, 'supply_times', k) // ' ends after ' // written_element(group, 'supply_times', &
+                     k + 1) // '; allowed: ramps that end before', diagnostics)
           return
         end do
       end associate

@@ -3,9 +3,8 @@ module nocdyn_joint_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t, role_bearing, role_clutch, role_freewheel
   use nocdyn_curves, only: curve_t, new_steps
   use nocdyn_element_groups, only: check_from_standstill, element_groups_t, group_curve
-  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_friction_joints, only: joint_ranges_t, new_friction_joints
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: to_text
   implicit none (type, external)
@@ -19,18 +18,18 @@ module nocdyn_joint_assembly
 contains
 
   !> Refuses clutches that hold less than they slip, and tables that do not begin with the slip.
-  subroutine check_clutch(input, index, error)
+  subroutine check_clutch(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
 
-    call check_from_standstill(input, index, 'table_slip', 'slips', error)
+    call check_from_standstill(input, index, 'table_slip', 'slips', diagnostics)
     associate (group => input%groups(index))
       if (.not. group%has_value('static_capacity')) return
       if (group%number('static_capacity') < sliding_capacity(group)) then
-        call add_mistake(error, input%location(index, 'static_capacity') // ': static_capacity = ' // &
-                 to_text(group%number('static_capacity')) // ' is below capacity = ' // to_text(sliding_capacity(group)) // &
-                 '; allowed: at least that of slip [N m]')
+        call input%report(index, 'static_capacity', 'static_capacity = ' // to_text(group%number('static_capacity')) // &
+                   ' is below capacity = ' // to_text(sliding_capacity(group)) // '; allowed: at least that of slip [N m]', &
+                   diagnostics)
       end if
     end associate
   end subroutine check_clutch

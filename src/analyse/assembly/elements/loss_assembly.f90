@@ -3,8 +3,7 @@ module nocdyn_loss_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
   use nocdyn_curves, only: curve_t, extrapolation_constant, interpolation_linear, new_curve
   use nocdyn_element_groups, only: check_from_standstill, element_groups_t
-  use nocdyn_errors, only: add_mistake, error_t
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_mesh_assembly, only: radii_of
   use nocdyn_text, only: to_text
@@ -28,22 +27,21 @@ contains
   end function has_losses
 
   !> Refuses losses of gears whose first wheel does not turn, and tables that do not begin at standstill.
-  subroutine check_loss(input, index, error)
+  subroutine check_loss(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
 
     associate (group => input%groups(index))
       if (.not. has_losses(group)) return
-      call check_from_standstill(input, index, 'table_speed', 'speeds', error)
+      call check_from_standstill(input, index, 'table_speed', 'speeds', diagnostics)
       if (group%has_value('table_reverse') .and. &
           size(group%numbers('table_reverse')) /= size(group%numbers('table_speed'))) then
-        call add_mistake(error, input%location(index, 'table_reverse') // ': table_reverse has ' // &
-                   to_text(size(group%numbers('table_reverse'))) // ' values; needed: ' // &
-                   to_text(size(group%numbers('table_speed'))) // ', as table_speed')
+        call input%report(index, 'table_reverse', 'table_reverse has ' // to_text(size(group%numbers('table_reverse'))) // &
+                   ' values; needed: ' // to_text(size(group%numbers('table_speed'))) // ', as table_speed', diagnostics)
       end if
       if (first_is_ground(group)) then
-        call add_mistake(error, input%location(index) // ": 'ground' is the first wheel, which does not turn; " // &
+        call diagnostics%add(input%groups(index)%line, index, "'ground' is the first wheel, which does not turn; " // &
                    'allowed: a body, as a gear with losses turns')
       end if
     end associate

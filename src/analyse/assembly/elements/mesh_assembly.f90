@@ -5,8 +5,7 @@ module nocdyn_mesh_assembly
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_element_rows, only: new_element_rows
   use nocdyn_gap_couplings, only: new_gap_couplings
-  use nocdyn_errors, only: add_mistake, error_t
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_mesh_phases, only: mesh_phases_t, new_mesh_phases
   use nocdyn_polynomial_couplings, only: new_polynomial_couplings
@@ -22,10 +21,10 @@ module nocdyn_mesh_assembly
 contains
 
   !> Refuses transmission errors without orders, and lists of other lengths.
-  subroutine check_mesh(input, index, error)
+  subroutine check_mesh(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
     character(len=*), parameter :: keys(*) = [character(len=12) :: 'error_orders', 'error_phases']
     integer :: k
 
@@ -33,13 +32,12 @@ contains
       if (errors == 0) return
       do k = 1, size(keys)
         if (any(size(mesh%numbers(keys(k))) == [0, errors])) cycle
-        call add_mistake(error, input%location(index, keys(k)) // ': ' // keys(k) // ' has ' // &
-                   to_text(size(mesh%numbers(keys(k)))) // ' and transmission_error ' // to_text(errors) // &
-                   ' values; needed: as many of each')
+        call input%report(index, keys(k), keys(k) // ' has ' // to_text(size(mesh%numbers(keys(k)))) // &
+                   ' and transmission_error ' // to_text(errors) // ' values; needed: as many of each', diagnostics)
       end do
       if (mesh%has_value('teeth') .or. mesh%has_value('error_orders')) return
-      call add_mistake(error, input%location(index, 'transmission_error') // ': error_orders is missing; needed ' // &
-                 'where radii stand for the teeth, whose number is the order')
+      call input%report(index, 'transmission_error', 'error_orders is missing; needed ' // &
+                 'where radii stand for the teeth, whose number is the order', diagnostics)
     end associate
   end subroutine check_mesh
 

@@ -6,8 +6,7 @@ module nocdyn_motion_assembly
     interpolation_linear, interpolation_spline, new_curve
   use nocdyn_drives, only: drive_motion_t, new_drives
   use nocdyn_element_groups, only: element_groups_t
-  use nocdyn_errors, only: add_mistake, error_t
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_phases, only: new_phases
   use nocdyn_relation_rows, only: new_relation_rows
@@ -26,21 +25,21 @@ module nocdyn_motion_assembly
 contains
 
   !> Refuses tables that are no motion over a turn.
-  subroutine check_relation(input, index, error)
+  subroutine check_relation(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error   !! names file, line, group and key
+    type(diagnostics_t), intent(inout) :: diagnostics
     character(len=:), allocatable :: text
 
     call find_table_mistake(input%groups(index), text)
-    if (text /= '') call add_mistake(error, input%location(index, 'table_driven') // ': ' // text)
+    if (text /= '') call input%report(index, 'table_driven', text, diagnostics)
   end subroutine check_relation
 
   !> Refuses drives whose motion jumps.
-  subroutine check_drive(input, index, error)
+  subroutine check_drive(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error   !! names file, line, group and key
+    type(diagnostics_t), intent(inout) :: diagnostics
     character(len=:), allocatable :: text
     logical :: is
 
@@ -48,12 +47,13 @@ contains
       is = group%text('kind') == 'angle' .and. group%has_value('interpolation')
       if (is) is = group%text('interpolation') == 'linear'
       if (is) then
-        call add_mistake(error, input%location(index, 'interpolation') // ": interpolation = 'linear' with kind = " // &
-                   "'angle': the speed would jump at the points, which needs an infinite torque; allowed: spline, dwells, cubic")
+        call input%report(index, 'interpolation', "interpolation = 'linear' with kind = " // &
+                   "'angle': the speed would jump at the points, which needs an infinite torque; " // &
+                   'allowed: spline, dwells, cubic', diagnostics)
         return
       end if
       call find_jump(group, text)
-      if (text /= '') call add_mistake(error, input%location(index, 'table_time') // ': table_time' // text)
+      if (text /= '') call input%report(index, 'table_time', 'table_time' // text, diagnostics)
     end associate
   end subroutine check_drive
 

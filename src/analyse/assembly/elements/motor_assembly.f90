@@ -3,10 +3,9 @@ module nocdyn_motor_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
   use nocdyn_dc_motors, only: new_dc_motors
   use nocdyn_element_groups, only: element_groups_t
-  use nocdyn_errors, only: add_mistake, error_t
   use nocdyn_governed_banks, only: governor_t
   use nocdyn_induction_assembly, only: add_flux_motors, check_flux_motor, check_poles
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_inverter_motors, only: new_inverter_motors, torque_harmonics_t
   use nocdyn_kinds, only: wp
   use nocdyn_motors, only: new_induction_motors, new_motors, new_table_motors
@@ -26,61 +25,61 @@ module nocdyn_motor_assembly
 contains
 
   !> Refuses motors whose values do not fit together.
-  subroutine check_motor(input, index, error)
+  subroutine check_motor(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
 
     select case (input%groups(index)%text('kind'))
     case ('induction')
-      call check_induction(input, index, error)
+      call check_induction(input, index, diagnostics)
     case ('induction_dq')
-      call check_flux_motor(input, index, error)
+      call check_flux_motor(input, index, diagnostics)
     case ('inverter')
       ! refuses a motor without a set speed, a gain that turns it away from that, and an odd number of poles
       associate (group => input%groups(index))
         if (.not. (group%has_value('governor_speed') .or. group%has_value('set_times'))) then
-          call add_mistake(error, input%location(index, 'kind') // ": kind = 'inverter' needs a set speed; " // &
-                     'required: governor_speed [rad/s], or set_times and set_speeds')
+          call input%report(index, 'kind', "kind = 'inverter' needs a set speed; " // &
+                     'required: governor_speed [rad/s], or set_times and set_speeds', diagnostics)
         else if (.not. group%number('governor_gain') > 0) then
-          call add_mistake(error, input%location(index, 'governor_gain') // ': governor_gain = ' // &
-                     to_text(group%number('governor_gain')) // "; allowed with kind = 'inverter': > 0 [s/rad]")
+          call input%report(index, 'governor_gain', 'governor_gain = ' // to_text(group%number('governor_gain')) // &
+                     "; allowed with kind = 'inverter': > 0 [s/rad]", diagnostics)
         end if
-        if (group%has_value('poles')) call check_poles(input, index, error)
+        if (group%has_value('poles')) call check_poles(input, index, diagnostics)
       end associate
     case ('synchronous')
-      call check_synchronous(input, index, error)
+      call check_synchronous(input, index, diagnostics)
     case default
     end select
   end subroutine check_motor
 
   !> Refuses a breakdown torque and a synchronous speed of different signs.
-  subroutine check_induction(input, index, error)
+  subroutine check_induction(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
 
     associate (torque => input%groups(index)%number('breakdown_torque'), speed => input%groups(index)%number('synchronous_speed'))
       if ((torque > 0 .and. speed > 0) .or. (torque < 0 .and. speed < 0)) return
-      call add_mistake(error, input%location(index, 'breakdown_torque') // ': breakdown_torque = ' // to_text(torque) // &
-                 ' must have the sign of synchronous_speed = ' // to_text(speed))
+      call input%report(index, 'breakdown_torque', 'breakdown_torque = ' // to_text(torque) // &
+                 ' must have the sign of synchronous_speed = ' // to_text(speed), diagnostics)
     end associate
   end subroutine check_induction
 
   !> Refuses an odd number of poles, and curves over the slip of which one is missing.
-  subroutine check_synchronous(input, index, error)
+  subroutine check_synchronous(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
     logical :: by_axes, by_parts
 
-    call check_poles(input, index, error)
+    call check_poles(input, index, diagnostics)
     associate (group => input%groups(index))
       by_axes = group%has_value('d_torques') .and. group%has_value('q_torques')
       by_parts = group%has_value('mean_torques') .and. group%has_value('pulsations')
       if (by_axes .neqv. by_parts) return
-      call add_mistake(error, input%location(index, 'slips') // ': allowed over the slips: d_torques and q_torques, ' // &
-                 'or mean_torques and pulsations')
+      call input%report(index, 'slips', 'allowed over the slips: d_torques and q_torques, ' // &
+                 'or mean_torques and pulsations', diagnostics)
     end associate
   end subroutine check_synchronous
 

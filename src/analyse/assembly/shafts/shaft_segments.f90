@@ -1,7 +1,6 @@
 !> The uniform segments of a shaft, and the spectral elements that they are divided into.
 module nocdyn_shaft_segments
-  use nocdyn_errors, only: add_mistake, error_t
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_spectral_elements, only: highest_order, least_order, new_spectral_element, spectral_element_t
   use nocdyn_text, only: to_text
@@ -30,45 +29,45 @@ contains
 
   !> Refuses bores that are no smaller than the diameter, numbers of nodes that do not fit the segments, and materials that are
   !> neither one nor as many as the segments.
-  subroutine check_shaft(input, index, error)
+  subroutine check_shaft(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
     integer :: k
 
-    call check_material(input, index, 'shear_modulus', error)
-    call check_material(input, index, 'density', error)
+    call check_material(input, index, 'shear_modulus', diagnostics)
+    call check_material(input, index, 'density', diagnostics)
     associate (group => input%groups(index))
       associate (bores => group%numbers('bores'), diameters => group%numbers('diameters'))
         do k = 1, size(bores)
           if (bores(k) < diameters(k)) cycle
-          call add_mistake(error, input%location(index, 'bores') // ': bores(' // to_text(k) // ') = ' // &
-                     to_text(bores(k)) // ' m is not less than diameters(' // to_text(k) // ') = ' // to_text(diameters(k)) // &
-                     ' m; allowed: 0 to below the diameter')
+          call input%report(index, 'bores', 'bores(' // to_text(k) // ') = ' // to_text(bores(k)) // &
+                     ' m is not less than diameters(' // to_text(k) // ') = ' // to_text(diameters(k)) // &
+                     ' m; allowed: 0 to below the diameter', diagnostics)
           return
         end do
         if (.not. group%has_value('nodes') .or. .not. has_inertia(group)) return
         if (group%whole_number('nodes') >= size(bores) - 1) return
-        call add_mistake(error, input%location(index, 'nodes') // ': nodes = ' // &
-                   to_text(group%whole_number('nodes')) // ' is out of range; allowed: from ' // to_text(size(bores) - 1) // &
-                   ', one between two segments, to ' // to_text(most_nodes))
+        call input%report(index, 'nodes', 'nodes = ' // to_text(group%whole_number('nodes')) // &
+                   ' is out of range; allowed: from ' // to_text(size(bores) - 1) // ', one between two segments, to ' // &
+                   to_text(most_nodes), diagnostics)
       end associate
     end associate
   end subroutine check_shaft
 
-  subroutine check_material(input, index, key, error)
+  subroutine check_material(input, index, key, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index
     character(len=*), intent(in) :: key
-    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostics_t), intent(inout) :: diagnostics
 
     associate (values => input%groups(index)%numbers(key), segments => size(input%groups(index)%numbers('lengths')))
       if (size(values) > 0 .and. all(size(values) /= [1, segments])) then
-        call add_mistake(error, input%location(index, key) // ': ' // key // ' has ' // to_text(size(values)) // &
-                   ' values, lengths has ' // to_text(segments) // '; allowed: one for the whole shaft, or one for each segment')
+        call input%report(index, key, key // ' has ' // to_text(size(values)) // ' values, lengths has ' // &
+                   to_text(segments) // '; allowed: one for the whole shaft, or one for each segment', diagnostics)
       else if (any(values > 0) .and. .not. all(values > 0)) then
-        call add_mistake(error, input%location(index, key) // ': ' // key // '(' // &
-                   to_text(findloc(values > 0, .false., dim=1)) // ') = 0, others are not; allowed: all are 0, or none')
+        call input%report(index, key, key // '(' // to_text(findloc(values > 0, .false., dim=1)) // &
+                   ') = 0, others are not; allowed: all are 0, or none', diagnostics)
       end if
     end associate
   end subroutine check_material

@@ -8,7 +8,7 @@ module nocdyn_recorded_quantities
   use nocdyn_kinds, only: wp
   use nocdyn_output_units, only: match_signal, output_units
   use nocdyn_recorded_analyses, only: analysis_reader_t
-  use nocdyn_schema_text, only: suggestion
+  use nocdyn_schema_text, only: suggest
   use nocdyn_signals, only: former_name, signal_t
   use nocdyn_statistics, only: is_of_fatigue, new_statistic, statistic_names, statistic_t
   use nocdyn_text, only: quoted, shortened, string_t, to_text
@@ -330,8 +330,10 @@ contains
     integer, intent(out) :: fatigue   !! index in the input
     type(diagnostics_t), intent(inout) :: diagnostics
     type(string_t), allocatable :: names(:)
+    character(len=:), allocatable :: hint
     integer, allocatable :: groups(:)
     integer :: i
+    logical :: is_near
 
     allocate (groups, source=input%groups_named('fatigue'))
     allocate (names(size(groups)))
@@ -343,8 +345,8 @@ contains
         return
       end do
       fatigue = 0
-      call input%report(record, 'fatigue', 'fatigue: there is no &fatigue ' // quoted(shortened(name)) // &
-                        suggestion(name, names), diagnostics)
+      call suggest(name, names, hint, is_near)
+      call input%report(record, 'fatigue', 'fatigue: there is no &fatigue ' // quoted(shortened(name)), diagnostics, hint=hint)
     end associate
   end subroutine find_fatigue
 

@@ -6,7 +6,7 @@ module nocdyn_sweep_plan
   use nocdyn_column_names, only: count_columns
   use nocdyn_designs, only: design_t
   use nocdyn_diagnostics, only: diagnostics_t
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: add_error, error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
   use nocdyn_input_text, only: input_text
   use nocdyn_kinds, only: wp
@@ -85,10 +85,11 @@ contains
       call note_former_records(input, reader, signals, plan%notes)
       if (plan%results() == 0 .and. diagnostics%count == 0) call input%report(sweeps(1), 'design', &
         'no number of the variants is kept; needed: a &record with quantity, fatigue, mode, response or path', diagnostics)
-      if (size(plan%trajectories) > 0) call check_output_times(input, failure)
+      if (size(plan%trajectories) > 0) call check_output_times(input, diagnostics)
       if (.not. allocated(failure)) call count_columns(input, plan%machine, plan%columns, plan%notes, failure)
     end if
-    call merge_errors(input, diagnostics, failure, error)
+    call input%refuse(diagnostics, error)
+    call add_error(error, failure)
   end subroutine make_plan
 
   !> Adds wrong targets and quantities to the error of an input that cannot be read, if all its errors are in groups of the sweep
@@ -113,7 +114,9 @@ contains
     call find_varied(input, varied, numbers, diagnostics)
     call list_variant_signals(input, numbers%targets, machine, signals, failure)
     if (size(varied) > 0 .and. .not. allocated(failure)) call check_quantities(input, signals, diagnostics)
-    call merge_errors(input, diagnostics, failure, error)
+    deallocate (error)   ! its mistakes are among the diagnostics
+    call input%refuse(diagnostics, error)
+    call add_error(error, failure)
   end subroutine add_plan_diagnostics
 
   !> The numbers of a variant: the ones of the design, rounded where they are integers.
@@ -190,23 +193,6 @@ contains
       if (.not. any(targets%group == i .and. targets%key == run%key_position('t_end'))) span%t_end = run%number('t_end')
     end associate
   end function fixed_span
-
-  !> Makes one error of the diagnostics on the sweep and of a failure of the base machine.
-  subroutine merge_errors(input, diagnostics, failure, error)
-    type(input_t), intent(in) :: input
-    type(diagnostics_t), intent(in) :: diagnostics
-    type(error_t), allocatable, intent(in) :: failure
-    type(error_t), allocatable, intent(out) :: error
-
-    if (diagnostics%count > 0 .and. allocated(failure)) then
-      call raise(error, max(failure%code, diagnostics%worst_code()), input%diagnostics_text(diagnostics) // new_line('a') // &
-                 failure%message)
-    else if (diagnostics%count > 0) then
-      call raise(error, diagnostics%worst_code(), input%diagnostics_text(diagnostics))
-    else if (allocated(failure)) then
-      error = failure
-    end if
-  end subroutine merge_errors
 
   !> The header of the files of a shard.
   type(sweep_header_t) function new_sweep_header(plan, shard, shards) result(header)

@@ -56,6 +56,7 @@ contains
       return
     end if
     call read_path(text, '=VALUE', override%key_path_t, message)
+    message = message // override%hint
     if (message /= '') return
     rule = key_rules(override%key_rule)
     if (rule%value_type == a_name) then

@@ -61,7 +61,7 @@ contains
     is_readable = diagnostics%count == 0
     if (is_readable) call find_load_cases(input, lacks, diagnostics)
     if (diagnostics%count > 0) then
-      call raise(error, diagnostics%worst_code(), input%diagnostics_text(diagnostics))
+      call input%refuse(diagnostics, error)
     else if (size(input%load_cases) > 0) then
       call keep_groups(input, lacks)
     end if
@@ -109,7 +109,7 @@ contains
         end do
       end do
     end associate
-    if (diagnostics%count > 0) call raise(own, diagnostics%worst_code(), input%diagnostics_text(diagnostics))
+    call input%refuse(diagnostics, own)
     if (.not. allocated(own)) then
       call keep_groups(input, input%load_case%lacks)
     else if (allocated(input%groups)) then

@@ -5,7 +5,7 @@ module nocdyn_target_search
   use nocdyn_name_checks, only: collect_names
   use nocdyn_schema, only: first_key, group_rules, has_word, key_rules, last_key, selector_name, selector_rule
   use nocdyn_schema_rules, only: a_number, an_integer, key_rule_t
-  use nocdyn_schema_text, only: only_if_text, suggestion, type_text
+  use nocdyn_schema_text, only: only_if_text, suggest, type_text
   use nocdyn_schema_units, only: name_in_unit, other_unit
   use nocdyn_near_words, only: nearest_word
   use nocdyn_text, only: append, listed, lower_case, quoted, string_t, to_text
@@ -27,21 +27,29 @@ contains
     type(key_path_t), intent(out) :: path
     integer, intent(out) :: position   !! in the list of the key
     character(len=:), allocatable, intent(out) :: message   !! what is wrong and allowed, '' if nothing is wrong
+    type(string_t), allocatable :: names(:)
     integer :: count
 
     group = 0
     position = 1
     call read_path(text, '', path, message)
-    if (path%key_rule == 0) call suggest_path(input, text, path%group_rule > 0, message)
+    if (path%key_rule == 0 .and. .not. path%is_near) call suggest_path(input, text, path%group_rule > 0, path%hint)
+    message = message // path%hint
     if (path%group_rule > 0) then
       if (has_word(fixed_groups, group_rules(path%group_rule)%name)) message = 'the keys of &' // &
         trim(group_rules(path%group_rule)%name) // ' cannot vary; allowed: bodies, couplings, joints, torques and &run'
     end if
     if (message == '') call check_kind_of_key(path, message)
     if (message /= '') return
-    call find_group(input, path, group, message)
-    if (message /= '') call suggest_path(input, text, .true., message)
-    if (message == '') call check_law(input%groups(group), key_rules(path%key_rule), message)
+    call find_group(input, path, group)
+    if (group == 0) then
+      call collect_names(input%groups, input%groups_named(trim(group_rules(path%group_rule)%name)), names)
+      call suggest(path%name, names, path%hint, path%is_near)
+      if (.not. path%is_near) call suggest_path(input, text, .true., path%hint)
+      message = 'there is no &' // trim(group_rules(path%group_rule)%name) // ' ' // quoted(path%name) // path%hint
+      return
+    end if
+    call check_law(input%groups(group), key_rules(path%key_rule), message)
     if (message == '') then
       ! Index of the value in the list of the key. Only a list has a subscript; a list of one value needs none.
       position = path%target%first
@@ -65,18 +73,17 @@ contains
     end if
   end subroutine search_target
 
-  !> Replaces the suggestion of a message by a path of the input, if only the group of the text is missing or wrong.
-  subroutine suggest_path(input, text, has_group, message)
+  !> Replaces a hint by a path of the input, if only the group of the text is missing or wrong.
+  subroutine suggest_path(input, text, has_group, hint)
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: text     !! the path
     logical, intent(in) :: has_group         !! the text begins with a group; then its rest must be a path
-    character(len=:), allocatable, intent(inout) :: message
+    character(len=:), allocatable, intent(inout) :: hint
     type(string_t), allocatable :: tails(:)
     integer, allocatable :: owners(:)
     character(len=:), allocatable :: tail
     integer :: near, subscript
 
-    if (index(message, '; did you mean') > 0) return   ! of the group or the key
     call list_tails(input, tails, owners)
     subscript = index(text // '(', '(')
     tail = lower_case(text(:subscript - 1))
@@ -84,8 +91,7 @@ contains
     near = nearest_word(tail, tails)
     if (near == 0) return
     if (has_group .and. tail /= lower_case(tails(near)%text)) return
-    message = message(:index(message // ';', ';') - 1) // "; did you mean '" // input%groups(owners(near))%kind // '.' // &
-                tails(near)%text // text(subscript:) // "'?"
+    hint = "; did you mean '" // input%groups(owners(near))%kind // '.' // tails(near)%text // text(subscript:) // "'?"
   end subroutine suggest_path
 
   !> The paths of all keys that can vary, also in their other units, without their groups.
@@ -157,20 +163,16 @@ contains
   end function is_numeric
 
   !> The group with the name of the path.
-  subroutine find_group(input, path, group, message)
+  subroutine find_group(input, path, group)
     type(input_t), intent(in) :: input
     type(key_path_t), intent(in) :: path
-    integer, intent(out) :: group   !! index in the input, if the message is empty
-    character(len=:), allocatable, intent(inout) :: message
-    type(string_t), allocatable :: names(:)
+    integer, intent(out) :: group   !! index in the input, 0: there is none
 
     do group = 1, size(input%groups)
       if (input%groups(group)%rule /= path%group_rule) cycle
       if (input%groups(group)%name == path%name) return
     end do
-    call collect_names(input%groups, input%groups_named(trim(group_rules(path%group_rule)%name)), names)
-    message = 'there is no &' // trim(group_rules(path%group_rule)%name) // ' ' // quoted(path%name) // &
-                suggestion(path%name, names)
+    group = 0
   end subroutine find_group
 
   !> Refuses a key that the kind of the group does not have.
