@@ -17,7 +17,7 @@ DATA = Path(__file__).parent / "data"
 BUILD_SETTINGS = (Path(os.environ["NOCDYN_BUILD"]) / "CMakeCache.txt").read_text()
 TRAPS_EXCEPTIONS = "CMAKE_BUILD_TYPE:STRING=Debug" in BUILD_SETTINGS
 IS_SANITIZED = "-fsanitize=address" in BUILD_SETTINGS  # takes terabytes of addresses, and memory of its own
-IS_SLOW = TRAPS_EXCEPTIONS or IS_SANITIZED  # takes ten times as long as release
+IS_SLOW = TRAPS_EXCEPTIONS or IS_SANITIZED  # takes several times as long as release
 FORTRAN_FLAGS = re.search(r"^CMAKE_Fortran_FLAGS:STRING=(.*)$", BUILD_SETTINGS, re.MULTILINE)[1]
 CASE_1 = SOURCE / "input/paper/case1.nml"
 CASE_2 = SOURCE / "input/paper/case2.nml"

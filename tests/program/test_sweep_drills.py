@@ -16,7 +16,7 @@ pytestmark = needs_sweeps
 RANKS = 3
 RANK_JOURNALS = [f"sweep.rank-{rank}.journal" for rank in range(1, RANKS)]
 SHARDS = 2
-SAMPLES = 2000 if IS_SLOW else 6000
+SAMPLES = 2000 if IS_SLOW else 24000
 T_END = 20 if IS_SLOW else 200
 LONG = ("--set", f"sweep.samples={SAMPLES}", "--set", f"run.t_end={T_END}")
 

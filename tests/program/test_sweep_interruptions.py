@@ -16,7 +16,7 @@ from sweep_inputs import MPI_ENVIRONMENT, MPI_PROGRAM, SWEEP, TWO_DISCS, limited
 pytestmark = needs_sweeps
 
 # variants that take this sweep about a second of one thread
-SAMPLES = 3000 if IS_SLOW else 40000
+SAMPLES = 6000 if IS_SLOW else 40000
 T_END = 20 if IS_SLOW else 200
 LONG = ("--set", f"sweep.samples={SAMPLES}", "--set", f"run.t_end={T_END}")
 ENDLESS = ("--set", "sweep.samples=100000000", "--set", "run.t_end=20")

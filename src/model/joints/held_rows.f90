@@ -85,7 +85,8 @@ contains
       allocate (self%holding(n), self%inverse(n, n), self%right(n))
       self%system = new_semidefinite(merge(n, 0, self%motions%count > 0))
       if (self%teeth%count == 0) return
-      allocate (self%factors(n, n), self%pivots(n), self%share(self%teeth%count))
+      allocate (self%factors(n, n), self%pivots(n))
+      allocate (self%share(self%teeth%count), source=0.0_wp)
     end associate
   end subroutine allocate_rows
 
