@@ -2,7 +2,8 @@
 !>
 !> A law M(u, u') that oscillates by u = u_0 + a cos(theta) has the equivalent stiffness -1 / (pi a) times the integral of
 !> M cos(theta) over a turn: its first harmonic (describing function). It is compared with the tangent stiffness of the linear
-!> response. The same over u' is compared with the damping. The amplitude a of several lines is half the range of their sum.
+!> response. The equivalent damping, from the same integral over an oscillation of u', is compared with the tangent damping. The
+!> amplitude a of several lines is half the range of their sum.
 module nocdyn_linear_ranges
   use nocdyn_bank, only: bank_t, role_coupling, role_load, role_motor
   use nocdyn_forced_response, only: forced_response_t
@@ -24,7 +25,7 @@ module nocdyn_linear_ranges
     integer :: worst = 0                     !! point
     logical :: is_elastic = .true.           !! whether the stiffness changes, else the damping
     real(wp) :: tangent = 0.0_wp             !! stiffness [N m/rad] or damping [N m s/rad] of the linear response there
-    real(wp) :: equivalent = 0.0_wp          !! the same over the oscillation
+    real(wp) :: equivalent = 0.0_wp          !! equivalent stiffness or damping over the oscillation
     real(wp) :: amplitude = 0.0_wp           !! of the oscillation [rad] or [rad/s]
     real(wp), private :: size = 0.0_wp       !! what makes a point worse than another one
   end type excursion_t

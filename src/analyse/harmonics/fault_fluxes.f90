@@ -9,8 +9,8 @@
 !> whose T_k are the time constants of the short circuit of all phases (P. Kundur, Power System Stability and Control, 1994,
 !> chapter 4; C. Concordia, Synchronous Machines, 1951). The stator has the resistance r = x'' / (omega T_a) and the equation
 !> psi' = v - omega r i in its own frame. While the rotor turns with the mains, these equations are linear with constant
-!> coefficients: in the rotor's frame for faults of all phases, in the stator's for that of two. Fluxes and currents are sums of
-!> exponentials, and the torque, their product, is one, without any approximation.
+!> coefficients: in the rotor's frame for faults of all phases, in the stator's frame for faults of two phases. Fluxes and
+!> currents are sums of exponentials, and the torque, their product, is one, without any approximation.
 module nocdyn_fault_fluxes
   use nocdyn_fault_excitations, only: fault_terms_t
   use nocdyn_finite, only: is_finite

@@ -13,7 +13,7 @@ contains
   subroutine find_shared_load(input, excitation, load, text)
     type(input_t), intent(in) :: input
     integer, intent(in) :: excitation   !! index of the group
-    integer, intent(out) :: load        !! the same, 0: not found
+    integer, intent(out) :: load        !! index of its group, 0: not found
     character(len=:), allocatable, intent(out) :: text   !! what is wrong, '' if nothing is
     integer, allocatable :: loads(:)
     type(string_t), allocatable :: names(:)

@@ -20,7 +20,7 @@ module nocdyn_response_summary
     integer :: quantity = 0            !! the coupling, 0 if there is none
     real(wp) :: speed = 0.0_wp         !! of its peak; the critical speed itself if there is no peak near it [rad/s]
     real(wp) :: amplitude = 0.0_wp     !! at this speed, of the line alone [N m]
-    real(wp) :: stress = 0.0_wp        !! the same of its stress; 0 if it is unknown [Pa]
+    real(wp) :: stress = 0.0_wp        !! amplitude of its stress at this speed, of the line alone; 0 if it is unknown [Pa]
     real(wp) :: half_range = 0.0_wp    !! at this speed, of all lines [N m]
     real(wp) :: ratio = 0.0_wp         !! of the response of this quantity to its limits there, 0 without limits
     logical :: is_unbounded = .false.  !! without damping there is no finite response

@@ -104,7 +104,7 @@ contains
   subroutine append_side(names, energies, sign, width, report)
     type(string_t), intent(in) :: names(:)
     real(wp), intent(in) :: energies(:)       !! [J]
-    real(wp), intent(in) :: sign              !! of those of the side: 1 or -1
+    real(wp), intent(in) :: sign              !! of the energies of the side: 1 or -1
     integer, intent(in) :: width              !! of the names
     type(text_buffer_t), intent(inout) :: report
     real(wp) :: left(size(energies)), total

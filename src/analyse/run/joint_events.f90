@@ -16,8 +16,8 @@ module nocdyn_joint_events
     real(wp) :: time = 0.0_wp                  !! [s]
     character(len=:), allocatable :: joint     !! e.g. "clutch engage"
     integer :: from = locked, to = locked      !! modes
-    real(wp) :: slip = 0.0_wp                  !! speed of the first body less that of the second before it [rad/s]
-    real(wp) :: torque = 0.0_wp                !! on the second body after it [N m]
+    real(wp) :: slip = 0.0_wp                  !! speed of the first body minus speed of the second one, before the event [rad/s]
+    real(wp) :: torque = 0.0_wp                !! on the second body after the event [N m]
     real(wp) :: impulse = 0.0_wp               !! of an impact [N m s]
   end type named_event_t
 

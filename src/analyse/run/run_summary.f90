@@ -37,7 +37,7 @@ module nocdyn_run_summary
     integer :: rows = 0                   !! before `from` too
     real(wp) :: from = -huge(1.0_wp)      !! [s]
     logical :: have_begun = .false.       !! whether the run has come to `from`
-    logical :: are_continuous = .false.   !! whether they are those of the motion, not of the only row
+    logical :: are_continuous = .false.   !! whether they are extremes of the motion, not of the only row
     real(wp), allocatable :: lowest(:), lowest_time(:), highest(:), highest_time(:), last(:)   !! [columns]
   end type extremes_t
 

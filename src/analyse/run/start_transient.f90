@@ -2,7 +2,7 @@
 !>
 !> The machine is linearised at its start. The moments there, their rates and the speeds of twist make each mode swing about
 !> its position of balance; the modes with the largest moments in a coupling are the excited ones. The transient lasts until these
-!> have decayed, but for some periods at least; where they decay too slowly, for these periods. A start in balance, as that of a
+!> have decayed, but for some periods at least; where they decay too slowly, for these periods. A start in balance, such as a
 !> steady state, has none.
 module nocdyn_start_transient
   use nocdyn_errors, only: error_t

@@ -19,7 +19,7 @@ module nocdyn_trajectory_table
   type, public :: trajectory_table_t
     type(string_t), allocatable :: labels(:)
     type(signal_t), allocatable :: signals(:)      !! of the columns, in the units of the table
-    integer, allocatable :: unit(:)                !! of each column: index of `units`, 0: that of SI
+    integer, allocatable :: unit(:)                !! of each column: index of `units`, 0: SI unit
     type(signal_values_t) :: columns
     real(wp), private :: t(1) = 0.0_wp             !! [s]
     real(wp), allocatable, private :: y(:, :)      !! [1, states + quadratures]
@@ -38,7 +38,7 @@ contains
   type(trajectory_table_t) function new_trajectory_table(formulation, t_start, wanted, others) result(table)
     class(formulation_t), target, intent(inout) :: formulation   !! of one lane, with work integrals
     real(wp), intent(in) :: t_start                   !! [s]
-    integer, intent(in) :: wanted(:)                  !! units of columns: indices of `units`; else those of SI
+    integer, intent(in) :: wanted(:)                  !! units of columns: indices of `units`; else SI units
     type(signal_source_t), intent(in), optional :: others(:)   !! further columns of `columns`, which are not in the rows
     type(signal_source_t), allocatable :: list(:)
 

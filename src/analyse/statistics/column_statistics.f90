@@ -41,7 +41,7 @@ module nocdyn_column_statistics
 
   type, abstract, public :: column_statistics_t
     type(accumulator_t), allocatable :: accumulators(:)       !! in the order of the columns
-    type(damage_sum_t), allocatable :: damages(:)             !! the same
+    type(damage_sum_t), allocatable :: damages(:)             !! in the order of the columns
     type(interpolation_t) :: rules(max_degree)                !! of the degrees of the steps that there have been
     real(wp), allocatable :: linear(:, :), cubic(:, :)        !! of the functions of x, [whole strips of lanes, columns]
     real(wp), allocatable :: x_end(:, :)                      !! [lanes, columns]

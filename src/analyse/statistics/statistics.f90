@@ -17,8 +17,8 @@ module nocdyn_statistics
   integer, parameter, public :: statistic_mean = 5            !! over time
   integer, parameter, public :: statistic_rms = 6             !! root of the mean square
   integer, parameter, public :: statistic_time_of_max = 7     !! when the largest value is first reached
-  integer, parameter, public :: statistic_time_of_min = 8     !! the same of the smallest value
-  integer, parameter, public :: statistic_time_of_max_abs = 9 !! the same of the largest magnitude
+  integer, parameter, public :: statistic_time_of_min = 8     !! when the smallest value is first reached
+  integer, parameter, public :: statistic_time_of_max_abs = 9 !! when the largest magnitude is first reached
   integer, parameter, public :: statistic_settling_time = 10  !! until the last exit from the band, counted from `from`
 
   integer, parameter, public :: statistic_damage = 11         !! of a &fatigue, by its cycles
@@ -49,7 +49,7 @@ module nocdyn_statistics
     logical :: is_stress = .false.                   !! whether that is its stress, not its moment
     character(len=:), allocatable :: label           !! e.g. 'moment_shaft_max_abs_from_2'
     character(len=:), allocatable :: unit            !! e.g. 'N m'
-    integer :: in_unit = 0                           !! the same: index of `units`, 0: SI
+    integer :: in_unit = 0                           !! this unit as index of `units`, 0: SI
     character(len=:), allocatable :: long_name       !! a description
   end type statistic_t
 

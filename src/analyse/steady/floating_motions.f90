@@ -1,5 +1,5 @@
-!> Motions of a machine that no torque acts on, though several speeds take part in them: such as that of two discs with a viscous
-!> damper between them. Any is steady, and the momentum of the start is kept.
+!> Motions of a machine that no torque acts on, though several speeds take part in them, such as the common rotation of two discs
+!> with a viscous damper between them. Any is steady, and the momentum of the start is kept.
 module nocdyn_floating_motions
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_eigen, only: singular_vectors

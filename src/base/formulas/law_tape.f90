@@ -64,7 +64,7 @@ module nocdyn_law_tape
     integer :: restoring = 0                   !! conservative moment [N m]
     integer :: applied = 0                     !! the other moment [N m]
     integer :: phase_restoring = 0             !! part of the conservative moment that acts on the phase [N m]
-    integer :: phase_applied = 0               !! the same of the other moment
+    integer :: phase_applied = 0               !! part of the other moment that acts on the phase [N m]
     integer :: stored = 0                      !! potential energy of `restoring` [J]
     integer, allocatable :: rate(:)            !! derivatives of the internal states by the time, [states]
     integer :: argument = 0                    !! of the curve of an element

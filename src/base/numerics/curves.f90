@@ -11,7 +11,7 @@ module nocdyn_curves
   integer, parameter, public :: interpolation_linear = 1
   integer, parameter, public :: interpolation_cubic = 2    !! without overshoot (monotone); its second derivative jumps
   integer, parameter, public :: interpolation_spline = 3   !! with two continuous derivatives
-  integer, parameter, public :: interpolation_dwells = 4   !! the same between dwells, which stay
+  integer, parameter, public :: interpolation_dwells = 4   !! as `interpolation_spline` between dwells, which stay
   integer, parameter, public :: extrapolation_linear = 1     !! with the slope at the end
   integer, parameter, public :: extrapolation_constant = 2   !! with the value at the end
 

@@ -9,7 +9,7 @@ module nocdyn_splines
   public :: new_spline
 
   integer, parameter, public :: spline_smooth = 1     !! with two continuous derivatives
-  integer, parameter, public :: spline_dwells = 2     !! the same between segments of equal values, which stay
+  integer, parameter, public :: spline_dwells = 2     !! as `spline_smooth` between segments of equal values, which stay
   integer, parameter, public :: spline_monotone = 3   !! without overshoot; the second derivative jumps at the points
 
   !> Segment s lies between points s and s + 1.

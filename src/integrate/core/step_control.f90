@@ -22,7 +22,7 @@ module nocdyn_step_control
     real(wp) :: rtol, atol
     real(wp) :: t_end                                  !! final time [s]
     real(wp) :: longest_step                           !! largest step size of all lanes [s]
-    real(wp), allocatable :: longest(:)                !! the same of each, [lanes]
+    real(wp), allocatable :: longest(:)                !! largest step size of each lane [s], [lanes]
     real(wp), allocatable :: h(:)                      !! next step size of each lane [s]
     real(wp), allocatable :: log_error(:)              !! logarithm to base 2 of the error norm of the last accepted step
     logical, allocatable :: was_rejected(:)            !! whether the last attempt was rejected

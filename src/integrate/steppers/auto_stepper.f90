@@ -29,7 +29,7 @@ module nocdyn_auto_stepper
     integer :: steps = 0               !! accepted steps without a decision, unless they show signs of stiffness
     integer :: uncounted = 0           !! of these, those that have been made
     integer :: signs = 0               !! as in `choice_t`, of implicit steps
-    logical :: is_in_doubt = .false.   !! the same
+    logical :: is_in_doubt = .false.   !! as in `choice_t`
     logical :: waits = .false.         !! whether signs lead to nothing yet
   end type calm_lane_t
 

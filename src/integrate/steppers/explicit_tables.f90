@@ -21,7 +21,7 @@ module nocdyn_explicit_tables
     real(wp), allocatable :: b(:)                 !! [stages]; the stages after these are for the dense output only
     real(wp), allocatable :: c(:)                 !! [all stages]
     real(wp), allocatable :: error(:)             !! b minus the embedded weights, [stages]
-    real(wp), allocatable :: low_order_error(:)   !! the same of a second embedded method of lower order, if there is one
+    real(wp), allocatable :: low_order_error(:)   !! b minus the weights of a second embedded method of lower order, if any
     real(wp), allocatable :: dense(:, :)          !! b_i(theta) = sum_p dense(i, p) theta^p, [all stages, degree]
   end type explicit_table_t
 

@@ -20,9 +20,9 @@ module nocdyn_method_choice
   integer, parameter, public :: kinds = 3
 
   integer, parameter :: first_period(kinds) = [2, 2, 4]   !! steps before the first trial of a kind
-  integer, parameter, public :: shared_period(kinds) = [2, 128, 64]   !! the same of variants: all wait for the trial of one
+  integer, parameter, public :: shared_period(kinds) = [2, 128, 64]   !! `first_period` of variants: all wait for the trial of one
   integer, parameter :: longest_period(kinds) = [256, 256, 64]   ! implicit steps are tried near the limit of stability only
-  integer, parameter, public :: longest_shared_period(kinds) = [256, 256, 1024]   !! the same of variants
+  integer, parameter, public :: longest_shared_period(kinds) = [256, 256, 1024]   !! `longest_period` of variants
   integer, parameter :: first_doubt = 64, last_doubt = 256  !! steps after which a weak sign is enough
   integer, parameter :: forgiven = 2                        !! attempts that may fail then: implicit steps damp what is fast first
   integer, parameter :: successes = 2                       !! successive attempts that win a trial: an error estimate scatters
@@ -39,7 +39,7 @@ module nocdyn_method_choice
     logical :: tries(kinds) = .true.      !! whether a kind is tried, and not only taken where no other can be
     real(wp) :: cost(kinds) = 1.0_wp      !! of a step
     integer :: first_period(kinds) = first_period       !! steps before the first trial of a kind
-    integer :: longest_period(kinds) = longest_period   !! the same after many trials that were lost
+    integer :: longest_period(kinds) = longest_period   !! steps before a trial after many lost trials
     real(wp) :: limit(kinds) = 1.0_wp     !! of |h lambda| on the negative real axis; no limit of the implicit kind
   end type kind_data_t
 
@@ -50,7 +50,7 @@ module nocdyn_method_choice
     integer :: may_fail = 0               !! attempts that do not yet lose it
     logical :: is_in_doubt = .false.      !! whether there has been a weak sign since the last trial of implicit steps
     integer :: doubt = first_doubt        !! steps until implicit ones are tried because of that
-    integer :: next_doubt = first_doubt   !! the same after the next trial
+    integer :: next_doubt = first_doubt   !! `doubt` after the next trial
     real(wp) :: rate = 0.0_wp             !! cost of a second by the kind `before` [1/s]
     real(wp) :: h = 0.0_wp                !! its step size [s]
     real(wp) :: lambda = 0.0_wp           !! the last estimate of the dominant eigenvalue [1/s]

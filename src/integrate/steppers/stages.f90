@@ -12,7 +12,7 @@ module nocdyn_stages
 
   type, public :: stages_t
     integer :: step = 0                            !! number of stages of a step
-    integer :: all = 0                             !! the same with the stages that only the dense output needs
+    integer :: all = 0                             !! number of all stages, with the stages that only the dense output needs
     type(stage_sum_t), allocatable :: internal(:)  !! rows of the tableau: states at which the stages are evaluated
     type(stage_sum_t) :: update                    !! weights of y_new
     type(stage_sum_t) :: error                     !! weights of the error estimate

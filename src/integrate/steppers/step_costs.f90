@@ -16,7 +16,7 @@ module nocdyn_step_costs
   real(wp), parameter :: implicit_start = 2500.0_wp, operation = 0.5_wp        ! Jacobian, factors and solutions
   real(wp), parameter :: taylor_start = 600.0_wp, taylor_state = 0.7_wp        ! sums of series: of a step, of a state and order
   real(wp), parameter :: shared_explicit_start = 300.0_wp, shared_taylor_start = 150.0_wp   ! where variants share vectors
-  real(wp), parameter :: shared_coefficient = 0.6_wp                           ! the same, of a series, in evaluations
+  real(wp), parameter :: shared_coefficient = 0.6_wp                           ! coefficient of a shared series, in evaluations
   real(wp), parameter :: sample_start = 820.0_wp, sample_state = 24.0_wp       ! of the columns: of a sample, of a state
 
 contains

@@ -34,12 +34,12 @@ module nocdyn_input
     procedure :: single         !! that group
     procedure :: title
     procedure :: shown_file     !! the path for messages
-    procedure :: shown_case     !! the same with the load case
+    procedure :: shown_case     !! the path and the load case for messages
     procedure :: label          !! "&gear 'reducer'"
     procedure :: case_overrides !! number of the overrides that the load case gives
     procedure, private :: location_of_group, location_of_key
     generic :: location => location_of_group, location_of_key   !! where they come from, to begin a message with
-    procedure :: place              !! the same for notes
+    procedure :: place              !! where a key comes from, without the load case, for notes
     procedure :: report             !! adds a diagnostic on a key of a group
     procedure :: refuse, refuse_new   !! make an error of diagnostics
     procedure :: diagnostics_text   !! all messages with their locations

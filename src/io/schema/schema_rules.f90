@@ -43,7 +43,7 @@ module nocdyn_schema_rules
 
   ! Relations between two sets of keys, `first` and `second`.
   integer, parameter, public :: exactly_one = 1    !! keys of one set are given; the ones of the other lose their defaults
-  integer, parameter, public :: at_most_one = 2    !! the same, or neither set is given
+  integer, parameter, public :: at_most_one = 2    !! as `exactly_one`, or neither set is given
   integer, parameter, public :: requires = 3       !! `first` has values and defaults only beside one of `second`, but for a 0
   integer, parameter, public :: equal_lengths = 4  !! of the lists `first`; `second`: a file with two of them as columns, or ''
   integer, parameter, public :: less_than = 5      !! the number `first` is less than the number `second`

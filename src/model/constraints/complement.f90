@@ -58,7 +58,7 @@ contains
     dual = inverse(:, size(independent) + 1:)
   end subroutine natural_complement
 
-  !> The factor that makes the natural complement of a group of geared bodies that of eq. (82) or (83).
+  !> The factor that turns the natural complement of a group of geared bodies into the complement of eq. (82) or (83).
   !>
   !> Section 6 multiplies the column of the gear pair by R2 or by -R2, which is the determinant of L_lambda^ext up to
   !> its sign; for a group of r gears the factor is the geometric mean over the gears, and 1 for a free body.

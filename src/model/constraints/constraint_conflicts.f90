@@ -81,7 +81,7 @@ contains
     bodies = pack([(b, b=1, size(trains%train))], is_locked(trains%train))
   end function bodies_of
 
-  !> Trains that the relations lock: those of the core whose row of the complement is zero, and those whose relation has only
+  !> Trains that the relations lock: trains of the core whose row of the complement is zero, and trains whose relation has only
   !> locked trains or speeds that cancel.
   function locked_trains(relations, elimination) result(is_locked)
     type(train_relations_t), intent(in) :: relations

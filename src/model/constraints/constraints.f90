@@ -42,7 +42,7 @@ module nocdyn_constraints
 
 contains
 
-  !> Rows from their entries; the arrays are those of `constraints_t`.
+  !> Rows from their entries; the arrays are components of `constraints_t`.
   function new_constraints(bodies, names, units, first, body, coefficient, kinds, members) result(constraints)
     integer, intent(in) :: bodies   !! bodies of the machine
     type(string_t), intent(in) :: names(:), units(:)
@@ -81,7 +81,7 @@ contains
     rows = size(self%names)
   end function rows
 
-  !> Whether a row is one of gears, whose multiplier is a reaction; that of others, as of clutches, is a torque.
+  !> Whether a row is one of gears, whose multiplier is a reaction; the multiplier of other rows, as of clutches, is a torque.
   pure logical function is_of_teeth(self, row)
     class(constraints_t), intent(in) :: self
     integer, intent(in) :: row

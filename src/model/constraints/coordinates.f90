@@ -28,7 +28,7 @@ module nocdyn_coordinates
     integer, allocatable :: first(:)                    !! first entry of each body, [bodies + 1]
     integer, allocatable :: coordinate(:)               !! [entries]
     real(wp), allocatable :: ratio(:, :)                !! nonzero blocks of L_tau, [lanes, entries]
-    real(wp), allocatable :: response(:, :)             !! the same blocks of ((L_tau^T J L_tau)^-1 L_tau^T)^T, [lanes, entries]
+    real(wp), allocatable :: response(:, :)             !! these blocks of ((L_tau^T J L_tau)^-1 L_tau^T)^T, [lanes, entries]
     type(reaction_solver_t) :: reactions                !! gives the reactions from J omega' - T
     integer, allocatable, private :: geared(:)          !! bodies in groups with rows, ascending
     real(wp), allocatable, private :: inertia(:, :)     !! J [kg m2], [lanes, bodies]

@@ -1,4 +1,4 @@
-!> Load sharing of redundant rows: of all reactions with the same effect on the bodies, those of minimum norm.
+!> Load sharing of redundant rows: of all reactions with the same effect on the bodies, the solution of minimum norm.
 !>
 !> Reactions without effect on any body are null vectors. Each redundant row has one, together with the rows that it repeats.
 !> Projecting the null vectors out leaves the reactions of minimum norm. Redundancies without a common row are independent of

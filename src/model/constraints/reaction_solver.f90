@@ -129,7 +129,7 @@ contains
     call self%load_sharing%minimise_norm(lane, lambda)
   end subroutine find_reactions
 
-  !> Reactions of the kept rows only: first those of the relations, then those of the rows between two bodies.
+  !> Reactions of the kept rows only: first of the relations, then of the rows between two bodies.
   pure subroutine back_substitute(self, lane, moment, lambda)
     class(reaction_solver_t), intent(inout) :: self
     integer, intent(in) :: lane

@@ -2,7 +2,7 @@
 !>
 !> The rows that join a train form a tree. The ratio of a body to the root is the product of the ratios along its path. A further
 !> row between two bodies of a train is either redundant or inconsistent. Ratios are stored as fraction and exponent, as
-!> those of a long reduction may exceed the range of real numbers.
+!> the ratio of a long reduction may exceed the range of real numbers.
 module nocdyn_rigid_trains
   use nocdyn_constraints, only: constraints_t
   use nocdyn_kinds, only: wp
@@ -188,8 +188,8 @@ contains
     end do
   end subroutine largest_exponents
 
-  !> The first row of two bodies that closes a loop with another ratio than that of the rows before it, in the first lane; 0 if
-  !> there is none.
+  !> The first row of two bodies that closes a loop with another ratio than the rows before it, in the first lane; 0 if there is
+  !> none.
   integer function first_contradiction(self, constraints, is_tree) result(row)
     class(rigid_trains_t), intent(in) :: self
     type(constraints_t), intent(in) :: constraints

@@ -77,7 +77,7 @@ contains
     real(wp), intent(in) :: dual(:, :)   !! D of the core, [core_trains, core]
     integer, intent(in) :: lane
     real(wp), intent(inout) :: moment(:)   !! [N m], [trains]; on return without the moments of the eliminated relations
-    real(wp), intent(inout) :: lambda(:)   !! [relations]; those of the elimination are set
+    real(wp), intent(inout) :: lambda(:)   !! [relations]; set for the relations of the elimination
     integer :: entry, i, k
 
     associate (equations => relations%equations)

@@ -32,8 +32,8 @@ module nocdyn_train_relations
 
 contains
 
-  !> The relations of a machine, for all lanes, with each train once in a relation. A coefficient is 0 where those of the bodies
-  !> cancel.
+  !> The relations of a machine, for all lanes, with each train once in a relation. A coefficient is 0 where the
+  !> coefficients of the bodies cancel.
   function new_relations(constraints, trains) result(self)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains

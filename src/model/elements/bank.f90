@@ -22,7 +22,7 @@ module nocdyn_bank
   integer, parameter, public :: role_excitation = 4   !! in Q_0 of eq. (17); puts energy in
   integer, parameter, public :: role_phase = 5        !! part of a coupling: the phase of an element of the bank before
   integer, parameter, public :: role_clutch = 6       !! locks or slips; takes energy out
-  integer, parameter, public :: role_freewheel = 7    !! the same in one direction
+  integer, parameter, public :: role_freewheel = 7    !! locks or slips in one direction; takes energy out
   integer, parameter, public :: role_cardan = 8       !! joints with a ratio that depends on the position
   integer, parameter, public :: role_crank = 9
   integer, parameter, public :: role_relation = 10

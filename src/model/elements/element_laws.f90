@@ -23,8 +23,8 @@ module nocdyn_element_laws
     type(law_t) :: law
     integer :: states = 0                       !! internal states of each element
     type(law_work_t) :: values                  !! of the moments and rates
-    type(law_work_t) :: series                  !! the same with the coefficients of a series
-    type(law_work_t), private :: tangents       !! the same with two coefficients more
+    type(law_work_t) :: series                  !! of the moments and rates, with the coefficients of a series
+    type(law_work_t), private :: tangents       !! of the moments and rates, with two coefficients more
     type(law_work_t), private :: energies
     type(law_work_t), private :: guards
     logical :: is_ready = .false.               !! whether there is work space for values and guards

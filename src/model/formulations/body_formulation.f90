@@ -196,7 +196,7 @@ contains
     if (self%joints%count > 0) call self%hold_columns(components, dfdy(1, :, :), dfdt(1, :))
   end subroutine fill_of_bodies
 
-  !> Derivatives of the torques T of one lane, from those of the elements.
+  !> Derivatives of the torques T of one lane, from the derivatives of the moments of the elements.
   subroutine differentiate_torques(self, lane)
     class(body_formulation_t), intent(inout) :: self
     integer, intent(in) :: lane

@@ -1,9 +1,9 @@
 !> The quantities in which the error of a step is measured: what breaks shafts, not the angles and speeds of bodies.
 !>
 !> They are linear functions of the states: the rates of twist of the couplings, the speeds of the rigid motions, the twists, the
-!> other states, and the angles of the rigid motions. The size of a twist is its distance from the rest angle, that of a rigid
-!> motion's speed its distance from the speed at the start, and that of its angle 1 rad, since a torque that depends on an
-!> angle depends on its phase. So a rotation that is added to the whole machine changes no size and no error.
+!> other states, and the angles of the rigid motions. The size of a twist is its distance from the rest angle, the size of a
+!> rigid motion's speed its distance from the speed at the start, and the size of its angle 1 rad, since a torque that depends on
+!> an angle depends on its phase. So a rotation that is added to the whole machine changes no size and no error.
 module nocdyn_error_measures
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t

@@ -136,7 +136,7 @@ contains
 
   !> Evaluates bodies, elements and torques at a state, so that they and the reactions can be read.
   !>
-  !> The branches of the laws are chosen by the state: `keep_branches` of the machine keeps those of an integration.
+  !> The branches of the laws are chosen by the state: `keep_branches` of the machine keeps the branches of an integration.
   subroutine observe_elements(self, t, y, in_motion)
     class(formulation_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)          !! [s], [lanes]
@@ -164,7 +164,7 @@ contains
     integer, intent(in) :: lane
   end subroutine reset_origin
 
-  !> The angle of a body where the angles in the state are zero [rad]; by default they are those of the bodies.
+  !> The angle of a body where the angles in the state are zero [rad]; by default they are the angles of the bodies.
   pure real(wp) function angle_at_zero(self, lane, body)
     class(formulation_t), intent(in) :: self
     integer, intent(in) :: lane, body

@@ -156,7 +156,7 @@ contains
   !> Decides anew which joints are locked where the engagement of one changes that others hold at rest.
   subroutine engage_at_rest(self, joint, t, y)
     class(joint_formulation_t), intent(inout) :: self
-    integer, intent(in) :: joint                  !! one of them; nothing happens if it is 0
+    integer, intent(in) :: joint                  !! the one whose engagement changes; nothing happens if it is 0
     real(wp), intent(in) :: t                     !! [s]
     real(wp), contiguous, intent(inout) :: y(:)   !! state, [states + quadratures]
 

@@ -107,7 +107,7 @@ contains
                                                          merge(largest_exponent, usual_exponent, self%has_springs_only)))
   end subroutine start_lane
 
-  !> Adds the angle of the origin to those of the elements that turn with it. Elastic elements do not feel it.
+  !> Adds the angle of the origin to the angles of the elements that turn with it. Elastic elements do not feel it.
   pure subroutine move_twists(self, lane, incidence, twist)
     class(moving_origin_t), intent(in) :: self
     integer, intent(in) :: lane

@@ -9,7 +9,7 @@ module nocdyn_multiplier
 
   !> A machine in the multiplier formulation, with the factors of its constant matrix.
   type, extends(body_formulation_t), public :: multiplier_t
-    integer, allocatable :: kept(:)             !! independent constraint rows, which are those of the system
+    integer, allocatable :: kept(:)             !! independent constraint rows, which alone are in the system
     real(wp), allocatable :: factors(:, :, :)   !! LU factors of the constant matrix, [n + kept, n + kept, lanes]
     integer, allocatable :: pivots(:, :)        !! of the LU factors, [n + kept, lanes]
     real(wp), allocatable :: solution(:, :)     !! omega' [rad/s2] and lambda of the kept rows, [n + kept, lanes]

@@ -31,7 +31,7 @@ contains
     class(paper_t), intent(inout) :: self
     logical, intent(in) :: with_energy_balance   !! as in `formulation_t`
     type(inertia_matrices_t) :: inertia
-    real(wp), allocatable :: incidence(:, :)   ! moments on the bodies from those of the couplings
+    real(wp), allocatable :: incidence(:, :)   ! moments on the bodies from the moments of the couplings
     integer :: l, n
     logical :: is_singular
 

@@ -1,6 +1,6 @@
 !> The matrices and vectors of the paper, eqs. (13)-(72), for any machine of n bodies.
 !>
-!> They are those of one lane, at the state at which `evaluate` and `differentiate` of the machine were last called. The parts of
+!> They belong to one lane, at the state at which `evaluate` and `differentiate` of the machine were last called. The parts of
 !> a law beyond -K12 u - c u' (the rest twist of a coupling, the torque of a motor) are terms of Q. Every procedure overwrites its
 !> last argument and allocates nothing.
 module nocdyn_paper_matrices
@@ -72,7 +72,7 @@ contains
     call extend_by_unit(self%inertia_2, self%inertia_3)
   end subroutine assemble_inertia
 
-  !> The matrices of eqs. (16)-(72) of one lane, up to those of eq. (43).
+  !> The matrices of eqs. (16)-(72) of one lane, up to the matrices of eq. (43).
   subroutine assemble(self, machine, lane, complement)
     class(paper_matrices_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
@@ -129,7 +129,7 @@ contains
   end subroutine inertia_matrix
 
   !> The terms of Q, eq. (16), from the banks of one role, [n]: Q_0 of eq. (17) from the excitations, Q_m of eqs. (18), (20)
-  !> from the motors, and from couplings and loads the parts beyond K phi and C omega, and those of slipping joints.
+  !> from the motors, and from couplings and loads the parts beyond K phi and C omega, and the moments of slipping joints.
   subroutine torque_vector(machine, lane, role, torque)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane

@@ -77,8 +77,8 @@ contains
     row = row(:self%pairs)
     column = column(:self%pairs)
     allocate (self%product, source=incidence%response(:, self%response_entry) * incidence%ratio(:, self%ratio_entry))
-    ! The parts of the derivatives of the work integrals: each coordinate of an element, and those of others on which its moment
-    ! depends.
+    ! The parts of the derivatives of the work integrals: each coordinate of an element, and the coordinates of others on which
+    ! its moment depends.
     n = sum(incidence%first(with_work + 1) - incidence%first(with_work)) &
         + sum(incidence%first(elements%cross%by + 1) - incidence%first(elements%cross%by))   ! at most
     allocate (self%work_position(n), self%work_element(n), self%work_pair(n), entry(n), work(n), work_column(n))

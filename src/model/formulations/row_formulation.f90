@@ -1,9 +1,10 @@
-!> Formulations with rows that hold beside those of the coordinates: locked joints, and rows that move (`nocdyn_held_rows`), in a
-!> block of one lane.
+!> Formulations with rows that hold beside the rows that determine the coordinates: locked joints, and rows that move
+!> (`nocdyn_held_rows`), in a block of one lane.
 !>
-!> The rows that hold add their moments to those of the elements, so that q'' is that on the complement of all of them. Where some
-!> move, errors of the integration would let the state leave them: after each step and before each observation it is put back by
-!> the least change, weighted by the inertias; E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, section IV.4.
+!> The rows that hold add their moments to the moments of the elements, so that q'' is the acceleration on the complement of all
+!> rows. Where some move, errors of the integration would let the state leave them: after each step and before each observation
+!> it is put back by the least change, weighted by the inertias; E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration,
+!> section IV.4.
 !> Extensions say how elements move with the states, and how the states answer to the moments of elements.
 module nocdyn_row_formulation
   use nocdyn_formulation, only: formulation_t
@@ -125,8 +126,8 @@ contains
     call self%joints%start(self%machine%banks)
   end subroutine prepare_joints
 
-  !> The moments of the joints that hold at a state of a block of one lane, where the branches are known; they are put among those
-  !> of the elements.
+  !> The moments of the joints that hold at a state of a block of one lane, where the branches are known; they are put among
+  !> the moments of the elements.
   subroutine find_held_moments(self, t, y)
     class(row_formulation_t), intent(inout) :: self
     real(wp), intent(in) :: t      !! [s]
@@ -138,7 +139,8 @@ contains
     call self%find_accelerations(t, self%acceleration)
   end subroutine find_held_moments
 
-  !> The accelerations of the first states from the moments of the elements, to which those of the joints that hold are added.
+  !> The accelerations of the first states from the moments of the elements, to which the moments of the joints that hold are
+  !> added.
   subroutine find_accelerations(self, t, acceleration)
     class(row_formulation_t), intent(inout) :: self
     real(wp), intent(in) :: t                    !! [s]
@@ -180,7 +182,8 @@ contains
     call self%joints%weigh()
   end subroutine move_rows
 
-  !> Adds the moments of the joints that hold to the accelerations of the first states, and puts them among those of the elements.
+  !> Adds the moments of the joints that hold to the accelerations of the first states, and puts them among the moments of the
+  !> elements.
   subroutine hold(self, demand, acceleration, drag)
     class(row_formulation_t), intent(inout) :: self
     real(wp), intent(in) :: demand(:)            !! what the rates of the rows that move must be [rad/s2], [rows that move]
@@ -235,7 +238,7 @@ contains
     end associate
   end subroutine clean_rates
 
-  !> Adds the powers of prescribed motions, and of teeth with losses, to those of the elements.
+  !> Adds the powers of prescribed motions, and of teeth with losses, to the powers of the elements.
   subroutine add_powers(self, powers)
     class(row_formulation_t), intent(in) :: self
     real(wp), intent(inout) :: powers(:)   !! [W], [quadratures]
@@ -298,8 +301,10 @@ contains
   subroutine hold_column(self, column, accelerations, powers)
     class(row_formulation_t), intent(inout) :: self
     integer, intent(in) :: column                !! state; 0: derivatives by the time
-    real(wp), intent(inout) :: accelerations(:)  !! derivatives of those of the first states without joints that hold, [moving]
-    real(wp), intent(inout) :: powers(:)         !! derivatives of those of the elements with work at these moments, [quadratures]
+    real(wp), intent(inout) :: accelerations(:)  !! derivatives of the accelerations of the first states without joints that
+                                                 !! hold, [moving]
+    real(wp), intent(inout) :: powers(:)         !! derivatives of the powers of the elements with work at these moments,
+                                                 !! [quadratures]
     integer :: i
 
     associate (motions => self%joints%motions, n => size(self%moving), speed => self%machine%elements%speed, unit => self%unit, &

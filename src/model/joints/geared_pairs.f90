@@ -17,7 +17,7 @@ contains
     type(element_rows_t), intent(in) :: rows   !! of the elements
     integer, intent(in) :: element
     real(wp), parameter :: rounding = 1.0e-10_wp
-    real(wp) :: speed(size(coordinates%body), 2)   ! of both bodies, by those of the coordinates
+    real(wp) :: speed(size(coordinates%body), 2)   ! of both bodies, by the speeds of the coordinates
     integer :: body, i, k
 
     has_other_ratio = .false.

@@ -1,4 +1,4 @@
-!> The rows of L_lambda that hold now: those of locked joints and those that move (`nocdyn_row_motions`), in a block of one lane.
+!> The rows of L_lambda that hold now: rows of locked joints and rows that move (`nocdyn_row_motions`), in a block of one lane.
 !>
 !> The joints that hold are a *set*; each is one more row u' = 0, or u' - g' v' = 0 where it moves. With the response R of the
 !> accelerations to the moments and W = U R, the moments of the set are -W^+ u'', with the accelerations u'' of its rows without
@@ -6,7 +6,8 @@
 !> W is formed from the slopes g' at each position. W is singular where some of the rows are redundant; the least norm shares the
 !> moment between them.
 !>
-!> Teeth with losses that turn hold no row, but their moments x = -s (T + V x) depend on those of the set and are found with them.
+!> Teeth with losses that turn hold no row, but their moments x = -s (T + V x) depend on the moments of the set and are found with
+!> them.
 module nocdyn_held_rows
   use nocdyn_friction_joints, only: locked
   use nocdyn_kinds, only: wp
@@ -22,7 +23,7 @@ module nocdyn_held_rows
     integer :: count = 0                     !! joints that lock, and rows that move
     integer :: locking = 0                   !! the first of them: clutches and freewheels
     type(row_motions_t) :: motions           !! of the others
-    type(tooth_loads_t) :: teeth             !! those of the first that are teeth with losses
+    type(tooth_loads_t) :: teeth             !! of the clutches and freewheels that are teeth with losses
     integer, allocatable :: element(:)       !! of the machine, [joints] as all that follow
     integer, allocatable :: driver(:)        !! element whose motion moves the row, 0 for none
     integer, allocatable :: mode(:)          !! `locked` where the row holds
@@ -37,7 +38,7 @@ module nocdyn_held_rows
     integer :: lost = 0                      !! a row with which the rank has changed, or that others contradict, 0: none
     logical :: is_assumed = .false.          !! whether the modes are for a trial only
     logical, private :: is_examined = .false.   !! whether `is_shared` knows the present modes
-    logical, private :: is_known = .false.   !! whether the set is that of the present modes and slopes
+    logical, private :: is_known = .false.   !! whether the set belongs to the present modes and slopes
     integer, private :: order = 0            !! number of rows that hold
     integer, allocatable, private :: holding(:)      !! these rows, the first `order` are in use
     real(wp), allocatable, private :: inverse(:, :)  !! their W^+, the first `order` rows and columns, where none move
@@ -45,7 +46,7 @@ module nocdyn_held_rows
     real(wp), allocatable, private :: right(:)       !! right-hand side, work space
     integer, private :: rank_at_start = 0    !! of the rows that move
     ! where there are teeth with losses:
-    logical, private :: has_factors = .false.      !! whether they are those of the present modes, slopes and shares
+    logical, private :: has_factors = .false.      !! whether `factors` belong to the present modes, slopes and shares
     real(wp), allocatable, private :: factors(:, :)       !! LU factors of the equations of all moments
     logical, private :: is_singular = .false.             !! `factors` are the pseudo-inverse
     real(wp), allocatable, private :: share(:)            !! of the factors, [losses]
@@ -127,7 +128,7 @@ contains
     self%has_factors = .false.
   end subroutine change_set
 
-  !> Whether a joint has a moment that follows from those of others: it is locked, or teeth with losses that turn.
+  !> Whether a joint has a moment that follows from the moments of others: it is locked, or teeth with losses that turn.
   pure logical function is_active(self, joint, with_losses)
     class(held_rows_t), intent(in) :: self
     integer, intent(in) :: joint
@@ -137,8 +138,8 @@ contains
     if (with_losses .and. joint <= self%locking) is_active = is_active .or. self%teeth%loss_of(joint) > 0
   end function is_active
 
-  !> The moments of the locked joints, from the accelerations `rate` without them; and those of the teeth that turn, from their
-  !> drags without them.
+  !> The moments of the locked joints, from the accelerations `rate` without them; and the moments of the teeth that turn, from
+  !> their drags without them.
   subroutine find_moments(self, drag)
     class(held_rows_t), intent(inout) :: self
     real(wp), intent(in), optional :: drag(:)   !! s T [N m], [losses]; absent: teeth that turn have no moments
@@ -304,7 +305,7 @@ contains
     end do
   end function unit_weights
 
-  !> Looks whether the rank of the rows that move is still that of the start. Locks may be combinations of them.
+  !> Looks whether the rank of the rows that move is still the rank at the start. Locks may be combinations of them.
   subroutine watch_rank(self)
     class(held_rows_t), intent(inout) :: self
     integer :: dependent, j, rank

@@ -1,10 +1,10 @@
 !> Which joints lock where teeth with losses are among them, whose bounds grow with the torque that they transmit.
 !>
 !> The modes that agree with their moments (`nocdyn_joint_problem`) are sought as in a complementarity problem: from the present
-!> ones, first all wrong ones change together, then one at a time, that of least index (K. G. Murty, Linear Complementarity,
+!> ones, first all wrong ones change together, then one at a time, the one of least index (K. G. Murty, Linear Complementarity,
 !> Linear and Nonlinear Programming, 1988, chapter 4); else from each combination of modes of teeth, or the first ones of many,
-!> with those of friction by pivoting (`nocdyn_joint_pivots`). Of several solutions those count that are limits of the motion of
-!> elastic teeth. Where none is left, turning teeth jam.
+!> with the modes of friction by pivoting (`nocdyn_joint_pivots`). Of several solutions those count that are limits of the motion
+!> of elastic teeth. Where none is left, turning teeth jam.
 module nocdyn_joint_choices
   use nocdyn_friction_joints, only: direction_of, driven_backwards, driven_forwards, locked, slips_backwards, slips_forwards
   use nocdyn_joint_pivots, only: pivot_modes
@@ -81,7 +81,7 @@ contains
     end do
   end subroutine settle
 
-  !> Seeks the modes from all combinations of those of teeth.
+  !> Seeks the modes from all combinations of the modes of teeth.
   subroutine combine(self, is_found)
     class(joint_choices_t), intent(inout) :: self
     logical, intent(out) :: is_found
@@ -123,7 +123,7 @@ contains
     is_left = rest == 0 .and. number < most_tried
   end subroutine take_combination
 
-  !> Seeks modes by pivoting, with those of teeth to begin with. Where friction that slips is less than at rest, the others are
+  !> Seeks modes by pivoting, from the present modes of teeth. Where friction that slips is less than at rest, the others are
   !> looked at again with it.
   subroutine pivot(self, is_found)
     class(joint_choices_t), intent(inout) :: self

@@ -11,8 +11,8 @@ module nocdyn_joint_log
     real(wp) :: time = 0.0_wp     !! [s]
     integer :: joint = 0
     integer :: from = 0, to = 0   !! modes
-    real(wp) :: slip = 0.0_wp     !! speed of the first body less that of the second before it [rad/s]
-    real(wp) :: torque = 0.0_wp   !! moment after it [N m]
+    real(wp) :: slip = 0.0_wp     !! speed of the first body minus speed of the second one, before the event [rad/s]
+    real(wp) :: torque = 0.0_wp   !! moment after the event [N m]
     real(wp) :: impulse = 0.0_wp  !! of an impact [N m s]
   end type joint_event_t
 

@@ -18,7 +18,7 @@ module nocdyn_joint_pivots
 
 contains
 
-  !> Chooses the modes of friction at rest where `is_found`. Those of all other joints are given.
+  !> Chooses the modes of friction at rest where `is_found`. The modes of all other joints are given.
   subroutine pivot_modes(problem, is_found)
     class(joint_problem_t), intent(inout) :: problem
     logical, intent(out) :: is_found

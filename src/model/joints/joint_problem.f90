@@ -116,7 +116,7 @@ contains
     end do
   end subroutine scaled_equations
 
-  !> The moments with the present modes; those of joints that slip away are in the laws.
+  !> The moments with the present modes; the moments of joints that slip away are in the laws.
   subroutine find_moments(self)
     class(joint_problem_t), intent(inout) :: self
     real(wp), dimension(size(self%mode), size(self%mode)) :: factors, matrix
@@ -137,9 +137,9 @@ contains
     end if
   end subroutine find_moments
 
-  !> Whether the moments of the present modes are the limit of those of elastic teeth, whose deflection goes back to them: the
-  !> determinant of the equations is positive. Where it is negative, 1 + s V of one pair of teeth, a deflection grows, away from
-  !> these moments.
+  !> Whether the moments of the present modes are the limit of the moments of elastic teeth, whose deflection goes back to them:
+  !> the determinant of the equations is positive. Where it is negative, 1 + s V of one pair of teeth, a deflection grows, away
+  !> from these moments.
   logical function is_stable(self)
     class(joint_problem_t), intent(in) :: self
     real(wp) :: matrix(size(self%mode), size(self%mode)), wanted(size(self%mode))
@@ -211,7 +211,7 @@ contains
     holds_always = self%is_at_rest .and. self%least <= -huge(1.0_wp) .and. self%most >= huge(1.0_wp)
   end function holds_always
 
-  !> The mode of teeth. A torque T along the motion is that of a first wheel which the second one drives.
+  !> The mode of teeth. Where the torque T is along the motion, the second wheel drives the first one.
   integer function better_teeth(self, i, acceleration, load, error) result(mode)
     class(joint_problem_t), intent(in) :: self
     integer, intent(in) :: i

@@ -2,7 +2,7 @@
 !>
 !> After an event, which joints lock is a complementarity problem over all that are at rest together: a joint whose moment is
 !> inside its range stays, one at a bound slips away from it, or would if redundant others did not hold it. Its moment then is
-!> that of slip, which may be smaller than at rest, and the others are looked at again. A row that moves has no bounds.
+!> the moment of slip, which may be smaller than at rest, and the others are looked at again. A row that moves has no bounds.
 module nocdyn_joint_sets
   use nocdyn_bank, only: bank_slot_t
   use nocdyn_bounded_complementarity, only: at_upper, is_free, solve_bounded_complementarity, solve_scaled_complementarity
@@ -31,7 +31,7 @@ module nocdyn_joint_sets
     real(wp), allocatable :: impulse(:)      !! of the last impact [N m s]; 0 after other events
     real(wp), allocatable :: shift(:)        !! by which the boundary of a slip lies beyond zero [rad/s]
     logical, allocatable :: is_jammed(:)     !! teeth that turn and stop at once, by an impulse
-    real(wp) :: moment_shift = 0.0_wp        !! by which those of the moments lie beyond their ranges [N m]
+    real(wp) :: moment_shift = 0.0_wp        !! by which the boundaries of the moments lie beyond their ranges [N m]
     type(joint_log_t) :: log                 !! of the motion
   contains
     procedure :: start
@@ -143,7 +143,7 @@ contains
     call self%change_set()
   end subroutine assume
 
-  !> Decides the modes of the joints at rest at a time t; those of the others are by their slips. `rate` has the accelerations
+  !> Decides the modes of the joints at rest at a time t; the others have the modes of their slips. `rate` has the accelerations
   !> without any moment of the joints at rest.
   subroutine decide(self, banks, t, is_at_rest, slip, is_solved)
     class(joint_sets_t), intent(inout) :: self
@@ -177,8 +177,8 @@ contains
     is_unbounded = abs(moment) >= huge(moment)
   end function is_unbounded
 
-  !> The impulses that end slips which joints without bounds do not allow, and those of teeth that jam; those of others are zero,
-  !> as friction has no time. A slip that none can end is `lost`: another joint or a drive does not let it.
+  !> The impulses that end slips which joints without bounds do not allow, and the impulses of teeth that jam. Finite friction
+  !> contributes no impulse. A slip that none can end is `lost`: another joint or a drive does not let it.
   subroutine find_impact(self, banks, t, slip, tolerance, impulse, is_struck)
     class(joint_sets_t), intent(inout) :: self
     type(bank_slot_t), intent(in) :: banks(:)
@@ -317,7 +317,7 @@ contains
     if (choices%jammed > 0) self%is_jammed(choices%jammed) = .true.
   end subroutine decide_with_teeth
 
-  !> The moments between which a joint is at rest, and those of its slips forwards and backwards.
+  !> The moments between which a joint is at rest, and its moments when it slips forwards and backwards.
   subroutine find_ranges(self, banks, joint, t, least, most, sliding)
     class(joint_sets_t), intent(in) :: self
     type(bank_slot_t), intent(in) :: banks(:)

@@ -204,7 +204,7 @@ contains
     class(tooth_loads_t), intent(inout) :: self
     type(elements_t), intent(in) :: elements
     real(wp), intent(in) :: error(:)          !! of the moments of the joints [N m], [joints]
-    real(wp), intent(in) :: least             !! that of the boundaries of all moments [N m]
+    real(wp), intent(in) :: least             !! least shift: the shift of the boundaries of the moments [N m]
     integer, intent(in) :: mode(:)            !! of the joints
     real(wp), parameter :: width = 1.0e-11_wp   ! relative to the terms of T
     integer :: i

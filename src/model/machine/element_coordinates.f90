@@ -16,7 +16,7 @@ module nocdyn_element_coordinates
     integer, allocatable :: first(:)          !! first entry of each element, [elements + 1]
     integer, allocatable :: coordinate(:)     !! [entries]
     real(wp), allocatable :: ratio(:, :)      !! sum of coefficient * row of L_tau over its bodies, [lanes, entries]
-    real(wp), allocatable :: response(:, :)   !! the same sum of ((L_tau^T J L_tau)^-1 L_tau^T)^T, [lanes, entries]
+    real(wp), allocatable :: response(:, :)   !! as `ratio`, with rows of ((L_tau^T J L_tau)^-1 L_tau^T)^T, [lanes, entries]
     integer, allocatable, private :: source(:)   !! by `selected`: number that each entry has among all, [entries]
   contains
     procedure :: selected

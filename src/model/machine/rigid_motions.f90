@@ -102,8 +102,8 @@ contains
     row%scale(coordinate) = row%scale(coordinate) + scale
   end subroutine add
 
-  !> Replaces the eliminated coordinates of a row by those of their definitions, and ends the row: its values stay until the next
-  !> `add`.
+  !> Replaces the eliminated coordinates of a row by the coordinates of their definitions, and ends the row: its values stay until
+  !> the next `add`.
   pure subroutine substitute(row, definition, left)
     type(row_t), intent(inout) :: row
     type(linear_combination_t), intent(in) :: definition(:)

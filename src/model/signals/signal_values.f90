@@ -20,7 +20,7 @@ module nocdyn_signal_values
     logical :: has_new_values = .true. !! whether the segment before is of another bank or quantity
   end type segment_t
 
-  !> Evaluates a formulation, which may be that of an integration: nothing is changed on which that depends.
+  !> Evaluates a formulation, which may be in use by an integration: nothing is changed on which the integration depends.
   type, public :: signal_values_t
     class(formulation_t), pointer :: formulation => null()
     logical :: in_motion = .false.                       !! whether joints have the modes of an integration; else by the state

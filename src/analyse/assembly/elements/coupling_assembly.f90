@@ -18,7 +18,7 @@ module nocdyn_coupling_assembly
   public :: coupling_form, add_coupling_form, check_coupling
 
   integer, parameter :: cubic = 1, slipping = 2, polynomial = 3, gap = 4, saturated = 5, table = 6, maxwell = 7   ! forms
-  integer, parameter :: elastic_forms = 7   ! the same with relative damping follow
+  integer, parameter :: elastic_forms = 7   ! these forms with relative damping follow
 
 contains
 

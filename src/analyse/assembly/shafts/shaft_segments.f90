@@ -18,7 +18,7 @@ module nocdyn_shaft_segments
   type, public :: segments_t
     real(wp), allocatable :: length(:)          !! [m]
     real(wp), allocatable :: second_moment(:)   !! of area against torsion [m4]
-    real(wp), allocatable :: section_modulus(:) !! the same over the radius [m3]
+    real(wp), allocatable :: section_modulus(:) !! second moment over the radius [m3]
     real(wp), allocatable :: shear_modulus(:)   !! G [Pa]
     real(wp), allocatable :: density(:)         !! [kg/m3]; of all of them positive, or 0
     real(wp), allocatable :: flexibility(:)     !! [rad/(N m)]

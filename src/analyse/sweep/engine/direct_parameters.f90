@@ -211,14 +211,14 @@ contains
     are_allowed = all(values >= self%lowest .and. values <= self%highest .and. .not. is_too_small(in_si(values, self%unit)))
   end function are_allowed
 
-  !> Makes a lane that of a variant. What the lane holds beside the values must be that of another variant.
+  !> Writes the values of a variant into a lane. Everything else in the lane must already be from another variant.
   subroutine write_values(self, values, lane, parameters, block, y, is_set)
     class(direct_parameters_t), intent(in) :: self
     real(wp), contiguous, intent(in) :: values(:)          !! [targets]
     integer, intent(in) :: lane
     type(lane_parameters_t), intent(inout) :: parameters   !! of the block
     type(reduced_t), intent(inout) :: block
-    real(wp), contiguous, intent(inout) :: y(:)            !! the start of another variant, then that of this one
+    real(wp), contiguous, intent(inout) :: y(:)            !! the start state of another variant, then of this one
     logical, intent(out) :: is_set                         !! not if rounding makes the mass matrix indefinite
     integer :: i
     logical :: is_indefinite

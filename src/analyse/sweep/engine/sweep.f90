@@ -20,7 +20,7 @@ module nocdyn_sweep
 
   public :: prepare_sweep, compute_variants
 
-  ! Measured: chains of 10 rotors are fastest with 32 lanes, those of 100 with 8 to 32, those of 1000 with 4 to 8. No result
+  ! Measured: chains of 10 rotors are fastest with 32 lanes, chains of 100 with 8 to 32, chains of 1000 with 4 to 8. No result
   ! depends on the number of lanes.
   integer, parameter :: max_states = 250   ! the parameters of `large_block` lanes fit into the second-level cache
   integer, parameter :: large_block = 32

@@ -16,7 +16,7 @@ module nocdyn_sweep_summary
 
   !> What the computation took.
   type, public :: sweep_effort_t
-    integer :: variants = 0              !! computed, without those of a journal that was resumed
+    integer :: variants = 0              !! computed, without the variants of a journal that was resumed
     integer :: threads = 1               !! of each process
     integer :: ranks = 1                 !! processes
     integer :: lanes = 1                 !! of a block

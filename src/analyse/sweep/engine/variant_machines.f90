@@ -32,7 +32,7 @@ module nocdyn_variant_machines
   type, public :: variant_machines_t
     type(input_t) :: input                                     !! with the values of the last variant that was assembled
     class(formulation_t), pointer :: formulation => null()     !! the block
-    type(reduced_t), pointer, private :: block => null()       !! the same if it is reduced: variants share it
+    type(reduced_t), pointer, private :: block => null()       !! the block if it is reduced: variants share it
     type(target_t), allocatable, private :: targets(:)
     logical, private :: has_energy_balance = .false.           !! whether the work integrals are among the states
     logical, allocatable, private :: is_of_run(:)              !! whether a target is of &run or &fatigue, [targets]
@@ -56,7 +56,7 @@ contains
     integer, intent(in) :: lanes
     logical, intent(in) :: with_energy_balance     !! whether the work integrals are among the states
     type(variant_machines_t), intent(out) :: self
-    real(wp), intent(in), optional :: typical(:)   !! values of the targets; absent, refused or with joints: those of the input
+    real(wp), intent(in), optional :: typical(:)   !! values of the targets; absent, refused or with joints: as in the input
     type(reduced_t), pointer :: block
     class(formulation_t), allocatable :: formulation
     character(len=:), allocatable :: message

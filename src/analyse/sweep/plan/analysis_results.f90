@@ -33,7 +33,7 @@ module nocdyn_analysis_results
     real(wp) :: order = 0.0_wp                      !! 0 stands for all orders together
     character(len=:), allocatable :: label          !! e.g. 'moment_shaft_order_6_peak'
     character(len=:), allocatable :: unit           !! e.g. 'N m'
-    integer :: in_unit = 0                          !! the same: index of `units`, 0: SI
+    integer :: in_unit = 0                          !! this unit as index of `units`, 0: SI
     character(len=:), allocatable :: long_name      !! a description
   end type analysis_result_t
 

@@ -26,7 +26,7 @@ module nocdyn_targets
     integer :: key = 0                           !! index in the group's values
     integer :: position = 1                      !! in the list of the key
     character(len=:), allocatable :: unit        !! of its values, '' if it has none
-    integer :: in_unit = 0                       !! the same: index of `units`, 0: the one of the schema
+    integer :: in_unit = 0                       !! this unit as index of `units`, 0: the one of the schema
     character(len=:), allocatable :: long_name   !! "viscous of &load 'work': torque per speed"
     logical :: is_integer = .false.              !! values are rounded to the nearest integer
     integer, private :: rule = 0                 !! row of `key_rules`

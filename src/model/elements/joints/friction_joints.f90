@@ -204,7 +204,7 @@ contains
     mode_of = self%branch(1, element + (self%mode_switch - 1) * self%count)
   end function mode_of
 
-  !> Sets it.
+  !> Sets the mode of a joint of the first lane.
   subroutine set_mode(self, element, mode)
     class(friction_joints_t), intent(inout) :: self
     integer, intent(in) :: element   !! numbered within the bank

@@ -14,7 +14,7 @@ module nocdyn_induction_circuits
     real(wp) :: stator_resistance = 0.0_wp   !! [Ohm]
     real(wp) :: rotor_resistance = 0.0_wp    !! [Ohm], positive
     real(wp) :: stator = 0.0_wp              !! leakage and mutual inductance of the stator [H]
-    real(wp) :: rotor = 0.0_wp               !! the same of the rotor [H]
+    real(wp) :: rotor = 0.0_wp               !! leakage and mutual inductance of the rotor [H]
     real(wp) :: mutual = 0.0_wp              !! [H]
   contains
     procedure :: determinant

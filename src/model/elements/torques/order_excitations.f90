@@ -24,7 +24,7 @@ module nocdyn_order_excitations
     real(wp), allocatable :: speed(:)                 !! ascending [rad/s], [points]; one: the torque is the same at every speed
     real(wp), allocatable :: mean(:)                  !! [N m], [points]
     real(wp), allocatable :: sine(:, :), cosine(:, :) !! [N m], [orders, points]
-    real(wp), allocatable :: square_order(:)          !! the same of the harmonics times u'^2, positive, [square orders]
+    real(wp), allocatable :: square_order(:)          !! orders of the harmonics times u'^2, positive, [square orders]
     real(wp), allocatable :: square_sine(:), square_cosine(:)   !! [N m s2/rad2], [square orders]
   end type order_torque_t
 

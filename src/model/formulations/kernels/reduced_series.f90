@@ -1,10 +1,10 @@
 !> Taylor series of the motion of a machine in the reduced formulation, by recurrence from one coefficient to the next.
 !>
-!> From the coefficients of q' up to number k, those of the elements are u'_k = U q'_k and u_k = u'_(k-1) / k. Their laws give
-!> the moments M_k, and (k + 1) q'_(k+1) = R M_k.
+!> From the coefficients of q' up to number k, the coefficients of the elements are u'_k = U q'_k and u_k = u'_(k-1) / k. Their
+!> laws give the moments M_k, and (k + 1) q'_(k+1) = R M_k.
 !>
-!> The numbers of the elements stand in groups of w, [w, 0:order, groups]: those of some lanes of one element, or in a block
-!> of one lane those of some elements. A strip of lanes goes through all coefficients before the next strip starts.
+!> The numbers of the elements stand in groups of w, [w, 0:order, groups]: a group has some lanes of one element, or in a block
+!> of one lane some elements. A strip of lanes goes through all coefficients before the next strip starts.
 module nocdyn_reduced_series
   use nocdyn_kinds, only: wp
   use nocdyn_laws, only: narrow, strip_lanes, wide
@@ -108,7 +108,7 @@ contains
     call self%accelerations%refresh_lane(lane, accelerations)
   end subroutine refresh_lane
 
-  !> Copies the polynomial laws of a lane; those of the last one to the lanes of its strip beyond it, too.
+  !> Copies the polynomial laws of a lane. The laws of the last lane also fill the lanes beyond it in its strip.
   subroutine copy_laws(self, lane, laws)
     type(reduced_series_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -160,7 +160,7 @@ contains
     end do
   end subroutine expand
 
-  !> The derivative of the state, to the same bits as that of `machine%evaluate_elements`; with several lanes.
+  !> The derivative of the state, to the same bits as by `machine%evaluate_elements`; with several lanes.
   subroutine derivative(self, machine, twists, accelerations, twist_at_origin, t, y, dydt)
     class(reduced_series_t), intent(inout) :: self
     type(machine_t), intent(inout) :: machine
@@ -178,7 +178,7 @@ contains
     end do
   end subroutine derivative
 
-  !> Coefficients k + 1 of the state in a strip, from those of the motion up to number k.
+  !> Coefficients k + 1 of the state in a strip, from the coefficients of the motion up to number k.
   subroutine advance(self, machine, twists, accelerations, strip, k, columns, y)
     type(reduced_series_t), intent(inout) :: self
     type(machine_t), intent(inout) :: machine
@@ -307,7 +307,7 @@ contains
   pure subroutine add(n, x, y, sum)
     integer, intent(in) :: n
     real(wp), intent(in) :: x(n), y(n)   !! [N m]
-    real(wp), intent(inout) :: sum(n)    !! the same
+    real(wp), intent(inout) :: sum(n)    !! x + y [N m]
 
     sum = x + y
   end subroutine add

@@ -1,7 +1,8 @@
 !> Coefficients of the moments and internal states of the banks whose laws are not polynomial, by the lists of their laws.
 !>
-!> The slots of a bank are consecutive slots of all elements; those beyond its last one are copies of that. The moments of some
-!> banks follow from the time alone: their series do not wait for that of the motion, and are computed at the start of a step.
+!> The slots of a bank are consecutive slots of all elements; slots beyond its last one are copies of the last one. The moments of
+!> some banks follow from the time alone: their series do not wait for the series of the motion, and are computed at the start of
+!> a step.
 module nocdyn_series_banks
   use nocdyn_bank, only: bank_t
   use nocdyn_kinds, only: wp
@@ -171,7 +172,7 @@ contains
     y = x
   end subroutine copy
 
-  !> Adds the coefficients k of the moments, from those of the motion up to number k.
+  !> Adds the coefficients k of the moments, from the coefficients of the motion up to number k.
   subroutine add_bank(bank, strip, order, groups, k, motion, restoring, applied)
     class(bank_t), intent(inout) :: bank
     integer, intent(in) :: strip, order, groups, k
@@ -202,7 +203,7 @@ contains
     type(law_work_t), intent(inout) :: work
     integer, intent(in) :: node            !! of the list; if it is 0, nothing is set
     integer, intent(in) :: k
-    integer, intent(in) :: before, slots   !! slots before those of the bank, slots of the bank
+    integer, intent(in) :: before, slots   !! slots before the bank, slots of the bank
     real(wp), contiguous, intent(in) :: x(:, 0:, :)   !! [w, 0:order, groups], in the unit of the input
     integer :: at, g, i, slot
 

@@ -62,7 +62,7 @@ contains
     groups_of = (numbers + narrow - 1) / narrow
   end function groups_of
 
-  !> Copies the coefficients of a lane; those of the last one to the lanes of its strip beyond it, too.
+  !> Copies the coefficients of a lane. The coefficients of the last lane also fill the lanes beyond it in its strip.
   subroutine refresh_lane(self, lane, map)
     class(series_map_t), intent(inout) :: self
     integer, intent(in) :: lane
