@@ -45,7 +45,7 @@ contains
   pure integer function strip_lanes(lanes, elements) result(strip)
     integer, intent(in) :: lanes      !! of the block
     integer, intent(in) :: elements   !! of the machine
-    integer, parameter :: small = 8   ! elements of a small machine
+    integer, parameter :: small = 48   ! elements of a small machine; measured with engines and chains of 10 to 120 rotors
 
     strip = 1
     if (lanes == 1) return

@@ -1,6 +1,7 @@
 !> One thread's share of a sweep: a block of lanes that works through consecutive variants.
 module nocdyn_sweep_block
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+  use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_ensemble, only: ensemble_t, initial_states, initial_states_t
   use nocdyn_errors, only: error_t
   use nocdyn_fatigue_groups, only: read_curve
@@ -26,7 +27,7 @@ module nocdyn_sweep_block
   use nocdyn_units, only: from_si
   use nocdyn_variant_analyses, only: analyse_chunk
   use nocdyn_variant_machines, only: new_variant_machines, variant_machines_t, variant_needs_own_block, variant_refused
-  use omp_lib, only: omp_test_lock, omp_unset_lock
+  use omp_lib, only: omp_set_lock, omp_test_lock, omp_unset_lock
   implicit none (type, external)
   private
 
@@ -34,6 +35,7 @@ module nocdyn_sweep_block
 
   integer, parameter :: poll_interval = 16   ! steps between two calls of the scheduler
   integer, parameter :: not_computed = -1    ! status of a variant until it has been computed
+  integer, parameter :: needs_own_block = -2 ! and of one that does not fit the lanes
 
   !> The statistics of the lanes. Between the steps it polls the scheduler.
   type, extends(statistics_observer_t) :: block_observer_t
@@ -43,13 +45,24 @@ module nocdyn_sweep_block
     procedure :: wants_stop
   end type block_observer_t
 
-  !> The variants of a chunk, for the lanes.
+  !> A chunk whose results are not all there.
+  type :: open_chunk_t
+    type(chunk_t) :: chunk
+    logical :: is_open = .false.
+    integer :: next_index = 1   !! of the next variant for a lane
+    integer :: left = 0         !! variants that are in lanes or come into some
+    integer :: own_blocks = 0   !! variants that do not fit the lanes; their status is `needs_own_block`
+  end type open_chunk_t
+
+  !> The variants of one chunk after the other, for the lanes: these do not wait for the slowest variant of a chunk.
   type, extends(ensemble_t) :: chunk_ensemble_t
     type(sweep_block_t), pointer :: block => null()
-    type(chunk_t), pointer :: chunk => null()
-    integer :: next_index = 1                    !! in the chunk
-    integer, allocatable :: index(:)             !! in the chunk, of the variant in each lane
-    logical, allocatable :: needs_own_block(:)   !! variants that do not fit the lanes, [variants of the chunk]
+    type(open_chunk_t), allocatable :: chunks(:)   !! each has a variant in a lane, or variants for lanes, [lanes + 1]
+    integer :: newest = 0                          !! chunk that has variants for lanes; 0: none
+    integer, allocatable :: slot(:), index(:)      !! chunk of the variant in each lane, and its number there
+    logical :: is_last = .false.                   !! no chunk is taken after the newest one in this integration
+    logical :: none_left = .false.                 !! the scheduler has no more variants
+    real(wp) :: submitted = 0.0_wp                 !! when the last chunk was submitted, or the integration began [s]
   contains
     procedure :: next, finish
   end type chunk_ensemble_t
@@ -64,7 +77,7 @@ module nocdyn_sweep_block
     real(wp) :: times(2) = 0.0_wp                       !! start and end [s]
     character(len=:), allocatable, private :: message   !! why the variants that fit the lanes are refused; '': they are not
   contains
-    procedure :: compute
+    procedure :: compute_chunks
     procedure, private :: compute_in_own_block
   end type sweep_block_t
 
@@ -127,36 +140,64 @@ contains
     end if
   end subroutine prepare_integration
 
-  !> Computes the variants `first`, `first` + 1, ...
-  subroutine compute(self, first, count, chunk, is_complete)
+  !> Computes the variants that the scheduler hands out, until there are none or it cancels the sweep.
+  subroutine compute_chunks(self)
     class(sweep_block_t), target, intent(inout) :: self
-    integer, intent(in) :: first, count
-    type(chunk_t), target, intent(out) :: chunk
-    logical, intent(out) :: is_complete   !! false if the computation was interrupted: the chunk is of no use
-    integer :: i
-
-    call allocate_chunk(chunk, first, count, self%plan%design%varied, self%plan%results())
-    chunk%results(:, :) = ieee_value(0.0_wp, ieee_quiet_nan)
-    chunk%status(:) = not_computed
-    if (size(self%plan%statistics) > 0) then
-      call integrate_chunk(self, chunk)
-    else
-      do i = 1, count
-        call self%plan%values(first + i - 1, chunk%parameters(:, i))
-        chunk%status(i) = status_done
-        chunk%steps(i) = 0
-      end do
-    end if
-    is_complete = all(chunk%status /= not_computed)
-    if (is_complete .and. size(self%plan%analyses) > 0) call analyse_chunk(self%plan, self%machines, self%scheduler, chunk, &
-                                                                           is_complete)
-  end subroutine compute
-
-  !> Integrates all variants of a chunk. Those that were interrupted remain `not_computed`.
-  subroutine integrate_chunk(self, chunk)
-    class(sweep_block_t), target, intent(inout) :: self
-    type(chunk_t), target, intent(inout) :: chunk
     type(chunk_ensemble_t) :: ensemble
+    integer :: i
+    logical :: found
+
+    ensemble%block => self
+    associate (lanes => self%machines%formulation%lanes)
+      allocate (ensemble%slot(lanes), ensemble%index(lanes), source=0)
+      allocate (ensemble%chunks(lanes + 1))
+    end associate
+    do
+      ensemble%is_last = size(self%plan%statistics) == 0 .or. size(self%plan%analyses) > 0
+      ensemble%submitted = time_now()
+      call take_chunk(ensemble, found)
+      if (.not. found) exit
+      call integrate_chunks(self, ensemble)
+      do i = 1, size(ensemble%chunks)
+        if (ensemble%chunks(i)%is_open) call complete(self, ensemble, ensemble%chunks(i))
+      end do
+      if (self%scheduler%is_cancelled()) exit
+    end do
+  end subroutine compute_chunks
+
+  !> Takes a chunk from the scheduler, if it has one.
+  subroutine take_chunk(self, found)
+    type(chunk_ensemble_t), intent(inout) :: self
+    logical, intent(out) :: found
+    integer :: count, first
+
+    self%newest = 0
+    found = .false.
+    if (self%none_left) return
+    associate (scheduler => self%block%scheduler)
+      call omp_set_lock(scheduler%lock)
+      call scheduler%next_chunk(first, count)
+      call omp_unset_lock(scheduler%lock)
+    end associate
+    found = count > 0
+    self%none_left = .not. found
+    if (.not. found) return
+    self%newest = findloc(self%chunks%is_open, .false., dim=1)
+    associate (open => self%chunks(self%newest))
+      call allocate_chunk(open%chunk, first, count, self%block%plan%design%varied, self%block%plan%results())
+      open%chunk%results(:, :) = ieee_value(0.0_wp, ieee_quiet_nan)
+      open%chunk%status(:) = not_computed
+      open%is_open = .true.
+      open%next_index = 1
+      open%left = count
+      open%own_blocks = 0
+    end associate
+  end subroutine take_chunk
+
+  !> Integrates the variants of the newest chunk and of those that follow it. Those that were interrupted remain `not_computed`.
+  subroutine integrate_chunks(self, ensemble)
+    class(sweep_block_t), target, intent(inout) :: self
+    type(chunk_ensemble_t), target, intent(inout) :: ensemble
     class(stepper_t), allocatable :: stepper
     type(solver_status_t) :: solver_status
     real(wp), allocatable :: y(:)
@@ -165,23 +206,58 @@ contains
     logical :: found
 
     t = 0.0_wp
-    ensemble%block => self
-    ensemble%chunk => chunk
-    allocate (ensemble%index(self%machines%formulation%lanes), source=0)
-    allocate (ensemble%needs_own_block(chunk%count), source=.false.)
-    if (self%message == '') then
+    if (size(self%plan%statistics) == 0) then
+      associate (chunk => ensemble%chunks(ensemble%newest)%chunk)
+        do i = 1, chunk%count
+          call self%plan%values(chunk%first + i - 1, chunk%parameters(:, i))
+          chunk%status(i) = status_done
+          chunk%steps(i) = 0
+        end do
+      end associate
+    else if (self%message == '') then
       allocate (stepper, source=self%stepper)
       call integrate_with(stepper, self%machines%formulation, self%settings, self%times, ensemble, self%observer, solver_status)
     else
       allocate (y(self%machines%formulation%states + self%machines%formulation%quadratures), source=0.0_wp)
       call ensemble%next(self%machines%formulation, 1, t, y, found)   ! refuses all, or notes that they need a block of their own
     end if
-    do i = 1, chunk%count
-      if (.not. ensemble%needs_own_block(i)) cycle
+  end subroutine integrate_chunks
+
+  !> Computes what a chunk lacks after the integration, and submits it, unless it was interrupted.
+  subroutine complete(self, ensemble, open)
+    class(sweep_block_t), intent(inout) :: self
+    type(chunk_ensemble_t), intent(inout) :: ensemble
+    type(open_chunk_t), intent(inout) :: open
+    integer :: i
+    logical :: is_complete
+
+    do i = 1, open%chunk%count
+      if (open%chunk%status(i) /= needs_own_block) cycle
       if (self%scheduler%is_cancelled()) exit
-      call self%compute_in_own_block(chunk, i)
+      call self%compute_in_own_block(open%chunk, i)
     end do
-  end subroutine integrate_chunk
+    is_complete = all(open%chunk%status >= 0)
+    if (is_complete .and. size(self%plan%analyses) > 0) call analyse_chunk(self%plan, self%machines, self%scheduler, open%chunk, &
+                                                                           is_complete)
+    if (is_complete) call submit(ensemble, open)
+    open%is_open = .false.
+  end subroutine complete
+
+  !> Hands a chunk that is complete to the scheduler.
+  subroutine submit(self, open)
+    type(chunk_ensemble_t), intent(inout) :: self
+    type(open_chunk_t), intent(inout) :: open
+    real(wp) :: now
+
+    now = time_now()
+    associate (scheduler => self%block%scheduler)
+      call omp_set_lock(scheduler%lock)
+      call scheduler%submit(open%chunk, now - self%submitted)
+      call omp_unset_lock(scheduler%lock)
+    end associate
+    self%submitted = now
+    open%is_open = .false.
+  end subroutine submit
 
   !> Sets the next variant that fits the lanes in one of them.
   subroutine next(self, system, lane, t, y, found)
@@ -196,23 +272,36 @@ contains
     integer :: i, status
 
     do
-      i = self%next_index
-      found = i <= self%chunk%count
+      found = self%newest > 0
       if (.not. found) return
-      self%next_index = i + 1
-      call self%block%plan%values(self%chunk%first + i - 1, self%chunk%parameters(:, i))
-      call self%block%plan%numbers%target_values(self%chunk%parameters(:, i), values)
-      call self%block%machines%set_variant(values, lane, y, status, reason)
-      select case (status)
-      case (variant_refused)
-        call refuse(self%chunk, i, reason)
-      case (variant_needs_own_block)
-        self%needs_own_block(i) = .true.
-      case default
-        if (self%block%message == '') exit
-        call refuse(self%chunk, i, self%block%message)
-      end select
+      associate (open => self%chunks(self%newest))
+        i = open%next_index
+        if (i <= open%chunk%count) then
+          open%next_index = i + 1
+          call self%block%plan%values(open%chunk%first + i - 1, open%chunk%parameters(:, i))
+          call self%block%plan%numbers%target_values(open%chunk%parameters(:, i), values)
+          call self%block%machines%set_variant(values, lane, y, status, reason)
+          select case (status)
+          case (variant_refused)
+            call refuse(open%chunk, i, reason)
+          case (variant_needs_own_block)
+            open%chunk%status(i) = needs_own_block
+            open%own_blocks = open%own_blocks + 1
+          case default
+            if (self%block%message == '') exit
+            call refuse(open%chunk, i, self%block%message)
+          end select
+          open%left = open%left - 1
+          cycle
+        end if
+        ! variants with a block of their own are computed when the lanes are empty
+        self%is_last = self%is_last .or. open%own_blocks > 0
+        if (open%left == 0 .and. .not. self%is_last) call submit(self, open)
+      end associate
+      self%newest = 0
+      if (.not. self%is_last) call take_chunk(self, found)
     end do
+    self%slot(lane) = self%newest
     self%index(lane) = i
   end subroutine next
 
@@ -231,8 +320,14 @@ contains
     real(wp), contiguous, intent(in) :: y(:)
     type(solver_status_t), intent(in) :: solver_status
 
-    call store_result(self%chunk, self%index(lane), lane, solver_status, self%block%machines%formulation, self%block%settings, &
-                      self%block%plan%statistics, self%block%observer)
+    associate (open => self%chunks(self%slot(lane)))
+      call store_result(open%chunk, self%index(lane), lane, solver_status, self%block%machines%formulation, &
+                        self%block%settings, self%block%plan%statistics, self%block%observer)
+      if (open%chunk%status(self%index(lane)) == not_computed) return   ! interrupted
+      open%left = open%left - 1
+      if (open%left > 0 .or. self%slot(lane) == self%newest .or. open%own_blocks > 0) return
+      if (size(self%block%plan%analyses) == 0) call submit(self, open)
+    end associate
   end subroutine finish
 
   !> Takes the results of the variant in a lane, or why it failed. A result that is not finite is a failure.
@@ -309,5 +404,13 @@ contains
     end if
     wants_stop = self%scheduler%is_cancelled()
   end function wants_stop
+
+  !> Monotonic clock time [s].
+  real(wp) function time_now() result(seconds)
+    integer(int64) :: count, rate
+
+    call system_clock(count, rate)
+    seconds = real(count, wp) / real(rate, wp)
+  end function time_now
 
 end module nocdyn_sweep_block
