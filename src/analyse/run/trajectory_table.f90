@@ -35,17 +35,15 @@ module nocdyn_trajectory_table
 contains
 
   !> A table for the columns of a machine. The energies of the start are those at `t_start`.
-  type(trajectory_table_t) function new_trajectory_table(formulation, t_start, wanted, others) result(table)
+  type(trajectory_table_t) function new_trajectory_table(formulation, t_start, wanted) result(table)
     class(formulation_t), target, intent(inout) :: formulation   !! of one lane, with work integrals
     real(wp), intent(in) :: t_start                   !! [s]
     integer, intent(in) :: wanted(:)                  !! units of columns: indices of `units`; else SI units
-    type(signal_source_t), intent(in), optional :: others(:)   !! further columns of `columns`, which are not in the rows
-    type(signal_source_t), allocatable :: list(:)
+    type(signal_source_t), allocatable :: sources(:)
 
     call list_signals(formulation%machine, table%signals)
-    list = table%signals%source
-    if (present(others)) list = [list, others]
-    table%columns = new_signal_values(formulation, list)
+    sources = table%signals%source
+    table%columns = new_signal_values(formulation, sources)
     call turn_units(table%signals, wanted, table%unit)
     call label_signals(table%signals, table%labels)
     table%t(1) = t_start

@@ -77,8 +77,8 @@ module nocdyn_transient
 
   !> Hands out the rows, and keeps the statistics of their columns.
   type, extends(statistics_observer_t) :: run_observer_t
-    type(trajectory_table_t) :: table        !! with the points of shafts after its columns
-    real(wp), allocatable :: row(:)          !! [columns, points]
+    type(trajectory_table_t) :: table
+    real(wp), allocatable :: row(:)          !! [columns]
     integer :: rows = 0
     integer, allocatable :: chosen(:)        !! columns that are written
     real(wp), allocatable :: written(:)      !! their values in the row
@@ -93,7 +93,7 @@ module nocdyn_transient
     real(wp) :: failure_time = 0.0_wp        !! of that row [s]
     class(run_output_t), pointer :: output => null()
   contains
-    procedure :: on_output, wants_stop, observe_lanes, tracked_values, find_pace
+    procedure :: on_output, wants_stop, find_pace
   end type run_observer_t
 
 contains
@@ -196,10 +196,10 @@ contains
     observer%end_time = times(size(times))
     call list_statistics(input, formulation%machine, times(1), statistics)
     observer%statistics_observer_t = new_statistics_observer(formulation, statistics, times(1), times(size(times)), &
-                                                             may_bend=.false., tracks_all=.true.)
-    observer%table = new_trajectory_table(formulation, times(1), output_units(input), observer%points)
+                                                             may_bend=.false.)
+    observer%table = new_trajectory_table(formulation, times(1), output_units(input))
     observer%vibration = new_vibration(formulation%machine)
-    allocate (observer%row(observer%tracked), source=0.0_wp)
+    allocate (observer%row(size(observer%table%signals)), source=0.0_wp)
     allocate (observer%lowest(formulation%machine%bodies), source=huge(0.0_wp))
     allocate (observer%highest, source=-observer%lowest)
     allocate (observer%last_speeds, source=0.0_wp * observer%lowest)
@@ -299,31 +299,13 @@ contains
     call self%table%keep_energies(at_last_row, y)
   end subroutine on_output
 
-  subroutine observe_lanes(self, t, y)
-    class(run_observer_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:), y(:, :)   !! [s], [1, states + quadratures]
-
-    call self%table%columns%observe(t, y)
-  end subroutine observe_lanes
-
-  !> The columns of the table between its rows, in SI, and the points of shafts.
-  subroutine tracked_values(self, lane, t, y, values)
-    class(run_observer_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: t                  !! [s]
-    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
-    real(wp), contiguous, intent(inout) :: values(:)   !! [columns, points]
-
-    call self%table%columns%fill_row(lane, t, y, values)
-  end subroutine tracked_values
-
-  !> How fast they oscillate where they were evaluated last.
+  !> How fast the columns oscillate where they were evaluated last.
   subroutine find_pace(self, lane, fastest, scale)
     class(run_observer_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(out) :: fastest, scale   !! [rad/s], [N m]
 
-    call self%table%columns%find_pace(lane, fastest, scale)
+    call self%statistics_observer_t%find_pace(lane, fastest, scale)
     self%largest_moment = max(self%largest_moment, scale)
   end subroutine find_pace
 

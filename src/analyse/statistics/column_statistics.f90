@@ -69,7 +69,7 @@ contains
     type(statistic_t), intent(in) :: statistics(:)       !! each of a column
     integer, intent(in) :: lanes
     real(wp), intent(in) :: t_start, t_end               !! [s]
-    integer, allocatable, intent(inout) :: wanted(:)     !! columns, ascending; not allocated: those that have statistics
+    integer, allocatable, intent(out) :: wanted(:)       !! columns that have statistics, ascending
     integer, allocatable :: number(:)   ! of each column among them, 0: none
     integer :: i
 
@@ -80,10 +80,10 @@ contains
     do i = 1, size(statistics)
       number(statistics(i)%column) = 1
     end do
-    if (.not. allocated(wanted)) wanted = pack([(i, i=1, size(number))], number > 0)
+    wanted = pack([(i, i=1, size(number))], number > 0)
     number(:) = 0
     do i = 1, size(wanted)
-      if (wanted(i) <= size(number)) number(wanted(i)) = i
+      number(wanted(i)) = i
     end do
     allocate (self%column(size(statistics)))
     self%column(:) = number(statistics%column)

@@ -4,7 +4,7 @@
 !>
 !> x = offset + sum of factor * y(component). An angle, a speed or a twist is x. An elastic moment is (linear + cubic x^2) x,
 !> where x is the twist minus that at rest. The moment of a linear coupling with damping is x = k (u - rest) + d u', its stress
-!> that by the section modulus.
+!> the moment over the section modulus, its damping moment d u'.
 module nocdyn_linear_columns
   use nocdyn_bank, only: role_coupling
   use nocdyn_column_statistics, only: width
@@ -12,7 +12,7 @@ module nocdyn_linear_columns
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_quantities, only: form_angle, form_elastic, form_total
+  use nocdyn_quantities, only: form_angle, form_applied, form_elastic, form_total
   use nocdyn_reduced, only: reduced_t
   use nocdyn_signals, only: signal_angle, signal_element, signal_source_t, signal_speed
   implicit none (type, external)
@@ -32,7 +32,8 @@ module nocdyn_linear_columns
     logical, allocatable, private :: is_speed(:)    !! [columns]
     integer, allocatable, private :: element(:)     !! whose twist or moment the column is, 0 if it is none; [columns]
     logical, allocatable, private :: has_law(:)     !! whether it is an elastic moment; [columns]
-    integer, allocatable, private :: bank(:)        !! of a whole moment or a stress, 0 of other columns; [columns]
+    integer, allocatable, private :: bank(:)        !! of a damping or whole moment or a stress, 0 of other columns; [columns]
+    logical, allocatable, private :: is_damping(:)  !! whether it is a damping moment, [columns]
     integer, allocatable, private :: divisor(:)     !! parameter of the bank that divides a moment, 0: none; [columns]
     real(wp), allocatable, private :: direction(:)  !! 1 if a moment is positive on the first body, else -1; [columns]
     logical, allocatable, private :: is_rate(:)     !! whether a speed is multiplied, [entries]
@@ -56,8 +57,8 @@ contains
     end select
   end function is_linear
 
-  !> Whether a column is the moment, elastic or whole, or the stress of a coupling without cubic stiffness and friction in all
-  !> lanes: a linear function of the state.
+  !> Whether a column is a moment, elastic, damping or whole, or the stress of a coupling without friction, and without cubic
+  !> stiffness in all lanes unless it is the damping moment: a linear function of the state.
   logical function is_proportional(block, column)
     class(formulation_t), intent(in) :: block
     type(signal_source_t), intent(in) :: column
@@ -68,9 +69,10 @@ contains
       select type (block)
       class is (reduced_t)
         is_proportional = bank%role == role_coupling .and. bank%has_paper_law .and. bank%has_polynomial_potential .and. &
-                          any(column%form == [form_elastic, form_total])
+                          any(column%form == [form_elastic, form_applied, form_total])
       end select
-      if (is_proportional) is_proportional = all(abs(machine%laws%cubic(:, bank%first - 1 + column%index)) <= 0)
+      if (.not. is_proportional .or. column%form == form_applied) return
+      is_proportional = all(abs(machine%laws%cubic(:, bank%first - 1 + column%index)) <= 0)
     end associate
   end function is_proportional
 
@@ -94,7 +96,7 @@ contains
     allocate (self%first(self%count + 1), source=1)
     allocate (self%component(0), self%ratio(0), self%coefficient(0), self%is_rate(0))
     allocate (self%is_speed, source=columns%kind == signal_speed)
-    allocate (self%has_law(self%count), source=.false.)
+    allocate (self%has_law(self%count), self%is_damping(self%count), source=.false.)
     allocate (self%element(self%count), self%body(self%count), self%bank(self%count), self%divisor(self%count), source=0)
     allocate (self%direction(self%count), source=1.0_wp)
     do i = 1, self%count
@@ -102,10 +104,10 @@ contains
       if (self%element(i) == 0) then
         call add_body(self, block%machine%coordinates, self%body(i), 1.0_wp, self%is_speed(i))
       else
-        associate (rows => block%machine%elements%rows, e => self%element(i))
+        associate (rows => block%machine%elements%rows, e => self%element(i), coordinates => block%machine%coordinates)
           do k = rows%first(e + 1) - 1, rows%first(e), -1
-            call add_body(self, block%machine%coordinates, rows%body(k), rows%coefficient(k), .false.)
-            if (self%bank(i) > 0) call add_body(self, block%machine%coordinates, rows%body(k), rows%coefficient(k), .true.)
+            if (.not. self%is_damping(i)) call add_body(self, coordinates, rows%body(k), rows%coefficient(k), .false.)
+            if (self%bank(i) > 0) call add_body(self, coordinates, rows%body(k), rows%coefficient(k), .true.)
           end do
         end associate
       end if
@@ -128,6 +130,7 @@ contains
     self%has_law(number) = has_law(machine, column)
     if (column%form /= form_angle) self%direction(number) = -column%factor
     if (self%has_law(number) .or. column%form == form_angle) return
+    self%is_damping(number) = column%form == form_applied
     self%bank(number) = column%bank
     self%divisor(number) = column%divisor
   end subroutine set_column
@@ -204,7 +207,7 @@ contains
     end associate
   end subroutine copy_lane
 
-  !> Makes a whole moment or a stress of a twist and its rate.
+  !> Makes a damping or whole moment or a stress of a twist and its rate.
   pure subroutine scale_column(self, i, machine, lane)
     class(linear_columns_t), intent(inout) :: self
     integer, intent(in) :: i   !! column
@@ -213,7 +216,8 @@ contains
     real(wp) :: stiffness, damping
     integer :: k
 
-    stiffness = self%direction(i) * machine%laws%linear(lane, self%element(i))
+    stiffness = 0.0_wp
+    if (.not. self%is_damping(i)) stiffness = self%direction(i) * machine%laws%linear(lane, self%element(i))
     damping = -self%direction(i) * machine%laws%by_speed(lane, self%element(i))
     if (self%divisor(i) > 0) then
       associate (bank => machine%banks(self%bank(i))%bank)

@@ -38,7 +38,7 @@ contains
     type(signal_source_t), intent(in) :: columns(:)         !! of the trajectory table
     type(statistic_t), intent(in) :: statistics(:)   !! each of a column that `is_linear`; a moment has no time of extremes
     real(wp), intent(in) :: t_start, t_end           !! of every variant [s]
-    integer, allocatable :: wanted(:)   ! not allocated: those that have statistics
+    integer, allocatable :: wanted(:)   ! columns that have statistics
 
     call self%set_statistics(statistics, block%lanes, t_start, t_end, wanted)
     self%columns = new_linear_columns(block, columns(wanted))

@@ -33,15 +33,12 @@ module nocdyn_sampled_statistics
 contains
 
   !> Statistics of the variants that pass through the lanes of a block.
-  type(sampled_statistics_t) function new_sampled_statistics(lanes, statistics, t_start, t_end, columns) result(self)
+  type(sampled_statistics_t) function new_sampled_statistics(lanes, statistics, t_start, t_end) result(self)
     integer, intent(in) :: lanes
     type(statistic_t), intent(in) :: statistics(:)   !! each of a column
     real(wp), intent(in) :: t_start, t_end           !! of every variant [s]
-    integer, intent(in) :: columns                   !! that are sampled; 0: those that have statistics
     integer, allocatable :: wanted(:)
-    integer :: i
 
-    if (columns > 0) wanted = [(i, i=1, columns)]
     call self%set_statistics(statistics, lanes, t_start, t_end, wanted)
     call move_alloc(wanted, self%columns)
   end function new_sampled_statistics

@@ -23,8 +23,6 @@ module nocdyn_statistics_observer
 
   !> The requested times must be, or contain, the start and the end of the variants.
   !>
-  !> The values of the tracked columns are the ones of `recorded`, if an extension does not override what gives them.
-  !>
   !> A statistic is computed by `linear` if its column allows it, else by `sampled`. A torque that the machine of the block does
   !> not have is 0 at all times. A statistic of a whole shaft has a part for each of its points, of which the worst one counts.
   type, extends(observer_t), public :: statistics_observer_t
@@ -39,7 +37,6 @@ module nocdyn_statistics_observer
     real(wp), allocatable, private :: default_value(:)        !! where a statistic has no column, [statistics]
     integer, allocatable, private :: kind(:)                  !! statistic_..., [statistics]
     logical, allocatable, private :: is_along(:)              !! extremes of the largest moment or stress along a shaft
-    type(signal_source_t), allocatable :: points(:)                  !! of shafts: columns after the ones of the table
     type(signal_values_t), private :: recorded             !! the tracked columns
     logical, private :: has_recorded = .false.                !! whether it has any
     real(wp), allocatable, private :: t(:), y(:, :)   !! where lanes start and end, [lanes], [lanes, components]
@@ -64,18 +61,16 @@ contains
   end function needs_work_integrals
 
   !> An observer of a block, which stays where it is.
-  function new_statistics_observer(block, statistics, t_start, t_end, may_bend, tracks_all) result(self)
+  function new_statistics_observer(block, statistics, t_start, t_end, may_bend) result(self)
     class(formulation_t), target, intent(inout) :: block   !! with work integrals if `needs_work_integrals`
     type(statistic_t), intent(inout) :: statistics(:)      !! each with t_start <= from < t_end; get their columns
     real(wp), intent(in) :: t_start, t_end                 !! of every variant [s]
     logical, intent(in) :: may_bend                        !! whether variants differ in cubic stiffnesses
-    logical, intent(in), optional :: tracks_all            !! whether an extension gives the values of all columns of the table
-                                                           !! and of `points`; absent: those that are needed are recorded
     type(statistics_observer_t) :: self
     type(statistic_t), allocatable :: parts(:)
     type(signal_source_t), allocatable :: columns(:)
     type(signal_t), allocatable :: signals(:)
-    integer :: i, tracked
+    integer :: i
 
     self%block => block
     self%t_start = t_start
@@ -86,7 +81,6 @@ contains
     columns = signals%source
     call find_columns(signals, statistics)
     call list_parts(self, statistics, columns, parts)
-    self%points = columns(size(signals) + 1:)
     self%missing = ''
     do i = size(statistics), 1, -1
       if (allocated(statistics(i)%shaft) .or. statistics(i)%column > 0) cycle
@@ -95,10 +89,8 @@ contains
     allocate (self%default_value, source=value_of_zero_column(statistics))
     allocate (self%kind(size(statistics)))
     self%kind(:) = statistics%kind
-    tracked = 0
-    if (present(tracks_all)) tracked = merge(size(columns), 0, tracks_all)
-    call distribute(self, parts, columns, may_bend, tracked)
-    if (tracked == 0) call record_columns(self, columns(self%sampled%columns))
+    call distribute(self, parts, columns, may_bend)
+    call record_columns(self, columns(self%sampled%columns))
     allocate (self%is_complete(block%lanes), source=.false.)
   end function new_statistics_observer
 
@@ -220,12 +212,11 @@ contains
 
   !> Chooses how each statistic is computed. The time of the largest moment is not the one of the largest twist in a coupling that
   !> softens. A value at the end is the one of the row of a run, to the last bit.
-  subroutine distribute(self, statistics, columns, may_bend, tracked)
+  subroutine distribute(self, statistics, columns, may_bend)
     type(statistics_observer_t), intent(inout) :: self
     type(statistic_t), intent(in) :: statistics(:)
     type(signal_source_t), intent(in) :: columns(:)   !! of the trajectory table, and points of shafts
     logical, intent(in) :: may_bend            !! as in `new_statistics_observer`
-    integer, intent(in) :: tracked             !! number of columns that are tracked in any case; 0: those that are needed
     logical, dimension(size(statistics)) :: is_of_linear, is_of_sampled
     logical :: is_multiple
     integer :: i
@@ -245,7 +236,7 @@ contains
     allocate (self%linear_index, source=indices_among(is_of_linear))
     allocate (self%sampled_index, source=indices_among(is_of_sampled))
     self%linear = new_linear_statistics(self%block, columns, pack(statistics, is_of_linear), self%t_start, self%t_end)
-    self%sampled = new_sampled_statistics(self%block%lanes, pack(statistics, is_of_sampled), self%t_start, self%t_end, tracked)
+    self%sampled = new_sampled_statistics(self%block%lanes, pack(statistics, is_of_sampled), self%t_start, self%t_end)
     call self%sampled%track(self%block%machine, columns, may_bend, self)
     if (self%tracked == 0) call self%linear%read_components(self%first_read, self%last_read)
   end subroutine distribute

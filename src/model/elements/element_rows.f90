@@ -73,8 +73,19 @@ contains
     integer, intent(in) :: lanes, bodies
     real(wp), intent(in) :: phi(lanes, 0:bodies)                    !! of the ground and the bodies
     real(wp), intent(inout) :: u(lanes, size(self%first) - 1)
+    real(wp) :: sum
     integer :: e, k, l
 
+    if (lanes == 1) then   ! in the same bits, without loops of one turn
+      do e = 1, size(self%first) - 1
+        sum = self%coefficient(self%first(e)) * phi(1, self%body(self%first(e)))
+        do k = self%first(e) + 1, self%first(e + 1) - 1
+          sum = sum + self%coefficient(k) * phi(1, self%body(k))
+        end do
+        u(1, e) = sum
+      end do
+      return
+    end if
     do e = 1, size(self%first) - 1
       do l = 1, lanes
         u(l, e) = self%coefficient(self%first(e)) * phi(l, self%body(self%first(e)))

@@ -192,6 +192,15 @@ contains
 
     torque(:, :) = 0.0_wp
     associate (rows => self%rows)
+      if (size(self%time) == 1) then   ! in the same bits, without loops of one turn
+        do e = 1, self%count
+          moment = self%restoring(1, e) + self%applied(1, e)
+          do k = rows%first(e), rows%first(e + 1) - 1
+            torque(1, rows%body(k)) = torque(1, rows%body(k)) + rows%coefficient(k) * moment
+          end do
+        end do
+        return
+      end if
       do e = 1, self%count
         do k = rows%first(e), rows%first(e + 1) - 1
           do l = 1, size(self%time)

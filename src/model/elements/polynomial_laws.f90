@@ -231,15 +231,21 @@ contains
   subroutine evaluate_energies(self, elements)
     class(polynomial_laws_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements
-    real(wp) :: w2
-    integer :: e, l
 
-    do e = 1, size(self%rest, 2)
-      do l = 1, size(self%rest, 1)
-        w2 = (elements%angle(l, e) - self%rest(l, e))**2
-        elements%stored(l, e) = (0.5_wp * self%linear(l, e) + 0.25_wp * self%cubic(l, e) * w2) * w2
-      end do
-    end do
+    call energies(self%values, self%rest, self%linear, self%cubic, elements%angle, elements%stored)
   end subroutine evaluate_energies
+
+  pure subroutine energies(n, rest, linear, cubic, angle, stored)
+    integer, intent(in) :: n   !! values
+    real(wp), intent(in), dimension(n) :: rest, linear, cubic, angle
+    real(wp), intent(inout) :: stored(n)
+    real(wp) :: w2
+    integer :: i
+
+    do i = 1, n
+      w2 = (angle(i) - rest(i))**2
+      stored(i) = (0.5_wp * linear(i) + 0.25_wp * cubic(i) * w2) * w2
+    end do
+  end subroutine energies
 
 end module nocdyn_polynomial_laws

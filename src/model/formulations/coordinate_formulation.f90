@@ -106,6 +106,11 @@ contains
     integer :: b, c, f, k, l
 
     f = self%machine%coordinates%freedoms
+    if (self%internal > 0) self%machine%elements%internal%value(:, :) = y(:, self%mechanical + 1:self%states)
+    if (self%lanes == 1) then
+      call set_single_state(self, size(y, 2), y)
+      return
+    end if
     associate (coordinates => self%machine%coordinates, start_angle => self%machine%start_angle)
       do b = 1, self%machine%bodies
         self%omega(:, b) = 0.0_wp
@@ -119,8 +124,31 @@ contains
         end do
       end do
     end associate
-    if (self%internal > 0) self%machine%elements%internal%value(:, :) = y(:, self%mechanical + 1:self%states)
   end subroutine set_state
+
+  !> `set_state` of a block of one lane, in the same bits, without loops of one turn.
+  pure subroutine set_single_state(self, components, y)
+    class(coordinate_formulation_t), intent(inout) :: self
+    integer, intent(in) :: components
+    real(wp), intent(in) :: y(components)
+    real(wp) :: angle, speed
+    integer :: b, c, f, k
+
+    f = self%machine%coordinates%freedoms
+    associate (coordinates => self%machine%coordinates)
+      do b = 1, self%machine%bodies
+        speed = 0.0_wp
+        angle = self%machine%start_angle(1, b)
+        do k = coordinates%first(b), coordinates%first(b + 1) - 1
+          c = coordinates%coordinate(k)
+          speed = speed + coordinates%ratio(1, k) * y(c)
+          angle = angle + coordinates%ratio(1, k) * (self%origin%q(1, c) + y(f + c))
+        end do
+        self%omega(1, b) = speed
+        self%phi(1, b) = angle
+      end do
+    end associate
+  end subroutine set_single_state
 
   !> Sets the motion of bodies and elements; the twists are not differences of the bodies' angles, which may be large.
   subroutine gather(self, y)
