@@ -469,3 +469,11 @@ def test_check_tells_all_limits_that_cannot_be(nocdyn):
     outcome = nocdyn("check", "m.nml")
     assert outcome.returncode == 2
     assert [line.split(": ")[1] for line in outcome.stderr.splitlines()] == ["m.nml:10", "m.nml:11"]
+
+
+def test_a_note_names_its_load_case_once(nocdyn):
+    nocdyn.write("m.nml", MACHINE + RUN + "&load_case name = 'a' /\n")
+    outcome = nocdyn("run", "m.nml", "--out", "out", "--set", "output.columns='shaft_shaft'")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    [note] = [line for line in outcome.stdout.splitlines() if "shaft_shaft is called" in line]
+    assert note.startswith("m.nml: load case 'a': note: --set output.columns='shaft_shaft': &output: ")

@@ -77,7 +77,6 @@ contains
     character(len=:), allocatable :: hint
     character(len=8) :: kind
     integer :: i
-    logical :: is_near
 
     kind = element_kind(input%groups(index))
     associate (group => input%groups(index))
@@ -89,7 +88,7 @@ contains
         call check_quantity(input, index, input%groups(candidates(i)), diagnostics)
         return
       end do
-      call suggest(group%text(trim(kind)), names, hint, is_near)
+      call suggest(group%text(trim(kind)), names, hint)
       call input%report(index, trim(kind), 'there is no ' // trim(kind) // ' ' // quoted(group%text(trim(kind))), diagnostics, &
                         hint=hint)
     end associate

@@ -96,9 +96,11 @@ contains
   pure function location_of_group(self, index) result(text)
     class(input_t), intent(in) :: self
     integer, intent(in) :: index   !! of the group
-    character(len=source_length(self, self%groups(index)%line, 0) + 2 + label_length(self, index)) :: text
+    character(len=location_length(self, index, '', .true.)) :: text
+    character(len=:), allocatable :: location
 
-    text = source_text(self, self%groups(index)%line, 0) // ': ' // self%label(index)
+    call make_location(self, index, '', .true., location)
+    text = location
   end function location_of_group
 
   !> Location of a key: the line of `key` if the file sets it, or "--set PATH=VALUE: &gear 'reducer'" if an override does.
@@ -106,12 +108,11 @@ contains
     class(input_t), intent(in) :: self
     integer, intent(in) :: index   !! of the group
     character(len=*), intent(in) :: key
-    character(len=key_source_length(self, index, key) + 2 + label_length(self, index)) :: text
+    character(len=location_length(self, index, key, .true.)) :: text
+    character(len=:), allocatable :: location
 
-    associate (value => self%groups(index)%values(self%groups(index)%key_position(key)))
-      text = source_text(self, merge(value%line, self%groups(index)%line, value%line > 0), value%override) // &
-             ': ' // self%label(index)
-    end associate
+    call make_location(self, index, key, .true., location)
+    text = location
   end function location_of_key
 
   !> The location of a key without the load case, for what is said of it: notes and its report.
@@ -119,50 +120,43 @@ contains
     class(input_t), intent(in) :: self
     integer, intent(in) :: index   !! of the group
     character(len=*), intent(in) :: key   !! '': the group
-    character(len=place_length(self, index, key)) :: text
-    character(len=:), allocatable :: place_text
+    character(len=location_length(self, index, key, .false.)) :: text
+    character(len=:), allocatable :: location
 
-    call make_place(self, index, key, place_text)
-    text = place_text
+    call make_location(self, index, key, .false., location)
+    text = location
   end function place
 
-  pure integer function place_length(self, index, key) result(length)
+  pure integer function location_length(self, index, key, names_case) result(length)
     class(input_t), intent(in) :: self
     integer, intent(in) :: index
     character(len=*), intent(in) :: key
-    character(len=:), allocatable :: text
+    logical, intent(in) :: names_case
+    character(len=:), allocatable :: location
 
-    call make_place(self, index, key, text)
-    length = len(text)
-  end function place_length
+    call make_location(self, index, key, names_case, location)
+    length = len(location)
+  end function location_length
 
-  pure subroutine make_place(self, index, key, text)
+  pure subroutine make_location(self, index, key, names_case, location)
     class(input_t), intent(in) :: self
     integer, intent(in) :: index
-    character(len=*), intent(in) :: key
-    character(len=:), allocatable, intent(out) :: text
-    integer :: line
+    character(len=*), intent(in) :: key   !! '': the group
+    logical, intent(in) :: names_case     !! whether a load case is named
+    character(len=:), allocatable, intent(out) :: location
+    integer :: line, override
 
     line = self%groups(index)%line
+    override = 0
     if (key /= '') then
       associate (value => self%groups(index)%values(self%groups(index)%key_position(key)))
         if (value%line > 0) line = value%line
-        if (value%override > 0) text = source_text(self, 0, value%override)
+        override = value%override
       end associate
     end if
-    if (.not. allocated(text)) text = shown_path(self%file) // ':' // to_text(line)
-    text = text // ': ' // self%label(index)
-  end subroutine make_place
-
-  pure integer function key_source_length(self, index, key) result(length)
-    class(input_t), intent(in) :: self
-    integer, intent(in) :: index
-    character(len=*), intent(in) :: key
-
-    associate (value => self%groups(index)%values(self%groups(index)%key_position(key)))
-      length = source_length(self, merge(value%line, self%groups(index)%line, value%line > 0), value%override)
-    end associate
-  end function key_source_length
+    call make_source(self, line, override, names_case, location)
+    location = location // ': ' // self%label(index)
+  end subroutine make_location
 
   !> "machine.nml:12: load case 'start'", or "--set PATH=VALUE" of an override.
   pure function source_text(input, line, override) result(text)
@@ -172,7 +166,7 @@ contains
     character(len=source_length(input, line, override)) :: text
     character(len=:), allocatable :: source
 
-    call make_source(input, line, override, source)
+    call make_source(input, line, override, .true., source)
     text = source
   end function source_text
 
@@ -181,15 +175,18 @@ contains
     integer, intent(in) :: line, override
     character(len=:), allocatable :: source
 
-    call make_source(input, line, override, source)
+    call make_source(input, line, override, .true., source)
     length = len(source)
   end function source_length
 
-  pure subroutine make_source(input, line, override, source)
+  pure subroutine make_source(input, line, override, names_case, source)
     class(input_t), intent(in) :: input
     integer, intent(in) :: line, override
+    logical, intent(in) :: names_case   !! whether a load case is named
     character(len=:), allocatable, intent(out) :: source
+    logical :: has_case
 
+    has_case = names_case .and. allocated(input%load_case)
     source = shown_path(input%file)
     if (override > 0 .and. override <= input%case_overrides()) then
       source = source // ':' // to_text(input%load_case%line) // ': &load_case ' // &
@@ -197,9 +194,9 @@ contains
       return
     end if
     if (override == 0 .and. line > 0 .and. line < no_line) source = source // ':' // to_text(line)
-    if (allocated(input%load_case)) source = source // ': load case ' // quoted(shortened(input%load_case%name))
+    if (has_case) source = source // ': load case ' // quoted(shortened(input%load_case%name))
     if (override == 0) return
-    if (allocated(input%load_case)) then
+    if (has_case) then
       source = source // ': --set ' // shortened(input%overrides(override)%text)
     else
       source = '--set ' // shortened(input%overrides(override)%text)
@@ -275,16 +272,17 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(diagnostics_t) :: new
     integer :: i, k, override
+    logical :: is_known
 
     do i = 1, diagnostics%count
       associate (own => diagnostics%list(i))
         override = max(0, own%override - self%case_overrides())   ! in the machine
-        do k = 1, known%count
-          if (own%override > 0 .and. override == 0) exit   ! the load case sets the value
-          if (known%list(k)%line == own%line .and. known%list(k)%override == override .and. known%list(k)%text == own%text) exit
-        end do
-        if (k <= known%count .and. (own%override == 0 .or. override > 0)) cycle
-        call new%add(own%line, own%group, own%text, own%override, own%code, own%hint)
+        is_known = .false.
+        if (own%override == 0 .or. override > 0) then   ! else the load case sets the value
+          is_known = any([(known%list(k)%line == own%line .and. known%list(k)%override == override .and. &
+                           known%list(k)%text == own%text, k=1, known%count)])
+        end if
+        if (.not. is_known) call new%add(own%line, own%group, own%text, own%override, own%code, own%hint)
       end associate
     end do
     call self%refuse(new, error)

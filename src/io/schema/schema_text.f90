@@ -12,8 +12,8 @@ module nocdyn_schema_text
   implicit none (type, external)
   private
 
-  public :: allowed_text, number_text, type_text, only_if_text, listed_keys, group_names, key_names, similar_keys, key_suggestion
-  public :: group_suggestion, suggest, suggest_group, suggest_key, suggestion
+  public :: allowed_text, number_text, type_text, only_if_text, listed_keys, group_names, key_names, similar_keys
+  public :: suggest, suggest_group, suggest_key, suggestion
 
   integer, parameter :: kept_digits = 14   ! of a number that is converted
 
@@ -197,46 +197,27 @@ contains
   end function similar_keys
 
   !> "; did you mean 'low'?", or all keys of the group if none is similar and they are few.
-  pure function key_suggestion(group_rule, word) result(text)
+  pure subroutine suggest_key(group_rule, word, hint, is_near)
     integer, intent(in) :: group_rule      !! row of `group_rules`
     character(len=*), intent(in) :: word   !! in lower case
-    character(len=:), allocatable :: text
-    logical :: is_near
-
-    call suggest_key(group_rule, word, text, is_near)
-  end function key_suggestion
-
-  !> As `key_suggestion`, and whether one key is similar.
-  pure subroutine suggest_key(group_rule, word, hint, is_near)
-    integer, intent(in) :: group_rule
-    character(len=*), intent(in) :: word
     character(len=:), allocatable, intent(out) :: hint
-    logical, intent(out) :: is_near
+    logical, intent(out), optional :: is_near   !! whether one key is similar
     type(string_t), allocatable :: keys(:)
 
     allocate (keys, source=similar_keys(group_rule, word))
-    is_near = size(keys) > 0
-    if (is_near) then
+    if (size(keys) > 0) then
       hint = '; did you mean ' // quoted_list(keys) // '?'
+      if (present(is_near)) is_near = .true.
     else
       call suggest(word, key_names(group_rule), hint, is_near)
     end if
   end subroutine suggest_key
 
   !> "; did you mean 'gear'?", or the group for which a word stands in the field.
-  pure function group_suggestion(word) result(text)
-    character(len=*), intent(in) :: word   !! in lower case
-    character(len=:), allocatable :: text
-    logical :: is_near
-
-    call suggest_group(word, text, is_near)
-  end function group_suggestion
-
-  !> As `group_suggestion`, and whether a group is similar or meant by the word.
   pure subroutine suggest_group(word, hint, is_near)
-    character(len=*), intent(in) :: word
+    character(len=*), intent(in) :: word   !! in lower case
     character(len=:), allocatable, intent(out) :: hint
-    logical, intent(out) :: is_near
+    logical, intent(out), optional :: is_near   !! whether a group is similar, or meant by the word
     integer :: i
 
     do i = 1, size(group_aliases)
@@ -244,7 +225,7 @@ contains
       hint = "; did you mean '" // trim(group_aliases(i)%group) // "'"
       if (group_aliases(i)%addition /= '') hint = hint // ' with ' // trim(group_aliases(i)%addition)
       hint = hint // '?'
-      is_near = .true.
+      if (present(is_near)) is_near = .true.
       return
     end do
     call suggest(word, group_names(), hint, is_near)
@@ -255,24 +236,23 @@ contains
     character(len=*), intent(in) :: word
     type(string_t), intent(in) :: candidates(:)
     character(len=:), allocatable :: text
-    logical :: is_near
 
-    call suggest(word, candidates, text, is_near)
+    call suggest(word, candidates, text)
   end function suggestion
 
-  !> As `suggestion`, and whether a candidate is similar.
+  !> As `suggestion`, for threads: gfortran keeps lengths of functions' texts in static memory.
   pure subroutine suggest(word, candidates, hint, is_near)
     character(len=*), intent(in) :: word
     type(string_t), intent(in) :: candidates(:)
     character(len=:), allocatable, intent(out) :: hint
-    logical, intent(out) :: is_near
+    logical, intent(out), optional :: is_near   !! whether a candidate is similar
     integer, parameter :: few = 16
     integer :: nearest
 
     nearest = nearest_word(word, candidates)
-    is_near = nearest > 0
+    if (present(is_near)) is_near = nearest > 0
     hint = ''
-    if (is_near) then
+    if (nearest > 0) then
       hint = "; did you mean '" // candidates(nearest)%text // "'?"
     else if (size(candidates) > 0 .and. size(candidates) <= few) then
       hint = '; allowed: ' // joined(candidates, ', ')

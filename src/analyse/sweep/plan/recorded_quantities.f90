@@ -333,7 +333,6 @@ contains
     character(len=:), allocatable :: hint
     integer, allocatable :: groups(:)
     integer :: i
-    logical :: is_near
 
     allocate (groups, source=input%groups_named('fatigue'))
     allocate (names(size(groups)))
@@ -345,7 +344,7 @@ contains
         return
       end do
       fatigue = 0
-      call suggest(name, names, hint, is_near)
+      call suggest(name, names, hint)
       call input%report(record, 'fatigue', 'fatigue: there is no &fatigue ' // quoted(shortened(name)), diagnostics, hint=hint)
     end associate
   end subroutine find_fatigue

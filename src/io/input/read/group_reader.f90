@@ -11,7 +11,7 @@ module nocdyn_group_reader
   use nocdyn_schema, only: first_key, group_rules, has_word, is_single, key_rules
   use nocdyn_schema_relations, only: relations_t
   use nocdyn_schema_rules, only: a_document, a_name, columns, equal_lengths
-  use nocdyn_schema_text, only: key_suggestion, similar_keys
+  use nocdyn_schema_text, only: similar_keys, suggest_key
   use nocdyn_schema_units, only: find_key, name_in_unit
   use nocdyn_table_columns, only: read_table_columns
   use nocdyn_table_file, only: read_table_file
@@ -107,7 +107,7 @@ contains
         call find_key(raw%rule, similar(i)%text, key, unit)
         raw%keys(raw%position(key))%may_be_missing = .true.
       end do
-      hint = key_suggestion(raw%rule, assignment%key)
+      call suggest_key(raw%rule, assignment%key, hint)
     end if
     call diagnostics%add(assignment%line, raw%index, shortened(assignment%key) // ' is not a key of &' // &
                          trim(group_rules(raw%rule)%name) // hint)

@@ -12,7 +12,7 @@ module nocdyn_input_reader
   use nocdyn_schema, only: first_key, group_rule_index, group_rules, is_single, key_rules, last_key
   use nocdyn_schema_relations, only: relations_of, relations_t
   use nocdyn_schema_rules, only: at_least_once, exactly_once, occurrence_texts, required
-  use nocdyn_schema_text, only: group_names, group_suggestion, suggestion
+  use nocdyn_schema_text, only: group_names, suggest_group, suggestion
   use nocdyn_near_words, only: nearest_word
   use nocdyn_text, only: append, quoted, shortened, string_t, to_text
   use nocdyn_text_file, only: largest_input, read_text_file
@@ -215,7 +215,7 @@ contains
           group%rule = group_rule_index(group%kind)
           if (group%rule == 0) then
             hint = ''
-            if (diagnostics%count < most_shown) hint = group_suggestion(group%kind)
+            if (diagnostics%count < most_shown) call suggest_group(group%kind, hint)
             call diagnostics%add(group%line, g, 'there is no such group' // hint)
             cycle
           end if
