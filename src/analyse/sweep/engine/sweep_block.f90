@@ -50,7 +50,7 @@ module nocdyn_sweep_block
     type(chunk_t) :: chunk
     logical :: is_open = .false.
     integer :: next_index = 1   !! of the next variant for a lane
-    integer :: left = 0         !! variants that are in lanes or come into some
+    integer :: left = 0         !! variants that are in lanes or not handed out
     integer :: own_blocks = 0   !! variants that do not fit the lanes; their status is `needs_own_block`
   end type open_chunk_t
 
@@ -273,37 +273,43 @@ contains
 
     do
       found = self%newest > 0
+      if (.not. (found .or. self%is_last)) call take_chunk(self, found)
       if (.not. found) return
-      associate (open => self%chunks(self%newest))
+      self%slot(lane) = self%newest
+      associate (open => self%chunks(self%slot(lane)))
         i = open%next_index
-        if (i <= open%chunk%count) then
-          open%next_index = i + 1
-          call self%block%plan%values(open%chunk%first + i - 1, open%chunk%parameters(:, i))
-          call self%block%plan%numbers%target_values(open%chunk%parameters(:, i), values)
-          call self%block%machines%set_variant(values, lane, y, status, reason)
-          select case (status)
-          case (variant_refused)
-            call refuse(open%chunk, i, reason)
-          case (variant_needs_own_block)
-            open%chunk%status(i) = needs_own_block
-            open%own_blocks = open%own_blocks + 1
-          case default
-            if (self%block%message == '') exit
-            call refuse(open%chunk, i, self%block%message)
-          end select
-          open%left = open%left - 1
-          cycle
+        open%next_index = i + 1
+        call self%block%plan%values(open%chunk%first + i - 1, open%chunk%parameters(:, i))
+        call self%block%plan%numbers%target_values(open%chunk%parameters(:, i), values)
+        call self%block%machines%set_variant(values, lane, y, status, reason)
+        if (status == variant_needs_own_block) open%own_blocks = open%own_blocks + 1
+        if (i == open%chunk%count) then
+          self%newest = 0
+          self%is_last = self%is_last .or. open%own_blocks > 0   ! they are computed when the lanes are empty
         end if
-        ! variants with a block of their own are computed when the lanes are empty
-        self%is_last = self%is_last .or. open%own_blocks > 0
-        if (open%left == 0 .and. .not. self%is_last) call submit(self, open)
+        select case (status)
+        case (variant_refused)
+          call refuse(open%chunk, i, reason)
+        case (variant_needs_own_block)
+          open%chunk%status(i) = needs_own_block
+        case default
+          if (self%block%message == '') exit
+          call refuse(open%chunk, i, self%block%message)
+        end select
+        call count_off(self, open)
       end associate
-      self%newest = 0
-      if (.not. self%is_last) call take_chunk(self, found)
     end do
-    self%slot(lane) = self%newest
     self%index(lane) = i
   end subroutine next
+
+  !> Takes note that a variant of a chunk needs no lane any more; of the last one, submits the chunk if it lacks nothing.
+  subroutine count_off(self, open)
+    type(chunk_ensemble_t), intent(inout) :: self
+    type(open_chunk_t), intent(inout) :: open
+
+    open%left = open%left - 1
+    if (open%left == 0 .and. open%own_blocks == 0 .and. size(self%block%plan%analyses) == 0) call submit(self, open)
+  end subroutine count_off
 
   subroutine refuse(chunk, index, reason)
     type(chunk_t), intent(inout) :: chunk
@@ -323,10 +329,7 @@ contains
     associate (open => self%chunks(self%slot(lane)))
       call store_result(open%chunk, self%index(lane), lane, solver_status, self%block%machines%formulation, &
                         self%block%settings, self%block%plan%statistics, self%block%observer)
-      if (open%chunk%status(self%index(lane)) == not_computed) return   ! interrupted
-      open%left = open%left - 1
-      if (open%left > 0 .or. self%slot(lane) == self%newest .or. open%own_blocks > 0) return
-      if (size(self%block%plan%analyses) == 0) call submit(self, open)
+      if (open%chunk%status(self%index(lane)) /= not_computed) call count_off(self, open)   ! else it was interrupted
     end associate
   end subroutine finish
 
