@@ -156,17 +156,27 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
     real(wp), intent(inout) :: stiffness(:, :)   !! K [N m/rad]
+
+    call sum_coefficients(machine, lane, secant, stiffness)
+  end subroutine stiffness_matrix
+
+  !> The matrix of all bodies of a coefficient of each element, which its moment has in proportion to its motion.
+  subroutine sum_coefficients(machine, lane, coefficient, matrix)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: lane
+    procedure(secant) :: coefficient
+    real(wp), intent(inout) :: matrix(:, :)   !! [n, n]
     integer :: e, i
 
-    stiffness = 0.0_wp
+    matrix = 0.0_wp
     do i = 1, size(machine%banks)
       associate (bank => machine%banks(i)%bank, elements => machine%elements)
         do e = bank%first, bank%last()
-          call elements%rows%add_coefficient(e, secant(bank, elements, lane, e), stiffness)
+          call elements%rows%add_coefficient(e, coefficient(bank, elements, lane, e), matrix)
         end do
       end associate
     end do
-  end subroutine stiffness_matrix
+  end subroutine sum_coefficients
 
   !> K12 of eq. (3) of an element of a bank: the elastic moment of a coupling over its twist from rest; the derivative at rest,
   !> and of meshes whose teeth have errors [N m/rad].
@@ -201,16 +211,8 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
     real(wp), intent(inout) :: damping(:, :)   !! C [N m s/rad]
-    integer :: e, i
 
-    damping = 0.0_wp
-    do i = 1, size(machine%banks)
-      associate (bank => machine%banks(i)%bank, elements => machine%elements)
-        do e = bank%first, bank%last()
-          call elements%rows%add_coefficient(e, viscous(bank, elements, lane, e), damping)
-        end do
-      end associate
-    end do
+    call sum_coefficients(machine, lane, viscous, damping)
   end subroutine damping_matrix
 
   !> K_4 of eqs. (62)-(72) from the tangent stiffnesses K1 + 3 k1 w^2, [n, n]; the derivative of the elastic moments is
