@@ -1,6 +1,7 @@
 """Variants in a second, every contestant at the loosest tolerance with which its errors are below the wanted one."""
 
 from dataclasses import dataclass, field
+from functools import cache
 from statistics import median
 
 import numpy as np
@@ -74,6 +75,7 @@ class Throughput:
         count = round(contestant.share * self.count)
         sample = min(count, self.sample, self.sample if contestant.share == 1.0 else SLOW_SAMPLE)
 
+        @cache
         def errors_at(tolerance: float) -> Errors:
             return errors_of(contestant.solve(tolerance, parameters[:sample]).results, exact[:sample])
 
