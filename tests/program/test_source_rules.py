@@ -1,13 +1,14 @@
 """Rules for the Fortran sources that CONTRIBUTING.md states: their length, their arguments, their comments."""
 
 import functools
+import re
 from collections import Counter
 
 import pytest
 from conftest import SOURCE
 from fortran_sources import read_source
 
-LEAST_SOURCES, LEAST_PROCEDURES = 200, 1500  # fewer in src were not found where they are
+LEAST_SOURCES, LEAST_PROCEDURES, LEAST_LINKS = 200, 1500, 100  # fewer in src were not found where they are
 MOST_LINES_OF_A_FILE = 500
 MOST_LINES_OF_A_PROCEDURE = 80
 USUAL_LINES_OF_A_PROCEDURE = 40  # of nine procedures in ten
@@ -112,6 +113,20 @@ def test_public_procedures_have_a_doc_comment():
         if procedure.host is None and procedure.name.lower() in source.public and not procedure.doc
     ]
     assert not bare, "\n".join(bare)
+
+
+def test_links_of_the_pages_lead_to_public_names():
+    """[[module:name]] and [[module(module)]] in pages, doc comments and sources of pages."""
+    public = {source.module.lower(): source.public for source in sources("src").values() if source.module}
+    texts = [*(SOURCE / "docs").glob("pages/*.md"), *(SOURCE / "src").rglob("*.f90")]
+    links = [(path.name, link) for path in texts for link in re.findall(r"\[\[(nocdyn_\w+[^\]]*)\]\]", path.read_text())]
+    assert len(links) >= LEAST_LINKS
+    lost = []
+    for name, link in links:
+        module, item = re.fullmatch(r"(\w+)(?:\(module\))?(?::(\w+))?(?:\(\w+\))?", link).groups()
+        if module not in public or (item and item.lower() not in public[module]):
+            lost.append(f"{name}: [[{link}]]")
+    assert not lost, "\n".join(lost)
 
 
 def test_real_arguments_in_model_have_a_comment():
