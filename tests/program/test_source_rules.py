@@ -3,6 +3,7 @@
 import functools
 import re
 from collections import Counter
+from pathlib import Path
 
 import pytest
 from conftest import SOURCE
@@ -13,6 +14,7 @@ MOST_LINES_OF_A_FILE = 500
 MOST_LINES_OF_A_PROCEDURE = 80
 USUAL_LINES_OF_A_PROCEDURE = 40  # of nine procedures in ten
 MOST_ARGUMENTS = 8
+LINK = re.compile(r"\[\[(nocdyn_\w+)(?:\(module\))?:?(\w*)(?:\(\w+\))?\]\]")
 FOLDERS = ("src", "tests", "bench", "docs/examples")  # files .f90; those of the tests, .pf, may be longer
 
 # arrays are arguments of their own, so that the compiler knows that they are contiguous and do not overlap
@@ -116,16 +118,16 @@ def test_public_procedures_have_a_doc_comment():
 
 
 def test_links_of_the_pages_lead_to_public_names():
-    """[[module:name]] and [[module(module)]] in pages, doc comments and sources of pages."""
-    public = {source.module.lower(): source.public for source in sources("src").values() if source.module}
-    texts = [*(SOURCE / "docs").glob("pages/*.md"), *(SOURCE / "src").rglob("*.f90")]
-    links = [(path.name, link) for path in texts for link in re.findall(r"\[\[(nocdyn_\w+[^\]]*)\]\]", path.read_text())]
+    """[[module:name]] and [[module(module)]] of pages and doc comments."""
+    public = {f"nocdyn_{Path(path).stem}": source.public for path, source in sources("src").items()}
+    paths = [*(SOURCE / "docs/pages").glob("*.md"), *(SOURCE / "src").rglob("*.f90")]
+    links = [(path.name, link) for path in paths for link in LINK.findall(path.read_text(encoding="utf-8"))]
     assert len(links) >= LEAST_LINKS
-    lost = []
-    for name, link in links:
-        module, item = re.fullmatch(r"(\w+)(?:\(module\))?(?::(\w+))?(?:\(\w+\))?", link).groups()
-        if module not in public or (item and item.lower() not in public[module]):
-            lost.append(f"{name}: [[{link}]]")
+    lost = [
+        f"{name}: [[{module}:{item}]]"
+        for name, (module, item) in links
+        if module not in public or (item and item.lower() not in public[module])
+    ]
     assert not lost, "\n".join(lost)
 
 

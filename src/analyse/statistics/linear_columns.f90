@@ -1,6 +1,6 @@
 !> Columns of the trajectory table that are a linear function x of the state of the reduced formulation, or the elastic moment
-!> of a coupling that is an odd cubic polynomial of x; for all lanes of a block. Where joints lock or move there are none: speeds
-!> jump there, and states between the steps are put back on rows that move.
+!> of a coupling that is an odd cubic polynomial of x; for all lanes of a block. Where rows move there are none: states between
+!> the steps are put back on them.
 !>
 !> x = offset + sum of factor * y(component). An angle, a speed or a twist is x. An elastic moment is (linear + cubic x^2) x,
 !> where x is the twist minus that at rest. The moment of a linear coupling with damping is x = k (u - rest) + d u', its stress
@@ -52,8 +52,8 @@ contains
     is_linear = .false.
     select type (block)
     class is (reduced_t)
-      is_linear = block%joints%count == 0 .and. (any(column%kind == [signal_angle, signal_speed]) .or. &
-                                                 column%form == form_angle .or. has_law(block%machine, column))
+      is_linear = .not. block%projects .and. (any(column%kind == [signal_angle, signal_speed]) .or. &
+                                              column%form == form_angle .or. has_law(block%machine, column))
     end select
   end function is_linear
 
@@ -64,7 +64,7 @@ contains
     type(signal_source_t), intent(in) :: column
 
     is_proportional = .false.
-    if (column%kind /= signal_element .or. block%joints%count > 0) return
+    if (column%kind /= signal_element .or. block%projects) return
     associate (machine => block%machine, bank => block%machine%banks(column%bank)%bank)
       select type (block)
       class is (reduced_t)

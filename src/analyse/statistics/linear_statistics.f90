@@ -27,7 +27,7 @@ module nocdyn_linear_statistics
     real(wp), allocatable, private :: y_last(:, :), y_new_last(:, :), c_last(:, :, :)   !! of an incomplete last strip, padded
     type(strip_t), private :: strip
   contains
-    procedure :: start_lane, add_steps, finish_lane, read_components
+    procedure :: start_lane, add_steps, add_state, finish_lane, read_components
   end type linear_statistics_t
 
 contains
@@ -97,6 +97,27 @@ contains
       self%x_end(lane, i) = self%columns%argument(i, lane, y)
     end do
   end subroutine finish_lane
+
+  !> Widens the ranges of a lane by a state to which it has jumped: steps widen them by their ends and what is between.
+  subroutine add_state(self, lane, t, y)
+    class(linear_statistics_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t                  !! [s]
+    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+    integer :: i
+    real(wp) :: x
+
+    do i = 1, size(self%accumulators)
+      associate (acc => self%accumulators(i))
+        if (acc%bound(lane) > 0) cycle   ! it has not begun
+        x = self%columns%argument(acc%column, lane, y)
+        if (x > acc%highest(lane)) acc%highest_time(lane) = t
+        if (x < acc%lowest(lane)) acc%lowest_time(lane) = t
+        acc%highest(lane) = max(acc%highest(lane), x)
+        acc%lowest(lane) = min(acc%lowest(lane), x)
+      end associate
+    end do
+  end subroutine add_state
 
   !> Adds the last steps of the lanes.
   subroutine add_steps(self, steps, y, y_new, c)

@@ -42,7 +42,7 @@ module nocdyn_statistics_observer
     real(wp), allocatable, private :: t(:), y(:, :)   !! where lanes start and end, [lanes], [lanes, components]
     logical, allocatable, private :: is_complete(:)           !! lanes that have reached the end
   contains
-    procedure :: results, value_of, has_begun, take_counters, on_start, on_output, on_steps, on_shift
+    procedure :: results, value_of, has_begun, take_counters, on_start, on_output, on_steps, on_shift, on_jump
     procedure :: observe_lanes, tracked_values, find_pace, on_piece
   end type statistics_observer_t
 
@@ -226,7 +226,9 @@ contains
       if (statistics(i)%column == 0 .or. statistics(i)%kind == statistic_settling_time) cycle
       associate (column => columns(statistics(i)%column))
         is_multiple = is_proportional(self%block, column) .and. .not. may_bend
-        is_of_linear(i) = is_linear(self%block, column) .or. is_multiple .and. statistics(i)%kind /= statistic_final
+        is_of_linear(i) = is_linear(self%block, column) .or. is_multiple
+        if (statistics(i)%kind == statistic_final) is_of_linear(i) = is_linear(self%block, column) &
+                                                                     .and. self%block%joints%count == 0
         if (has_law(self%block%machine, column)) then
           if (is_time_of_extreme(statistics(i)%kind) .or. is_of_fatigue(statistics(i)%kind)) is_of_linear(i) = is_multiple
         end if
@@ -428,6 +430,20 @@ contains
 
     call self%linear%columns%copy_lane(self%block, lane)
   end subroutine on_shift
+
+  !> Takes the state after a jump.
+  subroutine on_jump(self, lane, t, y)
+    class(statistics_observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)
+
+    if (t > self%t_start) then
+      call self%linear%add_state(lane, t, y)
+    else
+      call self%linear%start_lane(self%block, lane, y)
+    end if
+  end subroutine on_jump
 
   subroutine on_steps(self, steps, y, y_new, c)
     class(statistics_observer_t), intent(inout) :: self

@@ -27,7 +27,7 @@ module nocdyn_observer
     integer :: last_read = huge(0)
   contains
     procedure :: on_start, on_output, wants_stop, event_values, on_event
-    procedure :: observe_lanes, tracked_values, find_pace, on_extremes, on_piece, on_steps, on_shift
+    procedure :: observe_lanes, tracked_values, find_pace, on_extremes, on_piece, on_steps, on_shift, on_jump
   end type observer_t
 
   !> The steps that the lanes of a block have taken together; [lanes].
@@ -176,5 +176,13 @@ contains
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: shift(:)   !! [states + quadratures]
   end subroutine on_shift
+
+  !> The state of a lane may have jumped to (t, y), after the end of a step or at the start.
+  subroutine on_jump(self, lane, t, y)
+    class(observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+  end subroutine on_jump
 
 end module nocdyn_observer

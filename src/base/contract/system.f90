@@ -54,7 +54,7 @@ module nocdyn_system
     procedure :: jacobian_pattern, component_name, prepare_integration, measure, measure_name, find_far
     procedure :: project_state, evaluation_obstacle, limit_steps, shift_state, restore_state, series_obstacle
     procedure :: prepare_series, series, evaluation_cost, series_cost, start_lane, indicator_values
-    procedure :: set_indicator, block_indicators, find_fastest_wave, change_branch, switch_name
+    procedure :: set_indicator, block_indicators, find_fastest_wave, find_fastest_waves, change_branch, switch_name
   end type system_t
 
   abstract interface
@@ -150,9 +150,10 @@ contains
     real(wp), contiguous, intent(inout) :: y(:)   !! [states + quadratures]
   end subroutine project_state
 
-  !> Why the equations cannot be evaluated, or hardly, where they were evaluated last; '' if nothing is known.
-  function evaluation_obstacle(self) result(text)
+  !> Why the equations of a lane cannot be evaluated, or hardly, where they were evaluated last; '' if nothing is known.
+  function evaluation_obstacle(self, lane) result(text)
     class(system_t), intent(in) :: self
+    integer, intent(in) :: lane
     character(len=:), allocatable :: text
 
     text = ''
@@ -278,6 +279,16 @@ contains
 
     fastest = 0.0_wp
   end subroutine find_fastest_wave
+
+  !> `find_fastest_wave` of all lanes; a system with block indicators that follows waves overrides it.
+  subroutine find_fastest_waves(self, columns, y, fastest)
+    class(system_t), intent(inout) :: self
+    integer, intent(in) :: columns   !! at least `states`
+    real(wp), intent(in) :: y(self%lanes, columns)
+    real(wp), intent(inout) :: fastest(self%lanes)
+
+    fastest = 0.0_wp
+  end subroutine find_fastest_waves
 
   !> A lane changes to the branch on the other side of an indicator's zero. The indicator must be zero or positive there
   !> afterwards. A boundary that is moved outwards a little, so that it is positive, prevents that rounding crosses back. The

@@ -129,7 +129,7 @@ contains
       sentence = sentence // 'raise max_steps, or loosen rtol and atol'
       if (solver_status%jacobians(lane) == 0) sentence = sentence // ', or, if the system is stiff, take an implicit method'
     case (integration_chattering)
-      reason = system%evaluation_obstacle()
+      reason = system%evaluation_obstacle(lane)
       if (reason /= '') then
         sentence = 'no motion fits all joints beyond ' // when // ': ' // reason
       else
@@ -150,7 +150,7 @@ contains
     case (integration_rhs_failed)
       sentence = 'the equations cannot be evaluated beyond ' // when // ', and a shorter step does not help'
       if (solver_status%steps(lane) == 0) sentence = 'the equations cannot be evaluated at the start, ' // when
-      reason = system%evaluation_obstacle()
+      reason = system%evaluation_obstacle(lane)
       if (reason /= '' .and. solver_status%steps(lane) > 0) sentence = 'no motion fits all joints beyond ' // when
       if (reason == '') reason = 'check the start values and the parameters'
       sentence = sentence // ': ' // reason
@@ -178,8 +178,8 @@ contains
     if (solver_status%component(lane) > 0) what = system%component_name(solver_status%component(lane))
     if (solver_status%measure(lane) > 0) what = system%measure_name(solver_status%measure(lane))
     sentence = 'the step size became too small at ' // when // ' (h = ' // rounded_text(solver_status%h(lane), digits) // ' s): '
-    if (system%evaluation_obstacle() /= '') then
-      sentence = sentence // system%evaluation_obstacle()
+    if (system%evaluation_obstacle(lane) /= '') then
+      sentence = sentence // system%evaluation_obstacle(lane)
     else if (what /= '') then
       sentence = sentence // 'the error of the ' // what // ' cannot be kept within rtol = ' // &
         rounded_text(rtol, digits) // ', atol = ' // rounded_text(atol, digits) // &

@@ -5,16 +5,17 @@
 !> Between two times a function is as far from its chord as a parabola with twice the second difference of three values would
 !> be. Parts are halved until that shows that it does not reach zero, or that it falls once.
 module nocdyn_followed_crossings
-  use nocdyn_dense_output, only: dense_output_t, sample
+  use nocdyn_dense_output, only: batch, dense_output_t, sample, sample_lanes
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_observer, only: observer_t
   use nocdyn_root_functions, only: bracket_t, find_root, most_halvings, parts_of, root_functions_t, sign_of
+  use nocdyn_step_attempt, only: step_attempt_t
   use nocdyn_system, only: system_t
   implicit none (type, external)
   private
 
-  public :: find_followed_crossing
+  public :: find_followed_crossing, find_unsettled_lanes, new_followed_lanes
 
   real(wp), parameter :: part_of_wave = 0.5_wp   ! between two times [rad]
   real(wp), parameter :: safety = 2.0_wp         ! factor of the second difference
@@ -27,7 +28,89 @@ module nocdyn_followed_crossings
     real(wp) :: theta = 1.0_wp
   end type crossing_t
 
+  !> What is known of the functions of all lanes of a block; work space.
+  type, public :: followed_lanes_t
+    private
+    integer, allocatable :: pairs(:)         ! of parts of the step, [lanes]
+    real(wp), allocatable :: fastest(:)      ! [rad/s], [lanes]
+    real(wp), allocatable :: t(:)            ! [s], [lanes]
+    real(wp), allocatable :: theta(:, :)     ! [lanes, batch]
+    real(wp), allocatable :: g(:, :, :)      ! at the ends and in the middle of a pair, [lanes, functions, 3]
+  end type followed_lanes_t
+
 contains
+
+  !> Work space for a block of lanes.
+  type(followed_lanes_t) function new_followed_lanes(lanes, functions) result(self)
+    integer, intent(in) :: lanes, functions
+
+    allocate (self%pairs(lanes), source=0)
+    allocate (self%fastest(lanes), self%t(lanes), self%theta(lanes, batch), self%g(lanes, functions, 3), source=0.0_wp)
+  end function new_followed_lanes
+
+  !> Looks at the last steps of all lanes at once, and finds those whose steps `find_followed_crossing` has to look at: the
+  !> functions of the others stay above zero, and show it without a halving.
+  subroutine find_unsettled_lanes(self, roots, system, attempt, coefficients, taken, y, is_unsettled)
+    type(followed_lanes_t), intent(inout) :: self
+    type(root_functions_t), intent(inout) :: roots   !! `last` becomes the values at the ends of the steps of settled lanes
+    class(system_t), intent(inout) :: system
+    type(step_attempt_t), intent(in) :: attempt
+    real(wp), contiguous, intent(in) :: coefficients(:, :, :)   !! of the dense output, [lanes, padded columns, degree]
+    logical, intent(in) :: taken(:)                             !! whether the lane has taken a step, [lanes]
+    real(wp), contiguous, intent(inout) :: y(:, :, :)           !! work space, [lanes, padded columns, batch]
+    logical, intent(inout) :: is_unsettled(:)                   !! [lanes]
+    integer :: columns, first, i, l, pair
+
+    columns = size(y, 2)
+    call system%find_fastest_waves(columns, attempt%y, self%fastest)
+    do l = 1, attempt%lanes
+      self%pairs(l) = pairs_of_step(attempt%degree(l), attempt%h(l), self%fastest(l))
+      if (.not. taken(l)) self%pairs(l) = 1
+      is_unsettled(l) = taken(l) .and. any(roots%side(l, :) < 1)
+      self%g(l, :, 1) = roots%last(:, l)
+    end do
+    do first = 1, maxval(self%pairs), batch / 2
+      do i = 1, batch
+        ! the ends of the pairs have the even numbers; lanes with fewer pairs stay at the end of their step
+        self%theta(:, i) = 1.0_wp * min(2 * first - 2 + i, 2 * self%pairs) / (2 * self%pairs)
+      end do
+      call sample_lanes(attempt%lanes, columns, maxval(attempt%degree, mask=taken), attempt%y, coefficients, taken, &
+                        self%theta, y)
+      do pair = first, min(first + batch / 2 - 1, maxval(self%pairs))
+        do i = 1, 2
+          associate (sample => 2 * (pair - first) + i)
+            self%t(:) = attempt%t + self%theta(:, sample) * attempt%h
+            call system%block_indicators(columns, self%t, y(:, :, sample), self%g(:, :, 1 + i))
+          end associate
+        end do
+        do l = 1, attempt%lanes
+          if (pair > self%pairs(l) .or. .not. taken(l)) cycle
+          is_unsettled(l) = is_unsettled(l) .or. any(.not. stays_above(self%g(l, :, 1), self%g(l, :, 2), self%g(l, :, 3)))
+          self%g(l, :, 1) = self%g(l, :, 3)
+        end do
+      end do
+    end do
+    do l = 1, attempt%lanes
+      if (taken(l) .and. .not. is_unsettled(l)) roots%last(:, l) = self%g(l, :, 1)
+    end do
+  end subroutine find_unsettled_lanes
+
+  !> Whether three values of a function show that it stays above zero, or that there is none.
+  elemental logical function stays_above(before, middle, after)
+    real(wp), intent(in) :: before, middle, after
+
+    stays_above = is_settled(before, middle, after) .and. .not. (middle <= 0 .or. after <= 0)
+  end function stays_above
+
+  !> The number of pairs of parts of a step.
+  pure integer function pairs_of_step(degree, duration, fastest)
+    integer, intent(in) :: degree          ! of the dense output
+    real(wp), intent(in) :: duration       ! [s]
+    real(wp), intent(in) :: fastest        ! [rad/s]
+
+    pairs_of_step = max((parts_of(degree) + 1) / 2, &
+                        ceiling(min(0.25_wp * huge(1), 0.5_wp * duration * fastest / part_of_wave)))
+  end function pairs_of_step
 
   !> Finds the first crossing in the last step of a lane: the theta where an indicator falls through zero. The functions are
   !> looked at up to there; it is done again where it is early in the step, as they may have no sense beyond.
@@ -68,8 +151,7 @@ contains
     type(crossing_t), intent(out) :: first
     integer :: pair, pairs
 
-    pairs = (parts_of(dense%degree) + 1) / 2
-    pairs = max(pairs, ceiling(min(0.25_wp * huge(1), 0.5_wp * theta_end * dense%h * fastest / part_of_wave)))
+    pairs = pairs_of_step(dense%degree, theta_end * dense%h, fastest)
     roots%halves(:, 1, 0) = roots%last(:, dense%lane)
     do pair = 1, pairs
       associate (a => theta_end * (2 * pair - 2) / (2 * pairs), m => theta_end * (2 * pair - 1) / (2 * pairs), &

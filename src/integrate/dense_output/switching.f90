@@ -2,7 +2,7 @@
 module nocdyn_switching
   use nocdyn_dense_output, only: batch, dense_output_t, sample, sample_lanes, strip
   use nocdyn_finite, only: is_finite
-  use nocdyn_followed_crossings, only: find_followed_crossing
+  use nocdyn_followed_crossings, only: find_followed_crossing, find_unsettled_lanes, followed_lanes_t, new_followed_lanes
   use nocdyn_kinds, only: wp
   use nocdyn_observer, only: observer_t
   use nocdyn_root_functions, only: allocate_root_functions, bracket_t, find_grazing, find_root, part_bracket, &
@@ -29,6 +29,7 @@ module nocdyn_switching
     real(wp), allocatable :: t(:)              !! [s], [lanes]
     real(wp), allocatable :: theta(:, :)       !! [lanes, batch]
     real(wp), allocatable :: y(:, :, :)        !! [lanes, padded columns, batch]
+    type(followed_lanes_t) :: followed         !! where the system follows waves
   end type block_scan_t
 
   type, public :: switching_t
@@ -63,6 +64,7 @@ contains
     if (.not. switching%scan%is_used) return
     associate (lanes => attempt%lanes, scan => switching%scan)
       allocate (scan%is_near(lanes), source=.true.)
+      if (system%follows_waves) scan%followed = new_followed_lanes(lanes, system%switches)
       allocate (scan%parts(lanes), source=1)
       allocate (scan%g(lanes, system%switches, 0:parts_of(degree)), scan%t(lanes), scan%theta(lanes, batch), &
                 scan%y(lanes, size(attempt%y, 2), batch), source=0.0_wp)
@@ -93,6 +95,10 @@ contains
 
     if (.not. switching%scan%is_used) return
     associate (scan => switching%scan)
+      if (system%follows_waves) then
+        call find_unsettled_lanes(scan%followed, switching%roots, system, attempt, coefficients, taken, scan%y, scan%is_near)
+        return
+      end if
       columns = size(scan%y, 2)
       scan%parts(:) = parts_of(attempt%degree)
       parts = maxval(scan%parts, mask=taken)

@@ -205,7 +205,10 @@ contains
           call cross_boundaries(integrator%switching, system, attempt, lane, solver_status)
           if (integrator%has_extremes) call end_extremes(integrator%extremes, observer, attempt, lane)
         end if
-        if (integrator%has_jumps .and. integrator%steps%crosses(lane)) call output_at_crossing(integrator, lane, times, observer)
+        if (.not. (integrator%has_jumps .and. integrator%steps%crosses(lane))) cycle
+        integrator%sample(:) = attempt%y(lane, :attempt%components)
+        call observer%on_jump(lane, attempt%t(lane), integrator%sample)
+        call output_at_crossing(integrator, lane, times, observer)
       end do
       if (.not. any(starting)) return
       call evaluate_starts(integrator, system, solver_status)

@@ -175,6 +175,9 @@ contains
         call system%start_lane(lane, attempt%t(lane), integrator%sample)
         call observer%on_start(lane, attempt%t(lane), integrator%sample)
         if (integrator%has_switches) call start_switching(integrator%switching, system, attempt, lane, solver_status)
+        if (.not. integrator%has_jumps) cycle
+        integrator%sample(:) = attempt%y(lane, :attempt%components)
+        call observer%on_jump(lane, attempt%t(lane), integrator%sample)
       end do
       call evaluate_starts(integrator, system, solver_status)
       call measure_start(integrator%control, system, attempt, integrator%starting)

@@ -339,6 +339,7 @@ contains
 
     if (.not. self%is_ready) call make_ready(self)
     g = huge(g)
+    if (size(self%law%tape%guard) == 0) return
     associate (law => self%law, tape => self%law%tape, work => self%guards)
       do strip = 1, law%strips
         first = law%strip * (strip - 1) + 1

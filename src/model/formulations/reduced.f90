@@ -28,7 +28,8 @@ module nocdyn_reduced
     real(wp), allocatable, private :: moment(:, :)             !! M [N m], [lanes, elements], work space
     real(wp), allocatable, private :: free_jacobian(:, :)      !! without locked joints, if there are joints, [lanes, positions]
   contains
-    procedure :: formulate, update_inertia, list_parameters, refresh_lane, derivative, jacobian
+    procedure :: formulate, update_inertia, list_parameters, refresh_lane, refresh_parameters, derivative, jacobian
+    procedure :: evaluate_at, hold_jacobian, spread_jacobian
     procedure :: jacobian_pattern, series_obstacle, prepare_series, series
   end type reduced_t
 
@@ -122,11 +123,19 @@ contains
     class(reduced_t), intent(inout) :: self
     integer, intent(in) :: lane
 
+    call self%refresh_parameters(lane)
+    if (self%joints%count > 0) call self%prepare_joints()
+  end subroutine refresh_lane
+
+  !> Updates all of that but joints.
+  subroutine refresh_parameters(self, lane)
+    class(reduced_t), intent(inout) :: self
+    integer, intent(in) :: lane
+
     call self%reset_origin(lane)
     call self%machine%refresh_lane(lane)
     call self%series_kernel%refresh_lane(lane, self%machine%laws, self%twists, self%accelerations)
-    if (self%joints%count > 0) call self%prepare_joints()
-  end subroutine refresh_lane
+  end subroutine refresh_parameters
 
   !> q'' = R M, and the derivatives of internal states and work integrals.
   subroutine derivative(self, t, y, dydt, status)
@@ -156,7 +165,7 @@ contains
     real(wp), intent(inout) :: dydt(2 * n + internal + self%lanes * quadratures)   !! its derivative
     integer :: i
 
-    call evaluate_at(self, n, internal, t, y)
+    call self%evaluate_at(n, internal, t, y)
     call add(size(self%moment), self%machine%elements%restoring, self%machine%elements%applied, self%moment)
     call self%accelerations%multiply(self%moment, dydt)
     do i = 1, n
@@ -168,7 +177,7 @@ contains
 
   !> Evaluates the elements at a state.
   subroutine evaluate_at(self, n, internal, t, y)
-    type(reduced_t), intent(inout) :: self
+    class(reduced_t), intent(inout) :: self
     integer, intent(in) :: n                      !! lanes * freedoms
     integer, intent(in) :: internal               !! lanes * internal states
     real(wp), intent(in) :: t(self%lanes)         !! [s]
@@ -238,7 +247,7 @@ contains
 
     f = self%machine%coordinates%freedoms
     associate (machine => self%machine, elements => self%machine%elements)
-      call evaluate_at(self, self%lanes * f, self%lanes * self%internal, t, y)
+      call self%evaluate_at(self%lanes * f, self%lanes * self%internal, t, y)
       if (self%joints%motions%count + self%joints%teeth%count > 0) call self%find_accelerations(t(1), self%acceleration)
       call machine%differentiate_elements(t)
       if (self%joints%count > 0) then
@@ -254,26 +263,35 @@ contains
         e = machine%with_work(k)
         dfdt(:, self%states + k) = elements%applied_time(:, e) * elements%speed(:, e)
       end do
-      if (self%joints%count > 0) call hold_jacobian(self, self%states + self%quadratures, dfdy, dfdt)
+      if (self%joints%count > 0) call self%hold_jacobian(self%states + self%quadratures, dfdy, dfdt)
     end associate
   end subroutine jacobian
 
   !> The Jacobian where joints hold: each column has the accelerations that these leave.
   subroutine hold_jacobian(self, components, dfdy, dfdt)
     class(reduced_t), intent(inout) :: self
-    integer, intent(in) :: components                          !! states + quadratures
-    real(wp), intent(inout) :: dfdy(components, self%states)   !! of the only lane
-    real(wp), intent(inout) :: dfdt(components)
+    integer, intent(in) :: components                                       !! states + quadratures
+    real(wp), intent(inout) :: dfdy(self%lanes, components, self%states)    !! of one lane
+    real(wp), intent(inout) :: dfdt(self%lanes, components)
+
+    call self%spread_jacobian(components, dfdy)
+    call self%hold_columns(components, dfdy, dfdt)
+  end subroutine hold_jacobian
+
+  !> The Jacobian without joints at all positions.
+  subroutine spread_jacobian(self, components, dfdy)
+    class(reduced_t), intent(in) :: self
+    integer, intent(in) :: components                                       !! states + quadratures
+    real(wp), intent(inout) :: dfdy(self%lanes, components, self%states)
     integer :: k
 
     dfdy = 0.0_wp
     associate (pattern => self%element_jacobian%pattern)
       do k = 1, size(pattern%row)
-        dfdy(pattern%row(k), pattern%column(k)) = self%free_jacobian(1, k)
+        dfdy(:, pattern%row(k), pattern%column(k)) = self%free_jacobian(:, k)
       end do
     end associate
-    call self%hold_columns(components, dfdy, dfdt)
-  end subroutine hold_jacobian
+  end subroutine spread_jacobian
 
   !> All positions where there are joints.
   function jacobian_pattern(self) result(pattern)

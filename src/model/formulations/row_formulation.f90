@@ -404,8 +404,9 @@ contains
   end subroutine project
 
   !> Where the rank of the rows that move has changed, or is about to, or they contradict one another.
-  function evaluation_obstacle(self) result(text)
+  function evaluation_obstacle(self, lane) result(text)
     class(row_formulation_t), intent(in) :: self
+    integer, intent(in) :: lane
     character(len=:), allocatable :: text
 
     call describe_obstacle(self%joints, self%machine%banks, self%machine%elements%rows, self%machine%coordinates, text)

@@ -56,7 +56,7 @@ module nocdyn_held_rows
     procedure :: start_rows
     procedure :: weigh
     procedure :: change_set
-    procedure :: find_moments
+    procedure :: find_moments, find_holding
     procedure :: moment_errors
     procedure :: nearly_lost
     procedure :: partners
@@ -65,7 +65,7 @@ module nocdyn_held_rows
     procedure, private :: find_moments_with_teeth
     procedure, private :: factor_with_teeth
     procedure, private :: watch_rank
-    procedure, private :: choose_set
+    procedure, private :: choose_set, invert_weights
     procedure, private :: examine
     procedure, private :: unit_weights
   end type held_rows_t
@@ -153,13 +153,7 @@ contains
       call self%find_moving_moments()
       return
     end if
-    if (.not. self%is_known) then
-      call self%choose_set()
-      associate (which => self%holding(:self%order))
-        self%inverse(:self%order, :self%order) = pseudo_inverse(self%weight(which, which), null_tolerance)
-        call self%examine(which)
-      end associate
-    end if
+    call self%invert_weights()
     self%moment(:) = 0.0_wp
     do column = 1, self%order
       do row = 1, self%order
@@ -169,6 +163,33 @@ contains
       end do
     end do
   end subroutine find_moments
+
+  !> Finds W^+ of the set, where no rows move and no teeth have losses.
+  subroutine invert_weights(self)
+    class(held_rows_t), intent(inout) :: self
+
+    if (self%is_known) return
+    call self%choose_set()
+    associate (which => self%holding(:self%order))
+      self%inverse(:self%order, :self%order) = pseudo_inverse(self%weight(which, which), null_tolerance)
+      call self%examine(which)
+    end associate
+  end subroutine invert_weights
+
+  !> W^+ of the set with zeros for the joints that do not hold: the moments are -W^+ u''.
+  subroutine find_holding(self, holding)
+    class(held_rows_t), intent(inout) :: self
+    real(wp), intent(inout) :: holding(:, :)   !! [kg m2], [joints, joints]
+    integer :: i, j
+
+    call self%invert_weights()
+    holding(:, :) = 0.0_wp
+    do j = 1, self%order
+      do i = 1, self%order
+        holding(self%holding(i), self%holding(j)) = self%inverse(i, j)
+      end do
+    end do
+  end subroutine find_holding
 
   !> Moments of locked joints where rows move.
   subroutine find_moving_moments(self)

@@ -60,7 +60,7 @@ module nocdyn_machine
     procedure :: internal_name
     procedure :: is_electrical
     procedure :: choose_branches
-    procedure :: keep_branches, restore_branches
+    procedure :: keep_branches, restore_branches, take_branches
     procedure :: settle_internal
     procedure :: evaluate
     procedure :: evaluate_elements
@@ -296,6 +296,23 @@ contains
       call self%banks(i)%bank%restore_branches()
     end do
   end subroutine restore_branches
+
+  !> Puts a lane on the branches of a lane of a machine with the same structure.
+  subroutine take_branches(self, lane, from, from_lane)
+    class(machine_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    type(machine_t), intent(in) :: from
+    integer, intent(in) :: from_lane   !! lane of `from`
+    integer :: i, switch
+
+    do i = 1, size(self%banks)
+      associate (bank => self%banks(i)%bank)
+        do switch = 1, size(bank%switch_element)
+          call bank%set_branch(switch, lane, from%banks(i)%bank%branch(from_lane, switch))
+        end do
+      end associate
+    end do
+  end subroutine take_branches
 
   !> Replaces the internal states in the first lane of `elements` by those that do not change at the speeds there.
   subroutine settle_internal(self, t)

@@ -217,7 +217,7 @@ contains
     real(wp), contiguous, intent(in) :: values(:)          !! [targets]
     integer, intent(in) :: lane
     type(lane_parameters_t), intent(inout) :: parameters   !! of the block
-    type(reduced_t), intent(inout) :: block
+    class(reduced_t), intent(inout) :: block
     real(wp), contiguous, intent(inout) :: y(:)            !! the start state of another variant, then of this one
     logical, intent(out) :: is_set                         !! not if rounding makes the mass matrix indefinite
     integer :: i

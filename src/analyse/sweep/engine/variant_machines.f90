@@ -11,6 +11,7 @@ module nocdyn_variant_machines
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
+  use nocdyn_joint_blocks, only: can_share_block, joint_block_t
   use nocdyn_joint_sets, only: joint_sets_t, new_joint_sets
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
@@ -32,7 +33,7 @@ module nocdyn_variant_machines
   type, public :: variant_machines_t
     type(input_t) :: input                                     !! with the values of the last variant that was assembled
     class(formulation_t), pointer :: formulation => null()     !! the block
-    type(reduced_t), pointer, private :: block => null()       !! the block if it is reduced: variants share it
+    class(reduced_t), pointer, private :: block => null()      !! the block if it is reduced: variants share it
     type(target_t), allocatable, private :: targets(:)
     logical, private :: has_energy_balance = .false.           !! whether the work integrals are among the states
     logical, allocatable, private :: is_of_run(:)              !! whether a target is of &run or &fatigue, [targets]
@@ -56,9 +57,10 @@ contains
     integer, intent(in) :: lanes
     logical, intent(in) :: with_energy_balance     !! whether the work integrals are among the states
     type(variant_machines_t), intent(out) :: self
-    real(wp), intent(in), optional :: typical(:)   !! values of the targets; absent, refused or with joints: as in the input
-    type(reduced_t), pointer :: block
+    real(wp), intent(in), optional :: typical(:)   !! values of the targets; absent, refused or with joints that cannot share
+                                                   !! a block: as in the input
     class(formulation_t), allocatable :: formulation
+    type(machine_t) :: machine
     character(len=:), allocatable :: message
     logical :: is_typical
     type(target_t) :: no_targets(0)
@@ -78,46 +80,61 @@ contains
         self%base(i) = self%input%groups(target%group)%values(target%key)%number_at(target%position)
       end associate
     end do
-    allocate (block, self%assembled)
+    allocate (self%assembled)
     self%assembled%is_block = .true.
     is_typical = present(typical)
     if (is_typical) then
-      call assemble_variant(self%input, targets, typical, block%machine, message, lanes)
+      call assemble_variant(self%input, targets, typical, machine, message, lanes)
       is_typical = message == ''
-      if (is_typical .and. lanes > 1) is_typical = count_joints(block%machine) == 0
+      if (is_typical .and. lanes > 1) is_typical = can_share_block(joints_of(machine))
     end if
     if (.not. is_typical) then
       self%input = input
-      call assemble_variant(self%input, no_targets, no_values, block%machine, message, lanes)
+      call assemble_variant(self%input, no_targets, no_values, machine, message, lanes)
       if (message /= '') error stop 'nocdyn_variant_machines: the machine of the input cannot be assembled'
     end if
     allocate (self%holds_variant(lanes), source=is_typical)
     if (self%input%groups(self%input%position('run'))%text('formulation') == 'reduced') then
-      call share_block(self, block)
+      call share_block(self, machine, lanes)
       if (is_typical) call self%direct%accept(typical)
     else
-      call new_asked_formulation(self%input, block%machine, formulation, with_energy_balance)
+      call new_asked_formulation(self%input, machine, formulation, with_energy_balance)
       allocate (self%formulation, source=formulation)
-      deallocate (block)
     end if
   end subroutine new_variant_machines
 
-  !> The joints of a machine that lock or move, which lanes of a block do not share.
-  integer function count_joints(machine)
+  !> The joints of a machine that lock or move.
+  type(joint_sets_t) function joints_of(machine) result(joints)
     type(machine_t), intent(in) :: machine
-    type(joint_sets_t) :: joints
 
     joints = new_joint_sets(machine%banks, machine%switches, machine%elements%count)
-    count_joints = joints%count
-  end function count_joints
+  end function joints_of
 
   !> Makes the block of an assembled machine of all lanes.
-  subroutine share_block(self, block)
+  subroutine share_block(self, machine, lanes)
     type(variant_machines_t), intent(inout) :: self
-    type(reduced_t), pointer, intent(in) :: block
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: lanes
+    class(reduced_t), pointer :: block
+    type(joint_sets_t) :: joints
+    type(error_t), allocatable :: error
+    type(machine_t) :: single
 
+    joints = joints_of(machine)
+    if (lanes > 1 .and. joints%count > 0) then
+      allocate (joint_block_t :: block)
+    else
+      allocate (reduced_t :: block)
+    end if
+    block%machine = machine
     block%is_block = .true.
     call block%formulate(self%has_energy_balance)
+    select type (block)
+    class is (joint_block_t)
+      call assemble_machine(self%input, single, error)   ! with the values of the block
+      if (allocated(error)) error stop 'nocdyn_variant_machines: the machine of the block cannot be assembled'
+      call block%attach(single)
+    end select
     block%is_shared = block%joints%count == 0   ! whatever the number of lanes
     call block%list_parameters(self%parameters)
     self%block => block
@@ -129,7 +146,7 @@ contains
 
   !> The start of lane 1.
   subroutine take_start(formulation, start)
-    type(reduced_t), intent(in) :: formulation
+    class(reduced_t), intent(in) :: formulation
     real(wp), intent(out) :: start(:)   !! [states + quadratures]
     real(wp) :: starts(formulation%lanes, size(start))
 
@@ -218,11 +235,13 @@ contains
     real(wp), contiguous, intent(in) :: values(:)   !! [targets]
     class(formulation_t), allocatable, intent(out) :: formulation
     character(len=:), allocatable, intent(out) :: message   !! why there is no such machine, ''
+    type(joint_sets_t) :: joints
     type(machine_t) :: machine
 
     call assemble_variant(self%input, self%targets, values, machine, message)
     if (message /= '') return
-    call new_asked_formulation(self%input, machine, formulation, count_joints(machine) > 0 .or. self%has_energy_balance)
+    joints = joints_of(machine)
+    call new_asked_formulation(self%input, machine, formulation, joints%count > 0 .or. self%has_energy_balance)
   end subroutine own_formulation
 
   !> Sets the values of a variant in `input`.

@@ -1,0 +1,365 @@
+!> Blocks of lanes of the reduced formulation with joints that lock (`nocdyn_joint_sets`), each lane with its own set.
+!>
+!> All lanes are evaluated at once: the joints that hold have the moments -W^+ u'', with zeros in W^+ for joints that slip. What is
+!> decided in one lane, at the start of a variant and at events, is decided by a scout: the formulation of a single lane, which
+!> takes the parameters, the branches and the joints of that lane and gives branches and joints back. Rows that move and teeth
+!> with losses are in blocks of one lane only.
+module nocdyn_joint_blocks
+  use nocdyn_friction_joints, only: locked
+  use nocdyn_joint_sets, only: joint_sets_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_lane_parameters, only: lane_parameters_t
+  use nocdyn_machine, only: machine_t
+  use nocdyn_reduced, only: new_reduced, reduced_t
+  use nocdyn_row_obstacles, only: describe_obstacle
+  use nocdyn_system, only: evaluation_fatal
+  implicit none (type, external)
+  private
+
+  public :: can_share_block
+
+  !> Variables of this type are not to be copied once `attach` has listed their parameters.
+  type, extends(reduced_t), public :: joint_block_t
+    private
+    type(joint_sets_t), allocatable :: sets(:)            !! joints of each lane, [lanes]
+    logical, allocatable :: is_held(:)                    !! whether a joint is locked in some lane, [joints]
+    real(wp), allocatable :: holding(:, :, :)             !! W^+ [kg m2], [lanes, joints, joints]
+    real(wp), allocatable :: row_rate(:, :)               !! u'' of the joints without their moments [rad/s2], [lanes, joints]
+    real(wp), allocatable :: held_moment(:, :)            !! moments of the joints that hold [N m], [lanes, joints]
+    real(wp), allocatable :: lane_acceleration(:, :)      !! q'' [rad/s2], work space, [lanes, freedoms]
+    type(reduced_t), pointer :: scout => null()
+    integer :: scouted = 0                                !! lane that the scout stands for, 0: none
+    type(lane_parameters_t) :: parameters, scout_parameters
+  contains
+    procedure, public :: attach
+    procedure, public :: derivative, hold_jacobian, refresh_lane, observe, evaluation_obstacle
+    procedure, public :: start_lane, indicator_values, set_indicator, block_indicators, find_fastest_wave, find_fastest_waves
+    procedure, public :: change_branch
+    final :: release_scout
+  end type joint_block_t
+
+contains
+
+  !> Whether joints of lanes of one block may be in different sets: none are rows that move or teeth with losses.
+  pure logical function can_share_block(joints)
+    type(joint_sets_t), intent(in) :: joints
+
+    can_share_block = joints%motions%count == 0 .and. joints%teeth%count == 0
+  end function can_share_block
+
+  !> Makes the scout and lists all parameters, after `formulate`; the block stays where it is from now on.
+  subroutine attach(self, machine)
+    class(joint_block_t), target, intent(inout) :: self
+    type(machine_t), intent(in) :: machine   !! of one lane, with the structure of the block
+    integer :: lane
+
+    allocate (self%scout)
+    self%scout = new_reduced(machine, self%has_energy_balance, as_block=.true.)
+    call self%scout%list_parameters(self%scout_parameters)
+    call self%list_parameters(self%parameters)
+    if (.not. self%parameters%has_same_structure(self%scout_parameters)) then
+      error stop 'nocdyn_joint_blocks: the scout differs from the block'
+    end if
+    associate (joints => self%joints%count)
+      allocate (self%sets(self%lanes))
+      do lane = 1, self%lanes
+        self%sets(lane) = self%scout%joints
+      end do
+      allocate (self%is_held(joints), source=.false.)
+      allocate (self%holding(self%lanes, joints, joints), self%row_rate(self%lanes, joints), source=0.0_wp)
+      allocate (self%held_moment, source=self%row_rate)
+      allocate (self%lane_acceleration(self%lanes, size(self%moving)), source=0.0_wp)
+    end associate
+  end subroutine attach
+
+  subroutine release_scout(self)
+    type(joint_block_t), intent(inout) :: self
+
+    if (associated(self%scout)) deallocate (self%scout)
+  end subroutine release_scout
+
+  !> Makes the scout stand for a lane.
+  subroutine send_scout(self, lane)
+    class(joint_block_t), intent(inout) :: self
+    integer, intent(in) :: lane
+
+    if (self%scouted /= lane) then
+      call self%scout_parameters%copy_lane(1, self%parameters, lane)
+      call self%scout%machine%refresh_lane(1)
+      call self%scout%machine%take_branches(1, self%machine, lane)
+      self%scout%joints = self%sets(lane)
+      self%scout%joints%lane = 1
+      self%scouted = lane
+    end if
+    self%scout%twist_at_origin(1, :) = self%twist_at_origin(lane, :)
+  end subroutine send_scout
+
+  !> Takes the branches and joints of the lane that the scout stands for.
+  subroutine take_report(self)
+    class(joint_block_t), intent(inout) :: self
+    integer :: j
+
+    associate (lane => self%scouted, scout => self%scout)
+      call self%machine%take_branches(lane, scout%machine, 1)
+      scout%joints%log%count = 0   ! nobody reads it
+      self%sets(lane) = scout%joints
+      self%sets(lane)%lane = lane
+      call self%sets(lane)%find_holding(self%holding(lane, :, :))
+      do j = 1, self%joints%count
+        self%is_held(j) = self%sets(lane)%mode(j) == locked
+        if (.not. self%is_held(j)) self%is_held(j) = any(abs(self%holding(:, j, j)) > 0)
+      end do
+    end associate
+  end subroutine take_report
+
+  !> Updates what depends on the parameters of a lane; its joints are made anew at its start.
+  subroutine refresh_lane(self, lane)
+    class(joint_block_t), intent(inout) :: self
+    integer, intent(in) :: lane
+
+    call self%refresh_parameters(lane)
+    if (self%scouted == lane) self%scouted = 0
+  end subroutine refresh_lane
+
+  !> Prepares a lane that starts at time t and state y: the scout chooses the branches and decides which joints are locked.
+  subroutine start_lane(self, lane, t, y)
+    class(joint_block_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t                  !! [s]
+    real(wp), contiguous, intent(in) :: y(:)   !! state, [states + quadratures]
+
+    call self%refresh_lane(lane)
+    call self%norm%start_lane(lane, y, self%zero_twist(lane, :), self%machine%laws%rest(lane, :))
+    call self%scout_parameters%copy_lane(1, self%parameters, lane)
+    call self%scout%start_lane(1, t, y)
+    self%scouted = lane
+    call take_report(self)
+  end subroutine start_lane
+
+  !> The derivative, with the moments of the joints that hold.
+  subroutine derivative(self, t, y, dydt, status)
+    class(joint_block_t), intent(inout) :: self
+    real(wp), intent(in) :: t(self%lanes)                                         !! [s]
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)         !! state
+    real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)   !! its derivative
+    integer, intent(inout) :: status(self%lanes)
+    integer :: lane
+
+    call self%reduced_t%derivative(t, y, dydt, status)
+    if (any(self%is_held)) call hold(self, dydt)
+    do lane = 1, self%lanes
+      if (self%sets(lane)%lost > 0) status(lane) = evaluation_fatal
+    end do
+  end subroutine derivative
+
+  !> Adds what the joints that hold do to the accelerations of all lanes, and sets their moments.
+  subroutine hold(self, acceleration)
+    class(joint_block_t), intent(inout) :: self
+    real(wp), intent(inout) :: acceleration(self%lanes, size(self%moving))   !! [rad/s2]
+    integer :: i, j
+
+    self%held_moment(:, :) = 0.0_wp
+    do j = 1, size(self%is_held)
+      if (.not. self%is_held(j)) cycle
+      call find_rates(self, j, acceleration, self%row_rate(:, j))
+      do i = 1, size(self%is_held)
+        if (.not. self%is_held(i)) cycle
+        self%held_moment(:, i) = self%held_moment(:, i) - self%holding(:, i, j) * self%row_rate(:, j)
+      end do
+    end do
+    do j = 1, size(self%is_held)
+      if (self%is_held(j)) call push_joint(self, j, self%held_moment(:, j), acceleration)
+    end do
+  end subroutine hold
+
+  !> The rates of a joint in all lanes.
+  pure subroutine find_rates(self, joint, acceleration, rate)
+    class(joint_block_t), intent(in) :: self
+    integer, intent(in) :: joint
+    real(wp), intent(in) :: acceleration(self%lanes, size(self%moving))   !! [rad/s2], or speeds [rad/s]
+    real(wp), intent(inout) :: rate(self%lanes)                           !! u'' or u'
+    integer :: k
+
+    rate = 0.0_wp
+    associate (map => self%incidence, e => self%joints%element(joint))
+      do k = map%first(e), map%first(e + 1) - 1
+        rate = rate + map%ratio(:, k) * acceleration(:, map%coordinate(k))
+      end do
+    end associate
+  end subroutine find_rates
+
+  !> Adds the response to the moments of a joint in all lanes.
+  pure subroutine push_joint(self, joint, moment, acceleration)
+    class(joint_block_t), intent(in) :: self
+    integer, intent(in) :: joint
+    real(wp), intent(in) :: moment(self%lanes)                               !! [N m]
+    real(wp), intent(inout) :: acceleration(self%lanes, size(self%moving))   !! [rad/s2]
+    integer :: k
+
+    associate (map => self%incidence, e => self%joints%element(joint))
+      do k = map%first(e), map%first(e + 1) - 1
+        acceleration(:, map%coordinate(k)) = acceleration(:, map%coordinate(k)) + map%response(:, k) * moment
+      end do
+    end associate
+  end subroutine push_joint
+
+  !> The Jacobian where joints hold: each column has the accelerations that these leave.
+  subroutine hold_jacobian(self, components, dfdy, dfdt)
+    class(joint_block_t), intent(inout) :: self
+    integer, intent(in) :: components                                      !! states + quadratures
+    real(wp), intent(inout) :: dfdy(self%lanes, components, self%states)
+    real(wp), intent(inout) :: dfdt(self%lanes, components)
+    integer :: k
+
+    call self%spread_jacobian(components, dfdy)
+    if (.not. any(self%is_held)) return
+    do k = 1, self%states
+      call hold(self, dfdy(:, :, k))
+    end do
+    call hold(self, dfdt)
+  end subroutine hold_jacobian
+
+  !> Evaluates bodies, elements and torques at a state of all lanes, whose joints keep their modes.
+  subroutine observe(self, t, y, in_motion)
+    class(joint_block_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
+    real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states], at least
+    logical, intent(in), optional :: in_motion    !! as in `observe_elements`, and true
+    integer :: j
+
+    if (.not. present(in_motion)) error stop 'nocdyn_joint_blocks: only motions are observed'
+    call self%gather(y)
+    call self%machine%choose_branches(t)
+    call self%machine%evaluate_elements(t)
+    if (any(self%is_held)) then
+      call find_held_moments(self)
+      associate (applied => self%machine%elements%applied)
+        do j = 1, size(self%is_held)
+          associate (e => self%joints%element(j))
+            applied(:, e) = applied(:, e) + self%held_moment(:, j)
+          end associate
+        end do
+      end associate
+    end if
+    call self%machine%elements%scatter(self%torque)
+  end subroutine observe
+
+  !> The moments of the joints that hold, after the evaluation of the elements.
+  subroutine find_held_moments(self)
+    class(joint_block_t), intent(inout) :: self
+    integer :: b, c, k
+
+    call self%machine%elements%scatter(self%torque)
+    self%lane_acceleration(:, :) = 0.0_wp
+    associate (coordinates => self%machine%coordinates, q => self%lane_acceleration)
+      do b = 1, self%machine%bodies
+        do k = coordinates%first(b), coordinates%first(b + 1) - 1
+          c = coordinates%coordinate(k)
+          q(:, c) = q(:, c) + coordinates%response(:, k) * self%torque(:, b)
+        end do
+      end do
+    end associate
+    call hold(self, self%lane_acceleration)
+  end subroutine find_held_moments
+
+  !> Indicators of all switches in all lanes.
+  subroutine block_indicators(self, columns, t, y, g)
+    class(joint_block_t), intent(inout) :: self
+    integer, intent(in) :: columns
+    real(wp), intent(in) :: t(self%lanes)                         !! [s]
+    real(wp), intent(in) :: y(self%lanes, columns)
+    real(wp), intent(inout) :: g(self%lanes, self%switches)
+    integer :: lane, switch
+
+    call self%reduced_t%block_indicators(columns, t, y, g)
+    if (any(self%is_held)) then
+      call self%evaluate_at(self%lanes * self%machine%coordinates%freedoms, self%lanes * self%internal, t, y)
+      call find_held_moments(self)
+    end if
+    do switch = 1, self%switches
+      associate (joint => self%joints%joint_of(switch))
+        if (joint == 0) cycle
+        call find_rates(self, joint, y, self%row_rate(:, joint))
+        do lane = 1, self%lanes
+          associate (set => self%sets(lane))
+            set%moment(joint) = self%held_moment(lane, joint)
+            g(lane, switch) = set%indicator(self%machine%banks, joint, t(lane), self%row_rate(lane, joint))
+          end associate
+        end do
+      end associate
+    end do
+  end subroutine block_indicators
+
+  !> Indicators of all switches of one lane.
+  subroutine indicator_values(self, lane, t, y, g)
+    class(joint_block_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t                     !! [s]
+    real(wp), contiguous, intent(in) :: y(:)      !! state, [states + quadratures]
+    real(wp), contiguous, intent(inout) :: g(:)   !! [switches]
+
+    call send_scout(self, lane)
+    call self%scout%indicator_values(1, t, y, g)
+  end subroutine indicator_values
+
+  !> Indicator of one switch.
+  subroutine set_indicator(self, which, lane, t, y, g)
+    class(joint_block_t), intent(inout) :: self
+    integer, intent(in) :: which, lane            !! switch, 1 to `switches`; lane
+    real(wp), intent(in) :: t                     !! [s]
+    real(wp), contiguous, intent(in) :: y(:)      !! state, [states + quadratures]
+    real(wp), contiguous, intent(inout) :: g(:)   !! [switches]
+
+    call send_scout(self, lane)
+    call self%scout%set_indicator(which, 1, t, y, g)
+  end subroutine set_indicator
+
+  !> The largest rate at which the moments of joints that hold oscillate at a state [rad/s].
+  subroutine find_fastest_wave(self, lane, y, fastest)
+    class(joint_block_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+    real(wp), intent(out) :: fastest
+
+    call send_scout(self, lane)
+    call self%scout%find_fastest_wave(1, y, fastest)
+  end subroutine find_fastest_wave
+
+  subroutine find_fastest_waves(self, columns, y, fastest)
+    class(joint_block_t), intent(inout) :: self
+    integer, intent(in) :: columns
+    real(wp), intent(in) :: y(self%lanes, columns)
+    real(wp), intent(inout) :: fastest(self%lanes)
+    integer :: lane
+
+    associate (f => self%machine%coordinates%freedoms, elements => self%machine%elements)
+      call self%twists%multiply_pair(self%twist_at_origin, y(1, f + 1), y, elements%angle, elements%speed)
+    end associate
+    do lane = 1, self%lanes
+      fastest(lane) = self%fastest_wave(lane)
+    end do
+  end subroutine find_fastest_waves
+
+  !> Changes the branch of a law of one lane, or decides anew which joints are locked.
+  subroutine change_branch(self, lane, which, t, y)
+    class(joint_block_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    integer, intent(in) :: which                  !! switch, 1 to `switches`
+    real(wp), intent(in) :: t                     !! [s]
+    real(wp), contiguous, intent(inout) :: y(:)   !! state, [states + quadratures]
+
+    call send_scout(self, lane)
+    call self%scout%change_branch(1, which, t, y)
+    call take_report(self)
+  end subroutine change_branch
+
+  !> Why no motion fits the joints of a lane.
+  function evaluation_obstacle(self, lane) result(text)
+    class(joint_block_t), intent(in) :: self
+    integer, intent(in) :: lane
+    character(len=:), allocatable :: text
+
+    call describe_obstacle(self%sets(lane), self%machine%banks, self%machine%elements%rows, self%machine%coordinates, text)
+  end function evaluation_obstacle
+
+end module nocdyn_joint_blocks
