@@ -17,6 +17,7 @@ CONNECTIONS = (
     "planetary",
 )
 JOINTS = frozenset(("clutch", "dog", "freewheel", "cardan", "relation"))  # besides losses, bearings, brakes, cranks and drives
+ALONE = frozenset(("cardan", "relation", "crank", "drive", "losses"))  # machines with these do not share a block of a sweep
 
 
 class RandomMachine:
@@ -40,6 +41,10 @@ class RandomMachine:
             getattr(self, f"add_{kind}")(f"c{i}", self.bodies[i], self.bodies[i + 1])
         self.add_torques()
         self.add_to_bodies()
+
+    @property
+    def shares_lanes(self):
+        return not self.kinds & ALONE
 
     def some(self, low, high):
         return float(f"{self.chance.uniform(low, high):.3g}")

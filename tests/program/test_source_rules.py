@@ -31,6 +31,7 @@ MANY_ARGUMENTS = {
         "build_coordinates",
     ),
     "src/model/elements/polynomial_laws.f90": (KERNEL, "moments"),
+    "src/model/formulations/kernels/reduced_series.f90": (KERNEL, "expand"),
     "src/model/formulations/kernels/series_kernel.inc": (KERNEL, "accelerate", "begin_motion", "find_moments", "find_values"),
     "src/base/formulas/law_harmonics.inc": (KERNEL, "harmonic_sum"),
     "src/base/contract/sparse_map.f90": (

@@ -1,7 +1,7 @@
 """Each variant of a sweep is what its run is, whatever was computed before it in the same place: machines of all elements.
 
 All numbers are equal to the last bit where the steps are. They are not where the method is 'auto' and variants share lanes, which
-needs machines without joints: there it counts other costs (`is_shared` of the system), and so chooses other steps.
+needs machines without rows that move: there it counts other costs (`is_shared` of the system), and so chooses other steps.
 """
 
 import csv
@@ -97,8 +97,9 @@ def differences(variant, values, extremes, tolerance):
         compare("max", of_run["max"])
         compare("min", of_run["min"])
         compare("max_abs", largest)
-        compare("mean", np.trapezoid(course, t) / (t[-1] - t[0]), ROWS * size)
-        compare("rms", np.sqrt(np.trapezoid(course**2, t) / (t[-1] - t[0])), ROWS * size)
+        if column != "energy_residual [J]":  # it jumps from step to step, between the rows
+            compare("mean", np.trapezoid(course, t) / (t[-1] - t[0]), ROWS * size)
+            compare("rms", np.sqrt(np.trapezoid(course**2, t) / (t[-1] - t[0])), ROWS * size)
         if not tolerance:
             compare("time_of_max", of_run["time_of_max"], unit="s")
             compare("time_of_min", of_run["time_of_min"], unit="s")
@@ -130,7 +131,7 @@ def compare_with_runs(nocdyn, machine, targets, rows, run_group, tolerance):
 def test_a_variant_of_a_sweep_is_its_run(nocdyn, seed):
     machine = RandomMachine(seed)
     targets, rows = variants_of(machine, seed)
-    method = "auto" if machine.has_joints else METHODS[seed % len(METHODS)]
+    method = METHODS[seed % len(METHODS)] if machine.shares_lanes else "auto"
     run_group = RUN.replace("&run", f"&run method = '{method}'")
     columns, table = compare_with_runs(nocdyn, machine, targets, rows, run_group, 0)
     if machine.has_joints:  # the steps of others follow their works too, if these are recorded
@@ -144,8 +145,13 @@ def test_a_variant_of_a_sweep_is_its_run(nocdyn, seed):
 
 @pytest.mark.parametrize("seed", range(FIRST, FIRST + 1 + MACHINES // 10))
 @pytest.mark.parametrize("method", ["auto", *METHODS])
-def test_a_variant_that_shares_lanes_is_its_run(nocdyn, method, seed):
-    machine = next(machine for machine in map(RandomMachine, range(1000 * seed, 1000 * seed + 100)) if not machine.has_joints)
+@pytest.mark.parametrize("locks", [False, True])
+def test_a_variant_that_shares_lanes_is_its_run(nocdyn, locks, method, seed):
+    machine = next(
+        machine
+        for machine in map(RandomMachine, range(1000 * seed, 1000 * seed + 100))
+        if machine.shares_lanes and machine.has_joints == locks
+    )
     run_group = RUN.replace("&run", f"&run method = '{method}'")
     targets, rows = variants_of(machine, seed)
     compare_with_runs(nocdyn, machine, targets, rows, run_group, OTHER_STEPS if method == "auto" else 0)

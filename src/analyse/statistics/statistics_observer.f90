@@ -14,6 +14,7 @@ module nocdyn_statistics_observer
     statistic_max_abs, statistic_min, statistic_settling_time, statistic_t, statistic_time_of_max, statistic_time_of_min, &
     value_of_zero_column
   use nocdyn_observer, only: observer_t, piece_t, step_block_t
+  use nocdyn_quantities, only: form_applied
   use nocdyn_signals, only: is_largest_along, list_points, list_signals, signal_point_moment, signal_point_stress, &
     signal_source_t, signal_t, signal_work_in
   implicit none (type, external)
@@ -225,7 +226,7 @@ contains
     do i = 1, size(statistics)
       if (statistics(i)%column == 0 .or. statistics(i)%kind == statistic_settling_time) cycle
       associate (column => columns(statistics(i)%column))
-        is_multiple = is_proportional(self%block, column) .and. .not. may_bend
+        is_multiple = is_proportional(self%block, column) .and. (column%form == form_applied .or. .not. may_bend)
         is_of_linear(i) = is_linear(self%block, column) .or. is_multiple
         if (statistics(i)%kind == statistic_final) is_of_linear(i) = is_linear(self%block, column) &
                                                                      .and. self%block%joints%count == 0

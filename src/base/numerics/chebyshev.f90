@@ -192,7 +192,7 @@ contains
     real(wp), intent(in) :: whole_values(0:rule%degree), whole(0:max_degree)   !! of the whole polynomial: values, coefficients
     type(parts_t), intent(inout) :: parts
     real(wp), intent(out) :: middle, half, values(0:max_degree), c(0:max_degree)
-    integer :: i
+    real(wp) :: x(0:max_degree)
 
     middle = parts%middle(parts%count)
     half = parts%half(parts%count)
@@ -202,11 +202,35 @@ contains
       c(:rule%degree) = whole(:rule%degree)
       return
     end if
-    do i = 0, rule%degree
-      values(i) = value(rule%degree, whole, middle + half * rule%nodes(i))
-    end do
+    x = 0.0_wp
+    x(:rule%degree) = middle + half * rule%nodes
+    call find_values(rule%degree, whole, x, values)
     call find_series(rule, values, c)
   end subroutine take_part
+
+  !> The values at the points x, as many as coefficients, as by `value`: many points at once.
+  pure subroutine find_values(n, c, x, values)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: c(0:n), x(0:max_degree)
+    real(wp), intent(out) :: values(0:max_degree)
+    real(wp), dimension(rows) :: last, last_but_one, next
+    integer :: i, k, p
+
+    do p = 0, n, rows
+      last = 0.0_wp
+      last_but_one = 0.0_wp
+      do k = n, 1, -1
+        do i = 1, rows
+          next(i) = 2 * x(p + i - 1) * last(i) + (c(k) - last_but_one(i))
+          last_but_one(i) = last(i)
+          last(i) = next(i)
+        end do
+      end do
+      do i = 1, rows
+        values(p + i - 1) = c(0) + x(p + i - 1) * last(i) - last_but_one(i)
+      end do
+    end do
+  end subroutine find_values
 
   !> The coefficients from the values at the nodes.
   pure subroutine find_series(rule, values, c)

@@ -1,11 +1,10 @@
 !> Blocks of lanes of the reduced formulation with joints that lock (`nocdyn_joint_sets`), each lane with its own set.
 !>
-!> All lanes are evaluated at once: the joints that hold have the moments -W^+ u'', with zeros in W^+ for joints that slip. What is
-!> decided in one lane, at the start of a variant and at events, is decided by a scout: the formulation of a single lane, which
-!> takes the parameters, the branches and the joints of that lane and gives branches and joints back. Rows that move and teeth
-!> with losses are in blocks of one lane only.
+!> All lanes are evaluated at once (`nocdyn_held_lanes`). What is decided in one lane, at the start of a variant and at events,
+!> is decided by a scout: the formulation of a single lane, which takes the parameters, the branches and the joints of that lane
+!> and gives branches and joints back. Rows that move and teeth with losses are in blocks of one lane only.
 module nocdyn_joint_blocks
-  use nocdyn_friction_joints, only: locked
+  use nocdyn_held_lanes, only: new_held_lanes
   use nocdyn_joint_sets, only: joint_sets_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
@@ -16,36 +15,23 @@ module nocdyn_joint_blocks
   implicit none (type, external)
   private
 
-  public :: can_share_block
-
   !> Variables of this type are not to be copied once `attach` has listed their parameters.
   type, extends(reduced_t), public :: joint_block_t
     private
     type(joint_sets_t), allocatable :: sets(:)            !! joints of each lane, [lanes]
-    logical, allocatable :: is_held(:)                    !! whether a joint is locked in some lane, [joints]
-    real(wp), allocatable :: holding(:, :, :)             !! W^+ [kg m2], [lanes, joints, joints]
-    real(wp), allocatable :: row_rate(:, :)               !! u'' of the joints without their moments [rad/s2], [lanes, joints]
-    real(wp), allocatable :: held_moment(:, :)            !! moments of the joints that hold [N m], [lanes, joints]
     real(wp), allocatable :: lane_acceleration(:, :)      !! q'' [rad/s2], work space, [lanes, freedoms]
     type(reduced_t), pointer :: scout => null()
     integer :: scouted = 0                                !! lane that the scout stands for, 0: none
     type(lane_parameters_t) :: parameters, scout_parameters
   contains
     procedure, public :: attach
-    procedure, public :: derivative, hold_jacobian, refresh_lane, observe, evaluation_obstacle
+    procedure, public :: derivative, find_sets, hold_jacobian, refresh_lane, observe, evaluation_obstacle
     procedure, public :: start_lane, indicator_values, set_indicator, block_indicators, find_fastest_wave, find_fastest_waves
     procedure, public :: change_branch
     final :: release_scout
   end type joint_block_t
 
 contains
-
-  !> Whether joints of lanes of one block may be in different sets: none are rows that move or teeth with losses.
-  pure logical function can_share_block(joints)
-    type(joint_sets_t), intent(in) :: joints
-
-    can_share_block = joints%motions%count == 0 .and. joints%teeth%count == 0
-  end function can_share_block
 
   !> Makes the scout and lists all parameters, after `formulate`; the block stays where it is from now on.
   subroutine attach(self, machine)
@@ -60,16 +46,12 @@ contains
     if (.not. self%parameters%has_same_structure(self%scout_parameters)) then
       error stop 'nocdyn_joint_blocks: the scout differs from the block'
     end if
-    associate (joints => self%joints%count)
-      allocate (self%sets(self%lanes))
-      do lane = 1, self%lanes
-        self%sets(lane) = self%scout%joints
-      end do
-      allocate (self%is_held(joints), source=.false.)
-      allocate (self%holding(self%lanes, joints, joints), self%row_rate(self%lanes, joints), source=0.0_wp)
-      allocate (self%held_moment, source=self%row_rate)
-      allocate (self%lane_acceleration(self%lanes, size(self%moving)), source=0.0_wp)
-    end associate
+    allocate (self%sets(self%lanes))
+    do lane = 1, self%lanes
+      self%sets(lane) = self%scout%joints
+    end do
+    self%held = new_held_lanes(self%lanes, self%joints)
+    allocate (self%lane_acceleration(self%lanes, size(self%moving)), source=0.0_wp)
   end subroutine attach
 
   subroutine release_scout(self)
@@ -97,18 +79,13 @@ contains
   !> Takes the branches and joints of the lane that the scout stands for.
   subroutine take_report(self)
     class(joint_block_t), intent(inout) :: self
-    integer :: j
 
     associate (lane => self%scouted, scout => self%scout)
       call self%machine%take_branches(lane, scout%machine, 1)
       scout%joints%log%count = 0   ! nobody reads it
       self%sets(lane) = scout%joints
       self%sets(lane)%lane = lane
-      call self%sets(lane)%find_holding(self%holding(lane, :, :))
-      do j = 1, self%joints%count
-        self%is_held(j) = self%sets(lane)%mode(j) == locked
-        if (.not. self%is_held(j)) self%is_held(j) = any(abs(self%holding(:, j, j)) > 0)
-      end do
+      call self%held%take_set(lane, self%sets(lane))
     end associate
   end subroutine take_report
 
@@ -143,65 +120,30 @@ contains
     real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)         !! state
     real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)   !! its derivative
     integer, intent(inout) :: status(self%lanes)
+
+    call self%find_sets(status)
+    call self%reduced_t%derivative(t, y, dydt, status)
+    call hold(self, dydt)
+  end subroutine derivative
+
+  !> Finds lanes without a motion that fits their joints; those that hold are known.
+  subroutine find_sets(self, status)
+    class(joint_block_t), intent(inout) :: self
+    integer, intent(inout) :: status(self%lanes)
     integer :: lane
 
-    call self%reduced_t%derivative(t, y, dydt, status)
-    if (any(self%is_held)) call hold(self, dydt)
     do lane = 1, self%lanes
       if (self%sets(lane)%lost > 0) status(lane) = evaluation_fatal
     end do
-  end subroutine derivative
+  end subroutine find_sets
 
   !> Adds what the joints that hold do to the accelerations of all lanes, and sets their moments.
   subroutine hold(self, acceleration)
     class(joint_block_t), intent(inout) :: self
     real(wp), intent(inout) :: acceleration(self%lanes, size(self%moving))   !! [rad/s2]
-    integer :: i, j
 
-    self%held_moment(:, :) = 0.0_wp
-    do j = 1, size(self%is_held)
-      if (.not. self%is_held(j)) cycle
-      call find_rates(self, j, acceleration, self%row_rate(:, j))
-      do i = 1, size(self%is_held)
-        if (.not. self%is_held(i)) cycle
-        self%held_moment(:, i) = self%held_moment(:, i) - self%holding(:, i, j) * self%row_rate(:, j)
-      end do
-    end do
-    do j = 1, size(self%is_held)
-      if (self%is_held(j)) call push_joint(self, j, self%held_moment(:, j), acceleration)
-    end do
+    call self%held%hold(self%incidence, 1, self%lanes, self%lanes, size(self%moving), acceleration)
   end subroutine hold
-
-  !> The rates of a joint in all lanes.
-  pure subroutine find_rates(self, joint, acceleration, rate)
-    class(joint_block_t), intent(in) :: self
-    integer, intent(in) :: joint
-    real(wp), intent(in) :: acceleration(self%lanes, size(self%moving))   !! [rad/s2], or speeds [rad/s]
-    real(wp), intent(inout) :: rate(self%lanes)                           !! u'' or u'
-    integer :: k
-
-    rate = 0.0_wp
-    associate (map => self%incidence, e => self%joints%element(joint))
-      do k = map%first(e), map%first(e + 1) - 1
-        rate = rate + map%ratio(:, k) * acceleration(:, map%coordinate(k))
-      end do
-    end associate
-  end subroutine find_rates
-
-  !> Adds the response to the moments of a joint in all lanes.
-  pure subroutine push_joint(self, joint, moment, acceleration)
-    class(joint_block_t), intent(in) :: self
-    integer, intent(in) :: joint
-    real(wp), intent(in) :: moment(self%lanes)                               !! [N m]
-    real(wp), intent(inout) :: acceleration(self%lanes, size(self%moving))   !! [rad/s2]
-    integer :: k
-
-    associate (map => self%incidence, e => self%joints%element(joint))
-      do k = map%first(e), map%first(e + 1) - 1
-        acceleration(:, map%coordinate(k)) = acceleration(:, map%coordinate(k)) + map%response(:, k) * moment
-      end do
-    end associate
-  end subroutine push_joint
 
   !> The Jacobian where joints hold: each column has the accelerations that these leave.
   subroutine hold_jacobian(self, components, dfdy, dfdt)
@@ -212,7 +154,7 @@ contains
     integer :: k
 
     call self%spread_jacobian(components, dfdy)
-    if (.not. any(self%is_held)) return
+    if (.not. self%held%is_active) return
     do k = 1, self%states
       call hold(self, dfdy(:, :, k))
     end do
@@ -231,12 +173,12 @@ contains
     call self%gather(y)
     call self%machine%choose_branches(t)
     call self%machine%evaluate_elements(t)
-    if (any(self%is_held)) then
+    if (self%held%is_active) then
       call find_held_moments(self)
       associate (applied => self%machine%elements%applied)
-        do j = 1, size(self%is_held)
+        do j = 1, self%joints%count
           associate (e => self%joints%element(j))
-            applied(:, e) = applied(:, e) + self%held_moment(:, j)
+            applied(:, e) = applied(:, e) + self%held%moment(:, j)
           end associate
         end do
       end associate
@@ -272,18 +214,18 @@ contains
     integer :: lane, switch
 
     call self%reduced_t%block_indicators(columns, t, y, g)
-    if (any(self%is_held)) then
+    if (self%held%is_active) then
       call self%evaluate_at(self%lanes * self%machine%coordinates%freedoms, self%lanes * self%internal, t, y)
       call find_held_moments(self)
     end if
     do switch = 1, self%switches
       associate (joint => self%joints%joint_of(switch))
         if (joint == 0) cycle
-        call find_rates(self, joint, y, self%row_rate(:, joint))
+        call self%held%find_rates(self%incidence, joint, 1, self%lanes, self%lanes, size(self%moving), y)
         do lane = 1, self%lanes
           associate (set => self%sets(lane))
-            set%moment(joint) = self%held_moment(lane, joint)
-            g(lane, switch) = set%indicator(self%machine%banks, joint, t(lane), self%row_rate(lane, joint))
+            set%moment(joint) = self%held%moment(lane, joint)
+            g(lane, switch) = set%indicator(self%machine%banks, joint, t(lane), self%held%rate(lane, joint))
           end associate
         end do
       end associate

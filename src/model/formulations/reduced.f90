@@ -6,6 +6,7 @@
 !> the unit moments of the elements on their two bodies, and U = B^T L_tau.
 module nocdyn_reduced
   use nocdyn_coordinate_formulation, only: coordinate_formulation_t
+  use nocdyn_held_lanes, only: held_lanes_t, new_held_lanes
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_law_tape, only: op_tanh
@@ -13,13 +14,14 @@ module nocdyn_reduced
   use nocdyn_reduced_jacobian, only: new_reduced_jacobian, reduced_jacobian_t
   use nocdyn_reduced_series, only: new_reduced_series, reduced_series_t
   use nocdyn_sparse_map, only: new_sparse_map, sparse_map_t, transposed_order
-  use nocdyn_system, only: pattern_t
+  use nocdyn_system, only: evaluation_fatal, pattern_t
   implicit none (type, external)
   private
 
   public :: new_reduced
 
   type, extends(coordinate_formulation_t), public :: reduced_t
+    type(held_lanes_t) :: held                              !! joints that hold, with series or of a block
     logical :: is_block = .false.                           !! whether it is laid out as a block, whose parameters can be listed
     type(sparse_map_t), private :: accelerations            !! R
     integer, allocatable, private :: response_entry(:)      !! entry of `incidence` of each entry of R
@@ -30,7 +32,7 @@ module nocdyn_reduced
   contains
     procedure :: formulate, update_inertia, list_parameters, refresh_lane, refresh_parameters, derivative, jacobian
     procedure :: evaluate_at, hold_jacobian, spread_jacobian
-    procedure :: jacobian_pattern, series_obstacle, prepare_series, series
+    procedure :: jacobian_pattern, series_obstacle, prepare_series, series, find_sets
   end type reduced_t
 
 contains
@@ -188,13 +190,13 @@ contains
     call self%machine%evaluate_elements(t)
   end subroutine evaluate_at
 
-  !> Every law has a series, but not the moments of joints.
+  !> Every law has a series, but not the moments of rows that move or of teeth with losses.
   subroutine series_obstacle(self, obstacle)
     class(reduced_t), intent(in) :: self
     character(len=:), allocatable, intent(out) :: obstacle
 
     obstacle = ''
-    if (self%joints%count > 0) obstacle = 'joints that lock or move have no Taylor series'
+    if (.not. self%joints%only_lock()) obstacle = 'rows that move and teeth with losses have no Taylor series'
   end subroutine series_obstacle
 
   !> Allocates the recurrence for series up to an order.
@@ -203,6 +205,7 @@ contains
     integer, intent(in) :: order
 
     self%series_kernel = new_reduced_series(self%machine, self%twists, self%accelerations, self%has_energy_balance, order)
+    self%held = new_held_lanes(self%lanes, self%joints)
     self%hides_bends = self%machine%has_operation(op_tanh)
   end subroutine prepare_series
 
@@ -214,8 +217,20 @@ contains
     real(wp), intent(inout) :: y(self%lanes, columns, 0:order)   !! coefficients; number 0 is given
     integer, intent(inout) :: status(self%lanes)
 
-    call self%series_kernel%expand(self%machine, self%twists, self%accelerations, self%twist_at_origin, columns, t, y)
+    call self%find_sets(status)
+    call self%series_kernel%expand(self%machine, self%twists, self%accelerations, self%twist_at_origin, self%incidence, &
+                                   self%held, columns, t, y)
   end subroutine series
+
+  !> Finds the joints that hold in each lane, and lanes without a motion that fits them.
+  subroutine find_sets(self, status)
+    class(reduced_t), intent(inout) :: self
+    integer, intent(inout) :: status(self%lanes)
+
+    if (self%joints%count == 0) return
+    call self%held%take_set(1, self%joints)
+    if (self%joints%lost > 0) status(1) = evaluation_fatal
+  end subroutine find_sets
 
   !> Copies an array of any shape, by address.
   pure subroutine copy(n, x, y)

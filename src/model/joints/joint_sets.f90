@@ -43,7 +43,7 @@ module nocdyn_joint_sets
     procedure :: shift_boundaries
     procedure :: indicator
     procedure :: is_open
-    procedure :: has_teeth, has_stopped, is_moved
+    procedure :: has_teeth, has_stopped, is_moved, only_lock
   end type joint_sets_t
 
 contains
@@ -97,6 +97,14 @@ contains
       call set_mode(self, banks, j)
     end do
   end subroutine start
+
+  !> Whether all joints only lock and slip: then each lane of a block may have a set of its own, and moments have Taylor series.
+  !> Rows that move and teeth with losses do more.
+  pure logical function only_lock(self)
+    class(joint_sets_t), intent(in) :: self
+
+    only_lock = self%motions%count == 0 .and. self%teeth%count == 0
+  end function only_lock
 
   !> Whether a joint is one of teeth with losses.
   pure logical function has_teeth(self, joint)

@@ -4,7 +4,6 @@ module nocdyn_sweep
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_integration_settings, only: integration_settings_t
-  use nocdyn_joint_blocks, only: can_share_block
   use nocdyn_joint_simplifications, only: refuse_joints
   use nocdyn_kinds, only: wp
   use nocdyn_run_settings, only: choose_settings
@@ -46,7 +45,7 @@ contains
     if (size(plan%statistics) > 0) call choose_settings(plan%input, formulation, settings, notes, error)
     setup%lanes = block_lanes(findloc(formulation%states <= block_states, .true., dim=1))
     if (formulation%joints%count == 0) return
-    if (.not. can_share_block(formulation%joints)) setup%lanes = 1
+    if (.not. formulation%joints%only_lock()) setup%lanes = 1
     setup%has_energy_balance = .true.   ! a run has it, which takes the same steps
     if (size(plan%analyses) > 0) call refuse_joints(plan%input, .true., 'a sweep of modes or responses', error)
   end subroutine prepare_sweep

@@ -11,7 +11,7 @@ module nocdyn_variant_machines
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
-  use nocdyn_joint_blocks, only: can_share_block, joint_block_t
+  use nocdyn_joint_blocks, only: joint_block_t
   use nocdyn_joint_sets, only: joint_sets_t, new_joint_sets
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
@@ -61,6 +61,7 @@ contains
                                                    !! a block: as in the input
     class(formulation_t), allocatable :: formulation
     type(machine_t) :: machine
+    type(joint_sets_t) :: joints
     character(len=:), allocatable :: message
     logical :: is_typical
     type(target_t) :: no_targets(0)
@@ -86,7 +87,8 @@ contains
     if (is_typical) then
       call assemble_variant(self%input, targets, typical, machine, message, lanes)
       is_typical = message == ''
-      if (is_typical .and. lanes > 1) is_typical = can_share_block(joints_of(machine))
+      joints = joints_of(machine)
+      if (is_typical .and. lanes > 1) is_typical = joints%only_lock()
     end if
     if (.not. is_typical) then
       self%input = input
@@ -135,7 +137,7 @@ contains
       if (allocated(error)) error stop 'nocdyn_variant_machines: the machine of the block cannot be assembled'
       call block%attach(single)
     end select
-    block%is_shared = block%joints%count == 0   ! whatever the number of lanes
+    block%is_shared = block%joints%only_lock()   ! whatever the number of lanes
     call block%list_parameters(self%parameters)
     self%block => block
     self%formulation => block

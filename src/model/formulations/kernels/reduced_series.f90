@@ -6,6 +6,8 @@
 !> The numbers of the elements stand in groups of w, [w, 0:order, groups]: a group has some lanes of one element, or in a block
 !> of one lane some elements. A strip of lanes goes through all coefficients before the next strip starts.
 module nocdyn_reduced_series
+  use nocdyn_element_coordinates, only: element_coordinates_t
+  use nocdyn_held_lanes, only: held_lanes_t
   use nocdyn_kinds, only: wp
   use nocdyn_laws, only: narrow, strip_lanes, wide
   use nocdyn_machine, only: machine_t
@@ -141,21 +143,27 @@ contains
   end subroutine copy_laws
 
   !> Computes the coefficients number 1 to `order` of q', q, the internal states and the work integrals, which follow one another.
-  subroutine expand(self, machine, twists, accelerations, twist_at_origin, columns, t, y)
+  subroutine expand(self, machine, twists, accelerations, twist_at_origin, incidence, held, columns, t, y)
     class(reduced_series_t), intent(inout) :: self
     type(machine_t), intent(inout) :: machine
     type(sparse_map_t), intent(in) :: twists, accelerations     !! U, R
     real(wp), contiguous, intent(in) :: twist_at_origin(:, :)   !! [rad], [lanes, elements]
+    type(element_coordinates_t), intent(in) :: incidence
+    type(held_lanes_t), intent(inout) :: held                   !! joints that hold
     integer, intent(in) :: columns                              !! components of the state, and padding
     real(wp), intent(in) :: t(self%lanes)                       !! [s]
     real(wp), intent(inout) :: y(self%lanes, columns, 0:self%order)   !! coefficients; number 0 is given
-    integer :: k, strip
+    integer :: k, last, strip
 
     self%last = self%order - 1
     do strip = 1, size(self%law, 4)
       call begin(self, machine, twists, strip, twist_at_origin, columns, t, y)
       do k = 0, self%order - 1
         call advance(self, machine, twists, accelerations, strip, k, columns, y(1, 1, k + 1))
+        if (.not. held%is_active) cycle
+        last = min(self%strip * strip, self%lanes)
+        call held%hold(incidence, self%strip * (strip - 1) + 1, last, self%lanes, self%freedoms, y(1, 1, k + 1))
+        call gather(self, strip, self%freedoms, y(1, 1, k + 1), self%rates)
       end do
     end do
   end subroutine expand
