@@ -239,6 +239,18 @@ def test_a_sweep_over_capacities_is_its_variants_alone(nocdyn):
         assert float(next(v for n, v in found.items() if n.startswith("torque_c"))) == pytest.approx(most, rel=1e-5)
 
 
+def test_a_sweep_whose_first_variant_is_refused_computes_the_others(nocdyn):
+    nocdyn.write("list.csv", "clutch.c.capacity\n60\n40\n20\n")
+    text = PAIR.replace("KEYS", "static_capacity = 50") + "&run t_end = 2 /\n&sweep design = 'list' file = 'list.csv' /\n"
+    text += "&record quantity = 'work_out' statistic = 'final' /\n"
+    assert nocdyn("sweep", nocdyn.write("sweep.nml", text), "--out", "all", "--csv").returncode == 0
+    with open(nocdyn.folder / "all/sweep.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["status"] for row in rows] == ["refused", "done", "done"]
+    assert "static_capacity = 50" in rows[0]["reason"]
+    assert [float(row["work_out_final [J]"]) for row in rows[1:]] == pytest.approx([200, 200], rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("keys", "words"),
     [

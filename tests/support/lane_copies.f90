@@ -15,7 +15,7 @@ module nocdyn_test_lane_copies
   implicit none (type, external)
   private
 
-  public :: run_alone, run_copied
+  public :: copy_lane, have_same_structure, run_alone, run_copied
 
   type, public :: machine_slot_t
     class(machine_t), allocatable :: machine
@@ -23,7 +23,7 @@ module nocdyn_test_lane_copies
 
   !> Copies the lanes of a source, in their order, into the lanes that become free.
   type, extends(ensemble_t) :: copies_t
-    type(lane_parameters_t) :: block, source
+    class(reduced_t), pointer :: source => null()
     real(wp), allocatable :: y(:, :)     !! [variants, components]: start states, then end states
     integer, allocatable :: variant(:)   !! in each lane
     integer :: next_variant = 1
@@ -34,6 +34,29 @@ module nocdyn_test_lane_copies
   end type copies_t
 
 contains
+
+  !> Gives a lane of a block the parameters of a lane of a source with the same structure.
+  subroutine copy_lane(source, from, block, lane)
+    class(reduced_t), intent(inout) :: source, block
+    integer, intent(in) :: from, lane
+    type(lane_parameters_t) :: parameters
+
+    call parameters%take(from)
+    call source%pass_parameters(parameters)
+    call parameters%give(lane)
+    call block%pass_parameters(parameters)
+  end subroutine copy_lane
+
+  logical function have_same_structure(one, other)
+    class(reduced_t), intent(inout) :: one, other
+    type(lane_parameters_t) :: here, there
+
+    call here%take(1)
+    call one%pass_parameters(here)
+    call there%take(1)
+    call other%pass_parameters(there)
+    have_same_structure = here%has_same_structure(there)
+  end function have_same_structure
 
   !> End states of machines, each run in a block of its own.
   subroutine run_alone(machines, method, times, y)
@@ -66,9 +89,8 @@ contains
     real(wp), allocatable, intent(out) :: y(:, :)   !! [lanes of the source, components]; not allocated: the structures differ
     type(copies_t) :: ensemble
 
-    call source%list_parameters(ensemble%source)
-    call block%list_parameters(ensemble%block)
-    if (.not. ensemble%block%has_same_structure(ensemble%source)) return
+    if (.not. have_same_structure(source, block)) return
+    ensemble%source => source
     allocate (ensemble%y, source=source%start())
     allocate (ensemble%variant(block%lanes), source=0)
     call run(block, method, times, ensemble)
@@ -102,7 +124,12 @@ contains
 
     found = self%next_variant <= size(self%y, 1)
     if (.not. found) return
-    if (self%source%arrays > 0) call self%block%copy_lane(lane, self%source, self%next_variant)
+    if (associated(self%source)) then
+      select type (system)
+      class is (reduced_t)
+        call copy_lane(self%source, self%next_variant, system, lane)
+      end select
+    end if
     y(:) = self%y(self%next_variant, :)
     self%variant(lane) = self%next_variant
     self%next_variant = self%next_variant + 1

@@ -6,7 +6,6 @@ module nocdyn_test_sweep_blocks
   use nocdyn_integration, only: integrate, integrate_ensemble
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_machine, only: machine_t
   use nocdyn_solver_status, only: solver_status_t
   use nocdyn_ensemble, only: ensemble_t
@@ -17,6 +16,7 @@ module nocdyn_test_sweep_blocks
     statistic_time_of_min
   use nocdyn_statistics_observer, only: new_statistics_observer, statistics_observer_t
   use nocdyn_system, only: system_t
+  use nocdyn_test_lane_copies, only: copy_lane, have_same_structure
   use nocdyn_signals, only: list_signals, signal_t
   use nocdyn_test_states, only: reduced_form
   use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
@@ -27,7 +27,7 @@ module nocdyn_test_sweep_blocks
 
   !> Copies the lanes of a source into lanes that are free and stores their statistics.
   type, extends(ensemble_t) :: measured_copies_t
-    type(lane_parameters_t) :: block, source
+    class(reduced_t), pointer :: source => null()
     type(statistics_observer_t), pointer :: observer => null()
     real(wp), allocatable :: y(:, :)        !! starts, [variants, components]
     real(wp), allocatable :: values(:, :)   !! [statistics, variants]
@@ -56,9 +56,8 @@ contains
 
     source = reduced_form(variants, .true., as_block=.true.)
     block = reduced_form(lanes, .true., as_block=.true.)
-    call source%list_parameters(ensemble%source)
-    call block%list_parameters(ensemble%block)
-    if (.not. ensemble%block%has_same_structure(ensemble%source)) return
+    if (.not. have_same_structure(source, block)) return
+    ensemble%source => source
     allocate (own, source=statistics)
     observer = new_statistics_observer(block, own, 0.0_wp, t_end, may_bend=.true.)
     ensemble%observer => observer
@@ -82,7 +81,10 @@ contains
     if (.not. found) return
     self%begun = self%begun + 1
     self%variant(lane) = self%begun
-    call self%block%copy_lane(lane, self%source, self%begun)
+    select type (system)
+    class is (reduced_t)
+      call copy_lane(self%source, self%begun, system, lane)
+    end select
     y(:) = self%y(self%begun, :)
   end subroutine next
 

@@ -1,8 +1,9 @@
-!> The parameters of the lanes of one formulation: all numbers that may differ between the variants of a machine.
+!> The parameters of one lane of a formulation: all numbers that may differ between the variants of a machine.
 !>
-!> A formulation lists its parameter arrays in a fixed order, the ones of the machine and those derived from them. It also adds
-!> the integers that describe its structure: which elements are in which bank, which entries the sparse maps have. Two lists
-!> with the same structure differ in numbers only, so copying the numbers of a lane makes it the same variant.
+!> A formulation passes its arrays in a fixed order, the ones of the machine and those derived from them (`pass_parameters`).
+!> The numbers of a lane are taken from them, or given to a lane. On the way the integers are collected that describe the
+!> structure: which elements are in which bank, which entries the sparse maps have. Two lanes with the same structure differ in
+!> numbers only, so that giving one the numbers of the other makes it the same variant.
 module nocdyn_lane_parameters
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_curves, only: curve_t
@@ -11,130 +12,141 @@ module nocdyn_lane_parameters
   implicit none (type, external)
   private
 
-  integer, parameter :: longest = 24   ! of a name
-
-  !> One array; its lanes are the second dimension.
-  type, public :: parameter_array_t
-    character(len=longest) :: name
-    integer, allocatable :: element(:)   !! of the machine, in each column of a key's values; not allocated: no key's
-    real(wp), pointer, contiguous :: value(:, :, :) => null()   !! [rows, lanes, columns]
-  end type parameter_array_t
-
-  !> Position of a parameter in a list.
-  type, public :: parameter_index_t
-    integer :: array         !! in the order of listing
-    integer :: row, column   !! in that array
-  end type parameter_index_t
-
-  !> The curves of some elements.
-  type :: curve_array_t
-    type(curve_t), pointer :: curve(:, :) => null()   !! [lanes, elements]
-  end type curve_array_t
-
-  !> A list points to the arrays in it: they must be targets, and must not be reallocated or moved while it is in use.
   type, public :: lane_parameters_t
-    integer :: arrays = 0
-    integer :: first_element = 1                                  !! in the machine, of the bank that lists its arrays
-    type(parameter_array_t), allocatable :: array(:)              !! the first `arrays` are in use
-    integer, private :: curve_arrays = 0
-    type(curve_array_t), allocatable, private :: curve_array(:)   !! the first `curve_arrays` are in use
+    logical :: describes = .false.                          !! whether the structure is collected
+    logical, private :: gives = .false.                     !! whether numbers go to the arrays, else they come from them
+    integer, private :: lane = 0
+    integer, private :: numbers = 0, curves = 0             !! passed so far
     integer, private :: structure_size = 0
-    integer, allocatable, private :: structure(:)                 !! the first `structure_size` are in use
+    real(wp), allocatable, private :: number(:)             !! the first `numbers` are in use, as for the others
+    type(curve_t), allocatable, private :: curve(:)
+    integer, allocatable, private :: structure(:)
   contains
-    procedure :: clear
+    procedure :: take, give
     generic :: add => add_matrix, add_stack
-    procedure :: add_key, add_blocks, add_curves
+    procedure :: add_blocks, add_curves
     generic :: add_structure => add_integers, add_flag, add_names
-    procedure :: has_same_structure, copy_lane, differences, has_same_curves, index_of_key, value, set_value
-    procedure, private :: add_matrix, add_stack, add_integers, add_flag, add_names, next_array
+    procedure :: has_same_structure, is_same
+    procedure, private :: add_matrix, add_stack, add_integers, add_flag, add_names, move
   end type lane_parameters_t
 
 contains
 
-  !> Empties the list and keeps its memory.
-  subroutine clear(self)
+  !> Lets the next pass take the numbers of a lane.
+  subroutine take(self, lane, with_structure)
     class(lane_parameters_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    logical, intent(in), optional :: with_structure   !! whether the structure is collected too; absent: it is
 
-    if (.not. allocated(self%array)) allocate (self%array(64), self%curve_array(4), self%structure(256))
-    self%arrays = 0
-    self%curve_arrays = 0
-    self%structure_size = 0
-  end subroutine clear
+    if (.not. allocated(self%number)) allocate (self%number(256), self%curve(0), self%structure(256))
+    self%gives = .false.
+    self%lane = lane
+    self%numbers = 0
+    self%curves = 0
+    self%describes = .true.
+    if (present(with_structure)) self%describes = with_structure
+    if (self%describes) self%structure_size = 0
+  end subroutine take
 
-  !> Lists an array [lanes, columns].
+  !> Lets the next pass give the numbers to a lane, of a formulation with the same structure.
+  subroutine give(self, lane)
+    class(lane_parameters_t), intent(inout) :: self
+    integer, intent(in) :: lane
+
+    self%gives = .true.
+    self%lane = lane
+    self%numbers = 0
+    self%curves = 0
+    self%describes = .false.
+  end subroutine give
+
+  !> Passes an array [lanes, columns].
   subroutine add_matrix(self, name, value)
     class(lane_parameters_t), intent(inout) :: self
-    character(len=*), intent(in) :: name
-    real(wp), contiguous, target, intent(inout) :: value(:, :)
+    character(len=*), intent(in) :: name   !! for comparisons of structures
+    real(wp), contiguous, intent(inout) :: value(:, :)
 
-    call self%next_array(name)
-    self%array(self%arrays)%value(1:1, 1:size(value, 1), 1:size(value, 2)) => value
+    call self%move(name, 1, size(value, 1), size(value, 2), value)
   end subroutine add_matrix
 
-  !> Lists an array [lanes, columns] of a bank that holds the values of a key of the input as they are. A variant is set by
-  !> writing such a value: the laws of the bank follow by `polynomials`, and assembly asks nothing but its sign.
-  subroutine add_key(self, key, value, element)
-    class(lane_parameters_t), intent(inout) :: self
-    character(len=*), intent(in) :: key
-    real(wp), contiguous, target, intent(inout) :: value(:, :)   !! in the unit of the key
-    integer, intent(in), optional :: element(:)   !! of the bank in each column; absent: column k is the one of element k
-    integer :: k
-
-    call self%add_matrix(key, value)
-    if (present(element)) then
-      self%array(self%arrays)%element = self%first_element - 1 + element
-    else
-      self%array(self%arrays)%element = [(self%first_element - 1 + k, k=1, size(value, 2))]
-    end if
-  end subroutine add_key
-
-  !> Lists an array [rows, lanes, columns].
+  !> Passes an array [rows, lanes, columns].
   subroutine add_stack(self, name, value)
     class(lane_parameters_t), intent(inout) :: self
-    character(len=*), intent(in) :: name   !! for comparisons of structures
-    real(wp), contiguous, target, intent(inout) :: value(:, :, :)
+    character(len=*), intent(in) :: name
+    real(wp), contiguous, intent(inout) :: value(:, :, :)
 
-    call self%next_array(name)
-    self%array(self%arrays)%value => value
+    call self%move(name, size(value, 1), size(value, 2), size(value, 3), value)
   end subroutine add_stack
 
-  !> Lists an array [rows, columns, lanes].
+  !> Passes an array [rows, columns, lanes].
   subroutine add_blocks(self, name, value)
     class(lane_parameters_t), intent(inout) :: self
-    character(len=*), intent(in) :: name   !! for comparisons of structures
-    real(wp), contiguous, target, intent(inout) :: value(:, :, :)   !! [rows, columns, lanes]
+    character(len=*), intent(in) :: name
+    real(wp), contiguous, intent(inout) :: value(:, :, :)   !! [rows, columns, lanes]
 
-    call self%next_array(name)
-    self%array(self%arrays)%value(1:size(value, 1) * size(value, 2), 1:size(value, 3), 1:1) => value
     call self%add_structure([size(value, 1), size(value, 2)])
+    call self%move(name, size(value, 1) * size(value, 2), size(value, 3), 1, value)
   end subroutine add_blocks
 
-  !> Adds an array that is not yet associated.
-  subroutine next_array(self, name)
+  !> Moves the numbers of the lane.
+  subroutine move(self, name, rows, lanes, columns, value)
     class(lane_parameters_t), intent(inout) :: self
     character(len=*), intent(in) :: name
-    type(parameter_array_t), allocatable :: longer(:)
+    integer, intent(in) :: rows, lanes, columns
+    real(wp), intent(inout) :: value(rows, lanes, columns)
+    real(wp), allocatable :: longer(:)
+    integer :: c, i, next
 
-    if (self%arrays == size(self%array)) then
-      allocate (longer(2 * self%arrays))
-      longer(:self%arrays) = self%array
-      call move_alloc(longer, self%array)
+    if (self%describes) then
+      call self%add_structure([rows, columns, (iachar(name(i:i)), i=1, len(name))])
     end if
-    self%arrays = self%arrays + 1
-    self%array(self%arrays)%name = name
-    if (allocated(self%array(self%arrays)%element)) deallocate (self%array(self%arrays)%element)
-  end subroutine next_array
+    next = self%numbers
+    self%numbers = next + rows * columns
+    if (self%gives) then
+      do c = 1, columns
+        value(:, self%lane, c) = self%number(next + 1:next + rows)
+        next = next + rows
+      end do
+      return
+    end if
+    if (self%numbers > size(self%number)) then
+      allocate (longer(2 * self%numbers))
+      longer(:next) = self%number(:next)
+      call move_alloc(longer, self%number)
+    end if
+    do c = 1, columns
+      self%number(next + 1:next + rows) = value(:, self%lane, c)
+      next = next + rows
+    end do
+  end subroutine move
 
-  !> Lists curves [lanes, elements].
+  !> Passes curves [lanes, elements].
   subroutine add_curves(self, curve)
     class(lane_parameters_t), intent(inout) :: self
-    type(curve_t), target, intent(inout) :: curve(:, :)
-    integer :: e
+    type(curve_t), intent(inout) :: curve(:, :)
+    type(curve_t), allocatable :: longer(:)
+    integer :: e, i
 
-    if (self%curve_arrays == size(self%curve_array)) self%curve_array = [self%curve_array, self%curve_array]
-    self%curve_arrays = self%curve_arrays + 1
-    self%curve_array(self%curve_arrays)%curve => curve
-    call self%add_structure([(curve(1, e)%points(), e=1, size(curve, 2))])
+    if (self%describes) call self%add_structure([(curve(self%lane, e)%points(), e=1, size(curve, 2))])
+    associate (before => self%curves, elements => size(curve, 2))
+      if (self%gives) then
+        do e = 1, elements
+          curve(self%lane, e) = self%curve(before + e)
+        end do
+      else
+        if (before + elements > size(self%curve)) then
+          allocate (longer(2 * (before + elements)))
+          do i = 1, before
+            longer(i) = self%curve(i)
+          end do
+          call move_alloc(longer, self%curve)
+        end if
+        do e = 1, elements
+          self%curve(before + e) = curve(self%lane, e)
+        end do
+      end if
+    end associate
+    self%curves = self%curves + size(curve, 2)
   end subroutine add_curves
 
   !> Adds lists of integers that describe the structure, each preceded by its length.
@@ -144,6 +156,7 @@ contains
     integer, intent(in), optional :: second(:), third(:), fourth(:), fifth(:)
     integer, allocatable :: longer(:)
 
+    if (.not. self%describes) return
     associate (used => self%structure_size, added => size(parts) + 1)
       if (used + added > size(self%structure)) then
         allocate (longer(2 * (used + added)))
@@ -169,133 +182,32 @@ contains
     type(string_t), intent(in) :: names(:)
     integer :: i, k
 
-    do i = 1, size(names)
+    do i = 1, merge(size(names), 0, self%describes)
       call self%add_structure([(iachar(names(i)%text(k:k)), k=1, len(names(i)%text))])
     end do
   end subroutine add_names
 
-  !> Whether two lists have the same structure, names and shapes; the number of lanes may differ.
+  !> Whether two lanes, taken with their structures, have the same one.
   pure logical function has_same_structure(self, other)
     class(lane_parameters_t), intent(in) :: self
     type(lane_parameters_t), intent(in) :: other
-    integer :: i
 
-    has_same_structure = .false.
-    if (self%arrays /= other%arrays .or. self%curve_arrays /= other%curve_arrays) return
-    if (self%structure_size /= other%structure_size) return
-    if (any(self%structure(:self%structure_size) /= other%structure(:self%structure_size))) return
-    do i = 1, self%arrays
-      associate (here => self%array(i), there => other%array(i))
-        if (size(here%value, 1) /= size(there%value, 1) .or. size(here%value, 3) /= size(there%value, 3)) return
-        if (here%name /= there%name) return
-      end associate
-    end do
-    has_same_structure = .true.
+    has_same_structure = self%structure_size == other%structure_size .and. self%numbers == other%numbers .and. &
+                         self%curves == other%curves
+    if (has_same_structure) has_same_structure = all(self%structure(:self%structure_size) == &
+                                                     other%structure(:other%structure_size))
   end function has_same_structure
 
-  !> Copies the parameters and curves of a lane of another list, which has the same structure.
-  subroutine copy_lane(self, lane, from, from_lane)
-    class(lane_parameters_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    type(lane_parameters_t), intent(in) :: from   !! with the same structure
-    integer, intent(in) :: from_lane              !! lane of `from`
-    integer :: e, i, k, s
-
-    do s = 1, self%arrays
-      associate (into => self%array(s)%value, value => from%array(s)%value)
-        do k = 1, size(into, 3)
-          do i = 1, size(into, 1)
-            into(i, lane, k) = value(i, from_lane, k)
-          end do
-        end do
-      end associate
-    end do
-    do s = 1, self%curve_arrays
-      associate (into => self%curve_array(s)%curve, curve => from%curve_array(s)%curve)
-        do e = 1, size(into, 2)
-          into(lane, e) = curve(from_lane, e)
-        end do
-      end associate
-    end do
-  end subroutine copy_lane
-
-  !> Positions of the parameters in which a lane differs, in any bit, from a lane of another list with the same structure.
-  !> Curves are not compared.
-  pure function differences(self, lane, other, other_lane) result(indices)
+  !> Whether two lanes with the same structure are the same variant, to the last bit.
+  pure logical function is_same(self, other)
     class(lane_parameters_t), intent(in) :: self
-    integer, intent(in) :: lane
     type(lane_parameters_t), intent(in) :: other   !! with the same structure
-    integer, intent(in) :: other_lane              !! lane of `other`
-    type(parameter_index_t), allocatable :: indices(:)
-    type(parameter_index_t) :: index
-    integer :: found, i, k, pass, s
+    integer :: i
 
-    do pass = 1, 2   ! the first pass counts, the second one stores
-      found = 0
-      do s = 1, self%arrays
-        do k = 1, size(self%array(s)%value, 3)
-          do i = 1, size(self%array(s)%value, 1)
-            index = parameter_index_t(s, i, k)
-            if (transfer(self%value(index, lane), 0_int64) == transfer(other%value(index, other_lane), 0_int64)) cycle
-            found = found + 1
-            if (pass == 2) indices(found) = index
-          end do
-        end do
-      end do
-      if (pass == 1) allocate (indices(found))
+    is_same = all(transfer(self%number(:self%numbers), [0_int64]) == transfer(other%number(:other%numbers), [0_int64]))
+    do i = 1, self%curves
+      is_same = is_same .and. self%curve(i)%is_same(other%curve(i))
     end do
-  end function differences
-
-  !> Whether a lane has the same curves as a lane of another list, which has the same structure.
-  pure logical function has_same_curves(self, lane, other, other_lane)
-    class(lane_parameters_t), intent(in) :: self
-    integer, intent(in) :: lane
-    type(lane_parameters_t), intent(in) :: other   !! with the same structure
-    integer, intent(in) :: other_lane              !! lane of `other`
-    integer :: e, s
-
-    has_same_curves = .false.
-    do s = 1, self%curve_arrays
-      do e = 1, size(self%curve_array(s)%curve, 2)
-        if (.not. self%curve_array(s)%curve(lane, e)%is_same(other%curve_array(s)%curve(other_lane, e))) return
-      end do
-    end do
-    has_same_curves = .true.
-  end function has_same_curves
-
-  !> Where the value of a key of an element is; `array` is 0 if no array holds the values of that key as they are.
-  pure function index_of_key(self, key, element) result(index)
-    class(lane_parameters_t), intent(in) :: self
-    character(len=*), intent(in) :: key
-    integer, intent(in) :: element   !! number in the machine
-    type(parameter_index_t) :: index
-    integer :: column, i
-
-    index = parameter_index_t(0, 1, 0)
-    do i = 1, self%arrays
-      if (.not. allocated(self%array(i)%element) .or. self%array(i)%name /= key) cycle
-      column = findloc(self%array(i)%element, element, dim=1)
-      if (column > 0) index = parameter_index_t(i, 1, column)
-    end do
-  end function index_of_key
-
-  !> The parameter at a position in one lane.
-  pure real(wp) function value(self, index, lane)
-    class(lane_parameters_t), intent(in) :: self
-    type(parameter_index_t), intent(in) :: index
-    integer, intent(in) :: lane
-
-    value = self%array(index%array)%value(index%row, lane, index%column)
-  end function value
-
-  !> Sets the parameter at a position in one lane.
-  subroutine set_value(self, index, lane, value)
-    class(lane_parameters_t), intent(inout) :: self
-    type(parameter_index_t), intent(in) :: index
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: value   !! in the unit of the array
-
-    self%array(index%array)%value(index%row, lane, index%column) = value
-  end subroutine set_value
+  end function is_same
 
 end module nocdyn_lane_parameters

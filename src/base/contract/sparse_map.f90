@@ -34,7 +34,7 @@ module nocdyn_sparse_map
     integer, allocatable :: column(:)                    !! [entries]
     real(wp), allocatable :: coefficient(:, :)           !! [lanes, entries]
   contains
-    procedure :: multiply, multiply_pair, list_parameters
+    procedure :: multiply, multiply_pair, pass_parameters
   end type sparse_map_t
 
   integer, parameter :: short = 16   !! fewer rows are not worth a vector loop
@@ -259,14 +259,14 @@ contains
   end subroutine pair_on_lanes
 
   !> Lists the coefficients; only for a map without bands.
-  subroutine list_parameters(self, parameters)
-    class(sparse_map_t), target, intent(inout) :: self
+  subroutine pass_parameters(self, parameters)
+    class(sparse_map_t), intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
     if (self%bands > 0) error stop 'nocdyn_sparse_map: parameters in bands cannot be listed'
     call parameters%add_structure(self%first(:self%csr_rows + 1), self%column)
     call parameters%add('map: coefficient', self%coefficient)
-  end subroutine list_parameters
+  end subroutine pass_parameters
 
   !> u = A x for rows with coefficients of their own.
   pure subroutine multiply_band(rows, width, columns, column, coefficient, x, u)

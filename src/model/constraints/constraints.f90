@@ -37,7 +37,7 @@ module nocdyn_constraints
     procedure :: list_body_rows
     procedure :: block
     procedure :: residual
-    procedure :: list_parameters
+    procedure :: pass_parameters
   end type constraints_t
 
 contains
@@ -187,14 +187,14 @@ contains
     end do
   end subroutine residual
 
-  !> Registers the arrays whose values may differ from variant to variant.
-  subroutine list_parameters(self, parameters)
-    class(constraints_t), target, intent(inout) :: self
+  !> Passes the arrays whose values may differ from variant to variant.
+  subroutine pass_parameters(self, parameters)
+    class(constraints_t), intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
     call parameters%add_structure(self%first, self%body)
     call parameters%add('constraints: coefficient', self%coefficient)
     call parameters%add('constraints: factor', self%members%factor)
-  end subroutine list_parameters
+  end subroutine pass_parameters
 
 end module nocdyn_constraints

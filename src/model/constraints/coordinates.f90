@@ -41,7 +41,7 @@ module nocdyn_coordinates
     procedure :: mobility
     procedure :: project
     procedure :: reactions_of_torques
-    procedure :: list_parameters
+    procedure :: pass_parameters
   end type coordinates_t
 
 contains
@@ -282,16 +282,16 @@ contains
     call self%reactions%find_reactions(lane, self%imbalance, lambda)
   end subroutine reactions_of_torques
 
-  !> Registers the arrays whose values may differ from variant to variant.
-  subroutine list_parameters(self, parameters)
-    class(coordinates_t), target, intent(inout) :: self
+  !> Passes the arrays whose values may differ from variant to variant.
+  subroutine pass_parameters(self, parameters)
+    class(coordinates_t), intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
     call parameters%add_structure(self%body, self%first, self%coordinate, self%geared)
     call parameters%add('coordinates: ratio', self%ratio)
     call parameters%add('coordinates: response', self%response)
     call parameters%add('coordinates: inertia', self%inertia)
-    call self%reactions%list_parameters(parameters)
-  end subroutine list_parameters
+    call self%reactions%pass_parameters(parameters)
+  end subroutine pass_parameters
 
 end module nocdyn_coordinates

@@ -28,7 +28,7 @@ module nocdyn_load_sharing
     type(load_sharing_block_t), allocatable :: blocks(:)
   contains
     procedure :: minimise_norm
-    procedure :: list_parameters
+    procedure :: pass_parameters
   end type load_sharing_t
 
 contains
@@ -129,9 +129,9 @@ contains
     end do
   end subroutine minimise_norm
 
-  !> Registers the arrays whose values may differ from variant to variant.
-  subroutine list_parameters(self, parameters)
-    class(load_sharing_t), target, intent(inout) :: self
+  !> Passes the arrays whose values may differ from variant to variant.
+  subroutine pass_parameters(self, parameters)
+    class(load_sharing_t), intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
     integer :: b
 
@@ -139,6 +139,6 @@ contains
       call parameters%add_structure(self%blocks(b)%rows)
       call parameters%add_blocks('load sharing: null vectors', self%blocks(b)%null_vectors)
     end do
-  end subroutine list_parameters
+  end subroutine pass_parameters
 
 end module nocdyn_load_sharing

@@ -41,7 +41,7 @@ module nocdyn_reaction_solver
   contains
     procedure :: find_null_vectors
     procedure :: find_reactions
-    procedure :: list_parameters
+    procedure :: pass_parameters
     procedure, private :: back_substitute
   end type reaction_solver_t
 
@@ -162,16 +162,16 @@ contains
     end do
   end subroutine back_substitute
 
-  !> Registers the arrays whose values may differ from variant to variant.
-  subroutine list_parameters(self, parameters)
-    class(reaction_solver_t), target, intent(inout) :: self
+  !> Passes the arrays whose values may differ from variant to variant.
+  subroutine pass_parameters(self, parameters)
+    class(reaction_solver_t), intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
     integer :: g
 
     call parameters%add_structure(self%train, self%relations%row, self%group_index)
     call parameters%add_structure(self%child, self%parent, self%row)
-    call self%relations%rows%list_parameters(parameters)
-    call self%relations%equations%list_parameters(parameters)
+    call self%relations%rows%pass_parameters(parameters)
+    call self%relations%equations%pass_parameters(parameters)
     call parameters%add('reactions: ratio', self%ratio)
     call parameters%add('reactions: own', self%own)
     call parameters%add('reactions: other', self%other)
@@ -182,7 +182,7 @@ contains
       end associate
       call parameters%add_blocks('reactions: dual', self%groups(g)%dual)
     end do
-    call self%load_sharing%list_parameters(parameters)
-  end subroutine list_parameters
+    call self%load_sharing%pass_parameters(parameters)
+  end subroutine pass_parameters
 
 end module nocdyn_reaction_solver

@@ -79,7 +79,7 @@ module nocdyn_described_elements
     procedure :: indicator
     procedure :: block_indicators
     procedure :: fastest_wave
-    procedure :: list_parameters
+    procedure :: pass_parameters
   end type described_elements_t
 
 contains
@@ -258,27 +258,23 @@ contains
   end subroutine refresh_element
 
   !> Lists the parameter arrays of its elements, and the operations of its law.
-  subroutine list_parameters(self, parameters)
-    class(described_elements_t), target, intent(inout) :: self
+  subroutine pass_parameters(self, parameters)
+    class(described_elements_t), intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
     integer :: i
 
     do i = 1, size(self%parameters)
       associate (one => self%parameters(i))
-        if (one%is_key) then
-          call parameters%add_key(trim(one%name), one%value, one%element)
-        else
-          call parameters%add(one%name, one%value)
-        end if
+        call parameters%add(trim(one%name), one%value)
       end associate
     end do
     if (allocated(self%curve)) call parameters%add_curves(self%curve)
-    if (.not. allocated(self%law)) return
+    if (.not. (allocated(self%law) .and. parameters%describes)) return
     associate (node => self%law%law%tape%node, count => self%law%law%tape%count)
       call parameters%add_structure([(node(i)%operation, i=1, count)], [(node(i)%a, i=1, count)], [(node(i)%b, i=1, count)], &
                                     self%law%law%tape%list)
     end associate
-  end subroutine list_parameters
+  end subroutine pass_parameters
 
   !> Sets the coefficients of its elements among the ones of the machine, which are zero before, in some lanes.
   pure subroutine polynomials(self, first_lane, last_lane, laws)

@@ -34,7 +34,7 @@ module nocdyn_polynomial_laws
     procedure :: set
     procedure :: find_plain_parts
     procedure :: refresh_lane
-    procedure :: list_parameters
+    procedure :: pass_parameters
     procedure :: evaluate
     procedure :: differentiate
     procedure :: evaluate_energies
@@ -129,8 +129,8 @@ contains
                         abs(self%by_speed_squared(lane, element)) > 0)
   end function is_plain_in
 
-  subroutine list_parameters(self, parameters)
-    class(polynomial_laws_t), target, intent(inout) :: self
+  subroutine pass_parameters(self, parameters)
+    class(polynomial_laws_t), intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
     call parameters%add('laws: rest', self%rest)
@@ -139,7 +139,7 @@ contains
     call parameters%add('laws: constant', self%constant)
     call parameters%add('laws: by_speed', self%by_speed)
     call parameters%add('laws: by_speed_squared', self%by_speed_squared)
-  end subroutine list_parameters
+  end subroutine pass_parameters
 
   !> Number of consecutive elements from `first` on that are plain springs in all lanes.
   pure integer function plain_run(self, first)

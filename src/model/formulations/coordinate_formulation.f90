@@ -62,18 +62,18 @@ contains
     call self%prepare_joints()
   end subroutine set_coordinates
 
-  !> Registers the arrays that may differ from variant to variant.
+  !> Passes the arrays that may differ from variant to variant.
   subroutine list_coordinates(self, parameters)
     class(coordinate_formulation_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
-    call self%machine%list_parameters(parameters)
+    call self%machine%pass_parameters(parameters)
     call parameters%add('zero_twist', self%zero_twist)
-    call self%incidence%list_parameters(parameters)
-    call self%twists%list_parameters(parameters)
-    call self%switching%list_parameters(parameters)
-    call self%origin%list_parameters(parameters)
-    call self%norm%list_parameters(parameters)
+    call self%incidence%pass_parameters(parameters)
+    call self%twists%pass_parameters(parameters)
+    call self%switching%pass_parameters(parameters)
+    call self%origin%pass_parameters(parameters)
+    call self%norm%pass_parameters(parameters)
   end subroutine list_coordinates
 
   !> Start speeds and angles of the coordinates and start values of the internal states; the work integrals are zero.

@@ -22,7 +22,7 @@ module nocdyn_error_measures
     type(sparse_map_t), private :: map                !! from the states to the quantities
     real(wp), allocatable, private :: offset(:, :)    !! of their sizes, [lanes, count]
   contains
-    procedure :: measure, start_lane, twist_of, state_of, list_parameters
+    procedure :: measure, start_lane, twist_of, state_of, pass_parameters
   end type error_measures_t
 
   real(wp), parameter :: rounding = 1.0e-6_wp   !! of a large angle within a step: rtol times this is above its rounding
@@ -120,13 +120,13 @@ contains
     end associate
   end function state_of
 
-  !> Registers the arrays that may differ from variant to variant, without those that `start_lane` sets.
-  subroutine list_parameters(self, parameters)
-    class(error_measures_t), target, intent(inout) :: self
+  !> Passes the arrays that may differ from variant to variant, without those that `start_lane` sets.
+  subroutine pass_parameters(self, parameters)
+    class(error_measures_t), intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
     call parameters%add_structure(self%coupling, self%free)
-    call self%map%list_parameters(parameters)
-  end subroutine list_parameters
+    call self%map%pass_parameters(parameters)
+  end subroutine pass_parameters
 
 end module nocdyn_error_measures

@@ -15,37 +15,30 @@ module nocdyn_joint_blocks
   implicit none (type, external)
   private
 
-  !> Variables of this type are not to be copied once `attach` has listed their parameters.
   type, extends(reduced_t), public :: joint_block_t
     private
     type(joint_sets_t), allocatable :: sets(:)            !! joints of each lane, [lanes]
     real(wp), allocatable :: lane_acceleration(:, :)      !! q'' [rad/s2], work space, [lanes, freedoms]
-    type(reduced_t), pointer :: scout => null()
+    type(reduced_t), allocatable :: scout
     integer :: scouted = 0                                !! lane that the scout stands for, 0: none
-    type(lane_parameters_t) :: parameters, scout_parameters
+    type(lane_parameters_t) :: parameters                 !! of the lane that the scout stands for
   contains
     procedure, public :: attach
     procedure, public :: derivative, find_sets, hold_jacobian, refresh_lane, observe, evaluation_obstacle
     procedure, public :: start_lane, indicator_values, set_indicator, block_indicators, find_fastest_wave, find_fastest_waves
     procedure, public :: change_branch
-    final :: release_scout
   end type joint_block_t
 
 contains
 
-  !> Makes the scout and lists all parameters, after `formulate`; the block stays where it is from now on.
+  !> Makes the scout, after `formulate`.
   subroutine attach(self, machine)
-    class(joint_block_t), target, intent(inout) :: self
+    class(joint_block_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine   !! of one lane, with the structure of the block
     integer :: lane
 
     allocate (self%scout)
     self%scout = new_reduced(machine, self%has_energy_balance, as_block=.true.)
-    call self%scout%list_parameters(self%scout_parameters)
-    call self%list_parameters(self%parameters)
-    if (.not. self%parameters%has_same_structure(self%scout_parameters)) then
-      error stop 'nocdyn_joint_blocks: the scout differs from the block'
-    end if
     allocate (self%sets(self%lanes))
     do lane = 1, self%lanes
       self%sets(lane) = self%scout%joints
@@ -54,19 +47,13 @@ contains
     allocate (self%lane_acceleration(self%lanes, size(self%moving)), source=0.0_wp)
   end subroutine attach
 
-  subroutine release_scout(self)
-    type(joint_block_t), intent(inout) :: self
-
-    if (associated(self%scout)) deallocate (self%scout)
-  end subroutine release_scout
-
   !> Makes the scout stand for a lane.
   subroutine send_scout(self, lane)
     class(joint_block_t), intent(inout) :: self
     integer, intent(in) :: lane
 
     if (self%scouted /= lane) then
-      call self%scout_parameters%copy_lane(1, self%parameters, lane)
+      call brief_scout(self, lane)
       call self%scout%machine%refresh_lane(1)
       call self%scout%machine%take_branches(1, self%machine, lane)
       self%scout%joints = self%sets(lane)
@@ -75,6 +62,17 @@ contains
     end if
     self%scout%twist_at_origin(1, :) = self%twist_at_origin(lane, :)
   end subroutine send_scout
+
+  !> Gives the scout the parameters of a lane.
+  subroutine brief_scout(self, lane)
+    class(joint_block_t), intent(inout) :: self
+    integer, intent(in) :: lane
+
+    call self%parameters%take(lane, with_structure=.false.)
+    call self%pass_parameters(self%parameters)
+    call self%parameters%give(1)
+    call self%scout%pass_parameters(self%parameters)
+  end subroutine brief_scout
 
   !> Takes the branches and joints of the lane that the scout stands for.
   subroutine take_report(self)
@@ -107,7 +105,7 @@ contains
 
     call self%refresh_lane(lane)
     call self%norm%start_lane(lane, y, self%zero_twist(lane, :), self%machine%laws%rest(lane, :))
-    call self%scout_parameters%copy_lane(1, self%parameters, lane)
+    call brief_scout(self, lane)
     call self%scout%start_lane(1, t, y)
     self%scouted = lane
     call take_report(self)

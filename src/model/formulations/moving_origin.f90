@@ -30,7 +30,7 @@ module nocdyn_moving_origin
     integer, allocatable, private :: elastic(:)           !! elements that must not be twisted
     logical, private :: has_springs_only = .true.         !! whether the laws of these are polynomials
   contains
-    procedure :: find_shift, move, start_lane, move_twists, list_parameters
+    procedure :: find_shift, move, start_lane, move_twists, pass_parameters
   end type moving_origin_t
 
 contains
@@ -123,13 +123,13 @@ contains
     end do
   end subroutine move_twists
 
-  !> Registers the arrays that may differ from variant to variant.
-  subroutine list_parameters(self, parameters)
-    class(moving_origin_t), target, intent(inout) :: self
+  !> Passes the arrays that may differ from variant to variant.
+  subroutine pass_parameters(self, parameters)
+    class(moving_origin_t), intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
     call parameters%add_structure(self%motions%free, self%motions%first, self%motions%freedom)
     call parameters%add('rigid motions: ratio', self%ratio)
-  end subroutine list_parameters
+  end subroutine pass_parameters
 
 end module nocdyn_moving_origin

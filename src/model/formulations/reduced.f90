@@ -30,7 +30,7 @@ module nocdyn_reduced
     real(wp), allocatable, private :: moment(:, :)             !! M [N m], [lanes, elements], work space
     real(wp), allocatable, private :: free_jacobian(:, :)      !! without locked joints, if there are joints, [lanes, positions]
   contains
-    procedure :: formulate, update_inertia, list_parameters, refresh_lane, refresh_parameters, derivative, jacobian
+    procedure :: formulate, update_inertia, pass_parameters, refresh_lane, refresh_parameters, derivative, jacobian
     procedure :: evaluate_at, hold_jacobian, spread_jacobian
     procedure :: jacobian_pattern, series_obstacle, prepare_series, series, find_sets
   end type reduced_t
@@ -107,18 +107,17 @@ contains
     call self%switching%refresh_selected(lane, self%incidence)
   end subroutine update_inertia
 
-  !> Registers the arrays that may differ from variant to variant, without those that `refresh_lane` updates. The formulation must
+  !> Passes the arrays that may differ from variant to variant, without those that `refresh_lane` updates. The formulation must
   !> be a block, or laid out as one.
-  subroutine list_parameters(self, parameters)
-    class(reduced_t), target, intent(inout) :: self
+  subroutine pass_parameters(self, parameters)
+    class(reduced_t), intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
-    call parameters%clear()
     call parameters%add_structure([self%states, self%quadratures, self%switches])
     call self%list_coordinates(parameters)
-    call self%accelerations%list_parameters(parameters)
-    call self%element_jacobian%list_parameters(parameters)
-  end subroutine list_parameters
+    call self%accelerations%pass_parameters(parameters)
+    call self%element_jacobian%pass_parameters(parameters)
+  end subroutine pass_parameters
 
   !> Updates copies and precomputed values after the parameters of a lane have changed.
   subroutine refresh_lane(self, lane)

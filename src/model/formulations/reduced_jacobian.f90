@@ -43,7 +43,7 @@ module nocdyn_reduced_jacobian
     type(element_coordinates_t), private :: incidence       !! entries of the element of each internal state
     logical, allocatable, private :: has_work_integral(:)   !! of the element of each internal state
   contains
-    procedure :: fill, refresh_lane, list_parameters
+    procedure :: fill, refresh_lane, pass_parameters
   end type reduced_jacobian_t
 
 contains
@@ -289,15 +289,15 @@ contains
     self%product(lane, :) = incidence%response(lane, self%response_entry) * incidence%ratio(lane, self%ratio_entry)
   end subroutine refresh_lane
 
-  !> Registers the arrays whose values may differ from variant to variant.
-  subroutine list_parameters(self, parameters)
-    class(reduced_jacobian_t), target, intent(inout) :: self
+  !> Passes the arrays whose values may differ from variant to variant.
+  subroutine pass_parameters(self, parameters)
+    class(reduced_jacobian_t), intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
     call parameters%add_structure(self%element, self%position, self%work_element, self%pattern%row, self%pattern%column)
     call parameters%add('jacobian: product', self%product)
     call parameters%add('jacobian: ratio', self%ratio)
-    call self%incidence%list_parameters(parameters)
-  end subroutine list_parameters
+    call self%incidence%pass_parameters(parameters)
+  end subroutine pass_parameters
 
 end module nocdyn_reduced_jacobian

@@ -24,7 +24,7 @@ module nocdyn_element_coordinates
     procedure :: refresh_selected
     procedure :: has_ratio
     procedure :: entry_elements
-    procedure :: list_parameters
+    procedure :: pass_parameters
   end type element_coordinates_t
 
 contains
@@ -156,15 +156,15 @@ contains
     end do
   end function entry_elements
 
-  !> Registers the arrays whose values may differ from variant to variant.
-  subroutine list_parameters(self, parameters)
-    class(element_coordinates_t), target, intent(inout) :: self
+  !> Passes the arrays whose values may differ from variant to variant.
+  subroutine pass_parameters(self, parameters)
+    class(element_coordinates_t), intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
     call parameters%add_structure(self%first, self%coordinate)
     call parameters%add('elements: ratio', self%ratio)
     call parameters%add('elements: response', self%response)
-  end subroutine list_parameters
+  end subroutine pass_parameters
 
   !> The map U from coordinates to twists: the speeds of the elements are U q'.
   function twist_map(incidence, has_offset, without_bands) result(map)

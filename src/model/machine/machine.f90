@@ -50,7 +50,7 @@ module nocdyn_machine
     procedure :: add_nodes
     procedure :: freedoms
     procedure :: number_elements
-    procedure :: list_parameters
+    procedure :: pass_parameters
     procedure :: to_mean_torque
     procedure :: follows_mean_speed
     procedure :: elastic
@@ -136,9 +136,9 @@ contains
     self%switches = new_switches(self%banks)
   end subroutine number_elements
 
-  !> Registers all arrays whose values may differ from variant to variant.
-  subroutine list_parameters(self, parameters)
-    class(machine_t), target, intent(inout) :: self
+  !> Passes all arrays whose values may differ from variant to variant.
+  subroutine pass_parameters(self, parameters)
+    class(machine_t), intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
     integer :: i
 
@@ -149,14 +149,13 @@ contains
     call parameters%add_structure(allocated(self%steady_internal))
     if (allocated(self%steady_internal)) call parameters%add('machine: steady_internal', self%steady_internal)
     do i = 1, size(self%banks)
-      parameters%first_element = self%banks(i)%bank%first
-      call self%banks(i)%bank%list_structure(parameters)
-      call self%banks(i)%bank%list_parameters(parameters)
+      if (parameters%describes) call self%banks(i)%bank%list_structure(parameters)
+      call self%banks(i)%bank%pass_parameters(parameters)
     end do
-    call self%laws%list_parameters(parameters)
-    call self%constraints%list_parameters(parameters)
-    call self%coordinates%list_parameters(parameters)
-  end subroutine list_parameters
+    call self%laws%pass_parameters(parameters)
+    call self%constraints%pass_parameters(parameters)
+    call self%coordinates%pass_parameters(parameters)
+  end subroutine pass_parameters
 
   !> Replaces periodic torques by their means, for the search of a steady state.
   subroutine to_mean_torque(self)

@@ -1,13 +1,12 @@
 !> Targets of a sweep whose values stand in the parameters of a lane as they are, so that a variant is set by writing them there.
 !>
-!> Banks declare the arrays that hold the values of a key (`lane_parameters_t%add_key`): the laws follow from them by
+!> Banks say which of their parameters hold the values of a key as they are (`is_key`): the laws follow from them by
 !> `polynomials`, and assembly asks for nothing but their signs. The inertia of a body is direct too: the constraints do not
 !> depend on it, so that only the responses to moments follow. A variant is written into a lane if every target is
 !> direct and one with the same signs of all values has been assembled and had the structure of the block.
 module nocdyn_direct_parameters
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_parameters, only: lane_parameters_t, parameter_index_t
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: reduced_t
   use nocdyn_shaft_segments, only: has_own_nodes
@@ -23,11 +22,18 @@ module nocdyn_direct_parameters
   integer, parameter :: most_patterns = 1000   ! of signs: a search through more costs as much as an assembly
   integer, parameter :: negative_zero = 2      ! the sign of a value that is never direct: a sum with 0 is not -0.0
 
+  !> Where a value stands.
+  type :: place_t
+    integer :: bank = 0
+    integer :: parameter = 0   !! of the bank; 0: there is no such place
+    integer :: column = 0
+  end type place_t
+
   type, public :: direct_parameters_t
     logical :: are_direct = .false.                               !! whether all targets are
     integer, allocatable, private :: unit(:)                      !! of the values of each target: index of `units`
     integer, allocatable, private :: target(:)                    !! targets whose values are in arrays of banks ...
-    type(parameter_index_t), allocatable, private :: index(:)     !! ... and where each of them is
+    type(place_t), allocatable, private :: place(:)               !! ... and where each of them is
     integer, allocatable, private :: banks(:)                     !! with such arrays
     integer, allocatable, private :: inertia_target(:)            !! targets that are inertias ...
     integer, allocatable, private :: body(:)                      !! ... and the body of each
@@ -41,15 +47,14 @@ module nocdyn_direct_parameters
 contains
 
   !> Finds the targets in the machine of a block.
-  type(direct_parameters_t) function new_direct_parameters(input, targets, machine, parameters) result(self)
+  type(direct_parameters_t) function new_direct_parameters(input, targets, machine) result(self)
     type(input_t), intent(in) :: input
     type(target_t), intent(in) :: targets(:)
     type(machine_t), intent(in) :: machine
-    type(lane_parameters_t), intent(in) :: parameters   !! of the block
     logical :: holds_inertia   ! whether the machine has what follows from inertias: sums of them, or projected start speeds
     integer :: b, g, i
 
-    allocate (self%target(0), self%index(0), self%banks(0), self%inertia_target(0), self%body(0))
+    allocate (self%target(0), self%place(0), self%banks(0), self%inertia_target(0), self%body(0))
     allocate (self%signs(size(targets), 0))
     allocate (self%unit(size(targets)))
     self%unit(:) = targets%in_unit
@@ -69,7 +74,7 @@ contains
         self%inertia_target = [self%inertia_target, i]
         self%body = [self%body, findloc(input%groups_named('body'), targets(i)%group, dim=1)]
       else
-        call add_element_value(self, i, input, targets(i), machine, parameters)
+        call add_element_value(self, i, input, targets(i), machine)
       end if
       if (.not. self%are_direct) return
     end do
@@ -79,14 +84,13 @@ contains
   end function new_direct_parameters
 
   !> A value of an element, if its bank declares where it stands.
-  subroutine add_element_value(self, number, input, target, machine, parameters)
+  subroutine add_element_value(self, number, input, target, machine)
     type(direct_parameters_t), intent(inout) :: self
     integer, intent(in) :: number   !! of the target
     type(input_t), intent(in) :: input
     type(target_t), intent(in) :: target
     type(machine_t), intent(in) :: machine
-    type(lane_parameters_t), intent(in) :: parameters
-    type(parameter_index_t) :: index
+    type(place_t) :: place
     integer :: b, e
 
     self%are_direct = .false.
@@ -97,17 +101,34 @@ contains
           if (bank%has_parts .or. bank%kind_name() /= group%kind) cycle
           do e = 1, size(bank%names)
             if (bank%names(e)%text /= group%name) cycle
-            index = parameters%index_of_key(trim(parameter_of(key_of(input, target))), bank%first - 1 + e)
-            if (index%array == 0) cycle
+            place = place_of(machine, b, trim(parameter_of(key_of(input, target))), e)
+            if (place%parameter == 0) cycle
             self%are_direct = .true.
             self%target = [self%target, number]
-            self%index = [self%index, index]
+            self%place = [self%place, place]
             if (all(self%banks /= b)) self%banks = [self%banks, b]
           end do
         end associate
       end do
     end associate
   end subroutine add_element_value
+
+  !> Where the value of a key of an element stands as it is.
+  pure type(place_t) function place_of(machine, bank, key, element) result(place)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: bank
+    character(len=*), intent(in) :: key
+    integer, intent(in) :: element   !! numbered within the bank
+    integer :: column, p
+
+    associate (parameters => machine%banks(bank)%bank%parameters)
+      do p = 1, size(parameters)
+        if (.not. parameters(p)%is_key .or. parameters(p)%name /= key) cycle
+        column = findloc(parameters(p)%element, element, dim=1)
+        if (column > 0) place = place_t(bank, p, column)
+      end do
+    end associate
+  end function place_of
 
   !> Whether excitations have a share of the target's load: they hold its parameters too.
   pure logical function is_shared(input, target)
@@ -212,11 +233,10 @@ contains
   end function are_allowed
 
   !> Writes the values of a variant into a lane. Everything else in the lane must already be from another variant.
-  subroutine write_values(self, values, lane, parameters, block, y, is_set)
+  subroutine write_values(self, values, lane, block, y, is_set)
     class(direct_parameters_t), intent(in) :: self
     real(wp), contiguous, intent(in) :: values(:)          !! [targets]
     integer, intent(in) :: lane
-    type(lane_parameters_t), intent(inout) :: parameters   !! of the block
     class(reduced_t), intent(inout) :: block
     real(wp), contiguous, intent(inout) :: y(:)            !! the start state of another variant, then of this one
     logical, intent(out) :: is_set                         !! not if rounding makes the mass matrix indefinite
@@ -224,7 +244,10 @@ contains
     logical :: is_indefinite
 
     do i = 1, size(self%target)
-      call parameters%set_value(self%index(i), lane, in_si(values(self%target(i)), self%unit(self%target(i))))
+      associate (place => self%place(i))
+        block%machine%banks(place%bank)%bank%parameters(place%parameter)%value(lane, place%column) = &
+          in_si(values(self%target(i)), self%unit(self%target(i)))
+      end associate
     end do
     do i = 1, size(self%banks)
       call block%machine%banks(self%banks(i))%bank%polynomials(lane, lane, block%machine%laws)

@@ -29,7 +29,7 @@ module nocdyn_variant_machines
   integer, parameter, public :: variant_refused = 1           !! there is no such machine
   integer, parameter, public :: variant_needs_own_block = 2   !! it does not fit a lane of the block
 
-  !> Of one thread. Variables of this type are not to be copied: the lists of parameters point into what they hold.
+  !> Of one thread. Variables of this type are not to be copied: they point to the block.
   type, public :: variant_machines_t
     type(input_t) :: input                                     !! with the values of the last variant that was assembled
     class(formulation_t), pointer :: formulation => null()     !! the block
@@ -38,7 +38,7 @@ module nocdyn_variant_machines
     logical, private :: has_energy_balance = .false.           !! whether the work integrals are among the states
     logical, allocatable, private :: is_of_run(:)              !! whether a target is of &run or &fatigue, [targets]
     real(wp), allocatable, private :: base(:)                  !! values of those for the block, [targets]
-    type(lane_parameters_t), private :: parameters             !! of the block
+    type(lane_parameters_t), private :: parameters             !! of a lane of the block, with its structure
     type(direct_parameters_t), private :: direct
     real(wp), allocatable, private :: start(:)                 !! of a variant that has been set, [states + quadratures]
     logical, allocatable, private :: holds_variant(:)          !! lanes into which direct values may be written
@@ -87,8 +87,10 @@ contains
     if (is_typical) then
       call assemble_variant(self%input, targets, typical, machine, message, lanes)
       is_typical = message == ''
-      joints = joints_of(machine)
-      if (is_typical .and. lanes > 1) is_typical = joints%only_lock()
+      if (is_typical .and. lanes > 1) then
+        joints = joints_of(machine)
+        is_typical = joints%only_lock()
+      end if
     end if
     if (.not. is_typical) then
       self%input = input
@@ -138,12 +140,13 @@ contains
       call block%attach(single)
     end select
     block%is_shared = block%joints%only_lock()   ! whatever the number of lanes
-    call block%list_parameters(self%parameters)
+    call self%parameters%take(1)
+    call block%pass_parameters(self%parameters)
     self%block => block
     self%formulation => block
     allocate (self%start(block%states + block%quadratures), source=0.0_wp)
     if (self%holds_variant(1)) call take_start(block, self%start)
-    self%direct = new_direct_parameters(self%input, self%targets, block%machine, self%parameters)
+    self%direct = new_direct_parameters(self%input, self%targets, block%machine)
   end subroutine share_block
 
   !> The start of lane 1.
@@ -189,7 +192,7 @@ contains
         call self%direct%allow(values)
       end if
       y(:) = self%start
-      call self%direct%write_values(values, lane, self%parameters, self%block, y, is_set)
+      call self%direct%write_values(values, lane, self%block, y, is_set)
       status = variant_set
       if (is_set) return
       self%holds_variant(lane) = .false.
@@ -221,10 +224,12 @@ contains
     if (.not. associated(self%block)) return
     if (any(self%is_of_run .and. abs(values - self%base) > 0)) return
     call self%assembled%formulate(self%has_energy_balance)
-    call self%assembled%list_parameters(self%assembled_parameters)
+    call self%assembled_parameters%take(1)
+    call self%assembled%pass_parameters(self%assembled_parameters)
     if (.not. self%parameters%has_same_structure(self%assembled_parameters)) return
     status = variant_set
-    call self%parameters%copy_lane(lane, self%assembled_parameters, 1)
+    call self%assembled_parameters%give(lane)
+    call self%block%pass_parameters(self%assembled_parameters)
     call take_start(self%assembled, self%start)
     y(:) = self%start
     self%holds_variant(lane) = .true.
