@@ -8,10 +8,9 @@ module nocdyn_test_full_machines
   use nocdyn_element_rows, only: element_rows_t, new_element_rows
   use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_fault_excitations, only: fault_terms_t, new_fault_excitations
-  use nocdyn_flux_motors, only: circuit_keys, new_flux_motors
+  use nocdyn_flux_motors, only: new_flux_motors
   use nocdyn_gap_couplings, only: gap_couplings_t, new_gap_couplings
-  use nocdyn_governed_banks, only: governor_t
-  use nocdyn_inverter_motors, only: new_inverter_motors, torque_harmonics_t
+  use nocdyn_inverter_motors, only: new_inverter_motors
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_mesh_phases, only: new_mesh_phases
@@ -21,10 +20,10 @@ module nocdyn_test_full_machines
   use nocdyn_order_excitations, only: new_order_excitations, order_torque_t
   use nocdyn_polynomial_couplings, only: new_polynomial_couplings, polynomial_couplings_t
   use nocdyn_saturated_couplings, only: new_saturated_couplings
-  use nocdyn_schedules, only: join_points, schedule_t
-  use nocdyn_synchronous_motors, only: new_synchronous_motors, slip_curves_t
+  use nocdyn_synchronous_motors, only: new_synchronous_motors
   use nocdyn_table_couplings, only: new_table_couplings
   use nocdyn_table_excitations, only: new_table_excitations
+  use nocdyn_test_given_keys, only: given_keys_t, keys
   use nocdyn_test_machines, only: finish, numbered_names
   use nocdyn_test_random, only: random_stream, random_stream_t
   use nocdyn_test_random_machines, only: random_machine
@@ -34,6 +33,9 @@ module nocdyn_test_full_machines
   private
 
   public :: full_machine
+
+  character(len=*), parameter :: governor = 'governor_speed governor_gain governor_time governor_start'
+  real(wp), parameter :: of_governor(4) = [1.0_wp, 0.3_wp, 0.4_wp, 0.5_wp]
 
 contains
 
@@ -64,6 +66,29 @@ contains
 
     lane_values = spread(value * (1.0_wp + 0.03_wp * variants), 2, count)
   end function lane_values
+
+  !> Elements whose keys have the same number for every element, a little different in every lane.
+  function lane_keys(stem, body, variants, words, values) result(given)
+    character(len=*), intent(in) :: stem   !! of the names
+    integer, intent(in) :: body(:)         !! as in `keys`, of one body each
+    integer, intent(in) :: variants(:)
+    character(len=*), intent(in) :: words  !! keys
+    real(wp), intent(in) :: values(:)      !! [keys]
+    type(given_keys_t) :: given
+    integer :: e, k
+
+    given = keys(numbered_names(stem, size(body)), body, words, &
+                 [((values(k) * (1.0_wp + 0.03_wp * variants), e=1, size(body)), k=1, size(values))], size(variants))
+  end function lane_keys
+
+  !> Numbers that are a little different in every lane, [numbers, lanes].
+  pure function all_lanes(numbers, variants)
+    real(wp), intent(in) :: numbers(:)
+    integer, intent(in) :: variants(:)
+    real(wp) :: all_lanes(size(numbers), size(variants))
+
+    all_lanes = spread(numbers, 2, size(variants)) * spread(1.0_wp + 0.03_wp * variants, 1, size(numbers))
+  end function all_lanes
 
   !> A curve for every element, a little different in every lane, [lanes, elements].
   function curves(x, y, interpolation, extrapolation, variants, count) result(all_curves)
@@ -162,125 +187,64 @@ contains
   subroutine add_motors(bodies, variants, machine)
     integer, intent(in) :: bodies, variants(:)
     type(machine_t), intent(inout) :: machine
-    type(governor_t) :: governor
-    type(curve_t) :: table(size(variants), 1)
+    character(len=*), parameter :: circuit = 'voltage resistance flux_constant inductance'
+    real(wp), parameter :: of_circuit(4) = [24.0_wp, 2.0_wp, 1.5_wp, 0.5_wp]
+    type(given_keys_t) :: given
+    type(curve_t), allocatable :: table(:, :)
 
-    table = curves([-4.0_wp, 0.0_wp, 1.0_wp, 4.0_wp], [50.0_wp, 60.0_wp, 40.0_wp, -30.0_wp], &
-                   interpolation_linear, extrapolation_linear, variants, 1)
-    allocate (governor%set_speed, source=lane_values(1.0_wp, variants, 1))
-    allocate (governor%gain, source=lane_values(0.3_wp, variants, 1))
-    allocate (governor%time, source=lane_values(0.4_wp, variants, 1))
-    allocate (governor%start, source=lane_values(0.5_wp, variants, 1))
-    associate (one => lane_values(1.0_wp, variants, 1))
-      call append_bank(machine%banks, &
-                       new_induction_motors(numbered_names('induction', 1), [1], 60.0_wp * one, 0.3_wp * one, 10.0_wp * one))
-      call append_bank(machine%banks, &
-                       new_table_motors(numbered_names('table', 1), [bodies], table))
-      call append_bank(machine%banks, &
-                       new_motors(numbered_names('governed', 1), [2], 30.0_wp * one, 3.0_wp * one, 0.1_wp * one, governor, &
-                                  2.0_wp * one))
-      call append_bank(machine%banks, &
-                       new_table_motors(numbered_names('throttled', 1), [1], table, governor, 0.0_wp * one))
-      call append_bank(machine%banks, &
-                       new_dc_motors(numbered_names('dc', 1), [2], 24.0_wp * one, 2.0_wp * one, 1.5_wp * one, &
-                                     0.5_wp * one))
-      call append_bank(machine%banks, &
-                       new_dc_motors(numbered_names('drive', 1), [bodies], 24.0_wp * one, 2.0_wp * one, 1.5_wp * one, &
-                                     0.5_wp * one, governor))
-    end associate
-    call add_three_phase_motors(bodies, variants, governor, machine)
+    call append_bank(machine%banks, new_induction_motors(lane_keys('induction', [1], variants, &
+                                    'breakdown_torque breakdown_slip synchronous_speed', [60.0_wp, 0.3_wp, 10.0_wp])))
+    given = lane_keys('table', [bodies], variants, '', [real(wp) ::])
+    call given%add_table('table_speed', curves([-4.0_wp, 0.0_wp, 1.0_wp, 4.0_wp], [50.0_wp, 60.0_wp, 40.0_wp, -30.0_wp], &
+                                               interpolation_linear, extrapolation_linear, variants, 1))
+    call append_bank(machine%banks, new_table_motors(given))
+    table = given%curve
+    call append_bank(machine%banks, new_motors(lane_keys('governed', [2], variants, 'a b c flux_constant ' // governor, &
+                                                         [30.0_wp, 3.0_wp, 0.1_wp, 1.4_wp, of_governor])))
+    given = lane_keys('throttled', [1], variants, governor, of_governor)
+    call given%add_table('table_speed', table)
+    call append_bank(machine%banks, new_table_motors(given))
+    call append_bank(machine%banks, new_dc_motors(lane_keys('dc', [2], variants, circuit, of_circuit)))
+    call append_bank(machine%banks, new_dc_motors(lane_keys('drive', [bodies], variants, circuit // ' ' // governor, &
+                                                            [of_circuit, of_governor])))
+    call add_three_phase_motors(bodies, variants, machine)
   end subroutine add_motors
 
   !> Motors on mains and inverters.
-  subroutine add_three_phase_motors(bodies, variants, governor, machine)
+  subroutine add_three_phase_motors(bodies, variants, machine)
     integer, intent(in) :: bodies, variants(:)
-    type(governor_t), intent(inout) :: governor
     type(machine_t), intent(inout) :: machine
+    character(len=*), parameter :: circuit = &   ! inductances are given partly as reactances
+      'voltage frequency stator_resistance rotor_resistance stator_leakage rotor_reactance mutual_inductance'
+    real(wp), parameter :: of_circuit(7) = [30.0_wp, 12.0_wp, 0.4_wp, 0.5_wp, 0.05_wp, 0.6_wp, 0.8_wp]
+    type(given_keys_t) :: given
 
-    associate (one => lane_values(1.0_wp, variants, 1))
-      call append_bank(machine%banks, &
-                       new_synchronous_motors(numbered_names('starting', 1), [1], slip_curves(variants), 4.0_wp * one, &
-                                              4.0_wp + 0.0_wp * one, sign(1.0_wp, one), 0.3_wp * one))
-      governor%least = -1.0_wp
-      call set_courses(variants, governor)
-      call append_bank(machine%banks, &
-                       new_inverter_motors(numbered_names('inverter', 1), [bodies], 20.0_wp * one, governor, ripple(variants)))
-      call append_bank(machine%banks, new_flux_motors(numbered_names('fluxes', 1), [bodies], circuits(variants), &
-                                                      4.0_wp + 0.0_wp * one, sign(1.0_wp, -one), .true.))
-      call append_bank(machine%banks, new_flux_motors(numbered_names('supplied', 1), [1], circuits(variants), &
-                                                      2.0_wp + 0.0_wp * one, sign(1.0_wp, one), .true., supply(variants)))
-    end associate
+    given = lane_keys('starting', [1], variants, 'frequency phase', [4.0_wp, 0.3_wp])
+    call given%add_list('poles', [4.0_wp])
+    call given%add_list('slips', [0.0_wp, 0.3_wp, 1.0_wp])
+    call given%add_list('mean_torques', all_lanes([0.0_wp, 20.0_wp, 12.0_wp], variants))
+    call given%add_list('pulsations', all_lanes([0.0_wp, 5.0_wp, 9.0_wp], variants))
+    call append_bank(machine%banks, new_synchronous_motors(given))
+    given = lane_keys('inverter', [bodies], variants, 'torque_limit ' // governor, [20.0_wp, of_governor])
+    call given%add_list('poles', [2.0_wp])
+    call given%add_list('set_times', [0.05_wp, 0.5_wp, 4.0_wp])
+    call given%add_list('set_speeds', all_lanes([0.5_wp, 1.0_wp, -1.0_wp], variants))
+    call given%add_list('harmonics', [2.0_wp, 6.0_wp])
+    call given%add_list('harmonic_shares', all_lanes([0.1_wp, 0.1_wp], variants))
+    call given%add_list('harmonic_torques', all_lanes([0.5_wp, 0.5_wp], variants))
+    call given%add_list('harmonic_phases', all_lanes([0.3_wp, 0.3_wp], variants))
+    call append_bank(machine%banks, new_inverter_motors(given))
+    given = lane_keys('fluxes', [bodies], variants, circuit, of_circuit)
+    call given%add_list('poles', [4.0_wp])
+    call given%add_list('reversed', [1.0_wp])
+    call append_bank(machine%banks, new_flux_motors(given))
+    given = lane_keys('supplied', [1], variants, circuit, of_circuit)
+    call given%add_list('poles', [2.0_wp])
+    call given%add_list('supply_times', all_lanes([0.05_wp, 0.4_wp, 0.5_wp], variants))
+    call given%add_list('supply_factors', all_lanes([0.6_wp, 0.0_wp, 1.7_wp], variants))
+    call given%add_list('supply_ramps', all_lanes([0.2_wp, 0.0_wp, 3.0_wp], variants))
+    call append_bank(machine%banks, new_flux_motors(given))
   end subroutine add_three_phase_motors
-
-  !> A mean torque and a pulsation.
-  function slip_curves(variants) result(curves)
-    integer, intent(in) :: variants(:)
-    type(slip_curves_t) :: curves(size(variants), 1)
-    integer :: l
-
-    do l = 1, size(variants)
-      curves(l, 1)%slip = [0.0_wp, 0.3_wp, 1.0_wp]
-      curves(l, 1)%mean = [0.0_wp, 20.0_wp, 12.0_wp + variants(l)]
-      curves(l, 1)%pulsation = [0.0_wp, 5.0_wp + variants(l), 9.0_wp]
-    end do
-  end function slip_curves
-
-  !> Set speeds that rise from 0.05 s on.
-  subroutine set_courses(variants, governor)
-    integer, intent(in) :: variants(:)
-    type(governor_t), intent(inout) :: governor
-    integer :: l
-
-    allocate (governor%course(size(variants), 1))   ! gfortran 12: `source` copies the pointers to allocatable components
-    do l = 1, size(variants)
-      call join_points([0.05_wp, 0.5_wp, 4.0_wp], [0.5_wp, 1.0_wp + 0.03_wp * variants(l), -1.0_wp], governor%course(l, 1))
-    end do
-  end subroutine set_courses
-
-  !> Two harmonics of a motor.
-  function ripple(variants) result(harmonics)
-    integer, intent(in) :: variants(:)
-    type(torque_harmonics_t) :: harmonics
-
-    associate (one => reshape(lane_values(1.0_wp, variants, 2), [size(variants), 1, 2]))
-      harmonics%order = 0.0_wp * one
-      harmonics%order(:, 1, 1) = 2.0_wp
-      harmonics%order(:, 1, 2) = 6.0_wp
-      harmonics%share = 0.1_wp * one
-      harmonics%torque = 0.5_wp * one
-      harmonics%phase = 0.3_wp * one
-    end associate
-  end function ripple
-
-  !> A part of the voltage within a ramp, then disconnected, then another ramp.
-  function supply(variants) result(schedule)
-    integer, intent(in) :: variants(:)
-    type(schedule_t) :: schedule(size(variants), 1)
-    integer :: l
-
-    do l = 1, size(variants)
-      associate (factor => 1.0_wp + 0.03_wp * variants(l))
-        call schedule(l, 1)%append(0.05_wp, 0.0_wp, 0.0_wp, .true.)
-        call schedule(l, 1)%append(0.05_wp * factor, 0.1_wp * factor, factor, .false.)
-        call schedule(l, 1)%append(0.4_wp * factor, 0.0_wp, 0.0_wp, .true.)
-        call schedule(l, 1)%append(0.5_wp * factor, factor, 0.2_wp * factor, .false.)
-        call schedule(l, 1)%append(4.0_wp, 1.7_wp * factor, 0.0_wp, .false.)
-      end associate
-    end do
-  end function supply
-
-  !> The circuit of one induction motor, with inductances that are given partly as reactances, [lanes, 1, keys].
-  function circuits(variants)
-    integer, intent(in) :: variants(:)
-    real(wp) :: circuits(size(variants), 1, size(circuit_keys))
-    real(wp), parameter :: typical(size(circuit_keys)) = [30.0_wp, 12.0_wp, 0.4_wp, 0.5_wp, 0.05_wp, 0.0_wp, 0.8_wp, &
-                                                          0.0_wp, 0.6_wp, 0.0_wp]
-    integer :: k
-
-    do k = 1, size(circuit_keys)
-      circuits(:, :, k) = lane_values(typical(k), variants, 1)
-    end do
-  end function circuits
 
   subroutine add_loads(bodies, variants, machine)
     integer, intent(in) :: bodies, variants(:)

@@ -20,6 +20,7 @@ module nocdyn_test_machines
   use nocdyn_piston_forces, only: new_piston_force, periodic_force_t
   use nocdyn_relation_rows, only: new_relation_rows
   use nocdyn_splines, only: spline_smooth
+  use nocdyn_test_given_keys, only: keys
   use nocdyn_text, only: string_t, strings, to_text
   use nocdyn_tooth_losses, only: new_tooth_losses, teeth_t
   implicit none (type, external)
@@ -40,7 +41,7 @@ contains
     machine%names = strings([character(len=7) :: 'motor', 'pinion', 'machine'])
     call install(machine%banks, new_couplings(coupling_common_t(strings(['coupling']), [1], [2], row([0.0_wp]), &
                                                                 row([0.0_wp])), row([100.0_wp]), row([10.0_wp])))
-    call install(machine%banks, new_motors(strings(['drive']), [1], row([200.0_wp]), row([10.0_wp]), row([1.0_wp])))
+    call install(machine%banks, new_motors(keys(strings(['drive']), [1], 'a b c', [200.0_wp, 10.0_wp, 1.0_wp])))
     call install(machine%banks, new_loads(strings(['work']), [3], row([100.0_wp])))
     if (abs(amplitude) > 0.0_wp) then
       call install(machine%banks, new_excitations(strings(['shaker']), [1], row([amplitude]), row([5.0_wp]), &
@@ -61,8 +62,7 @@ contains
                                                                 row([0.3_wp, 0.2_wp, 0.0_wp, -0.1_wp, 0.4_wp])), &
                                               row([30.0_wp, 100.0_wp, 80.0_wp, 50.0_wp, 20.0_wp]), &
                                               row([5.0_wp, 10.0_wp, -4.0_wp, 0.0_wp, 0.0_wp])))
-    call install(machine%banks, new_motors(numbered_names('motor', 1), [1], row([90.0_wp]), row([6.0_wp]), &
-                                           row([0.5_wp])))
+    call install(machine%banks, new_motors(keys(numbered_names('motor', 1), [1], 'a b c', [90.0_wp, 6.0_wp, 0.5_wp])))
     call install(machine%banks, new_loads(numbered_names('load', 1), [3], row([12.0_wp])))
     call install(machine%banks, new_excitations(numbered_names('shaker', 2), [2, 4], row([8.0_wp, 5.0_wp]), &
                                                 row([3.0_wp, 7.0_wp]), row([0.5_wp, -1.0_wp])))
@@ -83,8 +83,7 @@ contains
                                                                   [(i + 1, i=1, bodies - 1)], 1.0e-4_wp * stiffness, &
                                                                   0.0_wp * stiffness), stiffness, 10.0_wp * stiffness))
     end associate
-    call install(machine%banks, new_motors(numbered_names('motor', 1), [1], row([100.0_wp]), row([0.0_wp]), &
-                                           row([0.0_wp])))
+    call install(machine%banks, new_motors(keys(numbered_names('motor', 1), [1], 'a', [100.0_wp])))
     call install(machine%banks, new_loads(numbered_names('load', 1), [bodies], row([10.0_wp])))
     call finish(machine, [integer ::], 1)
   end function long_chain
@@ -100,8 +99,7 @@ contains
                                                                 row([0.0_wp, 0.1_wp, -0.2_wp, 0.0_wp])), &
                                               row([60.0_wp, 40.0_wp, 90.0_wp, 10.0_wp]), &
                                               row([4.0_wp, 0.0_wp, 7.0_wp, 0.0_wp])))
-    call install(machine%banks, new_motors(numbered_names('motor', 1), [1], row([150.0_wp]), row([8.0_wp]), &
-                                           row([0.3_wp])))
+    call install(machine%banks, new_motors(keys(numbered_names('motor', 1), [1], 'a b c', [150.0_wp, 8.0_wp, 0.3_wp])))
     call install(machine%banks, new_loads(numbered_names('load', 2), [3, 7], row([5.0_wp, 20.0_wp])))
     machine%constraints = gear_rows(7, reshape([1, 2, 2, 3, 2, 4, 5, 6], [2, 4]), &
                                     row([2.0_wp, 3.0_wp, 1.5_wp, -4.0_wp, 1.0_wp, 2.5_wp, 1.0_wp, 1.25_wp]))
@@ -115,8 +113,7 @@ contains
     machine = machine_of_bodies(row([4.0_wp, 2.0_wp, 6.0_wp, 1.0_wp, 3.0_wp]))
     call install(machine%banks, new_couplings(coupling_common_t(numbered_names('shaft', 1), [3], [5], row([0.5_wp]), &
                                                                 row([0.0_wp])), row([60.0_wp]), row([4.0_wp])))
-    call install(machine%banks, new_motors(numbered_names('motor', 1), [1], row([150.0_wp]), row([8.0_wp]), &
-                                           row([0.3_wp])))
+    call install(machine%banks, new_motors(keys(numbered_names('motor', 1), [1], 'a b c', [150.0_wp, 8.0_wp, 0.3_wp])))
     call install(machine%banks, new_loads(numbered_names('load', 2), [4, 5], row([5.0_wp, 20.0_wp])))
     machine%constraints = gear_rows(5, reshape([1, 2, 2, 3, 3, 4, 4, 1], [2, 4]), &
                                     row([0.2_wp, 0.3_wp, 0.3_wp, 0.5_wp, 0.5_wp, 0.4_wp, 0.4_wp, 0.2_wp]))
@@ -136,8 +133,7 @@ contains
     machine%nodes = 0
     call install(machine%banks, new_couplings(coupling_common_t(numbered_names('shaft', 1), [4], [5], row([0.5_wp]), &
                                                                 row([0.0_wp])), row([60.0_wp]), row([4.0_wp])))
-    call install(machine%banks, new_motors(numbered_names('motor', 1), [1], row([150.0_wp]), row([8.0_wp]), &
-                                           row([0.3_wp])))
+    call install(machine%banks, new_motors(keys(numbered_names('motor', 1), [1], 'a b c', [150.0_wp, 8.0_wp, 0.3_wp])))
     call append_bank(machine%banks, new_cardan_rows(numbered_names('cardan', 1), [3], row([0.4_wp]), row([0.3_wp])))
     call append_bank(machine%banks, new_phases(1, numbered_names('cardan', 1), [2]))
     call append_bank(machine%banks, new_relation_rows(1, numbered_names('cam', 1), [4], [1, 6], &
@@ -190,7 +186,7 @@ contains
 
     allocate (banks(4))
     call install(banks, new_couplings(coupling_common_t(names, [integer ::], [integer ::], none, none), none, none))
-    call install(banks, new_motors(names, [integer ::], none, none, none))
+    call install(banks, new_motors(keys(names, [integer ::], '', [real(wp) ::], lanes)))
     call install(banks, new_loads(names, [integer ::], none))
     call install(banks, new_excitations(names, [integer ::], none, none, none))
   end function element_banks

@@ -7,6 +7,7 @@ module nocdyn_test_random_machines
   use nocdyn_loads, only: new_loads
   use nocdyn_machine, only: machine_t
   use nocdyn_motors, only: new_motors
+  use nocdyn_test_given_keys, only: keys
   use nocdyn_test_machines, only: machine_of_bodies, finish, gear_rows, install, numbered_names
   use nocdyn_test_random, only: random_stream, random_stream_t
   implicit none (type, external)
@@ -118,8 +119,9 @@ contains
     do i = 1, size(body)
       body(i) = layout%whole(1, machine%bodies)
     end do
-    call install(machine%banks, new_motors(numbered_names('motor', 2), body(1:2), drawn(lanes, 50.0_wp, 200.0_wp, 2), &
-                                           drawn(lanes, 1.0_wp, 10.0_wp, 2), drawn(lanes, -1.0_wp, 1.0_wp, 2)))
+    call install(machine%banks, new_motors(keys(numbered_names('motor', 2), body(1:2), 'a b c', &
+                                                [drawn(lanes, 50.0_wp, 200.0_wp, 2), drawn(lanes, 1.0_wp, 10.0_wp, 2), &
+                                                 drawn(lanes, -1.0_wp, 1.0_wp, 2)])))
     call install(machine%banks, new_loads(numbered_names('load', 3), body(3:5), drawn(lanes, 1.0_wp, 100.0_wp, 3)))
     call install(machine%banks, new_excitations(numbered_names('shaker', 2), body(6:7), &
                                                 drawn(lanes, 1.0_wp, 30.0_wp, 2), drawn(lanes, 1.0_wp, 8.0_wp, 2), &
