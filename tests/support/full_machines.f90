@@ -15,8 +15,8 @@ module nocdyn_test_full_machines
   use nocdyn_machine, only: machine_t
   use nocdyn_mesh_phases, only: new_mesh_phases
   use nocdyn_motors, only: new_induction_motors, new_motors, new_table_motors
-  use nocdyn_load_shares, only: new_load_shares, shared_load_t
-  use nocdyn_loads, only: new_nonlinear_loads
+  use nocdyn_load_shares, only: new_load_shares
+  use nocdyn_loads, only: new_loads
   use nocdyn_order_excitations, only: new_order_excitations, order_torque_t
   use nocdyn_polynomial_couplings, only: new_polynomial_couplings, polynomial_couplings_t
   use nocdyn_saturated_couplings, only: new_saturated_couplings
@@ -249,22 +249,21 @@ contains
   subroutine add_loads(bodies, variants, machine)
     integer, intent(in) :: bodies, variants(:)
     type(machine_t), intent(inout) :: machine
+    type(given_keys_t) :: given
 
-    associate (one => lane_values(1.0_wp, variants, 2))
-      call append_bank(machine%banks, &
-                       new_nonlinear_loads(numbered_names('fan', 2), [1, bodies], one, 0.5_wp * one, &
-                                           5.0_wp * one, 0.7_wp * one))
-      call append_bank(machine%banks, &
-                       new_nonlinear_loads(numbered_names('mill', 2), [2, 2], one, 0.5_wp * one, 0.0_wp * one, one, &
-                                           curves([-2.0_wp, 0.0_wp, 2.5_wp], [-10.0_wp, 0.0_wp, 30.0_wp], interpolation_cubic, &
-                                                  extrapolation_constant, variants, 2)))
-    end associate
+    call append_bank(machine%banks, new_loads(lane_keys('fan', [1, bodies], variants, &
+                                    'viscous quadratic constant constant_speed', [1.0_wp, 0.5_wp, 5.0_wp, 0.7_wp])))
+    given = lane_keys('mill', [2, 2], variants, 'viscous quadratic constant_speed', [1.0_wp, 0.5_wp, 1.0_wp])
+    call given%add_table('table_speed', curves([-2.0_wp, 0.0_wp, 2.5_wp], [-10.0_wp, 0.0_wp, 30.0_wp], interpolation_cubic, &
+                                               extrapolation_constant, variants, 2))
+    call append_bank(machine%banks, new_loads(given))
   end subroutine add_loads
 
   subroutine add_excitations(bodies, variants, machine)
     integer, intent(in) :: bodies, variants(:)
     type(machine_t), intent(inout) :: machine
     type(fault_terms_t) :: faults(2)
+    type(given_keys_t) :: given
 
     call set_fault(faults(1))
     call set_fault(faults(2))
@@ -272,26 +271,25 @@ contains
     call add_shares(bodies, variants, machine)
     associate (one => lane_values(1.0_wp, variants, 3))
       call append_bank(machine%banks, &
-                       new_wave_excitations(numbered_names('gas', 2), [1, bodies], [1, 1, 2], 9.0_wp * one, &
+                       new_wave_excitations(lane_keys('gas', [1, bodies], variants, '', [real(wp) ::]), [1, 1, 2], 9.0_wp * one, &
                                             spread([0.0_wp, 0.0_wp, 3.0_wp], 1, size(variants)), &
                                             spread([0.5_wp, 1.0_wp, -2.0_wp], 1, size(variants)), 0.4_wp * one))
-      call append_bank(machine%banks, &
-                       new_timed_excitations(numbered_names('impact', 3), [1, 2, bodies], &
-                                             [shape_step, shape_ramp, shape_pulse], 12.0_wp * one, &
-                                             0.35_wp * one, 0.2_wp * one))
-      call append_bank(machine%banks, new_fault_excitations(numbered_names('fault', 2), [1, bodies], &
-                                                            faults, 0.3_wp * one(:, :2)))
-      select type (bank => machine%banks(size(machine%banks))%bank)
-      class is (excitation_bank_t)
-        call bank%set_window(0.4_wp * one(:, :2), 0.9_wp * one(:, :2), 2.0_wp * one(:, :2))
-      class default
-        error stop 'full_machine: a fault is an excitation'
-      end select
-      call append_bank(machine%banks, &
-                       new_table_excitations(numbered_names('record', 1), [2], &
-                                             curves([0.1_wp, 0.3_wp, 0.6_wp], [0.0_wp, 20.0_wp, -10.0_wp], interpolation_linear, &
-                                                    extrapolation_constant, variants, 1)))
     end associate
+    call append_bank(machine%banks, new_timed_excitations(lane_keys('impact', [1, 2, bodies], variants, &
+                                                                    'amplitude time duration', [12.0_wp, 0.35_wp, 0.2_wp]), &
+                                                          [shape_step, shape_ramp, shape_pulse]))
+    given = lane_keys('fault', [1, bodies], variants, 'time start end decay', [0.3_wp, 0.4_wp, 0.9_wp, 0.5_wp])
+    call append_bank(machine%banks, new_fault_excitations(given, faults))
+    select type (bank => machine%banks(size(machine%banks))%bank)
+    class is (excitation_bank_t)
+      call bank%set_window(given, 1)
+    class default
+      error stop 'full_machine: a fault is an excitation'
+    end select
+    given = lane_keys('record', [2], variants, '', [real(wp) ::])
+    call given%add_table('table_time', curves([0.1_wp, 0.3_wp, 0.6_wp], [0.0_wp, 20.0_wp, -10.0_wp], interpolation_linear, &
+                                              extrapolation_constant, variants, 1))
+    call append_bank(machine%banks, new_table_excitations(given))
   end subroutine add_excitations
 
   !> A constant and two sines that decay.
@@ -333,16 +331,14 @@ contains
   subroutine add_shares(bodies, variants, machine)
     integer, intent(in) :: bodies, variants(:)
     type(machine_t), intent(inout) :: machine
-    type(shared_load_t) :: load
+    type(given_keys_t) :: blades
 
-    associate (one => lane_values(1.0_wp, variants, 2))
-      load%viscous = 2.0_wp * one
-      load%quadratic = 0.5_wp * one
-      load%constant = one
-      load%constant_speed = 0.7_wp * one
-      call append_bank(machine%banks, new_load_shares(numbered_names('blades', 2), [bodies, 1], [1, 2], 0.1_wp * one, &
-                                                      5.0_wp * one, one, load))
-    end associate
+    blades = lane_keys('blades', [bodies, 1], variants, '', [real(wp) ::])
+    call blades%add_list('share_of_load', all_lanes([0.1_wp], variants))
+    call blades%add_list('orders', all_lanes([5.0_wp], variants))
+    call blades%add_list('phases', all_lanes([1.0_wp], variants))
+    call append_bank(machine%banks, new_load_shares(blades, lane_keys('water', [bodies, 1], variants, &
+                                    'viscous quadratic constant constant_speed', [2.0_wp, 0.5_wp, 1.0_wp, 0.7_wp])))
   end subroutine add_shares
 
 end module nocdyn_test_full_machines

@@ -139,7 +139,6 @@ contains
     real(wp), allocatable :: numbers(:)
     integer :: i
 
-    if (element > size(self%names)) error stop 'nocdyn_test_given_keys: there are not so many elements'
     allocate (numbers(0))
     do i = 1, size(self%list)
       if (self%list(i)%key == key) numbers = self%list(i)%numbers(:, min(lane, size(self%list(i)%numbers, 2)))

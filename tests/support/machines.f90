@@ -42,10 +42,9 @@ contains
     call install(machine%banks, new_couplings(coupling_common_t(strings(['coupling']), [1], [2], row([0.0_wp]), &
                                                                 row([0.0_wp])), row([100.0_wp]), row([10.0_wp])))
     call install(machine%banks, new_motors(keys(strings(['drive']), [1], 'a b c', [200.0_wp, 10.0_wp, 1.0_wp])))
-    call install(machine%banks, new_loads(strings(['work']), [3], row([100.0_wp])))
+    call install(machine%banks, new_loads(keys(strings(['work']), [3], 'viscous', [100.0_wp])))
     if (abs(amplitude) > 0.0_wp) then
-      call install(machine%banks, new_excitations(strings(['shaker']), [1], row([amplitude]), row([5.0_wp]), &
-                                                  row([0.0_wp])))
+      call install(machine%banks, new_excitations(keys(strings(['shaker']), [1], 'amplitude frequency', [amplitude, 5.0_wp])))
     end if
     machine%constraints = gear_rows(3, reshape([2, 3], [2, 1]), row([2.0_wp, 3.0_wp]))
     machine%constraints%names(1)%text = 'reducer'
@@ -63,9 +62,9 @@ contains
                                               row([30.0_wp, 100.0_wp, 80.0_wp, 50.0_wp, 20.0_wp]), &
                                               row([5.0_wp, 10.0_wp, -4.0_wp, 0.0_wp, 0.0_wp])))
     call install(machine%banks, new_motors(keys(numbered_names('motor', 1), [1], 'a b c', [90.0_wp, 6.0_wp, 0.5_wp])))
-    call install(machine%banks, new_loads(numbered_names('load', 1), [3], row([12.0_wp])))
-    call install(machine%banks, new_excitations(numbered_names('shaker', 2), [2, 4], row([8.0_wp, 5.0_wp]), &
-                                                row([3.0_wp, 7.0_wp]), row([0.5_wp, -1.0_wp])))
+    call install(machine%banks, new_loads(keys(numbered_names('load', 1), [3], 'viscous', [12.0_wp])))
+    call install(machine%banks, new_excitations(keys(numbered_names('shaker', 2), [2, 4], 'amplitude frequency phase', &
+                                                     [8.0_wp, 5.0_wp, 3.0_wp, 7.0_wp, 0.5_wp, -1.0_wp])))
     machine%start_angle = row([0.1_wp, -0.2_wp, 0.3_wp, 0.05_wp])
     machine%start_speed = row([1.0_wp, 0.5_wp, -0.4_wp, 2.0_wp])
     call finish(machine, [integer ::], 1)
@@ -84,7 +83,7 @@ contains
                                                                   0.0_wp * stiffness), stiffness, 10.0_wp * stiffness))
     end associate
     call install(machine%banks, new_motors(keys(numbered_names('motor', 1), [1], 'a', [100.0_wp])))
-    call install(machine%banks, new_loads(numbered_names('load', 1), [bodies], row([10.0_wp])))
+    call install(machine%banks, new_loads(keys(numbered_names('load', 1), [bodies], 'viscous', [10.0_wp])))
     call finish(machine, [integer ::], 1)
   end function long_chain
 
@@ -100,7 +99,7 @@ contains
                                               row([60.0_wp, 40.0_wp, 90.0_wp, 10.0_wp]), &
                                               row([4.0_wp, 0.0_wp, 7.0_wp, 0.0_wp])))
     call install(machine%banks, new_motors(keys(numbered_names('motor', 1), [1], 'a b c', [150.0_wp, 8.0_wp, 0.3_wp])))
-    call install(machine%banks, new_loads(numbered_names('load', 2), [3, 7], row([5.0_wp, 20.0_wp])))
+    call install(machine%banks, new_loads(keys(numbered_names('load', 2), [3, 7], 'viscous', [5.0_wp, 20.0_wp])))
     machine%constraints = gear_rows(7, reshape([1, 2, 2, 3, 2, 4, 5, 6], [2, 4]), &
                                     row([2.0_wp, 3.0_wp, 1.5_wp, -4.0_wp, 1.0_wp, 2.5_wp, 1.0_wp, 1.25_wp]))
     call finish(machine, [integer ::], choice)
@@ -114,7 +113,7 @@ contains
     call install(machine%banks, new_couplings(coupling_common_t(numbered_names('shaft', 1), [3], [5], row([0.5_wp]), &
                                                                 row([0.0_wp])), row([60.0_wp]), row([4.0_wp])))
     call install(machine%banks, new_motors(keys(numbered_names('motor', 1), [1], 'a b c', [150.0_wp, 8.0_wp, 0.3_wp])))
-    call install(machine%banks, new_loads(numbered_names('load', 2), [4, 5], row([5.0_wp, 20.0_wp])))
+    call install(machine%banks, new_loads(keys(numbered_names('load', 2), [4, 5], 'viscous', [5.0_wp, 20.0_wp])))
     machine%constraints = gear_rows(5, reshape([1, 2, 2, 3, 3, 4, 4, 1], [2, 4]), &
                                     row([0.2_wp, 0.3_wp, 0.3_wp, 0.5_wp, 0.5_wp, 0.4_wp, 0.4_wp, 0.2_wp]))
     call finish(machine, [integer ::], 1)
@@ -187,8 +186,8 @@ contains
     allocate (banks(4))
     call install(banks, new_couplings(coupling_common_t(names, [integer ::], [integer ::], none, none), none, none))
     call install(banks, new_motors(keys(names, [integer ::], '', [real(wp) ::], lanes)))
-    call install(banks, new_loads(names, [integer ::], none))
-    call install(banks, new_excitations(names, [integer ::], none, none, none))
+    call install(banks, new_loads(keys(names, [integer ::], '', [real(wp) ::], lanes)))
+    call install(banks, new_excitations(keys(names, [integer ::], '', [real(wp) ::], lanes)))
   end function element_banks
 
   !> Replaces the bank of the same role.

@@ -122,10 +122,11 @@ contains
     call install(machine%banks, new_motors(keys(numbered_names('motor', 2), body(1:2), 'a b c', &
                                                 [drawn(lanes, 50.0_wp, 200.0_wp, 2), drawn(lanes, 1.0_wp, 10.0_wp, 2), &
                                                  drawn(lanes, -1.0_wp, 1.0_wp, 2)])))
-    call install(machine%banks, new_loads(numbered_names('load', 3), body(3:5), drawn(lanes, 1.0_wp, 100.0_wp, 3)))
-    call install(machine%banks, new_excitations(numbered_names('shaker', 2), body(6:7), &
-                                                drawn(lanes, 1.0_wp, 30.0_wp, 2), drawn(lanes, 1.0_wp, 8.0_wp, 2), &
-                                                drawn(lanes, -3.0_wp, 3.0_wp, 2)))
+    call install(machine%banks, new_loads(keys(numbered_names('load', 3), body(3:5), 'viscous', &
+                                               [drawn(lanes, 1.0_wp, 100.0_wp, 3)])))
+    call install(machine%banks, new_excitations(keys(numbered_names('shaker', 2), body(6:7), 'amplitude frequency phase', &
+                                                     [drawn(lanes, 1.0_wp, 30.0_wp, 2), drawn(lanes, 1.0_wp, 8.0_wp, 2), &
+                                                      drawn(lanes, -3.0_wp, 3.0_wp, 2)])))
   end subroutine add_torques
 
   !> Random numbers of every lane from its own stream, [lanes, count].

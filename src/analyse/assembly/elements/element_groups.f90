@@ -8,7 +8,7 @@ module nocdyn_element_groups
   use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_schema_rules, only: ground
-  use nocdyn_text, only: selected, string_t
+  use nocdyn_text, only: string_t
   use nocdyn_text_sort, only: argsort, sorted_position
   use nocdyn_written_values, only: written_element
   implicit none (type, external)
@@ -28,7 +28,7 @@ module nocdyn_element_groups
     type(input_t), pointer :: input => null()
     type(body_index_t), pointer, private :: body_index => null()
   contains
-    procedure :: has, values, numbers, curves, bodies, listed_bodies, some
+    procedure :: has, values, numbers, curves, bodies, listed_bodies, some, select
   end type element_groups_t
 
   abstract interface
@@ -79,18 +79,27 @@ contains
     character(len=*), intent(in) :: kind   !! 'coupling', 'motor' ...
     integer, intent(in) :: lanes
     type(body_index_t), target, intent(in), optional :: body_index   !! for `bodies`
-    integer :: i
 
     groups%lanes = lanes
     groups%input => input
     if (present(body_index)) groups%body_index => body_index
     groups%t_start = input%groups(input%position('run'))%number('t_start')
-    allocate (groups%indices, source=input%groups_named(kind))
-    allocate (groups%names(size(groups%indices)))
-    do i = 1, size(groups%indices)
-      groups%names(i)%text = input%groups(groups%indices(i))%name
-    end do
+    call groups%select(input%groups_named(kind))
   end function new_element_groups
+
+  !> Makes them other groups of the input.
+  subroutine select(self, indices)
+    class(element_groups_t), intent(inout) :: self
+    integer, intent(in) :: indices(:)
+    integer :: i
+
+    self%indices = indices
+    if (allocated(self%names)) deallocate (self%names)
+    allocate (self%names(size(indices)))
+    do i = 1, size(indices)
+      self%names(i)%text = self%input%groups(indices(i))%name
+    end do
+  end subroutine select
 
   !> Adds a bank of form 1, perhaps empty, and one of each other form that some groups have.
   subroutine add_banks(groups, form_of, add_form, banks)
@@ -111,14 +120,9 @@ contains
   type(element_groups_t) function some(groups, mask)
     class(element_groups_t), intent(in) :: groups
     logical, intent(in) :: mask(:)   !! [groups]
-    integer :: i
 
-    some%lanes = groups%lanes
-    some%t_start = groups%t_start
-    some%input => groups%input
-    some%body_index => groups%body_index
-    allocate (some%indices, source=pack(groups%indices, mask))
-    allocate (some%names, source=selected(groups%names, pack([(i, i=1, size(mask))], mask)))
+    some = groups
+    call some%select(pack(groups%indices, mask))
   end function some
 
   pure logical function has(self, key)
@@ -157,7 +161,6 @@ contains
     integer, intent(in) :: lane, element
     real(wp), allocatable :: numbers(:)
 
-    if (lane > self%lanes) error stop 'nocdyn_element_groups: there are not so many lanes'
     numbers = self%input%groups(self%indices(element))%numbers(key)
   end function numbers
 
