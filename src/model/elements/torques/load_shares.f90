@@ -16,7 +16,7 @@ module nocdyn_load_shares
   public :: new_load_shares
 
   type, extends(wave_excitations_t), public :: load_shares_t
-    logical :: has_quadratic = .false.
+    integer :: quadratic_switch = 0   !! as in `resistance`
   contains
     procedure :: torque
     procedure :: list_harmonics
@@ -30,16 +30,15 @@ contains
     class(element_keys_t), intent(in) :: load   !! the keys of the load of each excitation
     type(load_shares_t) :: bank
     integer, allocatable :: owner(:)
-    logical :: has_quadratic
-    integer :: e
+    integer :: e, switch
 
     allocate (owner, source=[(spread(e, 1, size(keys%numbers('orders', 1, e))), e=1, size(keys%names))])
     associate (share => terms('share_of_load'))
       bank%wave_excitations_t = new_wave_excitations(keys, owner, share, 0.0_wp * share, terms('orders'), terms('phases'))
     end associate
     call bank%add_parameter('viscous', load%values('viscous'), is_key=.false.)
-    call add_resistance(bank, load, .false., has_quadratic)
-    bank%has_quadratic = has_quadratic
+    call add_resistance(bank, load, .false., switch)
+    bank%quadratic_switch = switch
     call bank%prepare_law()
 
   contains
@@ -62,7 +61,7 @@ contains
     type(law_tape_t), target, intent(inout) :: tape
     type(expression_t) :: torque
 
-    torque = (self%parameter(tape, 'viscous') * speed_of(tape) - resistance(self, self%has_quadratic, tape)) &
+    torque = (self%parameter(tape, 'viscous') * speed_of(tape) - resistance(self, self%quadratic_switch, tape)) &
              * self%sum_of_waves(tape)
   end function torque
 

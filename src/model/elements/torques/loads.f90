@@ -17,7 +17,7 @@ module nocdyn_loads
   public :: new_loads, add_resistance, resistance
 
   type, extends(bank_t), public :: loads_t
-    logical :: has_quadratic = .false.
+    integer :: quadratic_switch = 0   !! as in `resistance`
   contains
     procedure :: describe
   end type loads_t
@@ -28,7 +28,7 @@ contains
   function new_loads(keys) result(bank)
     class(element_keys_t), intent(in) :: keys
     type(loads_t) :: bank
-    logical :: has_quadratic
+    integer :: switch
 
     call bank%connect(role_load, keys)
     call bank%add_key(keys, 'viscous')
@@ -37,41 +37,42 @@ contains
                                 keys%has('table_speed'))
     bank%has_paper_law = bank%is_polynomial
     if (bank%is_polynomial) return
-    call add_resistance(bank, keys, .true., has_quadratic)
-    bank%has_quadratic = has_quadratic
+    call add_resistance(bank, keys, .true., switch)
+    bank%quadratic_switch = switch
     call bank%prepare_law()
   end function new_loads
 
   !> Adds the parameters, tables and switches of `resistance`.
-  subroutine add_resistance(bank, keys, are_own, has_quadratic)
+  subroutine add_resistance(bank, keys, are_own, switch)
     class(bank_t), intent(inout) :: bank
     class(element_keys_t), intent(in) :: keys   !! of a load for each element
     logical, intent(in) :: are_own              !! whether they are the keys of the elements themselves
-    logical, intent(out) :: has_quadratic       !! as in `resistance`
+    integer, intent(out) :: switch              !! as in `resistance`
     integer :: e
 
     call bank%add_parameter('quadratic', keys%values('quadratic'), are_own)
     call bank%add_parameter('constant', keys%values('constant'), are_own)
     call bank%add_parameter('constant_speed', keys%values('constant_speed', absent=1.0_wp), are_own)
     if (keys%has('table_speed')) call add_table(bank, keys%curves('table_speed', 'table_torque'))
-    has_quadratic = any(abs(keys%values('quadratic')) > 0)
-    if (has_quadratic) call bank%add_switches([('standstill', e=1, bank%count)], 2)
+    switch = 0
+    if (.not. any(abs(keys%values('quadratic')) > 0)) return
+    call bank%add_switches([('standstill', e=1, bank%count)], 2)
+    switch = size(bank%switch_element) / bank%count
   end subroutine add_resistance
 
   subroutine describe(self, tape)
     class(loads_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape
 
-    tape%applied = node_of(resistance(self, self%has_quadratic, tape))
+    tape%applied = node_of(resistance(self, self%quadratic_switch, tape))
   end subroutine describe
 
   !> The moment that resists, without its viscous part: a formula of a bank with the parameters and switches of such loads.
-  function resistance(bank, has_quadratic, tape) result(moment)
+  function resistance(bank, switch, tape) result(moment)
     class(bank_t), intent(in) :: bank
-    logical, intent(in) :: has_quadratic   !! whether its last switch is the one of `quadratic`
+    integer, intent(in) :: switch          !! of `quadratic` among the ones of an element; 0: there is no such term
     type(law_tape_t), target, intent(inout) :: tape
     type(expression_t) :: moment, speed, speed_scale
-    integer :: switch
 
     speed = speed_of(tape)
     speed_scale = bank%parameter(tape, 'constant_speed')
@@ -80,8 +81,7 @@ contains
       moment = moment - curve_value(tape, speed)
       call guard_segment(tape, speed)
     end if
-    if (has_quadratic) then
-      switch = size(bank%switch_element) / bank%count
+    if (switch > 0) then
       moment = moment - pick(switch, [literal(tape, 1.0_wp), literal(tape, -1.0_wp)]) * bank%parameter(tape, 'quadratic') &
                * (speed * speed)
       call add_guard(switch, 1, speed, boundary_width * speed_scale)
