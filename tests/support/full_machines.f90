@@ -68,17 +68,20 @@ contains
   end function lane_values
 
   !> Elements whose keys have the same number for every element, a little different in every lane.
-  function lane_keys(stem, body, variants, words, values) result(given)
+  function lane_keys(stem, body, variants, words, values, ends) result(given)
     character(len=*), intent(in) :: stem   !! of the names
-    integer, intent(in) :: body(:)         !! as in `keys`, of one body each
+    integer, intent(in) :: body(:)         !! as in `keys`
     integer, intent(in) :: variants(:)
     character(len=*), intent(in) :: words  !! keys
     real(wp), intent(in) :: values(:)      !! [keys]
+    integer, intent(in), optional :: ends  !! bodies of each element; absent: 1
     type(given_keys_t) :: given
-    integer :: e, k
+    integer :: e, elements, k
 
-    given = keys(numbered_names(stem, size(body)), body, words, &
-                 [((values(k) * (1.0_wp + 0.03_wp * variants), e=1, size(body)), k=1, size(values))], size(variants))
+    elements = size(body)
+    if (present(ends)) elements = size(body) / ends
+    given = keys(numbered_names(stem, elements), body, words, &
+                 [((values(k) * (1.0_wp + 0.03_wp * variants), e=1, elements), k=1, size(values))], size(variants))
   end function lane_keys
 
   !> Numbers that are a little different in every lane, [numbers, lanes].
@@ -109,79 +112,75 @@ contains
     integer, intent(in) :: bodies, variants(:)
     type(machine_t), intent(inout) :: machine
     real(wp), parameter :: twist(4) = [-0.5_wp, -0.1_wp, 0.2_wp, 0.6_wp], moment(4) = [-30.0_wp, -4.0_wp, 5.0_wp, 60.0_wp]
-    real(wp) :: coefficient(5, size(variants), 2)
-    integer :: k
+    real(wp), parameter :: coefficients(5) = [50.0_wp, 25.0_wp, 50.0_wp / 3.0_wp, 12.5_wp, 10.0_wp]
+    type(given_keys_t) :: given
 
-    do k = 1, 5
-      coefficient(k, :, :) = lane_values(50.0_wp / k, variants, 2)
-    end do
-    associate (one => lane_values(1.0_wp, variants, 2), friction => lane_values(4.0_wp, variants, 2), &
-               friction_speed => lane_values(0.5_wp, variants, 2))
-      call append_bank(machine%banks, &
-                       new_polynomial_couplings(coupling_common_t(numbered_names('polynomial', 2), [0, 1], [1, bodies], one, &
-                                                                  0.1_wp * one, friction, friction_speed), coefficient))
-      call append_bank(machine%banks, &
-                       new_gap_couplings(coupling_common_t(numbered_names('gap', 2), [bodies, 0], [1, 2], 4.0_wp * one, &
-                                                           0.1_wp * one), coefficient, 0.3_wp * one))
-      call append_bank(machine%banks, &
-                       new_saturated_couplings(coupling_common_t(numbered_names('clutch', 2), [1, 2], [2, 0], 0.0_wp * one, &
-                                                                 0.1_wp * one, friction, friction_speed), 80.0_wp * one, &
-                                               20.0_wp * one))
-      call append_bank(machine%banks, &
-                       new_table_couplings(coupling_common_t(numbered_names('rubber', 2), [0, 1], [2, 2], one, 0.1_wp * one), &
-                                           curves(twist, moment, interpolation_cubic, extrapolation_linear, variants, 2)))
-    end associate
+    given = lane_keys('polynomial', [0, 1, 1, bodies], variants, 'damping rest_twist friction friction_speed', &
+                      [1.0_wp, 0.1_wp, 4.0_wp, 0.5_wp], 2)
+    call given%add_list('polynomial', all_lanes(coefficients, variants))
+    call append_bank(machine%banks, new_polynomial_couplings(given))
+    given = lane_keys('gap', [bodies, 0, 1, 2], variants, 'damping rest_twist gap', [4.0_wp, 0.1_wp, 0.3_wp], 2)
+    call given%add_list('polynomial', all_lanes(coefficients, variants))
+    call append_bank(machine%banks, new_gap_couplings(given))
+    call append_bank(machine%banks, new_saturated_couplings(lane_keys('clutch', [1, 2, 2, 0], variants, &
+                                    'rest_twist friction friction_speed stiffness saturation', &
+                                    [0.1_wp, 4.0_wp, 0.5_wp, 80.0_wp, 20.0_wp], 2)))
+    given = lane_keys('rubber', [0, 1, 2, 2], variants, 'damping rest_twist', [1.0_wp, 0.1_wp], 2)
+    call given%add_table('table_twist', curves(twist, moment, interpolation_cubic, extrapolation_linear, variants, 2))
+    call append_bank(machine%banks, new_table_couplings(given))
   end subroutine add_couplings
 
   !> Couplings along random rows of several bodies and the ground, smooth ones and ones with a gap.
   subroutine add_rows(seed, bodies, variants, machine)
     integer, intent(in) :: seed, bodies, variants(:)
     type(machine_t), intent(inout) :: machine
+    type(coupling_common_t) :: shared
     type(element_rows_t) :: rows
+    type(given_keys_t) :: given
     type(random_stream_t) :: numbers
-    real(wp) :: cubic(size(variants), 3)
     integer :: b
+    integer, parameter :: no_bodies(6) = 0   ! of the keys
 
     numbers = random_stream(7 * seed)
     rows = new_element_rows([1, bodies + 1, bodies + 4, bodies + 6], [(b, b=1, bodies), 1, 0, bodies, 2, 1], &
                             [(numbers%number(-1.5_wp, 1.5_wp), b=1, bodies + 5)])
-    cubic = lane_values(6.0_wp, variants, 3)
-    associate (one => lane_values(1.0_wp, variants, 3))
-      call append_bank(machine%banks, &
-                       new_couplings(coupling_common_t(numbered_names('mesh', 3), rows, 0.8_wp * one, 0.1_wp * one), &
-                                     40.0_wp * one, cubic))
-      call append_bank(machine%banks, &
-                       new_gap_couplings(coupling_common_t(numbered_names('play', 3), rows, 0.5_wp * one, 0.0_wp * one), &
-                                         spread(30.0_wp * one, 1, 1), 0.2_wp * one))
-    end associate
+    given = lane_keys('mesh', no_bodies, variants, 'damping rest_twist stiffness cubic_stiffness', &
+                      [0.8_wp, 0.1_wp, 40.0_wp, 6.0_wp], 2)
+    shared = coupling_common_t(given)
+    shared%rows = rows
+    call append_bank(machine%banks, new_couplings(given, shared))
+    given = lane_keys('play', no_bodies, variants, 'damping stiffness gap', [0.5_wp, 30.0_wp, 0.2_wp], 2)
+    shared = coupling_common_t(given)
+    shared%rows = rows
+    call append_bank(machine%banks, new_gap_couplings(given, shared))
   end subroutine add_rows
 
   !> Meshes with transmission errors, one with and one without a gap, each followed by its phase.
   subroutine add_meshes(bodies, variants, machine)
     integer, intent(in) :: bodies, variants(:)
     type(machine_t), intent(inout) :: machine
-    type(coupling_common_t) :: common
+    type(coupling_common_t) :: shared
+    type(given_keys_t) :: given
     type(gap_couplings_t) :: rattling
     type(polynomial_couplings_t) :: tight
-    real(wp), allocatable :: stiffness(:, :, :)
 
-    stiffness = spread(lane_values(35.0_wp, variants, 1), 1, 2)
-    associate (one => lane_values(1.0_wp, variants, 1))
-      common = coupling_common_t(numbered_names('teeth', 1), new_element_rows([1, 3], [2, bodies], [0.7_wp, 1.1_wp]), &
-                                 0.6_wp * one, 0.0_wp * one, one, 0.4_wp * one)
-      allocate (common%error)
-      common%error%order = [1.0_wp, 2.5_wp]
-      common%error%amplitude = [0.2_wp, 0.07_wp]
-      common%error%phase = [0.3_wp, -1.0_wp]
-      tight = new_polynomial_couplings(common, stiffness)
-      call append_bank(machine%banks, tight)
-      call append_bank(machine%banks, new_mesh_phases(tight))
-      common%names = numbered_names('rattle', 1)
-      common%rows = new_element_rows([1, 3], [bodies, 1], [0.9_wp, -1.3_wp])
-      rattling = new_gap_couplings(common, stiffness, 0.2_wp * one)
-      call append_bank(machine%banks, rattling)
-      call append_bank(machine%banks, new_mesh_phases(rattling))
-    end associate
+    given = lane_keys('teeth', [2, bodies], variants, 'damping friction friction_speed stiffness', &
+                      [0.6_wp, 1.0_wp, 0.4_wp, 35.0_wp], 2)
+    shared = coupling_common_t(given)
+    shared%rows = new_element_rows([1, 3], [2, bodies], [0.7_wp, 1.1_wp])
+    allocate (shared%error)
+    shared%error%order = [1.0_wp, 2.5_wp]
+    shared%error%amplitude = [0.2_wp, 0.07_wp]
+    shared%error%phase = [0.3_wp, -1.0_wp]
+    tight = new_polynomial_couplings(given, shared)
+    call append_bank(machine%banks, tight)
+    call append_bank(machine%banks, new_mesh_phases(tight))
+    given = lane_keys('rattle', [bodies, 1], variants, 'stiffness gap', [35.0_wp, 0.2_wp], 2)
+    shared%names = given%names
+    shared%rows = new_element_rows([1, 3], [bodies, 1], [0.9_wp, -1.3_wp])
+    rattling = new_gap_couplings(given, shared)
+    call append_bank(machine%banks, rattling)
+    call append_bank(machine%banks, new_mesh_phases(rattling))
   end subroutine add_meshes
 
   subroutine add_motors(bodies, variants, machine)

@@ -6,7 +6,7 @@ module nocdyn_test_machines
   use nocdyn_constraint_analysis, only: analyse_constraints
   use nocdyn_constraints, only: constraints_t, new_constraints
   use nocdyn_coordinates, only: build_coordinates
-  use nocdyn_couplings, only: coupling_common_t, new_couplings
+  use nocdyn_couplings, only: new_couplings
   use nocdyn_crank_rows, only: new_crank_rows, slider_crank_t
   use nocdyn_curves, only: extrapolation_constant, interpolation_linear, new_curve
   use nocdyn_drives, only: drive_motion_t, new_drives
@@ -29,6 +29,8 @@ module nocdyn_test_machines
   public :: paper_machine, damped_chain, long_chain, branched_train, gear_loop, moving_machine, machine_of_bodies
   public :: install, gear_rows, numbered_names, finish, row
 
+  character(len=*), parameter :: coupling = 'damping rest_twist stiffness cubic_stiffness'   ! keys
+
 contains
 
   !> The machine of the paper's section 7.
@@ -39,8 +41,8 @@ contains
 
     machine = machine_of_bodies(row([10.0_wp, 5.0_wp, 5.0_wp]))
     machine%names = strings([character(len=7) :: 'motor', 'pinion', 'machine'])
-    call install(machine%banks, new_couplings(coupling_common_t(strings(['coupling']), [1], [2], row([0.0_wp]), &
-                                                                row([0.0_wp])), row([100.0_wp]), row([10.0_wp])))
+    call install(machine%banks, new_couplings(keys(strings(['coupling']), [1, 2], coupling, &
+                                                   [0.0_wp, 0.0_wp, 100.0_wp, 10.0_wp])))
     call install(machine%banks, new_motors(keys(strings(['drive']), [1], 'a b c', [200.0_wp, 10.0_wp, 1.0_wp])))
     call install(machine%banks, new_loads(keys(strings(['work']), [3], 'viscous', [100.0_wp])))
     if (abs(amplitude) > 0.0_wp) then
@@ -56,11 +58,11 @@ contains
     class(machine_t), allocatable :: machine
 
     machine = machine_of_bodies(row([4.0_wp, 2.0_wp, 1.0_wp, 3.0_wp]))
-    call install(machine%banks, new_couplings(coupling_common_t(numbered_names('spring', 5), [0, 1, 2, 3, 4], [1, 2, 3, 4, 0], &
-                                                                row([0.7_wp, 3.0_wp, 0.0_wp, 1.5_wp, 0.0_wp]), &
-                                                                row([0.3_wp, 0.2_wp, 0.0_wp, -0.1_wp, 0.4_wp])), &
-                                              row([30.0_wp, 100.0_wp, 80.0_wp, 50.0_wp, 20.0_wp]), &
-                                              row([5.0_wp, 10.0_wp, -4.0_wp, 0.0_wp, 0.0_wp])))
+    call install(machine%banks, new_couplings(keys(numbered_names('spring', 5), [0, 1, 2, 3, 4, 1, 2, 3, 4, 0], coupling, &
+                                                   [0.7_wp, 3.0_wp, 0.0_wp, 1.5_wp, 0.0_wp, &
+                                                    0.3_wp, 0.2_wp, 0.0_wp, -0.1_wp, 0.4_wp, &
+                                                    30.0_wp, 100.0_wp, 80.0_wp, 50.0_wp, 20.0_wp, &
+                                                    5.0_wp, 10.0_wp, -4.0_wp, 0.0_wp, 0.0_wp])))
     call install(machine%banks, new_motors(keys(numbered_names('motor', 1), [1], 'a b c', [90.0_wp, 6.0_wp, 0.5_wp])))
     call install(machine%banks, new_loads(keys(numbered_names('load', 1), [3], 'viscous', [12.0_wp])))
     call install(machine%banks, new_excitations(keys(numbered_names('shaker', 2), [2, 4], 'amplitude frequency phase', &
@@ -77,11 +79,9 @@ contains
     integer :: i
 
     machine = machine_of_bodies(row([(1.0_wp, i=1, bodies)]))
-    associate (stiffness => row([(1.0e4_wp, i=1, bodies - 1)]))
-      call install(machine%banks, new_couplings(coupling_common_t(numbered_names('shaft', bodies - 1), [(i, i=1, bodies - 1)], &
-                                                                  [(i + 1, i=1, bodies - 1)], 1.0e-4_wp * stiffness, &
-                                                                  0.0_wp * stiffness), stiffness, 10.0_wp * stiffness))
-    end associate
+    call install(machine%banks, new_couplings(keys(numbered_names('shaft', bodies - 1), &
+                                                   [(i, i=1, bodies - 1), (i + 1, i=1, bodies - 1)], coupling, &
+                                                   [1.0_wp, 0.0_wp, 1.0e4_wp, 1.0e5_wp])))
     call install(machine%banks, new_motors(keys(numbered_names('motor', 1), [1], 'a', [100.0_wp])))
     call install(machine%banks, new_loads(keys(numbered_names('load', 1), [bodies], 'viscous', [10.0_wp])))
     call finish(machine, [integer ::], 1)
@@ -93,11 +93,11 @@ contains
     class(machine_t), allocatable :: machine
 
     machine = machine_of_bodies(row([4.0_wp, 2.0_wp, 6.0_wp, 1.0_wp, 3.0_wp, 2.5_wp, 8.0_wp]))
-    call install(machine%banks, new_couplings(coupling_common_t(numbered_names('shaft', 4), [4, 3, 6, 0], [5, 5, 7, 7], &
-                                                                row([0.5_wp, 0.0_wp, 1.0_wp, 0.2_wp]), &
-                                                                row([0.0_wp, 0.1_wp, -0.2_wp, 0.0_wp])), &
-                                              row([60.0_wp, 40.0_wp, 90.0_wp, 10.0_wp]), &
-                                              row([4.0_wp, 0.0_wp, 7.0_wp, 0.0_wp])))
+    call install(machine%banks, new_couplings(keys(numbered_names('shaft', 4), [4, 3, 6, 0, 5, 5, 7, 7], coupling, &
+                                                   [0.5_wp, 0.0_wp, 1.0_wp, 0.2_wp, &
+                                                    0.0_wp, 0.1_wp, -0.2_wp, 0.0_wp, &
+                                                    60.0_wp, 40.0_wp, 90.0_wp, 10.0_wp, &
+                                                    4.0_wp, 0.0_wp, 7.0_wp, 0.0_wp])))
     call install(machine%banks, new_motors(keys(numbered_names('motor', 1), [1], 'a b c', [150.0_wp, 8.0_wp, 0.3_wp])))
     call install(machine%banks, new_loads(keys(numbered_names('load', 2), [3, 7], 'viscous', [5.0_wp, 20.0_wp])))
     machine%constraints = gear_rows(7, reshape([1, 2, 2, 3, 2, 4, 5, 6], [2, 4]), &
@@ -110,8 +110,8 @@ contains
     class(machine_t), allocatable :: machine
 
     machine = machine_of_bodies(row([4.0_wp, 2.0_wp, 6.0_wp, 1.0_wp, 3.0_wp]))
-    call install(machine%banks, new_couplings(coupling_common_t(numbered_names('shaft', 1), [3], [5], row([0.5_wp]), &
-                                                                row([0.0_wp])), row([60.0_wp]), row([4.0_wp])))
+    call install(machine%banks, new_couplings(keys(numbered_names('shaft', 1), [3, 5], coupling, &
+                                                   [0.5_wp, 0.0_wp, 60.0_wp, 4.0_wp])))
     call install(machine%banks, new_motors(keys(numbered_names('motor', 1), [1], 'a b c', [150.0_wp, 8.0_wp, 0.3_wp])))
     call install(machine%banks, new_loads(keys(numbered_names('load', 2), [4, 5], 'viscous', [5.0_wp, 20.0_wp])))
     machine%constraints = gear_rows(5, reshape([1, 2, 2, 3, 3, 4, 4, 1], [2, 4]), &
@@ -130,8 +130,8 @@ contains
     machine = machine_of_bodies(row([4.0_wp, 2.0_wp, 6.0_wp, 1.0_wp, 3.0_wp]))
     call machine%add_nodes(numbered_names('part', 4), [1.5_wp, 0.8_wp, 0.8_wp, 0.1_wp])
     machine%nodes = 0
-    call install(machine%banks, new_couplings(coupling_common_t(numbered_names('shaft', 1), [4], [5], row([0.5_wp]), &
-                                                                row([0.0_wp])), row([60.0_wp]), row([4.0_wp])))
+    call install(machine%banks, new_couplings(keys(numbered_names('shaft', 1), [4, 5], coupling, &
+                                                   [0.5_wp, 0.0_wp, 60.0_wp, 4.0_wp])))
     call install(machine%banks, new_motors(keys(numbered_names('motor', 1), [1], 'a b c', [150.0_wp, 8.0_wp, 0.3_wp])))
     call append_bank(machine%banks, new_cardan_rows(numbered_names('cardan', 1), [3], row([0.4_wp]), row([0.3_wp])))
     call append_bank(machine%banks, new_phases(1, numbered_names('cardan', 1), [2]))
@@ -181,10 +181,9 @@ contains
     integer, intent(in) :: lanes
     type(bank_slot_t), allocatable :: banks(:)
     type(string_t) :: names(0)
-    real(wp) :: none(lanes, 0)
 
     allocate (banks(4))
-    call install(banks, new_couplings(coupling_common_t(names, [integer ::], [integer ::], none, none), none, none))
+    call install(banks, new_couplings(keys(names, [integer ::], '', [real(wp) ::], lanes)))
     call install(banks, new_motors(keys(names, [integer ::], '', [real(wp) ::], lanes)))
     call install(banks, new_loads(keys(names, [integer ::], '', [real(wp) ::], lanes)))
     call install(banks, new_excitations(keys(names, [integer ::], '', [real(wp) ::], lanes)))

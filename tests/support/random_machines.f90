@@ -1,7 +1,7 @@
 !> Random machines of any size, different with every seed, of one lane or several.
 module nocdyn_test_random_machines
   use nocdyn_constraints, only: constraints_t
-  use nocdyn_couplings, only: coupling_common_t, new_couplings
+  use nocdyn_couplings, only: new_couplings
   use nocdyn_excitations, only: new_excitations
   use nocdyn_kinds, only: wp
   use nocdyn_loads, only: new_loads
@@ -95,7 +95,7 @@ contains
     type(random_stream_t), intent(inout) :: layout, lanes(:)
     type(machine_t), intent(inout) :: machine
     integer :: from(machine%bodies), to(machine%bodies)
-    real(wp), dimension(size(lanes), machine%bodies) :: cubic, damping, stiffness
+    real(wp), dimension(size(lanes), machine%bodies) :: cubic, damping, rest, stiffness
     integer :: i
 
     do i = 1, machine%bodies
@@ -106,8 +106,10 @@ contains
     damping(:, 3::3) = 0.0_wp
     stiffness = drawn(lanes, 50.0_wp, 150.0_wp, machine%bodies)
     cubic = drawn(lanes, -10.0_wp, 10.0_wp, machine%bodies)
-    call install(machine%banks, new_couplings(coupling_common_t(numbered_names('shaft', machine%bodies), from, to, damping, &
-                                                                drawn(lanes, -0.3_wp, 0.3_wp, machine%bodies)), stiffness, cubic))
+    rest = drawn(lanes, -0.3_wp, 0.3_wp, machine%bodies)
+    call install(machine%banks, new_couplings(keys(numbered_names('shaft', machine%bodies), [from, to], &
+                                                   'damping rest_twist stiffness cubic_stiffness', &
+                                                   [damping, rest, stiffness, cubic])))
   end subroutine add_couplings
 
   !> Two motors, three loads, two excitations, which may share bodies.
