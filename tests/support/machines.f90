@@ -9,7 +9,7 @@ module nocdyn_test_machines
   use nocdyn_couplings, only: new_couplings
   use nocdyn_crank_rows, only: new_crank_rows, slider_crank_t
   use nocdyn_curves, only: extrapolation_constant, interpolation_linear, new_curve
-  use nocdyn_drives, only: drive_motion_t, new_drives
+  use nocdyn_drives, only: new_drives
   use nocdyn_errors, only: error_t
   use nocdyn_excitations, only: new_excitations
   use nocdyn_kinds, only: wp
@@ -20,7 +20,7 @@ module nocdyn_test_machines
   use nocdyn_piston_forces, only: new_piston_force, periodic_force_t
   use nocdyn_relation_rows, only: new_relation_rows
   use nocdyn_splines, only: spline_smooth
-  use nocdyn_test_given_keys, only: keys
+  use nocdyn_test_given_keys, only: given_keys_t, keys
   use nocdyn_text, only: string_t, strings, to_text
   use nocdyn_tooth_losses, only: new_tooth_losses, teeth_t
   implicit none (type, external)
@@ -124,6 +124,7 @@ contains
   function moving_machine() result(machine)
     class(machine_t), allocatable :: machine
     type(string_t) :: names(4)
+    type(given_keys_t) :: given
     type(teeth_t) :: teeth
     integer :: k
 
@@ -133,11 +134,12 @@ contains
     call install(machine%banks, new_couplings(keys(numbered_names('shaft', 1), [4, 5], coupling, &
                                                    [0.5_wp, 0.0_wp, 60.0_wp, 4.0_wp])))
     call install(machine%banks, new_motors(keys(numbered_names('motor', 1), [1], 'a b c', [150.0_wp, 8.0_wp, 0.3_wp])))
-    call append_bank(machine%banks, new_cardan_rows(numbered_names('cardan', 1), [3], row([0.4_wp]), row([0.3_wp])))
+    call append_bank(machine%banks, new_cardan_rows(keys(numbered_names('cardan', 1), [2, 3], 'angle phase', [0.4_wp, 0.3_wp])))
     call append_bank(machine%banks, new_phases(1, numbered_names('cardan', 1), [2]))
-    call append_bank(machine%banks, new_relation_rows(1, numbered_names('cam', 1), [4], [1, 6], &
-                                                      reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.8_wp, 3.0_wp, 0.3_wp, 5.0_wp, -0.6_wp, &
-                                                               6.0_wp, 0.0_wp], [2, 5]), [.true.], [spline_smooth]))
+    given = keys(numbered_names('cam', 1), [3, 4], '', [real(wp) ::])
+    call given%add_list('table_angle', [0.0_wp, 1.0_wp, 3.0_wp, 5.0_wp, 6.0_wp])
+    call given%add_list('table_driven', [0.0_wp, 0.8_wp, 0.3_wp, -0.6_wp, 0.0_wp])
+    call append_bank(machine%banks, new_relation_rows(given, [.true.], [spline_smooth]))
     call append_bank(machine%banks, new_phases(1, numbered_names('cam', 1), [3]))
     names = numbered_names('crank', 4)
     call append_bank(machine%banks, new_crank_rows(1, names, [6, 7, 8, 9], &
@@ -146,8 +148,8 @@ contains
     call append_bank(machine%banks, new_piston_force(1, names(1), 6, 0.7_wp, &
                                                      periodic_force_t(0.5_wp, 3.0_wp, [2.0_wp, 1.0_wp], [0.5_wp, -4.0_wp])))
     call append_bank(machine%banks, new_phases(1, names(:1), [3]))
-    call append_bank(machine%banks, new_drives(numbered_names('drive', 1), [5], 0.0_wp, .false., &
-                                               drive_motion_t(row([2.0_wp]), row([3.0_wp]), row([1.7_wp]), row([0.4_wp]))))
+    call append_bank(machine%banks, new_drives(keys(numbered_names('drive', 1), [5], 'speed speed_amplitude frequency phase', &
+                                                    [2.0_wp, 3.0_wp, 1.7_wp, 0.4_wp]), .false.))
     machine%constraints = gear_rows(9, reshape([1, 2], [2, 1]), row([2.0_wp, 3.0_wp]))
     teeth%row = [1]
     teeth%factor = [2.0_wp]

@@ -17,7 +17,7 @@ module nocdyn_element_keys
     procedure(numbers_interface), deferred :: numbers
     procedure(curves_interface), deferred :: curves
     procedure(bodies_interface), deferred :: bodies
-    procedure :: longest, lists
+    procedure :: longest, lists, joined, owners
   end type element_keys_t
 
   abstract interface
@@ -95,5 +95,28 @@ contains
       end do
     end do
   end function lists
+
+  !> The lists of all elements one after the other, [lanes, numbers].
+  pure function joined(self, key) result(numbers)
+    class(element_keys_t), intent(in) :: self
+    character(len=*), intent(in) :: key
+    real(wp), allocatable :: numbers(:, :)
+    integer :: e, lane
+
+    allocate (numbers(self%lanes, size(self%owners(key))))
+    do lane = 1, self%lanes
+      numbers(lane, :) = [(self%numbers(key, lane, e), e=1, size(self%names))]
+    end do
+  end function joined
+
+  !> The element of each of these numbers.
+  pure function owners(self, key)
+    class(element_keys_t), intent(in) :: self
+    character(len=*), intent(in) :: key
+    integer, allocatable :: owners(:)
+    integer :: e
+
+    allocate (owners, source=[(spread(e, 1, size(self%numbers(key, 1, e))), e=1, size(self%names))])
+  end function owners
 
 end module nocdyn_element_keys

@@ -29,31 +29,16 @@ contains
     class(element_keys_t), intent(in) :: keys
     class(element_keys_t), intent(in) :: load   !! the keys of the load of each excitation
     type(load_shares_t) :: bank
-    integer, allocatable :: owner(:)
-    integer :: e, switch
+    integer :: switch
 
-    allocate (owner, source=[(spread(e, 1, size(keys%numbers('orders', 1, e))), e=1, size(keys%names))])
-    associate (share => terms('share_of_load'))
-      bank%wave_excitations_t = new_wave_excitations(keys, owner, share, 0.0_wp * share, terms('orders'), terms('phases'))
+    associate (share => keys%joined('share_of_load'))
+      bank%wave_excitations_t = new_wave_excitations(keys, keys%owners('orders'), share, 0.0_wp * share, keys%joined('orders'), &
+                                                     keys%joined('phases'))
     end associate
     call bank%add_parameter('viscous', load%values('viscous'), is_key=.false.)
     call add_resistance(bank, load, .false., switch)
     bank%quadratic_switch = switch
     call bank%prepare_law()
-
-  contains
-
-    !> The numbers of all excitations, [lanes, terms].
-    function terms(key)
-      character(len=*), intent(in) :: key   !! of lists
-      real(wp) :: terms(keys%lanes, size(owner))
-      integer :: i, lane
-
-      do lane = 1, keys%lanes
-        terms(lane, :) = [(keys%numbers(key, lane, i), i=1, size(keys%names))]
-      end do
-    end function terms
-
   end function new_load_shares
 
   function torque(self, tape)
