@@ -104,7 +104,7 @@ contains
   !> Couplings by eq. (3). Those without damping and friction in all lanes have no work integral.
   function new_couplings(keys, common) result(bank)
     class(element_keys_t), intent(in) :: keys
-    type(coupling_common_t), intent(in), optional :: common   !! absent: as the keys say
+    type(coupling_common_t), intent(in), optional :: common   !! of meshes; absent: as the keys say
     type(couplings_t) :: bank
     real(wp), dimension(keys%lanes, size(keys%names)) :: cubic_stiffness
     integer :: e

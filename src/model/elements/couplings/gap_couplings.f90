@@ -37,7 +37,7 @@ contains
   !> twist is at the middle of the gap, the friction acts in the gap and in contact.
   function new_gap_couplings(keys, common) result(bank)
     class(element_keys_t), intent(in) :: keys
-    type(coupling_common_t), intent(in), optional :: common   !! absent: as the keys say
+    type(coupling_common_t), intent(in), optional :: common   !! of meshes; absent: as the keys say
     type(gap_couplings_t) :: bank
     real(wp), allocatable :: coefficient(:, :, :), gap(:, :)
     integer :: e

@@ -28,9 +28,8 @@ module nocdyn_maxwell_couplings
 contains
 
   !> Couplings by eq. (3) with branches, without moments in these at the start.
-  function new_maxwell_couplings(keys, common) result(bank)
+  function new_maxwell_couplings(keys) result(bank)
     class(element_keys_t), intent(in) :: keys
-    type(coupling_common_t), intent(in), optional :: common   !! absent: as the keys say
     type(maxwell_couplings_t) :: bank
     integer :: e, k
 
@@ -39,7 +38,7 @@ contains
     do k = 1, bank%states
       bank%internal_names(k) = 'moment of branch ' // to_text(k)
     end do
-    call bank%set_keys(keys, common)
+    call bank%set_common(coupling_common_t(keys))
     call bank%add_key(keys, 'stiffness')
     call bank%add_key(keys, 'cubic_stiffness')
     call bank%add_parts('branch stiffness', keys%lists('maxwell_stiffness', bank%states))

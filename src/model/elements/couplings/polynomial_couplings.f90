@@ -27,7 +27,7 @@ contains
   !> Couplings with the elastic moment sum p_k w^k.
   function new_polynomial_couplings(keys, common) result(bank)
     class(element_keys_t), intent(in) :: keys
-    type(coupling_common_t), intent(in), optional :: common   !! absent: as the keys say
+    type(coupling_common_t), intent(in), optional :: common   !! of meshes; absent: as the keys say
     type(polynomial_couplings_t) :: bank
     real(wp), allocatable :: coefficient(:, :, :)
     integer :: e

@@ -18,13 +18,12 @@ module nocdyn_saturated_couplings
 contains
 
   !> Couplings with the elastic moment saturation * tanh(stiffness * w / saturation).
-  function new_saturated_couplings(keys, common) result(bank)
+  function new_saturated_couplings(keys) result(bank)
     class(element_keys_t), intent(in) :: keys
-    type(coupling_common_t), intent(in), optional :: common   !! absent: as the keys say
     type(saturated_couplings_t) :: bank
     integer :: e
 
-    call bank%set_keys(keys, common)
+    call bank%set_common(coupling_common_t(keys))
     call bank%add_damping()
     call bank%add_key(keys, 'stiffness')
     call bank%add_key(keys, 'saturation')

@@ -19,13 +19,12 @@ module nocdyn_table_couplings
 contains
 
   !> Couplings with the elastic moment of a curve over the twist.
-  function new_table_couplings(keys, common) result(bank)
+  function new_table_couplings(keys) result(bank)
     class(element_keys_t), intent(in) :: keys
-    type(coupling_common_t), intent(in), optional :: common   !! absent: as the keys say
     type(table_couplings_t) :: bank
     integer :: e
 
-    call bank%set_keys(keys, common)
+    call bank%set_common(coupling_common_t(keys))
     call bank%add_damping()
     call add_table(bank, keys%curves('table_twist', 'table_moment'))
     bank%elastic = [(e, e=1, bank%count)]
