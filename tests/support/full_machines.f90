@@ -8,23 +8,22 @@ module nocdyn_test_full_machines
   use nocdyn_element_rows, only: element_rows_t, new_element_rows
   use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_fault_excitations, only: fault_terms_t, new_fault_excitations
-  use nocdyn_flux_motors, only: circuit_keys, new_flux_motors
+  use nocdyn_flux_motors, only: new_flux_motors
   use nocdyn_gap_couplings, only: gap_couplings_t, new_gap_couplings
-  use nocdyn_governed_banks, only: governor_t
-  use nocdyn_inverter_motors, only: new_inverter_motors, torque_harmonics_t
+  use nocdyn_inverter_motors, only: new_inverter_motors
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_mesh_phases, only: new_mesh_phases
   use nocdyn_motors, only: new_induction_motors, new_motors, new_table_motors
-  use nocdyn_load_shares, only: new_load_shares, shared_load_t
-  use nocdyn_loads, only: new_nonlinear_loads
+  use nocdyn_load_shares, only: new_load_shares
+  use nocdyn_loads, only: new_loads
   use nocdyn_order_excitations, only: new_order_excitations, order_torque_t
   use nocdyn_polynomial_couplings, only: new_polynomial_couplings, polynomial_couplings_t
   use nocdyn_saturated_couplings, only: new_saturated_couplings
-  use nocdyn_schedules, only: join_points, schedule_t
-  use nocdyn_synchronous_motors, only: new_synchronous_motors, slip_curves_t
+  use nocdyn_synchronous_motors, only: new_synchronous_motors
   use nocdyn_table_couplings, only: new_table_couplings
   use nocdyn_table_excitations, only: new_table_excitations
+  use nocdyn_test_given_keys, only: given_keys_t, keys
   use nocdyn_test_machines, only: finish, numbered_names
   use nocdyn_test_random, only: random_stream, random_stream_t
   use nocdyn_test_random_machines, only: random_machine
@@ -34,6 +33,9 @@ module nocdyn_test_full_machines
   private
 
   public :: full_machine
+
+  character(len=*), parameter :: governor = 'governor_speed governor_gain governor_time governor_start'
+  real(wp), parameter :: of_governor(4) = [1.0_wp, 0.3_wp, 0.4_wp, 0.5_wp]
 
 contains
 
@@ -65,6 +67,32 @@ contains
     lane_values = spread(value * (1.0_wp + 0.03_wp * variants), 2, count)
   end function lane_values
 
+  !> Elements whose keys have the same number for every element, a little different in every lane.
+  function lane_keys(stem, body, variants, words, values, ends) result(given)
+    character(len=*), intent(in) :: stem   !! of the names
+    integer, intent(in) :: body(:)         !! as in `keys`
+    integer, intent(in) :: variants(:)
+    character(len=*), intent(in) :: words  !! keys
+    real(wp), intent(in) :: values(:)      !! [keys]
+    integer, intent(in), optional :: ends  !! bodies of each element; absent: 1
+    type(given_keys_t) :: given
+    integer :: e, elements, k
+
+    elements = size(body)
+    if (present(ends)) elements = size(body) / ends
+    given = keys(numbered_names(stem, elements), body, words, &
+                 [((values(k) * (1.0_wp + 0.03_wp * variants), e=1, elements), k=1, size(values))], size(variants))
+  end function lane_keys
+
+  !> Numbers that are a little different in every lane, [numbers, lanes].
+  pure function all_lanes(numbers, variants)
+    real(wp), intent(in) :: numbers(:)
+    integer, intent(in) :: variants(:)
+    real(wp) :: all_lanes(size(numbers), size(variants))
+
+    all_lanes = spread(numbers, 2, size(variants)) * spread(1.0_wp + 0.03_wp * variants, 1, size(numbers))
+  end function all_lanes
+
   !> A curve for every element, a little different in every lane, [lanes, elements].
   function curves(x, y, interpolation, extrapolation, variants, count) result(all_curves)
     real(wp), intent(in) :: x(:), y(:)
@@ -84,223 +112,157 @@ contains
     integer, intent(in) :: bodies, variants(:)
     type(machine_t), intent(inout) :: machine
     real(wp), parameter :: twist(4) = [-0.5_wp, -0.1_wp, 0.2_wp, 0.6_wp], moment(4) = [-30.0_wp, -4.0_wp, 5.0_wp, 60.0_wp]
-    real(wp) :: coefficient(5, size(variants), 2)
-    integer :: k
+    real(wp), parameter :: coefficients(5) = [50.0_wp, 25.0_wp, 50.0_wp / 3.0_wp, 12.5_wp, 10.0_wp]
+    type(given_keys_t) :: given
 
-    do k = 1, 5
-      coefficient(k, :, :) = lane_values(50.0_wp / k, variants, 2)
-    end do
-    associate (one => lane_values(1.0_wp, variants, 2), friction => lane_values(4.0_wp, variants, 2), &
-               friction_speed => lane_values(0.5_wp, variants, 2))
-      call append_bank(machine%banks, &
-                       new_polynomial_couplings(coupling_common_t(numbered_names('polynomial', 2), [0, 1], [1, bodies], one, &
-                                                                  0.1_wp * one, friction, friction_speed), coefficient))
-      call append_bank(machine%banks, &
-                       new_gap_couplings(coupling_common_t(numbered_names('gap', 2), [bodies, 0], [1, 2], 4.0_wp * one, &
-                                                           0.1_wp * one), coefficient, 0.3_wp * one))
-      call append_bank(machine%banks, &
-                       new_saturated_couplings(coupling_common_t(numbered_names('clutch', 2), [1, 2], [2, 0], 0.0_wp * one, &
-                                                                 0.1_wp * one, friction, friction_speed), 80.0_wp * one, &
-                                               20.0_wp * one))
-      call append_bank(machine%banks, &
-                       new_table_couplings(coupling_common_t(numbered_names('rubber', 2), [0, 1], [2, 2], one, 0.1_wp * one), &
-                                           curves(twist, moment, interpolation_cubic, extrapolation_linear, variants, 2)))
-    end associate
+    given = lane_keys('polynomial', [0, 1, 1, bodies], variants, 'damping rest_twist friction friction_speed', &
+                      [1.0_wp, 0.1_wp, 4.0_wp, 0.5_wp], 2)
+    call given%add_list('polynomial', all_lanes(coefficients, variants))
+    call append_bank(machine%banks, new_polynomial_couplings(given))
+    given = lane_keys('gap', [bodies, 0, 1, 2], variants, 'damping rest_twist gap', [4.0_wp, 0.1_wp, 0.3_wp], 2)
+    call given%add_list('polynomial', all_lanes(coefficients, variants))
+    call append_bank(machine%banks, new_gap_couplings(given))
+    call append_bank(machine%banks, new_saturated_couplings(lane_keys('clutch', [1, 2, 2, 0], variants, &
+                                    'rest_twist friction friction_speed stiffness saturation', &
+                                    [0.1_wp, 4.0_wp, 0.5_wp, 80.0_wp, 20.0_wp], 2)))
+    given = lane_keys('rubber', [0, 1, 2, 2], variants, 'damping rest_twist', [1.0_wp, 0.1_wp], 2)
+    call given%add_table('table_twist', curves(twist, moment, interpolation_cubic, extrapolation_linear, variants, 2))
+    call append_bank(machine%banks, new_table_couplings(given))
   end subroutine add_couplings
 
   !> Couplings along random rows of several bodies and the ground, smooth ones and ones with a gap.
   subroutine add_rows(seed, bodies, variants, machine)
     integer, intent(in) :: seed, bodies, variants(:)
     type(machine_t), intent(inout) :: machine
+    type(coupling_common_t) :: shared
     type(element_rows_t) :: rows
+    type(given_keys_t) :: given
     type(random_stream_t) :: numbers
-    real(wp) :: cubic(size(variants), 3)
     integer :: b
+    integer, parameter :: no_bodies(6) = 0   ! of the keys
 
     numbers = random_stream(7 * seed)
     rows = new_element_rows([1, bodies + 1, bodies + 4, bodies + 6], [(b, b=1, bodies), 1, 0, bodies, 2, 1], &
                             [(numbers%number(-1.5_wp, 1.5_wp), b=1, bodies + 5)])
-    cubic = lane_values(6.0_wp, variants, 3)
-    associate (one => lane_values(1.0_wp, variants, 3))
-      call append_bank(machine%banks, &
-                       new_couplings(coupling_common_t(numbered_names('mesh', 3), rows, 0.8_wp * one, 0.1_wp * one), &
-                                     40.0_wp * one, cubic))
-      call append_bank(machine%banks, &
-                       new_gap_couplings(coupling_common_t(numbered_names('play', 3), rows, 0.5_wp * one, 0.0_wp * one), &
-                                         spread(30.0_wp * one, 1, 1), 0.2_wp * one))
-    end associate
+    given = lane_keys('mesh', no_bodies, variants, 'damping rest_twist stiffness cubic_stiffness', &
+                      [0.8_wp, 0.1_wp, 40.0_wp, 6.0_wp], 2)
+    shared = coupling_common_t(given)
+    shared%rows = rows
+    call append_bank(machine%banks, new_couplings(given, shared))
+    given = lane_keys('play', no_bodies, variants, 'damping stiffness gap', [0.5_wp, 30.0_wp, 0.2_wp], 2)
+    shared = coupling_common_t(given)
+    shared%rows = rows
+    call append_bank(machine%banks, new_gap_couplings(given, shared))
   end subroutine add_rows
 
   !> Meshes with transmission errors, one with and one without a gap, each followed by its phase.
   subroutine add_meshes(bodies, variants, machine)
     integer, intent(in) :: bodies, variants(:)
     type(machine_t), intent(inout) :: machine
-    type(coupling_common_t) :: common
+    type(coupling_common_t) :: shared
+    type(given_keys_t) :: given
     type(gap_couplings_t) :: rattling
     type(polynomial_couplings_t) :: tight
-    real(wp), allocatable :: stiffness(:, :, :)
 
-    stiffness = spread(lane_values(35.0_wp, variants, 1), 1, 2)
-    associate (one => lane_values(1.0_wp, variants, 1))
-      common = coupling_common_t(numbered_names('teeth', 1), new_element_rows([1, 3], [2, bodies], [0.7_wp, 1.1_wp]), &
-                                 0.6_wp * one, 0.0_wp * one, one, 0.4_wp * one)
-      allocate (common%error)
-      common%error%order = [1.0_wp, 2.5_wp]
-      common%error%amplitude = [0.2_wp, 0.07_wp]
-      common%error%phase = [0.3_wp, -1.0_wp]
-      tight = new_polynomial_couplings(common, stiffness)
-      call append_bank(machine%banks, tight)
-      call append_bank(machine%banks, new_mesh_phases(tight))
-      common%names = numbered_names('rattle', 1)
-      common%rows = new_element_rows([1, 3], [bodies, 1], [0.9_wp, -1.3_wp])
-      rattling = new_gap_couplings(common, stiffness, 0.2_wp * one)
-      call append_bank(machine%banks, rattling)
-      call append_bank(machine%banks, new_mesh_phases(rattling))
-    end associate
+    given = lane_keys('teeth', [2, bodies], variants, 'damping friction friction_speed stiffness', &
+                      [0.6_wp, 1.0_wp, 0.4_wp, 35.0_wp], 2)
+    shared = coupling_common_t(given)
+    shared%rows = new_element_rows([1, 3], [2, bodies], [0.7_wp, 1.1_wp])
+    allocate (shared%error)
+    shared%error%order = [1.0_wp, 2.5_wp]
+    shared%error%amplitude = [0.2_wp, 0.07_wp]
+    shared%error%phase = [0.3_wp, -1.0_wp]
+    tight = new_polynomial_couplings(given, shared)
+    call append_bank(machine%banks, tight)
+    call append_bank(machine%banks, new_mesh_phases(tight))
+    given = lane_keys('rattle', [bodies, 1], variants, 'stiffness gap', [35.0_wp, 0.2_wp], 2)
+    shared%names = given%names
+    shared%rows = new_element_rows([1, 3], [bodies, 1], [0.9_wp, -1.3_wp])
+    rattling = new_gap_couplings(given, shared)
+    call append_bank(machine%banks, rattling)
+    call append_bank(machine%banks, new_mesh_phases(rattling))
   end subroutine add_meshes
 
   subroutine add_motors(bodies, variants, machine)
     integer, intent(in) :: bodies, variants(:)
     type(machine_t), intent(inout) :: machine
-    type(governor_t) :: governor
-    type(curve_t) :: table(size(variants), 1)
+    character(len=*), parameter :: circuit = 'voltage resistance flux_constant inductance'
+    real(wp), parameter :: of_circuit(4) = [24.0_wp, 2.0_wp, 1.5_wp, 0.5_wp]
+    type(given_keys_t) :: given
+    type(curve_t), allocatable :: table(:, :)
 
-    table = curves([-4.0_wp, 0.0_wp, 1.0_wp, 4.0_wp], [50.0_wp, 60.0_wp, 40.0_wp, -30.0_wp], &
-                   interpolation_linear, extrapolation_linear, variants, 1)
-    allocate (governor%set_speed, source=lane_values(1.0_wp, variants, 1))
-    allocate (governor%gain, source=lane_values(0.3_wp, variants, 1))
-    allocate (governor%time, source=lane_values(0.4_wp, variants, 1))
-    allocate (governor%start, source=lane_values(0.5_wp, variants, 1))
-    associate (one => lane_values(1.0_wp, variants, 1))
-      call append_bank(machine%banks, &
-                       new_induction_motors(numbered_names('induction', 1), [1], 60.0_wp * one, 0.3_wp * one, 10.0_wp * one))
-      call append_bank(machine%banks, &
-                       new_table_motors(numbered_names('table', 1), [bodies], table))
-      call append_bank(machine%banks, &
-                       new_motors(numbered_names('governed', 1), [2], 30.0_wp * one, 3.0_wp * one, 0.1_wp * one, governor, &
-                                  2.0_wp * one))
-      call append_bank(machine%banks, &
-                       new_table_motors(numbered_names('throttled', 1), [1], table, governor, 0.0_wp * one))
-      call append_bank(machine%banks, &
-                       new_dc_motors(numbered_names('dc', 1), [2], 24.0_wp * one, 2.0_wp * one, 1.5_wp * one, &
-                                     0.5_wp * one))
-      call append_bank(machine%banks, &
-                       new_dc_motors(numbered_names('drive', 1), [bodies], 24.0_wp * one, 2.0_wp * one, 1.5_wp * one, &
-                                     0.5_wp * one, governor))
-    end associate
-    call add_three_phase_motors(bodies, variants, governor, machine)
+    call append_bank(machine%banks, new_induction_motors(lane_keys('induction', [1], variants, &
+                                    'breakdown_torque breakdown_slip synchronous_speed', [60.0_wp, 0.3_wp, 10.0_wp])))
+    given = lane_keys('table', [bodies], variants, '', [real(wp) ::])
+    call given%add_table('table_speed', curves([-4.0_wp, 0.0_wp, 1.0_wp, 4.0_wp], [50.0_wp, 60.0_wp, 40.0_wp, -30.0_wp], &
+                                               interpolation_linear, extrapolation_linear, variants, 1))
+    call append_bank(machine%banks, new_table_motors(given))
+    table = given%curve
+    call append_bank(machine%banks, new_motors(lane_keys('governed', [2], variants, 'a b c flux_constant ' // governor, &
+                                                         [30.0_wp, 3.0_wp, 0.1_wp, 1.4_wp, of_governor])))
+    given = lane_keys('throttled', [1], variants, governor, of_governor)
+    call given%add_table('table_speed', table)
+    call append_bank(machine%banks, new_table_motors(given))
+    call append_bank(machine%banks, new_dc_motors(lane_keys('dc', [2], variants, circuit, of_circuit)))
+    call append_bank(machine%banks, new_dc_motors(lane_keys('drive', [bodies], variants, circuit // ' ' // governor, &
+                                                            [of_circuit, of_governor])))
+    call add_three_phase_motors(bodies, variants, machine)
   end subroutine add_motors
 
   !> Motors on mains and inverters.
-  subroutine add_three_phase_motors(bodies, variants, governor, machine)
+  subroutine add_three_phase_motors(bodies, variants, machine)
     integer, intent(in) :: bodies, variants(:)
-    type(governor_t), intent(inout) :: governor
     type(machine_t), intent(inout) :: machine
+    character(len=*), parameter :: circuit = &   ! inductances are given partly as reactances
+      'voltage frequency stator_resistance rotor_resistance stator_leakage rotor_reactance mutual_inductance'
+    real(wp), parameter :: of_circuit(7) = [30.0_wp, 12.0_wp, 0.4_wp, 0.5_wp, 0.05_wp, 0.6_wp, 0.8_wp]
+    type(given_keys_t) :: given
 
-    associate (one => lane_values(1.0_wp, variants, 1))
-      call append_bank(machine%banks, &
-                       new_synchronous_motors(numbered_names('starting', 1), [1], slip_curves(variants), 4.0_wp * one, &
-                                              4.0_wp + 0.0_wp * one, sign(1.0_wp, one), 0.3_wp * one))
-      governor%least = -1.0_wp
-      call set_courses(variants, governor)
-      call append_bank(machine%banks, &
-                       new_inverter_motors(numbered_names('inverter', 1), [bodies], 20.0_wp * one, governor, ripple(variants)))
-      call append_bank(machine%banks, new_flux_motors(numbered_names('fluxes', 1), [bodies], circuits(variants), &
-                                                      4.0_wp + 0.0_wp * one, sign(1.0_wp, -one), .true.))
-      call append_bank(machine%banks, new_flux_motors(numbered_names('supplied', 1), [1], circuits(variants), &
-                                                      2.0_wp + 0.0_wp * one, sign(1.0_wp, one), .true., supply(variants)))
-    end associate
+    given = lane_keys('starting', [1], variants, 'frequency phase', [4.0_wp, 0.3_wp])
+    call given%add_list('poles', [4.0_wp])
+    call given%add_list('slips', [0.0_wp, 0.3_wp, 1.0_wp])
+    call given%add_list('mean_torques', all_lanes([0.0_wp, 20.0_wp, 12.0_wp], variants))
+    call given%add_list('pulsations', all_lanes([0.0_wp, 5.0_wp, 9.0_wp], variants))
+    call append_bank(machine%banks, new_synchronous_motors(given))
+    given = lane_keys('inverter', [bodies], variants, 'torque_limit ' // governor, [20.0_wp, of_governor])
+    call given%add_list('poles', [2.0_wp])
+    call given%add_list('set_times', [0.05_wp, 0.5_wp, 4.0_wp])
+    call given%add_list('set_speeds', all_lanes([0.5_wp, 1.0_wp, -1.0_wp], variants))
+    call given%add_list('harmonics', [2.0_wp, 6.0_wp])
+    call given%add_list('harmonic_shares', all_lanes([0.1_wp, 0.1_wp], variants))
+    call given%add_list('harmonic_torques', all_lanes([0.5_wp, 0.5_wp], variants))
+    call given%add_list('harmonic_phases', all_lanes([0.3_wp, 0.3_wp], variants))
+    call append_bank(machine%banks, new_inverter_motors(given))
+    given = lane_keys('fluxes', [bodies], variants, circuit, of_circuit)
+    call given%add_list('poles', [4.0_wp])
+    call given%add_list('reversed', [1.0_wp])
+    call append_bank(machine%banks, new_flux_motors(given))
+    given = lane_keys('supplied', [1], variants, circuit, of_circuit)
+    call given%add_list('poles', [2.0_wp])
+    call given%add_list('supply_times', all_lanes([0.05_wp, 0.4_wp, 0.5_wp], variants))
+    call given%add_list('supply_factors', all_lanes([0.6_wp, 0.0_wp, 1.7_wp], variants))
+    call given%add_list('supply_ramps', all_lanes([0.2_wp, 0.0_wp, 3.0_wp], variants))
+    call append_bank(machine%banks, new_flux_motors(given))
   end subroutine add_three_phase_motors
-
-  !> A mean torque and a pulsation.
-  function slip_curves(variants) result(curves)
-    integer, intent(in) :: variants(:)
-    type(slip_curves_t) :: curves(size(variants), 1)
-    integer :: l
-
-    do l = 1, size(variants)
-      curves(l, 1)%slip = [0.0_wp, 0.3_wp, 1.0_wp]
-      curves(l, 1)%mean = [0.0_wp, 20.0_wp, 12.0_wp + variants(l)]
-      curves(l, 1)%pulsation = [0.0_wp, 5.0_wp + variants(l), 9.0_wp]
-    end do
-  end function slip_curves
-
-  !> Set speeds that rise from 0.05 s on.
-  subroutine set_courses(variants, governor)
-    integer, intent(in) :: variants(:)
-    type(governor_t), intent(inout) :: governor
-    integer :: l
-
-    allocate (governor%course(size(variants), 1))   ! gfortran 12: `source` copies the pointers to allocatable components
-    do l = 1, size(variants)
-      call join_points([0.05_wp, 0.5_wp, 4.0_wp], [0.5_wp, 1.0_wp + 0.03_wp * variants(l), -1.0_wp], governor%course(l, 1))
-    end do
-  end subroutine set_courses
-
-  !> Two harmonics of a motor.
-  function ripple(variants) result(harmonics)
-    integer, intent(in) :: variants(:)
-    type(torque_harmonics_t) :: harmonics
-
-    associate (one => reshape(lane_values(1.0_wp, variants, 2), [size(variants), 1, 2]))
-      harmonics%order = 0.0_wp * one
-      harmonics%order(:, 1, 1) = 2.0_wp
-      harmonics%order(:, 1, 2) = 6.0_wp
-      harmonics%share = 0.1_wp * one
-      harmonics%torque = 0.5_wp * one
-      harmonics%phase = 0.3_wp * one
-    end associate
-  end function ripple
-
-  !> A part of the voltage within a ramp, then disconnected, then another ramp.
-  function supply(variants) result(schedule)
-    integer, intent(in) :: variants(:)
-    type(schedule_t) :: schedule(size(variants), 1)
-    integer :: l
-
-    do l = 1, size(variants)
-      associate (factor => 1.0_wp + 0.03_wp * variants(l))
-        call schedule(l, 1)%append(0.05_wp, 0.0_wp, 0.0_wp, .true.)
-        call schedule(l, 1)%append(0.05_wp * factor, 0.1_wp * factor, factor, .false.)
-        call schedule(l, 1)%append(0.4_wp * factor, 0.0_wp, 0.0_wp, .true.)
-        call schedule(l, 1)%append(0.5_wp * factor, factor, 0.2_wp * factor, .false.)
-        call schedule(l, 1)%append(4.0_wp, 1.7_wp * factor, 0.0_wp, .false.)
-      end associate
-    end do
-  end function supply
-
-  !> The circuit of one induction motor, with inductances that are given partly as reactances, [lanes, 1, keys].
-  function circuits(variants)
-    integer, intent(in) :: variants(:)
-    real(wp) :: circuits(size(variants), 1, size(circuit_keys))
-    real(wp), parameter :: typical(size(circuit_keys)) = [30.0_wp, 12.0_wp, 0.4_wp, 0.5_wp, 0.05_wp, 0.0_wp, 0.8_wp, &
-                                                          0.0_wp, 0.6_wp, 0.0_wp]
-    integer :: k
-
-    do k = 1, size(circuit_keys)
-      circuits(:, :, k) = lane_values(typical(k), variants, 1)
-    end do
-  end function circuits
 
   subroutine add_loads(bodies, variants, machine)
     integer, intent(in) :: bodies, variants(:)
     type(machine_t), intent(inout) :: machine
+    type(given_keys_t) :: given
 
-    associate (one => lane_values(1.0_wp, variants, 2))
-      call append_bank(machine%banks, &
-                       new_nonlinear_loads(numbered_names('fan', 2), [1, bodies], one, 0.5_wp * one, &
-                                           5.0_wp * one, 0.7_wp * one))
-      call append_bank(machine%banks, &
-                       new_nonlinear_loads(numbered_names('mill', 2), [2, 2], one, 0.5_wp * one, 0.0_wp * one, one, &
-                                           curves([-2.0_wp, 0.0_wp, 2.5_wp], [-10.0_wp, 0.0_wp, 30.0_wp], interpolation_cubic, &
-                                                  extrapolation_constant, variants, 2)))
-    end associate
+    call append_bank(machine%banks, new_loads(lane_keys('fan', [1, bodies], variants, &
+                                    'viscous quadratic constant constant_speed', [1.0_wp, 0.5_wp, 5.0_wp, 0.7_wp])))
+    given = lane_keys('mill', [2, 2], variants, 'viscous quadratic constant_speed', [1.0_wp, 0.5_wp, 1.0_wp])
+    call given%add_table('table_speed', curves([-2.0_wp, 0.0_wp, 2.5_wp], [-10.0_wp, 0.0_wp, 30.0_wp], interpolation_cubic, &
+                                               extrapolation_constant, variants, 2))
+    call append_bank(machine%banks, new_loads(given))
   end subroutine add_loads
 
   subroutine add_excitations(bodies, variants, machine)
     integer, intent(in) :: bodies, variants(:)
     type(machine_t), intent(inout) :: machine
     type(fault_terms_t) :: faults(2)
+    type(given_keys_t) :: given
 
     call set_fault(faults(1))
     call set_fault(faults(2))
@@ -308,26 +270,25 @@ contains
     call add_shares(bodies, variants, machine)
     associate (one => lane_values(1.0_wp, variants, 3))
       call append_bank(machine%banks, &
-                       new_wave_excitations(numbered_names('gas', 2), [1, bodies], [1, 1, 2], 9.0_wp * one, &
+                       new_wave_excitations(lane_keys('gas', [1, bodies], variants, '', [real(wp) ::]), [1, 1, 2], 9.0_wp * one, &
                                             spread([0.0_wp, 0.0_wp, 3.0_wp], 1, size(variants)), &
                                             spread([0.5_wp, 1.0_wp, -2.0_wp], 1, size(variants)), 0.4_wp * one))
-      call append_bank(machine%banks, &
-                       new_timed_excitations(numbered_names('impact', 3), [1, 2, bodies], &
-                                             [shape_step, shape_ramp, shape_pulse], 12.0_wp * one, &
-                                             0.35_wp * one, 0.2_wp * one))
-      call append_bank(machine%banks, new_fault_excitations(numbered_names('fault', 2), [1, bodies], &
-                                                            faults, 0.3_wp * one(:, :2)))
-      select type (bank => machine%banks(size(machine%banks))%bank)
-      class is (excitation_bank_t)
-        call bank%set_window(0.4_wp * one(:, :2), 0.9_wp * one(:, :2), 2.0_wp * one(:, :2))
-      class default
-        error stop 'full_machine: a fault is an excitation'
-      end select
-      call append_bank(machine%banks, &
-                       new_table_excitations(numbered_names('record', 1), [2], &
-                                             curves([0.1_wp, 0.3_wp, 0.6_wp], [0.0_wp, 20.0_wp, -10.0_wp], interpolation_linear, &
-                                                    extrapolation_constant, variants, 1)))
     end associate
+    call append_bank(machine%banks, new_timed_excitations(lane_keys('impact', [1, 2, bodies], variants, &
+                                                                    'amplitude time duration', [12.0_wp, 0.35_wp, 0.2_wp]), &
+                                                          [shape_step, shape_ramp, shape_pulse]))
+    given = lane_keys('fault', [1, bodies], variants, 'time start end decay', [0.3_wp, 0.4_wp, 0.9_wp, 0.5_wp])
+    call append_bank(machine%banks, new_fault_excitations(given, faults))
+    select type (bank => machine%banks(size(machine%banks))%bank)
+    class is (excitation_bank_t)
+      call bank%set_window(given, 1)
+    class default
+      error stop 'full_machine: a fault is an excitation'
+    end select
+    given = lane_keys('record', [2], variants, '', [real(wp) ::])
+    call given%add_table('table_time', curves([0.1_wp, 0.3_wp, 0.6_wp], [0.0_wp, 20.0_wp, -10.0_wp], interpolation_linear, &
+                                              extrapolation_constant, variants, 1))
+    call append_bank(machine%banks, new_table_excitations(given))
   end subroutine add_excitations
 
   !> A constant and two sines that decay.
@@ -369,16 +330,14 @@ contains
   subroutine add_shares(bodies, variants, machine)
     integer, intent(in) :: bodies, variants(:)
     type(machine_t), intent(inout) :: machine
-    type(shared_load_t) :: load
+    type(given_keys_t) :: blades
 
-    associate (one => lane_values(1.0_wp, variants, 2))
-      load%viscous = 2.0_wp * one
-      load%quadratic = 0.5_wp * one
-      load%constant = one
-      load%constant_speed = 0.7_wp * one
-      call append_bank(machine%banks, new_load_shares(numbered_names('blades', 2), [bodies, 1], [1, 2], 0.1_wp * one, &
-                                                      5.0_wp * one, one, load))
-    end associate
+    blades = lane_keys('blades', [bodies, 1], variants, '', [real(wp) ::])
+    call blades%add_list('share_of_load', all_lanes([0.1_wp], variants))
+    call blades%add_list('orders', all_lanes([5.0_wp], variants))
+    call blades%add_list('phases', all_lanes([1.0_wp], variants))
+    call append_bank(machine%banks, new_load_shares(blades, lane_keys('water', [bodies, 1], variants, &
+                                    'viscous quadratic constant constant_speed', [2.0_wp, 0.5_wp, 1.0_wp, 0.7_wp])))
   end subroutine add_shares
 
 end module nocdyn_test_full_machines

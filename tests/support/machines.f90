@@ -6,10 +6,10 @@ module nocdyn_test_machines
   use nocdyn_constraint_analysis, only: analyse_constraints
   use nocdyn_constraints, only: constraints_t, new_constraints
   use nocdyn_coordinates, only: build_coordinates
-  use nocdyn_couplings, only: coupling_common_t, new_couplings
+  use nocdyn_couplings, only: new_couplings
   use nocdyn_crank_rows, only: new_crank_rows, slider_crank_t
   use nocdyn_curves, only: extrapolation_constant, interpolation_linear, new_curve
-  use nocdyn_drives, only: drive_motion_t, new_drives
+  use nocdyn_drives, only: new_drives
   use nocdyn_errors, only: error_t
   use nocdyn_excitations, only: new_excitations
   use nocdyn_kinds, only: wp
@@ -20,6 +20,7 @@ module nocdyn_test_machines
   use nocdyn_piston_forces, only: new_piston_force, periodic_force_t
   use nocdyn_relation_rows, only: new_relation_rows
   use nocdyn_splines, only: spline_smooth
+  use nocdyn_test_given_keys, only: given_keys_t, keys
   use nocdyn_text, only: string_t, strings, to_text
   use nocdyn_tooth_losses, only: new_tooth_losses, teeth_t
   implicit none (type, external)
@@ -27,6 +28,8 @@ module nocdyn_test_machines
 
   public :: paper_machine, damped_chain, long_chain, branched_train, gear_loop, moving_machine, machine_of_bodies
   public :: install, gear_rows, numbered_names, finish, row
+
+  character(len=*), parameter :: coupling = 'damping rest_twist stiffness cubic_stiffness'   ! keys
 
 contains
 
@@ -38,13 +41,12 @@ contains
 
     machine = machine_of_bodies(row([10.0_wp, 5.0_wp, 5.0_wp]))
     machine%names = strings([character(len=7) :: 'motor', 'pinion', 'machine'])
-    call install(machine%banks, new_couplings(coupling_common_t(strings(['coupling']), [1], [2], row([0.0_wp]), &
-                                                                row([0.0_wp])), row([100.0_wp]), row([10.0_wp])))
-    call install(machine%banks, new_motors(strings(['drive']), [1], row([200.0_wp]), row([10.0_wp]), row([1.0_wp])))
-    call install(machine%banks, new_loads(strings(['work']), [3], row([100.0_wp])))
+    call install(machine%banks, new_couplings(keys(strings(['coupling']), [1, 2], coupling, &
+                                                   [0.0_wp, 0.0_wp, 100.0_wp, 10.0_wp])))
+    call install(machine%banks, new_motors(keys(strings(['drive']), [1], 'a b c', [200.0_wp, 10.0_wp, 1.0_wp])))
+    call install(machine%banks, new_loads(keys(strings(['work']), [3], 'viscous', [100.0_wp])))
     if (abs(amplitude) > 0.0_wp) then
-      call install(machine%banks, new_excitations(strings(['shaker']), [1], row([amplitude]), row([5.0_wp]), &
-                                                  row([0.0_wp])))
+      call install(machine%banks, new_excitations(keys(strings(['shaker']), [1], 'amplitude frequency', [amplitude, 5.0_wp])))
     end if
     machine%constraints = gear_rows(3, reshape([2, 3], [2, 1]), row([2.0_wp, 3.0_wp]))
     machine%constraints%names(1)%text = 'reducer'
@@ -56,16 +58,15 @@ contains
     class(machine_t), allocatable :: machine
 
     machine = machine_of_bodies(row([4.0_wp, 2.0_wp, 1.0_wp, 3.0_wp]))
-    call install(machine%banks, new_couplings(coupling_common_t(numbered_names('spring', 5), [0, 1, 2, 3, 4], [1, 2, 3, 4, 0], &
-                                                                row([0.7_wp, 3.0_wp, 0.0_wp, 1.5_wp, 0.0_wp]), &
-                                                                row([0.3_wp, 0.2_wp, 0.0_wp, -0.1_wp, 0.4_wp])), &
-                                              row([30.0_wp, 100.0_wp, 80.0_wp, 50.0_wp, 20.0_wp]), &
-                                              row([5.0_wp, 10.0_wp, -4.0_wp, 0.0_wp, 0.0_wp])))
-    call install(machine%banks, new_motors(numbered_names('motor', 1), [1], row([90.0_wp]), row([6.0_wp]), &
-                                           row([0.5_wp])))
-    call install(machine%banks, new_loads(numbered_names('load', 1), [3], row([12.0_wp])))
-    call install(machine%banks, new_excitations(numbered_names('shaker', 2), [2, 4], row([8.0_wp, 5.0_wp]), &
-                                                row([3.0_wp, 7.0_wp]), row([0.5_wp, -1.0_wp])))
+    call install(machine%banks, new_couplings(keys(numbered_names('spring', 5), [0, 1, 2, 3, 4, 1, 2, 3, 4, 0], coupling, &
+                                                   [0.7_wp, 3.0_wp, 0.0_wp, 1.5_wp, 0.0_wp, &
+                                                    0.3_wp, 0.2_wp, 0.0_wp, -0.1_wp, 0.4_wp, &
+                                                    30.0_wp, 100.0_wp, 80.0_wp, 50.0_wp, 20.0_wp, &
+                                                    5.0_wp, 10.0_wp, -4.0_wp, 0.0_wp, 0.0_wp])))
+    call install(machine%banks, new_motors(keys(numbered_names('motor', 1), [1], 'a b c', [90.0_wp, 6.0_wp, 0.5_wp])))
+    call install(machine%banks, new_loads(keys(numbered_names('load', 1), [3], 'viscous', [12.0_wp])))
+    call install(machine%banks, new_excitations(keys(numbered_names('shaker', 2), [2, 4], 'amplitude frequency phase', &
+                                                     [8.0_wp, 5.0_wp, 3.0_wp, 7.0_wp, 0.5_wp, -1.0_wp])))
     machine%start_angle = row([0.1_wp, -0.2_wp, 0.3_wp, 0.05_wp])
     machine%start_speed = row([1.0_wp, 0.5_wp, -0.4_wp, 2.0_wp])
     call finish(machine, [integer ::], 1)
@@ -78,14 +79,11 @@ contains
     integer :: i
 
     machine = machine_of_bodies(row([(1.0_wp, i=1, bodies)]))
-    associate (stiffness => row([(1.0e4_wp, i=1, bodies - 1)]))
-      call install(machine%banks, new_couplings(coupling_common_t(numbered_names('shaft', bodies - 1), [(i, i=1, bodies - 1)], &
-                                                                  [(i + 1, i=1, bodies - 1)], 1.0e-4_wp * stiffness, &
-                                                                  0.0_wp * stiffness), stiffness, 10.0_wp * stiffness))
-    end associate
-    call install(machine%banks, new_motors(numbered_names('motor', 1), [1], row([100.0_wp]), row([0.0_wp]), &
-                                           row([0.0_wp])))
-    call install(machine%banks, new_loads(numbered_names('load', 1), [bodies], row([10.0_wp])))
+    call install(machine%banks, new_couplings(keys(numbered_names('shaft', bodies - 1), &
+                                                   [(i, i=1, bodies - 1), (i + 1, i=1, bodies - 1)], coupling, &
+                                                   [1.0_wp, 0.0_wp, 1.0e4_wp, 1.0e5_wp])))
+    call install(machine%banks, new_motors(keys(numbered_names('motor', 1), [1], 'a', [100.0_wp])))
+    call install(machine%banks, new_loads(keys(numbered_names('load', 1), [bodies], 'viscous', [10.0_wp])))
     call finish(machine, [integer ::], 1)
   end function long_chain
 
@@ -95,14 +93,13 @@ contains
     class(machine_t), allocatable :: machine
 
     machine = machine_of_bodies(row([4.0_wp, 2.0_wp, 6.0_wp, 1.0_wp, 3.0_wp, 2.5_wp, 8.0_wp]))
-    call install(machine%banks, new_couplings(coupling_common_t(numbered_names('shaft', 4), [4, 3, 6, 0], [5, 5, 7, 7], &
-                                                                row([0.5_wp, 0.0_wp, 1.0_wp, 0.2_wp]), &
-                                                                row([0.0_wp, 0.1_wp, -0.2_wp, 0.0_wp])), &
-                                              row([60.0_wp, 40.0_wp, 90.0_wp, 10.0_wp]), &
-                                              row([4.0_wp, 0.0_wp, 7.0_wp, 0.0_wp])))
-    call install(machine%banks, new_motors(numbered_names('motor', 1), [1], row([150.0_wp]), row([8.0_wp]), &
-                                           row([0.3_wp])))
-    call install(machine%banks, new_loads(numbered_names('load', 2), [3, 7], row([5.0_wp, 20.0_wp])))
+    call install(machine%banks, new_couplings(keys(numbered_names('shaft', 4), [4, 3, 6, 0, 5, 5, 7, 7], coupling, &
+                                                   [0.5_wp, 0.0_wp, 1.0_wp, 0.2_wp, &
+                                                    0.0_wp, 0.1_wp, -0.2_wp, 0.0_wp, &
+                                                    60.0_wp, 40.0_wp, 90.0_wp, 10.0_wp, &
+                                                    4.0_wp, 0.0_wp, 7.0_wp, 0.0_wp])))
+    call install(machine%banks, new_motors(keys(numbered_names('motor', 1), [1], 'a b c', [150.0_wp, 8.0_wp, 0.3_wp])))
+    call install(machine%banks, new_loads(keys(numbered_names('load', 2), [3, 7], 'viscous', [5.0_wp, 20.0_wp])))
     machine%constraints = gear_rows(7, reshape([1, 2, 2, 3, 2, 4, 5, 6], [2, 4]), &
                                     row([2.0_wp, 3.0_wp, 1.5_wp, -4.0_wp, 1.0_wp, 2.5_wp, 1.0_wp, 1.25_wp]))
     call finish(machine, [integer ::], choice)
@@ -113,11 +110,10 @@ contains
     class(machine_t), allocatable :: machine
 
     machine = machine_of_bodies(row([4.0_wp, 2.0_wp, 6.0_wp, 1.0_wp, 3.0_wp]))
-    call install(machine%banks, new_couplings(coupling_common_t(numbered_names('shaft', 1), [3], [5], row([0.5_wp]), &
-                                                                row([0.0_wp])), row([60.0_wp]), row([4.0_wp])))
-    call install(machine%banks, new_motors(numbered_names('motor', 1), [1], row([150.0_wp]), row([8.0_wp]), &
-                                           row([0.3_wp])))
-    call install(machine%banks, new_loads(numbered_names('load', 2), [4, 5], row([5.0_wp, 20.0_wp])))
+    call install(machine%banks, new_couplings(keys(numbered_names('shaft', 1), [3, 5], coupling, &
+                                                   [0.5_wp, 0.0_wp, 60.0_wp, 4.0_wp])))
+    call install(machine%banks, new_motors(keys(numbered_names('motor', 1), [1], 'a b c', [150.0_wp, 8.0_wp, 0.3_wp])))
+    call install(machine%banks, new_loads(keys(numbered_names('load', 2), [4, 5], 'viscous', [5.0_wp, 20.0_wp])))
     machine%constraints = gear_rows(5, reshape([1, 2, 2, 3, 3, 4, 4, 1], [2, 4]), &
                                     row([0.2_wp, 0.3_wp, 0.3_wp, 0.5_wp, 0.5_wp, 0.4_wp, 0.4_wp, 0.2_wp]))
     call finish(machine, [integer ::], 1)
@@ -128,21 +124,22 @@ contains
   function moving_machine() result(machine)
     class(machine_t), allocatable :: machine
     type(string_t) :: names(4)
+    type(given_keys_t) :: given
     type(teeth_t) :: teeth
     integer :: k
 
     machine = machine_of_bodies(row([4.0_wp, 2.0_wp, 6.0_wp, 1.0_wp, 3.0_wp]))
     call machine%add_nodes(numbered_names('part', 4), [1.5_wp, 0.8_wp, 0.8_wp, 0.1_wp])
     machine%nodes = 0
-    call install(machine%banks, new_couplings(coupling_common_t(numbered_names('shaft', 1), [4], [5], row([0.5_wp]), &
-                                                                row([0.0_wp])), row([60.0_wp]), row([4.0_wp])))
-    call install(machine%banks, new_motors(numbered_names('motor', 1), [1], row([150.0_wp]), row([8.0_wp]), &
-                                           row([0.3_wp])))
-    call append_bank(machine%banks, new_cardan_rows(numbered_names('cardan', 1), [3], row([0.4_wp]), row([0.3_wp])))
+    call install(machine%banks, new_couplings(keys(numbered_names('shaft', 1), [4, 5], coupling, &
+                                                   [0.5_wp, 0.0_wp, 60.0_wp, 4.0_wp])))
+    call install(machine%banks, new_motors(keys(numbered_names('motor', 1), [1], 'a b c', [150.0_wp, 8.0_wp, 0.3_wp])))
+    call append_bank(machine%banks, new_cardan_rows(keys(numbered_names('cardan', 1), [2, 3], 'angle phase', [0.4_wp, 0.3_wp])))
     call append_bank(machine%banks, new_phases(1, numbered_names('cardan', 1), [2]))
-    call append_bank(machine%banks, new_relation_rows(1, numbered_names('cam', 1), [4], [1, 6], &
-                                                      reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.8_wp, 3.0_wp, 0.3_wp, 5.0_wp, -0.6_wp, &
-                                                               6.0_wp, 0.0_wp], [2, 5]), [.true.], [spline_smooth]))
+    given = keys(numbered_names('cam', 1), [3, 4], '', [real(wp) ::])
+    call given%add_list('table_angle', [0.0_wp, 1.0_wp, 3.0_wp, 5.0_wp, 6.0_wp])
+    call given%add_list('table_driven', [0.0_wp, 0.8_wp, 0.3_wp, -0.6_wp, 0.0_wp])
+    call append_bank(machine%banks, new_relation_rows(given, [.true.], [spline_smooth]))
     call append_bank(machine%banks, new_phases(1, numbered_names('cam', 1), [3]))
     names = numbered_names('crank', 4)
     call append_bank(machine%banks, new_crank_rows(1, names, [6, 7, 8, 9], &
@@ -151,8 +148,8 @@ contains
     call append_bank(machine%banks, new_piston_force(1, names(1), 6, 0.7_wp, &
                                                      periodic_force_t(0.5_wp, 3.0_wp, [2.0_wp, 1.0_wp], [0.5_wp, -4.0_wp])))
     call append_bank(machine%banks, new_phases(1, names(:1), [3]))
-    call append_bank(machine%banks, new_drives(numbered_names('drive', 1), [5], 0.0_wp, .false., &
-                                               drive_motion_t(row([2.0_wp]), row([3.0_wp]), row([1.7_wp]), row([0.4_wp]))))
+    call append_bank(machine%banks, new_drives(keys(numbered_names('drive', 1), [5], 'speed speed_amplitude frequency phase', &
+                                                    [2.0_wp, 3.0_wp, 1.7_wp, 0.4_wp]), .false.))
     machine%constraints = gear_rows(9, reshape([1, 2], [2, 1]), row([2.0_wp, 3.0_wp]))
     teeth%row = [1]
     teeth%factor = [2.0_wp]
@@ -186,13 +183,12 @@ contains
     integer, intent(in) :: lanes
     type(bank_slot_t), allocatable :: banks(:)
     type(string_t) :: names(0)
-    real(wp) :: none(lanes, 0)
 
     allocate (banks(4))
-    call install(banks, new_couplings(coupling_common_t(names, [integer ::], [integer ::], none, none), none, none))
-    call install(banks, new_motors(names, [integer ::], none, none, none))
-    call install(banks, new_loads(names, [integer ::], none))
-    call install(banks, new_excitations(names, [integer ::], none, none, none))
+    call install(banks, new_couplings(keys(names, [integer ::], '', [real(wp) ::], lanes)))
+    call install(banks, new_motors(keys(names, [integer ::], '', [real(wp) ::], lanes)))
+    call install(banks, new_loads(keys(names, [integer ::], '', [real(wp) ::], lanes)))
+    call install(banks, new_excitations(keys(names, [integer ::], '', [real(wp) ::], lanes)))
   end function element_banks
 
   !> Replaces the bank of the same role.

@@ -1,12 +1,13 @@
 !> Random machines of any size, different with every seed, of one lane or several.
 module nocdyn_test_random_machines
   use nocdyn_constraints, only: constraints_t
-  use nocdyn_couplings, only: coupling_common_t, new_couplings
+  use nocdyn_couplings, only: new_couplings
   use nocdyn_excitations, only: new_excitations
   use nocdyn_kinds, only: wp
   use nocdyn_loads, only: new_loads
   use nocdyn_machine, only: machine_t
   use nocdyn_motors, only: new_motors
+  use nocdyn_test_given_keys, only: keys
   use nocdyn_test_machines, only: machine_of_bodies, finish, gear_rows, install, numbered_names
   use nocdyn_test_random, only: random_stream, random_stream_t
   implicit none (type, external)
@@ -94,7 +95,7 @@ contains
     type(random_stream_t), intent(inout) :: layout, lanes(:)
     type(machine_t), intent(inout) :: machine
     integer :: from(machine%bodies), to(machine%bodies)
-    real(wp), dimension(size(lanes), machine%bodies) :: cubic, damping, stiffness
+    real(wp), dimension(size(lanes), machine%bodies) :: cubic, damping, rest, stiffness
     integer :: i
 
     do i = 1, machine%bodies
@@ -105,8 +106,10 @@ contains
     damping(:, 3::3) = 0.0_wp
     stiffness = drawn(lanes, 50.0_wp, 150.0_wp, machine%bodies)
     cubic = drawn(lanes, -10.0_wp, 10.0_wp, machine%bodies)
-    call install(machine%banks, new_couplings(coupling_common_t(numbered_names('shaft', machine%bodies), from, to, damping, &
-                                                                drawn(lanes, -0.3_wp, 0.3_wp, machine%bodies)), stiffness, cubic))
+    rest = drawn(lanes, -0.3_wp, 0.3_wp, machine%bodies)
+    call install(machine%banks, new_couplings(keys(numbered_names('shaft', machine%bodies), [from, to], &
+                                                   'damping rest_twist stiffness cubic_stiffness', &
+                                                   [damping, rest, stiffness, cubic])))
   end subroutine add_couplings
 
   !> Two motors, three loads, two excitations, which may share bodies.
@@ -118,12 +121,14 @@ contains
     do i = 1, size(body)
       body(i) = layout%whole(1, machine%bodies)
     end do
-    call install(machine%banks, new_motors(numbered_names('motor', 2), body(1:2), drawn(lanes, 50.0_wp, 200.0_wp, 2), &
-                                           drawn(lanes, 1.0_wp, 10.0_wp, 2), drawn(lanes, -1.0_wp, 1.0_wp, 2)))
-    call install(machine%banks, new_loads(numbered_names('load', 3), body(3:5), drawn(lanes, 1.0_wp, 100.0_wp, 3)))
-    call install(machine%banks, new_excitations(numbered_names('shaker', 2), body(6:7), &
-                                                drawn(lanes, 1.0_wp, 30.0_wp, 2), drawn(lanes, 1.0_wp, 8.0_wp, 2), &
-                                                drawn(lanes, -3.0_wp, 3.0_wp, 2)))
+    call install(machine%banks, new_motors(keys(numbered_names('motor', 2), body(1:2), 'a b c', &
+                                                [drawn(lanes, 50.0_wp, 200.0_wp, 2), drawn(lanes, 1.0_wp, 10.0_wp, 2), &
+                                                 drawn(lanes, -1.0_wp, 1.0_wp, 2)])))
+    call install(machine%banks, new_loads(keys(numbered_names('load', 3), body(3:5), 'viscous', &
+                                               [drawn(lanes, 1.0_wp, 100.0_wp, 3)])))
+    call install(machine%banks, new_excitations(keys(numbered_names('shaker', 2), body(6:7), 'amplitude frequency phase', &
+                                                     [drawn(lanes, 1.0_wp, 30.0_wp, 2), drawn(lanes, 1.0_wp, 8.0_wp, 2), &
+                                                      drawn(lanes, -3.0_wp, 3.0_wp, 2)])))
   end subroutine add_torques
 
   !> Random numbers of every lane from its own stream, [lanes, count].

@@ -5,6 +5,7 @@
 !> (`described_elements_t`).
 module nocdyn_bank
   use nocdyn_described_elements, only: described_elements_t
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_element_rows, only: element_rows_t, rows_between
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
@@ -74,8 +75,8 @@ module nocdyn_bank
     procedure :: steady_internal
     procedure :: knees
     procedure :: keep_energy
-    generic :: connect => connect_bodies, connect_rows
-    procedure, private :: connect_bodies, connect_rows
+    generic :: connect => connect_keys, connect_rows
+    procedure, private :: connect_keys, connect_rows
     procedure :: list_structure
     procedure :: last
     procedure :: named_count
@@ -108,16 +109,16 @@ contains
     call move_alloc(longer, banks)
   end subroutine append_bank
 
-  !> Elements that act on one body each.
-  subroutine connect_bodies(self, role, lanes, names, body)
+  !> Elements that act on one body each, the one of the key `body`.
+  subroutine connect_keys(self, role, keys)
     class(bank_t), intent(inout) :: self
-    integer, intent(in) :: role                 !! role_...
-    integer, intent(in) :: lanes
-    type(string_t), intent(in) :: names(:)      !! [elements]
-    integer, intent(in) :: body(:)              !! [elements]
+    integer, intent(in) :: role   !! role_...
+    class(element_keys_t), intent(in) :: keys
 
-    call self%connect(role, lanes, names, rows_between(0 * body, body))
-  end subroutine connect_bodies
+    associate (body => keys%bodies('body', 1))
+      call self%connect(role, keys%lanes, keys%names, rows_between(0 * body, body))
+    end associate
+  end subroutine connect_keys
 
   !> Sets the connectivity. Every constructor calls it, after setting `states` where its elements have internal states.
   subroutine connect_rows(self, role, lanes, names, rows)

@@ -17,6 +17,7 @@
 !> lane that has just crossed it is well inside its new branch.
 module nocdyn_described_elements
   use nocdyn_curves, only: curve_t
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_element_laws, only: element_law_t, new_element_law
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
@@ -63,6 +64,7 @@ module nocdyn_described_elements
     procedure :: polynomials
     procedure :: describe
     procedure :: set_size
+    procedure :: add_key
     procedure :: add_parameter
     procedure :: add_parts, part_columns
     procedure :: values_of
@@ -104,6 +106,16 @@ contains
 
     time_reached = t + 8.0_wp * spacing(t)
   end function time_reached
+
+  !> Adds the values of a key as parameters with its name.
+  subroutine add_key(self, keys, key, absent)
+    class(described_elements_t), intent(inout) :: self
+    class(element_keys_t), intent(in) :: keys
+    character(len=*), intent(in) :: key
+    real(wp), intent(in), optional :: absent   !! where it has no value; absent: 0
+
+    call self%add_parameter(key, keys%values(key, absent))
+  end subroutine add_key
 
   !> Adds an array of parameters, one column for each element unless `element` says otherwise.
   subroutine add_parameter(self, name, value, is_key, element)

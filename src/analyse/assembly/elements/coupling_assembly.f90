@@ -1,9 +1,8 @@
 !> The banks of couplings of an input: one for each form of the elastic moment that it has.
 module nocdyn_coupling_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
-  use nocdyn_couplings, only: coupling_common_t, new_couplings
+  use nocdyn_couplings, only: new_couplings
   use nocdyn_element_groups, only: element_groups_t
-  use nocdyn_element_rows, only: rows_between
   use nocdyn_gap_couplings, only: new_gap_couplings
   use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
@@ -81,21 +80,13 @@ contains
     end associate
   end subroutine check_relative_damping
 
-  !> The loss factor psi / (2 pi) = 1 / M of a group &coupling; 0 without relative damping.
-  pure real(wp) function loss_factor_of(group) result(factor)
-    type(group_t), intent(in) :: group
-    real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)
-
-    factor = group%number('relative_damping', absent=0.0_wp) / turn
-    if (group%has_value('magnifier')) factor = 1.0_wp / group%number('magnifier')
-  end function loss_factor_of
-
   !> Form of the law of a group &coupling.
   pure integer function coupling_form(group)
     type(group_t), intent(in) :: group
 
-    coupling_form = elastic_form(group)
-    if (loss_factor_of(group) > 0) coupling_form = coupling_form + elastic_forms
+    associate (is_relative => group%number('relative_damping', absent=0.0_wp) > 0 .or. group%has_value('magnifier'))
+      coupling_form = elastic_form(group) + merge(elastic_forms, 0, is_relative)
+    end associate
   end function coupling_form
 
   !> Form of the elastic moment.
@@ -133,111 +124,22 @@ contains
     type(element_groups_t), intent(in) :: groups
     integer, intent(in) :: form
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    type(coupling_common_t) :: shared
-    real(wp), allocatable :: damping(:, :)
-    integer :: i
 
-    shared = common_of(groups)
     select case (modulo(form - 1, elastic_forms) + 1)
     case (cubic, slipping)
-      call append_bank(banks, new_couplings(shared, groups%values('stiffness'), groups%values('cubic_stiffness')))
+      call append_bank(banks, new_couplings(groups))
     case (polynomial)
-      call append_bank(banks, new_polynomial_couplings(shared, all_coefficients(groups)))
+      call append_bank(banks, new_polynomial_couplings(groups))
     case (gap)
-      call append_bank(banks, new_gap_couplings(shared, all_coefficients(groups), groups%values('gap'), &
-                                                  groups%values('stiffness')))
+      call append_bank(banks, new_gap_couplings(groups))
     case (saturated)
-      call append_bank(banks, new_saturated_couplings(shared, groups%values('stiffness'), groups%values('saturation')))
+      call append_bank(banks, new_saturated_couplings(groups))
     case (maxwell)
-      call append_bank(banks, new_maxwell_couplings(shared, groups%values('stiffness'), groups%values('cubic_stiffness'), &
-                                                    branches(groups, 'maxwell_stiffness', 0.0_wp), &
-                                                    branches(groups, 'maxwell_time', 1.0_wp)))
+      call append_bank(banks, new_maxwell_couplings(groups))
     case default
-      call append_bank(banks, new_table_couplings(shared, groups%curves('table_twist', 'table_moment')))
+      call append_bank(banks, new_table_couplings(groups))
     end select
-    if (form <= elastic_forms) return
-    associate (bank => banks(size(banks))%bank)
-      bank%loss_factor = [(loss_factor_of(groups%input%groups(groups%indices(i))), i=1, size(groups%indices))]
-      damping = loss_damping(groups)
-      bank%loss_damping = damping(1, :)
-      bank%parameters%is_key = .false.   ! the damping depends on the stiffness
-    end associate
+    if (form > elastic_forms) banks(size(banks))%bank%parameters%is_key = .false.   ! the damping depends on the stiffness
   end subroutine add_coupling_form
-
-  !> The numbers of the Maxwell branches of all couplings, [lanes, couplings, branches].
-  function branches(groups, key, absent) result(values)
-    type(element_groups_t), intent(in) :: groups
-    character(len=*), intent(in) :: key
-    real(wp), intent(in) :: absent   !! of a coupling with fewer branches
-    real(wp), allocatable :: values(:, :, :)
-    integer :: i, most
-
-    most = maxval([(size(groups%input%groups(groups%indices(i))%numbers(key)), i=1, size(groups%indices))])
-    allocate (values(groups%lanes, size(groups%indices), most), source=absent)
-    do i = 1, size(groups%indices)
-      associate (one => groups%input%groups(groups%indices(i))%numbers(key))
-        values(:, i, :size(one)) = spread(one, 1, groups%lanes)
-      end associate
-    end do
-  end function branches
-
-  !> The viscous damping that has the loss of relative damping at `damping_frequency` [N m s/rad], [lanes, couplings].
-  function loss_damping(groups) result(damping)
-    type(element_groups_t), intent(in) :: groups
-    real(wp) :: damping(groups%lanes, size(groups%indices))
-    integer :: i
-
-    damping = 0.0_wp
-    do i = 1, size(groups%indices)
-      associate (group => groups%input%groups(groups%indices(i)))
-        if (.not. group%has_value('damping_frequency')) cycle
-        damping(:, i) = loss_factor_of(group) * group%number('stiffness') / group%number('damping_frequency')
-      end associate
-    end do
-  end function loss_damping
-
-  !> What the constructors of all forms take.
-  type(coupling_common_t) function common_of(groups) result(shared)
-    type(element_groups_t), intent(in) :: groups
-    real(wp), parameter :: pi = acos(-1.0_wp)
-    real(wp), dimension(groups%lanes, size(groups%indices)) :: friction, modulus
-    integer :: i
-
-    allocate (shared%names, source=groups%names)
-    shared%rows = rows_between(groups%bodies('bodies', 1), groups%bodies('bodies', 2))
-    allocate (shared%damping, source=groups%values('damping') + loss_damping(groups))
-    allocate (shared%rest_twist, source=groups%values('rest_twist'))
-    ! section moduli against torsion pi (D^4 - d^4) / (16 D) [m3], 0 where the diameter is unknown, [lanes, couplings]
-    modulus = groups%values('section_modulus')
-    do i = 1, size(groups%indices)
-      associate (group => groups%input%groups(groups%indices(i)))
-        if (group%has_value('diameter')) then
-          associate (outer => group%number('diameter'), inner => group%number('bore', absent=0.0_wp))
-            modulus(:, i) = pi / 16.0_wp * (outer**4 - inner**4) / outer
-          end associate
-        end if
-      end associate
-    end do
-    if (any(modulus > 0)) allocate (shared%section_modulus, source=modulus)
-    friction = groups%values('friction')
-    if (.not. any(friction > 0)) return
-    allocate (shared%friction, source=friction)
-    allocate (shared%friction_speed, source=groups%values('friction_speed', absent=1.0_wp))
-  end function common_of
-
-  !> p_1, p_2, ... of all couplings, [order, lanes, couplings].
-  function all_coefficients(groups) result(coefficients)
-    type(element_groups_t), intent(in) :: groups
-    real(wp), allocatable :: coefficients(:, :, :)
-    integer :: i, order
-
-    order = maxval([(size(coefficients_of(groups%input%groups(groups%indices(i)))), i=1, size(groups%indices))])
-    allocate (coefficients(order, groups%lanes, size(groups%indices)), source=0.0_wp)
-    do i = 1, size(groups%indices)
-      associate (one => coefficients_of(groups%input%groups(groups%indices(i))))
-        coefficients(:size(one), :, i) = spread(one, 2, groups%lanes)
-      end associate
-    end do
-  end function all_coefficients
 
 end module nocdyn_coupling_assembly

@@ -1,13 +1,14 @@
-!> The groups of one kind of an input, sorted into banks by the form of their laws; their values as the constructors of banks
-!> take them, the same in every lane; the bodies that they name.
+!> The groups of one kind of an input, sorted into banks by the form of their laws, as the constructors of banks ask for them:
+!> values of keys, the same in every lane, and bodies.
 module nocdyn_element_groups
   use nocdyn_bank, only: bank_slot_t
   use nocdyn_curves, only: curve_t, extrapolation_constant, extrapolation_linear, interpolation_cubic, interpolation_linear, &
                            new_curve
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_schema_rules, only: ground
-  use nocdyn_text, only: selected, string_t
+  use nocdyn_text, only: string_t
   use nocdyn_text_sort, only: argsort, sorted_position
   use nocdyn_written_values, only: written_element
   implicit none (type, external)
@@ -22,14 +23,12 @@ module nocdyn_element_groups
   end type body_index_t
 
   !> Some groups of an input. It points to the input and the index of its bodies, which have to outlive it.
-  type, public :: element_groups_t
-    integer :: lanes = 1
-    type(string_t), allocatable :: names(:)
+  type, extends(element_keys_t), public :: element_groups_t
     integer, allocatable :: indices(:)                      !! of the groups in the input
     type(input_t), pointer :: input => null()
     type(body_index_t), pointer, private :: body_index => null()
   contains
-    procedure :: values, curves, bodies, listed_bodies, some
+    procedure :: has, values, numbers, curves, bodies, listed_bodies, some, select
   end type element_groups_t
 
   abstract interface
@@ -80,17 +79,27 @@ contains
     character(len=*), intent(in) :: kind   !! 'coupling', 'motor' ...
     integer, intent(in) :: lanes
     type(body_index_t), target, intent(in), optional :: body_index   !! for `bodies`
-    integer :: i
 
     groups%lanes = lanes
     groups%input => input
     if (present(body_index)) groups%body_index => body_index
-    allocate (groups%indices, source=input%groups_named(kind))
-    allocate (groups%names(size(groups%indices)))
-    do i = 1, size(groups%indices)
-      groups%names(i)%text = input%groups(groups%indices(i))%name
-    end do
+    groups%t_start = input%groups(input%position('run'))%number('t_start')
+    call groups%select(input%groups_named(kind))
   end function new_element_groups
+
+  !> Makes them other groups of the input.
+  subroutine select(self, indices)
+    class(element_groups_t), intent(inout) :: self
+    integer, intent(in) :: indices(:)
+    integer :: i
+
+    self%indices = indices
+    if (allocated(self%names)) deallocate (self%names)
+    allocate (self%names(size(indices)))
+    do i = 1, size(indices)
+      self%names(i)%text = self%input%groups(indices(i))%name
+    end do
+  end subroutine select
 
   !> Adds a bank of form 1, perhaps empty, and one of each other form that some groups have.
   subroutine add_banks(groups, form_of, add_form, banks)
@@ -111,37 +120,55 @@ contains
   type(element_groups_t) function some(groups, mask)
     class(element_groups_t), intent(in) :: groups
     logical, intent(in) :: mask(:)   !! [groups]
-    integer :: i
 
-    some%lanes = groups%lanes
-    some%input => groups%input
-    some%body_index => groups%body_index
-    allocate (some%indices, source=pack(groups%indices, mask))
-    allocate (some%names, source=selected(groups%names, pack([(i, i=1, size(mask))], mask)))
+    some = groups
+    call some%select(pack(groups%indices, mask))
   end function some
 
-  !> One number of each group, [lanes, groups].
-  function values(self, key, absent)
+  pure logical function has(self, key)
     class(element_groups_t), intent(in) :: self
-    character(len=*), intent(in) :: key   !! of numbers
-    real(wp), intent(in), optional :: absent   !! where it is unset; absent: 0
-    real(wp) :: values(self%lanes, size(self%indices))
-    real(wp) :: default_value
+    character(len=*), intent(in) :: key
     integer :: i
 
-    default_value = 0.0_wp
-    if (present(absent)) default_value = absent
+    has = any([(self%input%groups(self%indices(i))%has_value(key), i=1, size(self%indices))])
+  end function has
+
+  pure function values(self, key, absent)
+    class(element_groups_t), intent(in) :: self
+    character(len=*), intent(in) :: key
+    real(wp), intent(in), optional :: absent
+    real(wp) :: values(self%lanes, size(self%names))
+    integer :: i
+
+    values = 0.0_wp
+    if (present(absent)) values = absent
     do i = 1, size(self%indices)
-      values(:, i) = self%input%groups(self%indices(i))%number(key, absent=default_value)
+      associate (group => self%input%groups(self%indices(i)))
+        associate (value => group%values(group%key_position(key)))
+          if (allocated(value%flags)) then
+            values(:, i) = merge(1.0_wp, 0.0_wp, value%flags(1))
+          else if (value%has_any()) then
+            values(:, i) = value%number_at(1)
+          end if
+        end associate
+      end associate
     end do
   end function values
 
-  !> Body number `which` of those that each group names under a key, 0 for the ground.
+  pure function numbers(self, key, lane, element)
+    class(element_groups_t), intent(in) :: self
+    character(len=*), intent(in) :: key
+    integer, intent(in) :: lane, element
+    real(wp), allocatable :: numbers(:)
+
+    numbers = self%input%groups(self%indices(element))%numbers(key)
+  end function numbers
+
   function bodies(self, key, which)
     class(element_groups_t), intent(in) :: self
-    character(len=*), intent(in) :: key   !! of names of bodies
-    integer, intent(in) :: which          !! 1 or more
-    integer :: bodies(size(self%indices))
+    character(len=*), intent(in) :: key
+    integer, intent(in) :: which
+    integer :: bodies(size(self%names))
     integer, allocatable :: named(:)
     integer :: i
 
@@ -161,11 +188,10 @@ contains
     bodies = bodies_of(self%input%groups(self%indices(group)), key, self%body_index)
   end function listed_bodies
 
-  !> The table of each group, [lanes, groups].
   function curves(self, x, y, extrapolation)
     class(element_groups_t), intent(in) :: self
-    character(len=*), intent(in) :: x, y                      !! keys of the lists
-    character(len=*), intent(in), optional :: extrapolation   !! the one of the group if absent
+    character(len=*), intent(in) :: x, y
+    character(len=*), intent(in), optional :: extrapolation
     type(curve_t), allocatable :: curves(:, :)
     integer :: i, lane
 

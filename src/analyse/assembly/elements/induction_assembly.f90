@@ -1,4 +1,4 @@
-!> The induction motors of an input with electrical transients: their circuits, and their supply over the time.
+!> The induction motors of an input with electrical transients: their circuits from rated values, and what is refused.
 module nocdyn_induction_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
   use nocdyn_element_groups, only: element_groups_t
@@ -8,52 +8,30 @@ module nocdyn_induction_assembly
   use nocdyn_kinds, only: wp
   use nocdyn_rated_circuits, only: fit_circuit, rating_fits, rating_impossible, rating_t, rating_too_efficient, &
                                    rating_too_strong, rating_too_weak
-  use nocdyn_schedules, only: schedule_t
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
   use nocdyn_written_values, only: written_element, written_key, written_number, written_unit
   implicit none (type, external)
   private
 
-  public :: add_flux_motors, check_flux_motor, check_poles, note_rated_motors
+  public :: add_rated_motors, check_flux_motor, check_poles, note_rated_motors
 
   real(wp), parameter :: resolution = 1.0e4_wp     ! of limits in messages
   real(wp), parameter :: tolerated = 0.2_wp        ! relative difference between what is given and what the circuit has
 
 contains
 
-  !> Adds a bank of induction motors, all or none of which have a supply over the time, and a circuit from rated values.
-  subroutine add_flux_motors(groups, body, banks)
+  !> Adds a bank of induction motors whose circuits follow from rated values.
+  subroutine add_rated_motors(groups, banks)
     type(element_groups_t), intent(in) :: groups
-    integer, intent(in) :: body(:)
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    real(wp), dimension(groups%lanes, size(body)) :: direction, poles
-    real(wp) :: values(groups%lanes, size(body), size(circuit_keys))
-    integer :: i, k, lane
-    type(schedule_t), allocatable :: schedule(:, :)
-    logical :: are_keys
+    real(wp) :: rated(groups%lanes, size(groups%indices), size(circuit_keys))
+    integer :: i
 
-    are_keys = .not. groups%input%groups(groups%indices(1))%has_value('rated_power')
-    do k = 1, size(circuit_keys)
-      values(:, :, k) = groups%values(trim(circuit_keys(k)))
+    do i = 1, size(groups%indices)
+      rated(:, i, :) = spread(fitted_values(groups%input%groups(groups%indices(i))), 1, groups%lanes)
     end do
-    do i = 1, size(body)
-      associate (group => groups%input%groups(groups%indices(i)))
-        poles(:, i) = group%whole_number('poles')
-        direction(:, i) = merge(-1.0_wp, 1.0_wp, group%flag('reversed'))
-        if (.not. are_keys) values(:, i, :) = spread(fitted_values(group), 1, groups%lanes)
-      end associate
-    end do
-    if (groups%input%groups(groups%indices(1))%has_value('supply_times')) then
-      ! the shares of the voltage over the time, the same in every lane
-      allocate (schedule(groups%lanes, size(groups%indices)))
-      do i = 1, size(groups%indices)
-        do lane = 1, groups%lanes
-          call schedule_supply(groups%input%groups(groups%indices(i)), schedule(lane, i))
-        end do
-      end do
-    end if
-    call append_bank(banks, new_flux_motors(groups%names, body, values, poles, direction, are_keys, schedule))
-  end subroutine add_flux_motors
+    call append_bank(banks, new_flux_motors(groups, rated))
+  end subroutine add_rated_motors
 
   !> The values of the circuit that follows from the rated values, in the order of `circuit_keys`.
   function fitted_values(group) result(values)
@@ -128,27 +106,6 @@ contains
                   rounded_text(found, 3) // ' with the circuit, which knows no skin effect in the bars')
     end associate
   end subroutine compare_start
-
-  !> The share of the voltage of one motor: at each of its times a change to the next factor, within a ramp. Before the first one,
-  !> and with the factor 0, the motor is disconnected.
-  subroutine schedule_supply(group, schedule)
-    type(group_t), intent(in) :: group
-    type(schedule_t), intent(out) :: schedule
-    real(wp), allocatable, dimension(:) :: factor, ramp, time
-    real(wp) :: before
-    integer :: k
-
-    allocate (time, source=group%numbers('supply_times'))
-    allocate (factor, source=group%numbers('supply_factors'))
-    allocate (ramp, source=group%numbers('supply_ramps'))
-    call schedule%append(time(1), 0.0_wp, 0.0_wp, .true.)
-    before = 0.0_wp
-    do k = 1, size(time)
-      if (ramp(k) > 0) call schedule%append(time(k), before, (factor(k) - before) / ramp(k), .false.)
-      call schedule%append(time(k) + ramp(k), factor(k), 0.0_wp, .not. factor(k) > 0)
-      before = factor(k)
-    end do
-  end subroutine schedule_supply
 
   !> Refuses an odd number of poles, a voltage that is not positive, and a supply that contradicts itself.
   subroutine check_flux_motor(input, index, diagnostics)

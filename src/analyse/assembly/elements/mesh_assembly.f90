@@ -78,7 +78,6 @@ contains
     type(element_groups_t), intent(in) :: groups
     integer, intent(in) :: form   !! without the one of the error
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    real(wp), dimension(groups%lanes, size(groups%indices)) :: stiffness, zero
     integer :: bodies(2, size(groups%indices)), i
     real(wp) :: radii(2, size(groups%indices))
     type(coupling_common_t) :: shared
@@ -89,18 +88,18 @@ contains
     do i = 1, size(groups%indices)
       radii(:, i) = radii_of(groups%input%groups(groups%indices(i)))
     end do
-    zero = 0.0_wp
-    shared = coupling_common_t(groups%names, new_element_rows([(2 * i - 1, i=1, size(bodies, 2) + 1)], [bodies], [radii]), &
-                               groups%values('damping'), zero)
+    shared%names = groups%names
+    shared%rows = new_element_rows([(2 * i - 1, i=1, size(bodies, 2) + 1)], [bodies], [radii])
+    shared%damping = groups%values('damping')
+    shared%rest_twist = 0.0_wp * shared%damping
     shared%is_mesh = .true.
     call read_error(groups%input%groups(groups%indices(1)), bodies(1, 1), shared%error)
-    stiffness = groups%values('stiffness')
     if (form == with_backlash) then
-      call append_bank(banks, new_gap_couplings(shared, spread(stiffness, 1, 1), groups%values('backlash'), stiffness))
+      call append_bank(banks, new_gap_couplings(groups, shared))
     else if (allocated(shared%error)) then
-      call append_bank(banks, new_polynomial_couplings(shared, spread(stiffness, 1, 1), stiffness))
+      call append_bank(banks, new_polynomial_couplings(groups, shared))
     else
-      call append_bank(banks, new_couplings(shared, stiffness, zero))
+      call append_bank(banks, new_couplings(groups, shared))
     end if
   end subroutine add_meshes
 

@@ -4,7 +4,7 @@ module nocdyn_motion_assembly
   use nocdyn_cardan_rows, only: new_cardan_rows
   use nocdyn_curves, only: curve_t, extrapolation_constant, extrapolation_linear, interpolation_cubic, interpolation_dwells, &
     interpolation_linear, interpolation_spline, new_curve
-  use nocdyn_drives, only: drive_motion_t, new_drives
+  use nocdyn_drives, only: new_drives
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
@@ -128,24 +128,17 @@ contains
   subroutine add_relations(groups, banks)
     type(element_groups_t), intent(in) :: groups
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    integer :: first(size(groups%indices) + 1), i, shape(size(groups%indices))
+    integer :: i, shape(size(groups%indices))
     logical :: repeats(size(groups%indices))
-    real(wp), allocatable :: driven(:), driving(:)
 
     if (size(groups%indices) == 0) return
-    allocate (driven(0), driving(0))
-    first(1) = 1
     do i = 1, size(groups%indices)
       associate (group => groups%input%groups(groups%indices(i)))
-        driving = [driving, group%numbers('table_angle')]
-        driven = [driven, group%numbers('table_driven')]
         repeats(i) = group%text('kind') /= 'lever'
         shape(i) = spline_shape(group%text('interpolation'))
-        first(i + 1) = size(driving) + 1
       end associate
     end do
-    call append_bank(banks, new_relation_rows(groups%lanes, groups%names, groups%bodies('bodies', 2), first, &
-                                              transpose(reshape([driving, driven], [size(driving), 2])), repeats, shape))
+    call append_bank(banks, new_relation_rows(groups, repeats, shape))
     call append_bank(banks, new_phases(groups%lanes, groups%names, groups%bodies('bodies', 1)))
   end subroutine add_relations
 
@@ -155,8 +148,7 @@ contains
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
 
     if (size(groups%indices) == 0) return
-    call append_bank(banks, new_cardan_rows(groups%names, groups%bodies('bodies', 2), groups%values('angle'), &
-                                            groups%values('phase')))
+    call append_bank(banks, new_cardan_rows(groups))
     call append_bank(banks, new_phases(groups%lanes, groups%names, groups%bodies('bodies', 1)))
   end subroutine add_cardans
 
@@ -173,28 +165,13 @@ contains
     type(element_groups_t), intent(in) :: groups
     integer, intent(in) :: form
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    type(drive_motion_t) :: given
     logical :: are_angles
-    real(wp) :: t_start
+    type(curve_t), allocatable :: tables(:, :)   ! not allocated: absent
 
     if (size(groups%indices) == 0) return
     are_angles = form > forms_of_speed
-    t_start = groups%input%groups(groups%input%position('run'))%number('t_start')
-    given%frequency = groups%values('frequency', absent=1.0_wp)
-    given%phase = groups%values('phase')
-    if (are_angles) then
-      given%speed = 0.0_wp * given%phase
-      given%amplitude = groups%values('angle_amplitude', absent=0.0_wp)
-    else
-      given%speed = groups%values('speed')
-      given%amplitude = groups%values('speed_amplitude', absent=0.0_wp)
-    end if
-    if (modulo(form, forms_of_speed) == by_formula) then
-      call append_bank(banks, new_drives(groups%names, groups%bodies('body', 1), t_start, are_angles, given))
-    else
-      call append_bank(banks, new_drives(groups%names, groups%bodies('body', 1), t_start, are_angles, given, &
-                                         drive_tables(groups, are_angles)))
-    end if
+    if (modulo(form, forms_of_speed) /= by_formula) tables = drive_tables(groups, are_angles)
+    call append_bank(banks, new_drives(groups, are_angles, tables))
   end subroutine add_drive_form
 
   !> The tables of drives. A table of angles has no kinks, also at its ends.

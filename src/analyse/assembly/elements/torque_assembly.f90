@@ -2,7 +2,6 @@
 module nocdyn_torque_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
   use nocdyn_cylinder_torques, only: cylinder_torques
-  use nocdyn_described_elements, only: never
   use nocdyn_electrical_faults, only: find_fault_terms
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_excitation_banks, only: excitation_bank_t
@@ -11,8 +10,8 @@ module nocdyn_torque_assembly
   use nocdyn_harmonic_tables, only: table_torque
   use nocdyn_input, only: group_t
   use nocdyn_kinds, only: wp
-  use nocdyn_load_shares, only: new_load_shares, shared_load_t
-  use nocdyn_loads, only: new_loads, new_nonlinear_loads
+  use nocdyn_load_shares, only: new_load_shares
+  use nocdyn_loads, only: new_loads
   use nocdyn_order_excitations, only: new_order_excitations, order_excitations_t, order_torque_t
   use nocdyn_shared_loads, only: find_shared_load
   use nocdyn_table_excitations, only: new_table_excitations
@@ -42,25 +41,10 @@ contains
   !> Adds the bank of the loads of one form.
   subroutine add_load_form(groups, form, banks)
     type(element_groups_t), intent(in) :: groups
-    integer, intent(in) :: form
+    integer, intent(in) :: form   !! their constructor knows it by the keys
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    integer :: body(size(groups%indices))
-    real(wp), dimension(groups%lanes, size(groups%indices)) :: constant, constant_speed, quadratic, slope
 
-    body = groups%bodies('body', 1)
-    slope = groups%values('viscous')
-    quadratic = groups%values('quadratic')
-    constant = groups%values('constant')
-    constant_speed = groups%values('constant_speed', absent=1.0_wp)
-    select case (form)
-    case (viscous)
-      call append_bank(banks, new_loads(groups%names, body, slope))
-    case (nonlinear)
-      call append_bank(banks, new_nonlinear_loads(groups%names, body, slope, quadratic, constant, constant_speed))
-    case default
-      call append_bank(banks, new_nonlinear_loads(groups%names, body, slope, quadratic, constant, constant_speed, &
-                                                  groups%curves('table_speed', 'table_torque')))
-    end select
+    call append_bank(banks, new_loads(groups))
   end subroutine add_load_form
 
   !> Form of the law of a group &excitation.
@@ -90,84 +74,59 @@ contains
     integer, intent(in) :: form
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(fault_terms_t) :: terms(size(groups%indices))
-    integer :: before, body(size(groups%indices)), i, shape(size(groups%indices))
+    integer :: before, first, i, shape(size(groups%indices))
     logical :: has_failed
 
     before = size(banks)
-    body = groups%bodies('body', 1)
     select case (form - 1 + modulo(form, 2))   ! without its window
     case (harmonic)
-      call append_bank(banks, new_excitations(groups%names, body, groups%values('amplitude'), groups%values('frequency'), &
-                                              groups%values('phase')))
+      call append_bank(banks, new_excitations(groups))
     case (waves)
-      call add_waves(groups, body, banks)
+      call add_waves(groups, banks)
     case (orders)
-      call append_bank(banks, new_order_excitations(groups%names, body, in_lanes(torques(groups), groups%lanes)))
+      call append_bank(banks, new_order_excitations(groups%names, groups%bodies('body', 1), &
+                                                    in_lanes(torques(groups), groups%lanes)))
     case (shares)
-      call add_shares(groups, body, banks)
+      call add_shares(groups, banks)
     case (tables)
-      call append_bank(banks, new_table_excitations(groups%names, body, &
-                                                    groups%curves('table_time', 'table_torque', extrapolation='constant')))
+      call append_bank(banks, new_table_excitations(groups))
     case (faults)
-      do i = 1, size(body)
+      do i = 1, size(terms)
         call find_fault_terms(groups%input%groups(groups%indices(i)), terms(i), has_failed)
         if (has_failed) error stop 'nocdyn_torque_assembly: the groups are checked'
       end do
-      call append_bank(banks, new_fault_excitations(groups%names, body, terms, groups%values('time')))
+      call append_bank(banks, new_fault_excitations(groups, terms))
     case default
       shape = shape_pulse
-      do i = 1, size(body)
+      do i = 1, size(shape)
         if (groups%input%groups(groups%indices(i))%text('kind') == 'step') shape(i) = shape_step
         if (groups%input%groups(groups%indices(i))%text('kind') == 'ramp') shape(i) = shape_ramp
       end do
-      call append_bank(banks, new_timed_excitations(groups%names, body, shape, groups%values('amplitude'), &
-                                                    groups%values('time'), groups%values('duration', absent=1.0_wp)))
+      call append_bank(banks, new_timed_excitations(groups, shape))
     end select
-    if (modulo(form, 2) == 0) call add_windows(groups, banks(before + 1:))
-  end subroutine add_excitation_form
-
-  !> Gives excitations their windows. Several banks have one excitation each.
-  subroutine add_windows(groups, banks)
-    type(element_groups_t), intent(in) :: groups
-    type(bank_slot_t), intent(inout) :: banks(:)
-    real(wp), dimension(groups%lanes, size(groups%indices)) :: begin, end, rate
-    real(wp) :: t_start
-    integer :: i, last
-
-    t_start = groups%input%groups(groups%input%position('run'))%number('t_start')
-    begin = groups%values('start', absent=t_start)
-    end = groups%values('end', absent=never)
-    rate = 0.0_wp
-    do i = 1, size(groups%indices)
-      associate (group => groups%input%groups(groups%indices(i)))
-        if (group%has_value('time') .and. .not. group%has_value('start')) begin(:, i) = max(t_start, group%number('time'))
-        if (group%has_value('decay')) rate(:, i) = 1 / group%number('decay')
-      end associate
-    end do
-    last = 0
-    do i = 1, size(banks)
+    if (modulo(form, 2) == 1) return
+    first = 1
+    do i = before + 1, size(banks)
       select type (bank => banks(i)%bank)
       class is (excitation_bank_t)
-        call bank%set_window(begin(:, last + 1:last + bank%count), end(:, last + 1:last + bank%count), &
-                             rate(:, last + 1:last + bank%count))
-        last = last + bank%count
+        call bank%set_window(groups, first)
+        first = first + bank%count
       class default
         error stop 'nocdyn_torque_assembly: an excitation has no window'
       end select
     end do
-  end subroutine add_windows
+  end subroutine add_excitation_form
 
   !> Adds a bank of waves: every order is a term, and so is amplitude sin(2 (frequency t - pole_pairs phi) + phase).
-  subroutine add_waves(groups, body, banks)
+  subroutine add_waves(groups, banks)
     type(element_groups_t), intent(in) :: groups
-    integer, intent(in) :: body(:)
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     real(wp), allocatable :: amplitude(:), frequency(:), order(:), phase(:)
     integer, allocatable :: owner(:)
     integer :: i
 
     allocate (owner(0), amplitude(0), frequency(0), order(0), phase(0))
-    do i = 1, size(body)
+    do i = 1, size(groups%indices)
       associate (group => groups%input%groups(groups%indices(i)))
         if (group%text('kind') == 'startup') then
           amplitude = [amplitude, group%number('amplitude')]
@@ -185,8 +144,8 @@ contains
       end associate
     end do
     associate (lanes => groups%lanes)
-      call append_bank(banks, new_wave_excitations(groups%names, body, owner, spread(amplitude, 1, lanes), &
-                                                   spread(frequency, 1, lanes), spread(order, 1, lanes), spread(phase, 1, lanes)))
+      call append_bank(banks, new_wave_excitations(groups, owner, spread(amplitude, 1, lanes), spread(frequency, 1, lanes), &
+                                                   spread(order, 1, lanes), spread(phase, 1, lanes)))
     end associate
   end subroutine add_waves
 
@@ -218,34 +177,21 @@ contains
   end function in_lanes
 
   !> Adds banks of shares of loads, one for each: their loads may have switches that the ones of others do not have.
-  subroutine add_shares(groups, body, banks)
+  subroutine add_shares(groups, banks)
     type(element_groups_t), intent(in) :: groups
-    integer, intent(in) :: body(:)
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    type(element_groups_t) :: loads
-    type(shared_load_t), allocatable :: load
+    type(element_groups_t) :: load, one
     character(len=:), allocatable :: text
     integer :: i, index
 
-    do i = 1, size(body)
+    one = groups
+    load = groups
+    do i = 1, size(groups%indices)
       call find_shared_load(groups%input, groups%indices(i), index, text)
       if (index == 0) error stop 'nocdyn_torque_assembly: the load of an excitation was not checked'
-      loads = groups
-      loads%indices = [index]
-      allocate (load)
-      load%viscous = loads%values('viscous')
-      load%quadratic = loads%values('quadratic')
-      load%constant = loads%values('constant')
-      load%constant_speed = loads%values('constant_speed', absent=1.0_wp)
-      if (groups%input%groups(index)%has_value('table_speed')) load%curve = loads%curves('table_speed', 'table_torque')
-      associate (group => groups%input%groups(groups%indices(i)), lanes => groups%lanes)
-        associate (orders => group%numbers('orders'))
-          call append_bank(banks, new_load_shares(groups%names(i:i), body(i:i), spread(1, 1, size(orders)), &
-                                                  spread(group%numbers('share_of_load'), 1, lanes), spread(orders, 1, lanes), &
-                                                  spread(group%numbers('phases'), 1, lanes), load))
-        end associate
-      end associate
-      deallocate (load)
+      call one%select(groups%indices(i:i))
+      call load%select([index])
+      call append_bank(banks, new_load_shares(one, load))
     end do
   end subroutine add_shares
 

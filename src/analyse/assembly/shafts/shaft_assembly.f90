@@ -254,7 +254,6 @@ contains
     type(shaft_set_t), intent(in) :: set
     type(machine_t), intent(inout) :: machine
     type(coupling_common_t) :: shared
-    real(wp), allocatable :: zero(:, :)
     integer :: b, k
 
     if (size(set%shafts) == 0) return
@@ -264,15 +263,17 @@ contains
       if (b > 0) machine%inertia(:, b) = machine%inertia(:, b) + set%inertia(k)
     end do
     associate (n => machine%lanes)
-      allocate (zero, source=spread(0.0_wp * set%stiffness, 1, n))
-      shared = coupling_common_t(set%slice_names, new_element_rows(set%first, set%body, set%coefficient), &
-                                 spread(set%loss_damping, 1, n), zero)
+      shared%names = set%slice_names
+      shared%rows = new_element_rows(set%first, set%body, set%coefficient)
+      shared%damping = spread(set%loss_damping, 1, n)
+      shared%rest_twist = 0.0_wp * shared%damping
+      if (any(set%loss_factor > 0)) then
+        shared%loss_factor = set%loss_factor
+        shared%loss_damping = set%loss_damping
+      end if
       call append_bank(machine%banks, new_shafts(shared, spread(set%stiffness, 1, n), set%shafts, spread(set%position, 1, n), &
                                                  spread(set%section_modulus, 1, n)))
     end associate
-    if (.not. any(set%loss_factor > 0)) return
-    machine%banks(size(machine%banks))%bank%loss_factor = set%loss_factor
-    machine%banks(size(machine%banks))%bank%loss_damping = set%loss_damping
   end subroutine add_shafts
 
   !> Sets the start of the nodes, as the one of a massless shaft between its ends.

@@ -8,6 +8,7 @@
 !> friction have one work integral.
 module nocdyn_couplings
   use nocdyn_bank, only: bank_t, harmonic_t, role_coupling
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_element_rows, only: element_rows_t, rows_between
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
@@ -42,12 +43,12 @@ module nocdyn_couplings
     real(wp), allocatable :: friction_speed(:, :)   !! [rad/s], positive
     logical :: is_mesh = .false.                    !! as in `bank_t`
     real(wp), allocatable :: section_modulus(:, :)  !! stress = moment / section_modulus [m3], 0: unknown; not allocated: all
+    real(wp), allocatable :: loss_factor(:), loss_damping(:)   !! as in `bank_t`
     type(transmission_error_t), allocatable :: error !! of the only coupling; not allocated: none
   end type coupling_common_t
 
-  ! gfortran 12 loses components of a structure constructor's value that is an argument
   interface coupling_common_t
-    procedure :: new_common, common_of_rows
+    procedure :: new_common
   end interface coupling_common_t
 
   !> M_el = -(K1 + k1 w^2) w on the second body, w = u - rest_twist; damping moment -d u'. Extensions have another elastic moment.
@@ -57,7 +58,7 @@ module nocdyn_couplings
   contains
     procedure :: list_harmonics
     procedure :: to_mean_torque
-    procedure :: set_common
+    procedure :: set_common, set_keys
     procedure :: add_damping
     procedure :: describe
     procedure :: describe_phase
@@ -71,48 +72,47 @@ module nocdyn_couplings
 
 contains
 
-  !> Couplings between two bodies each.
-  function new_common(names, from, to, damping, rest_twist, friction, friction_speed) result(shared)
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: from(:), to(:)                    !! bodies, 0 = ground
-    real(wp), intent(in) :: damping(:, :)                    !! [N m s/rad], shape [lanes, couplings] as all that follow
-    real(wp), intent(in) :: rest_twist(:, :)                 !! [rad]
-    real(wp), intent(in), optional :: friction(:, :)         !! [N m]; absent: none
-    real(wp), intent(in), optional :: friction_speed(:, :)   !! [rad/s], positive; present with `friction`
-    type(coupling_common_t) :: shared
+  !> Couplings between two bodies each. Relative damping has a viscous damping in its place at `damping_frequency`.
+  function new_common(keys) result(common)
+    class(element_keys_t), intent(in) :: keys
+    type(coupling_common_t) :: common
+    real(wp), parameter :: pi = acos(-1.0_wp)
+    real(wp), dimension(keys%lanes, size(keys%names)) :: bore, diameter, loss, modulus, viscous
 
-    shared = common_of_rows(names, rows_between(from, to), damping, rest_twist, friction, friction_speed)
+    allocate (common%names, source=keys%names)
+    common%rows = rows_between(keys%bodies('bodies', 1), keys%bodies('bodies', 2))
+    loss = keys%values('relative_damping') / (2.0_wp * pi)
+    where (keys%values('magnifier') > 0) loss = 1.0_wp / keys%values('magnifier')
+    viscous = 0.0_wp
+    where (keys%values('damping_frequency') > 0) viscous = loss * keys%values('stiffness') / keys%values('damping_frequency')
+    allocate (common%damping, source=keys%values('damping') + viscous)
+    if (any(loss > 0)) then
+      allocate (common%loss_factor, source=loss(1, :))
+      allocate (common%loss_damping, source=viscous(1, :))
+    end if
+    allocate (common%rest_twist, source=keys%values('rest_twist'))
+    modulus = keys%values('section_modulus')   ! against torsion
+    diameter = keys%values('diameter')
+    bore = keys%values('bore')
+    where (diameter > 0) modulus = pi / 16.0_wp * (diameter**4 - bore**4) / diameter
+    if (any(modulus > 0)) allocate (common%section_modulus, source=modulus)
+    if (.not. any(keys%values('friction') > 0)) return
+    allocate (common%friction, source=keys%values('friction'))
+    allocate (common%friction_speed, source=keys%values('friction_speed', absent=1.0_wp))
   end function new_common
 
-  !> Couplings along any rows.
-  function common_of_rows(names, rows, damping, rest_twist, friction, friction_speed) result(shared)
-    type(string_t), intent(in) :: names(:)
-    type(element_rows_t), intent(in) :: rows
-    real(wp), intent(in) :: damping(:, :)                    !! [N m s/rad], shape [lanes, couplings] as all that follow
-    real(wp), intent(in) :: rest_twist(:, :)                 !! [rad]
-    real(wp), intent(in), optional :: friction(:, :)         !! [N m]; absent: none
-    real(wp), intent(in), optional :: friction_speed(:, :)   !! [rad/s], positive; present with `friction`
-    type(coupling_common_t) :: shared
-
-    allocate (shared%names, source=names)
-    shared%rows = rows
-    allocate (shared%damping, source=damping)
-    allocate (shared%rest_twist, source=rest_twist)
-    if (.not. present(friction)) return
-    allocate (shared%friction, source=friction)
-    allocate (shared%friction_speed, source=friction_speed)
-  end function common_of_rows
-
   !> Couplings by eq. (3). Those without damping and friction in all lanes have no work integral.
-  function new_couplings(common, stiffness, cubic_stiffness) result(bank)
-    type(coupling_common_t), intent(in) :: common   !! names, bodies, damping, rest twists, friction
-    real(wp), intent(in) :: stiffness(:, :)            !! K1 [N m/rad], shape [lanes, couplings]
-    real(wp), intent(in) :: cubic_stiffness(:, :)      !! k1 [N m/rad3], of either sign
+  function new_couplings(keys, common) result(bank)
+    class(element_keys_t), intent(in) :: keys
+    type(coupling_common_t), intent(in), optional :: common   !! of meshes; absent: as the keys say
     type(couplings_t) :: bank
+    real(wp), dimension(keys%lanes, size(keys%names)) :: cubic_stiffness
     integer :: e
 
-    call bank%set_common(common)
-    call bank%add_parameter('stiffness', stiffness)
+    call bank%set_keys(keys, common)
+    cubic_stiffness = 0.0_wp
+    if (.not. bank%is_mesh) cubic_stiffness = keys%values('cubic_stiffness')
+    call bank%add_key(keys, 'stiffness')
     call bank%add_parameter('cubic_stiffness', cubic_stiffness)
     call bank%add_term('rest_twist', coefficient_rest, 1.0_wp)
     call bank%add_term('stiffness', coefficient_linear, 1.0_wp)
@@ -121,9 +121,23 @@ contains
     bank%is_polynomial = .not. bank%has_friction
     bank%has_paper_law = bank%is_polynomial
     bank%has_polynomial_potential = .true.
-    bank%elastic = pack([(e, e=1, bank%count)], any(abs(stiffness) > 0.0_wp .or. abs(cubic_stiffness) > 0.0_wp, dim=1))
+    bank%elastic = pack([(e, e=1, bank%count)], any(abs(keys%values('stiffness')) > 0.0_wp .or. abs(cubic_stiffness) > 0.0_wp, &
+                                                    dim=1))
     call bank%prepare_law()
   end function new_couplings
+
+  !> `set_common` with what is given, else with what the keys say.
+  subroutine set_keys(self, keys, common)
+    class(couplings_t), intent(inout) :: self
+    class(element_keys_t), intent(in) :: keys
+    type(coupling_common_t), intent(in), optional :: common
+
+    if (present(common)) then
+      call self%set_common(common)
+    else
+      call self%set_common(coupling_common_t(keys))
+    end if
+  end subroutine set_keys
 
   !> Connects the bodies and sets what couplings of every elastic law have in common.
   subroutine set_common(self, common)
@@ -145,6 +159,10 @@ contains
       is_dissipative = is_dissipative .or. any(abs(common%friction) > 0.0_wp, dim=1)
     end if
     if (allocated(common%section_modulus)) call self%add_parameter('section_modulus', common%section_modulus, is_key=.false.)
+    if (allocated(common%loss_factor)) then
+      self%loss_factor = common%loss_factor
+      self%loss_damping = common%loss_damping
+    end if
     self%with_work = pack([(e, e=1, self%count)], is_dissipative)
     self%is_polynomial = .false.
     self%has_polynomial_potential = .false.

@@ -7,11 +7,12 @@
 module nocdyn_gap_couplings
   use nocdyn_couplings, only: coupling_common_t, couplings_t
   use nocdyn_described_elements, only: boundary_width
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), operator(+), operator(-), pick
   use nocdyn_law_functions, only: add_guard, larger, polynomial, size_of
   use nocdyn_law_tape, only: law_tape_t
-  use nocdyn_polynomial_couplings, only: add_coefficients, coefficients_of
+  use nocdyn_polynomial_couplings, only: add_coefficients, all_coefficients, coefficients_of
   implicit none (type, external)
   private
 
@@ -34,16 +35,17 @@ contains
 
   !> Couplings with play, the elastic moment being sum p_k x^k of the penetration x. The damping is that in contact, the rest
   !> twist is at the middle of the gap, the friction acts in the gap and in contact.
-  function new_gap_couplings(common, coefficient, gap, stiffness) result(bank)
-    type(coupling_common_t), intent(in) :: common   !! names, bodies, damping, rest twists, friction
-    real(wp), intent(in) :: coefficient(:, :, :)       !! p_k [N m/rad^k], shape [order, lanes, couplings], some not zero
-    real(wp), intent(in) :: gap(:, :)                  !! [rad], positive, shape [lanes, couplings]
-    real(wp), intent(in), optional :: stiffness(:, :)  !! of the key, [N m/rad]; p_1 is this where there are no others
+  function new_gap_couplings(keys, common) result(bank)
+    class(element_keys_t), intent(in) :: keys
+    type(coupling_common_t), intent(in), optional :: common   !! of meshes; absent: as the keys say
     type(gap_couplings_t) :: bank
+    real(wp), allocatable :: coefficient(:, :, :), gap(:, :)
     integer :: e
 
-    call bank%set_common(common)
-    call add_coefficients(bank, coefficient, bank%order, stiffness)
+    call bank%set_keys(keys, common)
+    coefficient = all_coefficients(keys, bank%is_mesh)
+    call add_coefficients(bank, coefficient, keys%values('stiffness'), bank%order)
+    gap = keys%values(merge('backlash', 'gap     ', bank%is_mesh))
     if (any(gap <= 0) .or. .not. all(any(abs(coefficient) > 0, dim=1))) then
       error stop 'nocdyn_gap_couplings: gaps have widths and edges stiffness'
     end if

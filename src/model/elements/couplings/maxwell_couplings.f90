@@ -6,6 +6,7 @@
 !> frequency w the stiffness of a branch is K i w time / (1 + i w time).
 module nocdyn_maxwell_couplings
   use nocdyn_couplings, only: coupling_common_t, couplings_t
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, node_of, operator(*), operator(+), operator(-), operator(/), speed_of, state_of
@@ -27,25 +28,21 @@ module nocdyn_maxwell_couplings
 contains
 
   !> Couplings by eq. (3) with branches, without moments in these at the start.
-  function new_maxwell_couplings(common, stiffness, cubic_stiffness, branch_stiffness, branch_time) result(bank)
-    type(coupling_common_t), intent(in) :: common      !! names, bodies, damping, rest twists, friction
-    real(wp), intent(in) :: stiffness(:, :)            !! [N m/rad], [lanes, couplings]
-    real(wp), intent(in) :: cubic_stiffness(:, :)      !! [N m/rad3]
-    real(wp), intent(in) :: branch_stiffness(:, :, :)  !! K [N m/rad], 0: no such branch; [lanes, couplings, branches]
-    real(wp), intent(in) :: branch_time(:, :, :)       !! positive [s], the same
+  function new_maxwell_couplings(keys) result(bank)
+    class(element_keys_t), intent(in) :: keys
     type(maxwell_couplings_t) :: bank
     integer :: e, k
 
-    bank%states = size(branch_stiffness, 3)
+    bank%states = keys%longest('maxwell_stiffness')
     allocate (bank%internal_names(bank%states))
     do k = 1, bank%states
       bank%internal_names(k) = 'moment of branch ' // to_text(k)
     end do
-    call bank%set_common(common)
-    call bank%add_parameter('stiffness', stiffness)
-    call bank%add_parameter('cubic_stiffness', cubic_stiffness)
-    call bank%add_parts('branch stiffness', branch_stiffness)
-    call bank%add_parts('branch time', branch_time)
+    call bank%set_common(coupling_common_t(keys))
+    call bank%add_key(keys, 'stiffness')
+    call bank%add_key(keys, 'cubic_stiffness')
+    call bank%add_parts('branch stiffness', keys%lists('maxwell_stiffness', bank%states))
+    call bank%add_parts('branch time', keys%lists('maxwell_time', bank%states, absent=1.0_wp))
     call bank%add_term('rest_twist', coefficient_rest, 1.0_wp)
     call bank%add_term('stiffness', coefficient_linear, 1.0_wp)
     call bank%add_term('cubic_stiffness', coefficient_cubic, 1.0_wp)

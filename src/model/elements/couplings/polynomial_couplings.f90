@@ -2,6 +2,7 @@
 module nocdyn_polynomial_couplings
   use nocdyn_bank, only: bank_t
   use nocdyn_couplings, only: coupling_common_t, couplings_t
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, node_of, operator(*), operator(+), operator(-)
   use nocdyn_law_functions, only: polynomial
@@ -10,7 +11,7 @@ module nocdyn_polynomial_couplings
   implicit none (type, external)
   private
 
-  public :: new_polynomial_couplings, elastic_coefficients, add_coefficients, coefficients_of
+  public :: new_polynomial_couplings, elastic_coefficients, all_coefficients, add_coefficients, coefficients_of
 
   character(len=*), parameter :: first_name = 'stiffness'   ! the parameter p_1, and the key that may give it alone
 
@@ -24,16 +25,17 @@ module nocdyn_polynomial_couplings
 contains
 
   !> Couplings with the elastic moment sum p_k w^k.
-  function new_polynomial_couplings(common, coefficient, stiffness) result(bank)
-    type(coupling_common_t), intent(in) :: common   !! names, bodies, damping, rest twists, friction
-    real(wp), intent(in) :: coefficient(:, :, :)       !! p_k [N m/rad^k], shape [order, lanes, couplings]
-    real(wp), intent(in), optional :: stiffness(:, :)  !! of the key, [N m/rad]; p_1 is this where there are no others
+  function new_polynomial_couplings(keys, common) result(bank)
+    class(element_keys_t), intent(in) :: keys
+    type(coupling_common_t), intent(in), optional :: common   !! of meshes; absent: as the keys say
     type(polynomial_couplings_t) :: bank
+    real(wp), allocatable :: coefficient(:, :, :)
     integer :: e
 
-    call bank%set_common(common)
+    call bank%set_keys(keys, common)
     call bank%add_damping()
-    call add_coefficients(bank, coefficient, bank%order, stiffness)
+    coefficient = all_coefficients(keys, bank%is_mesh)
+    call add_coefficients(bank, coefficient, keys%values('stiffness'), bank%order)
     bank%elastic = pack([(e, e=1, bank%count)], [(any(abs(coefficient(:, :, e)) > 0.0_wp), e=1, bank%count)])
     call bank%prepare_law()
   end function new_polynomial_couplings
@@ -50,12 +52,36 @@ contains
     coefficient(3) = coefficient(3) + cubic_stiffness
   end function elastic_coefficients
 
+  !> p_1, p_2, ... of all couplings [N m/rad^k], [order, lanes, couplings]. A mesh has the stiffness alone.
+  function all_coefficients(keys, is_mesh) result(coefficient)
+    class(element_keys_t), intent(in) :: keys
+    logical, intent(in) :: is_mesh
+    real(wp), allocatable :: coefficient(:, :, :)
+    real(wp), dimension(keys%lanes, size(keys%names)) :: cubic_stiffness, stiffness
+    integer :: e, lane
+
+    stiffness = keys%values('stiffness')
+    if (is_mesh) then
+      coefficient = spread(stiffness, 1, 1)
+      return
+    end if
+    cubic_stiffness = keys%values('cubic_stiffness')
+    allocate (coefficient(max(3, keys%longest('polynomial')), keys%lanes, size(keys%names)), source=0.0_wp)
+    do e = 1, size(keys%names)
+      do lane = 1, keys%lanes
+        associate (one => elastic_coefficients(stiffness(lane, e), cubic_stiffness(lane, e), keys%numbers('polynomial', lane, e)))
+          coefficient(:size(one), lane, e) = one
+        end associate
+      end do
+    end do
+  end function all_coefficients
+
   !> Adds the coefficients as parameters, without the ones of high order that are zero everywhere.
-  subroutine add_coefficients(bank, coefficient, order, stiffness)
+  subroutine add_coefficients(bank, coefficient, stiffness, order)
     class(bank_t), intent(inout) :: bank
     real(wp), intent(in) :: coefficient(:, :, :)   !! p_k [N m/rad^k], shape [order, lanes, couplings]
+    real(wp), intent(in) :: stiffness(:, :)        !! of the key, shape [lanes, couplings]; p_1 where there are no others
     integer, intent(out) :: order                  !! of the last one that is left, at least 1
-    real(wp), intent(in), optional :: stiffness(:, :)   !! of the key, shape [lanes, couplings]; p_1 where there are no others
     logical :: is_key
     integer :: k
 
@@ -64,7 +90,7 @@ contains
       if (any(abs(coefficient(k, :, :)) > 0)) order = k
     end do
     is_key = .false.
-    if (order == 1 .and. present(stiffness)) is_key = .not. any(abs(coefficient(1, :, :) - stiffness) > 0)
+    if (order == 1) is_key = .not. any(abs(coefficient(1, :, :) - stiffness) > 0)
     call bank%add_parameter(first_name, coefficient(1, :, :), is_key)
     do k = 2, order
       call bank%add_parameter('coefficient ' // to_text(k), coefficient(k, :, :), is_key=.false.)

@@ -1,7 +1,7 @@
 !> Couplings whose elastic moment cannot exceed a limit: S tanh(K1 w / S) with w = u - rest_twist.
 module nocdyn_saturated_couplings
   use nocdyn_couplings, only: coupling_common_t, couplings_t
-  use nocdyn_kinds, only: wp
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_law_expressions, only: expression_t, node_of, operator(*), operator(-), operator(/)
   use nocdyn_law_functions, only: log_cosh, tanh
   use nocdyn_law_tape, only: law_tape_t
@@ -18,17 +18,15 @@ module nocdyn_saturated_couplings
 contains
 
   !> Couplings with the elastic moment saturation * tanh(stiffness * w / saturation).
-  function new_saturated_couplings(common, stiffness, saturation) result(bank)
-    type(coupling_common_t), intent(in) :: common   !! names, bodies, damping, rest twists, friction
-    real(wp), intent(in) :: stiffness(:, :)            !! K1 [N m/rad], positive, shape [lanes, couplings]
-    real(wp), intent(in) :: saturation(:, :)           !! S [N m], positive, shape [lanes, couplings]
+  function new_saturated_couplings(keys) result(bank)
+    class(element_keys_t), intent(in) :: keys
     type(saturated_couplings_t) :: bank
     integer :: e
 
-    call bank%set_common(common)
+    call bank%set_common(coupling_common_t(keys))
     call bank%add_damping()
-    call bank%add_parameter('stiffness', stiffness)
-    call bank%add_parameter('saturation', saturation)
+    call bank%add_key(keys, 'stiffness')
+    call bank%add_key(keys, 'saturation')
     bank%elastic = [(e, e=1, bank%count)]
     call bank%prepare_law()
   end function new_saturated_couplings

@@ -1,7 +1,7 @@
 !> Couplings with the elastic moment of a table over the twist.
 module nocdyn_table_couplings
   use nocdyn_couplings, only: coupling_common_t, couplings_t
-  use nocdyn_curves, only: curve_t
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_law_expressions, only: expression_t, node_of, operator(-)
   use nocdyn_law_tape, only: law_tape_t
   use nocdyn_tables, only: add_table, curve_integral, curve_value, guard_segment
@@ -19,15 +19,14 @@ module nocdyn_table_couplings
 contains
 
   !> Couplings with the elastic moment of a curve over the twist.
-  function new_table_couplings(common, curve) result(bank)
-    type(coupling_common_t), intent(in) :: common   !! names, bodies, damping, rest twists, friction
-    type(curve_t), intent(in) :: curve(:, :)   !! [N m] over [rad], shape [lanes, couplings]
+  function new_table_couplings(keys) result(bank)
+    class(element_keys_t), intent(in) :: keys
     type(table_couplings_t) :: bank
     integer :: e
 
-    call bank%set_common(common)
+    call bank%set_common(coupling_common_t(keys))
     call bank%add_damping()
-    call add_table(bank, curve)
+    call add_table(bank, keys%curves('table_twist', 'table_moment'))
     bank%elastic = [(e, e=1, bank%count)]
     call bank%prepare_law()
   end function new_table_couplings

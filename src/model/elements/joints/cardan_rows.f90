@@ -5,10 +5,9 @@
 !> times the one of the first: H. Chr. Seherr-Thoss, F. Schmelz, E. Aucktor, Universal Joints and Driveshafts, section 1.2.
 module nocdyn_cardan_rows
   use nocdyn_bank, only: role_cardan
-  use nocdyn_element_rows, only: rows_between
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_kinds, only: wp
   use nocdyn_moving_rows, only: moving_rows_t
-  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -22,16 +21,13 @@ module nocdyn_cardan_rows
 contains
 
   !> A bank of joints; their first shafts are the drivers.
-  function new_cardan_rows(names, driven, angle, phase) result(bank)
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: driven(:)        !! bodies of the second shafts
-    real(wp), intent(in) :: angle(:, :)     !! between the shafts [rad], [lanes, joints]
-    real(wp), intent(in) :: phase(:, :)     !! angle of the first fork where the angle of its body is zero [rad], [lanes, joints]
+  function new_cardan_rows(keys) result(bank)
+    class(element_keys_t), intent(in) :: keys
     type(cardan_rows_t) :: bank
 
-    call bank%connect_rows_only(role_cardan, size(angle, 1), names, rows_between(0 * driven, driven))
-    call bank%add_parameter('angle', angle, is_key=.false.)
-    call bank%add_parameter('phase', phase, is_key=.false.)
+    call bank%connect_rows_only(role_cardan, keys%lanes, keys%names, keys%bodies('bodies', 2))
+    call bank%add_parameter('angle', keys%values('angle'), is_key=.false.)
+    call bank%add_parameter('phase', keys%values('phase'), is_key=.false.)
   end function new_cardan_rows
 
   !> phi_2 = phi_1 + atan2((1 - c) sin phi_1 cos phi_1, c cos^2 phi_1 + sin^2 phi_1), c = cos(angle).

@@ -7,7 +7,6 @@
 !> piston. The force of the first row is therefore the one of the rod on the pin of the piston, however the rod is given.
 module nocdyn_crank_rows
   use nocdyn_bank, only: role_crank
-  use nocdyn_element_rows, only: rows_between
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_moving_rows, only: moving_rows_t
@@ -50,7 +49,7 @@ contains
     type(slider_crank_t), intent(in) :: crank
     type(crank_rows_t) :: bank
 
-    call bank%connect_rows_only(role_crank, lanes, names, rows_between(0 * driven, driven))
+    call bank%connect_rows_only(role_crank, lanes, names, driven)
     call bank%add_parameter('dimensions', spread([crank%crank_radius, crank%rod_length, crank%offset, crank%phase, &
                                                   crank%rod_center], 1, lanes), .false., spread(1, 1, 5))
   end function new_crank_rows

@@ -6,25 +6,16 @@
 module nocdyn_drives
   use nocdyn_bank, only: role_drive
   use nocdyn_curves, only: curve_t
-  use nocdyn_element_rows, only: rows_between
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: literal, node_of, time_of
   use nocdyn_law_tape, only: law_tape_t
   use nocdyn_moving_rows, only: moving_rows_t
   use nocdyn_tables, only: add_table, guard_segment
-  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
   public :: new_drives
-
-  !> Numbers of drives, shape [lanes, drives] all.
-  type, public :: drive_motion_t
-    real(wp), allocatable :: speed(:, :)        !! [rad/s], not of angles
-    real(wp), allocatable :: amplitude(:, :)    !! [rad/s], [rad] of angles
-    real(wp), allocatable :: frequency(:, :)    !! [rad/s], positive
-    real(wp), allocatable :: phase(:, :)        !! at t = 0 [rad]
-  end type drive_motion_t
 
   type, extends(moving_rows_t), public :: drives_t
     logical :: prescribe_angles = .false.
@@ -38,23 +29,20 @@ module nocdyn_drives
 contains
 
   !> A bank of drives, each of one body.
-  function new_drives(names, body, t_start, prescribe_angles, given, table) result(bank)
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: body(:)
-    real(wp), intent(in) :: t_start            !! [s]
+  function new_drives(keys, prescribe_angles, table) result(bank)
+    class(element_keys_t), intent(in) :: keys
     logical, intent(in) :: prescribe_angles
-    type(drive_motion_t), intent(in) :: given
     type(curve_t), intent(in), optional :: table(:, :)   !! [rad/s] or [rad] over [s], [lanes, drives]
     type(drives_t) :: bank
 
     bank%is_driven_by_time = .true.
     bank%prescribe_angles = prescribe_angles
-    bank%t_start = t_start
-    call bank%connect_rows_only(role_drive, size(given%speed, 1), names, rows_between(0 * body, body))
-    call bank%add_parameter('speed', given%speed, is_key=.false.)
-    call bank%add_parameter('amplitude', given%amplitude, is_key=.false.)
-    call bank%add_parameter('frequency', given%frequency, is_key=.false.)
-    call bank%add_parameter('phase', given%phase, is_key=.false.)
+    bank%t_start = keys%t_start
+    call bank%connect_rows_only(role_drive, keys%lanes, keys%names, keys%bodies('body', 1))
+    call bank%add_parameter('speed', keys%values('speed'), is_key=.false.)
+    call bank%add_parameter('amplitude', keys%values(merge('angle_amplitude', 'speed_amplitude', prescribe_angles)), .false.)
+    call bank%add_parameter('frequency', keys%values('frequency', absent=1.0_wp), is_key=.false.)
+    call bank%add_parameter('phase', keys%values('phase'), is_key=.false.)
     if (.not. present(table)) return
     bank%is_polynomial = .false.
     call add_table(bank, table)

@@ -5,7 +5,7 @@
 !> power. `nocdyn_joint_sets` finds it. The drivers are elements of a bank of their own, which follows.
 module nocdyn_moving_rows
   use nocdyn_bank, only: bank_t
-  use nocdyn_element_rows, only: element_rows_t
+  use nocdyn_element_rows, only: rows_between
   use nocdyn_kinds, only: wp
   use nocdyn_quantities, only: form_total, new_quantity, quantity_t, rank_torque
   use nocdyn_text, only: string_t
@@ -38,14 +38,14 @@ module nocdyn_moving_rows
 contains
 
   !> Sets the connectivity; the elements have no moments of their own and store nothing.
-  subroutine connect_rows_only(self, role, lanes, names, rows)
+  subroutine connect_rows_only(self, role, lanes, names, driven)
     class(moving_rows_t), intent(inout) :: self
     integer, intent(in) :: role                 !! role_...
     integer, intent(in) :: lanes
     type(string_t), intent(in) :: names(:)      !! [elements]
-    type(element_rows_t), intent(in) :: rows    !! of the elements
+    integer, intent(in) :: driven(:)            !! body of each
 
-    call self%connect(role, lanes, names, rows)
+    call self%connect(role, lanes, names, rows_between(0 * driven, driven))
     self%elastic = [integer ::]
     self%has_paper_law = .false.
     self%moving_rows = self%count

@@ -1,11 +1,10 @@
 !> Tables of the angle of one body over the one of another: cams, non-circular gears, levers; splines through their points.
 module nocdyn_relation_rows
   use nocdyn_bank, only: role_relation
-  use nocdyn_element_rows, only: rows_between
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_kinds, only: wp
   use nocdyn_moving_rows, only: moving_rows_t
   use nocdyn_splines, only: new_spline, spline_t
-  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -24,26 +23,22 @@ module nocdyn_relation_rows
 contains
 
   !> A bank of relations; their first bodies are the drivers.
-  function new_relation_rows(lanes, names, driven, first, points, repeats, shape) result(bank)
-    integer, intent(in) :: lanes
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: driven(:)        !! the second bodies
-    integer, intent(in) :: first(:)         !! first point of each relation, [relations + 1]
-    real(wp), intent(in) :: points(:, :)    !! angles of the first and second bodies [rad], [2, points]
+  function new_relation_rows(keys, repeats, shape) result(bank)
+    class(element_keys_t), intent(in) :: keys
     logical, intent(in) :: repeats(:)       !! [relations]
     integer, intent(in) :: shape(:)         !! spline_..., [relations]
     type(relation_rows_t) :: bank
-    integer :: e, k
+    integer :: e
 
-    call bank%connect_rows_only(role_relation, lanes, names, rows_between(0 * driven, driven))
-    allocate (bank%spline(size(driven)))
-    bank%points = first
+    call bank%connect_rows_only(role_relation, keys%lanes, keys%names, keys%bodies('bodies', 2))
+    allocate (bank%spline(bank%count))
+    associate (owner => keys%owners('table_angle'))
+      bank%points = [(1 + count(owner < e), e=1, bank%count + 1)]
+      call bank%add_parameter('driving', keys%joined('table_angle'), .false., owner)
+      call bank%add_parameter('driven', keys%joined('table_driven'), .false., owner)
+    end associate
     bank%repeats = repeats
     bank%shape = shape
-    associate (owner => [((e, k=first(e), first(e + 1) - 1), e=1, size(driven))])
-      call bank%add_parameter('driving', spread(points(1, :), 1, lanes), .false., owner)
-      call bank%add_parameter('driven', spread(points(2, :), 1, lanes), .false., owner)
-    end associate
     call bank%refresh_lane(1)
   end function new_relation_rows
 

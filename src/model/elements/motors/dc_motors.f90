@@ -1,11 +1,11 @@
 !> Direct-current motors with an inductance: torque k i, inductance i' = y voltage - resistance i - k omega, i = 0 at the start.
 module nocdyn_dc_motors
   use nocdyn_bank, only: role_motor
-  use nocdyn_governed_banks, only: governed_bank_t, governor_t
+  use nocdyn_element_keys, only: element_keys_t
+  use nocdyn_governed_banks, only: governed_bank_t, has_governors
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, node_of, operator(*), operator(-), operator(/), speed_of, state_of
   use nocdyn_law_tape, only: law_tape_t
-  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -22,24 +22,20 @@ module nocdyn_dc_motors
 contains
 
   !> A bank of motors, each on one body.
-  function new_dc_motors(names, body, voltage, resistance, flux_constant, inductance, governor) result(bank)
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: body(:)
-    real(wp), intent(in) :: voltage(:, :), resistance(:, :)         !! [V], [Ohm], shape [lanes, motors]
-    real(wp), intent(in) :: flux_constant(:, :), inductance(:, :)   !! k [V s/rad], [H], shape [lanes, motors]
-    type(governor_t), intent(in), optional :: governor   !! no motor has one if absent
+  function new_dc_motors(keys) result(bank)
+    class(element_keys_t), intent(in) :: keys
     type(dc_motors_t) :: bank
 
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
     bank%states = 1
     allocate (bank%internal_names, source=[character(len=24) :: 'armature current', 'governor integral'])
-    call bank%connect(role_motor, size(voltage, 1), names, body)
-    call bank%add_parameter('voltage', voltage)
-    call bank%add_parameter('resistance', resistance)
-    call bank%add_parameter('flux_constant', flux_constant)
-    call bank%add_parameter('inductance', inductance)
-    if (present(governor)) call bank%add_governor(governor)
+    call bank%connect(role_motor, keys)
+    call bank%add_key(keys, 'voltage')
+    call bank%add_key(keys, 'resistance')
+    call bank%add_key(keys, 'flux_constant')
+    call bank%add_key(keys, 'inductance')
+    if (has_governors(keys)) call bank%add_governor(keys)
     call bank%prepare_law()
   end function new_dc_motors
 

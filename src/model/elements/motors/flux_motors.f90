@@ -12,6 +12,7 @@
 !> the rotor alone makes it: lambda_s follows that by its rate, and what differs at the opening decays with `arc_time`.
 module nocdyn_flux_motors
   use nocdyn_bank, only: bank_t, role_motor
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_elements, only: elements_t
   use nocdyn_induction_circuits, only: induction_circuit_t
   use nocdyn_kinds, only: wp
@@ -19,13 +20,12 @@ module nocdyn_flux_motors
   use nocdyn_law_tape, only: law_tape_t
   use nocdyn_quantities, only: form_applied, form_observed, new_quantity, quantity_t, rank_current, rank_torque
   use nocdyn_schedules, only: add_schedule, guard_schedule, schedule_t, scheduled_flag, scheduled_value, value_at
-  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
   public :: new_flux_motors
 
-  !> Keys of a motor. Each inductance is given as such or as a reactance at the frequency; the other one is 0.
+  !> Keys of the circuit. Each inductance is given as such or as a reactance at the frequency; the other one is 0.
   character(len=*), parameter, public :: circuit_keys(*) = [character(len=17) :: &
     'voltage', 'frequency', 'stator_resistance', 'rotor_resistance', 'stator_leakage', 'rotor_leakage', 'mutual_inductance', &
     'stator_reactance', 'rotor_reactance', 'mutual_reactance']
@@ -52,32 +52,58 @@ module nocdyn_flux_motors
 
 contains
 
-  !> A bank of motors, each on one body.
-  function new_flux_motors(names, body, values, poles, direction, are_keys, schedule) result(bank)
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: body(:)
-    real(wp), intent(in) :: values(:, :, :)    !! in SI, shape [lanes, motors, keys], keys as in `circuit_keys`
-    real(wp), intent(in) :: poles(:, :)        !! number of poles, shape [lanes, motors]
-    real(wp), intent(in) :: direction(:, :)    !! 1 or -1: of the field, the same shape
-    logical, intent(in) :: are_keys            !! whether these are the values of the keys, not values that follow from others
-    type(schedule_t), intent(in), optional :: schedule(:, :)   !! of the supply, the same shape; its flag: disconnected
+  !> A bank of motors, each on one body, all or none of which have a supply over the time.
+  function new_flux_motors(keys, rated) result(bank)
+    class(element_keys_t), intent(in) :: keys
+    real(wp), intent(in), optional :: rated(:, :, :)   !! circuits in place of the ones of the keys, in SI, [lanes, motors, keys]
     type(flux_motors_t) :: bank
-    integer :: k
+    type(schedule_t), allocatable :: schedule(:, :)
+    integer :: e, k, lane
 
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
     bank%states = 4
     allocate (bank%internal_names, source=[character(len=24) :: 'stator flux d', 'stator flux q', 'rotor flux d', 'rotor flux q'])
-    call bank%connect(role_motor, size(poles, 1), names, body)
+    call bank%connect(role_motor, keys)
     do k = 1, size(circuit_keys)
-      call bank%add_parameter(circuit_keys(k), values(:, :, k), is_key=are_keys)
+      if (present(rated)) then
+        call bank%add_parameter(circuit_keys(k), rated(:, :, k), is_key=.false.)
+      else
+        call bank%add_key(keys, circuit_keys(k))
+      end if
     end do
-    call bank%add_parameter('pole pairs', 0.5_wp * poles, is_key=.false.)
-    call bank%add_parameter('direction', direction, is_key=.false.)
-    bank%has_schedule = present(schedule)
-    if (present(schedule)) call add_schedule(bank, supply, schedule, 'change of the supply')
+    call bank%add_parameter('pole pairs', 0.5_wp * keys%values('poles'), is_key=.false.)
+    call bank%add_parameter('direction', 1.0_wp - 2.0_wp * keys%values('reversed'), is_key=.false.)
+    bank%has_schedule = keys%has('supply_times')
+    if (bank%has_schedule) then
+      allocate (schedule(bank%lanes, bank%count))
+      do e = 1, bank%count
+        do lane = 1, bank%lanes
+          call schedule_supply(keys%numbers('supply_times', lane, e), keys%numbers('supply_factors', lane, e), &
+                               keys%numbers('supply_ramps', lane, e), schedule(lane, e))
+        end do
+      end do
+      call add_schedule(bank, supply, schedule, 'change of the supply')
+    end if
     call bank%prepare_law()
   end function new_flux_motors
+
+  !> The share of the voltage of one motor: at each time a change to the next factor, within a ramp. Before the first one, and
+  !> with the factor 0, the motor is disconnected.
+  subroutine schedule_supply(time, factor, ramp, schedule)
+    real(wp), intent(in) :: time(:), factor(:), ramp(:)   ! [s], [1], [s]
+    type(schedule_t), intent(out) :: schedule
+    real(wp) :: before
+    integer :: k
+
+    call schedule%append(time(1), 0.0_wp, 0.0_wp, .true.)
+    before = 0.0_wp
+    do k = 1, size(time)
+      if (ramp(k) > 0) call schedule%append(time(k), before, (factor(k) - before) / ramp(k), .false.)
+      call schedule%append(time(k) + ramp(k), factor(k), 0.0_wp, .not. factor(k) > 0)
+      before = factor(k)
+    end do
+  end subroutine schedule_supply
 
   subroutine describe(self, tape)
     class(flux_motors_t), intent(in) :: self

@@ -7,6 +7,7 @@
 module nocdyn_governed_banks
   use nocdyn_bank, only: bank_t
   use nocdyn_described_elements, only: boundary_width
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), operator(+), operator(-), operator(/), &
@@ -14,19 +15,11 @@ module nocdyn_governed_banks
   use nocdyn_law_functions, only: add_guard
   use nocdyn_law_tape, only: law_tape_t
   use nocdyn_quantities, only: form_applied, form_observed, new_quantity, quantity_t, rank_current, rank_torque
-  use nocdyn_schedules, only: add_schedule, guard_schedule, schedule_t, scheduled_value, value_at
+  use nocdyn_schedules, only: add_schedule, guard_schedule, join_points, schedule_t, scheduled_value, value_at
   implicit none (type, external)
   private
 
-  !> The governors of the motors of a bank, shape [lanes, motors].
-  type, public :: governor_t
-    real(wp), allocatable :: set_speed(:, :)   !! at the start [rad/s]
-    real(wp), allocatable :: gain(:, :)        !! [s/rad], not zero
-    real(wp), allocatable :: time(:, :)        !! integral time [s], positive
-    real(wp), allocatable :: start(:, :)       !! throttle y at the start, `least` to 1
-    real(wp) :: least = 0.0_wp                 !! lower limit of the throttle
-    type(schedule_t), allocatable :: course(:, :)   !! of the set speed, where it follows the time
-  end type governor_t
+  public :: has_governors
 
   !> The integral z of a governor is the last internal state of its motor. The switches of the governors are the last ones.
   type, extends(bank_t), public :: governed_bank_t
@@ -51,22 +44,40 @@ module nocdyn_governed_banks
 
 contains
 
+  !> Whether the motors of a bank have governors: all have one, or none.
+  pure logical function has_governors(keys)
+    class(element_keys_t), intent(in) :: keys
+
+    has_governors = keys%has('governor_speed') .or. keys%has('set_times')
+  end function has_governors
+
   !> Gives every motor a governor, with an internal state and a switch; after `connect` and `add_table`.
-  subroutine add_governor(self, governor)
+  subroutine add_governor(self, keys, least)
     class(governed_bank_t), intent(inout) :: self
-    type(governor_t), intent(in) :: governor   !! of all motors
-    integer :: e
+    class(element_keys_t), intent(in) :: keys
+    real(wp), intent(in), optional :: least   !! lower limit of the throttle; absent: 0
+    type(schedule_t), allocatable :: schedule(:, :)
+    real(wp) :: set_speed(self%lanes, self%count)   ! at the start
+    integer :: e, lane
 
     self%has_governor = .true.
     self%states = self%states + 1
     self%internal_values = self%states * self%values
-    call self%add_parameter('governor_speed', governor%set_speed, is_key=.false.)
-    call self%add_parameter('governor_gain', governor%gain, is_key=.false.)
-    call self%add_parameter('governor_time', governor%time)
-    call self%add_parameter('governor_start', governor%start, is_key=.false.)
-    self%least = governor%least
-    self%has_course = allocated(governor%course)
-    if (self%has_course) call add_schedule(self, course, governor%course, 'point of the set speed')
+    if (present(least)) self%least = least
+    self%has_course = keys%has('set_times')
+    set_speed = keys%values('governor_speed')
+    allocate (schedule(merge(self%lanes, 0, self%has_course), self%count))
+    do e = 1, self%count
+      do lane = 1, size(schedule, 1)
+        call join_points(keys%numbers('set_times', lane, e), keys%numbers('set_speeds', lane, e), schedule(lane, e))
+        set_speed(lane, e) = schedule(lane, e)%at(keys%t_start)
+      end do
+    end do
+    call self%add_parameter('governor_speed', set_speed, is_key=.false.)
+    call self%add_parameter('governor_gain', keys%values('governor_gain'), is_key=.false.)
+    call self%add_key(keys, 'governor_time')
+    call self%add_parameter('governor_start', keys%values('governor_start'), is_key=.false.)
+    if (self%has_course) call add_schedule(self, course, schedule, 'point of the set speed')
     call self%add_switches([('limit of the governor', e=1, self%count)], open)
   end subroutine add_governor
 

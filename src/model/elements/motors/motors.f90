@@ -1,14 +1,13 @@
 !> Motors whose torque is a function of their speed: eq. (20), Kloss' formula, or a table. A governor may throttle them.
 module nocdyn_motors
   use nocdyn_bank, only: role_motor
-  use nocdyn_curves, only: curve_t
-  use nocdyn_governed_banks, only: governed_bank_t, governor_t
+  use nocdyn_element_keys, only: element_keys_t
+  use nocdyn_governed_banks, only: governed_bank_t, has_governors
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, node_of, operator(*), operator(+), operator(-), operator(/), speed_of
   use nocdyn_law_tape, only: law_tape_t
   use nocdyn_polynomial_laws, only: coefficient_by_speed, coefficient_by_speed_squared, coefficient_constant
   use nocdyn_tables, only: add_table, curve_value, guard_segment
-  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -33,7 +32,7 @@ module nocdyn_motors
     end function torque_interface
   end interface
 
-  !> Eq. (20): A - B omega - C omega^2.
+  !> Eq. (20): A - B omega - C omega^2; also constant torques, and dc motors without inductance, which are linear.
   type, extends(speed_motors_t), public :: motors_t
   contains
     procedure :: torque => quadratic_torque
@@ -58,19 +57,20 @@ module nocdyn_motors
 contains
 
   !> A bank of motors, each on one body, with a quadratic torque-speed curve.
-  function new_motors(names, body, a, b, c, governor, drag) result(bank)
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: body(:)
-    real(wp), intent(in) :: a(:, :), b(:, :), c(:, :)   !! [N m], [N m s/rad], [N m s2/rad2], shape [lanes, motors]
-    type(governor_t), intent(in), optional :: governor    !! of all motors; no motor has one if absent
-    real(wp), intent(in), optional :: drag(:, :)          !! [N m s/rad], shape [lanes, motors]; present with `governor`
+  function new_motors(keys) result(bank)
+    class(element_keys_t), intent(in) :: keys
     type(motors_t) :: bank
 
-    call bank%connect(role_motor, size(a, 1), names, body)
-    call bank%add_parameter('a', a)
-    call bank%add_parameter('b', b)
-    call bank%add_parameter('c', c)
-    if (present(governor)) call govern(bank, governor, drag)
+    call bank%connect(role_motor, keys)
+    call bank%add_parameter('a', keys%values('a') + keys%values('torque') + &
+                            keys%values('flux_constant') * keys%values('voltage') / keys%values('resistance', absent=1.0_wp))
+    if (has_governors(keys)) then
+      call bank%add_key(keys, 'b')
+    else
+      call bank%add_parameter('b', keys%values('b') + drags(keys))
+    end if
+    call bank%add_key(keys, 'c')
+    call govern(bank, keys)
     bank%is_polynomial = .not. bank%has_governor
     if (bank%is_polynomial) then
       call bank%add_term('a', coefficient_constant, 1.0_wp)
@@ -82,53 +82,52 @@ contains
   end function new_motors
 
   !> A bank of motors, each on one body, with tables.
-  function new_table_motors(names, body, curve, governor, drag) result(bank)
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: body(:)
-    type(curve_t), intent(in) :: curve(:, :)              !! [N m] over [rad/s], shape [lanes, motors]
-    type(governor_t), intent(in), optional :: governor    !! of all motors; no motor has one if absent
-    real(wp), intent(in), optional :: drag(:, :)          !! [N m s/rad], shape [lanes, motors]; present with `governor`
+  function new_table_motors(keys) result(bank)
+    class(element_keys_t), intent(in) :: keys
     type(table_motors_t) :: bank
 
-    call bank%connect(role_motor, size(curve, 1), names, body)
+    call bank%connect(role_motor, keys)
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
-    call add_table(bank, curve)
-    if (present(governor)) call govern(bank, governor, drag)
+    call add_table(bank, keys%curves('table_speed', 'table_torque'))
+    call govern(bank, keys)
     call bank%prepare_law()
   end function new_table_motors
 
   !> A bank of induction motors, each on one body.
-  function new_induction_motors(names, body, breakdown_torque, breakdown_slip, synchronous_speed, governor, drag) result(bank)
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: body(:)
-    real(wp), intent(in) :: breakdown_torque(:, :)    !! T_k [N m], shape [lanes, motors] as all that follow
-    real(wp), intent(in) :: breakdown_slip(:, :)      !! s_k, positive
-    real(wp), intent(in) :: synchronous_speed(:, :)   !! [rad/s], not zero
-    type(governor_t), intent(in), optional :: governor    !! of all motors; no motor has one if absent
-    real(wp), intent(in), optional :: drag(:, :)          !! [N m s/rad], shape [lanes, motors]; present with `governor`
+  function new_induction_motors(keys) result(bank)
+    class(element_keys_t), intent(in) :: keys
     type(induction_motors_t) :: bank
 
-    call bank%connect(role_motor, size(breakdown_slip, 1), names, body)
+    call bank%connect(role_motor, keys)
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
-    call bank%add_parameter('breakdown_torque', breakdown_torque)
-    call bank%add_parameter('breakdown_slip', breakdown_slip)
-    call bank%add_parameter('synchronous_speed', synchronous_speed)
-    if (present(governor)) call govern(bank, governor, drag)
+    call bank%add_key(keys, 'breakdown_torque')
+    call bank%add_key(keys, 'breakdown_slip')
+    call bank%add_key(keys, 'synchronous_speed')
+    call govern(bank, keys)
     call bank%prepare_law()
   end function new_induction_motors
 
-  subroutine govern(bank, governor, drag)
+  !> Gives the motors governors, if they have some. The drag is not throttled.
+  subroutine govern(bank, keys)
     class(speed_motors_t), intent(inout) :: bank
-    type(governor_t), intent(in) :: governor   !! of all motors
-    real(wp), intent(in) :: drag(:, :)         !! not throttled [N m s/rad], shape [lanes, motors]
+    class(element_keys_t), intent(in) :: keys
 
+    if (.not. has_governors(keys)) return
     allocate (bank%internal_names, source=[character(len=24) :: 'governor integral'])
-    call bank%add_governor(governor)
-    call bank%add_parameter('drag', drag, is_key=.false.)
+    call bank%add_governor(keys)
+    call bank%add_parameter('drag', drags(keys), is_key=.false.)
     call bank%add_term('drag', coefficient_by_speed, -1.0_wp)
   end subroutine govern
+
+  !> Drags k^2 / resistance of dc motors without inductance [N m s/rad], [lanes, motors]; others have none.
+  pure function drags(keys)
+    class(element_keys_t), intent(in) :: keys
+    real(wp) :: drags(keys%lanes, size(keys%names))
+
+    drags = keys%values('flux_constant')**2 / keys%values('resistance', absent=1.0_wp)
+  end function drags
 
   subroutine describe(self, tape)
     class(speed_motors_t), intent(in) :: self

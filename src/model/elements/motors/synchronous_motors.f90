@@ -9,23 +9,16 @@
 module nocdyn_synchronous_motors
   use nocdyn_bank, only: bank_t, harmonic_t, role_motor, sine_harmonic
   use nocdyn_described_elements, only: boundary_width
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: angle_of, expression_t, literal, node_of, operator(*), operator(+), operator(-), &
     operator(/), pick, speed_of, time_of
   use nocdyn_law_functions, only: add_guard, sin
   use nocdyn_law_tape, only: law_tape_t
-  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
   public :: new_synchronous_motors
-
-  !> The torques of one motor over the slip.
-  type, public :: slip_curves_t
-    real(wp), allocatable :: slip(:)        !! ascending, at least 2, [points]
-    real(wp), allocatable :: mean(:)        !! [N m], [points]
-    real(wp), allocatable :: pulsation(:)   !! [N m], [points]
-  end type slip_curves_t
 
   type, extends(bank_t), public :: synchronous_motors_t
     integer, private :: segments = 1            !! between, below and above the points
@@ -40,43 +33,45 @@ module nocdyn_synchronous_motors
 contains
 
   !> A bank of motors, each on one body.
-  function new_synchronous_motors(names, body, curves, frequency, poles, direction, phase) result(bank)
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: body(:)
-    type(slip_curves_t), intent(in) :: curves(:, :)   !! their size does not depend on the lane, [lanes, motors]
-    real(wp), intent(in) :: frequency(:, :)           !! of the mains [rad/s], positive, shape [lanes, motors] as all that follow
-    real(wp), intent(in) :: poles(:, :)               !! even
-    real(wp), intent(in) :: direction(:, :)           !! 1 or -1: of the field
-    real(wp), intent(in) :: phase(:, :)               !! [rad]
+  function new_synchronous_motors(keys) result(bank)
+    class(element_keys_t), intent(in) :: keys
     type(synchronous_motors_t) :: bank
     integer :: e
 
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
-    call bank%connect(role_motor, size(frequency, 1), names, body)
-    call bank%add_parameter('frequency', frequency)
-    call bank%add_parameter('pole pairs', 0.5_wp * poles, is_key=.false.)
-    call bank%add_parameter('direction', direction, is_key=.false.)
-    call bank%add_parameter('phase', phase)
-    bank%segments = 1 + maxval([1, (size(curves(1, e)%slip), e=1, bank%count)])
-    call add_pieces(bank, curves)
+    call bank%connect(role_motor, keys)
+    call bank%add_key(keys, 'frequency')
+    call bank%add_parameter('pole pairs', 0.5_wp * keys%values('poles'), is_key=.false.)
+    call bank%add_parameter('direction', 1.0_wp - 2.0_wp * keys%values('reversed'), is_key=.false.)
+    call bank%add_key(keys, 'phase')
+    bank%segments = 1 + max(1, keys%longest('slips'))
+    call add_pieces(bank, keys)
     call bank%add_switches([('point in the table', e=1, bank%count)], bank%segments)
     call bank%prepare_law()
   end function new_synchronous_motors
 
   !> Adds the slip at the begin of each segment, sorted by segments, and the values and slopes of both torques.
-  subroutine add_pieces(bank, curves)
+  subroutine add_pieces(bank, keys)
     type(synchronous_motors_t), intent(inout) :: bank
-    type(slip_curves_t), intent(in) :: curves(:, :)   ! [lanes, motors]
+    class(element_keys_t), intent(in) :: keys
     real(wp), dimension(bank%lanes, bank%count, bank%segments) :: begin, mean, mean_slope, pulsation, pulsation_slope
+    real(wp), allocatable, dimension(:) :: direct, means, pulsations, quadrature, slips
     integer :: e, lane
 
     do e = 1, bank%count
       do lane = 1, bank%lanes
-        associate (one => curves(lane, e))
-          call divide(one%slip, one%mean, begin(lane, e, :), mean(lane, e, :), mean_slope(lane, e, :))
-          call divide(one%slip, one%pulsation, begin(lane, e, :), pulsation(lane, e, :), pulsation_slope(lane, e, :))
-        end associate
+        slips = keys%numbers('slips', lane, e)
+        means = keys%numbers('mean_torques', lane, e)
+        pulsations = keys%numbers('pulsations', lane, e)
+        if (size(means) == 0) then
+          direct = keys%numbers('d_torques', lane, e)
+          quadrature = keys%numbers('q_torques', lane, e)
+          means = 0.5_wp * (direct + quadrature)
+          pulsations = 0.5_wp * (direct - quadrature)
+        end if
+        call divide(slips, means, begin(lane, e, :), mean(lane, e, :), mean_slope(lane, e, :))
+        call divide(slips, pulsations, begin(lane, e, :), pulsation(lane, e, :), pulsation_slope(lane, e, :))
       end do
     end do
     call bank%add_parts('slip', begin)

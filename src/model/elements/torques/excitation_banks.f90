@@ -4,6 +4,7 @@
 module nocdyn_excitation_banks
   use nocdyn_bank, only: bank_t
   use nocdyn_described_elements, only: never
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), operator(-), pick, time_of
   use nocdyn_law_functions, only: add_guard, exp
@@ -35,17 +36,25 @@ module nocdyn_excitation_banks
 
 contains
 
-  !> Gives every excitation a window, with a switch; after the constructor.
-  subroutine set_window(self, begin, end, rate)
+  !> Gives every excitation a window, with a switch; after the constructor. It begins at `time` unless at `start`.
+  subroutine set_window(self, keys, first)
     class(excitation_bank_t), intent(inout) :: self
-    real(wp), intent(in) :: begin(:, :), end(:, :)   !! [s], shape [lanes, excitations]; `never`: without an end
-    real(wp), intent(in) :: rate(:, :)               !! 1 / time constant [1/s], the same shape
+    class(element_keys_t), intent(in) :: keys
+    integer, intent(in) :: first   !! its first element among the ones of the keys
+    real(wp), dimension(keys%lanes, size(keys%names)) :: begin, decay, rate
     integer :: e
 
+    begin = keys%values('start', absent=-never)
+    where (begin <= -never) begin = max(keys%t_start, keys%values('time', absent=keys%t_start))
+    decay = keys%values('decay')
+    rate = 0.0_wp
+    where (decay > 0) rate = 1 / decay
     self%has_window = .true.
-    call self%add_parameter('window begin', begin, is_key=.false.)
-    call self%add_parameter('window end', end, is_key=.false.)
-    call self%add_parameter('decay rate', rate, is_key=.false.)
+    associate (end => keys%values('end', absent=never), last => first + self%count - 1)
+      call self%add_parameter('window begin', begin(:, first:last), is_key=.false.)
+      call self%add_parameter('window end', end(:, first:last), is_key=.false.)
+      call self%add_parameter('decay rate', rate(:, first:last), is_key=.false.)
+    end associate
     call self%add_switches([('start or end', e=1, self%count)], after)
     call self%prepare_law()
   end subroutine set_window

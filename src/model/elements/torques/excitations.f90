@@ -1,12 +1,12 @@
 !> Harmonic excitations, eq. (17): M_0 sin(omega_p t + phase).
 module nocdyn_excitations
   use nocdyn_bank, only: harmonic_t, role_excitation, sine_harmonic
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, operator(*), operator(+), time_of
   use nocdyn_law_functions, only: sin
   use nocdyn_law_tape, only: law_tape_t
-  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -22,17 +22,15 @@ module nocdyn_excitations
 contains
 
   !> A bank of excitations, each on one body.
-  function new_excitations(names, body, amplitude, frequency, phase) result(bank)
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: body(:)
-    real(wp), intent(in) :: amplitude(:, :), frequency(:, :), phase(:, :)   !! [N m], [rad/s], [rad], shape [lanes, excitations]
+  function new_excitations(keys) result(bank)
+    class(element_keys_t), intent(in) :: keys
     type(excitations_t) :: bank
 
     bank%is_polynomial = .false.
-    call bank%connect(role_excitation, size(amplitude, 1), names, body)
-    call bank%add_parameter('amplitude', amplitude)
-    call bank%add_parameter('frequency', frequency)
-    call bank%add_parameter('phase', phase)
+    call bank%connect(role_excitation, keys)
+    call bank%add_key(keys, 'amplitude')
+    call bank%add_key(keys, 'frequency')
+    call bank%add_key(keys, 'phase')
     call bank%prepare_law()
   end function new_excitations
 

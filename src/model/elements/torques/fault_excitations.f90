@@ -3,12 +3,12 @@
 !> With x = t - time, the torque is the sum of A exp(-rate x) sin(n f x + phase), f the angular frequency of the mains.
 module nocdyn_fault_excitations
   use nocdyn_bank, only: role_excitation
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, literal, operator(*), operator(+), operator(-), pick, time_of
   use nocdyn_law_functions, only: add_guard, exp, sin
   use nocdyn_law_tape, only: law_tape_t
-  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -34,22 +34,20 @@ module nocdyn_fault_excitations
 contains
 
   !> A bank of excitations, each on one body.
-  function new_fault_excitations(names, body, terms, time) result(bank)
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: body(:)
+  function new_fault_excitations(keys, terms) result(bank)
+    class(element_keys_t), intent(in) :: keys
     type(fault_terms_t), intent(in) :: terms(:)   !! the same in every lane, [excitations]
-    real(wp), intent(in) :: time(:, :)            !! of the faults [s], shape [lanes, excitations]
     type(fault_excitations_t) :: bank
     integer :: e
 
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
-    call bank%connect(role_excitation, size(time, 1), names, body)
-    bank%most_terms = maxval([(size(terms(e)%amplitude), e=1, size(body))])
-    call bank%add_parameter('time', time)
-    call bank%add_parameter('mains', spread([(terms(e)%frequency, e=1, size(body))], 1, bank%lanes), is_key=.false.)
+    call bank%connect(role_excitation, keys)
+    bank%most_terms = maxval([(size(terms(e)%amplitude), e=1, bank%count)])
+    call bank%add_key(keys, 'time')
+    call bank%add_parameter('mains', spread([(terms(e)%frequency, e=1, bank%count)], 1, bank%lanes), is_key=.false.)
     call add_numbers(bank, terms)
-    call bank%add_switches([('fault', e=1, size(body))], 2)
+    call bank%add_switches([('fault', e=1, bank%count)], 2)
     call bank%prepare_law()
   end function new_fault_excitations
 

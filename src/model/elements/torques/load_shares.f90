@@ -4,13 +4,11 @@
 !> share sin(order u + phase).
 module nocdyn_load_shares
   use nocdyn_bank, only: harmonic_t
-  use nocdyn_curves, only: curve_t
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, operator(*), operator(-), speed_of
   use nocdyn_law_tape, only: law_tape_t
-  use nocdyn_loads, only: resistance
-  use nocdyn_tables, only: add_table
-  use nocdyn_text, only: string_t
+  use nocdyn_loads, only: add_resistance, resistance
   use nocdyn_wave_excitations, only: new_wave_excitations, wave_excitations_t
   implicit none (type, external)
   private
@@ -18,41 +16,28 @@ module nocdyn_load_shares
   public :: new_load_shares
 
   type, extends(wave_excitations_t), public :: load_shares_t
-    logical :: has_quadratic = .false.
+    integer :: quadratic_switch = 0   !! as in `resistance`
   contains
     procedure :: torque
     procedure :: list_harmonics
   end type load_shares_t
 
-  !> The loads of some excitations, with the terms of `new_nonlinear_loads`.
-  type, public :: shared_load_t
-    real(wp), allocatable :: viscous(:, :), quadratic(:, :)         !! [N m s/rad], [N m s2/rad2], [lanes, excitations]
-    real(wp), allocatable :: constant(:, :), constant_speed(:, :)   !! [N m], [rad/s], [lanes, excitations]
-    type(curve_t), allocatable :: curve(:, :)   !! resisting torque [N m] over speed [rad/s], [lanes, excitations]; or 0
-  end type shared_load_t
-
 contains
 
   !> A bank of excitations, each on one body.
-  function new_load_shares(names, body, owner, share, order, phase, load) result(bank)
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: body(:)
-    integer, intent(in) :: owner(:)                                        !! excitation of each term
-    real(wp), intent(in) :: share(:, :), order(:, :), phase(:, :)          !! [1], [1], [rad], shape [lanes, terms]
-    type(shared_load_t), intent(in) :: load
+  function new_load_shares(keys, load) result(bank)
+    class(element_keys_t), intent(in) :: keys
+    class(element_keys_t), intent(in) :: load   !! the keys of the load of each excitation
     type(load_shares_t) :: bank
-    real(wp) :: still(size(share, 1), size(share, 2))
-    integer :: e
+    integer :: switch
 
-    still = 0.0_wp
-    bank%wave_excitations_t = new_wave_excitations(names, body, owner, share, still, order, phase)
-    call bank%add_parameter('viscous', load%viscous, is_key=.false.)
-    call bank%add_parameter('quadratic', load%quadratic, is_key=.false.)
-    call bank%add_parameter('constant', load%constant, is_key=.false.)
-    call bank%add_parameter('constant_speed', load%constant_speed, is_key=.false.)
-    if (allocated(load%curve)) call add_table(bank, load%curve)
-    bank%has_quadratic = any(abs(load%quadratic) > 0)
-    if (bank%has_quadratic) call bank%add_switches([('standstill', e=1, size(body))], 2)
+    associate (share => keys%joined('share_of_load'))
+      bank%wave_excitations_t = new_wave_excitations(keys, keys%owners('orders'), share, 0.0_wp * share, keys%joined('orders'), &
+                                                     keys%joined('phases'))
+    end associate
+    call bank%add_parameter('viscous', load%values('viscous'), is_key=.false.)
+    call add_resistance(bank, load, .false., switch)
+    bank%quadratic_switch = switch
     call bank%prepare_law()
   end function new_load_shares
 
@@ -61,7 +46,7 @@ contains
     type(law_tape_t), target, intent(inout) :: tape
     type(expression_t) :: torque
 
-    torque = (self%parameter(tape, 'viscous') * speed_of(tape) - resistance(self, self%has_quadratic, tape)) &
+    torque = (self%parameter(tape, 'viscous') * speed_of(tape) - resistance(self, self%quadratic_switch, tape)) &
              * self%sum_of_waves(tape)
   end function torque
 

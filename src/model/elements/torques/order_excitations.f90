@@ -6,6 +6,7 @@
 module nocdyn_order_excitations
   use nocdyn_bank, only: harmonic_t, role_excitation
   use nocdyn_described_elements, only: boundary_width
+  use nocdyn_element_rows, only: rows_between
   use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: angle_of, expression_t, operator(*), operator(+), operator(-), pick, speed_of
@@ -52,7 +53,7 @@ contains
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
     bank%follows_mean_speed = .true.
-    call bank%connect(role_excitation, size(torque, 1), names, body)
+    call bank%connect(role_excitation, size(torque, 1), names, rows_between(0 * body, body))
     bank%segments = 1 + maxval([0, (size(torque(1, e)%speed), e=1, size(body))])
     if (bank%segments <= 2) bank%segments = 1
     excitation = [(e, e=1, size(body))]

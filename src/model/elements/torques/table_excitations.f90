@@ -1,12 +1,11 @@
 !> Excitations with a table over the time.
 module nocdyn_table_excitations
   use nocdyn_bank, only: role_excitation
-  use nocdyn_curves, only: curve_t
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_law_expressions, only: expression_t, time_of
   use nocdyn_law_tape, only: law_tape_t
   use nocdyn_tables, only: add_table, curve_value, guard_segment
-  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -20,16 +19,14 @@ module nocdyn_table_excitations
 contains
 
   !> A bank of excitations, each on one body.
-  function new_table_excitations(names, body, curve) result(bank)
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: body(:)
-    type(curve_t), intent(in) :: curve(:, :)   !! [N m] over [s], shape [lanes, excitations]
+  function new_table_excitations(keys) result(bank)
+    class(element_keys_t), intent(in) :: keys
     type(table_excitations_t) :: bank
 
-    call bank%connect(role_excitation, size(curve, 1), names, body)
+    call bank%connect(role_excitation, keys)
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
-    call add_table(bank, curve)
+    call add_table(bank, keys%curves('table_time', 'table_torque', extrapolation='constant'))
     call bank%prepare_law()
   end function new_table_excitations
 

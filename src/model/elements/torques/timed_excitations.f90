@@ -1,13 +1,13 @@
 !> Excitations that change during a limited time: steps, ramps and half-sine pulses.
 module nocdyn_timed_excitations
   use nocdyn_bank, only: role_excitation
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, literal, operator(*), operator(+), operator(-), operator(/), &
     pick, time_of
   use nocdyn_law_functions, only: add_guard, sin
   use nocdyn_law_tape, only: law_tape_t
-  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -31,19 +31,17 @@ module nocdyn_timed_excitations
 contains
 
   !> A bank of excitations, each on one body.
-  function new_timed_excitations(names, body, shape, amplitude, begin, duration) result(bank)
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: body(:)
+  function new_timed_excitations(keys, shape) result(bank)
+    class(element_keys_t), intent(in) :: keys
     integer, intent(in) :: shape(:)   !! shape_... of each
-    real(wp), intent(in) :: amplitude(:, :), begin(:, :), duration(:, :)   !! [N m], [s], [s], shape [lanes, excitations]
     type(timed_excitations_t) :: bank
 
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
-    call bank%connect(role_excitation, size(amplitude, 1), names, body)
-    call bank%add_parameter('amplitude', amplitude)
-    call bank%add_parameter('time', begin)
-    call bank%add_parameter('duration', duration)
+    call bank%connect(role_excitation, keys)
+    call bank%add_key(keys, 'amplitude')
+    call bank%add_key(keys, 'time')
+    call bank%add_key(keys, 'duration', absent=1.0_wp)
     call bank%add_parameter('is step', spread(merge(1.0_wp, 0.0_wp, shape == shape_step), 1, bank%lanes), is_key=.false.)
     call bank%add_parameter('is ramp', spread(merge(1.0_wp, 0.0_wp, shape == shape_ramp), 1, bank%lanes), is_key=.false.)
     call bank%add_switches(switch_names(shape), after)

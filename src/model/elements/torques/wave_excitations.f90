@@ -4,13 +4,13 @@
 !> A synchronous motor with p pole pairs pulsates during its start at twice the slip frequency: f = 2 omega_mains, order = -2 p.
 module nocdyn_wave_excitations
   use nocdyn_bank, only: harmonic_t, role_excitation, sine_harmonic
+  use nocdyn_element_keys, only: element_keys_t
   use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: angle_of, expression_t, operator(*), operator(+), time_of
   use nocdyn_law_functions, only: cos, harmonics, sin
   use nocdyn_law_tape, only: law_tape_t
   use nocdyn_order_terms, only: new_order_terms, order_terms_t
-  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -28,9 +28,8 @@ module nocdyn_wave_excitations
 contains
 
   !> A bank of excitations, each on one body.
-  function new_wave_excitations(names, body, owner, amplitude, frequency, order, phase) result(bank)
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: body(:)
+  function new_wave_excitations(keys, owner, amplitude, frequency, order, phase) result(bank)
+    class(element_keys_t), intent(in) :: keys
     integer, intent(in) :: owner(:)   !! excitation of each term
     real(wp), intent(in) :: amplitude(:, :), frequency(:, :)   !! [N m], [rad/s], shape [lanes, terms]
     real(wp), intent(in) :: order(:, :), phase(:, :)           !! [1], [rad], shape [lanes, terms]
@@ -38,12 +37,12 @@ contains
 
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
-    call bank%connect(role_excitation, size(amplitude, 1), names, body)
+    call bank%connect(role_excitation, keys)
     call bank%add_parameter('amplitude', amplitude, element=owner)
     call bank%add_parameter('frequency', frequency, is_key=.false., element=owner)
     call bank%add_parameter('order', order, is_key=.false., element=owner)
     call bank%add_parameter('phase', phase, element=owner)
-    bank%sorted = new_order_terms(size(body), owner, order(1, :), &
+    bank%sorted = new_order_terms(bank%count, owner, order(1, :), &
                                  .not. any(abs(frequency) > 0, dim=1) .and. all(order > 0, dim=1))
     call bank%add_parameter('base', spread(bank%sorted%base, 1, bank%lanes), is_key=.false.)
     call bank%prepare_law()
