@@ -1,6 +1,7 @@
 !> Excitations that change during a limited time: steps, ramps and half-sine pulses.
 module nocdyn_timed_excitations
   use nocdyn_bank, only: role_excitation
+  use nocdyn_described_elements, only: stays_whole
   use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, literal, operator(*), operator(+), operator(-), operator(/), &
@@ -40,6 +41,7 @@ contains
 
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
+    bank%steady_part = stays_whole
     call bank%connect(role_excitation, size(amplitude, 1), names, body)
     call bank%add_parameter('amplitude', amplitude)
     call bank%add_parameter('time', begin)

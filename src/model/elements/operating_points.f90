@@ -1,0 +1,106 @@
+!> What a law gives at one operating point of one element in the first lane: its branches, the harmonics at a constant speed.
+!> Nothing of the bank changes.
+module nocdyn_operating_points
+  use nocdyn_described_elements, only: described_elements_t, never, stays_as_mean, time_reached
+  use nocdyn_kinds, only: wp
+  use nocdyn_law_points, only: law_point_t, new_law_point
+  use nocdyn_law_waves, only: law_wave_t, list_waves
+  implicit none (type, external)
+  private
+
+  public :: waves_at
+
+  real(wp), parameter :: late = 0.5_wp * never   ! after all that begins [s]
+
+contains
+
+  !> The point at some inputs, on the branches that hold there. Branches that guards do not choose are the present ones.
+  subroutine find_point(bank, element, time, speed, internal, point)
+    class(described_elements_t), intent(in) :: bank
+    integer, intent(in) :: element       !! numbered within the bank
+    real(wp), intent(in) :: time         !! [s]
+    real(wp), intent(in) :: speed        !! u' [rad/s]; the angles, and the speed of the phase, are zero
+    real(wp), intent(in) :: internal(:)  !! its internal states
+    type(law_point_t), intent(out) :: point
+    integer :: s
+
+    associate (law => bank%law, switches => element + bank%count * [(s - 1, s=1, size(bank%choices) / bank%count)])
+      point = new_law_point(law%law, element, bank%branch(1, switches))
+      call set_constants(bank, point)
+      if (law%time > 0) point%x(law%time) = time_reached(time)
+      if (law%speed > 0) point%x(law%speed) = speed
+      do s = 1, bank%states
+        if (law%state(s) > 0) point%x(law%state(s)) = internal(s)
+      end do
+      call point%evaluate(law%law%tape, 0)
+      do s = 1, size(switches)
+        call choose(bank, s, bank%choices(switches(s)), point)
+      end do
+      if (law%time > 0) point%x(law%time) = time
+      call point%evaluate(law%law%tape, 0)
+    end associate
+  end subroutine find_point
+
+  subroutine set_constants(bank, point)
+    class(described_elements_t), intent(in) :: bank
+    type(law_point_t), intent(inout) :: point
+
+    if (allocated(bank%curve)) then
+      call point%set_constants(bank%law%law, bank%curve(1, point%element))
+    else
+      call point%set_constants(bank%law%law)
+    end if
+  end subroutine set_constants
+
+  !> Sets one branch to the one that contains the point, as `choose` of the bank does.
+  subroutine choose(bank, switch, choices, point)
+    class(described_elements_t), intent(in) :: bank
+    integer, intent(in) :: switch    !! of the element
+    integer, intent(in) :: choices   !! as in the type
+    type(law_point_t), intent(inout) :: point
+    real(wp) :: best, inside
+    integer :: i
+
+    if (choices < 0) return
+    associate (tape => bank%law%law%tape, branch => point%branch(switch))
+      if (choices == 0) branch = bank%curve(1, point%element)%segment(point%x(tape%argument))
+      best = -huge(best)
+      do i = 1, choices
+        inside = minval(point%x(tape%guard), mask=tape%guarded_switch == switch .and. &
+                        (tape%guarded_branch == i .or. tape%guarded_branch == 0))
+        if (inside <= best) cycle
+        best = inside
+        branch = i
+        if (best > 0) exit
+      end do
+      call set_constants(bank, point)
+      call point%evaluate(tape, 0)
+    end associate
+  end subroutine choose
+
+  !> The harmonics of some nodes at a constant speed, long after all that begins. A torque that decays or ends has some as well.
+  subroutine waves_at(bank, element, speed, internal, results, turns, list, kept)
+    class(described_elements_t), intent(in) :: bank
+    integer, intent(in) :: element       !! numbered within the bank
+    real(wp), intent(in) :: speed        !! u' [rad/s]
+    real(wp), intent(in) :: internal(:)  !! its internal states
+    integer, intent(in) :: results(:)    !! nodes, or 0
+    logical, intent(in) :: turns         !! whether the angle of the element advances
+    type(law_wave_t), allocatable, intent(out) :: list(:)
+    real(wp), intent(in), optional :: kept   !! value of `control`; absent: as the law gives it
+    type(law_point_t) :: point
+
+    if (bank%steady_part /= stays_as_mean .or. .not. allocated(bank%law)) then
+      allocate (list(0))
+      return
+    end if
+    associate (law => bank%law, tape => bank%law%law%tape)
+      call find_point(bank, element, late, speed, internal, point)
+      if (law%time > 0) point%x(law%time) = 0.0_wp
+      if (present(kept)) point%x(tape%control) = kept
+      call point%evaluate(tape, merge(tape%control, 0, present(kept)))
+      call list_waves(tape, law%law_inputs_t, point, results, turns, list)
+    end associate
+  end subroutine waves_at
+
+end module nocdyn_operating_points
