@@ -10,7 +10,7 @@ module nocdyn_bank
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_law_waves, only: law_wave_t
-  use nocdyn_operating_points, only: waves_at
+  use nocdyn_operating_points, only: late, settle, waves_at
   use nocdyn_quantities, only: form_total, new_quantity, quantity_t, rank_torque
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -73,7 +73,8 @@ module nocdyn_bank
     procedure :: hold_speed
     procedure :: follows_supply, set_supply, idle_supply
     procedure :: start_internal
-    procedure :: steady_internal
+    procedure, non_overridable :: steady_internal
+    procedure :: decide_internal
     procedure :: knees
     procedure :: keep_energy
     generic :: connect => connect_bodies, connect_rows
@@ -202,12 +203,15 @@ contains
     real(wp), intent(in) :: speed    !! u' [rad/s]
     type(harmonic_t), allocatable, intent(out) :: list(:)
     type(law_wave_t), allocatable :: base(:), waves(:)
-    real(wp) :: internal(self%states)
+    real(wp) :: internal(self%states), settled(self%states * self%count), speeds(self%count)
     integer :: n
 
     allocate (list(0))
     if (.not. allocated(self%law)) return
-    internal = 0.0_wp
+    if (.not. self%law%has_waves) return
+    speeds = speed
+    call self%steady_internal(late, speeds, settled)
+    internal = settled(self%states * (element - 1) + 1:self%states * element)
     associate (tape => self%law%law%tape, turns => size(self%elastic) == 0, number => self%first - 1 + element)
       if (tape%twist > 0) then
         call waves_at(self, element, speed, internal, [tape%twist], .false., waves)
@@ -307,9 +311,26 @@ contains
     real(wp), intent(in) :: t                 !! [s]
     real(wp), intent(in) :: speed(:)          !! u' [rad/s], [elements]
     real(wp), intent(inout) :: internal(:)    !! [states * elements], the states of the first element first
+    logical :: is_decided(self%states)
+    integer :: e
 
-    if (self%states > 0) error stop 'nocdyn_bank: a bank with internal states overrides steady_internal'
+    call self%decide_internal(t, speed, internal, is_decided)
+    if (all(is_decided)) return
+    do e = 1, self%count
+      call settle(self, e, t, speed(e), is_decided, internal(self%states * (e - 1) + 1:self%states * e))
+    end do
   end subroutine steady_internal
+
+  !> Sets internal states that do not follow from the rates when these are zero. By default there are none.
+  subroutine decide_internal(self, t, speed, internal, is_decided)
+    class(bank_t), intent(in) :: self
+    real(wp), intent(in) :: t                 !! [s]
+    real(wp), intent(in) :: speed(:)          !! u' [rad/s], [elements]
+    real(wp), intent(inout) :: internal(:)    !! as for `steady_internal`
+    logical, intent(out) :: is_decided(:)     !! which these are, [states]
+
+    is_decided = .false.
+  end subroutine decide_internal
 
   !> Speeds at which the applied moment of an element in the first lane has an extreme, changes its sign, bends or jumps [rad/s]:
   !> where the search of steady states at a time looks closely. By default there are none.

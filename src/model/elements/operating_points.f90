@@ -1,16 +1,17 @@
-!> What a law gives at one operating point of one element in the first lane: its branches, the harmonics at a constant speed.
-!> Nothing of the bank changes.
+!> What a law gives at one operating point of one element in the first lane: its branches, the harmonics at a constant speed, the
+!> internal states that do not change. Nothing of the bank changes.
 module nocdyn_operating_points
   use nocdyn_described_elements, only: described_elements_t, never, stays_as_mean, time_reached
   use nocdyn_kinds, only: wp
+  use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_law_points, only: law_point_t, new_law_point
   use nocdyn_law_waves, only: law_wave_t, list_waves
   implicit none (type, external)
   private
 
-  public :: waves_at
+  public :: waves_at, settle
 
-  real(wp), parameter :: late = 0.5_wp * never   ! after all that begins [s]
+  real(wp), parameter, public :: late = 0.5_wp * never   !! after all that begins [s]
 
 contains
 
@@ -102,5 +103,42 @@ contains
       call list_waves(tape, law%law_inputs_t, point, results, turns, list)
     end associate
   end subroutine waves_at
+
+  !> Replaces internal states by those that do not change at a speed, by Newton's method; linear rates take one step, and one that
+  !> finds it exact.
+  subroutine settle(bank, element, time, speed, is_decided, internal)
+    class(described_elements_t), intent(in) :: bank
+    integer, intent(in) :: element         !! numbered within the bank
+    real(wp), intent(in) :: time           !! [s]
+    real(wp), intent(in) :: speed          !! u' [rad/s]
+    logical, intent(in) :: is_decided(:)   !! states that stay as they are
+    real(wp), intent(inout) :: internal(:) !! its internal states
+    integer, parameter :: most_steps = 50
+    real(wp), parameter :: tolerance = 1.0e-13_wp   ! relative to the largest step
+    type(law_point_t) :: point
+    integer :: i, k, pivots(count(.not. is_decided)), unknown(count(.not. is_decided))
+    real(wp) :: matrix(size(unknown), size(unknown)), scale, step(size(unknown))
+    logical :: is_singular
+
+    unknown = pack([(i, i=1, size(internal))], .not. is_decided)
+    internal(unknown) = 0.0_wp
+    scale = 0.0_wp
+    associate (tape => bank%law%law%tape, state => bank%law%state(unknown))
+      do i = 1, most_steps
+        call find_point(bank, element, time, speed, internal, point)
+        do k = 1, size(unknown)
+          call point%differentiate(tape, tape%rate(unknown(k)))
+          matrix(k, :) = merge(point%slope(state), 0.0_wp, state > 0)
+          step(k) = -point%x(tape%rate(unknown(k)))
+        end do
+        call lu_factor(matrix, pivots, is_singular)
+        if (is_singular) return
+        call lu_solve(matrix, pivots, step)
+        internal(unknown) = internal(unknown) + step
+        if (all(abs(step) <= tolerance * scale)) return
+        scale = max(scale, maxval(abs(step)))
+      end do
+    end associate
+  end subroutine settle
 
 end module nocdyn_operating_points

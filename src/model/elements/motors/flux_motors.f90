@@ -42,7 +42,7 @@ module nocdyn_flux_motors
   contains
     procedure :: describe
     procedure :: circuit
-    procedure :: steady_internal
+    procedure :: decide_internal
     procedure :: transient_frequency
     procedure :: hold_speed, follows_supply, set_supply, idle_supply
     procedure :: knees
@@ -170,17 +170,19 @@ contains
 
   end function circuit
 
-  !> The fluxes of the steady state with the slip at a speed.
-  subroutine steady_internal(self, t, speed, internal)
+  !> The fluxes of the steady state with the slip at a speed, by the circuit.
+  subroutine decide_internal(self, t, speed, internal, is_decided)
     class(flux_motors_t), intent(in) :: self
     real(wp), intent(in) :: t                !! [s]
     real(wp), intent(in) :: speed(:)         !! u' [rad/s], [motors]
     real(wp), intent(inout) :: internal(:)   !! [states * motors]
+    logical, intent(out) :: is_decided(:)    !! [states]
     type(induction_circuit_t) :: circuit
     complex(wp) :: flux(2)
     integer :: e
     real(wp) :: slip
 
+    is_decided = .true.
     associate (direction => self%parameters(self%number_of('direction'))%value)
       do e = 1, self%count
         circuit = self%circuit(1, e)
@@ -191,7 +193,7 @@ contains
         internal(4 * e - 3:4 * e) = [real(flux(1), wp), aimag(flux(1)), real(flux(2), wp), aimag(flux(2))]
       end do
     end associate
-  end subroutine steady_internal
+  end subroutine decide_internal
 
   !> The torque swings with the mains after a change of the supply, which at the start is the one of switching on.
   pure real(wp) function transient_frequency(self, element, is_steady)

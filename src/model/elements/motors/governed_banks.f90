@@ -40,7 +40,7 @@ module nocdyn_governed_banks
     procedure :: hold_speed
     procedure :: integral_of, least_throttle
     procedure :: start_internal
-    procedure :: steady_internal
+    procedure :: decide_internal
     procedure :: knees
     procedure :: quantities
     procedure :: observe
@@ -145,14 +145,17 @@ contains
   end function least_throttle
 
   !> The integral of a governor at rest is its throttle; at the set speed, where any is steady, the open one.
-  subroutine steady_internal(self, t, speed, internal)
+  subroutine decide_internal(self, t, speed, internal, is_decided)
     class(governed_bank_t), intent(in) :: self
     real(wp), intent(in) :: t                !! [s]
     real(wp), intent(in) :: speed(:)         !! u' [rad/s], [motors]
     real(wp), intent(inout) :: internal(:)   !! [states * motors]
+    logical, intent(out) :: is_decided(:)    !! [states]
     integer :: e
 
+    is_decided = .false.
     if (.not. self%has_governor) return
+    is_decided(self%states) = .true.
     associate (gain => self%parameters(self%number_of('governor_gain'))%value)
       do e = 1, self%count
         associate (demand => gain(1, e) * (set_speed_at(self, e, t) - speed(e)))
@@ -164,7 +167,7 @@ contains
         end associate
       end do
     end associate
-  end subroutine steady_internal
+  end subroutine decide_internal
 
   !> The set speed of a governor in the first lane [rad/s].
   pure real(wp) function set_speed_at(self, element, t)
