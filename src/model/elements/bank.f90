@@ -10,7 +10,7 @@ module nocdyn_bank
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_law_waves, only: law_wave_t
-  use nocdyn_operating_points, only: late, settle, waves_at
+  use nocdyn_operating_points, only: boundary_speeds, late, settle, waves_at
   use nocdyn_quantities, only: form_total, new_quantity, quantity_t, rank_torque
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -75,7 +75,8 @@ module nocdyn_bank
     procedure :: start_internal
     procedure, non_overridable :: steady_internal
     procedure :: decide_internal
-    procedure :: knees
+    procedure, non_overridable :: knees
+    procedure :: extremes
     procedure :: keep_energy
     generic :: connect => connect_bodies, connect_rows
     procedure, private :: connect_bodies, connect_rows
@@ -333,15 +334,26 @@ contains
   end subroutine decide_internal
 
   !> Speeds at which the applied moment of an element in the first lane has an extreme, changes its sign, bends or jumps [rad/s]:
-  !> where the search of steady states at a time looks closely. By default there are none.
+  !> where the search of steady states at a time looks closely.
   function knees(self, element, t) result(speeds)
     class(bank_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
     real(wp), intent(in) :: t        !! [s]
     real(wp), allocatable :: speeds(:)
 
-    allocate (speeds(0))
+    call boundary_speeds(self, element, t, speeds)
+    speeds = [speeds, self%extremes(element, t)]
   end function knees
+
+  !> The ones of `knees` that are no boundaries between branches by the speed. By default there are none.
+  function extremes(self, element, t) result(speeds)
+    class(bank_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: t        !! [s]
+    real(wp), allocatable :: speeds(:)
+
+    allocate (speeds(0))
+  end function extremes
 
   !> Sets the energies that internal states keep. By default they keep none.
   pure subroutine keep_energy(self, elements)

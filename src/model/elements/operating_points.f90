@@ -1,5 +1,5 @@
 !> What a law gives at one operating point of one element in the first lane: its branches, the harmonics at a constant speed, the
-!> internal states that do not change. Nothing of the bank changes.
+!> internal states that do not change, the speeds where its branches end. Nothing of the bank changes.
 module nocdyn_operating_points
   use nocdyn_described_elements, only: described_elements_t, never, stays_as_mean, time_reached
   use nocdyn_kinds, only: wp
@@ -9,7 +9,7 @@ module nocdyn_operating_points
   implicit none (type, external)
   private
 
-  public :: waves_at, settle
+  public :: waves_at, settle, boundary_speeds
 
   real(wp), parameter, public :: late = 0.5_wp * never   !! after all that begins [s]
 
@@ -140,5 +140,63 @@ contains
       end do
     end associate
   end subroutine settle
+
+  !> Speeds at a time between the branches of an element: at the points of a curve over a linear function of the speed alone, and
+  !> where guards vanish that are such functions.
+  subroutine boundary_speeds(bank, element, time, speeds)
+    class(described_elements_t), intent(in) :: bank
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: time     !! [s]
+    real(wp), allocatable, intent(out) :: speeds(:)   !! [rad/s]
+    real(wp), parameter :: same = 1.0e-12_wp   ! relative
+    type(law_point_t) :: point
+    real(wp) :: internal(bank%states)
+    real(wp), allocatable :: roots(:)
+    integer :: i
+
+    allocate (speeds(0), roots(0))
+    if (.not. allocated(bank%law)) return
+    internal = 0.0_wp
+    call find_point(bank, element, time, 0.0_wp, internal, point)
+    associate (tape => bank%law%law%tape)
+      if (allocated(bank%curve)) roots = roots_of(bank, tape%argument, bank%curve(1, element)%knots(), point)
+      do i = 1, size(tape%guard)
+        roots = [roots, roots_of(bank, tape%guard(i), [0.0_wp], point)]
+      end do
+    end associate
+    do i = 1, size(roots)
+      if (.not. any(abs(speeds - roots(i)) <= same * abs(roots(i)))) speeds = [speeds, roots(i)]
+    end do
+  end subroutine boundary_speeds
+
+  !> The speeds at which a node has some values, if it is a linear function of the speed alone.
+  function roots_of(bank, node, values, point) result(roots)
+    class(described_elements_t), intent(in) :: bank
+    integer, intent(in) :: node
+    real(wp), intent(in) :: values(:)            !! in the unit of the node
+    type(law_point_t), intent(inout) :: point    !! without speed
+    real(wp), allocatable :: roots(:)
+    real(wp), parameter :: none = 1.0e100_wp, rounding = 1.0e-9_wp
+    real(wp) :: slope, start
+    logical :: is_linear
+
+    allocate (roots(0))
+    associate (tape => bank%law%law%tape, speed => bank%law%speed, one => bank%law%law%tape%node(node))
+      if (.not. one%has_speed .or. one%has_angle .or. one%has_state) return
+      call point%differentiate(tape, node)
+      start = point%x(node)
+      slope = point%slope(speed)
+      if (.not. abs(slope) > 0 .or. abs(start) > none) return
+      roots = (values - start) / slope
+      associate (last => size(values))
+        point%x(speed) = roots(last)
+        call point%evaluate(tape, 0)
+        is_linear = abs(point%x(node) - values(last)) <= rounding * (abs(start) + abs(values(last)))
+      end associate
+      if (.not. is_linear) roots = [real(wp) ::]
+      point%x(speed) = 0.0_wp
+      call point%evaluate(tape, 0)
+    end associate
+  end function roots_of
 
 end module nocdyn_operating_points

@@ -15,7 +15,7 @@ module nocdyn_dc_motors
   type, extends(governed_bank_t), public :: dc_motors_t
   contains
     procedure :: describe
-    procedure :: knees
+    procedure :: extremes
   end type dc_motors_t
 
 contains
@@ -57,7 +57,7 @@ contains
   end subroutine describe
 
   !> The speed without torque, and the one of the governor.
-  function knees(self, element, t) result(speeds)
+  function extremes(self, element, t) result(speeds)
     class(dc_motors_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
     real(wp), intent(in) :: t        !! [s]
@@ -65,8 +65,8 @@ contains
 
     associate (voltage => self%parameters(self%number_of('voltage'))%value, &
                flux_constant => self%parameters(self%number_of('flux_constant'))%value)
-      speeds = [self%governed_bank_t%knees(element, t), voltage(1, element) / flux_constant(1, element)]
+      speeds = [self%governed_bank_t%extremes(element, t), voltage(1, element) / flux_constant(1, element)]
     end associate
-  end function knees
+  end function extremes
 
 end module nocdyn_dc_motors

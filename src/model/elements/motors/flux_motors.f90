@@ -45,7 +45,7 @@ module nocdyn_flux_motors
     procedure :: decide_internal
     procedure :: transient_frequency
     procedure :: hold_speed, follows_supply, set_supply, idle_supply
-    procedure :: knees
+    procedure :: extremes
     procedure :: quantities
     procedure :: observe
   end type flux_motors_t
@@ -241,7 +241,7 @@ contains
   end function idle_supply
 
   !> The synchronous speed, and the ones of the largest steady torque as a motor and as a generator.
-  function knees(self, element, t) result(speeds)
+  function extremes(self, element, t) result(speeds)
     class(flux_motors_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
     real(wp), intent(in) :: t        !! [s]
@@ -253,7 +253,7 @@ contains
                / circuit%pole_pairs)
       speeds = synchronous * (1.0_wp + circuit%breakdown_slip() * [-1.0_wp, 0.0_wp, 1.0_wp])
     end associate
-  end function knees
+  end function extremes
 
   !> Torque, and the current of the stator.
   subroutine quantities(self, columns)

@@ -41,7 +41,7 @@ module nocdyn_governed_banks
     procedure :: integral_of, least_throttle
     procedure :: start_internal
     procedure :: decide_internal
-    procedure :: knees
+    procedure :: extremes
     procedure :: quantities
     procedure :: observe
   end type governed_bank_t
@@ -182,17 +182,16 @@ contains
     end if
   end function set_speed_at
 
-  !> The points of a table, and the speed that a governor keeps.
-  function knees(self, element, t) result(speeds)
+  !> The speed that a governor keeps.
+  function extremes(self, element, t) result(speeds)
     class(governed_bank_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
     real(wp), intent(in) :: t        !! [s]
     real(wp), allocatable :: speeds(:)
 
     allocate (speeds(0))
-    if (allocated(self%curve)) speeds = self%curve(1, element)%knots()
-    if (self%has_governor) speeds = [speeds, set_speed_at(self, element, t)]
-  end function knees
+    if (self%has_governor) speeds = [set_speed_at(self, element, t)]
+  end function extremes
 
   !> Torque, armature current where that is a state, and throttle where there is a governor.
   subroutine quantities(self, columns)

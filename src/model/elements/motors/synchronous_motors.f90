@@ -31,7 +31,7 @@ module nocdyn_synchronous_motors
     integer, private :: segments = 1            !! between, below and above the points
   contains
     procedure :: describe
-    procedure :: knees
+    procedure :: extremes
   end type synchronous_motors_t
 
 contains
@@ -133,19 +133,16 @@ contains
              * (slip - pick(1, [(self%parameter(tape, 'slip', self%part_columns(s)), s=1, self%segments)]))
   end function on_segment
 
-  !> The synchronous speed, and the ones of the points of the table.
-  function knees(self, element, t) result(speeds)
+  !> The synchronous speed.
+  function extremes(self, element, t) result(speeds)
     class(synchronous_motors_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
     real(wp), intent(in) :: t        !! [s]
     real(wp), allocatable :: speeds(:)
 
-    associate (slip => self%parameters(self%number_of('slip'))%value(1, element + self%count::self%count), &
-               synchronous => self%parameters(self%number_of('frequency'))%value(1, element) &
-               * self%parameters(self%number_of('direction'))%value(1, element) &
-               / self%parameters(self%number_of('pole pairs'))%value(1, element))
-      speeds = synchronous * [1.0_wp, 1.0_wp - pack(slip, slip < huge(slip))]
-    end associate
-  end function knees
+    speeds = [self%parameters(self%number_of('frequency'))%value(1, element) &
+              * self%parameters(self%number_of('direction'))%value(1, element) &
+              / self%parameters(self%number_of('pole pairs'))%value(1, element)]
+  end function extremes
 
 end module nocdyn_synchronous_motors

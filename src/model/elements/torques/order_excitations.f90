@@ -33,7 +33,6 @@ module nocdyn_order_excitations
     type(order_terms_t) :: sorted, sorted_squares   !! harmonics, and those times u'^2
   contains
     procedure :: torque => order_torque
-    procedure :: knees
   end type order_excitations_t
 
 contains
@@ -255,19 +254,5 @@ contains
     end do
     number = pick(1, choices)
   end function picked
-
-  !> The mean bends at the points.
-  function knees(self, element, t) result(speeds)
-    class(order_excitations_t), intent(in) :: self
-    integer, intent(in) :: element   !! numbered within the bank
-    real(wp), intent(in) :: t        !! [s]
-    real(wp), allocatable :: speeds(:)
-
-    allocate (speeds(0))
-    if (self%segments == 1) return
-    associate (edge => self%parameters(self%number_of('speed'))%value(1, element::self%count))
-      speeds = pack(edge, edge < huge(1.0_wp))
-    end associate
-  end function knees
 
 end module nocdyn_order_excitations
