@@ -1,7 +1,7 @@
 !> Machines with elements of every kind, for the tests that compare formulations, Jacobians and lanes.
 module nocdyn_test_full_machines
   use nocdyn_bank, only: append_bank
-  use nocdyn_couplings, only: coupling_common_t, new_couplings
+  use nocdyn_couplings, only: coupling_common_t, couplings_t, new_couplings
   use nocdyn_curves, only: curve_t, extrapolation_constant, extrapolation_linear, interpolation_cubic, interpolation_linear, &
                            new_curve
   use nocdyn_dc_motors, only: new_dc_motors
@@ -13,11 +13,11 @@ module nocdyn_test_full_machines
   use nocdyn_inverter_motors, only: new_inverter_motors
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_mesh_phases, only: new_mesh_phases
   use nocdyn_motors, only: new_induction_motors, new_motors, new_table_motors
   use nocdyn_load_shares, only: new_load_shares
   use nocdyn_loads, only: new_loads
   use nocdyn_order_excitations, only: new_order_excitations, order_torque_t
+  use nocdyn_phases, only: new_phases, phases_t
   use nocdyn_polynomial_couplings, only: new_polynomial_couplings, polynomial_couplings_t
   use nocdyn_saturated_couplings, only: new_saturated_couplings
   use nocdyn_synchronous_motors, only: new_synchronous_motors
@@ -174,14 +174,23 @@ contains
     shared%error%phase = [0.3_wp, -1.0_wp]
     tight = new_polynomial_couplings(given, shared)
     call append_bank(machine%banks, tight)
-    call append_bank(machine%banks, new_mesh_phases(tight))
+    call append_bank(machine%banks, phase_of(tight))
     given = lane_keys('rattle', [bodies, 1], variants, 'stiffness gap', [35.0_wp, 0.2_wp], 2)
     shared%names = given%names
     shared%rows = new_element_rows([1, 3], [bodies, 1], [0.9_wp, -1.3_wp])
     rattling = new_gap_couplings(given, shared)
     call append_bank(machine%banks, rattling)
-    call append_bank(machine%banks, new_mesh_phases(rattling))
+    call append_bank(machine%banks, phase_of(rattling))
   end subroutine add_meshes
+
+  !> The phase of a mesh, with work where the mesh has some.
+  function phase_of(mesh) result(phase)
+    class(couplings_t), intent(in) :: mesh
+    type(phases_t) :: phase
+
+    phase = new_phases(mesh%lanes, mesh%names, mesh%rows%body(:1))
+    phase%with_work = mesh%with_work
+  end function phase_of
 
   subroutine add_motors(bodies, variants, machine)
     integer, intent(in) :: bodies, variants(:)

@@ -93,7 +93,8 @@ contains
           end associate
           call bank%list_harmonics(e, speed, list)
           do i = 1, size(list)
-            if (list(i)%is_twist .or. abs(list(i)%amplitude) < small * maxval(abs(list%amplitude))) cycle
+            if (list(i)%is_twist) cycle
+            if (abs(list(i)%amplitude) < small * maxval(abs(list%amplitude), mask=.not. list%is_twist)) cycle
             rate = abs(list(i)%frequency)
             if (list(i)%body > 0) then
               rate = max(abs(list(i)%frequency + list(i)%order * lowest(list(i)%body)), &

@@ -77,7 +77,6 @@ contains
             call move_alloc(longer, sources)
           end if
           do i = 1, size(list)
-            sources(n + i)%element = bank%first + e - 1
             call set_source(list(i), state, sources(n + i))
             if (list(i)%by_element > 0) sources(n + i)%moment = state%mean(list(i)%by_element) * sources(n + i)%moment
           end do
@@ -95,6 +94,7 @@ contains
     type(source_t), intent(inout) :: source
     real(wp) :: angle
 
+    source%element = harmonic%element
     source%is_twist = harmonic%is_twist
     source%frequency = harmonic%frequency + harmonic%order * state%omega(harmonic%body)
     source%order = abs(source%frequency / state%speed)

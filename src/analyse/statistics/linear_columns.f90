@@ -39,7 +39,7 @@ module nocdyn_linear_columns
     logical, allocatable, private :: is_rate(:)     !! whether a speed is multiplied, [entries]
     integer, allocatable, private :: body(:)        !! whose angle or speed the column is; [columns]
   contains
-    procedure :: copy_lane, find_laws, argument
+    procedure :: copy_lane, find_laws, argument, value_at_end
   end type linear_columns_t
 
 contains
@@ -278,5 +278,19 @@ contains
       end do
     end associate
   end function argument
+
+  !> x at the end of a lane; an angle with the bits of the row of a run.
+  real(wp) function value_at_end(self, block, number, lane, y) result(x)
+    class(linear_columns_t), intent(in) :: self
+    class(formulation_t), intent(in) :: block
+    integer, intent(in) :: number, lane
+    real(wp), contiguous, intent(in) :: y(:)
+
+    x = self%argument(number, lane, y)
+    select type (block)
+    class is (reduced_t)
+      if (self%element(number) == 0 .and. .not. self%is_speed(number)) x = block%body_angle(lane, self%body(number), y)
+    end select
+  end function value_at_end
 
 end module nocdyn_linear_columns

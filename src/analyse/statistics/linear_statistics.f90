@@ -87,14 +87,15 @@ contains
   end subroutine start_lane
 
   !> Takes the end of a variant.
-  subroutine finish_lane(self, lane, y)
+  subroutine finish_lane(self, block, lane, y)
     class(linear_statistics_t), intent(inout) :: self
+    class(formulation_t), intent(in) :: block
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: y(:)
     integer :: i
 
     do i = 1, self%columns%count
-      self%x_end(lane, i) = self%columns%argument(i, lane, y)
+      self%x_end(lane, i) = self%columns%value_at_end(block, i, lane, y)
     end do
   end subroutine finish_lane
 

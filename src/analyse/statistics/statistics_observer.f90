@@ -417,7 +417,7 @@ contains
 
     if (t < self%t_end) return
     self%is_complete(lane) = .true.
-    call self%linear%finish_lane(lane, y)
+    call self%linear%finish_lane(self%block, lane, y)
     if (.not. self%has_recorded) return
     call observe_lane(self, lane, t, y)
     call self%recorded%fill_row(lane, t, y, self%sampled%x_end(lane, :))

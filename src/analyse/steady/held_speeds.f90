@@ -69,7 +69,6 @@ contains
 
     call mean_formulation(machine, formulation, holds_speed=.true.)
     call set_up_balance(formulation, t_infinity, self%balance)
-    call leave_out_silent(self%balance%formulation%machine)
     self%reference = reference
     allocate (self%ratio(size(self%balance%motions%free)))
     call find_ratios(self%balance, reference, self%ratio)
@@ -100,15 +99,6 @@ contains
       ratio(i) = omega(body)
     end do
   end subroutine find_ratios
-
-  !> Leaves out the banks without a mean torque, whose laws take most of the time.
-  subroutine leave_out_silent(machine)
-    type(machine_t), intent(inout) :: machine   !! with mean torques
-    integer :: i
-
-    machine%general_banks = pack(machine%general_banks, [(.not. machine%banks(machine%general_banks(i))%bank%is_silent, &
-                                                          i=1, size(machine%general_banks))])
-  end subroutine leave_out_silent
 
   !> The elements that drive: motors; if there are none, the cylinders of engines.
   function sources_of(balance) result(sources)

@@ -25,8 +25,8 @@ module nocdyn_law_tape
   integer, parameter, public :: op_harmonics = 24
   ! ... the natural logarithm; a variable to the power of a constant; ...
   integer, parameter, public :: op_logarithm = 25, op_power = 26
-  ! ... and values without a series: the larger of two, a quotient that is 0 where the divisor is 0, and the size of a constant.
-  integer, parameter, public :: op_larger = 27, op_size = 28
+  ! ... and values without a series: the larger of two; the size of a constant, and 1 where it is 0, else 0.
+  integer, parameter, public :: op_larger = 27, op_size = 28, op_is_zero = 29
 
   public :: new_law_tape
 
@@ -66,6 +66,8 @@ module nocdyn_law_tape
     integer :: phase_restoring = 0             !! part of the conservative moment that acts on the phase [N m]
     integer :: phase_applied = 0               !! part of the other moment that acts on the phase [N m]
     integer :: stored = 0                      !! potential energy of `restoring` [J]
+    integer :: twist = 0                       !! what the moments are functions of in place of the angle, with harmonics [rad]
+    integer :: control = 0                     !! part of the moment that is its mean, whatever sets that [N m]
     integer, allocatable :: rate(:)            !! derivatives of the internal states by the time, [states]
     integer :: argument = 0                    !! of the curve of an element
     integer, allocatable :: guard(:)           !! functions that are positive inside a branch ...
@@ -73,7 +75,7 @@ module nocdyn_law_tape
     integer, allocatable :: guarded_branch(:)  !! ... with this number, 0: every one, [guards]
     integer, allocatable :: guard_shift(:)     !! constants by which boundaries are shifted outwards, [guards]
   contains
-    procedure :: append, constants, needed, inputs
+    procedure :: append, constants, needed, inputs, find_dependences
   end type law_tape_t
 
 contains
@@ -116,6 +118,16 @@ contains
     if (are_equal) are_equal = x%last - x%first == y%last - y%first
     if (are_equal) are_equal = all(self%list(x%first:x%last) == self%list(y%first:y%last))
   end function are_equal
+
+  !> Finds what every node depends on, after a change of operations.
+  pure subroutine find_dependences(self)
+    class(law_tape_t), intent(inout) :: self
+    integer :: i
+
+    do i = 1, self%count
+      call find_properties(self, self%node(i))
+    end do
+  end subroutine find_dependences
 
   !> What a node depends on, and where its series ends.
   pure subroutine find_properties(self, node)

@@ -10,12 +10,14 @@ module nocdyn_bank
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
+  use nocdyn_law_waves, only: law_wave_t
+  use nocdyn_operating_points, only: boundary_speeds, late, settle, waves_at
   use nocdyn_quantities, only: form_total, new_quantity, quantity_t, rank_torque
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
-  public :: append_bank, bank_of, name_length, sine_harmonic
+  public :: append_bank, bank_of, name_length
 
   integer, parameter, public :: role_coupling = 1     !! in K and C of eqs. (21), (22); stores energy
   integer, parameter, public :: role_load = 2         !! in C of eq. (22); takes energy out
@@ -37,6 +39,7 @@ module nocdyn_bank
 
   !> One harmonic of the torque of an element that turns steadily, by the angle phi of `body`.
   type, public :: harmonic_t
+    integer :: element = 0              !! of the machine, on which it acts: the element, or its phase
     complex(wp) :: amplitude = 0.0_wp   !! the torque is the real part of amplitude exp(i (frequency t + order phi)) [N m]
     real(wp) :: frequency = 0.0_wp      !! [rad/s]
     real(wp) :: order = 0.0_wp          !! oscillations per turn of the body
@@ -55,7 +58,6 @@ module nocdyn_bank
     integer :: first_value = 1                    !! index of lane 1 of `first` in the flat arrays of the machine
     logical :: has_polynomial_potential = .true.  !! whether `polynomials` gives its whole restoring moment
     logical :: has_paper_law = .true.             !! whether its law is the one of eqs. (3), (5), (17) or (20)
-    logical :: is_silent = .false.                !! after `to_mean_torque`: whether the torque is zero in every state
     logical :: is_engine = .false.                !! whether its elements are excitations whose means drive
     logical :: follows_mean_speed = .false.       !! whether its torque changes with the speed from cycle to cycle, not within one
     logical :: is_mesh = .false.                  !! whether its rows are radii: angles are deformations [m], moments forces [N]
@@ -65,15 +67,17 @@ module nocdyn_bank
     real(wp), allocatable :: loss_factor(:)       !! k (1 + i loss_factor) is the stiffness at a frequency; not allocated: 0
     real(wp), allocatable :: loss_damping(:)      !! part of the damping that replaces it over the time [N m s/rad]; with it
   contains
-    procedure :: to_mean_torque
-    procedure :: list_harmonics
+    procedure, non_overridable :: to_mean_torque
+    procedure, non_overridable :: list_harmonics
     procedure :: has_ended
     procedure :: transient_frequency
     procedure :: hold_speed
     procedure :: follows_supply, set_supply, idle_supply
     procedure :: start_internal
-    procedure :: steady_internal
-    procedure :: knees
+    procedure, non_overridable :: steady_internal
+    procedure :: decide_internal
+    procedure, non_overridable :: knees
+    procedure :: extremes
     procedure :: keep_energy
     generic :: connect => connect_keys, connect_rows
     procedure, private :: connect_keys, connect_rows
@@ -184,22 +188,68 @@ contains
     is_source = any(self%role == [role_motor, role_excitation, role_crank, role_drive])
   end function is_source
 
-  !> Replaces torques that keep changing, with the time or with the angle of a turning body, by their means. By default there
-  !> are none. Changes that end, such as a ramp, stay as they are: evaluate at a late time. A bank without a mean gets silent.
+  !> Replaces torques that keep changing, with the time or with the angle of a turning body, by their means. Changes that end,
+  !> such as a ramp, stay as they are: evaluate at a late time.
   subroutine to_mean_torque(self)
     class(bank_t), intent(inout) :: self
+
+    call self%describe_mean(size(self%elastic) == 0)
   end subroutine to_mean_torque
 
   !> The harmonics of the torque, or of a twist in series, of an element in the first lane, which turns with a constant speed;
-  !> `to_mean_torque` removes them. By default there are none. The ones of an element that `has_ended` do not count.
+  !> `to_mean_torque` removes them. The ones of an element that `has_ended` do not count. With a transmission error, the element
+  !> has the twists, and its phase the moments -e' M of the mean moment M.
   subroutine list_harmonics(self, element, speed, list)
     class(bank_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
     real(wp), intent(in) :: speed    !! u' [rad/s]
     type(harmonic_t), allocatable, intent(out) :: list(:)
+    type(law_wave_t), allocatable :: base(:), waves(:)
+    real(wp) :: internal(self%states), settled(self%states * self%count), speeds(self%count)
+    integer :: n
 
     allocate (list(0))
+    if (.not. allocated(self%law)) return
+    if (.not. self%law%has_waves) return
+    speeds = speed
+    call self%steady_internal(late, speeds, settled)
+    internal = settled(self%states * (element - 1) + 1:self%states * element)
+    associate (tape => self%law%law%tape, turns => size(self%elastic) == 0, number => self%first - 1 + element)
+      if (tape%twist > 0) then
+        call waves_at(self, element, speed, internal, [tape%twist], .false., waves)
+        n = size(waves)
+        list = [harmonics_of(self, element, waves), harmonics_of(self, element, waves)]
+        list(:n)%amplitude = -waves%amplitude
+        list(:n)%is_twist = .true.
+        list(n + 1:)%element = number + self%count
+        list(n + 1:)%by_element = number
+        list(n + 1:)%amplitude = cmplx(0.0_wp, waves%by_phase, wp) * waves%amplitude
+      else if (tape%control > 0) then   ! its part without the control torque, then the part by that
+        call waves_at(self, element, speed, internal, [tape%restoring, tape%applied], turns, base, 0.0_wp)
+        call waves_at(self, element, speed, internal, [tape%restoring, tape%applied], turns, waves, 1.0_wp)
+        waves%amplitude = waves%amplitude - base%amplitude
+        list = [harmonics_of(self, element, base), harmonics_of(self, element, waves)]
+        list(size(base) + 1:)%by_element = number
+      else
+        call waves_at(self, element, speed, internal, [tape%restoring, tape%applied], turns, waves)
+        list = harmonics_of(self, element, waves)
+      end if
+    end associate
   end subroutine list_harmonics
+
+  !> Harmonics of the law of an element, by the angle of its last body, or of its phase, which is the angle of the first one.
+  pure function harmonics_of(self, element, waves) result(list)
+    class(bank_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    type(law_wave_t), intent(in) :: waves(:)
+    type(harmonic_t) :: list(size(waves))
+
+    list%element = self%first - 1 + element
+    list%amplitude = waves%amplitude
+    list%frequency = waves%by_time
+    list%order = waves%by_angle + waves%by_phase
+    list%body = merge(self%rows%body(self%rows%first(element)), self%rows%last_body(element), abs(waves%by_phase) > 0)
+  end function harmonics_of
 
   !> Whether an element of the first lane has no part in a steady state, because its torque ends or decays; by default none has.
   pure logical function has_ended(self, element)
@@ -217,17 +267,6 @@ contains
 
     transient_frequency = 0.0_wp
   end function transient_frequency
-
-  !> amplitude sin(frequency t + order phi + phase).
-  pure type(harmonic_t) function sine_harmonic(amplitude, frequency, order, phase, body) result(harmonic)
-    real(wp), intent(in) :: amplitude   !! [N m]
-    real(wp), intent(in) :: frequency   !! [rad/s]
-    real(wp), intent(in) :: order       !! oscillations per turn of the body
-    real(wp), intent(in) :: phase       !! [rad]
-    integer, intent(in) :: body
-
-    harmonic = harmonic_t(amplitude * cmplx(sin(phase), -cos(phase), wp), frequency, order, body)
-  end function sine_harmonic
 
   !> Prepares the elements for speeds that something outside of the machine holds: governors leave their throttles open, induction
   !> motors may follow the frequency of a supply. By default there is nothing to do.
@@ -274,20 +313,48 @@ contains
     real(wp), intent(in) :: t                 !! [s]
     real(wp), intent(in) :: speed(:)          !! u' [rad/s], [elements]
     real(wp), intent(inout) :: internal(:)    !! [states * elements], the states of the first element first
+    logical :: is_decided(self%states)
+    integer :: e
 
-    if (self%states > 0) error stop 'nocdyn_bank: a bank with internal states overrides steady_internal'
+    call self%decide_internal(t, speed, internal, is_decided)
+    if (all(is_decided)) return
+    do e = 1, self%count
+      call settle(self, e, t, speed(e), is_decided, internal(self%states * (e - 1) + 1:self%states * e))
+    end do
   end subroutine steady_internal
 
+  !> Sets internal states that do not follow from the rates when these are zero. By default there are none.
+  subroutine decide_internal(self, t, speed, internal, is_decided)
+    class(bank_t), intent(in) :: self
+    real(wp), intent(in) :: t                 !! [s]
+    real(wp), intent(in) :: speed(:)          !! u' [rad/s], [elements]
+    real(wp), intent(inout) :: internal(:)    !! as for `steady_internal`
+    logical, intent(out) :: is_decided(:)     !! which these are, [states]
+
+    is_decided = .false.
+  end subroutine decide_internal
+
   !> Speeds at which the applied moment of an element in the first lane has an extreme, changes its sign, bends or jumps [rad/s]:
-  !> where the search of steady states at a time looks closely. By default there are none.
+  !> where the search of steady states at a time looks closely.
   function knees(self, element, t) result(speeds)
     class(bank_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
     real(wp), intent(in) :: t        !! [s]
     real(wp), allocatable :: speeds(:)
 
-    allocate (speeds(0))
+    call boundary_speeds(self, element, t, speeds)
+    speeds = [speeds, self%extremes(element, t)]
   end function knees
+
+  !> The ones of `knees` that are no boundaries between branches by the speed. By default there are none.
+  function extremes(self, element, t) result(speeds)
+    class(bank_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: t        !! [s]
+    real(wp), allocatable :: speeds(:)
+
+    allocate (speeds(0))
+  end function extremes
 
   !> Sets the energies that internal states keep. By default they keep none.
   pure subroutine keep_energy(self, elements)

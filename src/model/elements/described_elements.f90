@@ -23,6 +23,7 @@ module nocdyn_described_elements
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_law_expressions, only: expression_t, parameter_of
   use nocdyn_law_tape, only: at_element, law_tape_t, new_law_tape
+  use nocdyn_law_waves, only: take_means
   use nocdyn_laws, only: law_parameter_t, strip_lanes
   use nocdyn_polynomial_laws, only: polynomial_laws_t
   implicit none (type, external)
@@ -32,6 +33,10 @@ module nocdyn_described_elements
 
   real(wp), parameter, public :: never = 1.0e60_wp   !! later than all times, of what does not begin or end [s]
   real(wp), parameter, public :: boundary_width = 1.0e-10_wp   !! shift of branch boundaries, relative to the scale of a law
+
+  integer, parameter, public :: stays_as_mean = 1   !! what of a torque is in a steady state: its mean over waves, ...
+  integer, parameter, public :: stays_whole = 2     !! ... all of it, as its changes end or belong to a motion ...
+  integer, parameter, public :: stays_away = 3      !! ... or nothing
 
   !> A coefficient of the polynomial part of a law: a multiple of a parameter.
   type, public :: polynomial_term_t
@@ -49,6 +54,9 @@ module nocdyn_described_elements
     integer :: states = 0                         !! internal states of each element
     integer :: ports = at_element                 !! `at_phase` if the elements have phases
     real(wp) :: phase_order = 0.0_wp              !! most oscillations of a law per turn of its phase
+    integer :: steady_part = stays_as_mean        !! stays_...
+    logical, private :: is_mean = .false.         !! whether the law is the one of steady states, after `describe_mean`
+    logical, private :: turns = .true.            !! whether its angle advances there
     integer :: internal_values = 0                !! lanes * states * elements
     integer, allocatable :: switch_element(:)     !! element of each switch
     character(len=24), allocatable :: switch_names(:)   !! of the boundaries, e.g. 'edge of the gap', [switches]
@@ -73,6 +81,7 @@ module nocdyn_described_elements
     procedure :: parameter
     procedure :: add_switches
     procedure :: prepare_law
+    procedure :: describe_mean
     procedure :: refresh_lane
     procedure :: evaluate
     procedure :: choose
@@ -236,12 +245,26 @@ contains
     if (self%is_polynomial .or. self%values == 0) return
     tape = new_law_tape(self%states)
     call self%describe(tape)
+    if (self%is_mean) call take_means(tape, self%turns)
+    if (self%is_mean .and. self%steady_part == stays_away) tape%applied = 0
     allocate (self%law, source=new_element_law(tape, self%lanes, self%count, self%states, &
                                                strip_lanes(self%lanes, all_elements)))
     do lane = 1, self%lanes
       call self%refresh_lane(lane)
     end do
   end subroutine prepare_law
+
+  !> Replaces the law by the one of steady states.
+  subroutine describe_mean(self, turns)
+    class(described_elements_t), intent(inout) :: self
+    logical, intent(in) :: turns   !! whether its angle advances, else it is a twist that stays
+
+    if (self%steady_part == stays_whole .or. .not. allocated(self%law)) return
+    if (.not. self%law%has_waves) return
+    self%is_mean = .true.
+    self%turns = turns
+    call self%prepare_law()
+  end subroutine describe_mean
 
   !> Computes the constants of the law again, after a change of the parameters of a lane.
   subroutine refresh_lane(self, lane)

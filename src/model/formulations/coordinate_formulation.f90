@@ -24,7 +24,7 @@ module nocdyn_coordinate_formulation
     real(wp), allocatable, private, dimension(:, :) :: switch_angle, switch_speed   !! their motion, [lanes, elements]
   contains
     procedure :: set_coordinates, list_coordinates, start, project_start_speeds, set_state, gather, find_far
-    procedure :: shift_state, restore_state, reset_origin, angle_at_zero, twist_at_zero, switch_motion
+    procedure :: shift_state, restore_state, reset_origin, angle_at_zero, body_angle, twist_at_zero, switch_motion
     procedure :: accelerate, element_rate, push_element, block_indicators, reactions
   end type coordinate_formulation_t
 
@@ -227,6 +227,22 @@ contains
       end do
     end associate
   end function angle_at_zero
+
+  !> The angle of a body in a state of a lane, to the bits of `set_state` [rad].
+  pure real(wp) function body_angle(self, lane, body, y) result(angle)
+    class(coordinate_formulation_t), intent(in) :: self
+    integer, intent(in) :: lane, body
+    real(wp), intent(in) :: y(:)   !! state, [states] at least
+    integer :: c, k
+
+    angle = self%machine%start_angle(lane, body)
+    associate (coordinates => self%machine%coordinates)
+      do k = coordinates%first(body), coordinates%first(body + 1) - 1
+        c = coordinates%coordinate(k)
+        angle = angle + coordinates%ratio(lane, k) * (self%origin%q(lane, c) + y(coordinates%freedoms + c))
+      end do
+    end associate
+  end function body_angle
 
   !> Twist of an element where all coordinates are zero [rad].
   pure real(wp) function twist_at_zero(self, lane, element)

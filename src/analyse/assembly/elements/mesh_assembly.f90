@@ -7,7 +7,7 @@ module nocdyn_mesh_assembly
   use nocdyn_gap_couplings, only: new_gap_couplings
   use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_mesh_phases, only: mesh_phases_t, new_mesh_phases
+  use nocdyn_phases, only: new_phases, phases_t
   use nocdyn_polynomial_couplings, only: new_polynomial_couplings
   use nocdyn_text, only: to_text
   implicit none (type, external)
@@ -54,7 +54,7 @@ contains
     type(element_groups_t), intent(in) :: groups
     integer, intent(in) :: form
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    type(mesh_phases_t) :: phase
+    type(phases_t) :: phase
     type(element_groups_t) :: one
     integer :: e, i
 
@@ -68,7 +68,8 @@ contains
       select type (mesh => banks(size(banks))%bank)
       class is (couplings_t)
         if (mesh%error_orders == 0) cycle
-        phase = new_mesh_phases(mesh)
+        phase = new_phases(mesh%lanes, mesh%names, mesh%rows%body(:1))
+        phase%with_work = mesh%with_work
       end select
       call append_bank(banks, phase)
     end do

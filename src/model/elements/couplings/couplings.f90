@@ -1,13 +1,13 @@
 !> Elastic couplings: the nonlinear spring of eqs. (2), (3) with viscous damping and a rest twist.
 !>
 !> A mesh with a transmission error e is a bank of its own with the phase phi, the angle of the first body; it is followed by
-!> the bank of its phase (`mesh_phases_t`). Its law has u - e(phi) in place of u. Its moment M acts along the gradient of this:
+!> the bank of its phase (`nocdyn_phases`). Its law has u - e(phi) in place of u. Its moment M acts along the gradient of this:
 !> along the row of the mesh, and on the first body with -e'(phi) M besides. So it has a potential.
 !>
 !> Friction in parallel with the spring resists with friction tanh(u' / friction_speed), as a slipping clutch does. Damping and
 !> friction have one work integral.
 module nocdyn_couplings
-  use nocdyn_bank, only: bank_t, harmonic_t, role_coupling
+  use nocdyn_bank, only: bank_t, role_coupling
   use nocdyn_element_keys, only: element_keys_t
   use nocdyn_element_rows, only: element_rows_t, rows_between
   use nocdyn_elements, only: elements_t
@@ -56,8 +56,6 @@ module nocdyn_couplings
     logical :: has_friction = .false.
     integer :: error_orders = 0    !! of the transmission error of its only coupling; 0: none
   contains
-    procedure :: list_harmonics
-    procedure :: to_mean_torque
     procedure :: set_common, set_keys
     procedure :: add_damping
     procedure :: describe
@@ -186,18 +184,6 @@ contains
     end associate
   end subroutine add_error
 
-  !> Without the transmission error, whose mean is zero.
-  subroutine to_mean_torque(self)
-    class(couplings_t), intent(inout) :: self
-    integer :: i
-
-    if (self%error_orders == 0) return
-    do i = 1, size(self%parameters)
-      if (any(self%parameters(i)%name == [character(len=12) :: 'error sine', 'error cosine'])) self%parameters(i)%value = 0.0_wp
-    end do
-    call self%prepare_law()
-  end subroutine to_mean_torque
-
   !> Adds the damping of eq. (5) to the polynomial part of the law; the one of a mesh with a transmission error is not in it.
   subroutine add_damping(self)
     class(couplings_t), intent(inout) :: self
@@ -244,6 +230,7 @@ contains
       w = w - self%parameter(tape, 'error sine', [k]) * sin(angle)
       w = w - self%parameter(tape, 'error cosine', [k]) * cos(angle)
     end do
+    if (self%error_orders > 0) tape%twist = node_of(w)
   end function twist_from_rest
 
   !> The derivative of the twist by the time: u', of a mesh u' - e'(phi) phi' [rad/s].
@@ -281,25 +268,6 @@ contains
 
     friction = -(self%parameter(tape, 'friction') * tanh(self%twist_speed(tape) / self%parameter(tape, 'friction_speed')))
   end function friction
-
-  !> The transmission error of a mesh.
-  subroutine list_harmonics(self, element, speed, list)
-    class(couplings_t), intent(in) :: self
-    integer, intent(in) :: element   !! numbered within the bank
-    real(wp), intent(in) :: speed    !! u' [rad/s]
-    type(harmonic_t), allocatable, intent(out) :: list(:)
-    integer :: k
-
-    allocate (list(self%error_orders))
-    if (size(list) == 0) return
-    associate (order => self%values_of('error order'), sine => self%values_of('error sine'), &
-               cosine => self%values_of('error cosine'))
-      do k = 1, size(list)
-        list(k) = harmonic_t(cmplx(cosine(1, k), -sine(1, k), wp), 0.0_wp, order(1, k), self%rows%body(self%rows%first(element)))
-      end do
-    end associate
-    list%is_twist = .true.
-  end subroutine list_harmonics
 
   subroutine quantities(self, columns)
     class(couplings_t), intent(in) :: self

@@ -21,7 +21,6 @@ module nocdyn_maxwell_couplings
   type, extends(couplings_t), public :: maxwell_couplings_t
   contains
     procedure :: describe
-    procedure :: steady_internal
     procedure :: keep_energy
   end type maxwell_couplings_t
 
@@ -68,25 +67,6 @@ contains
     if (self%has_friction) moment = moment + self%friction(tape)
     tape%applied = node_of(moment)
   end subroutine describe
-
-  !> F = K time u'.
-  subroutine steady_internal(self, t, speed, internal)
-    class(maxwell_couplings_t), intent(in) :: self
-    real(wp), intent(in) :: t                !! [s]
-    real(wp), intent(in) :: speed(:)         !! u' [rad/s], [couplings]
-    real(wp), intent(inout) :: internal(:)   !! [states * couplings]
-    integer :: e, k
-
-    associate (stiffness => self%values_of('branch stiffness'), time => self%values_of('branch time'))
-      do e = 1, self%count
-        do k = 1, self%states
-          associate (column => e + (k - 1) * self%count)
-            internal(self%states * (e - 1) + k) = stiffness(1, column) * time(1, column) * speed(e)
-          end associate
-        end do
-      end do
-    end associate
-  end subroutine steady_internal
 
   !> The springs of the branches keep F^2 / (2 K).
   pure subroutine keep_energy(self, elements)

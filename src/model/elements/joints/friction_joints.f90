@@ -49,7 +49,7 @@ module nocdyn_friction_joints
     procedure :: mode_of
     procedure :: set_mode
     procedure :: set_mode_by_slip
-    procedure :: knees
+    procedure :: extremes
     procedure :: quantities
   end type friction_joints_t
 
@@ -224,7 +224,7 @@ contains
   end subroutine set_mode_by_slip
 
   !> The friction jumps where the slip changes its direction, and bends at the points of a table.
-  function knees(self, element, t) result(speeds)
+  function extremes(self, element, t) result(speeds)
     class(friction_joints_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
     real(wp), intent(in) :: t        !! [s]
@@ -232,7 +232,7 @@ contains
 
     allocate (speeds(1), source=0.0_wp)
     if (allocated(self%over_slip)) speeds = [speeds, self%over_slip%knots(), -self%over_slip%knots()]
-  end function knees
+  end function extremes
 
   subroutine quantities(self, columns)
     class(friction_joints_t), intent(in) :: self

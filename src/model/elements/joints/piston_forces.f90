@@ -2,6 +2,7 @@
 !> phase, the crank, another.
 module nocdyn_piston_forces
   use nocdyn_bank, only: bank_t, role_crank
+  use nocdyn_described_elements, only: stays_whole
   use nocdyn_element_rows, only: rows_between
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), operator(+), phase_of
@@ -48,6 +49,7 @@ contains
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
     bank%ports = at_phase
+    bank%steady_part = stays_whole
     bank%orders = size(force%sine)
     bank%phase_order = force%base * bank%orders
     call bank%add_parameter('base', spread([force%base], 1, lanes), .false.)

@@ -41,7 +41,7 @@ module nocdyn_tooth_losses
     procedure :: share
     procedure :: range_under_load
     procedure :: is_self_locking
-    procedure :: knees
+    procedure :: extremes
     procedure :: quantities
   end type tooth_losses_t
 
@@ -132,7 +132,7 @@ contains
   end function is_self_locking
 
   !> The loss jumps where the wheels change their direction, and bends at the points of tables.
-  function knees(self, element, t) result(speeds)
+  function extremes(self, element, t) result(speeds)
     class(tooth_losses_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
     real(wp), intent(in) :: t        !! [s]
@@ -143,7 +143,7 @@ contains
       speeds = [speeds, self%forward_over_speed%knots(), -self%forward_over_speed%knots(), &
                 self%backward_over_speed%knots(), -self%backward_over_speed%knots()]
     end if
-  end function knees
+  end function extremes
 
   !> The moment of the loss on the first wheel.
   subroutine quantities(self, columns)

@@ -15,8 +15,7 @@ module nocdyn_dc_motors
   type, extends(governed_bank_t), public :: dc_motors_t
   contains
     procedure :: describe
-    procedure :: steady_internal
-    procedure :: knees
+    procedure :: extremes
   end type dc_motors_t
 
 contains
@@ -53,28 +52,8 @@ contains
                            / self%parameter(tape, 'inductance'))
   end subroutine describe
 
-  subroutine steady_internal(self, t, speed, internal)
-    class(dc_motors_t), intent(in) :: self
-    real(wp), intent(in) :: t                !! [s]
-    real(wp), intent(in) :: speed(:)         !! u' [rad/s], [motors]
-    real(wp), intent(inout) :: internal(:)   !! [states * motors]
-    real(wp) :: throttle
-    integer :: e
-
-    call self%governed_bank_t%steady_internal(t, speed, internal)
-    throttle = 1.0_wp
-    associate (voltage => self%parameters(self%number_of('voltage'))%value, &
-               resistance => self%parameters(self%number_of('resistance'))%value, &
-               flux_constant => self%parameters(self%number_of('flux_constant'))%value)
-      do e = 1, self%count
-        if (self%has_governor) throttle = min(1.0_wp, internal(self%states * e))
-        internal(self%states * (e - 1) + 1) = (throttle * voltage(1, e) - flux_constant(1, e) * speed(e)) / resistance(1, e)
-      end do
-    end associate
-  end subroutine steady_internal
-
   !> The speed without torque, and the one of the governor.
-  function knees(self, element, t) result(speeds)
+  function extremes(self, element, t) result(speeds)
     class(dc_motors_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
     real(wp), intent(in) :: t        !! [s]
@@ -82,8 +61,8 @@ contains
 
     associate (voltage => self%parameters(self%number_of('voltage'))%value, &
                flux_constant => self%parameters(self%number_of('flux_constant'))%value)
-      speeds = [self%governed_bank_t%knees(element, t), voltage(1, element) / flux_constant(1, element)]
+      speeds = [self%governed_bank_t%extremes(element, t), voltage(1, element) / flux_constant(1, element)]
     end associate
-  end function knees
+  end function extremes
 
 end module nocdyn_dc_motors

@@ -42,10 +42,10 @@ module nocdyn_flux_motors
   contains
     procedure :: describe
     procedure :: circuit
-    procedure :: steady_internal
+    procedure :: decide_internal
     procedure :: transient_frequency
     procedure :: hold_speed, follows_supply, set_supply, idle_supply
-    procedure :: knees
+    procedure :: extremes
     procedure :: quantities
     procedure :: observe
   end type flux_motors_t
@@ -196,17 +196,19 @@ contains
 
   end function circuit
 
-  !> The fluxes of the steady state with the slip at a speed.
-  subroutine steady_internal(self, t, speed, internal)
+  !> The fluxes of the steady state with the slip at a speed, by the circuit.
+  subroutine decide_internal(self, t, speed, internal, is_decided)
     class(flux_motors_t), intent(in) :: self
     real(wp), intent(in) :: t                !! [s]
     real(wp), intent(in) :: speed(:)         !! u' [rad/s], [motors]
     real(wp), intent(inout) :: internal(:)   !! [states * motors]
+    logical, intent(out) :: is_decided(:)    !! [states]
     type(induction_circuit_t) :: circuit
     complex(wp) :: flux(2)
     integer :: e
     real(wp) :: slip
 
+    is_decided = .true.
     associate (direction => self%parameters(self%number_of('direction'))%value)
       do e = 1, self%count
         circuit = self%circuit(1, e)
@@ -217,7 +219,7 @@ contains
         internal(4 * e - 3:4 * e) = [real(flux(1), wp), aimag(flux(1)), real(flux(2), wp), aimag(flux(2))]
       end do
     end associate
-  end subroutine steady_internal
+  end subroutine decide_internal
 
   !> The torque swings with the mains after a change of the supply, which at the start is the one of switching on.
   pure real(wp) function transient_frequency(self, element, is_steady)
@@ -265,7 +267,7 @@ contains
   end function idle_supply
 
   !> The synchronous speed, and the ones of the largest steady torque as a motor and as a generator.
-  function knees(self, element, t) result(speeds)
+  function extremes(self, element, t) result(speeds)
     class(flux_motors_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
     real(wp), intent(in) :: t        !! [s]
@@ -277,7 +279,7 @@ contains
                / circuit%pole_pairs)
       speeds = synchronous * (1.0_wp + circuit%breakdown_slip() * [-1.0_wp, 0.0_wp, 1.0_wp])
     end associate
-  end function knees
+  end function extremes
 
   !> Torque, and the current of the stator.
   subroutine quantities(self, columns)

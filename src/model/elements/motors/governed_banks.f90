@@ -33,8 +33,8 @@ module nocdyn_governed_banks
     procedure :: hold_speed
     procedure :: integral_of, least_throttle
     procedure :: start_internal
-    procedure :: steady_internal
-    procedure :: knees
+    procedure :: decide_internal
+    procedure :: extremes
     procedure :: quantities
     procedure :: observe
   end type governed_bank_t
@@ -156,14 +156,17 @@ contains
   end function least_throttle
 
   !> The integral of a governor at rest is its throttle; at the set speed, where any is steady, the open one.
-  subroutine steady_internal(self, t, speed, internal)
+  subroutine decide_internal(self, t, speed, internal, is_decided)
     class(governed_bank_t), intent(in) :: self
     real(wp), intent(in) :: t                !! [s]
     real(wp), intent(in) :: speed(:)         !! u' [rad/s], [motors]
     real(wp), intent(inout) :: internal(:)   !! [states * motors]
+    logical, intent(out) :: is_decided(:)    !! [states]
     integer :: e
 
+    is_decided = .false.
     if (.not. self%has_governor) return
+    is_decided(self%states) = .true.
     associate (gain => self%parameters(self%number_of('governor_gain'))%value)
       do e = 1, self%count
         associate (demand => gain(1, e) * (set_speed_at(self, e, t) - speed(e)))
@@ -175,7 +178,7 @@ contains
         end associate
       end do
     end associate
-  end subroutine steady_internal
+  end subroutine decide_internal
 
   !> The set speed of a governor in the first lane [rad/s].
   pure real(wp) function set_speed_at(self, element, t)
@@ -190,17 +193,16 @@ contains
     end if
   end function set_speed_at
 
-  !> The points of a table, and the speed that a governor keeps.
-  function knees(self, element, t) result(speeds)
+  !> The speed that a governor keeps.
+  function extremes(self, element, t) result(speeds)
     class(governed_bank_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
     real(wp), intent(in) :: t        !! [s]
     real(wp), allocatable :: speeds(:)
 
     allocate (speeds(0))
-    if (allocated(self%curve)) speeds = self%curve(1, element)%knots()
-    if (self%has_governor) speeds = [speeds, set_speed_at(self, element, t)]
-  end function knees
+    if (self%has_governor) speeds = [set_speed_at(self, element, t)]
+  end function extremes
 
   !> Torque, armature current where that is a state, and throttle where there is a governor.
   subroutine quantities(self, columns)

@@ -3,7 +3,7 @@
 !> The harmonics of the air gap's torque have multiples of the electrical frequency, the number of pole pairs times the speed:
 !> (1 + sum of share_k sin(n_k p u + phase_k)) times the control torque, plus a sum of torque_k sin(n_k p u + phase_k).
 module nocdyn_inverter_motors
-  use nocdyn_bank, only: harmonic_t, role_motor, sine_harmonic
+  use nocdyn_bank, only: role_motor
   use nocdyn_element_keys, only: element_keys_t
   use nocdyn_governed_banks, only: governed_bank_t
   use nocdyn_kinds, only: wp
@@ -19,8 +19,6 @@ module nocdyn_inverter_motors
     integer, private :: harmonics = 0   !! of each motor
   contains
     procedure :: describe
-    procedure :: to_mean_torque
-    procedure :: list_harmonics
   end type inverter_motors_t
 
 contains
@@ -53,6 +51,7 @@ contains
     integer :: columns(self%count), k
 
     control = self%parameter(tape, 'torque_limit') * self%throttle(tape)
+    tape%control = node_of(control)
     torque = control
     do k = 1, self%harmonics
       columns = self%part_columns(k)
@@ -61,35 +60,5 @@ contains
     end do
     tape%applied = node_of(torque)
   end subroutine describe
-
-  !> Without the harmonics.
-  subroutine to_mean_torque(self)
-    class(inverter_motors_t), intent(inout) :: self
-
-    self%harmonics = 0
-    call self%prepare_law()
-  end subroutine to_mean_torque
-
-  !> One harmonic for each share and each torque.
-  subroutine list_harmonics(self, element, speed, list)
-    class(inverter_motors_t), intent(in) :: self
-    integer, intent(in) :: element   !! numbered within the bank
-    real(wp), intent(in) :: speed    !! u' [rad/s]
-    type(harmonic_t), allocatable, intent(out) :: list(:)
-    integer :: k, n
-
-    associate (order => self%parameters(self%number_of('order'))%value(1, element::self%count), &
-               share => self%parameters(self%number_of('share'))%value(1, element::self%count), &
-               torque => self%parameters(self%number_of('torque'))%value(1, element::self%count), &
-               phase => self%parameters(self%number_of('phase'))%value(1, element::self%count))
-      n = size(order)
-      allocate (list(2 * n))
-      do k = 1, n
-        list(k) = sine_harmonic(torque(k), 0.0_wp, order(k), phase(k), self%rows%last_body(element))
-        list(n + k) = sine_harmonic(share(k), 0.0_wp, order(k), phase(k), self%rows%last_body(element))
-        list(n + k)%by_element = self%first - 1 + element
-      end do
-    end associate
-  end subroutine list_harmonics
 
 end module nocdyn_inverter_motors

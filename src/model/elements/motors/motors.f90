@@ -36,7 +36,7 @@ module nocdyn_motors
   type, extends(speed_motors_t), public :: motors_t
   contains
     procedure :: torque => quadratic_torque
-    procedure :: knees => quadratic_knees
+    procedure :: extremes => quadratic_extremes
   end type motors_t
 
   !> The curve of a table.
@@ -51,7 +51,7 @@ module nocdyn_motors
   contains
     procedure :: torque => induction_torque
     procedure :: hold_speed, follows_supply, set_supply, idle_supply
-    procedure :: knees => induction_knees
+    procedure :: extremes => induction_extremes
   end type induction_motors_t
 
 contains
@@ -203,7 +203,7 @@ contains
   end function idle_supply
 
   !> The vertex, and the speeds without torque, where a, b and c are of sizes that belong together.
-  function quadratic_knees(self, element, t) result(speeds)
+  function quadratic_extremes(self, element, t) result(speeds)
     class(motors_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
     real(wp), intent(in) :: t        !! [s]
@@ -211,7 +211,7 @@ contains
     real(wp), parameter :: together = 1.0e-20_wp   ! ratio of coefficients below which one is no part of the law
     real(wp) :: a, b, c, discriminant
 
-    speeds = self%governed_bank_t%knees(element, t)
+    speeds = self%governed_bank_t%extremes(element, t)
     a = self%parameters(self%number_of('a'))%value(1, element)
     b = self%parameters(self%number_of('b'))%value(1, element)
     c = self%parameters(self%number_of('c'))%value(1, element)
@@ -221,10 +221,10 @@ contains
     else if (abs(b) > together * abs(a)) then
       speeds = [speeds, a / b]
     end if
-  end function quadratic_knees
+  end function quadratic_extremes
 
   !> The synchronous speed, and the ones of the largest torque as a motor and as a generator.
-  function induction_knees(self, element, t) result(speeds)
+  function induction_extremes(self, element, t) result(speeds)
     class(induction_motors_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
     real(wp), intent(in) :: t        !! [s]
@@ -232,8 +232,8 @@ contains
 
     associate (synchronous => self%parameters(self%number_of('synchronous_speed'))%value(1, element), &
                slip => self%parameters(self%number_of('breakdown_slip'))%value(1, element))
-      speeds = [self%governed_bank_t%knees(element, t), synchronous * (1.0_wp + slip * [-1.0_wp, 0.0_wp, 1.0_wp])]
+      speeds = [self%governed_bank_t%extremes(element, t), synchronous * (1.0_wp + slip * [-1.0_wp, 0.0_wp, 1.0_wp])]
     end associate
-  end function induction_knees
+  end function induction_extremes
 
 end module nocdyn_motors

@@ -7,7 +7,7 @@
 !> there is one. (C. Concordia, Synchronous Machines, 1951, on starting; R_s is neglected.)
 !> Both are linear between the points of a table; below its least slip with the slope there, above its largest constant.
 module nocdyn_synchronous_motors
-  use nocdyn_bank, only: bank_t, harmonic_t, role_motor, sine_harmonic
+  use nocdyn_bank, only: bank_t, role_motor
   use nocdyn_described_elements, only: boundary_width
   use nocdyn_element_keys, only: element_keys_t
   use nocdyn_kinds, only: wp
@@ -22,12 +22,9 @@ module nocdyn_synchronous_motors
 
   type, extends(bank_t), public :: synchronous_motors_t
     integer, private :: segments = 1            !! between, below and above the points
-    logical, private :: is_mean = .false.       !! whether the pulsation is left out
   contains
     procedure :: describe
-    procedure :: to_mean_torque
-    procedure :: list_harmonics
-    procedure :: knees
+    procedure :: extremes
   end type synchronous_motors_t
 
 contains
@@ -106,11 +103,8 @@ contains
     frequency = self%parameter(tape, 'frequency')
     pole_pairs = self%parameter(tape, 'direction') * self%parameter(tape, 'pole pairs')
     slip = 1.0_wp - (pole_pairs / frequency) * speed_of(tape)
-    torque = on_segment(self, tape, 'mean', slip)
-    if (.not. self%is_mean) then
-      torque = torque + on_segment(self, tape, 'pulsation', slip) &
-               * sin(2.0_wp * (frequency * time_of(tape) - pole_pairs * angle_of(tape)) + self%parameter(tape, 'phase'))
-    end if
+    torque = on_segment(self, tape, 'mean', slip) + on_segment(self, tape, 'pulsation', slip) &
+             * sin(2.0_wp * (frequency * time_of(tape) - pole_pairs * angle_of(tape)) + self%parameter(tape, 'phase'))
     tape%applied = node_of(self%parameter(tape, 'direction') * torque)
     width = literal(tape, boundary_width)
     do s = 2, self%segments
@@ -134,58 +128,16 @@ contains
              * (slip - pick(1, [(self%parameter(tape, 'slip', self%part_columns(s)), s=1, self%segments)]))
   end function on_segment
 
-  !> Leaves the pulsation out.
-  subroutine to_mean_torque(self)
-    class(synchronous_motors_t), intent(inout) :: self
-
-    self%is_mean = .true.
-    call self%prepare_law()
-  end subroutine to_mean_torque
-
-  !> The pulsation at the slip of the speed.
-  subroutine list_harmonics(self, element, speed, list)
-    class(synchronous_motors_t), intent(in) :: self
-    integer, intent(in) :: element   !! numbered within the bank
-    real(wp), intent(in) :: speed    !! u' [rad/s]
-    type(harmonic_t), allocatable, intent(out) :: list(:)
-    real(wp) :: pulsation, slip
-    integer :: s
-
-    associate (frequency => parameter_of('frequency', 1), order => parameter_of('direction', 1) * parameter_of('pole pairs', 1))
-      slip = 1.0_wp - order * speed / frequency
-      do s = self%segments, 2, -1
-        if (slip >= parameter_of('slip', s)) exit
-      end do
-      pulsation = parameter_of('pulsation', s) + parameter_of('pulsation slope', s) * (slip - parameter_of('slip', s))
-      list = [sine_harmonic(parameter_of('direction', 1) * pulsation, 2.0_wp * frequency, -2.0_wp * order, &
-                            parameter_of('phase', 1), self%rows%last_body(element))]
-    end associate
-
-  contains
-
-    !> A parameter of the element in the first lane.
-    pure real(wp) function parameter_of(name, segment)
-      character(len=*), intent(in) :: name
-      integer, intent(in) :: segment   !! 1 for parameters that are the same on all segments
-
-      parameter_of = self%parameters(self%number_of(name))%value(1, element + (segment - 1) * self%count)
-    end function parameter_of
-
-  end subroutine list_harmonics
-
-  !> The synchronous speed, and the ones of the points of the table.
-  function knees(self, element, t) result(speeds)
+  !> The synchronous speed.
+  function extremes(self, element, t) result(speeds)
     class(synchronous_motors_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
     real(wp), intent(in) :: t        !! [s]
     real(wp), allocatable :: speeds(:)
 
-    associate (slip => self%parameters(self%number_of('slip'))%value(1, element + self%count::self%count), &
-               synchronous => self%parameters(self%number_of('frequency'))%value(1, element) &
-               * self%parameters(self%number_of('direction'))%value(1, element) &
-               / self%parameters(self%number_of('pole pairs'))%value(1, element))
-      speeds = synchronous * [1.0_wp, 1.0_wp - pack(slip, slip < huge(slip))]
-    end associate
-  end function knees
+    speeds = [self%parameters(self%number_of('frequency'))%value(1, element) &
+              * self%parameters(self%number_of('direction'))%value(1, element) &
+              / self%parameters(self%number_of('pole pairs'))%value(1, element)]
+  end function extremes
 
 end module nocdyn_synchronous_motors

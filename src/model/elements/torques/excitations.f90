@@ -1,6 +1,6 @@
 !> Harmonic excitations, eq. (17): M_0 sin(omega_p t + phase).
 module nocdyn_excitations
-  use nocdyn_bank, only: harmonic_t, role_excitation, sine_harmonic
+  use nocdyn_bank, only: role_excitation
   use nocdyn_element_keys, only: element_keys_t
   use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_kinds, only: wp
@@ -15,8 +15,6 @@ module nocdyn_excitations
   type, extends(excitation_bank_t), public :: excitations_t
   contains
     procedure :: torque
-    procedure :: to_mean_torque
-    procedure :: list_harmonics
   end type excitations_t
 
 contains
@@ -42,31 +40,5 @@ contains
     torque = self%parameter(tape, 'amplitude') &
              * sin(self%parameter(tape, 'frequency') * time_of(tape) + self%parameter(tape, 'phase'))
   end function torque
-
-  !> The mean of a sine is zero; with the frequency 0 it is a constant.
-  subroutine to_mean_torque(self)
-    class(excitations_t), intent(inout) :: self
-
-    where (abs(self%values_of('frequency')) > 0.0_wp) self%parameters(self%number_of('amplitude'))%value = 0.0_wp
-    self%parameters(self%number_of('frequency'))%value = 0.0_wp
-    self%is_silent = .not. any(abs(self%values_of('amplitude')) > 0)
-    call self%prepare_law()
-  end subroutine to_mean_torque
-
-  !> One harmonic, unless the frequency is 0.
-  subroutine list_harmonics(self, element, speed, list)
-    class(excitations_t), intent(in) :: self
-    integer, intent(in) :: element   !! numbered within the bank
-    real(wp), intent(in) :: speed    !! u' [rad/s]
-    type(harmonic_t), allocatable, intent(out) :: list(:)
-    real(wp), dimension(self%lanes, self%count) :: amplitude, frequency, phase
-
-    amplitude = self%values_of('amplitude')
-    frequency = self%values_of('frequency')
-    phase = self%values_of('phase')
-    allocate (list(merge(1, 0, frequency(1, element) > 0)))
-    list(:) = sine_harmonic(amplitude(1, element), frequency(1, element), 0.0_wp, phase(1, element), &
-                            self%rows%last_body(element))
-  end subroutine list_harmonics
 
 end module nocdyn_excitations

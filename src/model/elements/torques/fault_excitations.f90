@@ -3,6 +3,7 @@
 !> With x = t - time, the torque is the sum of A exp(-rate x) sin(n f x + phase), f the angular frequency of the mains.
 module nocdyn_fault_excitations
   use nocdyn_bank, only: role_excitation
+  use nocdyn_described_elements, only: stays_away
   use nocdyn_element_keys, only: element_keys_t
   use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_kinds, only: wp
@@ -28,7 +29,6 @@ module nocdyn_fault_excitations
   contains
     procedure :: torque
     procedure :: has_ended => fault_has_ended
-    procedure :: to_mean_torque
   end type fault_excitations_t
 
 contains
@@ -42,6 +42,7 @@ contains
 
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
+    bank%steady_part = stays_away
     call bank%connect(role_excitation, keys)
     bank%most_terms = maxval([(size(terms(e)%amplitude), e=1, bank%count)])
     call bank%add_key(keys, 'time')
@@ -83,14 +84,6 @@ contains
 
     fault_has_ended = .true.
   end function fault_has_ended
-
-  subroutine to_mean_torque(self)
-    class(fault_excitations_t), intent(inout) :: self
-
-    self%parameters(self%number_of('amplitude'))%value = 0.0_wp
-    self%is_silent = .true.
-    call self%prepare_law()
-  end subroutine to_mean_torque
 
   function torque(self, tape)
     class(fault_excitations_t), intent(in) :: self

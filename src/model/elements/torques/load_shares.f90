@@ -3,7 +3,6 @@
 !> The torque is (c u' + quadratic |u'| u' + constant tanh(u' / constant_speed) + table(u')) times the sum of
 !> share sin(order u + phase).
 module nocdyn_load_shares
-  use nocdyn_bank, only: harmonic_t
   use nocdyn_element_keys, only: element_keys_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, operator(*), operator(-), speed_of
@@ -19,7 +18,6 @@ module nocdyn_load_shares
     integer :: quadratic_switch = 0   !! as in `resistance`
   contains
     procedure :: torque
-    procedure :: list_harmonics
   end type load_shares_t
 
 contains
@@ -49,33 +47,5 @@ contains
     torque = (self%parameter(tape, 'viscous') * speed_of(tape) - resistance(self, self%quadratic_switch, tape)) &
              * self%sum_of_waves(tape)
   end function torque
-
-  !> One harmonic of each term.
-  subroutine list_harmonics(self, element, speed, list)
-    class(load_shares_t), intent(in) :: self
-    integer, intent(in) :: element   !! numbered within the bank
-    real(wp), intent(in) :: speed    !! u' [rad/s]
-    type(harmonic_t), allocatable, intent(out) :: list(:)
-
-    call self%wave_excitations_t%list_harmonics(element, speed, list)
-    list%amplitude = list%amplitude * load_torque(self, element, speed)
-  end subroutine list_harmonics
-
-  !> Torque of the load of an element in the first lane [N m].
-  pure real(wp) function load_torque(self, element, speed) result(torque)
-    class(load_shares_t), intent(in) :: self
-    integer, intent(in) :: element   !! numbered within the bank
-    real(wp), intent(in) :: speed    !! u' [rad/s]
-
-    torque = number('viscous') * speed + number('quadratic') * abs(speed) * speed &
-             + number('constant') * tanh(speed / number('constant_speed'))
-    if (allocated(self%curve)) torque = torque + self%curve(1, element)%value(speed)
-  contains
-    pure real(wp) function number(name)
-      character(len=*), intent(in) :: name
-
-      number = self%parameters(self%number_of(name))%value(1, element)
-    end function number
-  end function load_torque
 
 end module nocdyn_load_shares

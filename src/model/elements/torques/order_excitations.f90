@@ -4,7 +4,7 @@
 !> M, S and C are known at some speeds, linear between them, and constant below the lowest and above the highest one. They are
 !> the ones of a cycle at a constant speed: fuel is metered by the cycle. Their slopes over the speed belong to its mean.
 module nocdyn_order_excitations
-  use nocdyn_bank, only: harmonic_t, role_excitation
+  use nocdyn_bank, only: role_excitation
   use nocdyn_described_elements, only: boundary_width
   use nocdyn_element_rows, only: rows_between
   use nocdyn_excitation_banks, only: excitation_bank_t
@@ -34,9 +34,6 @@ module nocdyn_order_excitations
     type(order_terms_t) :: sorted, sorted_squares   !! harmonics, and those times u'^2
   contains
     procedure :: torque => order_torque
-    procedure :: to_mean_torque
-    procedure :: list_harmonics
-    procedure :: knees
   end type order_excitations_t
 
 contains
@@ -258,99 +255,5 @@ contains
     end do
     number = pick(1, choices)
   end function picked
-
-  !> The means stay.
-  subroutine to_mean_torque(self)
-    class(order_excitations_t), intent(inout) :: self
-    integer :: i
-
-    do i = 1, size(self%parameters)
-      if (index(self%parameters(i)%name, 'sine') > 0) self%parameters(i)%value = 0.0_wp
-    end do
-    self%is_silent = .not. any(abs(self%values_of('mean')) > 0)
-    if (self%segments > 1) self%is_silent = self%is_silent .and. .not. any(abs(self%values_of('mean slope')) > 0)
-    call self%prepare_law()
-  end subroutine to_mean_torque
-
-  !> The harmonics of the torque at this speed, then those that are multiplied by u'^2.
-  subroutine list_harmonics(self, element, speed, list)
-    class(order_excitations_t), intent(in) :: self
-    integer, intent(in) :: element   !! numbered within the bank
-    real(wp), intent(in) :: speed    !! u' [rad/s]
-    type(harmonic_t), allocatable, intent(out) :: list(:)
-    real(wp) :: distance   ! to the last point of the table below this speed
-    integer :: below, body, cosine, i, n, shift, sine
-
-    body = self%rows%last_body(element)
-    sine = self%number_of('sine')
-    cosine = self%number_of('cosine')
-    associate (orders => self%parameters(self%number_of('order')), squares => self%parameters(self%number_of('square order')), &
-               square_sine => self%parameters(self%number_of('square sine')), &
-               square_cosine => self%parameters(self%number_of('square cosine')))
-      call find_segment(self, element, speed, below, distance)
-      shift = below * size(orders%element)
-      allocate (list(count(orders%element == element) + count(squares%element == element)))
-      n = 0
-      do i = 1, size(orders%element)
-        if (orders%element(i) /= element) cycle
-        n = n + 1
-        list(n) = harmonic(orders%value(1, i), value_at(sine, 'sine slope'), value_at(cosine, 'cosine slope'), body)
-      end do
-      do i = 1, size(squares%element)
-        if (squares%element(i) /= element) cycle
-        n = n + 1
-        list(n) = harmonic(squares%value(1, i), speed**2 * square_sine%value(1, i), speed**2 * square_cosine%value(1, i), body)
-      end do
-    end associate
-  contains
-    !> A parameter of order number i.
-    pure real(wp) function value_at(parameter, slope) result(value)
-      integer, intent(in) :: parameter
-      character(len=*), intent(in) :: slope   !! name of the parameter that has its slopes
-
-      value = self%parameters(parameter)%value(1, i + shift)
-      if (below > 0) value = value + distance * self%parameters(self%number_of(slope))%value(1, i + shift)
-    end function value_at
-  end subroutine list_harmonics
-
-  !> sine sin(order u) + cosine cos(order u), with the angle u of a body.
-  pure type(harmonic_t) function harmonic(order, sine, cosine, body)
-    real(wp), intent(in) :: order          !! oscillations per turn of the body
-    real(wp), intent(in) :: sine, cosine   !! [N m]
-    integer, intent(in) :: body
-
-    harmonic = harmonic_t(cmplx(cosine, -sine, wp), 0.0_wp, order, body)
-  end function harmonic
-
-  !> The segment of the table over the speed that holds a speed.
-  pure subroutine find_segment(self, element, speed, below, distance)
-    class(order_excitations_t), intent(in) :: self
-    integer, intent(in) :: element   !! numbered within the bank
-    real(wp), intent(in) :: speed    !! [rad/s]
-    integer, intent(out) :: below    !! number of points below
-    real(wp), intent(out) :: distance   !! to the last of them, 0 if there is none [rad/s]
-
-    below = 0
-    distance = 0.0_wp
-    if (self%segments == 1) return
-    associate (edge => self%parameters(self%number_of('speed'))%value(1, element::self%count))
-      below = count(edge <= speed)
-      if (below > 0) distance = speed - edge(below)
-    end associate
-  end subroutine find_segment
-
-  !> The mean bends at the points.
-  function knees(self, element, t) result(speeds)
-    class(order_excitations_t), intent(in) :: self
-    integer, intent(in) :: element   !! numbered within the bank
-    real(wp), intent(in) :: t        !! [s]
-    real(wp), allocatable :: speeds(:)
-
-    allocate (speeds(0))
-    if (self%segments == 1) return
-    associate (edge => self%parameters(self%number_of('speed'))%value(1, element::self%count))
-      speeds = pack(edge, edge < huge(1.0_wp))
-    end associate
-  end function knees
 
 end module nocdyn_order_excitations

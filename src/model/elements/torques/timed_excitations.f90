@@ -1,6 +1,7 @@
 !> Excitations that change during a limited time: steps, ramps and half-sine pulses.
 module nocdyn_timed_excitations
   use nocdyn_bank, only: role_excitation
+  use nocdyn_described_elements, only: stays_whole
   use nocdyn_element_keys, only: element_keys_t
   use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_kinds, only: wp
@@ -38,6 +39,7 @@ contains
 
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
+    bank%steady_part = stays_whole
     call bank%connect(role_excitation, keys)
     call bank%add_key(keys, 'amplitude')
     call bank%add_key(keys, 'time')

@@ -3,7 +3,7 @@
 !> Engine orders have f = 0; the ones of one excitation that are whole multiples of one order follow from one sine and one cosine.
 !> A synchronous motor with p pole pairs pulsates during its start at twice the slip frequency: f = 2 omega_mains, order = -2 p.
 module nocdyn_wave_excitations
-  use nocdyn_bank, only: harmonic_t, role_excitation, sine_harmonic
+  use nocdyn_bank, only: role_excitation
   use nocdyn_element_keys, only: element_keys_t
   use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_kinds, only: wp
@@ -21,8 +21,6 @@ module nocdyn_wave_excitations
   contains
     procedure :: sum_of_waves
     procedure :: torque => sum_of_waves
-    procedure :: to_mean_torque
-    procedure :: list_harmonics
   end type wave_excitations_t
 
 contains
@@ -96,35 +94,5 @@ contains
              * sin(self%parameter(tape, 'frequency', columns) * time_of(tape) &
                    + self%parameter(tape, 'order', columns) * angle_of(tape) + self%parameter(tape, 'phase', columns))
   end function wave
-
-  !> The mean of a sine is zero.
-  subroutine to_mean_torque(self)
-    class(wave_excitations_t), intent(inout) :: self
-
-    self%parameters(self%number_of('amplitude'))%value = 0.0_wp
-    self%parameters(self%number_of('frequency'))%value = 0.0_wp
-    self%is_silent = .true.
-    call self%prepare_law()
-  end subroutine to_mean_torque
-
-  !> One harmonic of each term.
-  subroutine list_harmonics(self, element, speed, list)
-    class(wave_excitations_t), intent(in) :: self
-    integer, intent(in) :: element   !! numbered within the bank
-    real(wp), intent(in) :: speed    !! u' [rad/s]
-    type(harmonic_t), allocatable, intent(out) :: list(:)
-    integer :: i, k
-    integer, allocatable :: terms(:)
-
-    associate (amplitude => self%parameters(self%number_of('amplitude')), phase => self%parameters(self%number_of('phase')), &
-               frequency => self%parameters(self%number_of('frequency')), order => self%parameters(self%number_of('order')))
-      terms = pack([(k, k=1, size(amplitude%element))], amplitude%element == element)
-      allocate (list(size(terms)))
-      do i = 1, size(terms)
-        list(i) = sine_harmonic(amplitude%value(1, terms(i)), frequency%value(1, terms(i)), order%value(1, terms(i)), &
-                                phase%value(1, terms(i)), self%rows%last_body(element))
-      end do
-    end associate
-  end subroutine list_harmonics
 
 end module nocdyn_wave_excitations

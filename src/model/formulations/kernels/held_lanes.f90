@@ -17,7 +17,7 @@ module nocdyn_held_lanes
     real(wp), allocatable, private :: holding(:, :, :)   !! W^+ [kg m2], [lanes, joints, joints]
     integer, allocatable, private :: element(:)          !! of the machine, [joints]
   contains
-    procedure :: take_set, hold, find_rates
+    procedure :: take_set, hold, hold_coefficients, find_rates
   end type held_lanes_t
 
 contains
@@ -79,6 +79,21 @@ contains
       end do
     end do
   end subroutine hold
+
+  !> `hold` of Taylor coefficients. What is left of them by rounding alone becomes zero: over a long step of a machine that is at
+  !> rest, where the torques oscillate many times, it would grow by orders of magnitude.
+  pure subroutine hold_coefficients(self, map, first, last, lanes, freedoms, coefficient)
+    class(held_lanes_t), intent(inout) :: self
+    type(element_coordinates_t), intent(in) :: map
+    integer, intent(in) :: first, last, lanes, freedoms
+    real(wp), intent(inout) :: coefficient(lanes, freedoms)   !! of the accelerations
+    real(wp), parameter :: rounding = 256.0_wp * epsilon(1.0_wp)
+    real(wp) :: before(first:last, freedoms)
+
+    before = coefficient(first:last, :)
+    call self%hold(map, first, last, lanes, freedoms, coefficient)
+    where (abs(coefficient(first:last, :)) <= rounding * abs(before)) coefficient(first:last, :) = 0.0_wp
+  end subroutine hold_coefficients
 
   !> Sets the rates of a joint in some lanes, from accelerations or speeds.
   pure subroutine find_rates(self, map, joint, first, last, lanes, freedoms, acceleration)

@@ -162,7 +162,7 @@ contains
         call advance(self, machine, twists, accelerations, strip, k, columns, y(1, 1, k + 1))
         if (.not. held%is_active) cycle
         last = min(self%strip * strip, self%lanes)
-        call held%hold(incidence, self%strip * (strip - 1) + 1, last, self%lanes, self%freedoms, y(1, 1, k + 1))
+        call held%hold_coefficients(incidence, self%strip * (strip - 1) + 1, last, self%lanes, self%freedoms, y(1, 1, k + 1))
         call gather(self, strip, self%freedoms, y(1, 1, k + 1), self%rates)
       end do
     end do
