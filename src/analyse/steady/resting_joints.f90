@@ -90,7 +90,7 @@ contains
       class is (tooth_losses_t)
         return
       class is (friction_joints_t)
-        call bank%find_range(1, joints%number(joint), balance%t(1), least, most)
+        call bank%find_range(joints%number(joint), balance%t(1), least, most)
         may_rest = most > least
         always_rests = least <= -huge(least) .and. most >= huge(most)
       end select
@@ -251,7 +251,7 @@ contains
           call bank%share(joints%number(j), .true., speed, choices%driving(j), slope)
           call bank%share(joints%number(j), .false., speed, choices%driven(j), slope)
         class is (friction_joints_t)
-          call bank%find_range(1, joints%number(j), balance%t(1), choices%least(j), choices%most(j), choices%sliding(:, j))
+          call bank%find_range(joints%number(j), balance%t(1), choices%least(j), choices%most(j), choices%sliding(:, j))
         end select
       end do
     end associate
@@ -304,7 +304,7 @@ contains
         class is (tooth_losses_t)
           cycle
         class is (friction_joints_t)
-          call bank%find_range(1, joints%number(j), balance%t(1), least, most)
+          call bank%find_range(joints%number(j), balance%t(1), least, most)
         end select
         associate (slip => speed(1, joints%element(j)))
           slips_where_it_cannot = slips_where_it_cannot .or. (slip > scale .and. least <= -huge(least)) .or. &

@@ -1,27 +1,29 @@
 !> Blocks of lanes of the reduced formulation with joints that lock (`nocdyn_joint_sets`), each lane with its own set.
 !>
 !> All lanes are evaluated at once (`nocdyn_held_lanes`). What is decided in one lane, at the start of a variant and at events,
-!> is decided by a scout: the formulation of a single lane, which takes the parameters, the branches and the joints of that lane
-!> and gives branches and joints back. Rows that move and teeth with losses are in blocks of one lane only.
+!> is decided by a formulation of that lane alone, which has its parameters, branches and joints. Rows that move and teeth with
+!> losses are in blocks of one lane only.
 module nocdyn_joint_blocks
   use nocdyn_held_lanes, only: new_held_lanes
-  use nocdyn_joint_sets, only: joint_sets_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: new_reduced, reduced_t
-  use nocdyn_row_obstacles, only: describe_obstacle
   use nocdyn_system, only: evaluation_fatal
   implicit none (type, external)
   private
 
+  !> The formulation of a lane alone, once the lane has started.
+  type :: single_t
+    type(reduced_t), allocatable :: single
+  end type single_t
+
   type, extends(reduced_t), public :: joint_block_t
     private
-    type(joint_sets_t), allocatable :: sets(:)            !! joints of each lane, [lanes]
+    type(reduced_t) :: any_single                         !! the formulation of a lane
+    type(single_t), allocatable :: lane(:)                !! [lanes]
     real(wp), allocatable :: lane_acceleration(:, :)      !! q'' [rad/s2], work space, [lanes, freedoms]
-    type(reduced_t), allocatable :: scout
-    integer :: scouted = 0                                !! lane that the scout stands for, 0: none
-    type(lane_parameters_t) :: parameters                 !! of the lane that the scout stands for
+    type(lane_parameters_t) :: parameters                 !! of a lane that starts
   contains
     procedure, public :: attach
     procedure, public :: derivative, find_sets, hold_jacobian, refresh_lane, observe, evaluation_obstacle
@@ -31,61 +33,36 @@ module nocdyn_joint_blocks
 
 contains
 
-  !> Makes the scout, after `formulate`.
+  !> Makes the formulations of the lanes, after `formulate`.
   subroutine attach(self, machine)
     class(joint_block_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine   !! of one lane, with the structure of the block
-    integer :: lane
 
-    allocate (self%scout)
-    self%scout = new_reduced(machine, self%has_energy_balance, as_block=.true.)
-    allocate (self%sets(self%lanes))
-    do lane = 1, self%lanes
-      self%sets(lane) = self%scout%joints
-    end do
+    self%any_single = new_reduced(machine, self%has_energy_balance, as_block=.true.)
+    allocate (self%lane(self%lanes))
     self%held = new_held_lanes(self%lanes, self%joints)
     allocate (self%lane_acceleration(self%lanes, size(self%moving)), source=0.0_wp)
   end subroutine attach
 
-  !> Makes the scout stand for a lane.
-  subroutine send_scout(self, lane)
+  !> Takes the branches and joints of a lane, after they have been decided.
+  subroutine take_decision(self, lane)
     class(joint_block_t), intent(inout) :: self
     integer, intent(in) :: lane
 
-    if (self%scouted /= lane) then
-      call brief_scout(self, lane)
-      call self%scout%machine%refresh_lane(1)
-      call self%scout%machine%take_branches(1, self%machine, lane)
-      self%scout%joints = self%sets(lane)
-      self%scout%joints%lane = 1
-      self%scouted = lane
-    end if
-    self%scout%twist_at_origin(1, :) = self%twist_at_origin(lane, :)
-  end subroutine send_scout
-
-  !> Gives the scout the parameters of a lane.
-  subroutine brief_scout(self, lane)
-    class(joint_block_t), intent(inout) :: self
-    integer, intent(in) :: lane
-
-    call self%parameters%take(lane, with_structure=.false.)
-    call self%pass_parameters(self%parameters)
-    call self%parameters%give(1)
-    call self%scout%pass_parameters(self%parameters)
-  end subroutine brief_scout
-
-  !> Takes the branches and joints of the lane that the scout stands for.
-  subroutine take_report(self)
-    class(joint_block_t), intent(inout) :: self
-
-    associate (lane => self%scouted, scout => self%scout)
-      call self%machine%take_branches(lane, scout%machine, 1)
-      scout%joints%log%count = 0   ! nobody reads it
-      self%sets(lane) = scout%joints
-      self%sets(lane)%lane = lane
-      call self%held%take_set(lane, self%sets(lane))
+    associate (single => self%lane(lane)%single)
+      call self%machine%take_branches(lane, single%machine, 1)
+      single%joints%log%count = 0   ! nobody reads it
+      call self%held%take_set(lane, single%joints)
     end associate
-  end subroutine take_report
+  end subroutine take_decision
+
+  !> Gives the formulation of a lane the origin of the coordinates of that lane.
+  subroutine give_origin(self, lane)
+    class(joint_block_t), intent(inout) :: self
+    integer, intent(in) :: lane
+
+    self%lane(lane)%single%twist_at_origin(1, :) = self%twist_at_origin(lane, :)
+  end subroutine give_origin
 
   !> Updates what depends on the parameters of a lane; its joints are made anew at its start.
   subroutine refresh_lane(self, lane)
@@ -93,22 +70,27 @@ contains
     integer, intent(in) :: lane
 
     call self%refresh_parameters(lane)
-    if (self%scouted == lane) self%scouted = 0
   end subroutine refresh_lane
 
-  !> Prepares a lane that starts at time t and state y: the scout chooses the branches and decides which joints are locked.
+  !> Prepares a lane that starts at time t and state y: its branches are chosen, and it is decided which joints are locked.
   subroutine start_lane(self, lane, t, y)
     class(joint_block_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t                  !! [s]
     real(wp), contiguous, intent(in) :: y(:)   !! state, [states + quadratures]
 
+    if (.not. allocated(self%lane(lane)%single)) then
+      allocate (self%lane(lane)%single)
+      self%lane(lane)%single = self%any_single
+    end if
     call self%refresh_lane(lane)
     call self%norm%start_lane(lane, y, self%zero_twist(lane, :), self%machine%laws%rest(lane, :))
-    call brief_scout(self, lane)
-    call self%scout%start_lane(1, t, y)
-    self%scouted = lane
-    call take_report(self)
+    call self%parameters%take(lane, with_structure=.false.)
+    call self%pass_parameters(self%parameters)
+    call self%parameters%give(1)
+    call self%lane(lane)%single%pass_parameters(self%parameters)
+    call self%lane(lane)%single%start_lane(1, t, y)
+    call take_decision(self, lane)
   end subroutine start_lane
 
   !> The derivative, with the moments of the joints that hold.
@@ -131,7 +113,8 @@ contains
     integer :: lane
 
     do lane = 1, self%lanes
-      if (self%sets(lane)%lost > 0) status(lane) = evaluation_fatal
+      if (.not. allocated(self%lane(lane)%single)) cycle
+      if (self%lane(lane)%single%joints%lost > 0) status(lane) = evaluation_fatal
     end do
   end subroutine find_sets
 
@@ -221,9 +204,10 @@ contains
         if (joint == 0) cycle
         call self%held%find_rates(self%incidence, joint, 1, self%lanes, self%lanes, size(self%moving), y)
         do lane = 1, self%lanes
-          associate (set => self%sets(lane))
-            set%moment(joint) = self%held%moment(lane, joint)
-            g(lane, switch) = set%indicator(self%machine%banks, joint, t(lane), self%held%rate(lane, joint))
+          if (.not. allocated(self%lane(lane)%single)) cycle
+          associate (joints => self%lane(lane)%single%joints, banks => self%lane(lane)%single%machine%banks)
+            joints%moment(joint) = self%held%moment(lane, joint)
+            g(lane, switch) = joints%indicator(banks, joint, t(lane), self%held%rate(lane, joint))
           end associate
         end do
       end associate
@@ -238,8 +222,8 @@ contains
     real(wp), contiguous, intent(in) :: y(:)      !! state, [states + quadratures]
     real(wp), contiguous, intent(inout) :: g(:)   !! [switches]
 
-    call send_scout(self, lane)
-    call self%scout%indicator_values(1, t, y, g)
+    call give_origin(self, lane)
+    call self%lane(lane)%single%indicator_values(1, t, y, g)
   end subroutine indicator_values
 
   !> Indicator of one switch.
@@ -250,8 +234,8 @@ contains
     real(wp), contiguous, intent(in) :: y(:)      !! state, [states + quadratures]
     real(wp), contiguous, intent(inout) :: g(:)   !! [switches]
 
-    call send_scout(self, lane)
-    call self%scout%set_indicator(which, 1, t, y, g)
+    call give_origin(self, lane)
+    call self%lane(lane)%single%set_indicator(which, 1, t, y, g)
   end subroutine set_indicator
 
   !> The largest rate at which the moments of joints that hold oscillate at a state [rad/s].
@@ -261,8 +245,8 @@ contains
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
     real(wp), intent(out) :: fastest
 
-    call send_scout(self, lane)
-    call self%scout%find_fastest_wave(1, y, fastest)
+    call give_origin(self, lane)
+    call self%lane(lane)%single%find_fastest_wave(1, y, fastest)
   end subroutine find_fastest_wave
 
   subroutine find_fastest_waves(self, columns, y, fastest)
@@ -288,9 +272,9 @@ contains
     real(wp), intent(in) :: t                     !! [s]
     real(wp), contiguous, intent(inout) :: y(:)   !! state, [states + quadratures]
 
-    call send_scout(self, lane)
-    call self%scout%change_branch(1, which, t, y)
-    call take_report(self)
+    call give_origin(self, lane)
+    call self%lane(lane)%single%change_branch(1, which, t, y)
+    call take_decision(self, lane)
   end subroutine change_branch
 
   !> Why no motion fits the joints of a lane.
@@ -299,7 +283,7 @@ contains
     integer, intent(in) :: lane
     character(len=:), allocatable :: text
 
-    call describe_obstacle(self%sets(lane), self%machine%banks, self%machine%elements%rows, self%machine%coordinates, text)
+    text = self%lane(lane)%single%evaluation_obstacle(1)
   end function evaluation_obstacle
 
 end module nocdyn_joint_blocks

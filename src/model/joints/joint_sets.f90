@@ -26,7 +26,6 @@ module nocdyn_joint_sets
   real(wp), parameter, public :: boundary_shift = 1.0e-12_wp  !! shift of boundaries outwards, relative to speeds or moments
 
   type, extends(held_rows_t), public :: joint_sets_t
-    integer :: lane = 1                          !! of the banks, in which the parameters of the joints are
     integer, allocatable :: bank(:), number(:)   !! bank of each joint, and its number there, [joints] as all that follow
     integer, allocatable :: joint_of(:)      !! joint of each switch of the machine, 0 for none, [switches]
     real(wp), allocatable :: impulse(:)      !! of the last impact [N m s]; 0 after other events
@@ -339,7 +338,7 @@ contains
       call bank%range_under_load(self%number(joint), self%teeth%load(self%teeth%loss_of(joint)), least, most)
       sliding = 0.0_wp
     class is (friction_joints_t)
-      call bank%find_range(self%lane, self%number(joint), t, least, most, sliding)
+      call bank%find_range(self%number(joint), t, least, most, sliding)
     class default   ! a row that moves
       least = -huge(least)
       most = huge(most)

@@ -172,18 +172,18 @@ contains
 
   !> The range of the moment at rest, and the moments of slip forwards and backwards, by the engagement: a range without bounds
   !> stays so with any.
-  pure subroutine find_range(self, lane, element, t, least, most, sliding)
+  pure subroutine find_range(self, element, t, least, most, sliding)
     class(friction_joints_t), intent(in) :: self
-    integer, intent(in) :: lane, element   !! the latter numbered within the bank
+    integer, intent(in) :: element     !! numbered within the bank
     real(wp), intent(in) :: t          !! [s]
     real(wp), intent(out) :: least, most              !! [N m]
     real(wp), intent(out), optional :: sliding(2)     !! [N m]
     real(wp) :: moments(at_least:slip_most)
     integer :: k
 
-    moments = [(self%parameters(k)%value(lane, element), k=at_least, slip_most)]
+    moments = [(self%parameters(k)%value(1, element), k=at_least, slip_most)]
     if (allocated(self%curve)) then
-      associate (level => self%curve(lane, element)%value(t))
+      associate (level => self%curve(1, element)%value(t))
         where (abs(moments) < huge(moments))
           moments = moments * level
         else where
