@@ -1,15 +1,12 @@
 !> A hint after a run: the machine ends in a slow steady state, as a motor does that cannot start its load, and could run faster.
 module nocdyn_missed_states
   use nocdyn_steady_texts, only: describe_state_speeds
-  use nocdyn_balance_starts, only: follow_motion
-  use nocdyn_equilibrium, only: distances, equilibrium_t, find_equilibria, find_stability, mean_formulation
+  use nocdyn_equilibrium, only: distances, equilibrium_t, find_equilibria, find_stability
   use nocdyn_errors, only: error_t
-  use nocdyn_floating_motions, only: hold_floating
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_text, only: append, string_t
-  use nocdyn_torque_balance, only: set_up_balance, torque_balance_t
   implicit none (type, external)
   private
 
@@ -17,7 +14,6 @@ module nocdyn_missed_states
 
   integer, parameter :: most_bodies = 100    ! of a machine that is searched: the search is to take no time
   real(wp), parameter :: near = 1.0e-3_wp    ! kinetic energy of the difference, as a share of that between two states
-  real(wp), parameter :: far = 0.1_wp        ! from the state into which the machine settles, as a share of its energy
 
 contains
 
@@ -36,7 +32,6 @@ contains
     integer :: fastest, nearest
 
     if (machine%bodies > most_bodies) return
-    if (is_running_up(machine, t_end, omega)) return
     call find_equilibria(machine, t_end, formulation, equilibria, remarks, error)
     if (allocated(error)) return
     if (size(equilibria) < 2) return
@@ -55,31 +50,5 @@ contains
     call append(notes, 'the machine ends in the steady state at ' // here // '; it could run at ' // &
                        there // ", where &run start = 'equilibrium' starts it")
   end subroutine note_missed_state
-
-  !> Whether the machine is far below the speeds into which it settles after the end: then it is next to no steady state, and the
-  !> search for all of them, which takes longer than many a run, is left out.
-  logical function is_running_up(machine, t_end, omega)
-    type(machine_t), intent(in) :: machine   !! one lane
-    real(wp), intent(in) :: t_end            !! [s]
-    real(wp), intent(in) :: omega(:)         !! speeds at the end [rad/s], [bodies]
-    class(formulation_t), allocatable :: formulation
-    type(torque_balance_t) :: balance
-    real(wp), allocatable :: z(:)
-    real(wp) :: settled(size(omega))
-    integer :: i
-
-    call mean_formulation(machine, formulation)
-    formulation%machine%start_speed(1, :) = omega
-    call set_up_balance(formulation, t_end, balance)
-    call hold_floating(balance)
-    z = balance%start()
-    call balance%settle(z)
-    call follow_motion(balance, z, [(i, i=1, size(z))])
-    settled = balance%body_speeds(z(:size(balance%motions%free)))
-    associate (energy => machine%kinetic_energy(1, settled))
-      is_running_up = energy > machine%kinetic_energy(1, omega) .and. &
-                      machine%kinetic_energy(1, settled - omega) > far * energy
-    end associate
-  end function is_running_up
 
 end module nocdyn_missed_states

@@ -9,7 +9,7 @@ module nocdyn_balance_starts
   implicit none (type, external)
   private
 
-  public :: follow_motion, search_from_starts, solve_by_newton
+  public :: search_from_starts, solve_by_newton
 
   real(wp), parameter :: singular = 1.0e-13_wp   ! relative to the largest singular value
 
@@ -44,7 +44,7 @@ contains
     point = start
     call solve_by_newton(reduced%balance, point, block)
     point = start
-    call follow_motion(reduced%balance, point, block%members)
+    call follow_motion(reduced%balance, point, block)
     call solve_by_newton(reduced%balance, point, block)
   end subroutine search_from_starts
 
@@ -122,21 +122,21 @@ contains
 
   !> Follows the motion of the rigid bodies and the internal states by Euler's implicit method, with steps that grow while
   !> Newton's method converges in a few iterations: at the end they are long, and what is left is steady.
-  subroutine follow_motion(balance, z, members)
+  subroutine follow_motion(balance, z, block)
     type(torque_balance_t), intent(inout) :: balance
     real(wp), intent(inout) :: z(:)   !! start, then the end, [unknowns]
-    integer, intent(in) :: members(:)   !! unknowns that move
+    type(block_solutions_t), intent(in) :: block
     real(wp), parameter :: highest = 1.0e12_wp   ! rad/s
     real(wp), parameter :: converged = 1.0e-9_wp, least = 1.0e-12_wp   ! change, relative or in rad/s
     integer, parameter :: most_iterations = 8
     integer, parameter :: most_steps = 400
     real(wp), parameter :: first_step = 1.0e-6_wp, longest = 1.0e12_wp   ! s
     real(wp), allocatable :: inertia(:, :)
-    real(wp) :: ahead(size(z)), step, change(size(members)), slopes(size(z), size(z))
+    real(wp) :: ahead(size(z)), step, change(size(block%members)), slopes(size(z), size(z))
     integer :: i, j
     logical :: is_solved
 
-    allocate (inertia, source=balance%inertia(members))
+    allocate (inertia, source=balance%inertia(block%members))
     step = first_step
     do i = 1, most_steps
       ahead = z
@@ -145,11 +145,11 @@ contains
       do j = 1, most_iterations
         call balance%evaluate(ahead)
         call balance%differentiate(slopes)
-        change = matmul(pseudo_inverse(inertia / step - slopes(members, members), singular), &
-                        balance%residual(members) - matmul(inertia, ahead(members) - z(members)) / step)
-        ahead(members) = ahead(members) + change
-        is_solved = all(abs(change) <= converged * abs(ahead(members)) + least)
-        if (is_solved .or. any(abs(ahead(members)) > highest)) exit
+        change = matmul(pseudo_inverse(inertia / step - slopes(block%members, block%members), singular), &
+                        balance%residual(block%members) - matmul(inertia, ahead(block%members) - z(block%members)) / step)
+        ahead(block%members) = ahead(block%members) + change
+        is_solved = all(abs(change) <= converged * abs(ahead(block%members)) + least)
+        if (is_solved .or. any(abs(ahead(block%members)) > highest)) exit
       end do
       if (is_solved) z = ahead
       step = merge(2.0_wp, 0.25_wp, is_solved) * step

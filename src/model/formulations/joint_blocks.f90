@@ -9,6 +9,7 @@ module nocdyn_joint_blocks
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: new_reduced, reduced_t
+  use nocdyn_row_obstacles, only: describe_obstacle
   use nocdyn_system, only: evaluation_fatal
   implicit none (type, external)
   private
@@ -283,7 +284,9 @@ contains
     integer, intent(in) :: lane
     character(len=:), allocatable :: text
 
-    text = self%lane(lane)%single%evaluation_obstacle(1)
+    associate (single => self%lane(lane)%single)
+      call describe_obstacle(single%joints, single%machine%banks, single%machine%elements%rows, single%machine%coordinates, text)
+    end associate
   end function evaluation_obstacle
 
 end module nocdyn_joint_blocks
