@@ -3,7 +3,7 @@ module nocdyn_narrow_series
   use nocdyn_kinds, only: wp
   use nocdyn_laws, only: narrow
   use nocdyn_series_terms, only: by_speed, by_speed_squared, constant, cubic, has_angle, has_cubic, has_forcing, &
-    has_square, linear
+    has_history, has_square, linear
   implicit none (type, external)
   private
 

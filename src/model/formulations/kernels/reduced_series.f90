@@ -17,7 +17,7 @@ module nocdyn_reduced_series
   use nocdyn_series_banks, only: new_series_banks, series_banks_t
   use nocdyn_series_maps, only: new_series_map, series_map_t
   use nocdyn_series_terms, only: by_speed, by_speed_squared, constant, cubic, has_angle, has_applied, has_cubic, &
-    has_forcing, has_square, linear, parameters, rest
+    has_forcing, has_history, has_square, linear, parameters, rest
   use nocdyn_sparse_map, only: sparse_map_t
   use nocdyn_wide_series, only: wide_accelerate => accelerate, wide_begin_motion => begin_motion, &
     wide_find_moments => find_moments, wide_find_values => find_values, wide_multiply_group => multiply_group
@@ -80,7 +80,8 @@ contains
     self%twists = new_series_map(twists, self%lanes, self%strip, self%elements, self%freedoms)
     self%accelerations = new_series_map(accelerations, self%lanes, self%strip, self%freedoms, self%elements)
     allocate (self%law(self%w, self%groups, parameters, (machine%lanes + self%strip - 1) / self%strip), source=0.0_wp)
-    allocate (self%terms(self%groups), source=merge(has_applied, 0, self%has_energy_balance))
+    allocate (self%terms(self%groups), source=merge(has_applied, 0, self%has_energy_balance) &
+              + merge(has_history, 0, self%has_energy_balance .or. self%lanes == 1))
     associate (length => self%w * ((self%strip * self%freedoms + self%w - 1) / self%w))
       allocate (self%motion(self%w, 0:self%order, self%groups, 2), self%square(self%w, 0:self%order, self%groups), source=0.0_wp)
       allocate (self%restoring(self%w, self%groups), self%applied(self%w, self%groups), source=0.0_wp)
@@ -91,6 +92,7 @@ contains
     end associate
     self%banks = new_series_banks(machine, order, self%strip, self%groups)
     where (self%banks%has_angle) self%terms = ior(self%terms, has_angle)
+    where (self%banks%has_motion) self%terms = ior(self%terms, has_history)
     where (self%banks%has_forcing) self%terms = ior(self%terms, has_forcing)
     do lane = 1, machine%lanes
       call copy_laws(self, lane, machine%laws)
@@ -134,9 +136,9 @@ contains
         ! the terms that the law of an element has in one lane
         terms = 0
         if (abs(laws%linear(lane, e)) > 0) terms = has_angle
-        if (abs(laws%cubic(lane, e)) > 0) terms = has_angle + has_cubic
+        if (abs(laws%cubic(lane, e)) > 0) terms = has_angle + has_cubic + has_history
         if (abs(laws%constant(lane, e)) > 0 .or. abs(laws%by_speed(lane, e)) > 0) terms = terms + has_applied
-        if (abs(laws%by_speed_squared(lane, e)) > 0) terms = terms + has_square
+        if (abs(laws%by_speed_squared(lane, e)) > 0) terms = ior(terms, has_square + has_history)
         self%terms(g) = ior(self%terms(g), terms)
       end do
     end do

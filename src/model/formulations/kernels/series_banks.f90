@@ -21,6 +21,7 @@ module nocdyn_series_banks
     integer, allocatable, private :: moved(:)   !! banks whose moments follow from the motion
     integer, allocatable, private :: timed(:)   !! banks whose moments follow from the time alone
     logical, allocatable :: has_angle(:)        !! whether some law reads the angle, [groups of all elements]
+    logical, allocatable :: has_motion(:)       !! whether some moment follows from the motion, [groups]
     logical, allocatable :: has_forcing(:)      !! whether some moment follows from the time alone, [groups]
     real(wp), allocatable :: forcing(:, :, :)   !! series of these moments [N m], [w, 0:order, groups], or no groups
   contains
@@ -40,7 +41,7 @@ contains
 
     self%order = order
     w = max(strip, narrow)
-    allocate (self%has_angle(groups), self%has_forcing(groups), source=.false.)
+    allocate (self%has_angle(groups), self%has_motion(groups), self%has_forcing(groups), source=.false.)
     associate (numbers => machine%general_banks)
       allocate (timed(size(numbers)))
       do i = 1, size(numbers)
@@ -55,6 +56,7 @@ contains
           associate (first => strip * (bank%first - 1) / w + 1, &
                      last => (strip * (bank%last() + (bank%ports - 1) * bank%count) - 1) / w + 1)
             self%has_forcing(first:last) = self%has_forcing(first:last) .or. timed(i)
+            self%has_motion(first:last) = self%has_motion(first:last) .or. .not. timed(i)
             self%has_angle(first:last) = self%has_angle(first:last) .or. max(bank%law%angle, bank%law%phase) > 0
           end associate
         end associate
