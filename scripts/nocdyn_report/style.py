@@ -1,6 +1,7 @@
 """How all figures look, and how they are saved."""
 
 import argparse
+import importlib
 import re
 import textwrap
 from collections.abc import Sequence
@@ -10,9 +11,6 @@ import matplotlib
 import numpy as np
 from matplotlib import pyplot
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_pdf import FigureCanvasPdf
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import ScalarFormatter
 
@@ -21,7 +19,7 @@ from .thinning import thin
 # Okabe and Ito's colours, told apart with any colour vision; grey for the yellow that white paper swallows.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#999999", "#000000")
 REFERENCE = {"color": "0.35", "linestyle": (0, (5, 3)), "linewidth": 0.9}
-CANVASES = {"png": FigureCanvasAgg, "svg": FigureCanvasSVG, "pdf": FigureCanvasPdf}
+CANVASES = {"png": ("agg", "FigureCanvasAgg"), "svg": ("svg", "FigureCanvasSVG"), "pdf": ("pdf", "FigureCanvasPdf")}
 FORMATS = tuple(CANVASES)
 DPI = 160
 WIDTH = 8.0  # of a figure [in]
@@ -113,6 +111,8 @@ def save(figure: Figure, folder: Path, name: str, formats: Sequence[str] = FORMA
     figure.set_layout_engine("none")  # laid out once, not for each format again
     for kind in formats:
         undated = {"png": None, "svg": {"Date": None}, "pdf": {"CreationDate": None}}[kind]
+        backend, canvas = CANVASES[kind]
+        module = importlib.import_module(f"matplotlib.backends.backend_{backend}")  # the one of PDF takes half a second
         # savefig would draw each twice, first without a result
-        getattr(CANVASES[kind](figure), f"print_{kind}")(folder / f"{name}.{kind}", metadata=undated)
+        getattr(getattr(module, canvas)(figure), f"print_{kind}")(folder / f"{name}.{kind}", metadata=undated)
     pyplot.close(figure)

@@ -31,6 +31,14 @@ def discs(nocdyn):
     return nocdyn.write("discs.nml", TWO_DISCS + SWEEP)
 
 
+@pytest.fixture(scope="module")
+def whole(shared_nocdyn):
+    """The results of a sweep that ran through."""
+    shared_nocdyn.write("discs.nml", TWO_DISCS + SWEEP)
+    assert shared_nocdyn("sweep", "discs.nml", "--out", "whole", "--threads", 1, *LONG).returncode == 0
+    return (shared_nocdyn.folder / "whole/sweep.nc").read_bytes()
+
+
 def journal(nocdyn, folder="out"):
     return nocdyn.folder / folder / "sweep.journal"
 
@@ -58,8 +66,7 @@ def is_done(outcome):
     return outcome.returncode == 0 and all(progress.search(line) for line in outcome.stderr.splitlines())
 
 
-def test_a_sweep_that_is_killed_twenty_times_ends_as_one_that_is_not(nocdyn, discs):
-    nocdyn("sweep", discs, "--out", "whole", "--threads", 1, *LONG)
+def test_a_sweep_that_is_killed_twenty_times_ends_as_one_that_is_not(nocdyn, discs, whole):
     moments = random.Random(20261121)
     kills = 0
     while kills < 20:
@@ -71,7 +78,7 @@ def test_a_sweep_that_is_killed_twenty_times_ends_as_one_that_is_not(nocdyn, dis
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume", *LONG)
     assert is_done(outcome)
     assert nocdyn.files("out") == ["columns.json", "input.nml", "summary.json", "sweep.nc"]
-    assert (nocdyn.folder / "out/sweep.nc").read_bytes() == (nocdyn.folder / "whole/sweep.nc").read_bytes()
+    assert (nocdyn.folder / "out/sweep.nc").read_bytes() == whole
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -366,7 +373,7 @@ def test_a_disk_without_room_for_the_results_keeps_the_journal(nocdyn, discs):
 
 @needs_mpi
 @pytest.mark.parametrize(("ranks", "rank"), [(2, 0), (3, 2)])
-def test_a_dead_rank_ends_the_job_and_leaves_the_journal(nocdyn, discs, ranks, rank):
+def test_a_dead_rank_ends_the_job_and_leaves_the_journal(nocdyn, discs, whole, ranks, rank):
     process = start(nocdyn, "sweep", discs, "--out", "out", *LONG, ranks=ranks)
     victims = subprocess.run(["pgrep", "-P", str(process.pid)], check=True, capture_output=True, text=True).stdout.split()
     assert len(victims) == ranks
@@ -376,8 +383,7 @@ def test_a_dead_rank_ends_the_job_and_leaves_the_journal(nocdyn, discs, ranks, r
     assert nocdyn.files("out") == ["sweep.journal", *rank_journals(ranks)]
     assert nocdyn("sweep", discs, "--out", "out", "--resume", *LONG).returncode == 0
     assert nocdyn.summary("out")["variants_computed"] < SAMPLES
-    assert nocdyn("sweep", discs, "--out", "whole", *LONG).returncode == 0
-    assert (nocdyn.folder / "out/sweep.nc").read_bytes() == (nocdyn.folder / "whole/sweep.nc").read_bytes()
+    assert (nocdyn.folder / "out/sweep.nc").read_bytes() == whole
 
 
 @needs_mpi
