@@ -35,5 +35,5 @@ build_bench() {
 build_plain() {
   quietly 'Configuring for AVX2' cmake --preset release -B build/plain -DNOCDYN_NATIVE=OFF -DNOCDYN_BENCH=ON -DBUILD_TESTING=OFF \
     -DNOCDYN_SWEEP=OFF -DCMAKE_Fortran_FLAGS=-march=haswell -DCMAKE_EXE_LINKER_FLAGS=-no-pie
-  quietly 'Building for AVX2' cmake --build build/plain --target chunk_costs
+  quietly 'Building for AVX2' cmake --build build/plain --target chunk_costs nocdyn_program
 }

@@ -22,7 +22,7 @@ COLUMNS = {"states": "error", "moment": "moment"}  # kinds of errors, as heads o
 PEERS = ("heyoka", "numbalsoda", "numba", "scipy", "numpy", "opentorsion", "rainflow")
 VERDICTS = {
     "W1": targets.case2_verdicts,
-    "W2": targets.throughput_verdicts,
+    **dict.fromkeys(("W2", "W5_sweep", "W6_sweep"), targets.throughput_verdicts),
     "W4": targets.stiff_case2_verdicts,
     "W3": targets.chain_verdicts,
     "W3_stiff": targets.stiff_chain_verdicts,

@@ -123,13 +123,18 @@ def growth(workload: Scaling, label: str) -> Verdict:
 
 
 def throughput_verdicts(workload: Throughput) -> list[Verdict]:
-    rules = [
-        ("nocdyn rk45", "hand-written loop", 6.0),
-        ("nocdyn taylor", "hand-written loop", 15.0),
-        ("nocdyn taylor", "heyoka with the peak", 6.0),
-        ("nocdyn taylor, 2 threads", "nocdyn taylor", 1.9),
-    ]
-    return [*(faster(workload, *rule) for rule in rules), little_memory(workload)]
+    rules = {
+        "W2": [
+            ("nocdyn rk45", "hand-written loop", 6.0),
+            ("nocdyn taylor", "hand-written loop", 15.0),
+            ("nocdyn taylor", "heyoka with the peak", 6.0),
+            ("nocdyn taylor, 2 threads", "nocdyn taylor", 1.95),
+        ],
+        "W5_sweep": [("nocdyn taylor", "heyoka with the peak", 5.0), ("nocdyn taylor", "heyoka, final state only", 3.0)],
+        "W6_sweep": [("nocdyn taylor", "heyoka with the peak", 12.0)],
+    }
+    memory = [little_memory(workload)] if workload.counts else []
+    return [*(faster(workload, *rule) for rule in rules[workload.name]), *memory]
 
 
 def faster(workload: Throughput, own: str, rival: str, least: float) -> Verdict:

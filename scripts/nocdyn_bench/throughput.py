@@ -1,5 +1,6 @@
 """Variants in a second, every contestant at the loosest tolerance with which its errors are below the wanted one."""
 
+from bisect import bisect_left
 from dataclasses import dataclass, field
 from functools import cache
 from statistics import median
@@ -12,7 +13,6 @@ from .peers import heyoka_sweep, scipy_sweep
 from .variants import Errors, Family, SweepContestant, errors_of
 
 TOLERANCES = 10.0 ** -np.arange(4.0, 12.01, 0.1)
-LOOKED_AT = 15  # looser tolerances that are tried after a bisection, which takes the errors for monotonic
 SLOW_SAMPLE = 100  # most variants whose errors are looked at, of contestants that do not integrate all
 SECOND_SAMPLE = 10  # of the reference, computed a second time
 
@@ -82,17 +82,12 @@ class Throughput:
         def is_tight_enough(place: int) -> bool:
             return errors_at(float(TOLERANCES[place])).are_below(self.family.wanted, contestant.has_peak)
 
-        loose, tight = 0, len(TOLERANCES)
-        while loose < tight:
-            middle = (loose + tight) // 2
-            if is_tight_enough(middle):
-                tight = middle
-            else:
-                loose = middle + 1
+        if contestant.share == 1.0:  # a method of another order at a looser tolerance may have smaller errors
+            tight = next(filter(is_tight_enough, range(len(TOLERANCES))), len(TOLERANCES))
+        else:  # slow ones, whose errors are taken for monotonic
+            tight = bisect_left(range(len(TOLERANCES)), True, key=is_tight_enough)
         if tight == len(TOLERANCES):
             raise ContestantError(f"its errors are not below {self.family.wanted} at any tolerance")
-        if contestant.share == 1.0:  # a method of another order at a looser tolerance may have smaller errors
-            tight = next((place for place in range(max(0, tight - LOOKED_AT), tight) if is_tight_enough(place)), tight)
         tolerance = float(TOLERANCES[tight])
         return Rate(contestant, tolerance, errors_at(tolerance), count)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from . import whole_process
 from .chains import Scaling
 from .costs import Case, Costs, Sweeping, chunk_costs, hand_out_costs, step_costs
+from .example_runs import example_runs
 from .example_sweeps import example_sweeps, with_springs
 from .fatigue import fatigue_costs
 from .nocdyn_sweep import sweepers
@@ -281,6 +282,16 @@ def w6_sweep(bench: Bench) -> Throughput:
     return shipped_sweep(bench, "W6", "the rolling mill with its gap", MILL, 500, stepped_lanes=64)
 
 
+def runs(bench: Bench) -> Costs:
+    files = [file for file in sorted(EXAMPLES.glob("*/*.nml")) if "&sweep" not in file.read_text(encoding="utf-8")]
+    plain = bench.plain.parent / "bin" / "nocdyn"
+    return Costs(
+        "example_runs",
+        "What a run of each shipped example costs",
+        lambda rounds: example_runs(bench.nocdyn, plain, bench.scratch, files, rounds),
+    )
+
+
 def examples(bench: Bench) -> Costs:
     files = with_springs(sorted(EXAMPLES.glob("*/*.nml")))
     return Costs(
@@ -315,6 +326,7 @@ WORKLOADS: dict[str, Callable[[Bench], Workload]] = {
     "W5_sweep": w5_sweep,
     "W6": w6,
     "W6_sweep": w6_sweep,
+    "example_runs": runs,
     "example_sweeps": examples,
     "opentorsion": opentorsion,
     "fatigue": fatigue,

@@ -10,7 +10,7 @@ import pytest
 from conftest import SOURCE
 
 sys.path.insert(0, str(SOURCE / "scripts"))
-from nocdyn_bench import costs, example_sweeps, rounds, torsional_machines, torsional_results, variants
+from nocdyn_bench import costs, example_runs, example_sweeps, rounds, torsional_machines, torsional_results, variants
 from nocdyn_bench.contestant import Contestant, ContestantError, Run
 from nocdyn_bench.nocdyn_sweep import random_design, write_input
 from nocdyn_bench.shipped import Shipped
@@ -47,6 +47,40 @@ def test_instructions_of_the_program_count_and_those_of_called_procedures_once()
 
 def test_an_instruction_has_an_operation_for_each_double_of_its_registers():
     assert costs.operations(DISASSEMBLY) == {0x401000: 4, 0x401004: 1, 0x40100C: 16, 0x401014: 2}
+
+
+COUNTED = """\
+Profiled target:  nocdyn run engine.nml
+2,000 (100.0%)  PROGRAM TOTALS
+
+1,980 (99.00%)  ???:__nocdyn_transient_MOD_run_transient [/somewhere/nocdyn]
+1,800 (90.00%)  ???:__nocdyn_integration_MOD_integrate [/somewhere/nocdyn]
+1,799 (89.95%)  ???:__nocdyn_integration_MOD_integrate_with [/somewhere/nocdyn]
+  400 (20.00%)  ???:__nocdyn_extremes_MOD_update_extremes [/somewhere/nocdyn]
+  200 (10.00%)  ???:__nocdyn_after_step_MOD_output_until.constprop.0 [/somewhere/nocdyn]
+  100 ( 5.00%)  ???:__nocdyn_missed_states_MOD_note_missed_state [/somewhere/nocdyn]
+"""
+
+
+def test_the_parts_of_a_run_are_steps_outputs_extremes_and_the_search_after_it():
+    shares = example_runs.shares_of(COUNTED)
+    assert shares == pytest.approx(
+        {
+            "steps": 0.6,
+            "rows": 0.1,
+            "extremes by samples": 0.2,
+            "extremes by polynomials": 0.0,
+            "steady states": 0.05,
+            "rest": 0.05,
+        }
+    )
+
+
+def test_procedures_that_are_counted_are_there():
+    sources = {path.stem: path.read_text(encoding="utf-8") for path in (SOURCE / "src").rglob("*.f90")}
+    for name in (example_runs.STEPS, example_runs.SEARCH, *example_runs.PARTS.values()):
+        module, procedure = name.removeprefix("nocdyn_").split("_MOD_")
+        assert f"subroutine {procedure}(" in sources[module]
 
 
 def test_the_errors_of_a_sweep_are_the_largest_of_states_and_relative_peaks():
@@ -192,6 +226,19 @@ def test_each_contestant_of_a_sweep_has_the_loosest_tolerance_that_is_good_enoug
     assert [(rate.contestant.label, rate.best) for rate in workload.rates] == [("a", 40.0)]
     assert workload.rates[0].tolerance == pytest.approx(10**-6.1)
     assert workload.failures == ["b fails: 'gas' has no Taylor series"]
+
+
+def test_a_loose_tolerance_is_found_whose_errors_are_smaller_than_those_of_tighter_ones(monkeypatch):
+    pytest.importorskip("heyoka")
+    throughput = pytest.importorskip("nocdyn_bench.throughput")
+
+    def solve(tolerance, parameters):  # as of a method that takes another order at 1e-5
+        return variants.Found(0.5, 2.0 + np.full((len(parameters), 5), 0.0 if 0.9e-5 < tolerance < 1.1e-5 else tolerance))
+
+    contestant = variants.SweepContestant("a", "", solve)
+    workload = throughput.Throughput("W", "", variants.CASE2, 20, 10, [contestant], [])
+    exact = np.full((10, 5), 2.0)
+    assert workload._chosen(contestant, np.zeros((20, 2)), exact).tolerance == pytest.approx(1e-5)
 
 
 TORSIONAL = [machine() for machine in (*torsional_machines.MACHINES, torsional_machines.timed_plant)]
