@@ -1,10 +1,9 @@
 !> Errors of the analytic derivatives and of the energy of a bank with one element and one lane.
 module nocdyn_test_law_checks
   use nocdyn_bank, only: bank_t
-  use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_test_law_differences, only: by_angle, by_state, by_speed, by_time, choose_branches, difference_laws, elements_of, &
-                                         evaluate_all, law_slopes_t
+  use nocdyn_test_law_differences, only: bank_values_t, by_angle, by_state, by_speed, by_time, choose_branches, difference_laws, &
+                                         elements_of, evaluate_all, law_slopes_t
   implicit none (type, external)
   private
 
@@ -16,12 +15,12 @@ contains
 
   !> The largest difference between a derivative and its finite difference, relative to the largest derivative or 1.
   function law_error(bank, angle, speed, time, internal) result(error)
-    class(bank_t), intent(inout) :: bank   !! its branches are set here
+    class(bank_t), intent(in) :: bank
     real(wp), intent(in) :: angle, speed            !! u [rad], u' [rad/s]
     real(wp), intent(in), optional :: time          !! [s]; absent: 0
     real(wp), intent(in), optional :: internal(:)   !! internal states; absent: 0
     real(wp) :: error
-    type(elements_t) :: elements
+    type(bank_values_t) :: elements
     type(law_slopes_t) :: slopes
     integer :: s
 
@@ -60,10 +59,10 @@ contains
   !> The difference between the increase of the stored energy and the integral of the restoring moment (trapezoidal rule),
   !> relative to the largest energy. The range of angles should contain all branches.
   function energy_error(bank, low, high) result(error)
-    class(bank_t), intent(inout) :: bank
+    class(bank_t), intent(in) :: bank
     real(wp), intent(in) :: low, high   !! ends of the range of angles [rad]
     real(wp) :: error
-    type(elements_t) :: elements
+    type(bank_values_t) :: elements
     integer, parameter :: steps = 20000
     real(wp) :: area, before, largest, start
     integer :: i

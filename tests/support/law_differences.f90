@@ -4,7 +4,8 @@
 !> bank do not change.
 module nocdyn_test_law_differences
   use nocdyn_bank, only: bank_t
-  use nocdyn_elements, only: elements_t, new_elements
+  use nocdyn_bank_states, only: bank_state_t, new_bank_state
+  use nocdyn_elements, only: element_values_t, new_element_values, new_elements
   use nocdyn_kinds, only: wp
   use nocdyn_polynomial_laws, only: new_polynomial_laws, polynomial_laws_t
   implicit none (type, external)
@@ -20,6 +21,11 @@ module nocdyn_test_law_differences
   real(wp), parameter :: state_step = 0.1_wp
   real(wp), parameter :: time_step = 1.0e-3_wp
 
+  !> The values of the elements of a machine with one bank, and the state of the bank.
+  type, extends(element_values_t), public :: bank_values_t
+    type(bank_state_t) :: state
+  end type bank_values_t
+
   !> Derivatives of the moments and energies of a bank, [lanes, elements].
   type, public :: law_slopes_t
     real(wp), allocatable :: restoring(:, :), applied(:, :), stored(:, :)
@@ -32,40 +38,43 @@ contains
   !> The elements of a machine with one bank, at rest.
   function elements_of(bank) result(elements)
     class(bank_t), intent(in) :: bank
-    type(elements_t) :: elements
+    type(bank_values_t) :: elements
     integer :: e
 
-    elements = new_elements(bank%lanes, bank%rows, [(bank%states, e=1, bank%count)])
+    elements%element_values_t = new_element_values(new_elements(bank%rows, [(bank%states, e=1, bank%count)]), bank%lanes)
+    elements%state = new_bank_state(bank, bank%count)
   end function elements_of
 
   !> Sets moments, derivatives, energies and rates of the elements from their angles, speeds, internal states and time.
   subroutine evaluate_all(bank, elements)
-    class(bank_t), intent(inout) :: bank
-    type(elements_t), intent(inout) :: elements
+    class(bank_t), intent(in) :: bank
+    type(bank_values_t), intent(inout) :: elements
     type(polynomial_laws_t) :: laws
 
     laws = new_polynomial_laws(bank%lanes, bank%count)
     call bank%polynomials(1, bank%lanes, laws)
-    call laws%evaluate(elements)
-    call laws%differentiate(elements)
-    call laws%evaluate_energies(elements)
-    call bank%evaluate(elements%time, elements%angle, elements%speed, elements%internal%value, elements%restoring, &
-                       elements%applied, elements%internal%rate)
-    if (.not. allocated(bank%law)) return
-    call bank%law%differentiate(1, 1, 1, elements)
-    call bank%law%evaluate_energies(1, elements)
+    call laws%evaluate(elements%element_values_t)
+    call laws%differentiate(elements%element_values_t)
+    call laws%evaluate_energies(elements%element_values_t)
+    if (.not. allocated(elements%state%law)) return
+    associate (law => elements%state%law)
+      call law%evaluate(elements%time, elements%angle, elements%speed, elements%internal%value, elements%restoring, &
+                        elements%applied, elements%internal%rate)
+      call law%differentiate(1, 1, 1, elements%element_values_t)
+      call law%evaluate_energies(1, elements%element_values_t)
+    end associate
   end subroutine evaluate_all
 
   !> Sets the branches of all lanes of a bank to those that contain the states of its elements.
   subroutine choose_branches(bank, elements)
-    class(bank_t), intent(inout) :: bank
-    type(elements_t), intent(in) :: elements
+    class(bank_t), intent(in) :: bank
+    type(bank_values_t), intent(inout) :: elements
     integer :: k, l
 
     do k = 1, size(bank%switch_element)
       associate (e => bank%switch_element(k))
         do l = 1, bank%lanes
-          call bank%choose(k, l, elements%time(l), [elements%angle(l, e), elements%speed(l, e), 0.0_wp, 0.0_wp], &
+          call elements%state%choose(bank, k, l, elements%time(l), [elements%angle(l, e), elements%speed(l, e), 0.0_wp, 0.0_wp], &
                            states_of(bank, elements, l, e))
         end do
       end associate
@@ -74,16 +83,16 @@ contains
 
   !> Distances of the lanes from the boundaries of their branches, [lanes, switches].
   function indicators_of(bank, elements) result(indicators)
-    class(bank_t), intent(inout) :: bank
-    type(elements_t), intent(in) :: elements
+    class(bank_t), intent(in) :: bank
+    type(bank_values_t), intent(inout) :: elements
     real(wp) :: indicators(bank%lanes, size(bank%switch_element))
     integer :: k, l
 
     do k = 1, size(bank%switch_element)
       associate (e => bank%switch_element(k))
         do l = 1, bank%lanes
-          call bank%indicator(k, l, [elements%time(l), elements%angle(l, e), elements%speed(l, e), 0.0_wp, 0.0_wp], &
-                              states_of(bank, elements, l, e), indicators(l, k))
+          call elements%state%indicator(bank, k, l, [elements%time(l), elements%angle(l, e), elements%speed(l, e), 0.0_wp, &
+                                                     0.0_wp], states_of(bank, elements, l, e), indicators(l, k))
         end do
       end associate
     end do
@@ -91,7 +100,7 @@ contains
 
   function states_of(bank, elements, lane, element) result(internal)
     class(bank_t), intent(in) :: bank
-    type(elements_t), intent(in) :: elements
+    type(bank_values_t), intent(in) :: elements
     integer, intent(in) :: lane, element
     real(wp) :: internal(bank%states)
 
@@ -100,12 +109,12 @@ contains
 
   !> Derivatives of the laws of a bank by its angles, its speeds, the time or an internal state.
   function difference_laws(bank, elements, variable, by) result(slopes)
-    class(bank_t), intent(inout) :: bank
-    type(elements_t), intent(in) :: elements
+    class(bank_t), intent(in) :: bank
+    type(bank_values_t), intent(in) :: elements
     integer, intent(in) :: variable   !! by_...
     real(wp), intent(in), optional :: by   !! step; absent: 0.1, in time 0.001
     type(law_slopes_t) :: slopes
-    type(elements_t) :: moved
+    type(bank_values_t) :: moved
     real(wp) :: gain, step
     integer :: k
 

@@ -55,9 +55,9 @@ contains
       call formulation%observe(times(i:i), y)
       run%phi(:, i) = formulation%phi(1, 1:)
       run%omega(:, i) = formulation%omega(1, 1:)
-      call formulation%machine%evaluate_energies()
+      call formulation%state%evaluate_energies(formulation%machine)
       run%energy(i) = formulation%machine%kinetic_energy(1, run%omega(:, i)) &
-                      + sum(formulation%machine%elements%stored(1, :))
+                      + sum(formulation%state%elements%stored(1, :))
       run%work(i) = sum(y(1, formulation%states + 1:))
       run%effort = max(run%effort, sum(abs(y(1, formulation%states + 1:))))
     end do

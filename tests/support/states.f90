@@ -4,6 +4,7 @@ module nocdyn_test_states
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_machine_state, only: machine_state_t, new_machine_state
   use nocdyn_multiplier, only: multiplier_t
   use nocdyn_paper, only: paper_t
   use nocdyn_paper_matrices, only: elastic_moments
@@ -111,17 +112,17 @@ contains
     type(machine_t), intent(in) :: machine
     real(wp), contiguous, intent(in) :: phi(:, 0:), omega(:, 0:)
     real(wp), intent(inout) :: y(:, :)
-    class(machine_t), allocatable :: copy
+    type(machine_state_t) :: state
     real(wp) :: moments(machine%bodies)
     integer :: l, n
 
     n = machine%bodies
-    copy = machine
-    call copy%elements%gather(phi, omega)
-    call copy%choose_branches([(0.0_wp, l=1, machine%lanes)])
-    call bring_to(copy, [(0.0_wp, l=1, machine%lanes)], phi, omega)
+    state = new_machine_state(machine)
+    call state%elements%gather(machine%elements%rows, phi, omega)
+    call state%choose_branches(machine, [(0.0_wp, l=1, machine%lanes)])
+    call bring_to(machine, state, [(0.0_wp, l=1, machine%lanes)], phi, omega)
     do l = 1, machine%lanes
-      call elastic_moments(copy, l, moments)
+      call elastic_moments(machine, state%elements, l, moments)
       y(l, 2 * n + 1:3 * n) = moments
     end do
   end subroutine place_moments
@@ -141,15 +142,16 @@ contains
   end subroutine enter_all
 
   !> Sets the elements to a state and evaluates all that the paper's matrices need.
-  subroutine bring_to(machine, t, phi, omega)
-    type(machine_t), intent(inout) :: machine
+  subroutine bring_to(machine, state, t, phi, omega)
+    type(machine_t), intent(in) :: machine
+    type(machine_state_t), intent(inout) :: state
     real(wp), contiguous, intent(in) :: t(:)
     real(wp), contiguous, intent(in) :: phi(:, 0:), omega(:, 0:)
 
-    call machine%elements%gather(phi, omega)
-    call machine%evaluate_elements(t)
-    call machine%differentiate_elements(t)
-    call machine%evaluate_energies()
+    call state%elements%gather(machine%elements%rows, phi, omega)
+    call state%evaluate_elements(machine, t)
+    call state%differentiate_elements(machine, t)
+    call state%evaluate_energies(machine)
   end subroutine bring_to
 
 end module nocdyn_test_states

@@ -9,6 +9,7 @@ module nocdyn_moving_start
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pivoted_rank, pseudo_inverse
   use nocdyn_machine, only: machine_t
+  use nocdyn_machine_state, only: machine_state_t, new_machine_state
   use nocdyn_row_motions, only: new_row_motions, row_motions_t
   use nocdyn_text, only: append, rounded_text
   use nocdyn_written_values, only: speed_text, unit_of
@@ -59,14 +60,16 @@ contains
     type(machine_t), intent(inout) :: machine
     real(wp), intent(in) :: t   !! [s]
     type(moving_start_t), intent(inout) :: start
+    type(machine_state_t) :: state
     real(wp) :: row(machine%bodies), twist(machine%lanes, machine%elements%count)
     integer :: i
 
-    call machine%choose_branches(spread(t, 1, machine%lanes))   ! the ones of tables over the time
+    state = new_machine_state(machine)
+    call state%choose_branches(machine, spread(t, 1, machine%lanes))   ! the ones of tables over the time
     twist = machine%start_twist()
     associate (motions => start%motions, rows => machine%elements%rows)
-      call motions%set_start(machine%banks, twist(1, :))
-      call motions%move(machine%banks, t, twist(1, :), 0.0_wp * twist(1, :))
+      call motions%set_start(machine%banks, state%banks, twist(1, :))
+      call motions%move(machine%banks, state%banks, t, twist(1, :), 0.0_wp * twist(1, :))
       allocate (start%complement, source=machine%coordinates%complement(1))
       allocate (start%a(motions%count, machine%coordinates%freedoms), start%speed(machine%coordinates%freedoms))
       do i = 1, motions%count

@@ -8,6 +8,7 @@ module nocdyn_matrix_report
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_machine, only: machine_t
+  use nocdyn_machine_state, only: machine_state_t, new_machine_state
   use nocdyn_paper_matrices, only: constrained_vector, elastic_moments, elastic_rates, inertia_matrices_t, new_paper_matrices, &
                                    paper_matrices_t, torque_vector, unit_matrix
   use nocdyn_text, only: append, joined, rounded_text, selected, string_t, to_text
@@ -21,7 +22,7 @@ module nocdyn_matrix_report
 
   !> The matrices, and the report that they are written to.
   type :: equations_t
-    type(machine_t) :: machine
+    type(machine_state_t) :: state   !! of the machine at its start
     type(inertia_matrices_t) :: inertias
     type(paper_matrices_t) :: matrices
     real(wp), allocatable :: complement(:, :)     !! L_tau
@@ -44,16 +45,15 @@ contains
     type(string_t), allocatable :: names(:)
     integer :: i, role
 
-    equations%machine = machine
-    call set_start_state(equations%machine, t_start)
-    call assemble(equations)
+    call set_start_state(machine, t_start, equations%state)
+    call assemble(machine, equations)
     call equations%report%append_line('Bodies 1 to ' // to_text(machine%bodies) // ': ' // joined(machine%names, ', '))
     call equations%report%append_line('Coordinates: ' // joined(selected(machine%names, machine%coordinates%body), ', '))
     call equations%report%append_line('At the start: t = ' // rounded_text(t_start, digits) // ' s')
-    if (.not. all([(equations%machine%banks(i)%bank%has_paper_law, i=1, size(equations%machine%banks))])) then
+    if (.not. all([(machine%banks(i)%bank%has_paper_law, i=1, size(machine%banks))])) then
       ! lists the elements whose laws are not the ones of the paper, and says what the matrices contain for them
       do role = 1, size(role_names)
-        call collect_other_laws(equations%machine, role, names)
+        call collect_other_laws(machine, role, names)
         if (size(names) == 0) cycle
         call equations%report%append_line('Other laws than those of the paper: ' // trim(role_names(role)) // ' ' // &
                                           joined(names, ', '))
@@ -64,18 +64,18 @@ contains
     end if
     ! The bodies before the constraints: eqs. (13)-(22).
     call equations%put_matrix('(13) J [kg m2]', equations%inertias%inertia)
-    call equations%put_vector('(15) omega [rad/s]', equations%machine%start_speed(1, :))
+    call equations%put_vector('(15) omega [rad/s]', machine%start_speed(1, :))
     call equations%put_vector('(17) Q_0, excitations [N m]', equations%excitation)
     call equations%put_vector('(18), (20) Q_m, motors [N m]', equations%motor)
     call equations%put_vector('K12 * rest twist of the couplings, a further term of Q [N m]', equations%rest)
     call equations%put_vector('(16) Q [N m]', equations%matrices%torque)
-    call equations%put_vector('(19) phi [rad]', equations%machine%start_angle(1, :))
+    call equations%put_vector('(19) phi [rad]', machine%start_angle(1, :))
     call equations%put_matrix('(21) K, secant stiffness [N m/rad]', equations%matrices%stiffness)
     call equations%put_matrix('(22) C [N m s/rad]', equations%matrices%damping)
-    call report_constraints(equations)
-    call report_projection(equations)
-    call report_first_order(equations)
-    call report_moments_as_states(equations)
+    call report_constraints(machine, equations)
+    call report_projection(machine, equations)
+    call report_first_order(machine, equations)
+    call report_moments_as_states(machine, equations)
     text = equations%report%text()
     call move_alloc(equations%error, error)
   end subroutine matrix_report
@@ -98,46 +98,48 @@ contains
   end subroutine collect_other_laws
 
   !> Evaluates all elements at the start.
-  subroutine set_start_state(machine, t_start)
-    type(machine_t), intent(inout) :: machine
-    real(wp), intent(in) :: t_start
+  subroutine set_start_state(machine, t_start, state)
+    type(machine_t), intent(in) :: machine
+    real(wp), intent(in) :: t_start   !! [s]
+    type(machine_state_t), intent(out) :: state
     real(wp), dimension(1, 0:machine%bodies) :: phi, omega
 
     phi = 0.0_wp
     omega = 0.0_wp
     phi(:, 1:) = machine%start_angle
     omega(:, 1:) = machine%start_speed
-    machine%elements%internal%value = machine%start_internal()
-    call machine%elements%gather(phi, omega)
-    call machine%choose_branches([t_start])
-    call machine%evaluate_elements([t_start])
-    call machine%differentiate_elements([t_start])
+    state = new_machine_state(machine)
+    state%elements%internal%value = machine%start_internal()
+    call state%elements%gather(machine%elements%rows, phi, omega)
+    call state%choose_branches(machine, [t_start])
+    call state%evaluate_elements(machine, [t_start])
+    call state%differentiate_elements(machine, [t_start])
   end subroutine set_start_state
 
-  subroutine assemble(equations)
+  subroutine assemble(machine, equations)
+    type(machine_t), intent(in) :: machine
     type(equations_t), intent(inout) :: equations
-    real(wp) :: of_phases(equations%machine%bodies)
+    real(wp) :: of_phases(machine%bodies)
 
-    associate (machine => equations%machine)
-      allocate (equations%complement, source=machine%coordinates%complement(1))
-      call equations%inertias%assemble(machine, 1, equations%complement)
-      equations%matrices = new_paper_matrices(machine%bodies)
-      call equations%matrices%assemble(machine, 1, equations%complement)
-      allocate (equations%excitation(machine%bodies), equations%motor(machine%bodies), equations%rest(machine%bodies))
-      call torque_vector(machine, 1, role_excitation, equations%excitation)
-      call torque_vector(machine, 1, role_motor, equations%motor)
-      call torque_vector(machine, 1, role_coupling, equations%rest)
-      call torque_vector(machine, 1, role_phase, of_phases)
-      equations%rest = equations%rest + of_phases
-    end associate
+    allocate (equations%complement, source=machine%coordinates%complement(1))
+    call equations%inertias%assemble(machine, 1, equations%complement)
+    equations%matrices = new_paper_matrices(machine%bodies)
+    call equations%matrices%assemble(machine, equations%state%elements, 1, equations%complement)
+    allocate (equations%excitation(machine%bodies), equations%motor(machine%bodies), equations%rest(machine%bodies))
+    call torque_vector(machine, equations%state%elements, 1, role_excitation, equations%excitation)
+    call torque_vector(machine, equations%state%elements, 1, role_motor, equations%motor)
+    call torque_vector(machine, equations%state%elements, 1, role_coupling, equations%rest)
+    call torque_vector(machine, equations%state%elements, 1, role_phase, of_phases)
+    equations%rest = equations%rest + of_phases
   end subroutine assemble
 
   !> L_lambda and the complement that follows from it: eqs. (23), (31), (73)-(83).
-  subroutine report_constraints(equations)
+  subroutine report_constraints(machine, equations)
+    type(machine_t), intent(in) :: machine
     type(equations_t), intent(inout) :: equations
-    real(wp) :: coordinate_speed(equations%machine%coordinates%freedoms)
+    real(wp) :: coordinate_speed(machine%coordinates%freedoms)
 
-    associate (machine => equations%machine, coordinates => equations%machine%coordinates, &
+    associate (coordinates => machine%coordinates, &
                constraint => equations%inertias%constraint)
       call equations%put_matrix('(23), (74) L_lambda, independent rows', constraint)
       call coordinates%project(1, machine%inertia(1, :), machine%start_speed(1, :), coordinate_speed)
@@ -149,9 +151,10 @@ contains
   end subroutine report_constraints
 
   !> The projected system: eqs. (24)-(30).
-  subroutine report_projection(equations)
+  subroutine report_projection(machine, equations)
+    type(machine_t), intent(in) :: machine
     type(equations_t), intent(inout) :: equations
-    real(wp) :: projected(equations%machine%bodies)
+    real(wp) :: projected(machine%bodies)
 
     call equations%put_matrix('(25) J_1', equations%inertias%inertia_1)
     call equations%put_vector('(26) Q_1', equations%matrices%torque_1)
@@ -164,9 +167,10 @@ contains
   end subroutine report_projection
 
   !> The system of first order for alpha = [omega; phi]: eqs. (34)-(42).
-  subroutine report_first_order(equations)
+  subroutine report_first_order(machine, equations)
+    type(machine_t), intent(in) :: machine
     type(equations_t), intent(inout) :: equations
-    real(wp) :: block(equations%machine%bodies, equations%machine%bodies)
+    real(wp) :: block(machine%bodies, machine%bodies)
 
     call equations%put_matrix('(35) J_2', equations%inertias%inertia_2)
     call unit_matrix(block)
@@ -176,17 +180,18 @@ contains
     call equations%put_matrix('(38) C_2', equations%matrices%damping_2)
     call equations%put_matrix('(39) K_2', equations%matrices%stiffness_2)
     call equations%put_vector('(40) Q_2', equations%matrices%torque_2)
-    call equations%put_vector('(42) alpha', [equations%machine%start_speed(1, :), equations%machine%start_angle(1, :)])
+    call equations%put_vector('(42) alpha', [machine%start_speed(1, :), machine%start_angle(1, :)])
   end subroutine report_first_order
 
   !> The generalised system for beta = [omega; phi; F] and its solution: eqs. (43)-(72).
-  subroutine report_moments_as_states(equations)
+  subroutine report_moments_as_states(machine, equations)
+    type(machine_t), intent(in) :: machine
     type(equations_t), intent(inout) :: equations
-    real(wp) :: moments(equations%machine%bodies)
+    real(wp) :: moments(machine%bodies)
 
-    associate (machine => equations%machine, matrices => equations%matrices)
+    associate (matrices => equations%matrices)
       call equations%put_matrix('(44) J_3', equations%inertias%inertia_3)
-      call elastic_moments(machine, 1, moments)
+      call elastic_moments(machine, equations%state%elements, 1, moments)
       call equations%put_vector('(48)-(51) F, elastic moments on the bodies [N m]', moments)
       matrices%beta(:) = [machine%start_speed(1, :), machine%start_angle(1, :), moments]
       call equations%put_vector('(46) beta', matrices%beta)
@@ -195,14 +200,15 @@ contains
       call equations%put_matrix('(61) K_3', matrices%stiffness_3)
       call equations%put_matrix('(62)-(72) K_4, tangent stiffness [N m/rad]', matrices%tangent)
     end associate
-    call report_derivatives(equations)
+    call report_derivatives(machine, equations)
   end subroutine report_moments_as_states
 
   !> beta' from eq. (43), and its parts: eqs. (14), (33), (41), (45), (47).
-  subroutine report_derivatives(equations)
+  subroutine report_derivatives(machine, equations)
+    type(machine_t), intent(in) :: machine
     type(equations_t), intent(inout) :: equations
-    real(wp) :: rates(equations%machine%bodies)
-    integer :: pivots(3 * equations%machine%bodies)
+    real(wp) :: rates(machine%bodies)
+    integer :: pivots(3 * machine%bodies)
     logical :: is_singular
 
     call lu_factor(equations%inertias%inertia_3, pivots, is_singular)
@@ -210,13 +216,13 @@ contains
       call raise(equations%error, exit_failed, '(44) J_3 is singular by rounding: the inertias differ too much')
       return
     end if
-    associate (n => equations%machine%bodies, slope => equations%matrices%beta, matrices => equations%matrices)
+    associate (n => machine%bodies, slope => equations%matrices%beta, matrices => equations%matrices)
       slope = matrices%torque_3 + matmul(matrices%stiffness_3 + matrices%damping_3, slope)
       call lu_solve(equations%inertias%inertia_3, pivots, slope)
       call equations%put_vector("(14) omega' [rad/s2]", slope(:n))
       call equations%put_vector("(33) phi' = omega [rad/s]", slope(n + 1:2 * n))
       call equations%put_vector("(41) alpha'", slope(:2 * n))
-      call elastic_rates(matrices%tangent, equations%machine%start_speed(1, :), rates)
+      call elastic_rates(matrices%tangent, machine%start_speed(1, :), rates)
       call equations%put_vector("(47), (52)-(57) F' = K_4 omega [N m/s]", rates)
       call equations%put_vector("(45) beta'", slope)
     end associate

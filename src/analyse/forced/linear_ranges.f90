@@ -9,6 +9,7 @@ module nocdyn_linear_ranges
   use nocdyn_forced_response, only: forced_response_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_machine_state, only: machine_state_t, new_machine_state
   use nocdyn_response_points, only: response_point_t
   implicit none (type, external)
   private
@@ -38,25 +39,27 @@ contains
     type(forced_response_t), intent(in) :: response
     real(wp), intent(in) :: share
     type(excursion_t), allocatable, intent(out) :: excursions(:)
-    type(machine_t) :: machine
+    type(machine_state_t) :: state
     type(excursion_t), allocatable :: elastic(:), moving(:)
     integer, allocatable :: curved(:)
     integer :: i, k
     real(wp) :: t(1)
 
-    machine = response%held%balance%formulation%machine
     t = response%held%balance%t
-    allocate (curved, source=curved_elements(machine))
-    allocate (elastic(size(curved)), moving(size(curved)))
-    elastic%element = curved
-    moving%element = curved
-    moving%is_elastic = .false.
-    if (size(curved) > 0) then
-      do i = 1, size(response%points)
-        call compare(response, i, machine, t, share, elastic)
-        call compare(response, i, machine, t, share, moving)
-      end do
-    end if
+    associate (machine => response%held%balance%formulation%machine)
+      state = new_machine_state(machine)
+      allocate (curved, source=curved_elements(machine))
+      allocate (elastic(size(curved)), moving(size(curved)))
+      elastic%element = curved
+      moving%element = curved
+      moving%is_elastic = .false.
+      if (size(curved) > 0) then
+        do i = 1, size(response%points)
+          call compare(response, i, machine, state, t, share, elastic)
+          call compare(response, i, machine, state, t, share, moving)
+        end do
+      end if
+    end associate
     excursions = [(pack(elastic(k:k), elastic(k:k)%points > 0), pack(moving(k:k), moving(k:k)%points > 0), k=1, size(curved))]
   end subroutine find_excursions
 
@@ -81,10 +84,11 @@ contains
   end function curved_elements
 
   !> Compares all elements at one point.
-  subroutine compare(response, point, machine, t, share, excursions)
+  subroutine compare(response, point, machine, state, t, share, excursions)
     type(forced_response_t), intent(in) :: response
     integer, intent(in) :: point
-    type(machine_t), intent(inout) :: machine   !! with mean torques; its elements are work space
+    type(machine_t), intent(in) :: machine             !! with mean torques
+    type(machine_state_t), intent(inout) :: state      !! its elements are work space
     real(wp), contiguous, intent(in) :: t(:)
     real(wp), intent(in) :: share
     type(excursion_t), intent(inout) :: excursions(:)   !! all of stiffness or all of damping
@@ -99,8 +103,9 @@ contains
       do k = 1, size(excursions)
         amplitude(k) = oscillation(response, here, element(k), .not. is_elastic)
       end do
-      call set_mean(here, machine)
-      call find_equivalent(machine, t, element, is_elastic, amplitude, equivalent, tangent)
+      state%elements%angle(1, :) = here%state%twist
+      state%elements%speed(1, :) = here%state%rate
+      call find_equivalent(machine, state, t, element, is_elastic, amplitude, equivalent, tangent)
       largest = maxval([0.0_wp, here%half_range([(k, k=1, size(response%quantities))])])
       do k = 1, size(excursions)
         weight = 1.0_wp
@@ -171,18 +176,10 @@ contains
     amplitude = 0.5_wp * (highest - lowest)
   end function oscillation
 
-  !> Gives the elements their twists and speeds of the steady state.
-  pure subroutine set_mean(point, machine)
-    type(response_point_t), intent(in) :: point
-    type(machine_t), intent(inout) :: machine
-
-    machine%elements%angle(1, :) = point%state%twist
-    machine%elements%speed(1, :) = point%state%rate
-  end subroutine set_mean
-
   !> The slopes of the laws at the mean, and the ones of the first harmonics over the oscillations.
-  subroutine find_equivalent(machine, t, element, is_elastic, amplitude, equivalent, tangent)
-    type(machine_t), intent(inout) :: machine   !! at its mean
+  subroutine find_equivalent(machine, state, t, element, is_elastic, amplitude, equivalent, tangent)
+    type(machine_t), intent(in) :: machine
+    type(machine_state_t), intent(inout) :: state   !! at its mean
     real(wp), contiguous, intent(in) :: t(:)
     integer, intent(in) :: element(:)
     logical, intent(in) :: is_elastic
@@ -191,24 +188,24 @@ contains
     real(wp) :: mean(size(element)), moment(size(element))
     integer :: i
 
-    call machine%choose_branches(t)
-    call machine%evaluate_elements(t)
-    call machine%differentiate_elements(t)
+    call state%choose_branches(machine, t)
+    call state%evaluate_elements(machine, t)
+    call state%differentiate_elements(machine, t)
     if (is_elastic) then
-      tangent = -(machine%elements%restoring_angle(1, element) + machine%elements%applied_angle(1, element))
-      mean = machine%elements%angle(1, element)
+      tangent = -(state%elements%restoring_angle(1, element) + state%elements%applied_angle(1, element))
+      mean = state%elements%angle(1, element)
     else
-      tangent = -machine%elements%applied_speed(1, element)
-      mean = machine%elements%speed(1, element)
+      tangent = -state%elements%applied_speed(1, element)
+      mean = state%elements%speed(1, element)
     end if
     equivalent = 0.0_wp
     do i = 1, samples
       associate (wave => cos(pi * (i - 0.5_wp) / samples))
-        if (is_elastic) machine%elements%angle(1, element) = mean + amplitude * wave
-        if (.not. is_elastic) machine%elements%speed(1, element) = mean + amplitude * wave
-        call machine%choose_branches(t)
-        call machine%evaluate_elements(t)
-        moment = machine%elements%restoring(1, element) + machine%elements%applied(1, element)
+        if (is_elastic) state%elements%angle(1, element) = mean + amplitude * wave
+        if (.not. is_elastic) state%elements%speed(1, element) = mean + amplitude * wave
+        call state%choose_branches(machine, t)
+        call state%evaluate_elements(machine, t)
+        moment = state%elements%restoring(1, element) + state%elements%applied(1, element)
         equivalent = equivalent - moment * wave
       end associate
     end do

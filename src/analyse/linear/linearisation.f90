@@ -62,7 +62,7 @@ contains
 
     call differentiate(formulation, t, y, pattern, jacobian)
     incidence = new_element_coordinates(formulation%machine%elements, formulation%machine%coordinates)
-    call new_slopes(formulation%machine, slopes, error)
+    call new_slopes(formulation%machine, formulation%state%elements, slopes, error)
     if (allocated(error)) return
     allocate (held, source=held_elements(formulation))
     call undamped_modes(formulation%machine, incidence, slopes%stiffness, self, error, held)
@@ -96,7 +96,7 @@ contains
     real(wp), parameter :: rounding = 1.0e-9_wp       ! of the moments of the elements
 
     carries_nothing = .false.
-    associate (teeth => formulation%joints%teeth, elements => formulation%machine%elements)
+    associate (teeth => formulation%joints%teeth, elements => formulation%state%elements)
       if (teeth%loss_of(joint) == 0 .or. formulation%joints%mode(joint) /= locked) return
       carries_nothing = abs(teeth%load(teeth%loss_of(joint))) <= rounding * &
                         maxval([tiny(rounding), abs(elements%restoring(1, :)), abs(elements%applied(1, :))])
@@ -114,7 +114,7 @@ contains
     real(wp), allocatable :: jacobian(:, :)
 
     call differentiate(formulation, t, y, pattern, jacobian)
-    call new_slopes(formulation%machine, slopes, error)
+    call new_slopes(formulation%machine, formulation%state%elements, slopes, error)
   end subroutine find_slopes
 
   !> Differentiates the laws of all elements, and the equations of motion.

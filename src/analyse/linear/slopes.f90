@@ -3,7 +3,7 @@
 !> Relative damping is the imaginary part `loss` of a stiffness at every frequency. Over the time a viscous damping stands for it,
 !> which is no part of the linear machine.
 module nocdyn_slopes
-  use nocdyn_elements, only: internal_states_t
+  use nocdyn_elements, only: element_values_t, internal_states_t
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
@@ -31,9 +31,10 @@ module nocdyn_slopes
 
 contains
 
-  !> The slopes of a machine of one lane whose elements are evaluated and differentiated.
-  subroutine new_slopes(machine, self, error, weight)
+  !> The slopes of a machine of one lane from its elements, which are evaluated and differentiated.
+  subroutine new_slopes(machine, elements, self, error, weight)
     type(machine_t), intent(in) :: machine
+    type(element_values_t), intent(in) :: elements     !! of the machine
     type(slopes_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error   !! if a number is not finite; `self` is complete
     real(wp), intent(in), optional :: weight(:)        !! factors on the moments, [elements]; absent: 1
@@ -43,7 +44,7 @@ contains
     factor = 1.0_wp
     if (present(weight)) factor = weight
     allocate (self%loss(size(factor)), self%stand_in(size(factor)), source=0.0_wp)
-    associate (elements => machine%elements, internal => machine%elements%internal, follows => machine%follows_mean_speed())
+    associate (internal => elements%internal, follows => machine%follows_mean_speed())
       self%stiffness = -factor * (elements%restoring_angle(1, :) + elements%applied_angle(1, :))
       self%damping = -factor * elements%applied_speed(1, :)
       do b = 1, size(machine%banks)
@@ -56,7 +57,7 @@ contains
       self%damping = self%damping - self%stand_in
       self%mean_damping = merge(self%damping, 0.0_wp, follows)
       where (follows) self%damping = 0.0_wp
-      self%by_internal = factor(internal%element) * internal%applied(1, :)
+      self%by_internal = factor(machine%elements%internal%element) * internal%applied(1, :)
       self%rate_speed = internal%rate_speed(1, :)
       self%rate_internal = internal%rate_internal(1, :, :)
       do e = 1, size(factor)

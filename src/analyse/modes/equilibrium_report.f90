@@ -76,7 +76,7 @@ contains
     do k = 1, size(equilibria)
       y = [equilibria(k)%y(1, :), (0.0_wp, i=1, size(parts))]
       call table%fill(t_infinity, y, row)
-      call with_works%machine%power(watts)
+      call with_works%state%power(with_works%machine, watts)
       self%values(:, k) = row(reported)
       self%power(:, k) = whole_sums(parts, watts(1, :))
       i = findloc(is_finite([self%values(:, k), self%power(:, k)]), .false., dim=1)

@@ -62,7 +62,7 @@ contains
       return
     end if
     self%machine = point%formulation%machine
-    call note_mean_slopes(self%machine, self%machine%elements%applied_speed(1, :), point%notes)
+    call note_mean_slopes(self%machine, point%formulation%state%elements%applied_speed(1, :), point%notes)
     self%linear = linear
     allocate (self%elastic, source=self%machine%elastic())
     call find_modes(point%formulation, linear, self%elastic, self%modes, error)

@@ -72,7 +72,7 @@ contains
     call linearise(formulation, t_start, y, linear, error)
     if (allocated(error)) return
     call formulation%observe([t_start], y)
-    allocate (moments, source=moments_of_modes(formulation%machine, linear))
+    allocate (moments, source=moments_of_modes(formulation, linear))
     if (size(moments) == 0) return
     if (maxval(moments) <= max(balance_share * largest_moment, 0.0_wp)) return
     longest = fast_share * (t_end - t_start)
@@ -80,7 +80,7 @@ contains
     do i = 1, size(moments)
       if (moments(i) < excited_share * maxval(moments)) cycle
       duration = max(duration, periods * two_pi / linear%natural(i))
-      damping = -dot_product(formulation%machine%elements%applied_speed(1, :), linear%twists(:, i)**2)
+      damping = -dot_product(formulation%state%elements%applied_speed(1, :), linear%twists(:, i)**2)
       if (decays * 2.0_wp <= longest * damping) duration = max(duration, decays * 2.0_wp / damping)
     end do
     if (duration <= longest) until = t_start + duration
@@ -88,8 +88,8 @@ contains
 
   !> The largest amplitude of an elastic moment when each mode of the couplings swings freely from the state of the machine [N m],
   !> [modes].
-  pure function moments_of_modes(machine, linear) result(moments)
-    type(machine_t), intent(in) :: machine           !! evaluated at that state
+  pure function moments_of_modes(formulation, linear) result(moments)
+    type(reduced_t), intent(in) :: formulation       !! evaluated at that state
     type(linearisation_t), intent(in) :: linear      !! there
     real(wp), allocatable :: moments(:)
     real(wp) :: force_rate, offset, rate   ! of the modal coordinate from balance
@@ -97,8 +97,8 @@ contains
     integer :: i
 
     allocate (moments(size(linear%natural)), source=0.0_wp)
-    allocate (elastic, source=machine%elastic())
-    associate (elements => machine%elements)
+    allocate (elastic, source=formulation%machine%elastic())
+    associate (elements => formulation%state%elements)
       do i = 1, size(moments)
         associate (natural => linear%natural(i), twists => linear%twists(:, i))
           if (natural <= 0) cycle

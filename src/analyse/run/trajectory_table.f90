@@ -79,13 +79,14 @@ contains
     real(wp), intent(in) :: y(:)   !! there, [states + quadratures]
     integer :: i
 
-    associate (formulation => self%columns%formulation, machine => self%columns%formulation%machine)
+    associate (formulation => self%columns%formulation, machine => self%columns%formulation%machine, &
+               elements => self%columns%formulation%state%elements)
       self%kinetic(place) = self%columns%kinetic_energy(1)
       do i = 1, size(self%elastic)   ! without memory for them in every row
-        self%stored(i, place) = machine%elements%stored(1, self%elastic(i))
+        self%stored(i, place) = elements%stored(1, self%elastic(i))
       end do
       do i = 1, size(machine%with_work)
-        self%work(i, place) = y(formulation%states + i) + machine%elements%kept(1, machine%with_work(i))
+        self%work(i, place) = y(formulation%states + i) + elements%kept(1, machine%with_work(i))
       end do
     end associate
   end subroutine keep_energies

@@ -288,7 +288,7 @@ contains
     if (self%not_finite > 0) return
     self%rows = self%rows + 1
     associate (formulation => self%table%columns%formulation)
-      call self%vibration%include_energy(formulation%machine, formulation%omega(1, 1:))
+      call self%vibration%include_energy(formulation%machine, formulation%state%elements%stored(1, :), formulation%omega(1, 1:))
       self%lowest(:) = min(self%lowest, formulation%omega(1, 1:))
       self%highest(:) = max(self%highest, formulation%omega(1, 1:))
       self%last_speeds(:) = formulation%omega(1, 1:)

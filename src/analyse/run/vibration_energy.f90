@@ -48,10 +48,11 @@ contains
     if (is_indefinite) deallocate (self%motion)   ! by rounding: no energy is known
   end function new_vibration
 
-  !> Takes the energy at the present speeds and twists of a machine, after its `evaluate_energies`.
-  subroutine include_energy(self, machine, omega)
+  !> Takes the energy at the present speeds and twists of a machine, after `evaluate_energies`.
+  subroutine include_energy(self, machine, stored, omega)
     class(vibration_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
+    real(wp), intent(in) :: stored(:)  !! energies of its elements [J], [elements]
     real(wp), intent(in) :: omega(:)   !! speeds [rad/s], [bodies]
     integer :: m
 
@@ -60,7 +61,7 @@ contains
     do m = 1, size(self%motion, 2)
       self%speed(:) = self%speed - self%motion(:, m) * dot_product(self%momentum(m, :), omega)
     end do
-    self%largest = max(self%largest, machine%kinetic_energy(1, self%speed) + sum(machine%elements%stored(1, :)))
+    self%largest = max(self%largest, machine%kinetic_energy(1, self%speed) + sum(stored))
   end subroutine include_energy
 
 end module nocdyn_vibration_energy

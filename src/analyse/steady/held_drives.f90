@@ -33,7 +33,11 @@ contains
     integer :: b
 
     do b = 1, size(balance%formulation%machine%banks)
-      call balance%formulation%machine%banks(b)%bank%set_supply(share)
+      associate (bank => balance%formulation%machine%banks(b)%bank)
+        if (.not. bank%follows_supply()) cycle
+        call bank%set_supply(share)
+        call balance%formulation%state%banks(b)%refresh_lane(bank, 1)
+      end associate
     end do
   end subroutine set_supplies
 
@@ -42,9 +46,9 @@ contains
     type(torque_balance_t), intent(in) :: balance
     integer, intent(in) :: sources(:)   !! elements that drive, numbered in `balance%inelastic`
 
-    associate (e => balance%inelastic(sources(1)), machine => balance%formulation%machine)
+    associate (e => balance%inelastic(sources(1)), machine => balance%formulation%machine, state => balance%formulation%state)
       associate (bank => machine%banks(bank_of(machine%banks, e))%bank)
-        idle_share = bank%idle_supply(e - bank%first + 1, machine%elements%speed(1, e))
+        idle_share = bank%idle_supply(e - bank%first + 1, state%elements%speed(1, e))
       end associate
     end associate
   end function idle_share
@@ -83,7 +87,7 @@ contains
     real(wp) :: opened(size(z)), torque(2), throttle
 
     associate (integral => size(balance%motions%free) + bank%first_internal + element - 1, &
-               elements => balance%formulation%machine%elements, e => bank%first + element - 1)
+               elements => balance%formulation%state%elements, e => bank%first + element - 1)
       opened = z
       call balance%evaluate(z)
       torque(1) = elements%restoring(1, e) + elements%applied(1, e)

@@ -245,7 +245,7 @@ contains
   pure real(wp) function source_power(self)
     type(held_speeds_t), intent(in) :: self
 
-    associate (elements => self%balance%formulation%machine%elements, e => self%balance%inelastic(self%sources))
+    associate (elements => self%balance%formulation%state%elements, e => self%balance%inelastic(self%sources))
       source_power = sum((elements%restoring(1, e) + elements%applied(1, e)) * elements%speed(1, e))
     end associate
   end function source_power
@@ -348,7 +348,7 @@ contains
     sources = self%ratio
     if (.not. self%motors_hold) return
     sources = 0.0_wp
-    associate (balance => self%balance, elements => self%balance%formulation%machine%elements)
+    associate (balance => self%balance, elements => self%balance%formulation%state%elements)
       do i = 1, size(self%sources)
         associate (e => balance%inelastic(self%sources(i)))
           do k = balance%first(self%sources(i)), balance%first(self%sources(i) + 1) - 1
@@ -402,10 +402,11 @@ contains
     real(wp), parameter :: none = 1.0e-10_wp        ! relative to the largest speed
     integer :: j
 
-    associate (joints => balance%joints, machine => balance%formulation%machine)
+    associate (joints => balance%joints, machine => balance%formulation%machine, &
+               speed => balance%formulation%state%elements%speed)
       do j = 1, joints%count
         if (machine%banks(joints%bank(j))%bank%role /= role_bearing) cycle
-        if (abs(machine%elements%speed(1, joints%element(j))) > none * maxval(abs(machine%elements%speed(1, :)))) cycle
+        if (abs(speed(1, joints%element(j))) > none * maxval(abs(speed(1, :)))) cycle
         call raise(error, exit_failed, quoted(machine%element_name(joints%element(j))) // ' stands still: whether the ' // &
                    'friction of its bearing holds in vibrations is not known; allowed: bearing_friction = 0 there')
         return
@@ -423,19 +424,19 @@ contains
     associate (balance => self%balance, formulation => self%balance%formulation)
       balance%y(1, balance%coordinates + 1:2 * balance%coordinates) = self%q
       call formulation%gather(balance%y)
-      call formulation%machine%choose_branches(balance%t)
-      call formulation%machine%evaluate_elements(balance%t)
-      call formulation%machine%differentiate_elements(balance%t)
+      call formulation%state%choose_branches(formulation%machine, balance%t)
+      call formulation%state%evaluate_elements(formulation%machine, balance%t)
+      call formulation%state%differentiate_elements(formulation%machine, balance%t)
       state%omega = formulation%omega(1, 1:)
       state%phi = formulation%phi(1, 1:)
       state%phi = state%phi - state%omega * (state%phi(self%reference) / state%omega(self%reference))
     end associate
-    associate (elements => self%balance%formulation%machine%elements)
+    associate (elements => self%balance%formulation%state%elements)
       state%twist = elements%angle(1, :)
       state%rate = elements%speed(1, :)
       state%mean = weight * (elements%restoring(1, :) + elements%applied(1, :))
     end associate
-    call new_slopes(self%balance%formulation%machine, state%slopes, error, weight)
+    call new_slopes(self%balance%formulation%machine, self%balance%formulation%state%elements, state%slopes, error, weight)
   end subroutine linearise
 
 end module nocdyn_held_speeds

@@ -7,12 +7,14 @@
 !> are the ones of springs with the stiffness of the start, and `offset` corrects T.
 module nocdyn_joint_balance
   use nocdyn_element_coordinates, only: element_coordinates_t
+  use nocdyn_elements, only: element_values_t
   use nocdyn_friction_joints, only: friction_joints_t
   use nocdyn_joint_sets, only: joint_sets_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pseudo_inverse
   use nocdyn_linearisation, only: mass_matrix
   use nocdyn_machine, only: machine_t
+  use nocdyn_machine_state, only: machine_state_t
   use nocdyn_rigid_motions, only: rigid_motions_t
   use nocdyn_tooth_loads, only: tooth_loads_t
   use nocdyn_tooth_losses, only: tooth_losses_t
@@ -96,9 +98,10 @@ contains
 
   !> The torques T of teeth by the moments of the elements, where some elements keep their twists: those that do are given the
   !> moments that they need for the accelerations of the rigid motions.
-  function loads_by_moments(teeth, machine, incidence, motions, rigid) result(by_moment)
+  function loads_by_moments(teeth, machine, elements, incidence, motions, rigid) result(by_moment)
     type(tooth_loads_t), intent(in) :: teeth
-    type(machine_t), intent(in) :: machine                 !! differentiated at the start twists
+    type(machine_t), intent(in) :: machine
+    type(element_values_t), intent(in) :: elements         !! of the machine, differentiated at the start twists
     type(element_coordinates_t), intent(in) :: incidence   !! of its elements
     type(rigid_motions_t), intent(in) :: motions           !! which twist no element of `rigid`
     integer, intent(in) :: rigid(:)                        !! elements, [rigid]
@@ -119,7 +122,7 @@ contains
     allocate (inverse, source=pseudo_inverse(matmul(transpose(n), inertia), singular))
     torque = torque - matmul(inertia, matmul(inverse, matmul(transpose(n), torque)))
     deallocate (inverse)
-    weight = sqrt(abs(machine%elements%restoring_angle(1, rigid)))
+    weight = sqrt(abs(elements%restoring_angle(1, rigid)))
     if (size(weight) > 0) weight = max(weight, 1.0e-3_wp * maxval(weight))
     where (weight <= 0.0_wp) weight = 1.0_wp
     allocate (rows, source=rates_of_elements(incidence, rigid, size(n, 1)))
@@ -133,57 +136,59 @@ contains
   end function loads_by_moments
 
   !> Sets the modes by the speeds of the elements.
-  subroutine choose_modes(self, machine)
+  subroutine choose_modes(self, machine, state)
     class(joint_balance_t), intent(in) :: self
-    type(machine_t), intent(inout) :: machine
+    type(machine_t), intent(in) :: machine
+    type(machine_state_t), intent(inout) :: state
     integer :: j
 
     do j = 1, self%count
       select type (bank => machine%banks(self%bank(j))%bank)
       class is (friction_joints_t)
-        call bank%set_mode_by_slip(self%number(j), machine%elements%speed(1, self%element(j)), self%is_at_rest(j))
+        call bank%set_mode_by_slip(state%banks(self%bank(j)), self%number(j), state%elements%speed(1, self%element(j)), &
+                                   self%is_at_rest(j))
       end select
     end do
   end subroutine choose_modes
 
   !> Adds the moments of teeth that turn to the ones of the elements, which are evaluated.
-  subroutine add_losses(self, machine)
+  subroutine add_losses(self, machine, elements)
     class(joint_balance_t), intent(inout) :: self
-    type(machine_t), intent(inout) :: machine
+    type(machine_t), intent(in) :: machine
+    type(element_values_t), intent(inout) :: elements
     real(wp), dimension(self%teeth%count) :: free, moment
     integer, parameter :: together = 6, most_combined = 10
     integer :: first, i, number
     logical :: is_wrong(self%teeth%count), was_driving(self%teeth%count)
 
     if (self%teeth%count == 0) return
-    associate (elements => machine%elements)
-      free = matmul(self%by_moment, elements%restoring(1, :) + elements%applied(1, :)) + self%offset
-      was_driving = self%is_driving
-      do number = 1, together + 4 * self%teeth%count + 2**min(most_combined, self%teeth%count)
-        call self%solve_losses(machine, free, moment, is_wrong)
-        if (.not. any(is_wrong)) exit
-        if (number <= together) then
-          self%is_driving = self%is_driving .neqv. is_wrong
-        else if (number <= together + 4 * self%teeth%count) then
-          first = findloc(is_wrong, .true., dim=1)
-          self%is_driving(first) = .not. self%is_driving(first)
-        else
-          self%is_driving = [(btest(number - together - 4 * self%teeth%count - 1, modulo(i - 1, most_combined)), &
-                              i=1, self%teeth%count)]
-        end if
-      end do
-      if (any(is_wrong)) then   ! there is none; the last modes stand
-        self%is_driving = was_driving
-        call self%solve_losses(machine, free, moment, is_wrong)
+    free = matmul(self%by_moment, elements%restoring(1, :) + elements%applied(1, :)) + self%offset
+    was_driving = self%is_driving
+    do number = 1, together + 4 * self%teeth%count + 2**min(most_combined, self%teeth%count)
+      call self%solve_losses(machine, elements, free, moment, is_wrong)
+      if (.not. any(is_wrong)) exit
+      if (number <= together) then
+        self%is_driving = self%is_driving .neqv. is_wrong
+      else if (number <= together + 4 * self%teeth%count) then
+        first = findloc(is_wrong, .true., dim=1)
+        self%is_driving(first) = .not. self%is_driving(first)
+      else
+        self%is_driving = [(btest(number - together - 4 * self%teeth%count - 1, modulo(i - 1, most_combined)), &
+                            i=1, self%teeth%count)]
       end if
-      elements%applied(1, self%element(self%teeth%joint)) = moment
-    end associate
+    end do
+    if (any(is_wrong)) then   ! there is none; the last modes stand
+      self%is_driving = was_driving
+      call self%solve_losses(machine, elements, free, moment, is_wrong)
+    end if
+    elements%applied(1, self%element(self%teeth%joint)) = moment
   end subroutine add_losses
 
   !> The moments with the present drivers, and which of these contradict them.
-  subroutine solve_losses(self, machine, free, moment, is_wrong)
+  subroutine solve_losses(self, machine, elements, free, moment, is_wrong)
     class(joint_balance_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
+    type(element_values_t), intent(in) :: elements
     real(wp), intent(in) :: free(:)      !! T without losses [N m], [losses]
     real(wp), intent(out) :: moment(:)   !! M [N m], [losses]
     logical, intent(out) :: is_wrong(:)
@@ -191,7 +196,7 @@ contains
     real(wp) :: drag(size(moment))
     integer :: i
 
-    call self%set_shares(machine)
+    call self%set_shares(machine, elements)
     drag = self%share * free
     moment = -drag
     if (any(abs(drag) > 0.0_wp)) then
@@ -203,7 +208,7 @@ contains
       self%load = free + matmul(self%by_moment(:, own), moment)
       is_wrong = [(self%turns(i) .and. abs(self%load(i)) > 1.0e-12_wp * (abs(free(i)) + &
                                                                        sum(abs(self%by_moment(i, own) * moment))) .and. &
-                   (self%load(i) * machine%elements%speed(1, own(i)) < 0 .neqv. self%is_driving(i)), i=1, size(moment))]
+                   (self%load(i) * elements%speed(1, own(i)) < 0 .neqv. self%is_driving(i)), i=1, size(moment))]
     end associate
   end subroutine solve_losses
 
@@ -216,9 +221,10 @@ contains
   end function turns
 
   !> The shares that are lost; 0 of teeth at rest.
-  subroutine set_shares(self, machine)
+  subroutine set_shares(self, machine, elements)
     class(joint_balance_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
+    type(element_values_t), intent(in) :: elements
     integer :: i
 
     self%share = 0.0_wp
@@ -227,7 +233,7 @@ contains
       if (.not. self%turns(i)) cycle
       select type (bank => machine%banks(self%teeth%bank(i))%bank)
       class is (tooth_losses_t)
-        call bank%share(self%teeth%number(i), self%is_driving(i), machine%elements%speed(1, self%element(self%teeth%joint(i))), &
+        call bank%share(self%teeth%number(i), self%is_driving(i), elements%speed(1, self%element(self%teeth%joint(i))), &
                         self%share(i), self%share_slope(i))
       end select
     end do

@@ -150,7 +150,8 @@ contains
       allocate (self%by_element, source=matmul(rows, n))
       allocate (self%rates, source=self%by_element(balance%joints%element, :))
       call balance%differentiate_at_start()
-      allocate (self%loads, source=loads_by_moments(balance%joints%teeth, machine, balance%incidence, balance%loose, &
+      allocate (self%loads, source=loads_by_moments(balance%joints%teeth, machine, balance%formulation%state%elements, &
+                                                    balance%incidence, balance%loose, &
                                                     balance%elastic))
     end associate
     allocate (self%moment(balance%joints%count), source=0.0_wp)
@@ -169,7 +170,7 @@ contains
     real(wp), allocatable :: inverse(:, :), moments(:)
 
     self%overloaded = 0
-    associate (joints => balance%joints, elements => balance%formulation%machine%elements)
+    associate (joints => balance%joints, elements => balance%formulation%state%elements)
       elements%applied(1, joints%element(joints%teeth%joint)) = 0.0_wp
       applied = 0.0_wp
       do e = 1, size(applied)
@@ -234,7 +235,7 @@ contains
       choices%w = matmul(self%rates, turned)
       choices%rate = rate
       choices%is_at_rest = joints%is_at_rest
-      choices%slip = balance%formulation%machine%elements%speed(1, joints%element)
+      choices%slip = balance%formulation%state%elements%speed(1, joints%element)
       allocate (choices%v(n, n), choices%sliding(2, n), source=0.0_wp)
       allocate (choices%least(n), choices%most(n), choices%load(n), choices%driving(n), choices%driven(n), source=0.0_wp)
       allocate (choices%mode(n), source=locked)
@@ -296,7 +297,7 @@ contains
     integer :: j
 
     slips_where_it_cannot = .false.
-    associate (joints => balance%joints, speed => balance%formulation%machine%elements%speed)
+    associate (joints => balance%joints, speed => balance%formulation%state%elements%speed)
       scale = none * maxval([0.0_wp, abs(speed(1, :))])
       do j = 1, joints%count
         if (joints%is_at_rest(j)) cycle

@@ -100,7 +100,7 @@ contains
     integer, allocatable :: slack(:)   ! elastic elements without stiffness
     integer :: i
 
-    associate (stiffness => balance%formulation%machine%elements%restoring_angle(1, balance%elastic))
+    associate (stiffness => balance%formulation%state%elements%restoring_angle(1, balance%elastic))
       slack = pack(balance%elastic, abs(stiffness) <= 0.0_wp)
       if (size(slack) > 0) motions = new_rigid_motions(balance%coordinates, balance%incidence, &
                                                        pack(balance%elastic, abs(stiffness) > 0.0_wp))
@@ -192,7 +192,7 @@ contains
 
     self%external_torque = 0.0_wp
     self%external_scale = 0.0_wp
-    associate (elements => balance%formulation%machine%elements, incidence => balance%incidence)
+    associate (elements => balance%formulation%state%elements, incidence => balance%incidence)
       do e = 1, size(balance%is_elastic)
         moment = elements%applied(1, e)
         if (.not. balance%is_elastic(e)) moment = moment + elements%restoring(1, e)
@@ -223,11 +223,13 @@ contains
     balance%y(1, size(q) + 1:2 * size(q)) = q
     call balance%formulation%start_lane(1, balance%t(1), reshape(balance%y, [size(balance%y)]))
     call balance%formulation%derivative(balance%t, balance%y, balance%rate, balance%status)
-    call balance%formulation%machine%differentiate_elements(balance%t)
-    call balance%formulation%machine%evaluate_energies()
+    associate (machine => balance%formulation%machine, state => balance%formulation%state)
+      call state%differentiate_elements(machine, balance%t)
+      call state%evaluate_energies(machine)
+    end associate
     self%torque = self%external_torque
     self%tolerance = self%floor + balanced * self%external_scale
-    associate (elements => balance%formulation%machine%elements, incidence => balance%incidence, phi => balance%formulation%phi, &
+    associate (elements => balance%formulation%state%elements, incidence => balance%incidence, phi => balance%formulation%phi, &
                rows => balance%formulation%machine%elements%rows)
       self%energy = sum(elements%stored(1, balance%elastic)) - sum(self%external_torque * q)
       do i = 1, size(balance%elastic)
@@ -255,7 +257,7 @@ contains
     step = 0.0_wp
     is_singular = .false.
     if (size(self%unknown) == 0) return
-    associate (slopes => balance%formulation%machine%elements%restoring_angle(1, balance%elastic))
+    associate (slopes => balance%formulation%state%elements%restoring_angle(1, balance%elastic))
       if (allocated(self%factored)) then
         if (damping > 0 .or. any(abs(self%factored - slopes) > 0)) deallocate (self%factored)
       end if
@@ -281,7 +283,7 @@ contains
 
     self%band = 0.0_wp
     diagonal = 2 * self%width + 1
-    associate (elements => balance%formulation%machine%elements, incidence => balance%incidence)
+    associate (elements => balance%formulation%state%elements, incidence => balance%incidence)
       do i = 1, size(balance%elastic)
         e = balance%elastic(i)
         do k = incidence%first(e), incidence%first(e + 1) - 1

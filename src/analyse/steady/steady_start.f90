@@ -36,7 +36,7 @@ contains
     call formulation%set_state(equilibria(nearest)%y)
     machine%start_speed(1, :) = formulation%omega(1, 1:)
     machine%start_angle(1, :) = formulation%phi(1, 1:)
-    allocate (machine%steady_internal, source=formulation%machine%elements%internal%value)
+    allocate (machine%steady_internal, source=formulation%state%elements%internal%value)
     ! "steady state 3 of 3, of 2 stable ones the nearest to the given speeds"
     associate (alike => count(equilibria%stability == equilibria(nearest)%stability))
       if (size(equilibria) == 1) then

@@ -144,7 +144,7 @@ contains
           call add_to(holding, trim(kind_of(bank%role)) // ' ' // quoted(bank%names(number)%text))
         else if (bank%role == role_bearing .or. bank%role == role_loss) then
           cycle
-        else if (abs(formulation%machine%elements%applied(1, formulation%joints%element(j))) > 0.0_wp) then
+        else if (abs(formulation%state%elements%applied(1, formulation%joints%element(j))) > 0.0_wp) then
           call add_to(slipping, trim(kind_of(bank%role)) // ' ' // quoted(bank%names(number)%text))
         else
           call add_to(open, trim(kind_of(bank%role)) // ' ' // quoted(bank%names(number)%text))

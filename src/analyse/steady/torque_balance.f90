@@ -81,8 +81,9 @@ contains
       rigid = [self%elastic, pack(self%joints%element, is_at_rest)]
       if (any(is_at_rest)) self%motions = new_rigid_motions(self%coordinates, self%incidence, rigid)
       call self%differentiate_at_start()
-      associate (joints => self%joints, machine => self%formulation%machine)
-        joints%by_moment = loads_by_moments(joints%teeth, machine, self%incidence, self%motions, rigid)
+      associate (joints => self%joints, formulation => self%formulation)
+        joints%by_moment = loads_by_moments(joints%teeth, formulation%machine, formulation%state%elements, self%incidence, &
+                                            self%motions, rigid)
       end associate
     end if
     call gather_ratios(self)
@@ -95,13 +96,13 @@ contains
   subroutine differentiate_at_start(self)
     class(torque_balance_t), intent(inout) :: self
 
-    associate (machine => self%formulation%machine)
-      machine%elements%angle(1, :) = self%start_twist
-      machine%elements%speed(1, :) = 0.0_wp
-      call machine%settle_internal(self%t(1))
-      call machine%choose_branches(self%t)
-      call machine%evaluate_elements(self%t)
-      call machine%differentiate_elements(self%t)
+    associate (machine => self%formulation%machine, state => self%formulation%state)
+      state%elements%angle(1, :) = self%start_twist
+      state%elements%speed(1, :) = 0.0_wp
+      call state%settle_internal(machine, self%t(1))
+      call state%choose_branches(machine, self%t)
+      call state%evaluate_elements(machine, self%t)
+      call state%differentiate_elements(machine, self%t)
     end associate
   end subroutine differentiate_at_start
 
@@ -250,7 +251,7 @@ contains
     integer :: i, k
     real(wp) :: speed
 
-    associate (elements => self%formulation%machine%elements)
+    associate (elements => self%formulation%state%elements)
       elements%angle(1, :) = self%start_twist
       elements%speed(1, :) = 0.0_wp
       do i = 1, size(self%inelastic)
@@ -271,8 +272,8 @@ contains
 
     if (self%internal == 0) return
     call set_elements(self, z)
-    call self%formulation%machine%settle_internal(self%t(1))
-    z(size(self%motions%free) + 1:) = self%formulation%machine%elements%internal%value(1, :)
+    call self%formulation%state%settle_internal(self%formulation%machine, self%t(1))
+    z(size(self%motions%free) + 1:) = self%formulation%state%elements%internal%value(1, :)
   end subroutine settle
 
   !> Moments of the inelastic elements that all have one speed, with internal states that do not change [N m], [inelastic].
@@ -281,15 +282,15 @@ contains
     real(wp), intent(in) :: speed   !! u' [rad/s]
     real(wp) :: moments(size(self%inelastic))
 
-    associate (machine => self%formulation%machine)
-      machine%elements%angle(1, :) = self%start_twist
-      machine%elements%speed(1, :) = 0.0_wp
-      machine%elements%speed(1, self%inelastic) = speed
-      call machine%settle_internal(self%t(1))
-      call self%joints%choose_modes(machine)
-      call machine%choose_branches(self%t)
-      call machine%evaluate_elements(self%t)
-      moments = machine%elements%restoring(1, self%inelastic) + machine%elements%applied(1, self%inelastic)
+    associate (machine => self%formulation%machine, state => self%formulation%state)
+      state%elements%angle(1, :) = self%start_twist
+      state%elements%speed(1, :) = 0.0_wp
+      state%elements%speed(1, self%inelastic) = speed
+      call state%settle_internal(machine, self%t(1))
+      call self%joints%choose_modes(machine, state)
+      call state%choose_branches(machine, self%t)
+      call state%evaluate_elements(machine, self%t)
+      moments = state%elements%restoring(1, self%inelastic) + state%elements%applied(1, self%inelastic)
     end associate
   end function moments_at
 
@@ -304,12 +305,12 @@ contains
     call set_elements(self, z)
     self%residual = 0.0_wp
     self%scale = 0.0_wp
-    associate (machine => self%formulation%machine, r => size(self%motions%free))
+    associate (state => self%formulation%state, r => size(self%motions%free))
       call self%evaluate_laws()
       do i = 1, size(self%inelastic)
         e = self%inelastic(i)
         do k = self%first(i), self%first(i + 1) - 1
-          term = self%ratio(k) * (machine%elements%restoring(1, e) + machine%elements%applied(1, e))
+          term = self%ratio(k) * (state%elements%restoring(1, e) + state%elements%applied(1, e))
           self%residual(self%freedom(k)) = self%residual(self%freedom(k)) + term
           self%scale(self%freedom(k)) = self%scale(self%freedom(k)) + abs(term)
         end do
@@ -320,7 +321,7 @@ contains
           self%scale(i) = self%scale(i) + dot_product(abs(self%drag(:, i)), abs(z(:r)) + abs(self%start_speed))
         end do
       end if
-      self%residual(r + 1:) = machine%elements%internal%rate(1, :)
+      self%residual(r + 1:) = state%elements%internal%rate(1, :)
       self%scale(r + 1:) = abs(self%residual(r + 1:))
     end associate
   end subroutine evaluate
@@ -329,11 +330,11 @@ contains
   subroutine evaluate_laws(self)
     class(torque_balance_t), intent(inout) :: self
 
-    associate (machine => self%formulation%machine)
-      call self%joints%choose_modes(machine)
-      call machine%choose_branches(self%t)
-      call machine%evaluate_elements(self%t)
-      if (allocated(self%joints%by_moment)) call self%joints%add_losses(machine)
+    associate (machine => self%formulation%machine, state => self%formulation%state)
+      call self%joints%choose_modes(machine, state)
+      call state%choose_branches(machine, self%t)
+      call state%evaluate_elements(machine, self%t)
+      if (allocated(self%joints%by_moment)) call self%joints%add_losses(machine, state%elements)
     end associate
   end subroutine evaluate_laws
 
@@ -344,8 +345,8 @@ contains
     integer :: column, i, j, k, m, x
 
     matrix = 0.0_wp
-    call self%formulation%machine%differentiate_elements(self%t)
-    associate (elements => self%formulation%machine%elements)
+    call self%formulation%state%differentiate_elements(self%formulation%machine, self%t)
+    associate (elements => self%formulation%state%elements)
       do i = 1, size(self%inelastic)
         do k = self%first(i), self%first(i + 1) - 1
           do j = self%first(i), self%first(i + 1) - 1
@@ -362,17 +363,18 @@ contains
       end associate
     end if
     ! fills the rows and columns of the internal states x
-    associate (states => self%formulation%machine%elements%internal, r => size(self%motions%free))
+    associate (states => self%formulation%machine%elements%internal, values => self%formulation%state%elements%internal, &
+               r => size(self%motions%free))
       do x = 1, self%internal
         do m = 1, states%members(x)
           column = r + states%first(x) + m - 1
-          matrix(r + x, column) = states%rate_internal(1, m, x)
+          matrix(r + x, column) = values%rate_internal(1, m, x)
         end do
         i = findloc(self%inelastic, states%element(x), dim=1)
         if (i == 0) cycle   ! an elastic coupling, which does not turn
         do k = self%first(i), self%first(i + 1) - 1
-          matrix(self%freedom(k), r + x) = matrix(self%freedom(k), r + x) + self%ratio(k) * states%applied(1, x)
-          matrix(r + x, self%freedom(k)) = matrix(r + x, self%freedom(k)) + self%ratio(k) * states%rate_speed(1, x)
+          matrix(self%freedom(k), r + x) = matrix(self%freedom(k), r + x) + self%ratio(k) * values%applied(1, x)
+          matrix(r + x, self%freedom(k)) = matrix(r + x, self%freedom(k)) + self%ratio(k) * values%rate_speed(1, x)
         end do
       end do
     end associate
@@ -387,12 +389,13 @@ contains
     real(wp) :: change(self%joints%teeth%count)
     integer :: i, k, place, unknown
 
-    associate (elements => self%formulation%machine%elements, r => size(self%motions%free), joints => self%joints)
+    associate (elements => self%formulation%state%elements, states => self%formulation%machine%elements%internal, &
+               r => size(self%motions%free), joints => self%joints)
       do unknown = 1, size(matrix, 2)
         speeds = 0.0_wp
         moments = 0.0_wp
         if (unknown > r) then
-          moments(elements%internal%element(unknown - r)) = elements%internal%applied(1, unknown - r)
+          moments(states%element(unknown - r)) = elements%internal%applied(1, unknown - r)
         else
           do i = 1, size(self%inelastic)
             do k = self%first(i), self%first(i + 1) - 1

@@ -6,10 +6,10 @@ module nocdyn_law_points
   use nocdyn_curves, only: curve_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_tape, only: law_node_t, law_tape_t, op_add, op_cosine, op_exponential, op_fixed, op_harmonics, op_larger, &
-    op_log_cosh, op_logarithm, op_multiply, op_parameter, op_pick, op_power, op_reciprocal, op_scale, op_sech_squared, &
-    op_segment, op_shift, op_sine, op_square_root, op_subtract, op_tanh, op_wave
+    op_literal, op_log_cosh, op_logarithm, op_multiply, op_parameter, op_pick, op_power, op_reciprocal, op_scale, &
+    op_sech_squared, op_segment, op_shift, op_sine, op_square_root, op_subtract, op_tanh, op_wave
   use nocdyn_law_values, only: value_of
-  use nocdyn_laws, only: law_t
+  use nocdyn_laws, only: law_parameter_t
   use nocdyn_vector_functions, only: cosine_of, sine_of
   implicit none (type, external)
   private
@@ -18,7 +18,6 @@ module nocdyn_law_points
 
   type, public :: law_point_t
     integer :: element = 0
-    integer :: slot = 0                    !! of the element in the first lane
     integer, allocatable :: branch(:)      !! of the switches of the element
     real(wp), allocatable :: x(:)          !! values of all nodes, [0:nodes]
     logical, allocatable :: is_void(:)     !! constants that the element lacks, as the amplitude of a further term, [0:nodes]
@@ -31,36 +30,39 @@ module nocdyn_law_points
 contains
 
   !> A point of an element in the first lane, without inputs; its constants are not yet set.
-  function new_law_point(law, element, branch) result(self)
-    type(law_t), intent(in) :: law
+  function new_law_point(tape, element, branch) result(self)
+    type(law_tape_t), intent(in) :: tape
     integer, intent(in) :: element
     integer, intent(in) :: branch(:)   !! of the switches of the element
     type(law_point_t) :: self
 
     self%element = element
-    self%slot = law%slot(1, element)
     allocate (self%branch, source=branch)
-    allocate (self%x(0:law%tape%count), source=0.0_wp)
-    allocate (self%slope(0:law%tape%count), source=0.0_wp)
-    allocate (self%is_void(0:law%tape%count), self%reaches(0:law%tape%count), source=.false.)
+    allocate (self%x(0:tape%count), source=0.0_wp)
+    allocate (self%slope(0:tape%count), source=0.0_wp)
+    allocate (self%is_void(0:tape%count), self%reaches(0:tape%count), source=.false.)
   end function new_law_point
 
-  !> Sets the constants to the ones of the branches.
-  pure subroutine set_constants(self, law, curve)
+  !> Computes the constants from the parameters, on the branches of the point.
+  pure subroutine set_constants(self, tape, parameters, curve)
     class(law_point_t), intent(inout) :: self
-    type(law_t), intent(in) :: law
+    type(law_tape_t), intent(in) :: tape
+    type(law_parameter_t), intent(in) :: parameters(:)
     type(curve_t), intent(in), optional :: curve   !! of the element
     integer :: a, i
 
-    self%x(law%constants) = law%constant(self%slot, :)
-    do i = 1, law%tape%count
-      associate (node => law%tape%node(i), x => self%x)
+    do i = 1, tape%count
+      associate (node => tape%node(i), x => self%x)
         if (.not. node%is_constant) cycle
-        self%is_void(i) = lacks(self, law%tape, node)
-        if (.not. node%has_branch) cycle
+        self%is_void(i) = lacks(self, tape, node)
         select case (node%operation)
+        case (op_literal)
+          x(i) = node%value
+        case (op_parameter)
+          x(i) = 0.0_wp
+          if (.not. self%is_void(i)) x(i) = parameters(node%a)%value(1, tape%list(node%first - 1 + self%element))
         case (op_pick)
-          x(i) = x(law%tape%list(node%first - 1 + self%branch(node%a)))
+          x(i) = x(tape%list(node%first - 1 + self%branch(node%a)))
         case (op_segment)
           x(i) = curve%segment_number(self%branch(1), node%a)
         case default

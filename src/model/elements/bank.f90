@@ -7,10 +7,10 @@ module nocdyn_bank
   use nocdyn_described_elements, only: described_elements_t
   use nocdyn_element_keys, only: element_keys_t
   use nocdyn_element_rows, only: element_rows_t, rows_between
-  use nocdyn_elements, only: elements_t
+  use nocdyn_elements, only: element_values_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
-  use nocdyn_law_waves, only: law_wave_t
+  use nocdyn_law_waves, only: has_waves, law_wave_t
   use nocdyn_operating_points, only: boundary_speeds, late, settle, waves_at
   use nocdyn_quantities, only: form_total, new_quantity, quantity_t, rank_torque
   use nocdyn_text, only: string_t
@@ -55,7 +55,6 @@ module nocdyn_bank
     integer, allocatable :: elastic(:)            !! elements that can have a restoring moment, numbered within the bank
     integer :: moving_rows = 0                    !! rows of L_lambda that its elements hold always (`nocdyn_moving_rows`)
     integer :: role = role_coupling               !! role_...: term of eq. (12) to which the bank belongs
-    integer :: first_value = 1                    !! index of lane 1 of `first` in the flat arrays of the machine
     logical :: has_polynomial_potential = .true.  !! whether `polynomials` gives its whole restoring moment
     logical :: has_paper_law = .true.             !! whether its law is the one of eqs. (3), (5), (17) or (20)
     logical :: is_engine = .false.                !! whether its elements are excitations whose means drive
@@ -209,12 +208,12 @@ contains
     integer :: n
 
     allocate (list(0))
-    if (.not. allocated(self%law)) return
-    if (.not. self%law%has_waves) return
+    if (.not. allocated(self%tape)) return
+    if (.not. has_waves(self%tape)) return
     speeds = speed
     call self%steady_internal(late, speeds, settled)
     internal = settled(self%states * (element - 1) + 1:self%states * element)
-    associate (tape => self%law%law%tape, turns => size(self%elastic) == 0, number => self%first - 1 + element)
+    associate (tape => self%tape, turns => size(self%elastic) == 0, number => self%first - 1 + element)
       if (tape%twist > 0) then
         call waves_at(self, element, speed, internal, [tape%twist], .false., waves)
         n = size(waves)
@@ -359,7 +358,7 @@ contains
   !> Sets the energies that internal states keep. By default they keep none.
   pure subroutine keep_energy(self, elements)
     class(bank_t), intent(in) :: self
-    type(elements_t), intent(inout) :: elements   !! of the machine
+    type(element_values_t), intent(inout) :: elements   !! of the machine
   end subroutine keep_energy
 
   !> What the elements put out, by default the torque of each on its body.
@@ -376,7 +375,7 @@ contains
   !> Values of a quantity without a form, of all elements of the bank, after `evaluate`. Banks that have one override this.
   pure subroutine observe(self, elements, quantity, lane, values)
     class(bank_t), intent(in) :: self
-    type(elements_t), intent(in) :: elements   !! of the machine
+    type(element_values_t), intent(in) :: elements   !! of the machine
     integer, intent(in) :: quantity   !! index in `quantities`
     integer, intent(in) :: lane
     real(wp), intent(out) :: values(:)   !! [elements of the bank], in the unit of the quantity

@@ -1,8 +1,8 @@
-!> Elements with the same form of law: their parameters, the law, and its branches.
+!> Elements with the same form of law: their parameters, the law, and the names of its branches.
 !>
 !> The polynomial part of the law is given as multiples of parameters, which one loop evaluates for all elements of a machine
 !> (`polynomial_laws_t`); the rest is written once, as formulas in `describe`, from which moments, rates, derivatives, energies,
-!> Taylor series and the choice of branches follow (`element_law_t`).
+!> Taylor series and the choice of branches follow (`element_law_t`). What changes while they are evaluated is a `bank_state_t`.
 !>
 !> An element may have a *phase*: another element, which belongs to a bank of its own that follows, and whose angle and speed the
 !> law reads beside its own. The law gives a moment for both. The phases of a bank follow one another as its elements do.
@@ -12,19 +12,18 @@
 !>
 !> A law with kinks or jumps has *branches*: on each branch it is one smooth formula that may be evaluated anywhere. A branch
 !> selects constants of the formulas (`pick`), or a segment of a curve; guards, which tell where a branch holds, contain no picks.
-!> Only `choose` changes a branch. The branches divide the plane of the law's variables, so the branch follows from the state and
-!> a law has no memory. Every boundary of a branch is shifted outwards by `boundary_width`, relative to the scale of the law: a
-!> lane that has just crossed it is well inside its new branch.
+!> The branches divide the plane of the law's variables, so the branch follows from the state and a law has no memory. Every
+!> boundary of a branch is shifted outwards by `boundary_width`, relative to the scale of the law: a lane that has just crossed it
+!> is well inside its new branch.
 module nocdyn_described_elements
   use nocdyn_curves, only: curve_t
   use nocdyn_element_keys, only: element_keys_t
-  use nocdyn_element_laws, only: element_law_t, new_element_law
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_law_expressions, only: expression_t, parameter_of
   use nocdyn_law_tape, only: at_element, law_tape_t, new_law_tape
-  use nocdyn_law_waves, only: take_means
-  use nocdyn_laws, only: law_parameter_t, strip_lanes
+  use nocdyn_law_waves, only: has_waves, take_means
+  use nocdyn_laws, only: law_parameter_t
   use nocdyn_polynomial_laws, only: polynomial_laws_t
   implicit none (type, external)
   private
@@ -62,12 +61,10 @@ module nocdyn_described_elements
     character(len=24), allocatable :: switch_names(:)   !! of the boundaries, e.g. 'edge of the gap', [switches]
     integer, allocatable :: choices(:)            !! branches of each switch, [switches]; 0: the segments of `curve`; negative:
                                                   !! something else than guards chooses them
-    integer, allocatable :: branch(:, :)          !! present branch of each switch, 1 or more, or a segment; [lanes, switches]
-    integer, allocatable, private :: kept_branch(:, :)   !! after `keep_branches`
     type(law_parameter_t), allocatable :: parameters(:)
     type(polynomial_term_t), allocatable :: terms(:)   !! of the polynomial part of the law
     type(curve_t), allocatable :: curve(:, :)     !! of the first switch of each element, [lanes, elements]
-    type(element_law_t), allocatable :: law       !! the part that is not polynomial
+    type(law_tape_t), allocatable :: tape         !! the part of the law that is not polynomial
   contains
     procedure :: polynomials
     procedure :: describe
@@ -83,12 +80,6 @@ module nocdyn_described_elements
     procedure :: prepare_law
     procedure :: describe_mean
     procedure :: refresh_lane
-    procedure :: evaluate
-    procedure :: choose
-    procedure :: set_branch
-    procedure :: keep_branches, restore_branches
-    procedure :: indicator
-    procedure :: block_indicators
     procedure :: fastest_wave
     procedure :: pass_parameters
   end type described_elements_t
@@ -105,7 +96,7 @@ contains
     self%values = lanes * count
     self%internal_values = lanes * self%states * count
     allocate (self%parameters(0), self%terms(0))
-    allocate (self%switch_element(0), self%switch_names(0), self%choices(0), self%branch(lanes, 0))
+    allocate (self%switch_element(0), self%switch_names(0), self%choices(0))
   end subroutine set_size
 
   !> The time to compare with the times at which a law changes: later by some roundings, by which a step may end too early.
@@ -215,7 +206,7 @@ contains
     end if
   end function parameter
 
-  !> Gives every element one more switch, which is on its first branch until `choose` sets it.
+  !> Gives every element one more switch.
   subroutine add_switches(self, names, choices)
     class(described_elements_t), intent(inout) :: self
     character(len=*), intent(in) :: names(:)   !! of the boundaries, [elements]
@@ -225,73 +216,38 @@ contains
     self%switch_names = [character(len=len(self%switch_names)) :: self%switch_names, names]
     self%switch_element = [self%switch_element, (e, e=1, self%count)]
     self%choices = [self%choices, spread(choices, 1, self%count)]
-    deallocate (self%branch)
-    allocate (self%branch(self%lanes, size(self%switch_element)), source=1)
   end subroutine add_switches
 
-  !> Records the law and computes its constants. Every constructor of a bank that overrides `describe` calls it at the end.
-  subroutine prepare_law(self, elements)
+  !> Records the law. Every constructor of a bank that overrides `describe` calls it at the end.
+  subroutine prepare_law(self)
     class(described_elements_t), intent(inout) :: self
-    integer, intent(in), optional :: elements   !! of the machine; absent: as for the bank
     type(law_tape_t), target :: tape
-    integer :: all_elements, lane
 
-    all_elements = self%count
-    if (present(elements)) all_elements = elements
-    if (allocated(self%law)) then
-      if (present(elements) .and. self%law%law%strip == strip_lanes(self%lanes, all_elements)) return
-      deallocate (self%law)
-    end if
+    if (allocated(self%tape)) deallocate (self%tape)
     if (self%is_polynomial .or. self%values == 0) return
     tape = new_law_tape(self%states)
     call self%describe(tape)
     if (self%is_mean) call take_means(tape, self%turns)
     if (self%is_mean .and. self%steady_part == stays_away) tape%applied = 0
-    allocate (self%law, source=new_element_law(tape, self%lanes, self%count, self%states, &
-                                               strip_lanes(self%lanes, all_elements)))
-    do lane = 1, self%lanes
-      call self%refresh_lane(lane)
-    end do
+    allocate (self%tape, source=tape)
   end subroutine prepare_law
-
   !> Replaces the law by the one of steady states.
   subroutine describe_mean(self, turns)
     class(described_elements_t), intent(inout) :: self
     logical, intent(in) :: turns   !! whether its angle advances, else it is a twist that stays
 
-    if (self%steady_part == stays_whole .or. .not. allocated(self%law)) return
-    if (.not. self%law%has_waves) return
+    if (self%steady_part == stays_whole .or. .not. allocated(self%tape)) return
+    if (.not. has_waves(self%tape)) return
     self%is_mean = .true.
     self%turns = turns
     call self%prepare_law()
   end subroutine describe_mean
 
-  !> Computes the constants of the law again, after a change of the parameters of a lane.
+  !> Computes what the elements keep of the parameters of a lane, after these have changed. By default they keep nothing.
   subroutine refresh_lane(self, lane)
     class(described_elements_t), intent(inout) :: self
     integer, intent(in) :: lane
-    integer :: e
-
-    if (.not. allocated(self%law)) return
-    do e = 1, self%count
-      call refresh_element(self, lane, e, .false.)
-    end do
   end subroutine refresh_lane
-
-  subroutine refresh_element(self, lane, element, is_branch_only)
-    class(described_elements_t), intent(inout) :: self
-    integer, intent(in) :: lane, element
-    logical, intent(in) :: is_branch_only   !! whether the parameters are as before
-
-    associate (branch => self%branch(lane, element::self%count), law => self%law)
-      if (allocated(self%curve)) then
-        call law%refresh(lane, element, self%parameters, branch, is_branch_only, self%curve(lane, element))
-      else
-        call law%refresh(lane, element, self%parameters, branch, is_branch_only)
-      end if
-    end associate
-  end subroutine refresh_element
-
   !> Lists the parameter arrays of its elements, and the operations of its law.
   subroutine pass_parameters(self, parameters)
     class(described_elements_t), intent(inout) :: self
@@ -304,10 +260,10 @@ contains
       end associate
     end do
     if (allocated(self%curve)) call parameters%add_curves(self%curve)
-    if (.not. (allocated(self%law) .and. parameters%describes)) return
-    associate (node => self%law%law%tape%node, count => self%law%law%tape%count)
+    if (.not. (allocated(self%tape) .and. parameters%describes)) return
+    associate (node => self%tape%node, count => self%tape%count)
       call parameters%add_structure([(node(i)%operation, i=1, count)], [(node(i)%a, i=1, count)], [(node(i)%b, i=1, count)], &
-                                    self%law%law%tape%list)
+                                    self%tape%list)
     end associate
   end subroutine pass_parameters
 
@@ -340,124 +296,12 @@ contains
     end if
   end subroutine describe
 
-  !> Adds the part of the law that is not polynomial to the moments of the elements, and sets the rates of the internal
-  !> states. All arrays but `time` are flat: the lanes of its first element, then the ones of its second, and so on.
-  subroutine evaluate(self, time, angle, speed, internal, restoring, applied, rate)
-    class(described_elements_t), intent(inout) :: self
-    real(wp), intent(in) :: time(self%lanes)                                      !! t [s]
-    real(wp), intent(in), dimension(self%values * self%ports) :: angle, speed     !! u [rad], u' [rad/s]; phases come last
-    real(wp), intent(in) :: internal(self%internal_values)                        !! [lanes, states, elements]
-    real(wp), intent(inout), dimension(self%values * self%ports) :: restoring, applied   !! [N m]
-    real(wp), intent(inout) :: rate(self%internal_values)                     !! of the internal states
-
-    if (allocated(self%law)) call self%law%evaluate(time, angle, speed, internal, restoring, applied, rate)
-  end subroutine evaluate
-
-  !> Sets the branch of a switch in one lane to the one that contains the state.
-  subroutine choose(self, switch, lane, t, motion_of_element, internal)
-    class(described_elements_t), intent(inout) :: self
-    integer, intent(in) :: switch          !! numbered within the bank
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: t              !! [s]
-    real(wp), intent(in) :: motion_of_element(4)   !! u [rad], u' [rad/s] of the switching element, and of its phase
-    real(wp), intent(in) :: internal(:)    !! its internal states
-    real(wp) :: best, inside, motion(5)
-    integer :: before, i, slot
-
-    if (self%choices(switch) < 0) return
-    if (.not. self%law%is_ready) call self%law%make_ready()
-    associate (branch => self%branch(lane, switch), e => self%switch_element(switch), numbers => self%law%numbers)
-      before = branch
-      slot = self%law%law%slot(lane, e)
-      motion = [time_reached(t), motion_of_element]
-      if (self%choices(switch) == 0) then
-        call numbers%curve_argument(slot, motion(:3), internal, inside)
-        branch = self%curve(lane, e)%segment(inside)
-      else
-        best = -huge(best)
-        do i = 1, self%choices(switch)
-          call numbers%lowest_guard(slot, number_in_element(self, switch), i, motion, internal, .false., inside)
-          if (inside <= best) cycle
-          best = inside
-          branch = i
-          if (best > 0) exit
-        end do
-      end if
-      if (branch /= before) call refresh_element(self, lane, e, .true.)
-    end associate
-  end subroutine choose
-
-  !> Sets the branch of a switch in one lane.
-  subroutine set_branch(self, switch, lane, branch)
-    class(described_elements_t), intent(inout) :: self
-    integer, intent(in) :: switch   !! numbered within the bank
-    integer, intent(in) :: lane, branch
-
-    if (self%branch(lane, switch) == branch) return
-    self%branch(lane, switch) = branch
-    call refresh_element(self, lane, self%switch_element(switch), .true.)
-  end subroutine set_branch
-
-  !> Keeps the present branches, to which `restore_branches` goes back.
-  subroutine keep_branches(self)
-    class(described_elements_t), intent(inout) :: self
-
-    self%kept_branch = self%branch
-  end subroutine keep_branches
-
-  subroutine restore_branches(self)
-    class(described_elements_t), intent(inout) :: self
-    integer :: lane, switch
-
-    do switch = 1, size(self%kept_branch, 2)
-      do lane = 1, size(self%kept_branch, 1)
-        call self%set_branch(switch, lane, self%kept_branch(lane, switch))
-      end do
-    end do
-  end subroutine restore_branches
-
-  !> Number of a switch among the ones of its element.
-  pure integer function number_in_element(self, switch)
-    class(described_elements_t), intent(in) :: self
-    integer, intent(in) :: switch   !! numbered within the bank
-
-    number_in_element = (switch - 1) / self%count + 1
-  end function number_in_element
-
-  !> Distance of a lane from the nearest boundary of its present branch, in a unit of the law: continuous, negative beyond.
-  subroutine indicator(self, switch, lane, motion, internal, distance)
-    class(described_elements_t), intent(inout) :: self
-    integer, intent(in) :: switch          !! numbered within the bank
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: motion(5)      !! t [s], u [rad], u' [rad/s] of the switching element, and of its phase
-    real(wp), intent(in) :: internal(:)    !! its internal states
-    real(wp), intent(out) :: distance
-
-    if (.not. self%law%is_ready) call self%law%make_ready()
-    call self%law%numbers%lowest_guard(self%law%law%slot(lane, self%switch_element(switch)), number_in_element(self, switch), &
-                                       self%branch(lane, switch), motion, internal, .true., distance)
-  end subroutine indicator
-
-  !> Indicators of all switches in all lanes of a block.
-  subroutine block_indicators(self, time, angle, speed, internal, distance)
-    class(described_elements_t), intent(inout) :: self
-    real(wp), intent(in) :: time(self%lanes)                         !! t [s]
-    real(wp), intent(in), dimension(self%values * self%ports) :: angle, speed   !! u [rad], u' [rad/s]; phases come last
-    real(wp), intent(in) :: internal(self%internal_values)           !! [lanes, states, elements]
-    real(wp), intent(inout) :: distance(:, :)                        !! [lanes, switches]
-
-    call self%law%lowest_guards(self%branch, time, angle, speed, internal, distance)
-  end subroutine block_indicators
-
-  !> The largest rate at which the moments of one lane oscillate with the time or an angle [rad/s]: the one of the sines of the
-  !> law.
-  pure real(wp) function fastest_wave(self, lane, speed)
+  !> The largest rate of oscillations in one lane that are no part of the law [rad/s]. By default there are none.
+  pure real(wp) function fastest_wave(self, lane)
     class(described_elements_t), intent(in) :: self
     integer, intent(in) :: lane
-    real(wp), intent(in) :: speed(:)   !! u' of the elements, then of their phases [rad/s]
 
     fastest_wave = 0.0_wp
-    if (allocated(self%law)) fastest_wave = self%law%fastest(lane, speed)
   end function fastest_wave
 
 end module nocdyn_described_elements

@@ -4,7 +4,7 @@
 !> input are the coefficients 1 where that input has the coefficient 1 and all others have none. The values of a few elements of
 !> one lane are computed number by number.
 module nocdyn_element_laws
-  use nocdyn_elements, only: elements_t, internal_states_t
+  use nocdyn_elements, only: element_values_t, internal_values_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_numbers, only: law_numbers_t, new_law_numbers
   use nocdyn_law_strips, only: fill, load, load_lanes, unload
@@ -154,9 +154,9 @@ contains
     class(element_law_t), intent(inout) :: self
     integer, intent(in) :: first, first_internal   !! first element and internal state of the bank in the machine
     integer, intent(in) :: first_cross             !! first of its derivatives between elements and phases
-    type(elements_t), intent(inout) :: elements
+    type(element_values_t), intent(inout) :: elements
     real(wp) :: none(0)
-    integer :: strip
+    integer :: e, i, strip
 
     if (.not. self%is_ready) call make_ready(self)
     if (self%states > 0) then
@@ -174,7 +174,15 @@ contains
         if (self%ports == at_phase) call differentiate_phases(self, strip, first, first_cross, elements)
         call differentiate_by_states(self, strip, first_internal, z)
       end do
-      if (self%ports == at_phase) call to%cross%subtract_curvatures(first_cross, law%elements, to%restoring_curvature)
+      if (self%ports == at_phase) then   ! `mixed` has half of the second derivatives along both angles
+        do e = 1, law%elements
+          do i = 0, 1
+            associate (pair => first_cross + 2 * (e - 1) + i, own => to%restoring_curvature(:, first - 1 + e + i * law%elements))
+              to%cross%mixed(:, pair) = to%cross%mixed(:, pair) - 0.5_wp * (own + to%cross%curvature(:, pair))
+            end associate
+          end do
+        end do
+      end if
     end associate
   end subroutine differentiate
 
@@ -182,7 +190,7 @@ contains
   subroutine differentiate_by_motion(self, strip, first, first_internal, to)
     class(element_law_t), intent(inout) :: self
     integer, intent(in) :: strip, first, first_internal
-    type(elements_t), intent(inout) :: to
+    type(element_values_t), intent(inout) :: to
     integer :: i
 
     associate (law => self%law, tape => self%law%tape, work => self%tangents)
@@ -212,12 +220,12 @@ contains
   end subroutine differentiate_by_motion
 
   !> Derivatives of the moments of the elements by the motion of their phases, and of the ones of the phases, in a strip, after
-  !> `walk` for the values. The mixed second derivative is that along both angles, less those along each (`subtract_curvatures`).
+  !> `walk` for the values. The mixed second derivative is that along both angles, less those along each (`differentiate`).
   subroutine differentiate_phases(self, strip, first, cross, to)
     class(element_law_t), intent(inout) :: self
     integer, intent(in) :: strip, first
     integer, intent(in) :: cross   !! first derivative between elements and phases: element by phase, then phase by element
-    type(elements_t), intent(inout) :: to
+    type(element_values_t), intent(inout) :: to
     integer :: i, phase
 
     phase = first + self%law%elements
@@ -250,7 +258,7 @@ contains
 
   pure subroutine clear_internal(first, last, internal)
     integer, intent(in) :: first, last
-    type(internal_states_t), intent(inout) :: internal
+    type(internal_values_t), intent(inout) :: internal
 
     internal%applied(:, first:last) = 0.0_wp
     internal%rate_speed(:, first:last) = 0.0_wp
@@ -263,7 +271,7 @@ contains
     class(element_law_t), intent(inout) :: self
     integer, intent(in) :: strip
     integer, intent(in) :: first   !! internal state of the bank in the machine
-    type(internal_states_t), intent(inout) :: internal
+    type(internal_values_t), intent(inout) :: internal
     integer :: i, j, members
 
     members = size(internal%rate_internal, 2)
@@ -308,7 +316,7 @@ contains
   subroutine evaluate_energies(self, first, elements)
     class(element_law_t), intent(inout) :: self
     integer, intent(in) :: first   !! element of the bank in the machine
-    type(elements_t), intent(inout) :: elements
+    type(element_values_t), intent(inout) :: elements
     integer :: strip
 
     associate (law => self%law, tape => self%law%tape, work => self%energies, to => elements)

@@ -5,6 +5,7 @@ module nocdyn_operating_points
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_law_points, only: law_point_t, new_law_point
+  use nocdyn_law_tape, only: law_inputs_t
   use nocdyn_law_waves, only: law_wave_t, list_waves
   implicit none (type, external)
   private
@@ -15,7 +16,7 @@ module nocdyn_operating_points
 
 contains
 
-  !> The point at some inputs, on the branches that hold there. Branches that guards do not choose are the present ones.
+  !> The point at some inputs, on the branches that hold there. Of branches that guards do not choose it is the first one.
   subroutine find_point(bank, element, time, speed, internal, point)
     class(described_elements_t), intent(in) :: bank
     integer, intent(in) :: element       !! numbered within the bank
@@ -23,22 +24,24 @@ contains
     real(wp), intent(in) :: speed        !! u' [rad/s]; the angles, and the speed of the phase, are zero
     real(wp), intent(in) :: internal(:)  !! its internal states
     type(law_point_t), intent(out) :: point
+    type(law_inputs_t) :: inputs
     integer :: s
 
-    associate (law => bank%law, switches => element + bank%count * [(s - 1, s=1, size(bank%choices) / bank%count)])
-      point = new_law_point(law%law, element, bank%branch(1, switches))
+    inputs = bank%tape%inputs()
+    associate (tape => bank%tape, switches => size(bank%choices) / bank%count)
+      point = new_law_point(tape, element, spread(1, 1, switches))
       call set_constants(bank, point)
-      if (law%time > 0) point%x(law%time) = time_reached(time)
-      if (law%speed > 0) point%x(law%speed) = speed
+      if (inputs%time > 0) point%x(inputs%time) = time_reached(time)
+      if (inputs%speed > 0) point%x(inputs%speed) = speed
       do s = 1, bank%states
-        if (law%state(s) > 0) point%x(law%state(s)) = internal(s)
+        if (inputs%state(s) > 0) point%x(inputs%state(s)) = internal(s)
       end do
-      call point%evaluate(law%law%tape, 0)
-      do s = 1, size(switches)
-        call choose(bank, s, bank%choices(switches(s)), point)
+      call point%evaluate(tape, 0)
+      do s = 1, switches
+        call choose(bank, s, bank%choices(element + bank%count * (s - 1)), point)
       end do
-      if (law%time > 0) point%x(law%time) = time
-      call point%evaluate(law%law%tape, 0)
+      if (inputs%time > 0) point%x(inputs%time) = time
+      call point%evaluate(tape, 0)
     end associate
   end subroutine find_point
 
@@ -47,13 +50,13 @@ contains
     type(law_point_t), intent(inout) :: point
 
     if (allocated(bank%curve)) then
-      call point%set_constants(bank%law%law, bank%curve(1, point%element))
+      call point%set_constants(bank%tape, bank%parameters, bank%curve(1, point%element))
     else
-      call point%set_constants(bank%law%law)
+      call point%set_constants(bank%tape, bank%parameters)
     end if
   end subroutine set_constants
 
-  !> Sets one branch to the one that contains the point, as `choose` of the bank does.
+  !> Sets one branch to the one that contains the point, as `choose` of `bank_state_t` does.
   subroutine choose(bank, switch, choices, point)
     class(described_elements_t), intent(in) :: bank
     integer, intent(in) :: switch    !! of the element
@@ -63,7 +66,7 @@ contains
     integer :: i
 
     if (choices < 0) return
-    associate (tape => bank%law%law%tape, branch => point%branch(switch))
+    associate (tape => bank%tape, branch => point%branch(switch))
       if (choices == 0) branch = bank%curve(1, point%element)%segment(point%x(tape%argument))
       best = -huge(best)
       do i = 1, choices
@@ -89,18 +92,20 @@ contains
     logical, intent(in) :: turns         !! whether the angle of the element advances
     type(law_wave_t), allocatable, intent(out) :: list(:)
     real(wp), intent(in), optional :: kept   !! value of `control`; absent: as the law gives it
+    type(law_inputs_t) :: inputs
     type(law_point_t) :: point
 
-    if (bank%steady_part /= stays_as_mean .or. .not. allocated(bank%law)) then
+    if (bank%steady_part /= stays_as_mean .or. .not. allocated(bank%tape)) then
       allocate (list(0))
       return
     end if
-    associate (law => bank%law, tape => bank%law%law%tape)
+    inputs = bank%tape%inputs()
+    associate (tape => bank%tape)
       call find_point(bank, element, late, speed, internal, point)
-      if (law%time > 0) point%x(law%time) = 0.0_wp
+      if (inputs%time > 0) point%x(inputs%time) = 0.0_wp
       if (present(kept)) point%x(tape%control) = kept
       call point%evaluate(tape, merge(tape%control, 0, present(kept)))
-      call list_waves(tape, law%law_inputs_t, point, results, turns, list)
+      call list_waves(tape, inputs, point, results, turns, list)
     end associate
   end subroutine waves_at
 
@@ -115,6 +120,7 @@ contains
     real(wp), intent(inout) :: internal(:) !! its internal states
     integer, parameter :: most_steps = 50
     real(wp), parameter :: tolerance = 1.0e-13_wp   ! relative to the largest step
+    type(law_inputs_t) :: inputs
     type(law_point_t) :: point
     integer :: i, k, pivots(count(.not. is_decided)), unknown(count(.not. is_decided))
     real(wp) :: matrix(size(unknown), size(unknown)), scale, step(size(unknown))
@@ -123,7 +129,8 @@ contains
     unknown = pack([(i, i=1, size(internal))], .not. is_decided)
     internal(unknown) = 0.0_wp
     scale = 0.0_wp
-    associate (tape => bank%law%law%tape, state => bank%law%state(unknown))
+    inputs = bank%tape%inputs()
+    associate (tape => bank%tape, state => inputs%state(unknown))
       do i = 1, most_steps
         call find_point(bank, element, time, speed, internal, point)
         do k = 1, size(unknown)
@@ -155,10 +162,10 @@ contains
     integer :: i
 
     allocate (speeds(0), roots(0))
-    if (.not. allocated(bank%law)) return
+    if (.not. allocated(bank%tape)) return
     internal = 0.0_wp
     call find_point(bank, element, time, 0.0_wp, internal, point)
-    associate (tape => bank%law%law%tape)
+    associate (tape => bank%tape)
       if (allocated(bank%curve)) roots = roots_of(bank, tape%argument, bank%curve(1, element)%knots(), point)
       do i = 1, size(tape%guard)
         roots = [roots, roots_of(bank, tape%guard(i), [0.0_wp], point)]
@@ -177,11 +184,13 @@ contains
     type(law_point_t), intent(inout) :: point    !! without speed
     real(wp), allocatable :: roots(:)
     real(wp), parameter :: none = 1.0e100_wp, rounding = 1.0e-9_wp
+    type(law_inputs_t) :: inputs
     real(wp) :: slope, start
     logical :: is_linear
 
     allocate (roots(0))
-    associate (tape => bank%law%law%tape, speed => bank%law%speed, one => bank%law%law%tape%node(node))
+    inputs = bank%tape%inputs()
+    associate (tape => bank%tape, speed => inputs%speed, one => bank%tape%node(node))
       if (.not. one%has_speed .or. one%has_angle .or. one%has_state) return
       call point%differentiate(tape, node)
       start = point%x(node)

@@ -5,7 +5,7 @@
 !> Large machines spend their time on reading the coefficients. A plain spring, which has no rest angle, constant or
 !> by_speed_squared, needs linear, cubic and by_speed only: in long runs of plain springs no other coefficients are read.
 module nocdyn_polynomial_laws
-  use nocdyn_elements, only: elements_t
+  use nocdyn_elements, only: element_values_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   implicit none (type, external)
@@ -159,7 +159,7 @@ contains
   !> Sets the moments of all elements: eqs. (3), (49), (50) as restoring moments; eqs. (5) and (20) as applied ones.
   subroutine evaluate(self, elements)
     class(polynomial_laws_t), intent(in) :: self
-    type(elements_t), intent(inout) :: elements   !! angles and speeds are set
+    type(element_values_t), intent(inout) :: elements   !! angles and speeds are set
     integer :: part
 
     if (self%is_divided) then
@@ -211,7 +211,7 @@ contains
   !> Sets the derivatives of the moments; `restoring_angle` is minus the tangent stiffness K1 + 3 k1 w^2 of eqs. (64)-(68).
   subroutine differentiate(self, elements)
     class(polynomial_laws_t), intent(in) :: self
-    type(elements_t), intent(inout) :: elements
+    type(element_values_t), intent(inout) :: elements
     real(wp) :: w
     integer :: e, l
 
@@ -230,7 +230,7 @@ contains
   !> Sets the stored energies linear w^2 / 2 + cubic w^4 / 4.
   subroutine evaluate_energies(self, elements)
     class(polynomial_laws_t), intent(in) :: self
-    type(elements_t), intent(inout) :: elements
+    type(element_values_t), intent(inout) :: elements
 
     call energies(self%values, self%rest, self%linear, self%cubic, elements%angle, elements%stored)
   end subroutine evaluate_energies

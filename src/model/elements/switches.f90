@@ -1,6 +1,7 @@
 !> The switches of a machine, numbered consecutively over all banks. A switch selects the branch of an element's law.
 module nocdyn_switches
   use nocdyn_bank, only: bank_slot_t
+  use nocdyn_bank_states, only: bank_state_t
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: quoted
   implicit none (type, external)
@@ -59,35 +60,42 @@ contains
   end function new_switches
 
   !> Sets the branch of a switch in one lane to the one that contains the state.
-  subroutine choose(self, banks, switch, lane, t, motion, internal)
+  subroutine choose(self, banks, states, switch, lane, t, motion, internal)
     class(switches_t), intent(in) :: self
-    type(bank_slot_t), intent(inout) :: banks(:)
+    type(bank_slot_t), intent(in) :: banks(:)
+    type(bank_state_t), intent(inout) :: states(:)   !! of the banks
     integer, intent(in) :: switch, lane   !! switch numbered in the machine
     real(wp), intent(in) :: t             !! [s]
     real(wp), intent(in) :: motion(4)     !! u [rad], u' [rad/s] of the element of the switch, and of its phase
     real(wp), intent(in) :: internal(:)   !! the internal states of all elements
 
-    call banks(self%bank(switch))%bank%choose(self%number(switch), lane, t, motion, &
-                                              internal(self%first_internal(switch):self%last_internal(switch)))
+    associate (b => self%bank(switch))
+      call states(b)%choose(banks(b)%bank, self%number(switch), lane, t, motion, &
+                            internal(self%first_internal(switch):self%last_internal(switch)))
+    end associate
   end subroutine choose
 
   !> Distance of a lane from the nearest boundary of the present branch of a switch, negative beyond it.
-  subroutine indicator(self, banks, switch, lane, motion, internal, distance)
+  subroutine indicator(self, banks, states, switch, lane, motion, internal, distance)
     class(switches_t), intent(in) :: self
-    type(bank_slot_t), intent(inout) :: banks(:)
+    type(bank_slot_t), intent(in) :: banks(:)
+    type(bank_state_t), intent(inout) :: states(:)   !! of the banks
     integer, intent(in) :: switch, lane   !! switch numbered in the machine
     real(wp), intent(in) :: motion(5)     !! t [s]; u [rad], u' [rad/s] of the element of the switch, and of its phase
     real(wp), intent(in) :: internal(:)   !! the internal states of all elements
     real(wp), intent(out) :: distance     !! in a unit of the law
 
-    call banks(self%bank(switch))%bank%indicator(self%number(switch), lane, motion, &
-                                                 internal(self%first_internal(switch):self%last_internal(switch)), distance)
+    associate (b => self%bank(switch))
+      call states(b)%indicator(banks(b)%bank, self%number(switch), lane, motion, &
+                               internal(self%first_internal(switch):self%last_internal(switch)), distance)
+    end associate
   end subroutine indicator
 
   !> Indicators of all switches in all lanes of a block.
-  subroutine block_indicators(self, banks, time, angle, speed, internal, distance)
+  subroutine block_indicators(self, banks, states, time, angle, speed, internal, distance)
     class(switches_t), intent(in) :: self
-    type(bank_slot_t), intent(inout) :: banks(:)
+    type(bank_slot_t), intent(in) :: banks(:)
+    type(bank_state_t), intent(inout) :: states(:)   !! of the banks
     real(wp), intent(in) :: time(:)                   !! t [s], [lanes]
     real(wp), contiguous, intent(in) :: angle(:, :), speed(:, :)  !! of the elements `moving` [rad], [rad/s], [lanes, moving]
     real(wp), contiguous, intent(in) :: internal(:, :)            !! [lanes, states of all elements]
@@ -100,10 +108,10 @@ contains
       associate (bank => banks(i)%bank)
         associate (last => first + size(bank%switch_element) - 1)
           if (last < first) cycle
-          call bank%block_indicators(time, angle(:, moving + 1:moving + bank%ports * bank%count), &
-                                     speed(:, moving + 1:moving + bank%ports * bank%count), &
-                                     internal(:, bank%first_internal:bank%first_internal + bank%states * bank%count - 1), &
-                                     distance(:, first:last))
+          call states(i)%law%lowest_guards(states(i)%branch, time, angle(:, moving + 1:moving + bank%ports * bank%count), &
+                                           speed(:, moving + 1:moving + bank%ports * bank%count), &
+                                           internal(:, bank%first_internal:bank%first_internal + bank%states * bank%count - 1), &
+                                           distance(:, first:last))
           first = last + 1
           moving = moving + bank%ports * bank%count
         end associate

@@ -102,7 +102,7 @@ contains
       self%omega(:, b) = y(:, b)
       self%phi(:, b) = y(:, self%machine%bodies + b)
     end do
-    if (self%internal > 0) self%machine%elements%internal%value(:, :) = y(:, self%mechanical + 1:self%states)
+    if (self%internal > 0) self%state%elements%internal%value(:, :) = y(:, self%mechanical + 1:self%states)
   end subroutine set_state
 
   !> Evaluates the right-hand side at a state and keeps it in `slope`.
@@ -115,12 +115,12 @@ contains
     if (self%joints%count > 0) then
       call observe_with_joints(self, t, y, in_motion)
       call self%derivative(t, self%near, self%slope, self%status)
-      call self%machine%elements%scatter(self%torque)
+      call self%state%elements%scatter(self%machine%elements%rows, self%torque)
       return
     end if
     if (self%switches > 0) then
       call self%gather(y)
-      call self%machine%choose_branches(t)
+      call self%state%choose_branches(self%machine, t)
     end if
     call self%derivative(t, y, self%slope, self%status)
   end subroutine observe_bodies
@@ -173,8 +173,8 @@ contains
 
     n = self%machine%bodies
     call self%gather(y)
-    call self%machine%evaluate_elements(t)
-    call self%machine%differentiate_elements(t)
+    call self%state%evaluate_elements(self%machine, t)
+    call self%state%differentiate_elements(self%machine, t)
     dfdy = 0.0_wp
     dfdt = 0.0_wp
     if (self%joints%count > 0) then
@@ -191,7 +191,7 @@ contains
       call multiply(self%mobility(:, :, l), self%by_time, dfdt(l, :n))
       call differentiate_powers(self, l, dfdy(l, :, :), dfdt(l, :))
       call differentiate_internal(self, l, dfdy(l, :, :))
-      dfdt(l, self%mechanical + 1:self%states) = self%machine%elements%internal%rate_time(l, :)
+      dfdt(l, self%mechanical + 1:self%states) = self%state%elements%internal%rate_time(l, :)
     end do
     if (self%joints%count > 0) call self%hold_columns(components, dfdy(1, :, :), dfdt(1, :))
   end subroutine fill_of_bodies
@@ -205,18 +205,18 @@ contains
     self%by_angle(:, :) = 0.0_wp
     self%by_speed(:, :) = 0.0_wp
     self%by_time(:) = 0.0_wp
-    associate (elements => self%machine%elements)
-      call elements%rows%add_coefficients(-1.0_wp, elements%restoring_angle(lane, :), self%by_angle)
-      call elements%rows%add_coefficients(-1.0_wp, elements%applied_angle(lane, :), self%by_angle)
-      call elements%rows%add_coefficients(-1.0_wp, elements%applied_speed(lane, :), self%by_speed)
-      do e = 1, elements%cross%count
-        associate (x => elements%cross, rows => elements%rows)
-          call rows%add_product(x%element(e), x%by(e), x%restoring_angle(lane, e) + x%applied_angle(lane, e), self%by_angle)
-          call rows%add_product(x%element(e), x%by(e), x%applied_speed(lane, e), self%by_speed)
+    associate (elements => self%state%elements, rows => self%machine%elements%rows, pairs => self%machine%elements%cross)
+      call rows%add_coefficients(-1.0_wp, elements%restoring_angle(lane, :), self%by_angle)
+      call rows%add_coefficients(-1.0_wp, elements%applied_angle(lane, :), self%by_angle)
+      call rows%add_coefficients(-1.0_wp, elements%applied_speed(lane, :), self%by_speed)
+      do e = 1, pairs%count
+        associate (x => elements%cross, i => pairs%element(e), by => pairs%by(e))
+          call rows%add_product(i, by, x%restoring_angle(lane, e) + x%applied_angle(lane, e), self%by_angle)
+          call rows%add_product(i, by, x%applied_speed(lane, e), self%by_speed)
         end associate
       end do
-      do e = 1, elements%count
-        call elements%rows%add_moment(e, elements%applied_time(lane, e), self%by_time)
+      do e = 1, size(elements%applied, 2)
+        call rows%add_moment(e, elements%applied_time(lane, e), self%by_time)
       end do
     end associate
   end subroutine differentiate_torques
@@ -230,19 +230,19 @@ contains
     integer :: c, e, k, n
 
     n = self%machine%bodies
-    associate (elements => self%machine%elements)
+    associate (elements => self%state%elements, rows => self%machine%elements%rows, pairs => self%machine%elements%cross)
       do k = 1, self%quadratures
         e = self%machine%with_work(k)
-        call elements%rows%add_moment(e, elements%applied(lane, e) &
-                        + elements%speed(lane, e) * elements%applied_speed(lane, e), dfdy(self%states + k, :n))
-        call elements%rows%add_moment(e, elements%speed(lane, e) * elements%applied_angle(lane, e), &
-                        dfdy(self%states + k, n + 1:2 * n))
+        call rows%add_moment(e, elements%applied(lane, e) &
+                             + elements%speed(lane, e) * elements%applied_speed(lane, e), dfdy(self%states + k, :n))
+        call rows%add_moment(e, elements%speed(lane, e) * elements%applied_angle(lane, e), &
+                             dfdy(self%states + k, n + 1:2 * n))
         dfdt(self%states + k) = elements%applied_time(lane, e) * elements%speed(lane, e)
-        do c = 1, elements%cross%count
-          if (elements%cross%element(c) /= e) cycle
-          associate (cross => elements%cross, by => elements%cross%by(c), row => self%states + k)
-            call elements%rows%add_moment(by, elements%speed(lane, e) * cross%applied_speed(lane, c), dfdy(row, :n))
-            call elements%rows%add_moment(by, elements%speed(lane, e) * cross%applied_angle(lane, c), dfdy(row, n + 1:2 * n))
+        do c = 1, pairs%count
+          if (pairs%element(c) /= e) cycle
+          associate (cross => elements%cross, by => pairs%by(c), row => self%states + k)
+            call rows%add_moment(by, elements%speed(lane, e) * cross%applied_speed(lane, c), dfdy(row, :n))
+            call rows%add_moment(by, elements%speed(lane, e) * cross%applied_angle(lane, c), dfdy(row, n + 1:2 * n))
           end associate
         end do
       end do
@@ -257,15 +257,16 @@ contains
     integer :: e, i, k, n, s
 
     n = self%machine%bodies
-    associate (elements => self%machine%elements, internal => self%machine%elements%internal)
+    associate (elements => self%state%elements, internal => self%state%elements%internal, rows => self%machine%elements%rows, &
+               states => self%machine%elements%internal)
       do s = 1, self%internal
-        e = internal%element(s)
+        e = states%element(s)
         self%by_state(:) = 0.0_wp
-        call elements%rows%add_moment(e, internal%applied(lane, s), self%by_state)
+        call rows%add_moment(e, internal%applied(lane, s), self%by_state)
         call multiply(self%mobility(:, :, lane), self%by_state, dfdy(:n, self%mechanical + s))
-        call elements%rows%add_moment(e, internal%rate_speed(lane, s), dfdy(self%mechanical + s, :n))
-        do i = 1, internal%members(s)
-          dfdy(self%mechanical + s, self%mechanical + internal%first(s) + i - 1) = internal%rate_internal(lane, i, s)
+        call rows%add_moment(e, internal%rate_speed(lane, s), dfdy(self%mechanical + s, :n))
+        do i = 1, states%members(s)
+          dfdy(self%mechanical + s, self%mechanical + states%first(s) + i - 1) = internal%rate_internal(lane, i, s)
         end do
         do k = 1, self%quadratures
           if (self%machine%with_work(k) /= e) cycle

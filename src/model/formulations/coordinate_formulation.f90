@@ -106,7 +106,7 @@ contains
     integer :: b, c, f, k, l
 
     f = self%machine%coordinates%freedoms
-    if (self%internal > 0) self%machine%elements%internal%value(:, :) = y(:, self%mechanical + 1:self%states)
+    if (self%internal > 0) self%state%elements%internal%value(:, :) = y(:, self%mechanical + 1:self%states)
     if (self%lanes == 1) then
       call set_single_state(self, size(y, 2), y)
       return
@@ -156,7 +156,7 @@ contains
     real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states], at least
 
     call self%set_state(y)
-    associate (f => self%machine%coordinates%freedoms, elements => self%machine%elements)
+    associate (f => self%machine%coordinates%freedoms, elements => self%state%elements)
       call self%twists%multiply_pair(self%twist_at_origin, y(:, f + 1:2 * f), y(:, :f), elements%angle, elements%speed)
     end associate
   end subroutine gather
@@ -306,7 +306,8 @@ contains
           end do
         end do
       end do
-      call switches%block_indicators(self%machine%banks, t, angle, speed, y(:, self%mechanical + 1:self%states), g)
+      call switches%block_indicators(self%machine%banks, self%state%banks, t, angle, speed, &
+                                     y(:, self%mechanical + 1:self%states), g)
     end associate
   end subroutine block_indicators
 

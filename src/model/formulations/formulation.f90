@@ -4,6 +4,7 @@ module nocdyn_formulation
   use nocdyn_joint_sets, only: joint_sets_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_machine_state, only: machine_state_t, new_machine_state
   use nocdyn_system, only: system_t
   use nocdyn_text, only: quoted
   implicit none (type, external)
@@ -16,6 +17,7 @@ module nocdyn_formulation
   !> quadratures.
   type, abstract, extends(system_t), public :: formulation_t
     type(machine_t) :: machine
+    type(machine_state_t) :: state           !! of `machine`
     integer, allocatable :: moving(:)        !! bodies whose speeds and then angles are the first states
     integer :: mechanical = 0                !! number of states before the internal states
     integer :: internal = 0                  !! number of internal states
@@ -97,6 +99,7 @@ contains
     logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
 
     associate (machine => self%machine)
+      self%state = new_machine_state(machine)
       self%moving = moving
       self%mechanical = mechanical
       self%internal = machine%elements%internal%count
@@ -136,7 +139,7 @@ contains
 
   !> Evaluates bodies, elements and torques at a state, so that they and the reactions can be read.
   !>
-  !> The branches of the laws are chosen by the state: `keep_branches` of the machine keeps the branches of an integration.
+  !> The branches of the laws are chosen by the state: `keep_branches` of the state keeps the branches of an integration.
   subroutine observe_elements(self, t, y, in_motion)
     class(formulation_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)          !! [s], [lanes]
@@ -144,9 +147,9 @@ contains
     logical, intent(in), optional :: in_motion        !! whether joints keep their modes; absent or false: by the state
 
     call self%gather(y)
-    if (self%switches > 0) call self%machine%choose_branches(t)
-    call self%machine%evaluate_elements(t)
-    call self%machine%elements%scatter(self%torque)
+    if (self%switches > 0) call self%state%choose_branches(self%machine, t)
+    call self%state%evaluate_elements(self%machine, t)
+    call self%state%elements%scatter(self%machine%elements%rows, self%torque)
   end subroutine observe_elements
 
   !> Sets the motion of bodies and elements from the state.
@@ -155,7 +158,7 @@ contains
     real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states], at least
 
     call self%set_state(y)
-    call self%machine%elements%gather(self%phi, self%omega)
+    call self%state%elements%gather(self%machine%elements%rows, self%phi, self%omega)
   end subroutine gather
 
   !> Forgets the shifts of a lane, before it starts. By default there are none.
@@ -266,11 +269,11 @@ contains
     real(wp), parameter :: order = 4.0_wp   ! of what cardan joints and cranks do over the angle of their driver
     integer :: i
 
-    fastest = self%machine%fastest_wave(lane)
+    fastest = self%state%fastest_wave(self%machine, lane)
     associate (motions => self%joints%motions)
       do i = 1, motions%count
         if (motions%driver(i) == 0) cycle
-        fastest = max(fastest, order * abs(self%machine%elements%speed(lane, motions%driver(i))))
+        fastest = max(fastest, order * abs(self%state%elements%speed(lane, motions%driver(i))))
       end do
     end associate
   end function fastest_wave
@@ -300,7 +303,8 @@ contains
 
     associate (switches => self%machine%switches)
       call self%switch_motion(lane, which, y, motion)
-      call switches%indicator(self%machine%banks, which, lane, [t, motion], y(self%mechanical + 1:self%states), g(which))
+      call switches%indicator(self%machine%banks, self%state%banks, which, lane, [t, motion], &
+                              y(self%mechanical + 1:self%states), g(which))
     end associate
   end subroutine indicate_branch
 
@@ -316,7 +320,7 @@ contains
 
     associate (switches => self%machine%switches)
       call self%switch_motion(lane, which, y, motion)
-      call switches%choose(self%machine%banks, which, lane, t, motion, y(self%mechanical + 1:self%states))
+      call switches%choose(self%machine%banks, self%state%banks, which, lane, t, motion, y(self%mechanical + 1:self%states))
     end associate
   end subroutine choose_branch
 

@@ -51,7 +51,7 @@ contains
     integer, intent(in) :: lane
 
     associate (single => self%lane(lane)%single)
-      call self%machine%take_branches(lane, single%machine, 1)
+      call self%state%take_branches(self%machine, lane, single%state, 1)
       single%joints%log%count = 0   ! nobody reads it
       call self%held%take_set(lane, single%joints)
     end associate
@@ -153,11 +153,11 @@ contains
 
     if (.not. present(in_motion)) error stop 'nocdyn_joint_blocks: only motions are observed'
     call self%gather(y)
-    call self%machine%choose_branches(t)
-    call self%machine%evaluate_elements(t)
+    call self%state%choose_branches(self%machine, t)
+    call self%state%evaluate_elements(self%machine, t)
     if (self%held%is_active) then
       call find_held_moments(self)
-      associate (applied => self%machine%elements%applied)
+      associate (applied => self%state%elements%applied)
         do j = 1, self%joints%count
           associate (e => self%joints%element(j))
             applied(:, e) = applied(:, e) + self%held%moment(:, j)
@@ -165,7 +165,7 @@ contains
         end do
       end associate
     end if
-    call self%machine%elements%scatter(self%torque)
+    call self%state%elements%scatter(self%machine%elements%rows, self%torque)
   end subroutine observe
 
   !> The moments of the joints that hold, after the evaluation of the elements.
@@ -173,7 +173,7 @@ contains
     class(joint_block_t), intent(inout) :: self
     integer :: b, c, k
 
-    call self%machine%elements%scatter(self%torque)
+    call self%state%elements%scatter(self%machine%elements%rows, self%torque)
     self%lane_acceleration(:, :) = 0.0_wp
     associate (coordinates => self%machine%coordinates, q => self%lane_acceleration)
       do b = 1, self%machine%bodies
@@ -257,7 +257,7 @@ contains
     real(wp), intent(inout) :: fastest(self%lanes)
     integer :: lane
 
-    associate (f => self%machine%coordinates%freedoms, elements => self%machine%elements)
+    associate (f => self%machine%coordinates%freedoms, elements => self%state%elements)
       call self%twists%multiply_pair(self%twist_at_origin, y(1, f + 1), y, elements%angle, elements%speed)
     end associate
     do lane = 1, self%lanes

@@ -40,12 +40,12 @@ contains
       ! evaluates the elements where some joints may be locked, in a block of one lane
       self%joint_state(1, :) = y(1, :self%states)
       call self%gather(self%joint_state)
-      call self%machine%choose_branches([t(1)])
+      call self%state%choose_branches(self%machine, [t(1)])
       self%near(:) = y(1, :self%states)
       if (self%joints%motions%count > 0) call self%project(t(1), self%near)
       if (.not. by_modes) call start_joints(self, t(1), self%near)
       call self%find_held_moments(t(1), self%near)
-      call self%machine%elements%scatter(self%torque)
+      call self%state%elements%scatter(self%machine%elements%rows, self%torque)
     else
       call observe_elements(self, t, y)
     end if
@@ -197,7 +197,7 @@ contains
       end do
       call self%hold(joints%motions%speed, y)
       call self%find_held_moments(t, y(:self%states))
-      call joints%shift_boundaries(self%machine%banks, self%machine%elements, t)
+      call joints%shift_boundaries(self%machine%banks, self%state%elements, t)
       do j = 1, joints%count
         if (is_at_rest(j) .and. joints%mode(j) /= locked) then   ! a drive may leave it a slip in the other direction
           joints%shift(j) = boundary_shift * speed + max(0.0_wp, -direction_of(joints%mode(j)) * self%joint_rate(j, y))
@@ -219,7 +219,7 @@ contains
     real(wp) :: moments, resting(size(y)), slip(self%joints%count), tolerance
     integer :: j
 
-    associate (joints => self%joints, elements => self%machine%elements)
+    associate (joints => self%joints, elements => self%state%elements)
       tolerance = rest_width * speed_scale(self, y)
       do j = 1, joints%count
         slip(j) = self%joint_rate(j, y)
@@ -229,7 +229,7 @@ contains
       end do
       has_stopped = .false.
       if (which /= by_state) has_stopped = joints%mode(which) /= locked .and. is_at_rest(which)
-      call joints%assume(self%machine%banks, is_at_rest, slip)
+      call joints%assume(self%machine%banks, self%state%banks, is_at_rest, slip)
       resting = y
       if (has_stopped) then
         ! The state after a joint has stopped, in which those at rest have no slip left, so that no acceleration comes from one.
@@ -243,14 +243,14 @@ contains
             is_at_rest(j) = abs(slip(j)) <= tolerance
             is_changed = is_changed .or. is_at_rest(j)
           end do
-          if (is_changed) call joints%assume(self%machine%banks, is_at_rest, slip)
+          if (is_changed) call joints%assume(self%machine%banks, self%state%banks, is_at_rest, slip)
         end associate
       end if
       call self%find_held_moments(t, resting(:self%states))
       call self%clean_rates()
       moments = sum(abs(elements%applied(1, :))) + sum(abs(elements%restoring(1, :)))
       joints%moment_shift = boundary_shift * max(moments, tiny(moments))
-      call joints%decide(self%machine%banks, t, is_at_rest, slip, is_solved)
+      call joints%decide(self%machine%banks, self%state%banks, t, is_at_rest, slip, is_solved)
     end associate
   end subroutine decide_at
 
@@ -265,7 +265,7 @@ contains
     integer :: j, work
     logical :: is_hit
 
-    associate (joints => self%joints, elements => self%machine%elements)
+    associate (joints => self%joints, elements => self%state%elements)
       before = [(self%joint_rate(j, y), j=1, joints%count)]
       slip = before
       slip(joints%locking + 1:) = 0.0_wp
@@ -275,7 +275,7 @@ contains
       joints%impulse(:) = joints%impulse + impulse
       do j = 1, joints%locking
         if (abs(impulse(j)) <= 0) cycle
-        if (has_other_ratio(self%machine%coordinates, elements%rows, joints%element(j))) joints%lost = j
+        if (has_other_ratio(self%machine%coordinates, self%machine%elements%rows, joints%element(j))) joints%lost = j
       end do
       do j = 1, joints%count
         call self%push(j, impulse(j), y)
@@ -310,7 +310,7 @@ contains
       if (before(j) /= locked) then   ! it is not, and cannot be
         if (self%joints%is_open(self%machine%banks, j, t)) cycle
       end if
-      self%joints%moment(j) = self%machine%elements%applied(1, self%joints%element(j))
+      self%joints%moment(j) = self%state%elements%applied(1, self%joints%element(j))
       call self%joints%note(t, j, before(j), slip(j), self%joints%impulse(j))
     end do
   end subroutine settle_at_event

@@ -57,7 +57,7 @@ contains
 
     n = self%machine%bodies
     call self%set_state(y)
-    call self%machine%evaluate(t, self%phi, self%omega, self%torque)
+    call self%state%evaluate(self%machine, t, self%phi, self%omega, self%torque)
     do l = 1, self%lanes
       self%solution(:n, l) = self%torque(l, 1:)
       self%solution(n + 1:, l) = 0.0_wp
@@ -65,8 +65,8 @@ contains
       dydt(l, :n) = self%solution(:n, l)
     end do
     dydt(:, n + 1:2 * n) = y(:, :n)
-    if (self%internal > 0) dydt(:, self%mechanical + 1:self%states) = self%machine%elements%internal%rate
-    if (self%quadratures > 0) call self%machine%power(dydt(:, self%states + 1:))
+    if (self%internal > 0) dydt(:, self%mechanical + 1:self%states) = self%state%elements%internal%rate
+    if (self%quadratures > 0) call self%state%power(self%machine, dydt(:, self%states + 1:))
     if (self%joints%count > 0) call self%hold_derivative(self%states + self%quadratures, t(1), dydt, status(1))
   end subroutine derivative
 

@@ -6,7 +6,7 @@ module nocdyn_paper
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pseudo_inverse
   use nocdyn_lapack_lu, only: lu_factor
-  use nocdyn_machine, only: machine_t
+  use nocdyn_machine_state, only: machine_state_t, new_machine_state
   use nocdyn_paper_matrices, only: elastic_moments, inertia_matrices_t, new_paper_matrices, paper_matrices_t, tangent_matrix
   implicit none (type, external)
   private
@@ -51,9 +51,7 @@ contains
     allocate (self%couplings, source=coupling_elements(self%machine))
     allocate (incidence(n, size(self%couplings)), source=0.0_wp)
     do l = 1, size(self%couplings)
-      associate (elements => self%machine%elements, e => self%couplings(l))
-        call elements%rows%add_moment(e, 1.0_wp, incidence(:, l))
-      end associate
+      call self%machine%elements%rows%add_moment(self%couplings(l), 1.0_wp, incidence(:, l))
     end do
     self%moment_of_bodies = pseudo_inverse(incidence, 1.0e-10_wp)
   end subroutine formulate
@@ -62,7 +60,7 @@ contains
   function start(self) result(y)
     class(paper_t), intent(in) :: self
     real(wp), allocatable :: y(:, :)
-    type(machine_t) :: machine
+    type(machine_state_t) :: state
     real(wp) :: t(self%lanes), moments(self%machine%bodies)
     real(wp), dimension(self%lanes, 0:self%machine%bodies) :: phi, omega, torque
     integer :: l, n
@@ -73,13 +71,13 @@ contains
     omega = 0.0_wp
     t = 0.0_wp
     phi(:, 1:) = self%machine%start_angle
-    machine = self%machine
-    if (self%internal > 0) machine%elements%internal%value = machine%start_internal()
-    call machine%elements%gather(phi, omega)
-    call machine%choose_branches(t)
-    call machine%evaluate(t, phi, omega, torque)
+    state = new_machine_state(self%machine)
+    if (self%internal > 0) state%elements%internal%value = self%machine%start_internal()
+    call state%elements%gather(self%machine%elements%rows, phi, omega)
+    call state%choose_branches(self%machine, t)
+    call state%evaluate(self%machine, t, phi, omega, torque)
     do l = 1, self%lanes
-      call elastic_moments(machine, l, moments)
+      call elastic_moments(self%machine, state%elements, l, moments)
       y(l, 2 * n + 1:3 * n) = moments
     end do
   end function start
@@ -95,16 +93,16 @@ contains
 
     n = self%machine%bodies
     call self%set_state(y)
-    call self%machine%evaluate(t, self%phi, self%omega, self%torque)
-    call self%machine%differentiate_elements(t)
+    call self%state%evaluate(self%machine, t, self%phi, self%omega, self%torque)
+    call self%state%differentiate_elements(self%machine, t)
     do l = 1, self%lanes
-      call self%work%assemble(self%machine, l, self%complement(:, :, l))
+      call self%work%assemble(self%machine, self%state%elements, l, self%complement(:, :, l))
       self%work%beta(:) = y(l, :3 * n)
       call self%work%solve(self%factors(:, :, l), self%pivots(:, l))
       dydt(l, :3 * n) = self%work%beta
     end do
-    if (self%internal > 0) dydt(:, self%mechanical + 1:self%states) = self%machine%elements%internal%rate
-    if (self%quadratures > 0) call self%machine%power(dydt(:, self%states + 1:))
+    if (self%internal > 0) dydt(:, self%mechanical + 1:self%states) = self%state%elements%internal%rate
+    if (self%quadratures > 0) call self%state%power(self%machine, dydt(:, self%states + 1:))
     if (self%joints%count > 0) call self%hold_derivative(self%states + self%quadratures, t(1), dydt, status(1))
   end subroutine derivative
 
@@ -129,21 +127,19 @@ contains
     integer :: e, l, n
 
     n = self%machine%bodies
-    associate (elements => self%machine%elements)
+    associate (elements => self%state%elements, rows => self%machine%elements%rows, pairs => self%machine%elements%cross)
       do l = 1, self%lanes
-        call tangent_matrix(self%machine, l, self%work%tangent)
+        call tangent_matrix(self%machine, self%state%elements, l, self%work%tangent)
         dfdy(l, 2 * n + 1:3 * n, :n) = self%work%tangent
         self%work%tangent(:, :) = 0.0_wp
-        do e = 1, elements%count
-          call elements%rows%add_coefficient(e, -elements%restoring_curvature(l, e) * elements%speed(l, e), self%work%tangent)
+        do e = 1, size(elements%applied, 2)
+          call rows%add_coefficient(e, -elements%restoring_curvature(l, e) * elements%speed(l, e), self%work%tangent)
         end do
         associate (cross => elements%cross)
-          do e = 1, cross%count
-            call elements%rows%add_coefficient(cross%element(e), -cross%mixed(l, e) * elements%speed(l, cross%by(e)), &
-                                               self%work%tangent)
-            call elements%rows%add_product(cross%element(e), cross%by(e), &
-                                           cross%mixed(l, e) * elements%speed(l, cross%element(e)) &
-                                           + cross%curvature(l, e) * elements%speed(l, cross%by(e)), self%work%tangent)
+          do e = 1, pairs%count
+            call rows%add_coefficient(pairs%element(e), -cross%mixed(l, e) * elements%speed(l, pairs%by(e)), self%work%tangent)
+            call rows%add_product(pairs%element(e), pairs%by(e), cross%mixed(l, e) * elements%speed(l, pairs%element(e)) &
+                                  + cross%curvature(l, e) * elements%speed(l, pairs%by(e)), self%work%tangent)
           end do
         end associate
         dfdy(l, 2 * n + 1:3 * n, n + 1:2 * n) = self%work%tangent
@@ -165,9 +161,9 @@ contains
     n = self%machine%bodies
     call observe_bodies(self, t, y, in_motion)
     do l = 1, self%lanes
-      call elastic_moments(self%machine, l, self%term)
+      call elastic_moments(self%machine, self%state%elements, l, self%term)
       do i = 1, size(self%couplings)
-        associate (moment => self%machine%elements%restoring(l, self%couplings(i)))
+        associate (moment => self%state%elements%restoring(l, self%couplings(i)))
           do b = 1, n
             moment = moment + self%moment_of_bodies(i, b) * (y(l, 2 * n + b) - self%term(b))
           end do

@@ -1,12 +1,12 @@
 !> The matrices and vectors of the paper, eqs. (13)-(72), for any machine of n bodies.
 !>
-!> They belong to one lane, at the state at which `evaluate` and `differentiate` of the machine were last called. The parts of
-!> a law beyond -K12 u - c u' (the rest twist of a coupling, the torque of a motor) are terms of Q. Every procedure overwrites its
-!> last argument and allocates nothing.
+!> They belong to one lane, at the values of the elements after `evaluate_elements` and `differentiate_elements` of a state. The
+!> parts of a law beyond -K12 u - c u' (the rest twist of a coupling, the torque of a motor) are terms of Q. Every procedure
+!> overwrites its last argument and allocates nothing.
 module nocdyn_paper_matrices
   use nocdyn_bank, only: bank_t, role_bearing, role_clutch, role_coupling, role_crank, role_excitation, role_freewheel, &
     role_load, role_loss, role_motor, role_phase
-  use nocdyn_elements, only: elements_t
+  use nocdyn_elements, only: element_values_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_solve
   use nocdyn_machine, only: machine_t
@@ -73,9 +73,10 @@ contains
   end subroutine assemble_inertia
 
   !> The matrices of eqs. (16)-(72) of one lane, up to the matrices of eq. (43).
-  subroutine assemble(self, machine, lane, complement)
+  subroutine assemble(self, machine, values, lane, complement)
     class(paper_matrices_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
+    type(element_values_t), intent(in) :: values   !! of its elements
     integer, intent(in) :: lane
     real(wp), intent(in) :: complement(:, :)   !! L_tau, [n, freedoms]
     integer, parameter :: roles(*) = [role_coupling, role_load, role_motor, role_excitation, role_phase, role_clutch, &
@@ -84,12 +85,12 @@ contains
 
     self%torque(:) = 0.0_wp
     do i = 1, size(roles)
-      call torque_vector(machine, lane, roles(i), self%term)
+      call torque_vector(machine, values, lane, roles(i), self%term)
       self%torque(:) = self%torque + self%term
     end do
-    call stiffness_matrix(machine, lane, self%stiffness)
-    call damping_matrix(machine, lane, self%damping)
-    call tangent_matrix(machine, lane, self%tangent)
+    call stiffness_matrix(machine, values, lane, self%stiffness)
+    call damping_matrix(machine, values, lane, self%damping)
+    call tangent_matrix(machine, values, lane, self%tangent)
     call constrained_vector(complement, self%torque, self%torque_1)
     call constrained_matrix(complement, self%damping, self%damping_1)
     call constrained_matrix(complement, self%stiffness, self%stiffness_1)
@@ -130,8 +131,9 @@ contains
 
   !> The terms of Q, eq. (16), from the banks of one role, [n]: Q_0 of eq. (17) from the excitations, Q_m of eqs. (18), (20)
   !> from the motors, and from couplings and loads the parts beyond K phi and C omega, and the moments of slipping joints.
-  subroutine torque_vector(machine, lane, role, torque)
+  subroutine torque_vector(machine, values, lane, role, torque)
     type(machine_t), intent(in) :: machine
+    type(element_values_t), intent(in) :: values   !! of its elements
     integer, intent(in) :: lane
     integer, intent(in) :: role            !! role_... of nocdyn_bank
     real(wp), intent(inout) :: torque(:)   !! [N m]
@@ -139,30 +141,32 @@ contains
 
     torque = 0.0_wp
     do i = 1, size(machine%banks)
-      associate (bank => machine%banks(i)%bank, elements => machine%elements)
+      associate (bank => machine%banks(i)%bank)
         if (bank%role /= role) cycle
         do e = bank%first, bank%last()
-          call elements%rows%add_moment(e, (elements%restoring(lane, e) + secant(bank, elements, lane, e) &
-                                                                          * elements%angle(lane, e)) &
-                                        + (elements%applied(lane, e) + viscous(bank, elements, lane, e) &
-                                                                       * elements%speed(lane, e)), torque)
+          call machine%elements%rows%add_moment(e, (values%restoring(lane, e) + secant(bank, values, lane, e) &
+                                                                                * values%angle(lane, e)) &
+                                                + (values%applied(lane, e) + viscous(bank, values, lane, e) &
+                                                                             * values%speed(lane, e)), torque)
         end do
       end associate
     end do
   end subroutine torque_vector
 
   !> K of eq. (21) from the secant stiffnesses K12 of eq. (3), [n, n].
-  subroutine stiffness_matrix(machine, lane, stiffness)
+  subroutine stiffness_matrix(machine, values, lane, stiffness)
     type(machine_t), intent(in) :: machine
+    type(element_values_t), intent(in) :: values   !! of its elements
     integer, intent(in) :: lane
     real(wp), intent(inout) :: stiffness(:, :)   !! K [N m/rad]
 
-    call sum_coefficients(machine, lane, secant, stiffness)
+    call sum_coefficients(machine, values, lane, secant, stiffness)
   end subroutine stiffness_matrix
 
   !> The matrix of all bodies of a coefficient of each element, which its moment has in proportion to its motion.
-  subroutine sum_coefficients(machine, lane, coefficient, matrix)
+  subroutine sum_coefficients(machine, values, lane, coefficient, matrix)
     type(machine_t), intent(in) :: machine
+    type(element_values_t), intent(in) :: values   !! of its elements
     integer, intent(in) :: lane
     procedure(secant) :: coefficient
     real(wp), intent(inout) :: matrix(:, :)   !! [n, n]
@@ -170,9 +174,9 @@ contains
 
     matrix = 0.0_wp
     do i = 1, size(machine%banks)
-      associate (bank => machine%banks(i)%bank, elements => machine%elements)
+      associate (bank => machine%banks(i)%bank)
         do e = bank%first, bank%last()
-          call elements%rows%add_coefficient(e, coefficient(bank, elements, lane, e), matrix)
+          call machine%elements%rows%add_coefficient(e, coefficient(bank, values, lane, e), matrix)
         end do
       end associate
     end do
@@ -182,7 +186,7 @@ contains
   !> and of meshes whose teeth have errors [N m/rad].
   pure real(wp) function secant(bank, elements, lane, e)
     class(bank_t), intent(in) :: bank
-    type(elements_t), intent(in) :: elements   !! of the machine
+    type(element_values_t), intent(in) :: elements
     integer, intent(in) :: lane, e             !! number of the element in the machine
     integer :: rest
     real(wp) :: twist
@@ -199,7 +203,7 @@ contains
   !> c of eq. (5) of an element of a bank: minus the derivative of the moment of a coupling or load by the speed [N m s/rad].
   pure real(wp) function viscous(bank, elements, lane, e)
     class(bank_t), intent(in) :: bank
-    type(elements_t), intent(in) :: elements   !! of the machine
+    type(element_values_t), intent(in) :: elements
     integer, intent(in) :: lane, e             !! number of the element in the machine
 
     viscous = 0.0_wp
@@ -207,44 +211,45 @@ contains
   end function viscous
 
   !> C of eq. (22) from loads and the damping of couplings, [n, n].
-  subroutine damping_matrix(machine, lane, damping)
+  subroutine damping_matrix(machine, values, lane, damping)
     type(machine_t), intent(in) :: machine
+    type(element_values_t), intent(in) :: values   !! of its elements
     integer, intent(in) :: lane
     real(wp), intent(inout) :: damping(:, :)   !! C [N m s/rad]
 
-    call sum_coefficients(machine, lane, viscous, damping)
+    call sum_coefficients(machine, values, lane, viscous, damping)
   end subroutine damping_matrix
 
   !> K_4 of eqs. (62)-(72) from the tangent stiffnesses K1 + 3 k1 w^2, [n, n]; the derivative of the elastic moments is
   !> F' = K_4 omega, eqs. (47), (52)-(56).
-  subroutine tangent_matrix(machine, lane, tangent)
+  subroutine tangent_matrix(machine, values, lane, tangent)
     type(machine_t), intent(in) :: machine
+    type(element_values_t), intent(in) :: values   !! of its elements
     integer, intent(in) :: lane
     real(wp), intent(inout) :: tangent(:, :)   !! K_4 [N m/rad]
     integer :: i
 
     tangent = 0.0_wp
-    call machine%elements%rows%add_coefficients(-1.0_wp, machine%elements%restoring_angle(lane, :), tangent)
+    call machine%elements%rows%add_coefficients(-1.0_wp, values%restoring_angle(lane, :), tangent)
     associate (cross => machine%elements%cross)
       do i = 1, cross%count
-        call machine%elements%rows%add_product(cross%element(i), cross%by(i), cross%restoring_angle(lane, i), tangent)
+        call machine%elements%rows%add_product(cross%element(i), cross%by(i), values%cross%restoring_angle(lane, i), tangent)
       end do
     end associate
   end subroutine tangent_matrix
 
   !> F of eqs. (48)-(51): the elastic moment on each body [N m], [n].
-  subroutine elastic_moments(machine, lane, moments)
+  subroutine elastic_moments(machine, values, lane, moments)
     type(machine_t), intent(in) :: machine
+    type(element_values_t), intent(in) :: values   !! of its elements
     integer, intent(in) :: lane
     real(wp), intent(inout) :: moments(:)   !! F [N m]
     integer :: e
 
     moments = 0.0_wp
-    associate (elements => machine%elements)
-      do e = 1, elements%count
-        call elements%rows%add_moment(e, elements%restoring(lane, e), moments)
-      end do
-    end associate
+    do e = 1, machine%elements%count
+      call machine%elements%rows%add_moment(e, values%restoring(lane, e), moments)
+    end do
   end subroutine elastic_moments
 
   !> F' of eqs. (47), (52)-(57): K_4 omega, [n].

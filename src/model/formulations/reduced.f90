@@ -135,6 +135,7 @@ contains
 
     call self%reset_origin(lane)
     call self%machine%refresh_lane(lane)
+    call self%state%refresh_lane(self%machine, lane)
     call self%series_kernel%refresh_lane(lane, self%machine%laws, self%twists, self%accelerations)
   end subroutine refresh_parameters
 
@@ -147,7 +148,7 @@ contains
     integer, intent(inout) :: status(self%lanes)
 
     if (self%lanes > 1) then
-      call self%series_kernel%derivative(self%machine, self%twists, self%accelerations, self%twist_at_origin, t, y, dydt)
+      call self%series_kernel%derivative(self%state, self%twists, self%accelerations, self%twist_at_origin, t, y, dydt)
       return
     end if
     call fill_derivative(self, self%lanes * self%machine%coordinates%freedoms, self%lanes * self%internal, self%quadratures, &
@@ -167,13 +168,13 @@ contains
     integer :: i
 
     call self%evaluate_at(n, internal, t, y)
-    call add(size(self%moment), self%machine%elements%restoring, self%machine%elements%applied, self%moment)
+    call add(size(self%moment), self%state%elements%restoring, self%state%elements%applied, self%moment)
     call self%accelerations%multiply(self%moment, dydt)
     do i = 1, n
       dydt(n + i) = y(i)
     end do
-    if (internal > 0) call copy(internal, self%machine%elements%internal%rate, dydt(2 * n + 1))
-    if (quadratures > 0) call self%machine%power(dydt(2 * n + internal + 1))
+    if (internal > 0) call copy(internal, self%state%elements%internal%rate, dydt(2 * n + 1))
+    if (quadratures > 0) call self%state%power(self%machine, dydt(2 * n + internal + 1))
   end subroutine fill_derivative
 
   !> Evaluates the elements at a state.
@@ -184,9 +185,9 @@ contains
     real(wp), intent(in) :: t(self%lanes)         !! [s]
     real(wp), intent(in) :: y(2 * n + internal)   !! state
 
-    call self%twists%multiply_pair(self%twist_at_origin, y(n + 1), y(1), self%machine%elements%angle, self%machine%elements%speed)
-    if (internal > 0) call copy(internal, y(2 * n + 1), self%machine%elements%internal%value)
-    call self%machine%evaluate_elements(t)
+    call self%twists%multiply_pair(self%twist_at_origin, y(n + 1), y(1), self%state%elements%angle, self%state%elements%speed)
+    if (internal > 0) call copy(internal, y(2 * n + 1), self%state%elements%internal%value)
+    call self%state%evaluate_elements(self%machine, t)
   end subroutine evaluate_at
 
   !> Every law has a series, but not the moments of rows that move or of teeth with losses.
@@ -203,7 +204,8 @@ contains
     class(reduced_t), intent(inout) :: self
     integer, intent(in) :: order
 
-    self%series_kernel = new_reduced_series(self%machine, self%twists, self%accelerations, self%has_energy_balance, order)
+    self%series_kernel = new_reduced_series(self%machine, self%state, self%twists, self%accelerations, self%has_energy_balance, &
+                                            order)
     self%held = new_held_lanes(self%lanes, self%joints)
     self%hides_bends = self%machine%has_operation(op_tanh)
   end subroutine prepare_series
@@ -217,7 +219,7 @@ contains
     integer, intent(inout) :: status(self%lanes)
 
     call self%find_sets(status)
-    call self%series_kernel%expand(self%machine, self%twists, self%accelerations, self%twist_at_origin, self%incidence, &
+    call self%series_kernel%expand(self%state, self%twists, self%accelerations, self%twist_at_origin, self%incidence, &
                                    self%held, columns, t, y)
   end subroutine series
 
@@ -260,15 +262,15 @@ contains
     integer :: e, f, k
 
     f = self%machine%coordinates%freedoms
-    associate (machine => self%machine, elements => self%machine%elements)
+    associate (machine => self%machine, elements => self%state%elements)
       call self%evaluate_at(self%lanes * f, self%lanes * self%internal, t, y)
       if (self%joints%motions%count + self%joints%teeth%count > 0) call self%find_accelerations(t(1), self%acceleration)
-      call machine%differentiate_elements(t)
+      call self%state%differentiate_elements(machine, t)
       if (self%joints%count > 0) then
         call self%differentiate_rows(self%acceleration)
-        call self%element_jacobian%fill(elements, self%free_jacobian)
+        call self%element_jacobian%fill(machine%elements%internal, elements, self%free_jacobian)
       else
-        call self%element_jacobian%fill(elements, dfdy)
+        call self%element_jacobian%fill(machine%elements%internal, elements, dfdy)
       end if
       call self%accelerations%multiply(elements%applied_time, dfdt)
       dfdt(:, f + 1:2 * f) = 0.0_wp

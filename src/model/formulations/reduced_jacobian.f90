@@ -11,7 +11,7 @@
 !> q'' = R M and on its work integral, W' = M u'.
 module nocdyn_reduced_jacobian
   use nocdyn_element_coordinates, only: element_coordinates_t
-  use nocdyn_elements, only: cross_slopes_t, elements_t, internal_states_t
+  use nocdyn_elements, only: cross_pairs_t, element_values_t, elements_t, internal_states_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_sparse_map, only: transposed_order
@@ -34,7 +34,7 @@ module nocdyn_reduced_jacobian
     integer, allocatable, private :: response_entry(:)   !! entry of the response in each product
     integer, allocatable, private :: ratio_entry(:)      !! entry of the ratio in each product
     real(wp), allocatable, private :: product(:, :)      !! response * ratio, [lanes, products]
-    integer, allocatable, private :: pair(:)             !! of `cross_slopes_t`, 0 for the own motion
+    integer, allocatable, private :: pair(:)             !! of `cross_pairs_t`, 0 for the own motion
     integer, private :: works = 0                        !! number of positions of dW'/dq'
     integer, allocatable, private :: work_position(:)    !! of each part of a dW'/dq', 1 to works
     integer, allocatable, private :: work_element(:)     !! its element
@@ -114,7 +114,7 @@ contains
   subroutine form_products(freedoms, incidence, cross, row, column, self)
     integer, intent(in) :: freedoms
     type(element_coordinates_t), intent(in) :: incidence
-    type(cross_slopes_t), intent(in) :: cross
+    type(cross_pairs_t), intent(in) :: cross
     integer, intent(inout) :: row(:), column(:)   !! of each position
     type(reduced_jacobian_t), intent(inout) :: self
     integer :: order(size(incidence%coordinate)), element_of(size(incidence%coordinate)), first(freedoms + 1)
@@ -204,9 +204,10 @@ contains
   end subroutine add_position
 
   !> Computes the values at the positions of `pattern`, from the elements after `differentiate`.
-  subroutine fill(self, elements, dfdy)
+  subroutine fill(self, states, elements, dfdy)
     class(reduced_jacobian_t), intent(in) :: self
-    type(elements_t), intent(in) :: elements
+    type(internal_states_t), intent(in) :: states   !! of the machine
+    type(element_values_t), intent(in) :: elements
     real(wp), contiguous, intent(inout) :: dfdy(:, :)   !! [lanes, positions]
     integer :: at, e, i, j, l, n, s
 
@@ -231,10 +232,10 @@ contains
     at = 2 * self%pairs + self%freedoms
     call fill_works(self, elements, dfdy(:, at + 1:at + 2 * self%works))
     at = at + 2 * self%works
-    if (elements%internal%count > 0) then
+    if (states%count > 0) then
       j = at
       associate (internal => elements%internal, incidence => self%incidence)
-        do s = 1, internal%count
+        do s = 1, states%count
           do i = incidence%first(s), incidence%first(s + 1) - 1
             j = j + 1
             dfdy(:, j) = incidence%response(:, i) * internal%applied(:, s)
@@ -242,13 +243,13 @@ contains
             j = j + 1
             dfdy(:, j) = incidence%ratio(:, i) * internal%rate_speed(:, s)
           end do
-          do i = 1, internal%members(s)
+          do i = 1, states%members(s)
             dfdy(:, j + i) = internal%rate_internal(:, i, s)
           end do
-          j = j + internal%members(s)
+          j = j + states%members(s)
           if (.not. self%has_work_integral(s)) cycle
           j = j + 1
-          dfdy(:, j) = elements%speed(:, internal%element(s)) * internal%applied(:, s)
+          dfdy(:, j) = elements%speed(:, states%element(s)) * internal%applied(:, s)
         end do
       end associate
     end if
@@ -257,7 +258,7 @@ contains
   !> dW'/dq' and dW'/dq of W' = M u'.
   subroutine fill_works(self, elements, values)
     class(reduced_jacobian_t), intent(in) :: self
-    type(elements_t), intent(in) :: elements
+    type(element_values_t), intent(in) :: elements
     real(wp), contiguous, intent(inout) :: values(:, :)   !! [lanes, 2 * positions]
     integer :: e, l, n
 

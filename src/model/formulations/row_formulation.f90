@@ -122,8 +122,8 @@ contains
     call self%joints%teeth%find_coefficients(self%machine%banks, self%machine%elements%rows, self%machine%coordinates, &
                                              self%machine%constraints%rows(), self%machine%bodies)
     twist = self%machine%start_twist()
-    call self%joints%motions%set_start(self%machine%banks, twist(1, :))
-    call self%joints%start(self%machine%banks)
+    call self%joints%motions%set_start(self%machine%banks, self%state%banks, twist(1, :))
+    call self%joints%start(self%machine%banks, self%state%banks)
   end subroutine prepare_joints
 
   !> The moments of the joints that hold at a state of a block of one lane, where the branches are known; they are put among
@@ -135,7 +135,7 @@ contains
 
     self%joint_state(1, :) = y
     call self%gather(self%joint_state)
-    call self%machine%evaluate_elements([t])
+    call self%state%evaluate_elements(self%machine, [t])
     call self%find_accelerations(t, self%acceleration)
   end subroutine find_held_moments
 
@@ -146,7 +146,7 @@ contains
     real(wp), intent(in) :: t                    !! [s]
     real(wp), intent(inout) :: acceleration(:)   !! [rad/s2], [moving]
 
-    call self%machine%elements%scatter(self%torque)
+    call self%state%elements%scatter(self%machine%elements%rows, self%torque)
     call self%accelerate(acceleration)
     call self%hold_accelerations(t, acceleration)
   end subroutine find_accelerations
@@ -158,7 +158,7 @@ contains
     real(wp), intent(inout) :: acceleration(:)   !! [rad/s2], [moving] at least
 
     call self%move_rows(t)
-    associate (joints => self%joints, teeth => self%joints%teeth, elements => self%machine%elements)
+    associate (joints => self%joints, teeth => self%joints%teeth, elements => self%state%elements)
       if (teeth%count == 0) then
         call self%hold(joints%motions%acceleration, acceleration)
       else
@@ -176,8 +176,8 @@ contains
     real(wp), intent(in) :: t   !! [s]
 
     if (self%joints%motions%count == 0) return
-    associate (elements => self%machine%elements)
-      call self%joints%motions%move(self%machine%banks, t, elements%angle(1, :), elements%speed(1, :))
+    associate (elements => self%state%elements)
+      call self%joints%motions%move(self%machine%banks, self%state%banks, t, elements%angle(1, :), elements%speed(1, :))
     end associate
     call self%joints%weigh()
   end subroutine move_rows
@@ -191,7 +191,7 @@ contains
     real(wp), intent(in), optional :: drag(:)    !! of teeth [N m], [losses]; absent: those that turn have no moments
     integer :: j
 
-    associate (joints => self%joints, applied => self%machine%elements%applied)
+    associate (joints => self%joints, applied => self%state%elements%applied)
       do j = 1, joints%count
         joints%rate(j) = self%joint_rate(j, acceleration)
         if (j > joints%locking) joints%rate(j) = joints%rate(j) - demand(j - joints%locking)
@@ -215,7 +215,7 @@ contains
     real(wp) :: size_of_terms(self%joints%count), response(size(self%moving))
     integer :: e, j
 
-    associate (joints => self%joints, elements => self%machine%elements)
+    associate (joints => self%joints, elements => self%state%elements)
       moment = abs(elements%applied(1, :)) + abs(elements%restoring(1, :))
       do j = 1, joints%count
         if (.not. joints%is_active(j, .true.)) cycle
@@ -224,7 +224,7 @@ contains
       end do
       size_of_terms = 0.0_wp
       size_of_terms(joints%locking + 1:) = abs(joints%motions%acceleration)
-      do e = 1, elements%count
+      do e = 1, size(elements%applied, 2)
         if (moment(e) <= 0) cycle
         response = 0.0_wp
         call self%push_element(e, moment(e), response)
@@ -246,7 +246,7 @@ contains
 
     do j = 1, self%joints%count
       associate (k => self%work_of(j))
-        if (k > 0) powers(k) = powers(k) + self%joints%moment(j) * self%machine%elements%speed(1, self%joints%element(j))
+        if (k > 0) powers(k) = powers(k) + self%joints%moment(j) * self%state%elements%speed(1, self%joints%element(j))
       end associate
     end do
   end subroutine add_powers
@@ -258,7 +258,7 @@ contains
     real(wp), intent(in) :: acceleration(:)   !! [rad/s2], [moving]
     integer :: i
 
-    associate (joints => self%joints, motions => self%joints%motions, elements => self%machine%elements)
+    associate (joints => self%joints, motions => self%joints%motions, elements => self%state%elements)
       motions%held(:) = joints%moment(joints%locking + 1:)
       do i = 1, motions%count
         associate (driver => motions%driver(i))
@@ -307,7 +307,7 @@ contains
                                                  !! [quadratures]
     integer :: i
 
-    associate (motions => self%joints%motions, n => size(self%moving), speed => self%machine%elements%speed, unit => self%unit, &
+    associate (motions => self%joints%motions, n => size(self%moving), speed => self%state%elements%speed, unit => self%unit, &
                demand => self%joints%motions%demand)
       unit = 0.0_wp
       if (column > 0 .and. column <= 2 * n) unit(1 + modulo(column - 1, n)) = 1.0_wp
@@ -335,9 +335,10 @@ contains
     integer, intent(in) :: column   !! as in `hold_column`, whose `unit` is the speed or the position that changes
     integer :: e
 
-    associate (elements => self%machine%elements, teeth => self%joints%teeth, n => size(self%moving), rates => self%rates, &
+    associate (elements => self%state%elements, teeth => self%joints%teeth, n => size(self%moving), rates => self%rates, &
+               pairs => self%machine%elements%cross, states => self%machine%elements%internal, &
                slope => self%joints%teeth%moment)
-      do e = 1, elements%count
+      do e = 1, size(elements%applied, 2)
         rates(e) = self%element_rate(e, self%unit)
       end do
       slope = 0.0_wp
@@ -348,10 +349,10 @@ contains
       else if (column <= 2 * n) then
         slope = (elements%restoring_angle(1, :) + elements%applied_angle(1, :)) * rates
       else if (column > self%mechanical) then
-        slope(elements%internal%element(column - self%mechanical)) = elements%internal%applied(1, column - self%mechanical)
+        slope(states%element(column - self%mechanical)) = elements%internal%applied(1, column - self%mechanical)
       end if
-      do e = 1, merge(elements%cross%count, 0, column > 0)
-        associate (x => elements%cross, by => rates(elements%cross%by(e)), moved => slope(elements%cross%element(e)))
+      do e = 1, merge(pairs%count, 0, column > 0)
+        associate (x => elements%cross, by => rates(pairs%by(e)), moved => slope(pairs%element(e)))
           if (column <= n) moved = moved + x%applied_speed(1, e) * by
           if (column > n) moved = moved + (x%restoring_angle(1, e) + x%applied_angle(1, e)) * by
         end associate
@@ -384,7 +385,7 @@ contains
     real(wp), parameter :: rounding = 4.0_wp * epsilon(1.0_wp), far = 1.0e-9_wp   ! relative to the terms of a row
     integer :: step
 
-    associate (n => size(self%moving), motions => self%joints%motions, elements => self%machine%elements)
+    associate (n => size(self%moving), motions => self%joints%motions, elements => self%state%elements)
       do step = 1, most_steps
         self%joint_state(1, :) = y(:self%states)
         call self%gather(self%joint_state)

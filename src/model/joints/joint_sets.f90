@@ -5,8 +5,9 @@
 !> the moment of slip, which may be smaller than at rest, and the others are looked at again. A row that moves has no bounds.
 module nocdyn_joint_sets
   use nocdyn_bank, only: bank_slot_t
+  use nocdyn_bank_states, only: bank_state_t
   use nocdyn_bounded_complementarity, only: at_upper, is_free, solve_bounded_complementarity, solve_scaled_complementarity
-  use nocdyn_elements, only: elements_t
+  use nocdyn_elements, only: element_values_t
   use nocdyn_friction_joints, only: direction_of, friction_joints_t, idle, locked, slips_backwards, &
     slips_forwards
   use nocdyn_held_rows, only: held_rows_t
@@ -86,15 +87,13 @@ contains
   end function new_joint_sets
 
   !> Weighs the rows at the start, where `mutual` is known, and gives the laws the modes.
-  subroutine start(self, banks)
+  subroutine start(self, banks, states)
     class(joint_sets_t), intent(inout) :: self
-    type(bank_slot_t), intent(inout) :: banks(:)
-    integer :: j
+    type(bank_slot_t), intent(in) :: banks(:)
+    type(bank_state_t), intent(inout) :: states(:)   !! of the banks
 
     call self%start_rows()
-    do j = 1, self%locking
-      call set_mode(self, banks, j)
-    end do
+    call set_modes(self, banks, states)
   end subroutine start
 
   !> Whether all joints only lock and slip: then each lane of a block may have a set of its own, and moments have Taylor series.
@@ -136,26 +135,25 @@ contains
   end function is_open
 
   !> Locks the joints at rest without any moment, until `decide`; the others slip.
-  subroutine assume(self, banks, is_at_rest, slip)
+  subroutine assume(self, banks, states, is_at_rest, slip)
     class(joint_sets_t), intent(inout) :: self
-    type(bank_slot_t), intent(inout) :: banks(:)
+    type(bank_slot_t), intent(in) :: banks(:)
+    type(bank_state_t), intent(inout) :: states(:)   !! of the banks
     logical, intent(in) :: is_at_rest(:)   !! [joints]
     real(wp), intent(in) :: slip(:)        !! u' [rad/s], [joints]
-    integer :: j
 
     self%is_assumed = .true.
     self%mode(:) = merge(locked, merge(slips_forwards, slips_backwards, slip > 0), is_at_rest)
-    do j = 1, self%locking
-      call set_mode(self, banks, j)
-    end do
+    call set_modes(self, banks, states)
     call self%change_set()
   end subroutine assume
 
   !> Decides the modes of the joints at rest at a time t; the others have the modes of their slips. `rate` has the accelerations
   !> without any moment of the joints at rest.
-  subroutine decide(self, banks, t, is_at_rest, slip, is_solved)
+  subroutine decide(self, banks, states, t, is_at_rest, slip, is_solved)
     class(joint_sets_t), intent(inout) :: self
-    type(bank_slot_t), intent(inout) :: banks(:)
+    type(bank_slot_t), intent(in) :: banks(:)
+    type(bank_state_t), intent(inout) :: states(:)   !! of the banks
     real(wp), intent(in) :: t                !! [s]
     logical, intent(in) :: is_at_rest(:)     !! [joints]
     real(wp), intent(in) :: slip(:)          !! u' [rad/s], [joints]
@@ -174,8 +172,8 @@ contains
     end if
     do i = 1, self%locking
       if (is_at_rest(i)) call rest_idly(self, banks, i, t)
-      call set_mode(self, banks, i)
     end do
+    call set_modes(self, banks, states)
     call self%change_set()
   end subroutine decide
 
@@ -346,16 +344,20 @@ contains
     end select
   end subroutine find_ranges
 
-  subroutine set_mode(self, banks, joint)
-    class(joint_sets_t), intent(in) :: self
-    type(bank_slot_t), intent(inout) :: banks(:)
-    integer, intent(in) :: joint
+  !> Gives the laws the modes.
+  subroutine set_modes(self, banks, states)
+    type(joint_sets_t), intent(in) :: self
+    type(bank_slot_t), intent(in) :: banks(:)
+    type(bank_state_t), intent(inout) :: states(:)   !! of the banks
+    integer :: j
 
-    select type (bank => banks(self%bank(joint))%bank)
-    class is (friction_joints_t)
-      call bank%set_mode(self%number(joint), self%mode(joint))
-    end select
-  end subroutine set_mode
+    do j = 1, self%locking
+      select type (bank => banks(self%bank(j))%bank)
+      class is (friction_joints_t)
+        call bank%set_mode(states(self%bank(j)), self%number(j), self%mode(j))
+      end select
+    end do
+  end subroutine set_modes
 
   !> Keeps an event of a joint whose mode was `from`.
   subroutine note(self, t, joint, from, slip, impulse)
@@ -372,7 +374,7 @@ contains
   subroutine shift_boundaries(self, banks, elements, t)
     class(joint_sets_t), intent(inout) :: self
     type(bank_slot_t), intent(in) :: banks(:)
-    type(elements_t), intent(in) :: elements
+    type(element_values_t), intent(in) :: elements
     real(wp), intent(in) :: t   !! [s]
     integer :: j
     real(wp) :: inside, least, most, sliding(2)

@@ -2,6 +2,7 @@
 !> u - g(v) - constant = 0, u' - g' v' = 0 and u'' - g' v'' = g'' v'^2, or with the time v = t.
 module nocdyn_row_motions
   use nocdyn_bank, only: bank_slot_t
+  use nocdyn_bank_states, only: bank_state_t
   use nocdyn_kinds, only: wp
   use nocdyn_moving_rows, only: moving_rows_t
   implicit none (type, external)
@@ -58,23 +59,25 @@ contains
   end function new_row_motions
 
   !> Sets the constants so that a position at the start fulfils the rows. Prescribed motions are zero there.
-  subroutine set_start(self, banks, angle)
+  subroutine set_start(self, banks, states, angle)
     class(row_motions_t), intent(inout) :: self
     type(bank_slot_t), intent(in) :: banks(:)
+    type(bank_state_t), intent(in) :: states(:)   !! of the banks
     real(wp), intent(in) :: angle(:)   !! u of all elements [rad]
 
     self%constant(:) = 0.0_wp
-    call self%move(banks, 0.0_wp, angle, 0.0_wp * angle)
+    call self%move(banks, states, 0.0_wp, angle, 0.0_wp * angle)
     self%constant(:) = merge(self%position, angle(self%element), self%driver > 0)
   end subroutine set_start
 
   !> Sets g and what the rows demand at a position.
-  pure subroutine move(self, banks, t, angle, speed)
+  pure subroutine move(self, banks, states, t, angle, speed)
     class(row_motions_t), intent(inout) :: self
     type(bank_slot_t), intent(in) :: banks(:)
+    type(bank_state_t), intent(in) :: states(:)   !! of the banks
     real(wp), intent(in) :: t                    !! [s]
     real(wp), intent(in) :: angle(:), speed(:)   !! of all elements, [rad], [rad/s]
-    integer :: i
+    integer :: i, segment
     real(wp) :: v
 
     do i = 1, self%count
@@ -82,7 +85,9 @@ contains
       if (self%driver(i) > 0) v = angle(self%driver(i))
       select type (bank => banks(self%bank(i))%bank)
       class is (moving_rows_t)
-        call bank%motion(self%number(i), v, self%g(:, i))
+        segment = 1
+        if (allocated(bank%curve)) segment = states(self%bank(i))%branch(1, self%number(i))
+        call bank%motion(self%number(i), segment, v, self%g(:, i))
       end select
       self%position(i) = angle(self%element(i)) - self%g(0, i) - self%constant(i)
       if (self%driver(i) > 0) then

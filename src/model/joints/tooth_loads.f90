@@ -6,7 +6,7 @@ module nocdyn_tooth_loads
   use nocdyn_bank, only: bank_slot_t, role_coupling
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_element_rows, only: element_rows_t
-  use nocdyn_elements, only: elements_t
+  use nocdyn_elements, only: element_values_t
   use nocdyn_friction_joints, only: direction_of, first_wheel_drives
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t
@@ -147,7 +147,7 @@ contains
   !> Finds T without the moments of the joints that hold and the losses, after the laws of all elements.
   pure subroutine apply(self, elements)
     class(tooth_loads_t), intent(inout) :: self
-    type(elements_t), intent(in) :: elements
+    type(element_values_t), intent(in) :: elements
 
     self%moment(:) = elements%restoring(1, :) + elements%applied(1, :)
     self%applied(:) = matmul(self%by_moment, self%moment)
@@ -202,7 +202,7 @@ contains
   !> Shifts the boundaries of T, after a decision.
   pure subroutine shift_boundaries(self, elements, error, least, mode)
     class(tooth_loads_t), intent(inout) :: self
-    type(elements_t), intent(in) :: elements
+    type(element_values_t), intent(in) :: elements
     real(wp), intent(in) :: error(:)          !! of the moments of the joints [N m], [joints]
     real(wp), intent(in) :: least             !! least shift: the shift of the boundaries of the moments [N m]
     integer, intent(in) :: mode(:)            !! of the joints

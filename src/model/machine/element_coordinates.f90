@@ -40,7 +40,7 @@ contains
     associate (rows => elements%rows)
       entries = sum(coordinates%first(rows%body + 1) - coordinates%first(max(1, rows%body)), mask=rows%body > 0)
       allocate (self%first(elements%count + 1), self%coordinate(entries))
-      allocate (self%ratio(size(elements%time), entries), source=0.0_wp)
+      allocate (self%ratio(size(coordinates%ratio, 1), entries), source=0.0_wp)
       allocate (self%response, source=self%ratio)
       entry_of = 0
       self%first(1) = 1

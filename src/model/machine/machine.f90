@@ -1,10 +1,10 @@
 !> A machine on a block of lanes: bodies, banks of elements, constraints, and the independent coordinates.
 module nocdyn_machine
-  use nocdyn_bank, only: bank_of, bank_slot_t, bank_t, name_length, role_motor
+  use nocdyn_bank, only: bank_of, bank_slot_t, name_length, role_motor
   use nocdyn_constraints, only: constraints_t
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_element_rows, only: element_rows_t, joined_rows, rows_between
-  use nocdyn_elements, only: elements_t, internal_states_t, new_elements
+  use nocdyn_elements, only: elements_t, new_elements
   use nocdyn_geared_groups, only: geared_group_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
@@ -59,16 +59,7 @@ module nocdyn_machine
     procedure :: start_internal
     procedure :: internal_name
     procedure :: is_electrical
-    procedure :: choose_branches
-    procedure :: keep_branches, restore_branches, take_branches
-    procedure :: settle_internal
-    procedure :: evaluate
-    procedure :: evaluate_elements
-    procedure :: differentiate_elements
-    procedure :: evaluate_energies
-    procedure :: fastest_wave
     procedure :: refresh_lane
-    procedure :: power
     procedure :: has_operation
     procedure :: kinetic_energy
   end type machine_t
@@ -112,7 +103,6 @@ contains
     do i = 1, size(self%banks)
       associate (bank => self%banks(i)%bank)
         bank%first = total + 1
-        bank%first_value = self%lanes * total + 1
         bank%first_internal = internal + 1
         total = bank%last()
         rows = joined_rows(rows, bank%rows)
@@ -120,13 +110,11 @@ contains
         phase = [phase, merge(0, bank%first - 1 + [(e + bank%count, e=1, bank%count)], bank%ports == 1)]
       end associate
     end do
-    self%elements = new_elements(self%lanes, rows, &
-                                 [(spread(self%banks(i)%bank%states, 1, self%banks(i)%bank%count), i=1, size(self%banks))], &
-                                 phase)
+    self%elements = new_elements(rows, [(spread(self%banks(i)%bank%states, 1, self%banks(i)%bank%count), &
+                                        i=1, size(self%banks))], phase)
     self%laws = new_polynomial_laws(self%lanes, total)
     do i = 1, size(self%banks)
       call self%banks(i)%bank%polynomials(1, self%lanes, self%laws)
-      call self%banks(i)%bank%prepare_law(total)
     end do
     call self%laws%find_plain_parts()
     self%general_banks = pack([(i, i=1, size(self%banks))], [(self%banks(i)%bank%values > 0 .and. &
@@ -258,75 +246,6 @@ contains
     end do
   end function is_electrical
 
-  !> Chooses the branches of the laws in all lanes, from the angles, speeds and internal states in `elements`.
-  subroutine choose_branches(self, t)
-    class(machine_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)   !! [s], [lanes]
-    integer :: k, lane
-
-    associate (switches => self%switches, elements => self%elements)
-      do k = 1, switches%count
-        do lane = 1, self%lanes
-          associate (e => switches%element(k), p => switches%moving(switches%phase_place(k)))
-            call switches%choose(self%banks, k, lane, t(lane), [elements%angle(lane, e), elements%speed(lane, e), &
-                                                                elements%angle(lane, p), elements%speed(lane, p)], &
-                                 elements%internal%value(lane, :))
-          end associate
-        end do
-      end do
-    end associate
-  end subroutine choose_branches
-
-  !> Keeps the present branches of all laws, to which `restore_branches` goes back.
-  subroutine keep_branches(self)
-    class(machine_t), intent(inout) :: self
-    integer :: i
-
-    do i = 1, merge(size(self%banks), 0, self%switches%count > 0)
-      call self%banks(i)%bank%keep_branches()
-    end do
-  end subroutine keep_branches
-
-  subroutine restore_branches(self)
-    class(machine_t), intent(inout) :: self
-    integer :: i
-
-    do i = 1, merge(size(self%banks), 0, self%switches%count > 0)
-      call self%banks(i)%bank%restore_branches()
-    end do
-  end subroutine restore_branches
-
-  !> Puts a lane on the branches of a lane of a machine with the same structure.
-  subroutine take_branches(self, lane, from, from_lane)
-    class(machine_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    type(machine_t), intent(in) :: from
-    integer, intent(in) :: from_lane   !! lane of `from`
-    integer :: i, switch
-
-    do i = 1, size(self%banks)
-      associate (bank => self%banks(i)%bank)
-        do switch = 1, size(bank%switch_element)
-          call bank%set_branch(switch, lane, from%banks(i)%bank%branch(from_lane, switch))
-        end do
-      end associate
-    end do
-  end subroutine take_branches
-
-  !> Replaces the internal states in the first lane of `elements` by those that do not change at the speeds there.
-  subroutine settle_internal(self, t)
-    class(machine_t), intent(inout) :: self
-    real(wp), intent(in) :: t   !! [s]
-    integer :: i
-
-    do i = 1, size(self%internal_banks)
-      associate (bank => self%banks(self%internal_banks(i))%bank, speed => self%elements%speed, z => self%elements%internal%value)
-        call bank%steady_internal(t, speed(1, bank%first:bank%last()), &
-                                  z(1, bank%first_internal:bank%first_internal + bank%states * bank%count - 1))
-      end associate
-    end do
-  end subroutine settle_internal
-
   !> Name of an element.
   pure function element_name(self, element) result(name)
     class(machine_t), intent(in) :: self
@@ -338,34 +257,6 @@ contains
     end associate
   end function element_name
 
-  !> Torques T = Q + C omega + K phi of all elements on the bodies: the right-hand side of eq. (12) without reactions.
-  subroutine evaluate(self, t, phi, omega, torque)
-    class(machine_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)               !! [s], [lanes]
-    real(wp), contiguous, intent(in) :: phi(:, 0:)         !! angles [rad], [lanes, 0:bodies], body 0 is the ground
-    real(wp), contiguous, intent(in) :: omega(:, 0:)       !! speeds [rad/s], [lanes, 0:bodies]
-    real(wp), contiguous, intent(inout) :: torque(:, 0:)   !! [N m], [lanes, 0:bodies]
-
-    call self%elements%gather(phi, omega)
-    call self%evaluate_elements(t)
-    call self%elements%scatter(torque)
-  end subroutine evaluate
-
-  !> Moments of all elements, from the angles and speeds in `elements`.
-  subroutine evaluate_elements(self, t)
-    class(machine_t), intent(inout) :: self
-    real(wp), intent(in) :: t(self%lanes)   !! [s]
-    integer :: i
-
-    call self%laws%evaluate(self%elements)
-    do i = 1, size(self%general_banks)
-      associate (bank => self%banks(self%general_banks(i))%bank, elements => self%elements, internal => self%elements%internal)
-        call evaluate_bank(bank, size(elements%angle), t, elements%angle, elements%speed, internal, elements%restoring, &
-                           elements%applied)
-      end associate
-    end do
-  end subroutine evaluate_elements
-
   !> Whether the law of some bank has an operation.
   pure logical function has_operation(self, operation)
     class(machine_t), intent(in) :: self
@@ -374,85 +265,13 @@ contains
 
     has_operation = .false.
     do i = 1, size(self%general_banks)
-      associate (tape => self%banks(self%general_banks(i))%bank%law%law%tape)
+      associate (tape => self%banks(self%general_banks(i))%bank%tape)
         has_operation = has_operation .or. any([(tape%node(k)%operation == operation, k=1, tape%count)])
       end associate
     end do
   end function has_operation
 
-  !> Calls the law of a bank with its part of all values. Only addresses are passed, no array descriptors.
-  subroutine evaluate_bank(bank, n, t, angle, speed, internal, restoring, applied)
-    class(bank_t), intent(inout) :: bank
-    integer, intent(in) :: n                              !! lanes * elements of the machine
-    real(wp), intent(in) :: t(bank%lanes)                 !! [s]
-    real(wp), intent(in) :: angle(n), speed(n)            !! [rad], [rad/s]
-    type(internal_states_t), intent(inout) :: internal
-    real(wp), intent(inout) :: restoring(n), applied(n)   !! [N m]
-    real(wp) :: no_rates(0)
-
-    associate (first => bank%first_value, state => bank%first_internal)
-      if (bank%states > 0) then
-        call bank%evaluate(t, angle(first), speed(first), internal%value(1, state), restoring(first), applied(first), &
-                           internal%rate(1, state))
-      else
-        call bank%evaluate(t, angle(first), speed(first), no_rates, restoring(first), applied(first), no_rates)
-      end if
-    end associate
-  end subroutine evaluate_bank
-
-  !> Derivatives of the moments, after `evaluate_elements`.
-  subroutine differentiate_elements(self, t)
-    class(machine_t), intent(inout) :: self
-    real(wp), intent(in) :: t(self%lanes)   !! [s]
-    integer :: first_cross, i
-
-    self%elements%time(:) = t
-    call self%laws%differentiate(self%elements)
-    call self%elements%cross%clear()
-    first_cross = 1
-    do i = 1, size(self%general_banks)
-      associate (bank => self%banks(self%general_banks(i))%bank)
-        call bank%law%differentiate(bank%first, bank%first_internal, first_cross, self%elements)
-        if (bank%ports > 1) first_cross = first_cross + 2 * bank%count
-      end associate
-    end do
-  end subroutine differentiate_elements
-
-  !> Stored energies of all elements, from the angles and speeds in `elements`.
-  subroutine evaluate_energies(self)
-    class(machine_t), intent(inout) :: self
-    integer :: i
-
-    call self%laws%evaluate_energies(self%elements)
-    do i = 1, size(self%general_banks)
-      associate (bank => self%banks(self%general_banks(i))%bank)
-        call bank%law%evaluate_energies(bank%first, self%elements)
-        if (bank%states == 0) cycle
-        call bank%keep_energy(self%elements)
-        self%elements%stored(:, bank%first:bank%last()) = self%elements%stored(:, bank%first:bank%last()) &
-                                                          + self%elements%kept(:, bank%first:bank%last())
-      end associate
-    end do
-  end subroutine evaluate_energies
-
-  !> The largest rate at which the moments of one lane oscillate with the time or an angle [rad/s], at the speeds in `elements`.
-  pure real(wp) function fastest_wave(self, lane) result(fastest)
-    class(machine_t), intent(in) :: self
-    integer, intent(in) :: lane
-    integer :: i
-
-    fastest = 0.0_wp
-    do i = 1, size(self%banks)
-      associate (bank => self%banks(i)%bank)
-        if (bank%is_polynomial .and. bank%moving_rows == 0) cycle
-        associate (last => bank%first - 1 + bank%ports * bank%count)   ! of its phases
-          fastest = max(fastest, bank%fastest_wave(lane, self%elements%speed(lane, bank%first:last)))
-        end associate
-      end associate
-    end do
-  end function fastest_wave
-
-  !> Computes what the laws keep of the parameters of a lane, after these have changed.
+  !> Computes what is kept of the parameters of a lane, after these have changed.
   subroutine refresh_lane(self, lane)
     class(machine_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -463,20 +282,6 @@ contains
       call self%banks(i)%bank%refresh_lane(lane)
     end do
   end subroutine refresh_lane
-
-  !> Powers of the elements `with_work` after `evaluate`, positive into the machine.
-  subroutine power(self, watts)
-    class(machine_t), intent(in) :: self
-    real(wp), intent(inout) :: watts(self%lanes, size(self%with_work))   !! [W]
-    integer :: e, k, l
-
-    do k = 1, size(self%with_work)
-      e = self%with_work(k)
-      do l = 1, self%lanes
-        watts(l, k) = self%elements%applied(l, e) * self%elements%speed(l, e)
-      end do
-    end do
-  end subroutine power
 
   !> Kinetic energy omega^T J omega / 2 of one lane [J].
   pure real(wp) function kinetic_energy(self, lane, omega) result(energy)

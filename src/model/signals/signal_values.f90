@@ -1,6 +1,7 @@
 !> The values of signals over the time, for all lanes of a block.
 module nocdyn_signal_values
   use nocdyn_bank, only: role_coupling
+  use nocdyn_elements, only: element_values_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -117,9 +118,9 @@ contains
     real(wp), intent(out) :: scale     !! [N m]
 
     fastest = self%formulation%fastest_wave(lane)
-    associate (elements => self%formulation%machine%elements)
+    associate (elements => self%formulation%state%elements)
       scale = 0.0_wp
-      if (elements%count > 0) scale = maxval(abs(elements%applied(lane, :))) + maxval(abs(elements%restoring(lane, :)))
+      if (size(elements%applied, 2) > 0) scale = maxval(abs(elements%applied(lane, :))) + maxval(abs(elements%restoring(lane, :)))
     end associate
   end subroutine find_pace
 
@@ -129,7 +130,7 @@ contains
     integer, intent(in) :: lane
 
     if (.not. self%have_elastic) return
-    associate (elements => self%formulation%machine%elements)
+    associate (elements => self%formulation%state%elements)
       self%start_energy(lane) = self%kinetic_energy(lane) + sum(elements%stored(lane, :))
       self%start_kept(lane) = sum(elements%kept(lane, :))
     end associate
@@ -144,10 +145,10 @@ contains
 
     associate (formulation => self%formulation)
       lost = formulation%joints%lost
-      call formulation%machine%keep_branches()
+      call formulation%state%keep_branches()
       call formulation%observe(t, y, self%in_motion)
-      if (self%have_elastic) call formulation%machine%evaluate_energies()
-      call formulation%machine%restore_branches()
+      if (self%have_elastic) call formulation%state%evaluate_energies(formulation%machine)
+      call formulation%state%restore_branches(formulation%machine)
       formulation%joints%lost = lost
     end associate
   end subroutine observe
@@ -175,7 +176,7 @@ contains
           case (signal_speed)
             row(first:last) = self%formulation%omega(lane, i:j)
           case (signal_element)
-            if (segment%has_new_values) call observe_bank(machine, segment, lane, self%values)
+            if (segment%has_new_values) call observe_bank(machine, self%formulation%state%elements, segment, lane, self%values)
             row(first:last) = self%values(i:j)
             if (segment%body > 0) row(first) = row(first) * self%formulation%omega(lane, segment%body)
           case (signal_reaction)
@@ -185,7 +186,7 @@ contains
               row(first + m - i) = members%factor(lane, m) * self%lambda(members%row(m))
             end do
           case (signal_point_moment, signal_point_stress)
-            call fill_points(machine, segment, lane, row(first:last))
+            call fill_points(machine, self%formulation%state%elements, segment, lane, row(first:last))
           case (signal_kinetic:signal_residual)
             row(first) = self%energies(segment%kind)
           case default
@@ -197,14 +198,15 @@ contains
   end subroutine fill_row
 
   !> The values of one quantity of a bank. A sum with 0 makes no -0.
-  subroutine observe_bank(machine, segment, lane, values)
+  subroutine observe_bank(machine, elements, segment, lane, values)
     type(machine_t), intent(in) :: machine
+    type(element_values_t), intent(in) :: elements   !! of the machine
     type(segment_t), intent(in) :: segment
     integer, intent(in) :: lane
     real(wp), contiguous, intent(inout) :: values(:)   !! [elements of the bank at least]
 
     associate (bank => machine%banks(segment%bank)%bank)
-      associate (elements => machine%elements, first => bank%first, last => bank%last(), factor => segment%factor, &
+      associate (first => bank%first, last => bank%last(), factor => segment%factor, &
                  n => bank%count)
         select case (segment%form)
         case (form_angle)
@@ -229,8 +231,9 @@ contains
   end subroutine observe_bank
 
   !> The moments or stresses at points of a shaft.
-  subroutine fill_points(machine, segment, lane, values)
+  subroutine fill_points(machine, elements, segment, lane, values)
     type(machine_t), intent(in) :: machine
+    type(element_values_t), intent(in) :: elements   !! of the machine
     type(segment_t), intent(in) :: segment
     integer, intent(in) :: lane
     real(wp), intent(inout) :: values(:)   !! [N m] or [Pa]
@@ -239,7 +242,7 @@ contains
     select type (bank => machine%banks(segment%bank)%bank)
     type is (shafts_t)
       do p = 1, size(values)
-        values(p) = bank%moment_at(machine%elements, segment%quantity, segment%index + p - 1, lane)
+        values(p) = bank%moment_at(elements, segment%quantity, segment%index + p - 1, lane)
       end do
       if (segment%kind == signal_point_stress) then
         associate (moduli => bank%parameters(bank%number_of('shaft_modulus'))%value, &
@@ -260,11 +263,11 @@ contains
 
     associate (energies => self%energies)
       energies(signal_kinetic) = self%kinetic_energy(lane)
-      if (self%have_elastic) energies(signal_elastic) = sum(self%formulation%machine%elements%stored(lane, :))
+      if (self%have_elastic) energies(signal_elastic) = sum(self%formulation%state%elements%stored(lane, :))
       if (.not. self%have_works) return
       energies(signal_work_in) = work(self%works_in, self%formulation%states, y)
       energies(signal_work_out) = work(self%works_out, self%formulation%states, y) &
-                                  + sum(self%formulation%machine%elements%kept(lane, :)) - self%start_kept(lane)
+                                  + sum(self%formulation%state%elements%kept(lane, :)) - self%start_kept(lane)
       energies(signal_residual) = (energies(signal_kinetic) + energies(signal_elastic) - self%start_energy(lane)) &
                                   - (energies(signal_work_in) + energies(signal_work_out))
       energies(signal_work_out) = 0.0_wp - energies(signal_work_out)   ! not -0 without any work

@@ -149,7 +149,7 @@ contains
     do i = 1, samples
       angle = 2.0_wp * pi / force%base * (i - 1) / samples
       do k = size(masses), 1, -1   ! the piston comes last
-        call rows%motion(k, angle, g)
+        call rows%motion(k, 1, angle, g)
         inertia(i) = inertia(i) + masses(k) * g(1)**2
         change(i) = change(i) - masses(k) * g(1) * g(2)
       end do

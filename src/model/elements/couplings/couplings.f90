@@ -10,7 +10,7 @@ module nocdyn_couplings
   use nocdyn_bank, only: bank_t, role_coupling
   use nocdyn_element_keys, only: element_keys_t
   use nocdyn_element_rows, only: element_rows_t, rows_between
-  use nocdyn_elements, only: elements_t
+  use nocdyn_elements, only: element_values_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: angle_of, expression_t, node_of, operator(*), operator(+), operator(-), operator(/), &
     phase_of, phase_speed_of, speed_of

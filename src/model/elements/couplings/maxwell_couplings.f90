@@ -7,7 +7,7 @@
 module nocdyn_maxwell_couplings
   use nocdyn_couplings, only: coupling_common_t, couplings_t
   use nocdyn_element_keys, only: element_keys_t
-  use nocdyn_elements, only: elements_t
+  use nocdyn_elements, only: element_values_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, node_of, operator(*), operator(+), operator(-), operator(/), speed_of, state_of
   use nocdyn_law_tape, only: law_tape_t
@@ -71,7 +71,7 @@ contains
   !> The springs of the branches keep F^2 / (2 K).
   pure subroutine keep_energy(self, elements)
     class(maxwell_couplings_t), intent(in) :: self
-    type(elements_t), intent(inout) :: elements   !! of the machine
+    type(element_values_t), intent(inout) :: elements   !! of the machine
     integer :: e, k, s, stiffness
 
     stiffness = self%number_of('branch stiffness')

@@ -4,7 +4,7 @@
 !> stands for, and its moment the one of the shaft there. Between the Gauss points of a segment the moment is a polynomial.
 module nocdyn_shafts
   use nocdyn_couplings, only: coupling_common_t, couplings_t
-  use nocdyn_elements, only: elements_t
+  use nocdyn_elements, only: element_values_t
   use nocdyn_kinds, only: wp
   use nocdyn_polynomial_laws, only: coefficient_linear, coefficient_rest
   use nocdyn_quantities, only: form_observed, new_quantity, quantity_t, rank_moment, rank_stress, rank_torque, rank_twist
@@ -136,7 +136,7 @@ contains
   !> of a shaft are the ones of its first slice.
   pure subroutine observe(self, elements, quantity, lane, values)
     class(shafts_t), intent(in) :: self
-    type(elements_t), intent(in) :: elements
+    type(element_values_t), intent(in) :: elements
     integer, intent(in) :: quantity   !! twist ... stress
     integer, intent(in) :: lane
     real(wp), intent(out) :: values(:)   !! [elements of the bank]
@@ -174,7 +174,7 @@ contains
   !> The moment at a point of a shaft, elastic and of its damping [N m], after `evaluate`.
   pure real(wp) function moment_at(self, elements, shaft, point, lane) result(moment)
     class(shafts_t), intent(in) :: self
-    type(elements_t), intent(in) :: elements
+    type(element_values_t), intent(in) :: elements
     integer, intent(in) :: shaft, point, lane
 
     associate (one => self%shafts(shaft), first => self%first - 1 + self%shafts(shaft)%first + self%shafts(shaft)%before(point), &

@@ -31,9 +31,9 @@ contains
   end function new_cardan_rows
 
   !> phi_2 = phi_1 + atan2((1 - c) sin phi_1 cos phi_1, c cos^2 phi_1 + sin^2 phi_1), c = cos(angle).
-  pure subroutine motion(self, element, v, g)
+  pure subroutine motion(self, element, segment, v, g)
     class(cardan_rows_t), intent(in) :: self
-    integer, intent(in) :: element
+    integer, intent(in) :: element, segment
     real(wp), intent(in) :: v          !! angle of the first body [rad]
     real(wp), intent(out) :: g(0:3)    !! of the second [rad]
     real(wp) :: bend, c, d(0:2), s, shift

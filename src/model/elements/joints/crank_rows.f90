@@ -7,7 +7,7 @@
 !> piston. The force of the first row is therefore the one of the rod on the pin of the piston, however the rod is given.
 module nocdyn_crank_rows
   use nocdyn_bank, only: role_crank
-  use nocdyn_elements, only: elements_t
+  use nocdyn_elements, only: element_values_t
   use nocdyn_kinds, only: wp
   use nocdyn_moving_rows, only: moving_rows_t
   use nocdyn_quantities, only: form_angle, form_applied, form_observed, form_speed, new_quantity, quantity_t, rank_force, &
@@ -54,9 +54,9 @@ contains
                                                   crank%rod_center], 1, lanes), .false., spread(1, 1, 5))
   end function new_crank_rows
 
-  pure subroutine motion(self, element, v, g)
+  pure subroutine motion(self, element, segment, v, g)
     class(crank_rows_t), intent(in) :: self
-    integer, intent(in) :: element
+    integer, intent(in) :: element, segment
     real(wp), intent(in) :: v          !! angle of the body [rad]
     real(wp), intent(out) :: g(0:3)    !! [m] or [rad]
 
@@ -97,7 +97,7 @@ contains
     real(wp), intent(in) :: v   !! angle of the body [rad]
     real(wp) :: g(0:3)
 
-    call self%motion(element, v, g)
+    call self%motion(element, 1, v, g)
     position = g(0)
   end function position
 
@@ -178,7 +178,7 @@ contains
 
   pure subroutine observe_cranks(self, elements, quantity, lane, values)
     class(crank_rows_t), intent(in) :: self
-    type(elements_t), intent(in) :: elements
+    type(element_values_t), intent(in) :: elements
     integer, intent(in) :: quantity
     integer, intent(in) :: lane
     real(wp), intent(out) :: values(:)   !! [elements of the bank]

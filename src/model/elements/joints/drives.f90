@@ -59,9 +59,9 @@ contains
     call guard_segment(tape, time_of(tape), is_time=.true.)
   end subroutine describe
 
-  pure subroutine motion(self, element, v, g)
+  pure subroutine motion(self, element, segment, v, g)
     class(drives_t), intent(in) :: self
-    integer, intent(in) :: element
+    integer, intent(in) :: element, segment
     real(wp), intent(in) :: v          !! time [s]
     real(wp), intent(out) :: g(0:3)    !! [rad]
     real(wp) :: sine(0:3), table(0:3)
@@ -77,18 +77,18 @@ contains
         sine(:1) = sine(:1) + self%parameters(1)%value(1, element) * [v - self%t_start, 1.0_wp]
       end if
     end associate
-    if (allocated(self%curve)) table = table_motion(self, element, v)
+    if (allocated(self%curve)) table = table_motion(self, element, segment, v)
     g = sine + table
   end subroutine motion
 
-  !> The part of a table, on its present branch.
-  pure function table_motion(self, element, t) result(g)
+  !> The part of a table.
+  pure function table_motion(self, element, segment, t) result(g)
     class(drives_t), intent(in) :: self
-    integer, intent(in) :: element
+    integer, intent(in) :: element, segment
     real(wp), intent(in) :: t   !! [s]
     real(wp) :: g(0:3)
 
-    associate (curve => self%curve(1, element), segment => self%branch(1, element), t_start => self%t_start)
+    associate (curve => self%curve(1, element), t_start => self%t_start)
       g = curve%derivatives(segment, t)
       if (self%prescribe_angles) then
         g(0) = g(0) - curve%value(t_start)
@@ -99,13 +99,11 @@ contains
   end function table_motion
 
   !> The one of the sines.
-  pure real(wp) function fastest_wave(self, lane, speed)
+  pure real(wp) function fastest_wave(self, lane)
     class(drives_t), intent(in) :: self
     integer, intent(in) :: lane
-    real(wp), intent(in) :: speed(:)
 
-    fastest_wave = 0.0_wp
-    if (size(speed) > 0) fastest_wave = maxval(self%parameters(3)%value(lane, :), mask=abs(self%parameters(2)%value(lane, :)) > 0)
+    fastest_wave = maxval(self%parameters(3)%value(lane, :), mask=abs(self%parameters(2)%value(lane, :)) > 0)
     fastest_wave = max(fastest_wave, 0.0_wp)
   end function fastest_wave
 

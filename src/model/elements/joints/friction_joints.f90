@@ -11,9 +11,10 @@
 !> (`nocdyn_joint_sets`).
 module nocdyn_friction_joints
   use nocdyn_bank, only: bank_t, role_bearing
+  use nocdyn_bank_states, only: bank_state_t
   use nocdyn_curves, only: curve_t
   use nocdyn_element_rows, only: rows_between
-  use nocdyn_elements, only: elements_t
+  use nocdyn_elements, only: element_values_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), pick, speed_of, time_of
   use nocdyn_law_tape, only: law_tape_t
@@ -46,7 +47,6 @@ module nocdyn_friction_joints
     procedure :: add_modes
     procedure :: describe
     procedure :: find_range
-    procedure :: mode_of
     procedure :: set_mode
     procedure :: set_mode_by_slip
     procedure :: extremes
@@ -196,31 +196,25 @@ contains
     if (present(sliding)) sliding = moments(slip_least:)
   end subroutine find_range
 
-  !> The mode of a joint of the first lane.
-  pure integer function mode_of(self, element)
-    class(friction_joints_t), intent(in) :: self
-    integer, intent(in) :: element   !! numbered within the bank
-
-    mode_of = self%branch(1, element + (self%mode_switch - 1) * self%count)
-  end function mode_of
-
   !> Sets the mode of a joint of the first lane.
-  subroutine set_mode(self, element, mode)
-    class(friction_joints_t), intent(inout) :: self
+  subroutine set_mode(self, state, element, mode)
+    class(friction_joints_t), intent(in) :: self
+    type(bank_state_t), intent(inout) :: state
     integer, intent(in) :: element   !! numbered within the bank
     integer, intent(in) :: mode
 
-    call self%set_branch(element + (self%mode_switch - 1) * self%count, 1, mode)
+    call state%set_branch(self, element + (self%mode_switch - 1) * self%count, 1, mode)
   end subroutine set_mode
 
   !> Sets the mode of a joint that slips, or is locked.
-  subroutine set_mode_by_slip(self, element, slip, is_locked)
-    class(friction_joints_t), intent(inout) :: self
+  subroutine set_mode_by_slip(self, state, element, slip, is_locked)
+    class(friction_joints_t), intent(in) :: self
+    type(bank_state_t), intent(inout) :: state
     integer, intent(in) :: element     !! numbered within the bank
     real(wp), intent(in) :: slip       !! u' [rad/s]
     logical, intent(in) :: is_locked
 
-    call self%set_mode(element, merge(locked, merge(slips_forwards, slips_backwards, slip >= 0), is_locked))
+    call self%set_mode(state, element, merge(locked, merge(slips_forwards, slips_backwards, slip >= 0), is_locked))
   end subroutine set_mode_by_slip
 
   !> The friction jumps where the slip changes its direction, and bends at the points of a table.

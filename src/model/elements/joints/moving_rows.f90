@@ -25,10 +25,11 @@ module nocdyn_moving_rows
   abstract interface
 
     !> g and its first three derivatives by v.
-    pure subroutine motion_interface(self, element, v, g)
+    pure subroutine motion_interface(self, element, segment, v, g)
       import :: moving_rows_t, wp
       class(moving_rows_t), intent(in) :: self
       integer, intent(in) :: element     !! numbered within the bank
+      integer, intent(in) :: segment     !! of its table over the time, if it has one
       real(wp), intent(in) :: v          !! [rad] or [s]
       real(wp), intent(out) :: g(0:3)    !! [rad] or [m] by powers of the unit of v
     end subroutine motion_interface

@@ -57,9 +57,9 @@ contains
     end do
   end subroutine refresh_lane
 
-  pure subroutine motion(self, element, v, g)
+  pure subroutine motion(self, element, segment, v, g)
     class(relation_rows_t), intent(in) :: self
-    integer, intent(in) :: element
+    integer, intent(in) :: element, segment
     real(wp), intent(in) :: v          !! angle of the first body [rad]
     real(wp), intent(out) :: g(0:3)    !! of the second [rad]
 

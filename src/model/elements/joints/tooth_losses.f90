@@ -11,7 +11,7 @@
 module nocdyn_tooth_losses
   use nocdyn_bank, only: role_loss
   use nocdyn_curves, only: curve_t
-  use nocdyn_elements, only: elements_t
+  use nocdyn_elements, only: element_values_t
   use nocdyn_friction_joints, only: friction_joints_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: literal, node_of

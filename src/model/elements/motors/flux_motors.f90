@@ -13,7 +13,7 @@
 module nocdyn_flux_motors
   use nocdyn_bank, only: bank_t, role_motor
   use nocdyn_element_keys, only: element_keys_t
-  use nocdyn_elements, only: elements_t
+  use nocdyn_elements, only: element_values_t
   use nocdyn_induction_circuits, only: induction_circuit_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, node_of, operator(*), operator(+), operator(-), operator(/), speed_of, state_of
@@ -253,7 +253,6 @@ contains
     real(wp), intent(in) :: share   !! of the frequency in the input
 
     self%parameters(self%number_of(share_name))%value(1, :) = share
-    call self%refresh_lane(1)
   end subroutine set_supply
 
   pure real(wp) function idle_supply(self, element, speed)
@@ -295,7 +294,7 @@ contains
 
   pure subroutine observe(self, elements, quantity, lane, values)
     class(flux_motors_t), intent(in) :: self
-    type(elements_t), intent(in) :: elements
+    type(element_values_t), intent(in) :: elements
     integer, intent(in) :: quantity   !! index in `quantities`
     integer, intent(in) :: lane
     real(wp), intent(out) :: values(:)   !! [elements of the bank]; the current is the one of a line, rms

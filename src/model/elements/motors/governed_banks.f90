@@ -8,7 +8,7 @@ module nocdyn_governed_banks
   use nocdyn_bank, only: bank_t
   use nocdyn_described_elements, only: boundary_width
   use nocdyn_element_keys, only: element_keys_t
-  use nocdyn_elements, only: elements_t
+  use nocdyn_elements, only: element_values_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), operator(+), operator(-), operator(/), &
     pick, speed_of, state_of
@@ -221,7 +221,7 @@ contains
 
   pure subroutine observe(self, elements, quantity, lane, values)
     class(governed_bank_t), intent(in) :: self
-    type(elements_t), intent(in) :: elements
+    type(element_values_t), intent(in) :: elements
     integer, intent(in) :: quantity   !! index in `quantities`
     integer, intent(in) :: lane
     real(wp), intent(out) :: values(:)   !! [elements of the bank]

@@ -191,7 +191,6 @@ contains
     real(wp), intent(in) :: share   !! of the frequency in the input
 
     self%parameters(self%number_of(share_name))%value(1, :) = share
-    call self%refresh_lane(1)
   end subroutine set_supply
 
   pure real(wp) function idle_supply(self, element, speed)

@@ -11,6 +11,7 @@ module nocdyn_reduced_series
   use nocdyn_kinds, only: wp
   use nocdyn_laws, only: narrow, strip_lanes, wide
   use nocdyn_machine, only: machine_t
+  use nocdyn_machine_state, only: machine_state_t
   use nocdyn_narrow_series, only: narrow_accelerate => accelerate, narrow_begin_motion => begin_motion, &
     narrow_find_moments => find_moments, narrow_find_values => find_values, narrow_multiply_group => multiply_group
   use nocdyn_polynomial_laws, only: polynomial_laws_t
@@ -33,10 +34,11 @@ module nocdyn_reduced_series
     integer :: last = 0                         !! coefficient of the moments that will be asked for
     integer :: lanes = 1, elements = 0, freedoms = 0
     integer :: components = 0                   !! of the state
+    integer :: internal = 0                     !! internal states of the elements
+    integer, allocatable :: with_work(:)        !! elements whose powers are integrated
     integer :: strip = 1                        !! lanes of a strip
     integer :: w = narrow                        !! numbers of a group
     integer :: groups = 0                       !! of the elements in a strip
-    logical :: has_energy_balance = .false.     !! whether the powers of the elements `machine%with_work` are integrated
     type(series_map_t) :: twists, accelerations !! U, R
     real(wp), allocatable :: law(:, :, :, :)    !! polynomial laws, [w, groups, parameters, strips]
     integer, allocatable :: terms(:)            !! has_... of `nocdyn_series_terms`, [groups]
@@ -58,8 +60,9 @@ module nocdyn_reduced_series
 contains
 
   !> Work space for series up to an order.
-  function new_reduced_series(machine, twists, accelerations, with_energy_balance, order) result(self)
-    type(machine_t), intent(inout) :: machine         !! its banks get work space too
+  function new_reduced_series(machine, state, twists, accelerations, with_energy_balance, order) result(self)
+    type(machine_t), intent(in) :: machine
+    type(machine_state_t), intent(inout) :: state     !! its laws get work space too
     type(sparse_map_t), intent(in) :: twists          !! U
     type(sparse_map_t), intent(in) :: accelerations   !! R
     logical, intent(in) :: with_energy_balance        !! whether the powers of the elements `machine%with_work` are integrated
@@ -74,23 +77,24 @@ contains
     self%strip = strip_lanes(machine%lanes, self%elements)
     self%w = max(self%strip, narrow)
     self%groups = max((self%strip * self%elements + self%w - 1) / self%w, 1)
-    self%has_energy_balance = with_energy_balance .and. size(machine%with_work) > 0
-    self%components = 2 * self%freedoms + machine%elements%internal%count
-    if (self%has_energy_balance) self%components = self%components + size(machine%with_work)
+    self%internal = machine%elements%internal%count
+    allocate (self%with_work(merge(size(machine%with_work), 0, with_energy_balance)))
+    self%with_work(:) = machine%with_work(:size(self%with_work))
+    self%components = 2 * self%freedoms + self%internal + size(self%with_work)
     self%twists = new_series_map(twists, self%lanes, self%strip, self%elements, self%freedoms)
     self%accelerations = new_series_map(accelerations, self%lanes, self%strip, self%freedoms, self%elements)
     allocate (self%law(self%w, self%groups, parameters, (machine%lanes + self%strip - 1) / self%strip), source=0.0_wp)
-    allocate (self%terms(self%groups), source=merge(has_applied, 0, self%has_energy_balance) &
-              + merge(has_history, 0, self%has_energy_balance .or. self%lanes == 1))
+    allocate (self%terms(self%groups), source=merge(has_applied, 0, size(self%with_work) > 0) &
+              + merge(has_history, 0, size(self%with_work) > 0 .or. self%lanes == 1))
     associate (length => self%w * ((self%strip * self%freedoms + self%w - 1) / self%w))
       allocate (self%motion(self%w, 0:self%order, self%groups, 2), self%square(self%w, 0:self%order, self%groups), source=0.0_wp)
       allocate (self%restoring(self%w, self%groups), self%applied(self%w, self%groups), source=0.0_wp)
       allocate (self%moment(self%w, self%groups), self%origin(self%w, self%groups), source=0.0_wp)
-      if (self%has_energy_balance) allocate (self%powers(self%w, 0:self%order, self%groups), source=0.0_wp)
+      if (size(self%with_work) > 0) allocate (self%powers(self%w, 0:self%order, self%groups), source=0.0_wp)
       allocate (self%rates(length), self%coordinates(length), self%acceleration(length), source=0.0_wp)
       allocate (self%angles(self%elements), self%speeds(self%elements), source=0.0_wp)
     end associate
-    self%banks = new_series_banks(machine, order, self%strip, self%groups)
+    self%banks = new_series_banks(machine, state, order, self%strip, self%groups)
     where (self%banks%has_angle) self%terms = ior(self%terms, has_angle)
     where (self%banks%has_motion) self%terms = ior(self%terms, has_history)
     where (self%banks%has_forcing) self%terms = ior(self%terms, has_forcing)
@@ -145,9 +149,9 @@ contains
   end subroutine copy_laws
 
   !> Computes the coefficients number 1 to `order` of q', q, the internal states and the work integrals, which follow one another.
-  subroutine expand(self, machine, twists, accelerations, twist_at_origin, incidence, held, columns, t, y)
+  subroutine expand(self, state, twists, accelerations, twist_at_origin, incidence, held, columns, t, y)
     class(reduced_series_t), intent(inout) :: self
-    type(machine_t), intent(inout) :: machine
+    type(machine_state_t), intent(inout) :: state
     type(sparse_map_t), intent(in) :: twists, accelerations     !! U, R
     real(wp), contiguous, intent(in) :: twist_at_origin(:, :)   !! [rad], [lanes, elements]
     type(element_coordinates_t), intent(in) :: incidence
@@ -159,9 +163,9 @@ contains
 
     self%last = self%order - 1
     do strip = 1, size(self%law, 4)
-      call begin(self, machine, twists, strip, twist_at_origin, columns, t, y)
+      call begin(self, state, twists, strip, twist_at_origin, columns, t, y)
       do k = 0, self%order - 1
-        call advance(self, machine, twists, accelerations, strip, k, columns, y(1, 1, k + 1))
+        call advance(self, state, twists, accelerations, strip, k, columns, y(1, 1, k + 1))
         if (.not. held%is_active) cycle
         last = min(self%strip * strip, self%lanes)
         call held%hold_coefficients(incidence, self%strip * (strip - 1) + 1, last, self%lanes, self%freedoms, y(1, 1, k + 1))
@@ -170,10 +174,10 @@ contains
     end do
   end subroutine expand
 
-  !> The derivative of the state, to the same bits as by `machine%evaluate_elements`; with several lanes.
-  subroutine derivative(self, machine, twists, accelerations, twist_at_origin, t, y, dydt)
+  !> The derivative of the state, to the same bits as by `evaluate_elements` of the state; with several lanes.
+  subroutine derivative(self, state, twists, accelerations, twist_at_origin, t, y, dydt)
     class(reduced_series_t), intent(inout) :: self
-    type(machine_t), intent(inout) :: machine
+    type(machine_state_t), intent(inout) :: state
     type(sparse_map_t), intent(in) :: twists, accelerations     !! U, R
     real(wp), contiguous, intent(in) :: twist_at_origin(:, :)   !! [rad], [lanes, elements]
     real(wp), intent(in) :: t(self%lanes)                       !! [s]
@@ -183,15 +187,15 @@ contains
 
     self%last = 0
     do strip = 1, size(self%law, 4)
-      call begin(self, machine, twists, strip, twist_at_origin, self%components, t, y)
-      call advance(self, machine, twists, accelerations, strip, 0, self%components, dydt)
+      call begin(self, state, twists, strip, twist_at_origin, self%components, t, y)
+      call advance(self, state, twists, accelerations, strip, 0, self%components, dydt)
     end do
   end subroutine derivative
 
   !> Coefficients k + 1 of the state in a strip, from the coefficients of the motion up to number k.
-  subroutine advance(self, machine, twists, accelerations, strip, k, columns, y)
+  subroutine advance(self, state, twists, accelerations, strip, k, columns, y)
     type(reduced_series_t), intent(inout) :: self
-    type(machine_t), intent(inout) :: machine
+    type(machine_state_t), intent(inout) :: state
     type(sparse_map_t), intent(in) :: twists, accelerations   !! U, R
     integer, intent(in) :: strip, k, columns
     real(wp), intent(inout) :: y(self%lanes, columns)         !! coefficients k + 1 of the state
@@ -202,18 +206,18 @@ contains
       if (self%lanes == 1) call self%twists%multiply(twists, self%order, k, self%rates, self%motion(1, 0, 1, 2))
       call find_moments(self, strip, k)
     end if
-    call self%banks%add(machine, strip, k, self%motion, self%restoring, self%applied)
-    if (self%has_energy_balance) self%powers(:, k, :) = self%applied
+    call self%banks%add(state, strip, k, self%motion, self%restoring, self%applied)
+    if (size(self%with_work) > 0) self%powers(:, k, :) = self%applied
     call add(size(self%moment), self%restoring, self%applied, self%moment)
     call integrate(self, accelerations, strip, k, columns, y)
-    if (machine%elements%internal%count > 0) call self%banks%integrate(machine, strip, k, y(1, 2 * self%freedoms + 1))
-    if (self%has_energy_balance) call integrate_powers(self, machine, strip, k, columns, y)
+    if (self%internal > 0) call self%banks%integrate(state, strip, k, y(1, 2 * self%freedoms + 1))
+    if (size(self%with_work) > 0) call integrate_powers(self, strip, k, columns, y)
   end subroutine advance
 
   !> Coefficients 0 of the elements of a strip.
-  subroutine begin(self, machine, twists, strip, twist_at_origin, columns, t, y)
+  subroutine begin(self, state, twists, strip, twist_at_origin, columns, t, y)
     type(reduced_series_t), intent(inout) :: self
-    type(machine_t), intent(inout) :: machine
+    type(machine_state_t), intent(inout) :: state
     type(sparse_map_t), intent(in) :: twists                    !! U
     integer, intent(in) :: strip, columns
     real(wp), intent(in) :: twist_at_origin(self%lanes, self%elements)   !! [rad]
@@ -244,7 +248,7 @@ contains
         end associate
       end if
     end associate
-    call self%banks%begin(machine, strip, self%last, t, y(1, min(2 * self%freedoms + 1, columns)))
+    call self%banks%begin(state, strip, self%last, t, y(1, min(2 * self%freedoms + 1, columns)))
   end subroutine begin
 
   !> Angles from rest and speeds of the elements of several lanes.
@@ -351,19 +355,18 @@ contains
   end subroutine integrate
 
   !> Coefficients k + 1 of the work integrals; the powers are `applied` times the speed.
-  subroutine integrate_powers(self, machine, strip, k, columns, y)
+  subroutine integrate_powers(self, strip, k, columns, y)
     type(reduced_series_t), intent(in) :: self
-    type(machine_t), intent(in) :: machine
     integer, intent(in) :: strip, k, columns
     real(wp), intent(inout) :: y(self%lanes, columns)   !! coefficients k + 1 of the state
     real(wp) :: power(wide)
     integer :: a, before, first, g, i, slot
 
-    before = 2 * self%freedoms + machine%elements%internal%count
+    before = 2 * self%freedoms + self%internal
     first = self%strip * (strip - 1)
     g = 0
-    do a = 1, size(machine%with_work)
-      slot = self%strip * (machine%with_work(a) - 1)
+    do a = 1, size(self%with_work)
+      slot = self%strip * (self%with_work(a) - 1)
       if (g /= slot / self%w + 1) then
         g = slot / self%w + 1
         if (self%w == narrow) then

@@ -4,13 +4,14 @@
 !> some banks follow from the time alone: their series do not wait for the series of the motion, and are computed at the start of
 !> a step.
 module nocdyn_series_banks
-  use nocdyn_bank, only: bank_t
+  use nocdyn_element_laws, only: element_law_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_strips, only: load, load_lanes
   use nocdyn_law_walk, only: walk
   use nocdyn_law_work, only: law_work_t
   use nocdyn_laws, only: narrow
   use nocdyn_machine, only: machine_t
+  use nocdyn_machine_state, only: machine_state_t
   implicit none (type, external)
   private
 
@@ -20,6 +21,9 @@ module nocdyn_series_banks
     integer, private :: order = 0               !! of the series
     integer, allocatable, private :: moved(:)   !! banks whose moments follow from the motion
     integer, allocatable, private :: timed(:)   !! banks whose moments follow from the time alone
+    integer, allocatable, private :: first(:)   !! element of each bank, [banks]
+    integer, allocatable, private :: first_internal(:)   !! internal state of each bank, [banks]
+    integer, private :: lanes = 1, internal = 0          !! internal states of all elements
     logical, allocatable :: has_angle(:)        !! whether some law reads the angle, [groups of all elements]
     logical, allocatable :: has_motion(:)       !! whether some moment follows from the motion, [groups]
     logical, allocatable :: has_forcing(:)      !! whether some moment follows from the time alone, [groups]
@@ -31,8 +35,9 @@ module nocdyn_series_banks
 contains
 
   !> Work space for series up to an order.
-  function new_series_banks(machine, order, strip, groups) result(self)
-    type(machine_t), intent(inout) :: machine   !! its banks get work space too
+  function new_series_banks(machine, state, order, strip, groups) result(self)
+    type(machine_t), intent(in) :: machine
+    type(machine_state_t), intent(inout) :: state   !! its laws get work space too
     integer, intent(in) :: order
     integer, intent(in) :: strip, groups        !! lanes of a strip, groups of all elements in it
     type(series_banks_t) :: self
@@ -40,24 +45,29 @@ contains
     logical, allocatable :: timed(:)
 
     self%order = order
+    allocate (self%first(size(machine%banks)), self%first_internal(size(machine%banks)))
+    self%first(:) = [(machine%banks(i)%bank%first, i=1, size(machine%banks))]
+    self%first_internal(:) = [(machine%banks(i)%bank%first_internal, i=1, size(machine%banks))]
+    self%lanes = machine%lanes
+    self%internal = machine%elements%internal%count
     w = max(strip, narrow)
     allocate (self%has_angle(groups), self%has_motion(groups), self%has_forcing(groups), source=.false.)
     associate (numbers => machine%general_banks)
       allocate (timed(size(numbers)))
       do i = 1, size(numbers)
-        associate (bank => machine%banks(numbers(i))%bank)
-          call bank%law%prepare_series(order)
-          timed(i) = bank%states == 0 .and. bank%law%law%tape%restoring == 0
+        associate (bank => machine%banks(numbers(i))%bank, law => state%banks(numbers(i))%law)
+          call law%prepare_series(order)
+          timed(i) = bank%states == 0 .and. bank%tape%restoring == 0
           if (timed(i)) then
-            associate (law => bank%law%law%tape%node(bank%law%law%tape%applied))
-              timed(i) = .not. (law%has_angle .or. law%has_speed)
+            associate (applied => bank%tape%node(bank%tape%applied))
+              timed(i) = .not. (applied%has_angle .or. applied%has_speed)
             end associate
           end if
           associate (first => strip * (bank%first - 1) / w + 1, &
                      last => (strip * (bank%last() + (bank%ports - 1) * bank%count) - 1) / w + 1)
             self%has_forcing(first:last) = self%has_forcing(first:last) .or. timed(i)
             self%has_motion(first:last) = self%has_motion(first:last) .or. .not. timed(i)
-            self%has_angle(first:last) = self%has_angle(first:last) .or. max(bank%law%angle, bank%law%phase) > 0
+            self%has_angle(first:last) = self%has_angle(first:last) .or. max(law%angle, law%phase) > 0
           end associate
         end associate
       end do
@@ -68,90 +78,89 @@ contains
   end function new_series_banks
 
   !> What the banks need besides the motion at the start of a step, in a strip. Moments will be asked for up to number `last`.
-  subroutine begin(self, machine, strip, last, t, internal)
+  subroutine begin(self, state, strip, last, t, internal)
     class(series_banks_t), intent(inout) :: self
-    type(machine_t), intent(inout) :: machine
+    type(machine_state_t), intent(inout) :: state
     integer, intent(in) :: strip, last
-    real(wp), intent(in) :: t(machine%lanes)             !! [s]
-    real(wp), intent(in) :: internal(machine%lanes, machine%elements%internal%count)   !! states of the elements
+    real(wp), intent(in) :: t(self%lanes)                              !! [s]
+    real(wp), intent(in) :: internal(self%lanes, self%internal)        !! states of the elements
     integer :: i
 
     do i = 1, size(self%moved)
-      associate (bank => machine%banks(self%moved(i))%bank)
-        if (bank%states > 0) then
-          call begin_bank(bank, strip, t, internal(1, bank%first_internal))
+      associate (law => state%banks(self%moved(i))%law)
+        if (law%states > 0) then
+          call begin_bank(law, strip, t, internal(1, self%first_internal(self%moved(i))))
         else
-          call begin_bank(bank, strip, t, internal)
+          call begin_bank(law, strip, t, internal)
         end if
       end associate
     end do
     do i = 1, size(self%timed)
-      associate (bank => machine%banks(self%timed(i))%bank)
-        call begin_bank(bank, strip, t, internal)
-        call set_forcing(bank, strip, last, self%order, size(self%forcing, 3), self%forcing)
+      associate (law => state%banks(self%timed(i))%law)
+        call begin_bank(law, strip, t, internal)
+        call set_forcing(law, self%first(self%timed(i)), strip, last, self%order, size(self%forcing, 3), self%forcing)
       end associate
     end do
   end subroutine begin
 
   !> Adds the coefficients k of the moments that follow from the motion.
-  subroutine add(self, machine, strip, k, motion, restoring, applied)
+  subroutine add(self, state, strip, k, motion, restoring, applied)
     class(series_banks_t), intent(in) :: self
-    type(machine_t), intent(inout) :: machine
+    type(machine_state_t), intent(inout) :: state
     integer, intent(in) :: strip, k
     real(wp), contiguous, intent(in) :: motion(:, 0:, :, :)   !! angles [rad] and speeds [rad/s], [w, 0:order, groups, 2]
     real(wp), contiguous, intent(inout) :: restoring(:, :), applied(:, :)   !! [N m], [w, groups]
     integer :: i
 
     do i = 1, size(self%moved)
-      call add_bank(machine%banks(self%moved(i))%bank, strip, self%order, size(restoring, 2), k, motion, restoring, applied)
+      call add_bank(state%banks(self%moved(i))%law, self%first(self%moved(i)), strip, k, motion, restoring, applied)
     end do
   end subroutine add
 
   !> Coefficients k + 1 of the internal states.
-  subroutine integrate(self, machine, strip, k, internal)
+  subroutine integrate(self, state, strip, k, internal)
     class(series_banks_t), intent(in) :: self
-    type(machine_t), intent(inout) :: machine
+    type(machine_state_t), intent(inout) :: state
     integer, intent(in) :: strip, k
-    real(wp), intent(inout) :: internal(machine%lanes, machine%elements%internal%count)   !! states of the elements
+    real(wp), intent(inout) :: internal(self%lanes, self%internal)   !! states of the elements
     integer :: i
 
     do i = 1, size(self%moved)
-      associate (bank => machine%banks(self%moved(i))%bank)
-        if (bank%states > 0) call internal_coefficients(bank, strip, k, internal(1, bank%first_internal))
+      associate (law => state%banks(self%moved(i))%law)
+        if (law%states > 0) call internal_coefficients(law, strip, k, internal(1, self%first_internal(self%moved(i))))
       end associate
     end do
   end subroutine integrate
 
   !> Sets the time and the internal states at the start of a step.
-  subroutine begin_bank(bank, strip, t, internal)
-    class(bank_t), intent(inout) :: bank
+  subroutine begin_bank(law, strip, t, internal)
+    type(element_law_t), intent(inout) :: law
     integer, intent(in) :: strip
-    real(wp), intent(in) :: t(bank%lanes)                       !! [s]
-    real(wp), intent(in) :: internal(bank%internal_values)      !! [lanes, states, elements]
+    real(wp), intent(in) :: t(law%law%lanes)                                        !! [s]
+    real(wp), intent(in) :: internal(law%law%lanes * law%states * law%law%elements) !! [lanes, states, elements]
     integer :: i
 
-    associate (law => bank%law)
-      call load_lanes(law%law, law%series, law%time, 0, strip, t)
-      do i = 1, bank%states
-        call load(law%law, law%series, law%state(i), 0, strip, bank%states, i, internal)
-      end do
-    end associate
+    call load_lanes(law%law, law%series, law%time, 0, strip, t)
+    do i = 1, law%states
+      call load(law%law, law%series, law%state(i), 0, strip, law%states, i, internal)
+    end do
   end subroutine begin_bank
 
   !> Sets the series of the moments of a bank that follow from the time alone, after `begin_bank`, up to number `last`.
-  subroutine set_forcing(bank, strip, last, order, groups, forcing)
-    class(bank_t), intent(inout) :: bank
+  subroutine set_forcing(bank_law, first, strip, last, order, groups, forcing)
+    type(element_law_t), intent(inout) :: bank_law
+    integer, intent(in) :: first   !! element of the bank
     integer, intent(in) :: strip, last, order, groups
-    real(wp), intent(inout) :: forcing(bank%law%law%w, 0:order, groups)   !! of all elements [N m]
+    real(wp), intent(inout) :: forcing(bank_law%law%w, 0:order, groups)   !! of all elements [N m]
     integer :: at, g, k, slot
 
-    associate (law => bank%law%law, work => bank%law%series)
+    associate (law => bank_law%law, work => bank_law%series)
       do k = 0, last
         call walk(law, work, k, law%groups * (strip - 1) + 1)
       end do
       if (law%strip == 1) then
-        do slot = bank%first - 1, bank%last() - 1
-          associate (x => forcing(modulo(slot, law%w) + 1, :, slot / law%w + 1), i => slot - bank%first + 1)
+        do slot = first - 1, first + law%elements - 2
+          associate (x => forcing(modulo(slot, law%w) + 1, :, slot / law%w + 1), i => slot - first + 1)
             do k = 0, last
               x(k + 1) = work%pool(work%address(law%tape%applied, k, i / law%w + 1) + modulo(i, law%w))
             end do
@@ -161,7 +170,7 @@ contains
       end if
       do g = 1, law%groups
         at = work%address(law%tape%applied, 0, g)
-        call copy(law%w * (last + 1), work%pool(at), forcing(1, 0, bank%first - 1 + g))
+        call copy(law%w * (last + 1), work%pool(at), forcing(1, 0, first - 1 + g))
       end do
     end associate
   end subroutine set_forcing
@@ -175,15 +184,16 @@ contains
   end subroutine copy
 
   !> Adds the coefficients k of the moments, from the coefficients of the motion up to number k.
-  subroutine add_bank(bank, strip, order, groups, k, motion, restoring, applied)
-    class(bank_t), intent(inout) :: bank
-    integer, intent(in) :: strip, order, groups, k
-    real(wp), intent(in) :: motion(bank%law%law%w, 0:order, groups, 2)      !! angles and speeds of all elements [rad], [rad/s]
-    real(wp), intent(inout), dimension(bank%law%law%w, groups) :: restoring, applied   !! moments of all elements [N m]
+  subroutine add_bank(law, first, strip, k, motion, restoring, applied)
+    type(element_law_t), intent(inout) :: law
+    integer, intent(in) :: first   !! element of the bank
+    integer, intent(in) :: strip, k
+    real(wp), contiguous, intent(in) :: motion(:, 0:, :, :)   !! angles [rad] and speeds [rad/s] of all elements
+    real(wp), contiguous, intent(inout) :: restoring(:, :), applied(:, :)   !! moments of all elements [N m]
     integer :: before, slots
 
-    associate (law => bank%law, work => bank%law%series, tape => bank%law%law%tape)
-      before = law%law%strip * (bank%first - 1)
+    associate (work => law%series, tape => law%law%tape, groups => size(restoring, 2))
+      before = law%law%strip * (first - 1)
       slots = law%law%strip * law%law%elements
       call feed(work, law%angle, k, before, slots, motion(:, :, :, 1))
       call feed(work, law%speed, k, before, slots, motion(:, :, :, 2))
@@ -250,16 +260,16 @@ contains
   end subroutine drain
 
   !> Computes coefficient k + 1 of the internal states from coefficient k of their rates.
-  subroutine internal_coefficients(bank, strip, k, internal)
-    class(bank_t), intent(inout) :: bank
+  subroutine internal_coefficients(law, strip, k, internal)
+    type(element_law_t), intent(inout) :: law
     integer, intent(in) :: strip, k
-    real(wp), intent(inout) :: internal(bank%lanes, bank%states, bank%count)   !! [lanes, states, elements]
+    real(wp), intent(inout) :: internal(law%law%lanes, law%states, law%law%elements)   !! [lanes, states, elements]
     integer :: e, i, lane, slot, state
     real(wp) :: inverse
 
     inverse = 1.0_wp / (k + 1)
-    associate (law => bank%law, work => bank%law%series)
-      do i = 1, bank%states
+    associate (work => law%series)
+      do i = 1, law%states
         state = law%state(i)
         do slot = 0, work%w * work%groups - 1
           associate (at => work%w * (k + (work%order + 1) * (slot / work%w)) + modulo(slot, work%w))
@@ -269,7 +279,7 @@ contains
           end associate
         end do
         do e = 1, law%law%elements
-          do lane = law%law%strip * (strip - 1) + 1, min(law%law%strip * strip, bank%lanes)
+          do lane = law%law%strip * (strip - 1) + 1, min(law%law%strip * strip, law%law%lanes)
             slot = law%law%strip * (e - 1) + lane - law%law%strip * (strip - 1) - 1
             internal(lane, i, e) = inverse * work%pool(work%first(law%law%tape%rate(i)) + modulo(slot, work%w) &
                                                        + work%w * (k + (work%order + 1) * (slot / work%w)))
