@@ -68,6 +68,7 @@ module nocdyn_law_tape
     integer :: stored = 0                      !! potential energy of `restoring` [J]
     integer :: twist = 0                       !! what the moments are functions of in place of the angle, with harmonics [rad]
     integer :: control = 0                     !! part of the moment that is its mean, whatever sets that [N m]
+    integer, allocatable :: row(:)             !! g of rows that move: of an element, or of all of one driver [rad] or [m]
     integer, allocatable :: rate(:)            !! derivatives of the internal states by the time, [states]
     integer :: argument = 0                    !! of the curve of an element
     integer, allocatable :: guard(:)           !! functions that are positive inside a branch ...
@@ -85,7 +86,8 @@ contains
     integer, intent(in) :: states
     type(law_tape_t) :: self
 
-    allocate (self%node(16), self%list(0), self%guard(0), self%guarded_switch(0), self%guarded_branch(0), self%guard_shift(0))
+    allocate (self%node(16), self%list(0), self%guard(0), self%guarded_switch(0), self%guarded_branch(0), self%guard_shift(0), &
+              self%row(0))
     allocate (self%rate(states), source=0)
   end function new_law_tape
 
