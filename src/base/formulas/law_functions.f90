@@ -1,12 +1,13 @@
 !> Functions in the formulas of laws.
 module nocdyn_law_functions
+  use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: add_list, apply, expression_t, node_of, operator(*), operator(+)
-  use nocdyn_law_tape, only: law_node_t, op_cosine, op_exponential, op_harmonics, op_larger, op_log_cosh, op_logarithm, &
-    op_sech_squared, op_sine, op_size, op_square_root, op_tanh
+  use nocdyn_law_tape, only: law_node_t, op_arctangent, op_cosine, op_exponential, op_harmonics, op_larger, op_log_cosh, &
+    op_logarithm, op_sech_squared, op_sine, op_size, op_square_root, op_tanh
   implicit none (type, external)
   private
 
-  public :: sin, cos, tanh, exp, log, sqrt, log_cosh, larger, size_of, polynomial, harmonics, add_guard
+  public :: sin, cos, tanh, exp, log, sqrt, atan, log_cosh, larger, size_of, polynomial, harmonics, add_guard
 
   interface sin
     procedure :: sine_of
@@ -26,6 +27,9 @@ module nocdyn_law_functions
   interface sqrt
     procedure :: root_of
   end interface sqrt
+  interface atan
+    procedure :: arctangent_of
+  end interface atan
 
 contains
 
@@ -74,6 +78,15 @@ contains
 
     root = apply(x%tape, op_square_root, x%node)
   end function root_of
+
+  !> The angle between -pi/2 and pi/2 whose tangent is x.
+  function arctangent_of(x) result(arctangent)
+    type(expression_t), intent(in) :: x
+    type(expression_t) :: arctangent, by_derivative
+
+    by_derivative = 1.0_wp + x * x
+    arctangent = apply(x%tape, op_arctangent, x%node, by_derivative%node)
+  end function arctangent_of
 
   !> ln cosh x, whose derivative is tanh x.
   function log_cosh(x) result(value)

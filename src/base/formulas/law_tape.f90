@@ -23,10 +23,10 @@ module nocdyn_law_tape
   integer, parameter, public :: op_square_root = 22, op_log_cosh = 23
   ! ... the sum of a(n) sin(n x) + b(n) cos(n x) over whole numbers n; ...
   integer, parameter, public :: op_harmonics = 24
-  ! ... the natural logarithm; a variable to the power of a constant; ...
-  integer, parameter, public :: op_logarithm = 25, op_power = 26
+  ! ... the natural logarithm; a variable to the power of a constant; the arctangent of a, with b = 1 + a^2; ...
+  integer, parameter, public :: op_logarithm = 25, op_power = 26, op_arctangent = 27
   ! ... and values without a series: the larger of two; the size of a constant, and 1 where it is 0, else 0.
-  integer, parameter, public :: op_larger = 27, op_size = 28, op_is_zero = 29
+  integer, parameter, public :: op_larger = 28, op_size = 29, op_is_zero = 30
 
   public :: new_law_tape
 
@@ -68,6 +68,7 @@ module nocdyn_law_tape
     integer :: stored = 0                      !! potential energy of `restoring` [J]
     integer :: twist = 0                       !! what the moments are functions of in place of the angle, with harmonics [rad]
     integer :: control = 0                     !! part of the moment that is its mean, whatever sets that [N m]
+    integer, allocatable :: row(:)             !! g of rows that move: of an element, or of all of one driver [rad] or [m]
     integer, allocatable :: rate(:)            !! derivatives of the internal states by the time, [states]
     integer :: argument = 0                    !! of the curve of an element
     integer, allocatable :: guard(:)           !! functions that are positive inside a branch ...
@@ -85,7 +86,8 @@ contains
     integer, intent(in) :: states
     type(law_tape_t) :: self
 
-    allocate (self%node(16), self%list(0), self%guard(0), self%guarded_switch(0), self%guarded_branch(0), self%guard_shift(0))
+    allocate (self%node(16), self%list(0), self%guard(0), self%guarded_switch(0), self%guarded_branch(0), self%guard_shift(0), &
+              self%row(0))
     allocate (self%rate(states), source=0)
   end function new_law_tape
 
@@ -211,7 +213,8 @@ contains
   end function constants
 
   !> The variables that some nodes need, these among them, ascending. The series of a sine needs the cosine, which follows it in
-  !> the list, unless its argument grows evenly, and the series of tanh needs 1 - tanh^2, which follows too.
+  !> the list, unless its argument grows evenly; the series of tanh needs 1 - tanh^2, which follows too, the one of atan x needs
+  !> 1 + x^2.
   pure function needed(self, results, with_series) result(nodes)
     class(law_tape_t), intent(in) :: self
     integer, intent(in) :: results(:)        !! nodes, or 0
@@ -228,7 +231,7 @@ contains
         if (node%operation == op_sech_squared) is_needed(i - 1) = is_needed(i - 1) .or. is_needed(i)
         if (.not. is_needed(i) .or. node%operation < op_add) cycle
         is_needed(node%a) = .true.
-        is_needed(node%b) = .true.
+        if (with_series .or. node%operation /= op_arctangent) is_needed(node%b) = .true.
         if (with_series .and. node%operation == op_tanh) is_needed(i + 1) = .true.
         if (with_series .and. node%operation == op_sine .and. self%node(node%a)%degree > 1) is_needed(i + 1) = .true.
       end associate

@@ -2,9 +2,9 @@
 !> over groups gives (`nocdyn_law_walk`), which takes longer if a bank has few elements.
 module nocdyn_law_values
   use nocdyn_kinds, only: wp
-  use nocdyn_law_tape, only: law_tape_t, op_add, op_cosine, op_exponential, op_fixed, op_harmonics, op_is_zero, op_larger, &
-    op_log_cosh, op_logarithm, op_multiply, op_power, op_reciprocal, op_scale, op_sech_squared, op_shift, op_sine, op_size, &
-    op_square_root, op_subtract, op_tanh, op_wave
+  use nocdyn_law_tape, only: law_tape_t, op_add, op_arctangent, op_cosine, op_exponential, op_fixed, op_harmonics, op_is_zero, &
+    op_larger, op_log_cosh, op_logarithm, op_multiply, op_power, op_reciprocal, op_scale, op_sech_squared, op_shift, op_sine, &
+    op_size, op_square_root, op_subtract, op_tanh, op_wave
   use nocdyn_vector_functions, only: cosine_of, exp_of, log_cosh_of, sine_of, tanh_of
   implicit none (type, external)
   private
@@ -98,6 +98,8 @@ contains
       value = log(x)
     case (op_power)
       value = x**y
+    case (op_arctangent)
+      value = atan(x)
     case (op_larger)
       value = max(x, y)
     case (op_size)

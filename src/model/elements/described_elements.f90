@@ -49,7 +49,8 @@ module nocdyn_described_elements
     integer :: count = 0                          !! elements
     integer :: first = 1                          !! number of the first one in the machine
     integer :: values = 0                         !! lanes * elements
-    logical :: is_polynomial = .true.             !! whether `polynomials` gives the whole law
+    logical :: is_polynomial = .true.             !! whether `polynomials` gives the moments
+    logical :: has_described_rows = .false.       !! whether formulas give rows that move (`nocdyn_described_rows`)
     integer :: states = 0                         !! internal states of each element
     integer :: ports = at_element                 !! `at_phase` if the elements have phases
     real(wp) :: phase_order = 0.0_wp              !! most oscillations of a law per turn of its phase
@@ -224,7 +225,7 @@ contains
     type(law_tape_t), target :: tape
 
     if (allocated(self%tape)) deallocate (self%tape)
-    if (self%is_polynomial .or. self%values == 0) return
+    if (self%is_polynomial .and. .not. self%has_described_rows .or. self%values == 0) return
     tape = new_law_tape(self%states)
     call self%describe(tape)
     if (self%is_mean) call take_means(tape, self%turns)
@@ -285,8 +286,8 @@ contains
     end do
   end subroutine polynomials
 
-  !> Writes the part of the law that is not polynomial as formulas: sets `restoring`, `applied`, `stored`, `rate` of the list and
-  !> the guards of its branches. By default there is none.
+  !> Writes the part of the law that is not polynomial as formulas: sets `restoring`, `applied`, `stored`, `rate`, `row` of the
+  !> list and the guards of its branches. By default there is none.
   subroutine describe(self, tape)
     class(described_elements_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape

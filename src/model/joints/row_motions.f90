@@ -16,6 +16,8 @@ module nocdyn_row_motions
     integer, allocatable :: driver(:)        !! element whose angle is v, 0: v is the time
     integer, allocatable :: bank(:), number(:)   !! its bank, and its number there
     real(wp), allocatable :: constant(:)     !! u - g(v) at the start [rad] or [m]
+    real(wp), allocatable :: v(:)            !! where g is known [rad] or [s]
+    logical, allocatable :: is_new(:)        !! whether v has changed
     real(wp), allocatable :: g(:, :)         !! g and its derivatives at the present position, [0:3, rows]
     real(wp), allocatable :: position(:)     !! u - g(v) - constant
     real(wp), allocatable :: speed(:)        !! what u' - g' v' is: 0, or g' of the time
@@ -53,6 +55,8 @@ contains
     end do
     self%count = size(self%element)
     allocate (self%constant(self%count), source=0.0_wp)
+    allocate (self%v(self%count), source=huge(1.0_wp))
+    allocate (self%is_new(self%count), source=.true.)
     allocate (self%position, self%speed, self%acceleration, self%terms, self%demand, self%held, self%driver_acceleration, &
               source=self%constant)
     allocate (self%g(0:3, self%count), source=0.0_wp)
@@ -66,29 +70,36 @@ contains
     real(wp), intent(in) :: angle(:)   !! u of all elements [rad]
 
     self%constant(:) = 0.0_wp
+    self%v(:) = huge(1.0_wp)   ! with parameters that may have changed
     call self%move(banks, states, 0.0_wp, angle, 0.0_wp * angle)
     self%constant(:) = merge(self%position, angle(self%element), self%driver > 0)
   end subroutine set_start
 
-  !> Sets g and what the rows demand at a position.
+  !> Sets g, where v has changed, and what the rows demand at a position.
   pure subroutine move(self, banks, states, t, angle, speed)
     class(row_motions_t), intent(inout) :: self
     type(bank_slot_t), intent(in) :: banks(:)
     type(bank_state_t), intent(in) :: states(:)   !! of the banks
     real(wp), intent(in) :: t                    !! [s]
     real(wp), intent(in) :: angle(:), speed(:)   !! of all elements, [rad], [rad/s]
-    integer :: i, segment
+    integer :: i
     real(wp) :: v
 
     do i = 1, self%count
       v = t
       if (self%driver(i) > 0) v = angle(self%driver(i))
+      self%is_new(i) = self%driver(i) == 0 .or. .not. abs(v - self%v(i)) <= 0   ! drives have branches
+      self%v(i) = v
+    end do
+    i = 1
+    do while (i <= self%count)
       select type (bank => banks(self%bank(i))%bank)
       class is (moving_rows_t)
-        segment = 1
-        if (allocated(bank%curve)) segment = states(self%bank(i))%branch(1, self%number(i))
-        call bank%motion(self%number(i), segment, v, self%g(:, i))
+        if (any(self%is_new(i:i + bank%count - 1))) call bank%motions(states(self%bank(i)), self%v(i), self%g(0, i))
+        i = i + bank%count
       end select
+    end do
+    do i = 1, self%count
       self%position(i) = angle(self%element(i)) - self%g(0, i) - self%constant(i)
       if (self%driver(i) > 0) then
         self%speed(i) = 0.0_wp

@@ -205,7 +205,7 @@ contains
     do i = 1, size(machine%banks)
       associate (bank => machine%banks(i)%bank)
         fastest = max(fastest, bank%fastest_wave(lane))
-        if (.not. allocated(self%banks(i)%law)) cycle
+        if (bank%moving_rows > 0 .or. .not. allocated(self%banks(i)%law)) cycle   ! moments of rows are reactions
         associate (last => bank%first - 1 + bank%ports * bank%count)   ! of its phases
           fastest = max(fastest, self%banks(i)%law%fastest(lane, self%elements%speed(lane, bank%first:last)))
         end associate

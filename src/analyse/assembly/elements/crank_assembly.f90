@@ -2,6 +2,7 @@
 !> forces.
 module nocdyn_crank_assembly
   use nocdyn_bank, only: append_bank
+  use nocdyn_bank_states, only: bank_state_t, new_bank_state
   use nocdyn_crank_rows, only: crank_rows_t, new_crank_rows, slider_crank_t
   use nocdyn_cylinder_torques, only: cycle_of
   use nocdyn_element_groups, only: element_groups_t
@@ -90,9 +91,7 @@ contains
     piston = machine%bodies + 1
     call machine%add_nodes(nodes, inertia)
     bank = new_crank_rows(machine%lanes, spread(name, 1, size(inertia)), [(piston - 1 + k, k=1, size(inertia))], crank_of(group))
-    do k = 1, size(inertia)
-      machine%start_angle(:, piston - 1 + k) = bank%position(k, machine%start_angle(1, body))
-    end do
+    machine%start_angle(:, piston:) = spread(bank%positions(machine%start_angle(1, body)), 1, machine%lanes)
     call append_bank(machine%banks, bank)
     call append_bank(machine%banks, new_phases(machine%lanes, spread(name, 1, size(inertia)), spread(body, 1, size(inertia))))
     if (.not. group%has_value('crank_angles')) return
@@ -133,13 +132,17 @@ contains
     type(order_excitations_t) :: bank
     type(periodic_force_t) :: force
     type(crank_rows_t) :: rows
+    type(bank_state_t) :: state
     real(wp), allocatable :: masses(:)
     real(wp), dimension(samples) :: change, gas, inertia
-    real(wp) :: mean, mean_inertia, angle, g(0:3)
+    real(wp), allocatable :: g(:, :)
+    real(wp) :: mean, mean_inertia, angle
     integer :: i, k
 
     call find_masses(group, body, machine, masses)
     rows = new_crank_rows(1, spread(name, 1, size(masses)), [(0, k=1, size(masses))], crank_of(group))
+    state = new_bank_state(rows, size(masses))
+    allocate (g(0:3, size(masses)))
     force%base = 1.0_wp
     allocate (force%sine(0), force%cosine(0))
     if (group%has_value('crank_angles')) force = force_of(group)
@@ -148,12 +151,12 @@ contains
     change = 0.0_wp
     do i = 1, samples
       angle = 2.0_wp * pi / force%base * (i - 1) / samples
-      do k = size(masses), 1, -1   ! the piston comes last
-        call rows%motion(k, 1, angle, g)
-        inertia(i) = inertia(i) + masses(k) * g(1)**2
-        change(i) = change(i) - masses(k) * g(1) * g(2)
+      call rows%motions(state, spread(angle, 1, size(masses)), g)
+      do k = size(masses), 1, -1
+        inertia(i) = inertia(i) + masses(k) * g(1, k)**2
+        change(i) = change(i) - masses(k) * g(1, k) * g(2, k)
       end do
-      gas(i) = g(1) * force%value(angle + group%number('phase'))
+      gas(i) = g(1, 1) * force%value(angle + group%number('phase'))
     end do
     associate (n => nint(most_orders / force%base))
       torque%square_order = [(k * force%base, k=1, n)]

@@ -5,17 +5,20 @@
 !> times the one of the first: H. Chr. Seherr-Thoss, F. Schmelz, E. Aucktor, Universal Joints and Driveshafts, section 1.2.
 module nocdyn_cardan_rows
   use nocdyn_bank, only: role_cardan
+  use nocdyn_described_rows, only: described_rows_t
   use nocdyn_element_keys, only: element_keys_t
   use nocdyn_kinds, only: wp
-  use nocdyn_moving_rows, only: moving_rows_t
+  use nocdyn_law_expressions, only: expression_t, node_of, operator(*), operator(+), operator(-), operator(/)
+  use nocdyn_law_functions, only: atan, cos, sin
+  use nocdyn_law_tape, only: law_tape_t
   implicit none (type, external)
   private
 
   public :: new_cardan_rows
 
-  type, extends(moving_rows_t), public :: cardan_rows_t
+  type, extends(described_rows_t), public :: cardan_rows_t
   contains
-    procedure :: motion
+    procedure :: describe
   end type cardan_rows_t
 
 contains
@@ -28,27 +31,20 @@ contains
     call bank%connect_rows_only(role_cardan, keys%lanes, keys%names, keys%bodies('bodies', 2))
     call bank%add_parameter('angle', keys%values('angle'), is_key=.false.)
     call bank%add_parameter('phase', keys%values('phase'), is_key=.false.)
+    call bank%prepare_rows()
   end function new_cardan_rows
 
-  !> phi_2 = phi_1 + atan2((1 - c) sin phi_1 cos phi_1, c cos^2 phi_1 + sin^2 phi_1), c = cos(angle).
-  pure subroutine motion(self, element, segment, v, g)
+  !> phi_2 = phi_1 - atan(m sin(2 phi_1) / (1 + m cos(2 phi_1))), m = -tan^2(angle / 2) = (c - 1) / (c + 1), c = cos(angle).
+  subroutine describe(self, tape)
     class(cardan_rows_t), intent(in) :: self
-    integer, intent(in) :: element, segment
-    real(wp), intent(in) :: v          !! angle of the first body [rad]
-    real(wp), intent(out) :: g(0:3)    !! of the second [rad]
-    real(wp) :: bend, c, d(0:2), s, shift
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: c, m, twice, v
 
-    shift = self%parameters(2)%value(1, element)
-    c = cos(self%parameters(1)%value(1, element))
-    bend = sin(self%parameters(1)%value(1, element))**2
-    s = sin(v + shift)
-    d(0) = 1.0_wp - bend * (1.0_wp - s**2)
-    d(1) = bend * sin(2.0_wp * (v + shift))
-    d(2) = 2.0_wp * bend * cos(2.0_wp * (v + shift))
-    g(0) = v + atan2((1.0_wp - c) * s * cos(v + shift), c + (1.0_wp - c) * s**2)
-    g(1) = c / d(0)
-    g(2) = -c * d(1) / d(0)**2
-    g(3) = c * (2.0_wp * d(1)**2 / d(0) - d(2)) / d(0)**2
-  end subroutine motion
+    v = self%driver(tape)
+    c = cos(self%parameter(tape, 'angle'))
+    m = (c - 1.0_wp) / (c + 1.0_wp)
+    twice = 2.0_wp * (v + self%parameter(tape, 'phase'))
+    tape%row = [node_of(v - atan(sin(twice) * (m / (m * cos(twice) + 1.0_wp))))]
+  end subroutine describe
 
 end module nocdyn_cardan_rows

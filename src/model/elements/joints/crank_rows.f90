@@ -3,13 +3,18 @@
 !> piston is at x = r cos(v) + sqrt(l^2 - p^2), p = r sin(v) - e; F. Freudenstein, Trans. ASME 77 (1955) 853 for e = 0 likewise.
 !>
 !> A rod with an inertia of its own has three rows more: the position of its centre of mass along the line and across, and its
-!> angle asin(p / l). Without one its mass is on its two ends; the part at the piston has one more row with the motion of the
-!> piston. The force of the first row is therefore the one of the rod on the pin of the piston, however the rod is given.
+!> angle asin(p / l) = atan(p / sqrt(l^2 - p^2)). Without one its mass is on its two ends; the part at the piston has one more
+!> row with the motion of the piston. The force of the first row is therefore the one of the rod on the pin of the piston, however
+!> the rod is given.
 module nocdyn_crank_rows
   use nocdyn_bank, only: role_crank
+  use nocdyn_bank_states, only: new_bank_state
+  use nocdyn_described_rows, only: described_rows_t
   use nocdyn_elements, only: element_values_t
   use nocdyn_kinds, only: wp
-  use nocdyn_moving_rows, only: moving_rows_t
+  use nocdyn_law_expressions, only: expression_t, node_of, operator(*), operator(+), operator(-), operator(/)
+  use nocdyn_law_functions, only: atan, cos, sin, sqrt
+  use nocdyn_law_tape, only: law_tape_t
   use nocdyn_quantities, only: form_angle, form_applied, form_observed, form_speed, new_quantity, quantity_t, rank_force, &
     rank_slip, rank_torque, rank_twist
   use nocdyn_text, only: string_t
@@ -18,7 +23,8 @@ module nocdyn_crank_rows
 
   public :: new_crank_rows
 
-  integer, parameter :: part_piston = 1, part_rod_along = 2, part_rod_across = 3   ! the elements; the fourth is the rod's angle
+  integer, parameter :: part_piston = 1    ! the first element; the others of a rod: along, across, angle
+  integer, parameter :: all_parts = 4      ! elements if the rod has an inertia of its own
 
   !> Dimensions of a slider-crank.
   type, public :: slider_crank_t
@@ -29,11 +35,10 @@ module nocdyn_crank_rows
     real(wp) :: rod_center = 0.0_wp     !! centre of mass of the rod, distance from the crank pin [m]
   end type slider_crank_t
 
-  type, extends(moving_rows_t), public :: crank_rows_t
+  type, extends(described_rows_t), public :: crank_rows_t
   contains
-    procedure :: motion
-    procedure, private :: crank
-    procedure :: position
+    procedure :: describe
+    procedure :: positions
     procedure :: quantities => columns_of_cranks
     procedure :: observe => observe_cranks
     procedure :: named_count
@@ -52,113 +57,41 @@ contains
     call bank%connect_rows_only(role_crank, lanes, names, driven)
     call bank%add_parameter('dimensions', spread([crank%crank_radius, crank%rod_length, crank%offset, crank%phase, &
                                                   crank%rod_center], 1, lanes), .false., spread(1, 1, 5))
+    call bank%prepare_rows()
   end function new_crank_rows
 
-  pure subroutine motion(self, element, segment, v, g)
+  !> The motion of the piston, also where the end of the rod moves with it; else of all parts.
+  subroutine describe(self, tape)
     class(crank_rows_t), intent(in) :: self
-    integer, intent(in) :: element, segment
-    real(wp), intent(in) :: v          !! angle of the body [rad]
-    real(wp), intent(out) :: g(0:3)    !! [m] or [rad]
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: dimension(5), p, pin, reach, share, v   ! p and `pin`: of the crank pin across and along
+    integer :: k
 
-    type(slider_crank_t) :: crank
-    real(wp) :: share   ! of the rod between the crank pin and its centre of mass
-
-    crank = self%crank()
-    share = crank%rod_center / crank%rod_length
-    if (self%count == 2) then   ! the end of the rod moves with the piston
-      g = piston_motion(crank, v)
-      return
-    end if
-    select case (element)
-    case (part_piston)
-      g = piston_motion(crank, v)
-    case (part_rod_along)
-      g = share * piston_motion(crank, v) + (1.0_wp - share) * turned_arm(crank, v)
-    case (part_rod_across)
-      g = (1.0_wp - share) * crossed_arm(crank, v)
-    case default
-      call rod_motion(crank, v, g)
-    end select
-  end subroutine motion
-
-  !> Its dimensions in the first lane.
-  pure type(slider_crank_t) function crank(self)
-    class(crank_rows_t), intent(in) :: self
-
-    associate (x => self%parameters(1)%value(1, :))
-      crank = slider_crank_t(x(1), x(2), x(3), x(4), x(5))
+    do k = 1, size(dimension)
+      dimension(k) = self%parameter(tape, 'dimensions', spread(k, 1, self%count))
+    end do
+    share = dimension(5) / dimension(2)
+    associate (r => dimension(1), l => dimension(2), e => dimension(3), phase => dimension(4))
+      v = self%driver(tape) + phase
+      pin = r * cos(v)
+      p = r * (sin(v) - e / r)
+      reach = sqrt(l * l - p * p)
+      tape%row = spread(node_of(pin + reach), 1, self%count)
+      if (self%count < all_parts) return
+      tape%row(2:) = [node_of(pin + share * reach), node_of((1.0_wp - share) * p), node_of(atan(p / reach))]
     end associate
-  end function crank
+  end subroutine describe
 
-  !> g alone.
-  pure real(wp) function position(self, element, v)
+  !> g of all rows.
+  function positions(self, v)
     class(crank_rows_t), intent(in) :: self
-    integer, intent(in) :: element
     real(wp), intent(in) :: v   !! angle of the body [rad]
-    real(wp) :: g(0:3)
+    real(wp) :: positions(self%count)   !! [m] or [rad]
+    real(wp) :: g(0:3, self%count)
 
-    call self%motion(element, 1, v, g)
-    position = g(0)
-  end function position
-
-  !> r cos(v), the crank pin along the line of the piston, and its derivatives.
-  pure function turned_arm(crank, v) result(g)
-    type(slider_crank_t), intent(in) :: crank
-    real(wp), intent(in) :: v   !! [rad]
-    real(wp) :: g(0:3)          !! [m]
-
-    associate (a => v + crank%phase)
-      g = crank%crank_radius * [cos(a), -sin(a), -cos(a), sin(a)]
-    end associate
-  end function turned_arm
-
-  !> p = r sin(v) - e, the crank pin across it.
-  pure function crossed_arm(crank, v) result(g)
-    type(slider_crank_t), intent(in) :: crank
-    real(wp), intent(in) :: v   !! [rad]
-    real(wp) :: g(0:3)          !! [m]
-
-    associate (a => v + crank%phase)
-      g = crank%crank_radius * [sin(a), cos(a), -sin(a), -cos(a)]
-    end associate
-    g(0) = g(0) - crank%offset
-  end function crossed_arm
-
-  !> Position of the piston from the axis of the crank.
-  pure function piston_motion(crank, v) result(g)
-    type(slider_crank_t), intent(in) :: crank
-    real(wp), intent(in) :: v   !! angle of the body [rad]
-    real(wp) :: g(0:3)          !! [m]
-
-    g = turned_arm(crank, v) + rod_reach(crank, crossed_arm(crank, v))
-  end function piston_motion
-
-  !> w = sqrt(l^2 - p^2), by w w' = -p p' and its derivatives.
-  pure function rod_reach(crank, p) result(w)
-    type(slider_crank_t), intent(in) :: crank
-    real(wp), intent(in) :: p(0:3)   !! [m]
-    real(wp) :: w(0:3)               !! [m]
-
-    w(0) = sqrt(crank%rod_length**2 - p(0)**2)
-    w(1) = -p(0) * p(1) / w(0)
-    w(2) = -(p(1)**2 + p(0) * p(2) + w(1)**2) / w(0)
-    w(3) = -(3.0_wp * p(1) * p(2) + p(0) * p(3) + 3.0_wp * w(1) * w(2)) / w(0)
-  end function rod_reach
-
-  !> The angle beta of the rod: sin(beta) = p / l, w beta' = p' and its derivatives.
-  pure subroutine rod_motion(crank, v, beta)
-    type(slider_crank_t), intent(in) :: crank
-    real(wp), intent(in) :: v             !! [rad]
-    real(wp), intent(out) :: beta(0:3)    !! [rad]
-    real(wp) :: p(0:3), w(0:3)
-
-    p = crossed_arm(crank, v)
-    w = rod_reach(crank, p)
-    beta(0) = asin(p(0) / crank%rod_length)
-    beta(1) = p(1) / w(0)
-    beta(2) = (p(2) - w(1) * beta(1)) / w(0)
-    beta(3) = (p(3) - 2.0_wp * w(1) * beta(2) - w(2) * beta(1)) / w(0)
-  end subroutine rod_motion
+    call self%motions(new_bank_state(self, self%count), spread(v, 1, self%count), g)
+    positions = g(0, :)
+  end function positions
 
   !> Position, speed and force of the piston, and the torque of piston and rod on the crank.
   subroutine columns_of_cranks(self, columns)

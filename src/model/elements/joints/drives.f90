@@ -6,23 +6,24 @@
 module nocdyn_drives
   use nocdyn_bank, only: role_drive
   use nocdyn_curves, only: curve_t
+  use nocdyn_described_rows, only: described_rows_t
   use nocdyn_element_keys, only: element_keys_t
   use nocdyn_kinds, only: wp
-  use nocdyn_law_expressions, only: literal, node_of, time_of
+  use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), operator(+), operator(-), operator(/)
+  use nocdyn_law_functions, only: cos, sin
+  use nocdyn_law_operators, only: operator(*)
   use nocdyn_law_tape, only: law_tape_t
-  use nocdyn_moving_rows, only: moving_rows_t
-  use nocdyn_tables, only: add_table, guard_segment
+  use nocdyn_tables, only: add_table, curve_integral, curve_value, guard_segment
   implicit none (type, external)
   private
 
   public :: new_drives
 
-  type, extends(moving_rows_t), public :: drives_t
+  type, extends(described_rows_t), public :: drives_t
     logical :: prescribe_angles = .false.
     real(wp) :: t_start = 0.0_wp   !! [s]
   contains
     procedure :: describe
-    procedure :: motion
     procedure :: fastest_wave
   end type drives_t
 
@@ -43,60 +44,55 @@ contains
     call bank%add_parameter('amplitude', keys%values(merge('angle_amplitude', 'speed_amplitude', prescribe_angles)), .false.)
     call bank%add_parameter('frequency', keys%values('frequency', absent=1.0_wp), is_key=.false.)
     call bank%add_parameter('phase', keys%values('phase'), is_key=.false.)
-    if (.not. present(table)) return
-    bank%is_polynomial = .false.
-    call add_table(bank, table)
-    call bank%prepare_law()
+    if (present(table)) then
+      bank%is_polynomial = .false.
+      call add_table(bank, table)
+      call bank%add_parameter('table_start', starts_of(table, bank%t_start, prescribe_angles), is_key=.false.)
+    end if
+    call bank%prepare_rows()
   end function new_drives
 
-  !> No moment but the reaction; the points of the tables.
+  !> The part of g of a table at the start [rad].
+  elemental real(wp) function starts_of(table, t_start, prescribe_angles) result(start)
+    type(curve_t), intent(in) :: table
+    real(wp), intent(in) :: t_start   !! [s]
+    logical, intent(in) :: prescribe_angles
+
+    if (prescribe_angles) then
+      start = table%value(t_start)
+    else
+      start = table%integral_to(table%segment(t_start), t_start) - table%integral_to(table%segment(0.0_wp), 0.0_wp)
+    end if
+  end function starts_of
+
+  !> g, no moment but the reaction, and the points of the tables.
   subroutine describe(self, tape)
     class(drives_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: amplitude, frequency, g, phase, start, t, x
 
-    if (.not. allocated(self%curve)) error stop 'nocdyn_drives: there are no tables'
-    tape%applied = node_of(literal(tape, 0.0_wp))
-    call guard_segment(tape, time_of(tape), is_time=.true.)
+    amplitude = self%parameter(tape, 'amplitude')
+    frequency = self%parameter(tape, 'frequency')
+    phase = self%parameter(tape, 'phase')
+    t = self%driver(tape)
+    x = frequency * t + phase
+    start = frequency * self%t_start + phase
+    if (self%prescribe_angles) then
+      g = amplitude * sin(x) - amplitude * sin(start)
+    else
+      g = (amplitude / frequency) * (cos(start) - cos(x)) + self%parameter(tape, 'speed') * (t - self%t_start)
+    end if
+    if (allocated(self%curve)) then
+      if (self%prescribe_angles) then
+        g = g + curve_value(tape, t) - self%parameter(tape, 'table_start')
+      else
+        g = g + curve_integral(tape, t) - self%parameter(tape, 'table_start')
+      end if
+      tape%applied = node_of(literal(tape, 0.0_wp))
+      call guard_segment(tape, t, is_time=.true.)
+    end if
+    tape%row = [node_of(g)]
   end subroutine describe
-
-  pure subroutine motion(self, element, segment, v, g)
-    class(drives_t), intent(in) :: self
-    integer, intent(in) :: element, segment
-    real(wp), intent(in) :: v          !! time [s]
-    real(wp), intent(out) :: g(0:3)    !! [rad]
-    real(wp) :: sine(0:3), table(0:3)
-
-    associate (amplitude => self%parameters(2)%value(1, element), frequency => self%parameters(3)%value(1, element), &
-               x => self%parameters(3)%value(1, element) * v + self%parameters(4)%value(1, element), &
-               start => self%parameters(3)%value(1, element) * self%t_start + self%parameters(4)%value(1, element))
-      table = 0.0_wp
-      if (self%prescribe_angles) then
-        sine = amplitude * [sin(x) - sin(start), frequency * cos(x), -frequency**2 * sin(x), -frequency**3 * cos(x)]
-      else
-        sine = amplitude * [(cos(start) - cos(x)) / frequency, sin(x), frequency * cos(x), -frequency**2 * sin(x)]
-        sine(:1) = sine(:1) + self%parameters(1)%value(1, element) * [v - self%t_start, 1.0_wp]
-      end if
-    end associate
-    if (allocated(self%curve)) table = table_motion(self, element, segment, v)
-    g = sine + table
-  end subroutine motion
-
-  !> The part of a table.
-  pure function table_motion(self, element, segment, t) result(g)
-    class(drives_t), intent(in) :: self
-    integer, intent(in) :: element, segment
-    real(wp), intent(in) :: t   !! [s]
-    real(wp) :: g(0:3)
-
-    associate (curve => self%curve(1, element), t_start => self%t_start)
-      g = curve%derivatives(segment, t)
-      if (self%prescribe_angles) then
-        g(0) = g(0) - curve%value(t_start)
-      else
-        g = [curve%integral_to(segment, t) - curve%integral_to(curve%segment(t_start), t_start), g(:2)]
-      end if
-    end associate
-  end function table_motion
 
   !> The one of the sines.
   pure real(wp) function fastest_wave(self, lane)

@@ -5,6 +5,7 @@
 !> power. `nocdyn_joint_sets` finds it. The drivers are elements of a bank of their own, which follows.
 module nocdyn_moving_rows
   use nocdyn_bank, only: bank_t
+  use nocdyn_bank_states, only: bank_state_t
   use nocdyn_element_rows, only: rows_between
   use nocdyn_kinds, only: wp
   use nocdyn_quantities, only: form_total, new_quantity, quantity_t, rank_torque
@@ -12,27 +13,26 @@ module nocdyn_moving_rows
   implicit none (type, external)
   private
 
-  !> Extensions set `element_unit` and say what g is.
+  !> Extensions say what g is: by formulas (`nocdyn_described_rows`), or by splines (`nocdyn_relation_rows`).
   type, abstract, extends(bank_t), public :: moving_rows_t
     logical :: is_driven_by_time = .false.   !! whether v is the time; else a bank of drivers follows
     character(len=3) :: moment_unit = 'N m'  !! of the moments on the elements; N where these are sliders
   contains
-    procedure(motion_interface), deferred :: motion
+    procedure(motions_interface), deferred :: motions
     procedure :: connect_rows_only
     procedure :: quantities => torques_of_rows
   end type moving_rows_t
 
   abstract interface
 
-    !> g and its first three derivatives by v.
-    pure subroutine motion_interface(self, element, segment, v, g)
-      import :: moving_rows_t, wp
+    !> g of all elements and its first three derivatives by v.
+    pure subroutine motions_interface(self, state, v, g)
+      import :: bank_state_t, moving_rows_t, wp
       class(moving_rows_t), intent(in) :: self
-      integer, intent(in) :: element     !! numbered within the bank
-      integer, intent(in) :: segment     !! of its table over the time, if it has one
-      real(wp), intent(in) :: v          !! [rad] or [s]
-      real(wp), intent(out) :: g(0:3)    !! [rad] or [m] by powers of the unit of v
-    end subroutine motion_interface
+      type(bank_state_t), intent(in) :: state         !! of this bank
+      real(wp), intent(in) :: v(self%count)           !! [rad] or [s]
+      real(wp), intent(out) :: g(0:3, self%count)     !! [rad] or [m] by powers of the unit of v
+    end subroutine motions_interface
 
   end interface
 

@@ -1,6 +1,10 @@
 !> Tables of the angle of one body over the one of another: cams, non-circular gears, levers; splines through their points.
+!>
+!> These are no formulas of a law: the segment, and the turn of a table that repeats, follow from the angle wherever it is asked
+!> for, while the segments of a curve in a law are branches, which end at events. A spline needs none.
 module nocdyn_relation_rows
   use nocdyn_bank, only: role_relation
+  use nocdyn_bank_states, only: bank_state_t
   use nocdyn_element_keys, only: element_keys_t
   use nocdyn_kinds, only: wp
   use nocdyn_moving_rows, only: moving_rows_t
@@ -16,7 +20,7 @@ module nocdyn_relation_rows
     integer, allocatable :: shape(:)           !! spline_..., [elements]
     type(spline_t), allocatable :: spline(:)   !! of each element, in the first lane
   contains
-    procedure :: motion
+    procedure :: motions
     procedure :: refresh_lane
   end type relation_rows_t
 
@@ -57,13 +61,16 @@ contains
     end do
   end subroutine refresh_lane
 
-  pure subroutine motion(self, element, segment, v, g)
+  pure subroutine motions(self, state, v, g)
     class(relation_rows_t), intent(in) :: self
-    integer, intent(in) :: element, segment
-    real(wp), intent(in) :: v          !! angle of the first body [rad]
-    real(wp), intent(out) :: g(0:3)    !! of the second [rad]
+    type(bank_state_t), intent(in) :: state
+    real(wp), intent(in) :: v(self%count)          !! angles of the first bodies [rad]
+    real(wp), intent(out) :: g(0:3, self%count)    !! of the second ones [rad]
+    integer :: e
 
-    g = self%spline(element)%derivatives(v)
-  end subroutine motion
+    do e = 1, self%count
+      g(:, e) = self%spline(e)%derivatives(v(e))
+    end do
+  end subroutine motions
 
 end module nocdyn_relation_rows
