@@ -36,7 +36,7 @@ contains
     integer, intent(in) :: variable     !! node of an angle or of the time, all that the results depend on
     integer, intent(in) :: results(:)   !! nodes
     type(law_derivatives_t) :: self
-    integer, allocatable :: nodes(:)
+    integer, allocatable :: constants(:), nodes(:)
     integer :: column(0:tape%count), i
 
     associate (needed => tape%needed(results, .false.))
@@ -48,9 +48,8 @@ contains
     self%steps = size(nodes)
     if (self%steps > most_steps) error stop 'nocdyn_law_derivatives: too many operations'
     column = 0
-    associate (constants => tape%constants())   ! columns as in `law_t`
-      column(constants) = [(i, i=1, size(constants))]
-    end associate
+    constants = tape%constants()
+    column(constants) = [(i, i=1, size(constants))]   ! as in `law_t`
     column(nodes) = [(i, i=1, size(nodes))]
     allocate (self%results(size(results)), self%operation(self%steps), self%a(self%steps), self%b(self%steps))
     self%results(:) = column(results)

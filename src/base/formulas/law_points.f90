@@ -6,7 +6,7 @@ module nocdyn_law_points
   use nocdyn_curves, only: curve_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_tape, only: law_node_t, law_tape_t, op_add, op_arctangent, op_cosine, op_exponential, op_fixed, op_harmonics, &
-    op_larger, op_log_cosh, op_logarithm, op_multiply, op_parameter, op_pick, op_power, op_reciprocal, op_scale, &
+    op_larger, op_literal, op_log_cosh, op_logarithm, op_multiply, op_parameter, op_pick, op_power, op_reciprocal, op_scale, &
     op_sech_squared, op_segment, op_shift, op_sine, op_square_root, op_subtract, op_tanh, op_wave
   use nocdyn_law_values, only: value_of
   use nocdyn_laws, only: law_parameter_t

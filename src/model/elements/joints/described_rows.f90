@@ -5,7 +5,7 @@ module nocdyn_described_rows
   use nocdyn_described_elements, only: stays_whole
   use nocdyn_law_derivatives, only: law_derivatives_t, new_law_derivatives
   use nocdyn_law_expressions, only: expression_t, phase_of, time_of
-  use nocdyn_law_tape, only: law_tape_t
+  use nocdyn_law_tape, only: law_inputs_t, law_tape_t
   use nocdyn_moving_rows, only: moving_rows_t
   implicit none (type, external)
   private
@@ -37,14 +37,14 @@ contains
   !> Records the formulas.
   subroutine prepare_rows(self)
     class(described_rows_t), intent(inout) :: self
+    type(law_inputs_t) :: inputs
 
     self%has_described_rows = .true.
     self%steady_part = stays_whole
     call self%prepare_law()
     if (.not. allocated(self%tape)) return
-    associate (inputs => self%tape%inputs())
-      self%derivatives = new_law_derivatives(self%tape, max(inputs%phase, inputs%time), self%tape%row)
-    end associate
+    inputs = self%tape%inputs()
+    self%derivatives = new_law_derivatives(self%tape, max(inputs%phase, inputs%time), self%tape%row)
   end subroutine prepare_rows
 
   pure subroutine motions(self, state, v, g)
