@@ -2,7 +2,7 @@
 module nocdyn_described_rows
   use nocdyn_kinds, only: wp
   use nocdyn_described_elements, only: stays_whole
-  use nocdyn_law_derivatives, only: law_derivatives_t, new_law_derivatives
+  use nocdyn_row_derivatives, only: row_derivatives_t, new_row_derivatives
   use nocdyn_law_expressions, only: expression_t, phase_of, time_of
   use nocdyn_law_tape, only: law_tape_t
   use nocdyn_moving_rows, only: moving_rows_t
@@ -11,7 +11,7 @@ module nocdyn_described_rows
 
   !> Extensions override `describe`, and call `prepare_rows` at the end of their constructor.
   type, abstract, extends(moving_rows_t), public :: described_rows_t
-    type(law_derivatives_t), private :: derivatives   !! of all rows of the list
+    type(row_derivatives_t), private :: derivatives   !! of all rows of the list
   contains
     procedure :: motions   ! not `non_overridable`: gfortran 12 then calls another procedure through `moving_rows_t`
     procedure, non_overridable :: driver
@@ -43,7 +43,7 @@ contains
     call self%prepare_law()
     if (.not. allocated(self%law)) return
     associate (law => self%law%law)
-      self%derivatives = new_law_derivatives(law, max(self%law%phase, self%law%time), law%tape%row)
+      self%derivatives = new_row_derivatives(law, max(self%law%phase, self%law%time), law%tape%row)
     end associate
   end subroutine prepare_rows
 
