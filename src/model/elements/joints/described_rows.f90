@@ -1,18 +1,18 @@
 !> Rows that move whose g(v) is written as formulas: `describe` sets `row` of the list, and g and its derivatives follow.
 module nocdyn_described_rows
   use nocdyn_bank_states, only: bank_state_t
-  use nocdyn_kinds, only: wp
   use nocdyn_described_elements, only: stays_whole
-  use nocdyn_law_derivatives, only: law_derivatives_t, new_law_derivatives
+  use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, phase_of, time_of
   use nocdyn_law_tape, only: law_inputs_t, law_tape_t
   use nocdyn_moving_rows, only: moving_rows_t
+  use nocdyn_row_derivatives, only: new_row_derivatives, row_derivatives_t
   implicit none (type, external)
   private
 
   !> Extensions override `describe`, and call `prepare_rows` at the end of their constructor.
   type, abstract, extends(moving_rows_t), public :: described_rows_t
-    type(law_derivatives_t), private :: derivatives   !! of all rows of the list
+    type(row_derivatives_t), private :: derivatives   !! of all rows of the list
   contains
     procedure :: motions   ! not `non_overridable`: gfortran 12 then calls another procedure through `moving_rows_t`
     procedure, non_overridable :: driver
@@ -44,7 +44,7 @@ contains
     call self%prepare_law()
     if (.not. allocated(self%tape)) return
     inputs = self%tape%inputs()
-    self%derivatives = new_law_derivatives(self%tape, max(inputs%phase, inputs%time), self%tape%row)
+    self%derivatives = new_row_derivatives(self%tape, max(inputs%phase, inputs%time), self%tape%row)
   end subroutine prepare_rows
 
   pure subroutine motions(self, state, v, g)

@@ -3,7 +3,7 @@
 !>
 !> This is the Taylor arithmetic of `law_series.inc` (`nocdyn_law_walk`), but each operation gives all coefficients at once, which
 !> takes less than a third of the time for one element. Tests compare both. Of the operations it knows those that rows need.
-module nocdyn_law_derivatives
+module nocdyn_row_derivatives
   use nocdyn_kinds, only: wp
   use nocdyn_law_tape, only: law_tape_t, op_add, op_arctangent, op_cosine, op_fixed, op_multiply, op_reciprocal, op_scale, &
     op_shift, op_sine, op_square_root, op_subtract, op_wave
@@ -12,7 +12,7 @@ module nocdyn_law_derivatives
   implicit none (type, external)
   private
 
-  public :: new_law_derivatives
+  public :: new_row_derivatives
 
   integer, parameter :: order = 3          ! of the last derivative
   integer, parameter :: most_steps = 40
@@ -20,22 +20,22 @@ module nocdyn_law_derivatives
                                     op_sine, op_cosine, op_square_root, op_arctangent]
 
   !> The operations that give the nodes. Their coefficients are the columns of a local array; the variable is column 0.
-  type, public :: law_derivatives_t
+  type, public :: row_derivatives_t
     integer, private :: steps = 0
     integer, allocatable, private :: operation(:), a(:), b(:)   !! operands: columns of coefficients or of constants, [steps]
     integer, allocatable, private :: results(:)                 !! their columns
   contains
     procedure :: compute
-  end type law_derivatives_t
+  end type row_derivatives_t
 
 contains
 
   !> The operations that give some nodes.
-  function new_law_derivatives(tape, variable, results) result(self)
+  function new_row_derivatives(tape, variable, results) result(self)
     type(law_tape_t), intent(in) :: tape
     integer, intent(in) :: variable     !! node of an angle or of the time, all that the results depend on
     integer, intent(in) :: results(:)   !! nodes
-    type(law_derivatives_t) :: self
+    type(row_derivatives_t) :: self
     integer, allocatable :: constants(:), nodes(:)
     integer :: column(0:tape%count), i
 
@@ -46,7 +46,7 @@ contains
     end associate
     nodes = pack(nodes, nodes /= variable)
     self%steps = size(nodes)
-    if (self%steps > most_steps) error stop 'nocdyn_law_derivatives: too many operations'
+    if (self%steps > most_steps) error stop 'nocdyn_row_derivatives: too many operations'
     column = 0
     constants = tape%constants()
     column(constants) = [(i, i=1, size(constants))]   ! as in `law_t`
@@ -55,17 +55,17 @@ contains
     self%results(:) = column(results)
     do i = 1, self%steps
       associate (node => tape%node(nodes(i)))
-        if (all(node%operation /= known)) error stop 'nocdyn_law_derivatives: an operation that rows have not needed so far'
+        if (all(node%operation /= known)) error stop 'nocdyn_row_derivatives: an operation that rows have not needed so far'
         self%operation(i) = node%operation
         self%a(i) = column(node%a)
         self%b(i) = column(node%b)
       end associate
     end do
-  end function new_law_derivatives
+  end function new_row_derivatives
 
   !> The values and their derivatives.
   pure subroutine compute(self, law, slot, v, g)
-    class(law_derivatives_t), intent(in) :: self
+    class(row_derivatives_t), intent(in) :: self
     type(law_t), intent(in) :: law
     integer, intent(in) :: slot           !! of the element, counted through all strips
     real(wp), intent(in) :: v             !! variable [rad] or [s]
@@ -155,4 +155,4 @@ contains
     f(2:) = [-0.5_wp, -1.0_wp / 6.0_wp] * f(:1)
   end function sine_series
 
-end module nocdyn_law_derivatives
+end module nocdyn_row_derivatives
