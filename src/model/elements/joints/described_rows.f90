@@ -60,7 +60,7 @@ contains
     end associate
   end subroutine motions
 
-  !> None: their moments are reactions.
+  !> Zero, as their moments are reactions.
   pure real(wp) function fastest_wave(self, lane, speed)
     class(described_rows_t), intent(in) :: self
     integer, intent(in) :: lane
