@@ -22,7 +22,7 @@ module nocdyn_row_derivatives
   !> The operations that give the nodes. Their coefficients are the columns of a local array; the variable is column 0.
   type, public :: row_derivatives_t
     integer, private :: steps = 0
-    integer, allocatable, private :: operation(:), a(:), b(:)   !! operands: columns of coefficients or of constants, [steps]
+    integer, allocatable, private :: operation(:), a(:), b(:)   !! columns of coefficients or constants, [steps]
     integer, allocatable, private :: results(:)                 !! their columns
   contains
     procedure :: compute
