@@ -67,7 +67,7 @@ contains
     integer :: i
 
     do i = 1, size(self%banks)
-      self%banks(i)%kept_branch(:, :) = self%banks(i)%branch
+      if (size(self%banks(i)%branch) > 0) self%banks(i)%kept_branch(:, :) = self%banks(i)%branch
     end do
   end subroutine keep_branches
 
@@ -204,7 +204,7 @@ contains
     fastest = 0.0_wp
     do i = 1, size(machine%banks)
       associate (bank => machine%banks(i)%bank)
-        fastest = max(fastest, bank%fastest_wave(lane))
+        if (bank%moving_rows > 0) fastest = max(fastest, bank%fastest_wave(lane))
         if (.not. allocated(self%banks(i)%law)) cycle
         associate (last => bank%first - 1 + bank%ports * bank%count)   ! of its phases
           fastest = max(fastest, self%banks(i)%law%fastest(lane, self%elements%speed(lane, bank%first:last)))
