@@ -67,7 +67,7 @@ contains
     integer :: i
 
     do i = 1, size(self%banks)
-      self%banks(i)%kept_branch(:, :) = self%banks(i)%branch
+      if (size(self%banks(i)%branch) > 0) self%banks(i)%kept_branch(:, :) = self%banks(i)%branch
     end do
   end subroutine keep_branches
 
@@ -204,11 +204,13 @@ contains
     fastest = 0.0_wp
     do i = 1, size(machine%banks)
       associate (bank => machine%banks(i)%bank)
-        fastest = max(fastest, bank%fastest_wave(lane))
-        if (bank%moving_rows > 0 .or. .not. allocated(self%banks(i)%law)) cycle   ! moments of rows are reactions
-        associate (last => bank%first - 1 + bank%ports * bank%count)   ! of its phases
-          fastest = max(fastest, self%banks(i)%law%fastest(lane, self%elements%speed(lane, bank%first:last)))
-        end associate
+        if (bank%moving_rows > 0) then   ! whose moments are reactions
+          fastest = max(fastest, bank%fastest_wave(lane))
+        else if (allocated(self%banks(i)%law)) then
+          associate (last => bank%first - 1 + bank%ports * bank%count)   ! of its phases
+            fastest = max(fastest, self%banks(i)%law%fastest(lane, self%elements%speed(lane, bank%first:last)))
+          end associate
+        end if
       end associate
     end do
   end function fastest_wave
