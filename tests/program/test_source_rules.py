@@ -109,6 +109,15 @@ def test_most_procedures_are_short():
     assert longer <= 0.1 * len(lengths)
 
 
+def test_a_type_has_a_name_of_its_own():
+    places = {}
+    for path in sorted((SOURCE / "src").rglob("*.f90")):
+        for name in re.findall(r"^  type\b(?!\()[^!\n]*?\b(\w+_t)\s*$", path.read_text(encoding="utf-8"), re.MULTILINE):
+            places.setdefault(name.lower(), []).append(path.name)
+    assert len(places) > 300
+    assert {name: files for name, files in places.items() if len(files) > 1} == {}
+
+
 def test_public_procedures_have_a_doc_comment():
     bare = [
         f"{path}: {procedure.name}"

@@ -3,7 +3,7 @@ module sample_sweeps
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use nocdyn_kinds, only: wp
   use nocdyn_sweep_chunk, only: allocate_chunk, chunk_t, status_done, status_failed, status_refused
-  use nocdyn_sweep_header, only: quantity_t, sweep_header_t
+  use nocdyn_sweep_header, only: stored_quantity_t, sweep_header_t
   use nocdyn_text, only: to_text
   implicit none (type, external)
   private
@@ -38,7 +38,7 @@ contains
   end function header_of
 
   subroutine name_quantity(quantity, label, unit, long_name)
-    type(quantity_t), intent(inout) :: quantity
+    type(stored_quantity_t), intent(inout) :: quantity
     character(len=*), intent(in) :: label, unit, long_name
     integer :: k
 

@@ -5,7 +5,7 @@ module nocdyn_cylinder_torques
   use nocdyn_kinds, only: wp
   use nocdyn_order_excitations, only: order_torque_t
   use nocdyn_slider_cranks, only: close_cycle, gas_harmonics, inertia_harmonics, sampled_gas_torque, samples, &
-    slider_crank_t
+    cylinder_t
   implicit none (type, external)
   private
 
@@ -92,7 +92,7 @@ contains
     allocate (torque%square_order(0), torque%square_sine(0), torque%square_cosine(0))
     if (size(group%numbers(pressures)) == 0) return
     call take_pressures(group, pressures, angle, pressure)
-    call gas_harmonics(slider_crank(group), cycle, angle, pressure, torque%mean(1), torque%sine(:, 1), torque%cosine(:, 1))
+    call gas_harmonics(cylinder(group), cycle, angle, pressure, torque%mean(1), torque%sine(:, 1), torque%cosine(:, 1))
   end function gas_torque
 
   !> The torque of a cylinder by its pressure at equal distances over a cycle, with all its harmonics [N m].
@@ -103,7 +103,7 @@ contains
     real(wp), allocatable :: angle(:), pressure(:)
 
     call take_pressures(group, pressures, angle, pressure)
-    torque = sampled_gas_torque(slider_crank(group), cycle_of(group), angle, pressure)
+    torque = sampled_gas_torque(cylinder(group), cycle_of(group), angle, pressure)
   end function sampled_torque
 
   !> The points of one cycle, with the pressure above the one of the crankcase.
@@ -118,11 +118,11 @@ contains
     pressure = pressure - group%number('crankcase_pressure')
   end subroutine take_pressures
 
-  type(slider_crank_t) function slider_crank(group)
+  type(cylinder_t) function cylinder(group)
     type(group_t), intent(in) :: group
 
-    slider_crank = slider_crank_t(group%number('bore', absent=0.0_wp), group%number('crank_radius'), group%number('rod_length'))
-  end function slider_crank
+    cylinder = cylinder_t(group%number('bore', absent=0.0_wp), group%number('crank_radius'), group%number('rod_length'))
+  end function cylinder
 
   !> Sets the harmonics of the inertia torque, if the engine has a reciprocating mass.
   subroutine add_inertia(group, torque)
@@ -131,7 +131,7 @@ contains
 
     if (.not. group%has_value('reciprocating_mass')) return
     torque%square_order = [1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp]
-    torque%square_sine = inertia_harmonics(slider_crank(group), group%number('reciprocating_mass'))
+    torque%square_sine = inertia_harmonics(cylinder(group), group%number('reciprocating_mass'))
     torque%square_cosine = 0.0_wp * torque%square_sine
   end subroutine add_inertia
 

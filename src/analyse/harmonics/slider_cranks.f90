@@ -8,11 +8,11 @@ module nocdyn_slider_cranks
 
   public :: lever, gas_harmonics, sampled_gas_torque, inertia_harmonics, close_cycle, sample_cycle
 
-  type, public :: slider_crank_t
+  type, public :: cylinder_t
     real(wp) :: bore = 0.0_wp           !! diameter of the piston [m]
     real(wp) :: crank_radius = 0.0_wp   !! r [m]
     real(wp) :: rod_length = 0.0_wp     !! l > r [m]
-  end type slider_crank_t
+  end type cylinder_t
 
   real(wp), parameter :: pi = acos(-1.0_wp)
   integer, parameter, public :: samples = 4096   !! of a cycle: the pressure between them follows from points that are less dense
@@ -21,7 +21,7 @@ contains
 
   !> Torque per force on the piston, r sin(theta) (1 + lambda cos(theta) / sqrt(1 - lambda^2 sin(theta)^2)) with lambda = r / l.
   elemental real(wp) function lever(crank, theta)
-    type(slider_crank_t), intent(in) :: crank
+    type(cylinder_t), intent(in) :: crank
     real(wp), intent(in) :: theta   !! angle of the crank after top dead centre [rad]
     real(wp) :: ratio
 
@@ -60,7 +60,7 @@ contains
 
   !> Mean and harmonics of the gas torque, sums of sine_k sin(k x) + cosine_k cos(k x), x = 2 pi theta / cycle.
   subroutine gas_harmonics(crank, cycle, theta, pressure, mean, sine, cosine)
-    type(slider_crank_t), intent(in) :: crank
+    type(cylinder_t), intent(in) :: crank
     real(wp), intent(in) :: cycle                     !! 2 pi or 4 pi [rad]
     real(wp), intent(in) :: theta(:)                  !! points of less than a cycle, ascending; 0: top dead centre [rad]
     real(wp), intent(in) :: pressure(:)               !! at the points, above the one of the crankcase [Pa]
@@ -72,7 +72,7 @@ contains
 
   !> The gas torque at equal distances over a cycle from the angle 0 on.
   function sampled_gas_torque(crank, cycle, theta, pressure) result(torque)
-    type(slider_crank_t), intent(in) :: crank
+    type(cylinder_t), intent(in) :: crank
     real(wp), intent(in) :: cycle                   !! 2 pi or 4 pi [rad]
     real(wp), intent(in) :: theta(:), pressure(:)   !! as of `gas_harmonics`
     real(wp) :: torque(samples)                     !! [N m]
@@ -89,7 +89,7 @@ contains
   !> lambda^2. The first three are in J. P. Den Hartog, Mechanical Vibrations, 4th edition, 1956, chapter 5; the fourth follows
   !> likewise from the piston's travel r (cos theta + lambda / 4 cos 2 theta).
   pure function inertia_harmonics(crank, mass) result(amplitude)
-    type(slider_crank_t), intent(in) :: crank
+    type(cylinder_t), intent(in) :: crank
     real(wp), intent(in) :: mass    !! [kg]
     real(wp) :: amplitude(4)        !! [kg m2]
 

@@ -6,7 +6,7 @@ module nocdyn_run_statistics
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_run_fatigue, only: new_run_fatigue, run_fatigue_t
-  use nocdyn_run_summary, only: extremes_t
+  use nocdyn_run_summary, only: column_extremes_t
   use nocdyn_statistics, only: statistic_damage, statistic_max, statistic_min, statistic_t, &
     statistic_time_of_max, statistic_time_of_min
   use nocdyn_statistics_observer, only: statistics_observer_t
@@ -59,7 +59,7 @@ contains
     integer, intent(in) :: units(:)    !! of the columns of the table
     real(wp), intent(in) :: row(:)     !! the last one
     integer, intent(in) :: rows        !! their number
-    type(extremes_t), intent(out) :: extremes
+    type(column_extremes_t), intent(out) :: extremes
     real(wp) :: values(size(kinds))
     integer :: c, k
 

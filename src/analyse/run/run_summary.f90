@@ -33,13 +33,13 @@ module nocdyn_run_summary
   real(wp), parameter :: passing_share = 1.0e-8_wp     !! of the work that passes through: less says nothing of the vibration
 
   !> Smallest and largest values of the columns from `from` on, with their times.
-  type, public :: extremes_t
+  type, public :: column_extremes_t
     integer :: rows = 0                   !! before `from` too
     real(wp) :: from = -huge(1.0_wp)      !! [s]
     logical :: have_begun = .false.       !! whether the run has come to `from`
     logical :: are_continuous = .false.   !! whether they are extremes of the motion, not of the only row
     real(wp), allocatable :: lowest(:), lowest_time(:), highest(:), highest_time(:), last(:)   !! [columns]
-  end type extremes_t
+  end type column_extremes_t
 
   type, public :: run_summary_t
     logical :: has_run = .false.                    !! whether the input was integrated
@@ -52,7 +52,7 @@ module nocdyn_run_summary
     type(string_t), allocatable :: labels(:)        !! of the columns
     integer, allocatable :: chosen(:)               !! columns that are written, ascending, the time first
     real(wp) :: t_start = 0.0_wp                    !! [s]
-    type(extremes_t) :: extremes
+    type(column_extremes_t) :: extremes
     type(start_transient_t) :: transient            !! of a run that has come to its end
     character(len=:), allocatable :: method         !! of integration
     type(solver_status_t) :: solver_status
@@ -67,7 +67,7 @@ contains
 
   !> Refuses extremes that are not finite: the motion between two rows can reach them.
   subroutine check_extremes(extremes, labels, error)
-    type(extremes_t), intent(in) :: extremes
+    type(column_extremes_t), intent(in) :: extremes
     type(string_t), intent(in) :: labels(:)   !! of the columns
     type(error_t), allocatable, intent(out) :: error
     integer :: i
@@ -93,7 +93,7 @@ contains
 
   !> Adds a note on a large energy balance error. The last five columns are the energies and works; the last one is the error.
   subroutine check_energy_balance(extremes, vibration, negligible, notes)
-    type(extremes_t), intent(in) :: extremes
+    type(column_extremes_t), intent(in) :: extremes
     real(wp), intent(in) :: vibration    !! largest energy of the vibration [J]; 0 if nothing can vibrate
     real(wp), intent(in) :: negligible   !! energy of motions within the absolute tolerance [J]
     type(string_t), allocatable, intent(inout) :: notes(:)

@@ -25,12 +25,12 @@ module nocdyn_run_command
   public :: run_command, run_inputs
 
   !> What is to be run of a file, or why it is refused.
-  type :: reading_t
+  type :: file_runs_t
     type(input_t), allocatable :: inputs(:)    !! the machine itself, or its load cases
     type(string_t), allocatable :: folders(:)  !! of their results
     character(len=:), allocatable :: folder    !! of the file
     type(error_t), allocatable :: error
-  end type reading_t
+  end type file_runs_t
 
   character(len=*), parameter :: json_file = 'cases.json', csv_file = 'cases.csv'
 
@@ -49,7 +49,7 @@ contains
     type(arguments_t), intent(in) :: arguments
     integer, intent(out) :: code
     class(trajectory_file_t), intent(in), optional :: netcdf   !! not open
-    type(reading_t), allocatable :: readings(:)
+    type(file_runs_t), allocatable :: readings(:)
     type(error_t), allocatable :: error
     integer :: i, k
     type(string_t), allocatable :: files(:), folders(:)
@@ -86,7 +86,7 @@ contains
 
   subroutine run_all(arguments, readings, code, netcdf)
     type(arguments_t), intent(in) :: arguments
-    type(reading_t), intent(in) :: readings(:)
+    type(file_runs_t), intent(in) :: readings(:)
     integer, intent(inout) :: code
     class(trajectory_file_t), intent(in), optional :: netcdf   !! as in `run_inputs`
     type(run_summary_t) :: summary
@@ -115,7 +115,7 @@ contains
   !> Runs the load cases of a file, then writes and prints what they say together. Cases that fail do not stop the others.
   subroutine run_load_cases(arguments, reading, code, netcdf)
     type(arguments_t), intent(in) :: arguments
-    type(reading_t), intent(in) :: reading
+    type(file_runs_t), intent(in) :: reading
     integer, intent(inout) :: code
     class(trajectory_file_t), intent(in), optional :: netcdf   !! as in `run_inputs`
     type(case_run_t), allocatable :: runs(:)
@@ -154,7 +154,7 @@ contains
     type(arguments_t), intent(in) :: arguments
     integer, intent(in) :: number        !! of the file
     logical, intent(in) :: has_netcdf    !! whether this program can write NetCDF
-    type(reading_t), intent(inout) :: reading
+    type(file_runs_t), intent(inout) :: reading
     type(input_t) :: machine
     type(input_t), allocatable :: load_cases(:)
     integer :: bytes, c, chosen, k
@@ -207,7 +207,7 @@ contains
 
   !> Whether an input is to be run, but not by a program that cannot write NetCDF.
   logical function needs_companion(reading)
-    type(reading_t), intent(in) :: reading
+    type(file_runs_t), intent(in) :: reading
 
     integer :: i
 

@@ -27,10 +27,10 @@ module nocdyn_chebyshev
   end type interpolation_t
 
   !> Parts of [-1, 1] that are left to be searched; the last one is next.
-  type :: parts_t
+  type :: series_parts_t
     integer :: count = 0
     real(wp) :: middle(max_halvings + 2), half(max_halvings + 2)   !! middles and half lengths
-  end type parts_t
+  end type series_parts_t
 
 contains
 
@@ -68,7 +68,7 @@ contains
     logical, intent(out) :: found                   !! whether `highest` has been raised
     real(wp), dimension(0:max_degree) :: whole, part_values, c, slopes, bends
     real(wp) :: middle, half, rounding, sizes, turn, x
-    type(parts_t) :: parts
+    type(series_parts_t) :: parts
     logical, dimension(2) :: has_none, has_one   ! of maxima, of minima
     integer :: bottom, i, part, top
 
@@ -117,7 +117,7 @@ contains
     logical, intent(out) :: found                   !! whether there is one
     real(wp), dimension(0:max_degree) :: whole, part, c
     real(wp) :: middle, half
-    type(parts_t) :: parts
+    type(series_parts_t) :: parts
 
     found = .false.
     position = -1.0_wp
@@ -145,7 +145,7 @@ contains
     integer, intent(out) :: count
     real(wp), dimension(0:max_degree) :: whole, part_values, c, slopes, bends
     real(wp) :: middle, half, x
-    type(parts_t) :: parts
+    type(series_parts_t) :: parts
     logical, dimension(2) :: has_none, has_one   ! of maxima, of minima
     integer :: part
 
@@ -178,7 +178,7 @@ contains
   end subroutine list_extremes
 
   pure subroutine add_part(parts, middle, half)
-    type(parts_t), intent(inout) :: parts
+    type(series_parts_t), intent(inout) :: parts
     real(wp), intent(in) :: middle, half
 
     parts%count = parts%count + 1
@@ -190,7 +190,7 @@ contains
   pure subroutine take_part(rule, whole_values, whole, parts, middle, half, values, c)
     type(interpolation_t), intent(in) :: rule
     real(wp), intent(in) :: whole_values(0:rule%degree), whole(0:max_degree)   !! of the whole polynomial: values, coefficients
-    type(parts_t), intent(inout) :: parts
+    type(series_parts_t), intent(inout) :: parts
     real(wp), intent(out) :: middle, half, values(0:max_degree), c(0:max_degree)
     real(wp) :: x(0:max_degree)
 

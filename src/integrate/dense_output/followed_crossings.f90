@@ -9,7 +9,7 @@ module nocdyn_followed_crossings
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_observer, only: observer_t
-  use nocdyn_root_functions, only: bracket_t, find_root, most_halvings, parts_of, root_functions_t, sign_of
+  use nocdyn_root_functions, only: sign_change_t, find_root, most_halvings, parts_of, root_functions_t, sign_of
   use nocdyn_step_attempt, only: step_attempt_t
   use nocdyn_system, only: system_t
   implicit none (type, external)
@@ -23,10 +23,10 @@ module nocdyn_followed_crossings
   real(wp), parameter :: early = 0.5_wp          ! of a step: an earlier crossing is no sign that there is none before
 
   !> The first crossing so far.
-  type, private :: crossing_t
+  type, private :: found_crossing_t
     integer :: function = 0        ! 0: there is none
     real(wp) :: theta = 1.0_wp
-  end type crossing_t
+  end type found_crossing_t
 
   !> What is known of the functions of all lanes of a block; work space.
   type, public :: followed_lanes_t
@@ -121,7 +121,7 @@ contains
     type(dense_output_t), intent(inout) :: dense     !! of the lane
     integer, intent(out) :: function                 !! 0 if there is none
     real(wp), intent(out) :: theta                   !! of the crossing, 1 if there is none
-    type(crossing_t) :: first, next
+    type(found_crossing_t) :: first, next
     real(wp) :: fastest, searched
 
     roots%first_side(:) = roots%side(dense%lane, :)
@@ -148,7 +148,7 @@ contains
     type(dense_output_t), intent(inout) :: dense
     real(wp), intent(in) :: fastest   !! [rad/s]
     real(wp), intent(in) :: theta_end
-    type(crossing_t), intent(out) :: first
+    type(found_crossing_t), intent(out) :: first
     integer :: pair, pairs
 
     pairs = pairs_of_step(dense%degree, theta_end * dense%h, fastest)
@@ -174,7 +174,7 @@ contains
     type(dense_output_t), intent(inout) :: dense
     real(wp), intent(in) :: theta(3)
     integer, intent(in) :: level   !! halvings so far
-    type(crossing_t), intent(inout) :: first
+    type(found_crossing_t), intent(inout) :: first
     real(wp) :: middle
     integer :: part
     logical :: is_known   ! where they cross zero
@@ -230,7 +230,7 @@ contains
     type(dense_output_t), intent(inout) :: dense
     real(wp), intent(in) :: theta(2)         !! of the ends
     real(wp), intent(in) :: values(:, :)     !! of the functions there, [functions, 2]
-    type(crossing_t), intent(inout) :: first
+    type(found_crossing_t), intent(inout) :: first
     real(wp) :: root
     integer :: function
 
@@ -238,10 +238,11 @@ contains
       associate (side => roots%side(dense%lane, function), g => values(function, 2))
         if (.not. is_finite(g)) cycle
         if (side > 0 .and. g <= 0) then
-          call find_root(roots, system, observer, dense, bracket_t(function, theta(1), theta(2), values(function, 1), g), root)
-          if (first%function == 0 .or. root < first%theta) first = crossing_t(function, root)
+          call find_root(roots, system, observer, dense, sign_change_t(function, theta(1), theta(2), values(function, 1), g), &
+                         root)
+          if (first%function == 0 .or. root < first%theta) first = found_crossing_t(function, root)
         else if (side == 0 .and. g < 0) then
-          if (first%function == 0 .or. theta(1) < first%theta) first = crossing_t(function, theta(1))
+          if (first%function == 0 .or. theta(1) < first%theta) first = found_crossing_t(function, theta(1))
         end if
         side = sign_of(g)
       end associate

@@ -35,11 +35,11 @@ module nocdyn_root_functions
   end type root_functions_t
 
   !> Two values of theta between which a function changes its sign.
-  type, public :: bracket_t
+  type, public :: sign_change_t
     integer :: function = 0
     real(wp) :: before = 0.0_wp, after = 0.0_wp
     real(wp) :: g_before = 0.0_wp, g_after = 0.0_wp     !! values of the function there
-  end type bracket_t
+  end type sign_change_t
 
 contains
 
@@ -122,7 +122,7 @@ contains
   end function part_end
 
   !> One part of a step as a bracket of one function.
-  pure type(bracket_t) function part_bracket(roots, function, part, theta_end)
+  pure type(sign_change_t) function part_bracket(roots, function, part, theta_end)
     type(root_functions_t), intent(in) :: roots
     integer, intent(in) :: function, part
     real(wp), intent(in) :: theta_end   !! end of the step
@@ -185,7 +185,7 @@ contains
     class(system_t), intent(inout) :: system
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense
-    type(bracket_t), intent(in) :: bracket
+    type(sign_change_t), intent(in) :: bracket
     real(wp), intent(out) :: root   !! theta
     real(wp) :: a, b, c, ga, gb, gc   ! newest point, best point of the other sign, the point that they replaced
     real(wp) :: fraction, least, tolerance, x
@@ -241,7 +241,7 @@ contains
     type(dense_output_t), intent(inout) :: dense
     integer, intent(in) :: function
     integer, intent(in) :: middle               !! index of the part that ends at the middle point
-    type(bracket_t), intent(inout) :: bracket   !! of the fall through zero, set if it is found
+    type(sign_change_t), intent(inout) :: bracket   !! of the fall through zero, set if it is found
     logical, intent(out) :: found
     real(wp) :: x(3), g(3), lowest
     logical :: is_promising
@@ -260,7 +260,7 @@ contains
       if (found) exit
       call keep_lowest_three(x, g, left, lowest, roots%g(function))
     end do
-    if (found) bracket = bracket_t(function, x(left), lowest, g(left), roots%g(function))
+    if (found) bracket = sign_change_t(function, x(left), lowest, g(left), roots%g(function))
   end subroutine find_grazing
 
   !> The vertex of the parabola through three points.

@@ -5,7 +5,7 @@ module nocdyn_switching
   use nocdyn_followed_crossings, only: find_followed_crossing, find_unsettled_lanes, followed_lanes_t, new_followed_lanes
   use nocdyn_kinds, only: wp
   use nocdyn_observer, only: observer_t
-  use nocdyn_root_functions, only: allocate_root_functions, bracket_t, find_grazing, find_root, part_bracket, &
+  use nocdyn_root_functions, only: allocate_root_functions, sign_change_t, find_grazing, find_root, part_bracket, &
     part_end, parts_of, root_functions_t, scan_step, set_start, sign_of
   use nocdyn_solver_status, only: count_crossing, integration_chattering, solver_status_t
   use nocdyn_step_attempt, only: step_attempt_t
@@ -221,9 +221,9 @@ contains
     class(system_t), intent(inout) :: system
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense
-    type(bracket_t), intent(in) :: whole
+    type(sign_change_t), intent(in) :: whole
     real(wp), intent(inout) :: theta
-    type(bracket_t) :: bracket
+    type(sign_change_t) :: bracket
     real(wp) :: root
 
     bracket = whole
@@ -256,7 +256,7 @@ contains
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense
     real(wp), intent(inout) :: theta
-    type(bracket_t) :: bracket
+    type(sign_change_t) :: bracket
     real(wp) :: root
     integer :: function, part
     logical :: found

@@ -8,7 +8,7 @@ module nocdyn_sweep_netcdf
   use nocdyn_kinds, only: wp
   use nocdyn_netcdf_file, only: check, create, define, netcdf_file_t, new_name, put_text
   use nocdyn_sweep_chunk, only: chunk_t, status_done, status_words
-  use nocdyn_sweep_header, only: quantity_t, sweep_netcdf_name
+  use nocdyn_sweep_header, only: stored_quantity_t, sweep_netcdf_name
   use nocdyn_sweep_journal, only: sweep_journal_t
   use nocdyn_text, only: strings
   implicit none (type, external)
@@ -102,7 +102,7 @@ contains
   !> Defines a variable for each quantity. Its name is the label as far as NetCDF allows; the attribute `label` has all of it.
   subroutine define_quantities(file, quantities, role, variables)
     type(sweep_file_t), intent(inout) :: file
-    type(quantity_t), intent(in) :: quantities(:)
+    type(stored_quantity_t), intent(in) :: quantities(:)
     character(len=*), intent(in) :: role
     integer, allocatable, intent(out) :: variables(:)
     character(len=:), allocatable :: name

@@ -5,7 +5,7 @@ module nocdyn_sweep_csv
   use nocdyn_journal_chunks, only: check_sweep, chunk_cursor_t
   use nocdyn_output_file, only: output_file_t
   use nocdyn_sweep_chunk, only: chunk_t, status_done, status_words
-  use nocdyn_sweep_header, only: quantity_t, sweep_header_t
+  use nocdyn_sweep_header, only: stored_quantity_t, sweep_header_t
   use nocdyn_sweep_journal, only: sweep_journal_t
   use nocdyn_printable, only: in_quotes
   use nocdyn_text, only: append, string_t, to_text
@@ -73,7 +73,7 @@ contains
 
   pure subroutine append_quantities(labels, quantities)
     type(string_t), allocatable, intent(inout) :: labels(:)
-    type(quantity_t), intent(in) :: quantities(:)
+    type(stored_quantity_t), intent(in) :: quantities(:)
     integer :: i
 
     do i = 1, size(quantities)

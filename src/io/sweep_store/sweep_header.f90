@@ -14,12 +14,12 @@ module nocdyn_sweep_header
                                                           'point', 'caption', 'positive']
 
   !> A target or a result.
-  type, public :: quantity_t
+  type, public :: stored_quantity_t
     character(len=:), allocatable :: label       !! 'load.work.viscous', 'omega_motor_final'
     character(len=:), allocatable :: unit        !! '' if it has none
     character(len=:), allocatable :: long_name
     type(string_t) :: facts(size(fact_names))    !! by `fact_names`; '': none
-  end type quantity_t
+  end type stored_quantity_t
 
   type, public :: sweep_header_t
     character(len=:), allocatable :: title
@@ -31,8 +31,8 @@ module nocdyn_sweep_header
     integer :: seed = 0
     integer :: variants = 0                             !! of the whole sweep
     integer :: first = 1, last = 0                      !! variants of this shard
-    type(quantity_t), allocatable :: parameters(:)
-    type(quantity_t), allocatable :: results(:)
+    type(stored_quantity_t), allocatable :: parameters(:)
+    type(stored_quantity_t), allocatable :: results(:)
   end type sweep_header_t
 
 contains
@@ -61,7 +61,7 @@ contains
   subroutine put_quantities(bytes, used, quantities)
     character(len=:), allocatable, intent(inout) :: bytes
     integer, intent(inout) :: used
-    type(quantity_t), intent(in) :: quantities(:)
+    type(stored_quantity_t), intent(in) :: quantities(:)
     integer :: i, k
 
     do i = 1, size(quantities)
@@ -102,7 +102,7 @@ contains
     type(byte_reader_t), intent(inout) :: reader
     character(len=*), intent(in) :: bytes
     integer, intent(in) :: count
-    type(quantity_t), allocatable, intent(out) :: quantities(:)
+    type(stored_quantity_t), allocatable, intent(out) :: quantities(:)
     integer :: i, k
 
     ! damaged bytes can give any count: no more than they can hold

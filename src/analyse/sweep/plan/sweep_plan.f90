@@ -22,7 +22,7 @@ module nocdyn_sweep_plan
   use nocdyn_signals, only: label_signals, list_signals, signal_t
   use nocdyn_statistics, only: statistic_names, statistic_t
   use nocdyn_sweep_design, only: find_varied, read_design
-  use nocdyn_sweep_header, only: quantity_t, sweep_header_t
+  use nocdyn_sweep_header, only: stored_quantity_t, sweep_header_t
   use nocdyn_targets, only: set_targets, target_t
   use nocdyn_text, only: counted, string_t, to_text
   use nocdyn_text_sort, only: argsort, sorted_position
@@ -252,7 +252,7 @@ contains
 
   subroutine set_quantity(label, unit, long_name, quantity)
     character(len=*), intent(in) :: label, unit, long_name
-    type(quantity_t), intent(out) :: quantity
+    type(stored_quantity_t), intent(out) :: quantity
     integer :: k
 
     quantity%label = label
@@ -267,7 +267,7 @@ contains
   subroutine set_facts(signal, statistic, quantity)
     type(signal_t), intent(in) :: signal
     character(len=*), intent(in) :: statistic
-    type(quantity_t), intent(inout) :: quantity
+    type(stored_quantity_t), intent(inout) :: quantity
 
     quantity%facts(1)%text = signal%symbol
     quantity%facts(2)%text = statistic
