@@ -4,8 +4,8 @@ module nocdyn_cylinder_torques
   use nocdyn_input, only: group_t
   use nocdyn_kinds, only: wp
   use nocdyn_order_excitations, only: order_torque_t
-  use nocdyn_slider_cranks, only: close_cycle, gas_harmonics, inertia_harmonics, sampled_gas_torque, samples, &
-    cylinder_t
+  use nocdyn_slider_cranks, only: close_cycle, cylinder_t, gas_harmonics, inertia_harmonics, sampled_gas_torque, &
+    samples
   implicit none (type, external)
   private
 
