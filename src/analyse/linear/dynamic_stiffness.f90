@@ -19,10 +19,12 @@ module nocdyn_dynamic_stiffness
   implicit none (type, external)
   private
 
-  public :: new_dynamic_stiffness, new_band_work
+  public :: list_mass, new_dynamic_stiffness, new_band_work
 
   real(wp), parameter :: most_entries = 4.0e7_wp   ! of a band, 0.6 GB
   real(wp), parameter :: stiff = 1.0e8_wp          ! over Omega^2 times the inertia: half of the digits
+
+  real(wp), parameter, public :: rigid_stiffness = 1.0e150_wp   !! of an element that does not turn: its moment is an unknown [N m/rad]
 
   !> Some products of ratios, and where they are added in the band as one array.
   type :: products_t
@@ -40,7 +42,7 @@ module nocdyn_dynamic_stiffness
     type(products_t), private :: stiffness          !! U_e^T U_e of each element
     type(products_t), private :: mass               !! entries of the mass matrix, one "element" [kg m2]
   contains
-    procedure :: factor, factor_square, add_forces, add_twist, solve, find_moment
+    procedure :: factor, factor_square, fill_real, positive_moments, add_forces, add_twist, solve, find_moment
   end type dynamic_stiffness_t
 
   !> Work space of one thread.
@@ -230,6 +232,26 @@ contains
       call complex_band_factor(self%width, self%width, work%band, work%pivots, singular)
     end if
   end subroutine factor_square
+
+  !> Sets the real part of the matrix, without factoring it. It is symmetric.
+  pure subroutine fill_real(self, square, stiffness, work, band)
+    class(dynamic_stiffness_t), intent(in) :: self
+    real(wp), intent(in) :: square             !! Omega^2, may be negative [rad2/s2]
+    complex(wp), intent(in) :: stiffness(:)    !! D_e [N m/rad], [elements]
+    type(band_work_t), intent(inout) :: work
+    real(wp), intent(inout) :: band(:, :)      !! as of `band_factor`, [3 width + 1, unknowns]
+
+    call fill(self, size(work%band), cmplx(square, kind=wp), stiffness, work%band, work%scale)
+    band = real(work%band, wp)
+  end subroutine fill_real
+
+  !> The number of moments of elements with positive stiffness that are unknowns: each makes one eigenvalue of the matrix negative.
+  pure integer function positive_moments(self, stiffness) result(moments)
+    class(dynamic_stiffness_t), intent(in) :: self
+    complex(wp), intent(in) :: stiffness(:)    !! D_e [N m/rad], [elements]
+
+    moments = count(self%unknown > 0 .and. real(stiffness, wp) > 0)
+  end function positive_moments
 
   !> Sets the matrix, as one array.
   pure subroutine fill(self, n, square, stiffness, band, scale)
