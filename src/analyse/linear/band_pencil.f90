@@ -67,7 +67,7 @@ contains
     call list_mass(machine, self%row, self%column, self%mass)
     frequency = no_moments
     do round = 1, 3   ! the moments that are unknowns depend on the lowest frequency, found first without any
-      call new_dynamic_stiffness(machine, incidence, frequency, abs(self%complete), self%matrix, error)
+      call new_dynamic_stiffness(machine, incidence, frequency, abs(self%complete), self%matrix, error, moments_follow=.true.)
       if (allocated(error)) return
       call set_work(self)
       if (round == 1) then

@@ -9,6 +9,7 @@ module nocdyn_damped_bands
   use nocdyn_eigenpairs, only: eigenpairs_t, find_eigenpairs
   use nocdyn_elements, only: internal_states_t
   use nocdyn_errors, only: error_t
+  use nocdyn_internal_modes, only: refine_internal
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: fill_matrix, linearisation_t
   use nocdyn_machine, only: machine_t
@@ -53,17 +54,21 @@ contains
     integer, parameter :: widths(3) = [12, 48, 200]
     type(window_t), allocatable :: windows(:)
     integer :: modes, w, width
+    logical :: is_complete
 
     modes = size(linear%natural)
     do w = 1, size(widths)
       width = merge(modes, widths(w), 2 * widths(w) >= modes)
-      call find_starts(machine%elements%internal, slopes, linear, width, windows, self%is_complete, error)
+      call find_starts(machine%elements%internal, slopes, linear, width, windows, is_complete, error)
       if (allocated(error)) return
-      if (self%is_complete .or. width == modes) exit
+      if (.not. is_complete .and. width < modes .and. w < size(widths)) cycle
+      self = damped_modes_t(is_complete=is_complete)
+      self%pairs%slopes = slopes
+      self%pairs%locked = pencil%locked
+      call refine_all(machine, pencil%matrix, windows, self)
+      ! internal states need the flexibility of many modes
+      if (width == modes .or. all(self%is_exact .or. self%pairs%internal == 0)) return
     end do
-    self%pairs%slopes = slopes
-    self%pairs%locked = pencil%locked
-    call refine_all(machine, pencil%matrix, windows, self)
   end subroutine find_damped
 
   !> The eigenvalues of all windows, and whether they are as many as there are states.
@@ -191,8 +196,12 @@ contains
       end do
     end do
     do m = 1, modes
-      if (.not. self%is_exact(m) .and. self%pairs%internal(m) == 0) call refine_cluster(machine, matrix, work, self%pairs, m, &
-                                                                                        self%is_exact)
+      if (self%is_exact(m)) cycle
+      if (self%pairs%internal(m) > 0) then
+        call refine_internal(machine, matrix, work, self%pairs, m, self%is_exact(m))
+      else
+        call refine_cluster(machine, matrix, work, self%pairs, m, self%is_exact)
+      end if
     end do
   end subroutine refine_all
 

@@ -9,6 +9,7 @@
 module nocdyn_dynamic_stiffness
   use nocdyn_element_coordinates, only: element_coordinates_t
   use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_grouping, only: grouped, groups_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_complex, only: complex_band_factor, complex_band_solve, tridiagonal_factor, tridiagonal_solve
   use nocdyn_machine, only: machine_t
@@ -57,13 +58,15 @@ module nocdyn_dynamic_stiffness
 contains
 
   !> The pattern of a machine's matrices. A machine with too wide a band is refused.
-  subroutine new_dynamic_stiffness(machine, incidence, frequency, stiffness, self, error)
+  subroutine new_dynamic_stiffness(machine, incidence, frequency, stiffness, self, error, moments_follow)
     type(machine_t), intent(in) :: machine
     type(element_coordinates_t), intent(in) :: incidence   !! of its elements
     real(wp), intent(in) :: frequency                      !! the lowest one [rad/s]
     real(wp), intent(in) :: stiffness(:)                   !! the largest |D_e| at low frequencies [N m/rad], [elements]
     type(dynamic_stiffness_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: moments_follow        !! whether each moment comes after the coordinates of its element, so
+                                                           !! that pivots need no row interchanges
     type(entries_t) :: entries
     integer, allocatable :: mass_row(:), mass_column(:), order(:)
     integer :: c, unknowns, upper
@@ -77,6 +80,7 @@ contains
     entries%row = [entries%row, mass_row]
     entries%column = [entries%column, mass_column]
     order = reverse_cuthill_mckee(unknowns, entries%row, entries%column)
+    if (present(moments_follow)) call put_moments_back(self, mass_row, mass_column, order)
     call half_bandwidths(order, entries, self%width, upper)
     self%width = max(self%width, upper)
     if ((3.0_wp * self%width + 1.0_wp) * unknowns > most_entries) then
@@ -89,6 +93,34 @@ contains
     self%stiffness%place = places(self, entries%row(:size(self%stiffness%value)), entries%column(:size(self%stiffness%value)))
     self%mass%place = places(self, mass_row, mass_column)
   end subroutine new_dynamic_stiffness
+
+  !> Orders the coordinates, and puts each moment behind the last coordinate of its element.
+  subroutine put_moments_back(self, mass_row, mass_column, order)
+    type(dynamic_stiffness_t), intent(in) :: self
+    integer, intent(in) :: mass_row(:), mass_column(:)   !! of the entries of the mass matrix
+    integer, allocatable, intent(inout) :: order(:)      !! unknown at each place
+    type(dynamic_stiffness_t) :: plain
+    type(entries_t) :: entries
+    type(groups_t) :: places
+    type(products_t) :: products
+    integer, allocatable :: coordinates(:)
+    integer :: behind(size(order)), c, e, position(self%coordinates)
+
+    if (all(self%unknown == 0)) return
+    plain%coordinates = self%coordinates
+    plain%incidence = self%incidence
+    allocate (plain%unknown(size(self%unknown)), source=0)
+    call list_pairs(plain, entries, products)
+    coordinates = reverse_cuthill_mckee(self%coordinates, [entries%row, mass_row], [entries%column, mass_column])
+    position(coordinates) = [(c, c=1, size(coordinates))]
+    behind(:self%coordinates) = position
+    do e = 1, size(self%unknown)
+      if (self%unknown(e) == 0) cycle
+      behind(self%unknown(e)) = maxval(position(self%incidence%coordinate(self%incidence%first(e):self%incidence%first(e + 1) - 1)))
+    end do
+    places = grouped(self%coordinates, behind, [(c, c=1, size(order))])   ! each coordinate before its moments
+    order = places%member
+  end subroutine put_moments_back
 
   !> Index of entries in the band as one array.
   pure function places(self, row, column) result(place)

@@ -241,6 +241,10 @@ contains
         if (allocated(self%locked)) stiffness(self%locked) = rigid_stiffness
         call matrix%factor_square(-value**2, stiffness, work, singular)
         if (singular) call matrix%factor_square(-(value * (1.0_wp + beside))**2, stiffness, work, singular)
+        if (singular) then   ! the value is exact
+          is_found = abs(change) <= accuracy * abs(value)
+          return
+        end if
         work%x(:) = (0.0_wp, 0.0_wp)   ! also of the moments of very stiff elements
         work%x(matrix%position(:matrix%coordinates)) = masses_times(machine, self%x(:, m))
         call matrix%solve(work)

@@ -27,6 +27,7 @@ module nocdyn_large_modes
   integer, parameter :: default_modes = 100      ! of a machine with more
   integer, parameter :: most_numbers = 5000000   ! coordinates times modes
   integer, parameter :: least_margin = 12        ! undamped modes beside the ones that are wanted
+  real(wp), parameter :: negligible = 1.0e-200_wp   ! eigenvalue that is zero [1/s]
 
   !> The damped modes, and the undamped ones that they go on from.
   type :: found_t
@@ -40,10 +41,12 @@ contains
 
   !> Finds the modes that are wanted, in the order of `order_of`, and the undamped modes that they go on from. An obstacle says why
   !> these are not certain.
-  subroutine find_large_modes(point, choice, elastic, linear, modes, obstacle, error)
+  subroutine find_large_modes(point, choice, elastic, has_fallback, linear, modes, obstacle, error)
     type(operating_point_t), intent(inout) :: point   !! gets notes on modes that are left out
     type(modes_choice_t), intent(in) :: choice
     integer, intent(in) :: elastic(:)                 !! elements whose shares in the potential energy are wanted
+    logical, intent(in) :: has_fallback               !! whether dense matrices are affordable: else a small error of what does
+                                                      !! not oscillate is no obstacle
     type(linearisation_t), intent(out) :: linear      !! without `matrix`
     type(mode_t), allocatable, intent(out) :: modes(:)
     character(len=:), allocatable, intent(out) :: obstacle   !! '': none
@@ -58,7 +61,7 @@ contains
     call find_slopes(point%formulation, point%t, point%y, slopes, error)
     if (allocated(error)) return
     if (has_turning_losses(point%formulation)) obstacle = 'its teeth have losses'
-    if (any(abs(slopes%mean_damping) > 0)) obstacle = 'torques of it follow the mean speed of a cycle'
+    if (has_fallback .and. any(abs(slopes%mean_damping) > 0)) obstacle = 'torques of it follow the mean speed of a cycle'
     if (obstacle /= '') return
     allocate (held, source=held_elements(point%formulation))
     associate (machine => point%formulation%machine)
@@ -67,7 +70,7 @@ contains
       if (.not. allocated(error)) call choose_numbers(pencil, choice, wanted, error)
       if (.not. allocated(error)) call find_covering(machine, pencil, slopes, held, choice, wanted, found, error)
       if (allocated(error)) return
-      call find_obstacle(machine, slopes, found%damped, found%chosen, obstacle)
+      call find_obstacle(machine, found%damped, found%chosen, has_fallback, obstacle)
       if (obstacle /= '') return
       call put_modes(point, slopes, elastic, found, modes)
       linear = found%linear
@@ -193,24 +196,30 @@ contains
   end function ascending
 
   !> Why modes are not certain, '' if they are.
-  subroutine find_obstacle(machine, slopes, damped, chosen, obstacle)
+  subroutine find_obstacle(machine, damped, chosen, has_fallback, obstacle)
     type(machine_t), intent(in) :: machine
-    type(slopes_t), intent(in) :: slopes
     type(damped_modes_t), intent(in) :: damped
-    integer, intent(in) :: chosen(:)      !! modes of `damped`
+    integer, intent(in) :: chosen(:)       !! modes of `damped`
+    logical, intent(in) :: has_fallback
     character(len=:), allocatable, intent(out) :: obstacle
     integer :: i, k
     logical :: has_loss
 
     obstacle = ''
-    has_loss = any(abs(slopes%loss) > 0)
     if (.not. damped%is_complete) obstacle = 'damping couples more of its modes than are looked at together'
     associate (pairs => damped%pairs)
+      has_loss = any(abs(pairs%slopes%loss) > 0)
       do i = 1, size(chosen)
         associate (m => chosen(i), value => pairs%value(chosen(i)))
           if (obstacle /= '') return
-          if (.not. damped%is_exact(m) .and. pairs%internal(m) == 0 .and. abs(value) > 0 .and. &
-              (aimag(value) > 0 .or. .not. has_loss)) obstacle = 'damping changes some of its modes too much'
+          if (.not. damped%is_exact(m) .and. abs(value) > negligible) then
+            ! relative damping has no frequency where nothing oscillates, and hardly matters to rigid motions
+            if (aimag(value) > 0 .or. .not. has_loss) then
+              obstacle = 'damping changes some of its modes too much'
+            else if (has_fallback .and. (pairs%internal(m) > 0 .or. damped%rigid_part(m) < 0.5_wp)) then
+              obstacle = 'it has relative damping and modes that do not oscillate'
+            end if
+          end if
           do k = 1, size(pairs%value)
             if (k == m .or. .not. are_same(machine, pairs, m, k)) cycle
             obstacle = 'damping makes some of its modes too similar'
@@ -251,6 +260,7 @@ contains
     do i = 1, size(modes)
       associate (m => found%chosen(i), pairs => found%damped%pairs)
         value = pairs%value(m)
+        if (abs(value) <= negligible) value = (0.0_wp, 0.0_wp)
         if (abs(real(value, wp)) <= rounding * aimag(value)) value = cmplx(0.0_wp, aimag(value), wp)
         modes(i)%internal = pairs%internal(m)
         modes(i)%undamped = from_si(found%natural(found%damped%undamped(m)), unit_hz)

@@ -31,7 +31,7 @@ contains
 
     coordinates = point%formulation%machine%coordinates%freedoms
     if (coordinates > most_dense) then
-      call find_large_modes(point, choice, elastic, linear, modes, obstacle, error)
+      call find_large_modes(point, choice, elastic, coordinates <= most_fallback, linear, modes, obstacle, error)
       if (allocated(error) .or. obstacle == '') return
       if (coordinates > most_fallback) then
         call raise(error, exit_failed, 'the modes of this machine need dense matrices, because ' // obstacle // &

@@ -116,13 +116,15 @@ contains
   end subroutine tridiagonal_solve
 
   !> Solves A x = b (ZGESV).
-  pure subroutine complex_solve(matrix, x)
-    complex(wp), contiguous, intent(inout) :: matrix(:, :)   !! A, not singular, [n, n]; overwritten
-    complex(wp), contiguous, intent(inout) :: x(:)           !! b, on return x; [n]
+  pure subroutine complex_solve(matrix, x, singular)
+    complex(wp), contiguous, intent(inout) :: matrix(:, :)   !! A, [n, n]; overwritten
+    complex(wp), contiguous, intent(inout) :: x(:)           !! b, on return x, if A is not singular; [n]
+    logical, intent(out), optional :: singular               !! whether a pivot is exactly zero
     integer :: info, pivots(size(x))
 
     call zgesv(size(x), 1, matrix, size(x), pivots, x, size(x), info)
     if (info < 0) error stop 'nocdyn_lapack_complex: zgesv refused an argument'
+    if (present(singular)) singular = info > 0
   end subroutine complex_solve
 
   !> Eigenvalues with A x = value B x, and the vectors x (ZGGEV).
