@@ -1,8 +1,8 @@
 !> The undamped oscillations of a machine as a pencil K - s M of real symmetric band matrices, s the square of a frequency.
 !>
 !> K and M are the parts of the dynamic stiffness. How many squares of natural frequencies are below a shift is the number of
-!> negative eigenvalues of the matrix (Sturm's count). An element that is much stiffer than the inertia beside it has its moment as
-!> an unknown, and so has an element that does not turn, without compliance; each of these moments makes one more eigenvalue
+!> negative eigenvalues of the matrix (Sturm's count). An element that is much stiffer than the inertia beside it has its moment
+!> as an unknown, and so has an element that does not turn, without compliance; each of these moments makes one more eigenvalue
 !> negative.
 module nocdyn_band_pencil
   use nocdyn_dynamic_stiffness, only: band_work_t, dynamic_stiffness_t, list_mass, new_band_work, new_dynamic_stiffness, &
@@ -23,7 +23,8 @@ module nocdyn_band_pencil
     integer :: coordinates = 0
     integer :: rigid = 0                             !! number of the motions without any twist
     integer :: modes = 0                             !! coordinates less what joints hold
-    real(wp) :: lowest = 0.0_wp                      !! about the least s > 0 of a mode that is not rigid [rad2/s2]
+    real(wp) :: lowest = 0.0_wp                      !! about the least s > 0 of a mode that is not rigid [rad2/s2];
+                                                     !! 0, and so are the ends: nothing is elastic
     integer :: negative = 0                          !! number of the motions that a negative stiffness drives apart
     real(wp) :: bottom = 0.0_wp, top = 0.0_wp        !! no s is below or above [rad2/s2]
     type(element_coordinates_t) :: incidence         !! U
@@ -72,13 +73,7 @@ contains
       call set_work(self)
       if (round == 1) then
         call find_rigid(self, machine, held, error)
-        if (allocated(error)) return
-        if (self%rigid == self%modes) then
-          self%bottom = -1.0_wp
-          self%top = 1.0_wp
-          self%lowest = 1.0_wp
-          return
-        end if
+        if (allocated(error) .or. self%rigid == self%modes) return
       end if
       known = self%lowest
       call find_ends(self)

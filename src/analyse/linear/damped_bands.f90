@@ -1,8 +1,8 @@
 !> The damped modes of a large machine, from some of its undamped ones.
 !>
-!> The first-order matrix of a window of neighbouring undamped modes, with the internal states, gives the eigenvalues of the modes in
-!> the middle of the window to start with; the modes beside them are there for what damping couples. Inverse iteration on the band
-!> matrix of the whole machine makes them exact. As many must be found as there are states; else the windows are widened.
+!> The first-order matrix of a window of neighbouring undamped modes, with the internal states, gives the eigenvalues of the modes
+!> in the middle of the window to start with; the modes beside them are there for what damping couples. Inverse iteration on the
+!> band matrix of the whole machine makes them exact. As many must be found as there are states; else the windows are widened.
 module nocdyn_damped_bands
   use nocdyn_band_pencil, only: band_pencil_t
   use nocdyn_dynamic_stiffness, only: band_work_t, dynamic_stiffness_t, new_band_work

@@ -25,7 +25,7 @@ module nocdyn_dynamic_stiffness
   real(wp), parameter :: most_entries = 4.0e7_wp   ! of a band, 0.6 GB
   real(wp), parameter :: stiff = 1.0e8_wp          ! over Omega^2 times the inertia: half of the digits
 
-  real(wp), parameter, public :: rigid_stiffness = 1.0e150_wp   !! of an element that does not turn: its moment is an unknown [N m/rad]
+  real(wp), parameter, public :: rigid_stiffness = 1.0e150_wp   !! of an element that does not turn [N m/rad]
 
   !> Some products of ratios, and where they are added in the band as one array.
   type :: products_t
@@ -116,7 +116,9 @@ contains
     behind(:self%coordinates) = position
     do e = 1, size(self%unknown)
       if (self%unknown(e) == 0) cycle
-      behind(self%unknown(e)) = maxval(position(self%incidence%coordinate(self%incidence%first(e):self%incidence%first(e + 1) - 1)))
+      associate (members => self%incidence%coordinate(self%incidence%first(e):self%incidence%first(e + 1) - 1))
+        behind(self%unknown(e)) = maxval(position(members))
+      end associate
     end do
     places = grouped(self%coordinates, behind, [(c, c=1, size(order))])   ! each coordinate before its moments
     order = places%member
@@ -277,7 +279,8 @@ contains
     band = real(work%band, wp)
   end subroutine fill_real
 
-  !> The number of moments of elements with positive stiffness that are unknowns: each makes one eigenvalue of the matrix negative.
+  !> The number of moments of elements with positive stiffness that are unknowns: each makes one eigenvalue of the matrix
+  !> negative.
   pure integer function positive_moments(self, stiffness) result(moments)
     class(dynamic_stiffness_t), intent(in) :: self
     complex(wp), intent(in) :: stiffness(:)    !! D_e [N m/rad], [elements]

@@ -1,7 +1,7 @@
 !> Damped modes of nearly equal eigenvalues, which inverse iteration does not tell apart: together.
 !>
-!> Inverse iteration with one shift for all of them gives the space of their motions. In it T(lambda) x = 0, linear in lambda about
-!> the shift, is a small eigenvalue problem; as T is symmetric, its values have an error of second order.
+!> Inverse iteration with one shift for all of them gives the space of their motions. In it T(lambda) x = 0, linear in lambda
+!> about the shift, is a small eigenvalue problem; as T is symmetric, its values have an error of second order.
 module nocdyn_mode_clusters
   use nocdyn_dynamic_stiffness, only: band_work_t, dynamic_stiffness_t, rigid_stiffness
   use nocdyn_kinds, only: wp

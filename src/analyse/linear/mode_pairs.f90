@@ -174,9 +174,9 @@ contains
     end do
   end function ascending
 
-  !> Refines a mode, and sets all that belongs to it but `undamped`. What is mostly an internal state may have no motion at all, and
-  !> stays as it is; so does a mode whose iteration goes astray, and one that does not oscillate where there is relative damping, or
-  !> whose eigenvalue is zero; `has_failed` tells it.
+  !> Refines a mode, and sets all that belongs to it but `undamped`. What is mostly an internal state may have no motion at all,
+  !> and stays as it is; so does a mode whose iteration goes astray, and one that does not oscillate where there is relative
+  !> damping, or whose eigenvalue is zero; `has_failed` tells it.
   subroutine refine(machine, matrix, work, self, m, has_failed)
     type(machine_t), intent(in) :: machine
     type(dynamic_stiffness_t), intent(in) :: matrix

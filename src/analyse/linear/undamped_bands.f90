@@ -1,10 +1,10 @@
 !> The undamped modes of a large machine: some of them, by Lanczos' method about shifts, and none missed.
 !>
-!> The squares of the frequencies are divided into intervals of a dozen modes, by Sturm's count. About the middle of each, Lanczos'
-!> method with full orthogonalisation finds the modes of (K - s M)^-1 M; it starts again, orthogonal to what it has, until the
+!> The squares of the frequencies are divided into intervals of a dozen modes, by Sturm's count. About the middle of each, the
+!> method of Lanczos with full orthogonalisation finds the modes of (K - s M)^-1 M; it starts again, orthogonal to what it has, until the
 !> interval has as many as were counted (T. Ericsson and A. Ruhe, Math. Comp. 35 (1980) 1251-1268; R. G. Grimes, J. G. Lewis and
-!> H. D. Simon, SIAM J. Matrix Anal. Appl. 15 (1994) 228-272). A frequency follows from the twists of its mode, so that its error is
-!> of second order.
+!> H. D. Simon, SIAM J. Matrix Anal. Appl. 15 (1994) 228-272). A frequency follows from the twists of its mode: its error is of
+!> second order.
 module nocdyn_undamped_bands
   use nocdyn_band_pencil, only: band_pencil_t
   use nocdyn_errors, only: error_t, exit_failed, raise
@@ -17,6 +17,14 @@ module nocdyn_undamped_bands
   public :: band_modes
 
   integer, parameter :: some = 6, many = 12   ! modes of an interval
+
+  !> What Lanczos' method has found in an interval.
+  type :: found_t
+    integer :: count = 0
+    real(wp), allocatable :: square(:)       ! s [rad2/s2], [modes]
+    real(wp), allocatable :: shape(:, :)     ! x, x^T M x = 1, [coordinates, modes]
+    real(wp), allocatable :: momentum(:, :)  ! M x
+  end type found_t
 
 contains
 
@@ -142,22 +150,24 @@ contains
     real(wp), intent(out) :: square(:)          !! s, ascending; as many as the interval has [rad2/s2]
     real(wp), intent(out) :: shapes(:, :)       !! [coordinates, modes]
     logical, intent(out) :: has_failed
-    integer :: found, start
+    integer :: start
     integer :: order(size(square))
-    real(wp) :: momenta(size(shapes, 1), size(shapes, 2)), shift
+    real(wp) :: shift
+    type(found_t) :: found
 
     call choose_shift(pencil, ends, shift)
     call pencil%factor(shift)
-    found = 0
+    allocate (found%square(size(square)), found%shape(size(shapes, 1), size(square)), &
+              found%momentum(size(shapes, 1), size(square)))
     do start = 1, starts
-      call iterate(pencil, [shift, ends], start, found, square, shapes, momenta)
-      if (found == size(square)) exit
+      call iterate(pencil, [shift, ends], start, found)
+      if (found%count == size(square)) exit
     end do
-    has_failed = found < size(square)
+    has_failed = found%count < size(square)
     if (has_failed) return
-    order = ascending(square)
-    square = square(order)
-    shapes = shapes(:, order)
+    order = ascending(found%square)
+    square = found%square(order)
+    shapes = found%shape(:, order)
   end subroutine find_about
 
   !> A shift about the middle of an interval, not right beside a mode.
@@ -179,46 +189,43 @@ contains
   end subroutine choose_shift
 
   !> Lanczos' method, orthogonal to the modes found so far; adds what converges in the interval.
-  subroutine iterate(pencil, shifts, start, found, square, shapes, momenta)
+  subroutine iterate(pencil, shifts, start, found)
     type(band_pencil_t), intent(inout) :: pencil     !! factored
     real(wp), intent(in) :: shifts(3)                !! the one of the inverse, and the ends of the interval [rad2/s2]
     integer, intent(in) :: start                     !! number of the start vector
-    integer, intent(inout) :: found                  !! modes
-    real(wp), intent(inout) :: square(:)             !! [modes]
-    real(wp), intent(inout) :: shapes(:, :)          !! x, [coordinates, modes]
-    real(wp), intent(inout) :: momenta(:, :)         !! M x
+    type(found_t), intent(inout) :: found
     integer, parameter :: pause = 5                  ! steps between two looks
     real(wp), parameter :: negligible = 1.0e-13_wp   ! of the largest eigenvalue
     integer :: j, left, steps
     logical :: is_closed
     real(wp), allocatable :: p(:, :), q(:, :)        ! basis, and M times it
     real(wp), allocatable :: diagonal(:), beside(:)
-    real(wp) :: x(size(shapes, 1))
+    real(wp) :: x(pencil%coordinates)
 
-    left = size(square) - found
-    steps = min(pencil%modes - found, 4 * left + 40)
+    left = size(found%square) - found%count
+    steps = min(pencil%modes - found%count, 4 * left + 40)
     allocate (q(size(x), steps), p(size(x), steps), diagonal(steps), beside(steps))
     call choose_start(start, x)
     call pencil%solve(x)   ! without motion of what does not turn
-    call make_orthogonal(shapes(:, :found), momenta(:, :found), x)
+    call make_orthogonal(found%shape(:, :found%count), found%momentum(:, :found%count), x)
     call normalise(pencil, x, q(:, 1), p(:, 1))
     do j = 1, steps
       x = p(:, j)
       call pencil%solve(x)
       diagonal(j) = dot_product(x, p(:, j))
-      call make_orthogonal(shapes(:, :found), momenta(:, :found), x)
+      call make_orthogonal(found%shape(:, :found%count), found%momentum(:, :found%count), x)
       call make_orthogonal(q(:, :j), p(:, :j), x)
       beside(j) = sqrt(max(dot_product(x, pencil%masses_times(x)), 0.0_wp))
       is_closed = beside(j) <= negligible * maxval(abs(diagonal(:j)))
       if (is_closed .or. j == steps .or. (j >= 2 * left .and. modulo(j, pause) == 0)) then
-        call collect(pencil, shifts, diagonal(:j), beside(:j), q(:, :j), j == steps, found, square, shapes, momenta)
-        if (found == size(square) .or. j == steps) return
+        call collect(pencil, shifts, diagonal(:j), beside(:j), q(:, :j), j == steps, found)
+        if (found%count == size(found%square) .or. j == steps) return
       end if
       if (is_closed) then   ! goes on elsewhere
         beside(j) = 0.0_wp
         call choose_start(start + j, x)
         call pencil%solve(x)
-        call make_orthogonal(shapes(:, :found), momenta(:, :found), x)
+        call make_orthogonal(found%shape(:, :found%count), found%momentum(:, :found%count), x)
         call make_orthogonal(q(:, :j), p(:, :j), x)
       end if
       call normalise(pencil, x, q(:, j + 1), p(:, j + 1))
@@ -226,14 +233,13 @@ contains
   end subroutine iterate
 
   !> Adds the modes of a basis that have converged in the interval, if these are all that are left.
-  subroutine collect(pencil, shifts, diagonal, beside, basis, is_last, found, square, shapes, momenta)
+  subroutine collect(pencil, shifts, diagonal, beside, basis, is_last, found)
     type(band_pencil_t), intent(in) :: pencil
     real(wp), intent(in) :: shifts(3)                !! the one of the inverse, and the ends of the interval [rad2/s2]
     real(wp), intent(in) :: diagonal(:), beside(:)   !! of the projected inverse, [vectors]
     real(wp), intent(in) :: basis(:, :)              !! [coordinates, vectors]
     logical, intent(in) :: is_last                   !! whether some are taken too
-    integer, intent(inout) :: found
-    real(wp), intent(inout) :: square(:), shapes(:, :), momenta(:, :)   !! as of `iterate`
+    type(found_t), intent(inout) :: found
     real(wp), parameter :: accuracy = 1.0e-12_wp     ! relative
     integer :: k, n
     logical :: has_failed, is_wanted(size(diagonal))
@@ -248,14 +254,16 @@ contains
       s = shifts(1) + 1.0_wp / inverse(k)
       is_wanted(k) = s > shifts(2) .and. s < shifts(3)
     end do
-    if (count(is_wanted) < size(square) - found .and. .not. is_last) return
+    if (count(is_wanted) < size(found%square) - found%count .and. .not. is_last) return
     do k = 1, n
-      if (.not. is_wanted(k) .or. found == size(square)) cycle
+      if (.not. is_wanted(k) .or. found%count == size(found%square)) cycle
       x = matmul(basis, part(:, k))
-      call make_orthogonal(shapes(:, :found), momenta(:, :found), x)
-      found = found + 1
-      call normalise(pencil, x, shapes(:, found), momenta(:, found))
-      square(found) = sum(pencil%stiffness * pencil%twists_of(shapes(:, found))**2)
+      call make_orthogonal(found%shape(:, :found%count), found%momentum(:, :found%count), x)
+      found%count = found%count + 1
+      associate (n => found%count)
+        call normalise(pencil, x, found%shape(:, n), found%momentum(:, n))
+        found%square(n) = sum(pencil%stiffness * pencil%twists_of(found%shape(:, n))**2)
+      end associate
     end do
   end subroutine collect
 

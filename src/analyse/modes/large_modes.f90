@@ -1,6 +1,6 @@
 !> The modes of a large machine that are wanted, by band matrices.
 !>
-!> They are the ones that go on from its lowest undamped modes, or from the ones in a range of frequencies, whose number is counted.
+!> They go on from its lowest undamped modes, or from the ones in a range of frequencies, whose number is counted.
 !> More undamped modes are taken than are wanted: damping couples neighbours, and lowers frequencies.
 module nocdyn_large_modes
   use nocdyn_band_pencil, only: band_pencil_t, new_band_pencil
@@ -39,8 +39,8 @@ module nocdyn_large_modes
 
 contains
 
-  !> Finds the modes that are wanted, in the order of `order_of`, and the undamped modes that they go on from. An obstacle says why
-  !> these are not certain.
+  !> Finds the modes that are wanted, in the order of `order_of`, and the undamped modes that they go on from. An obstacle says
+  !> why these are not certain.
   subroutine find_large_modes(point, choice, elastic, has_fallback, linear, modes, obstacle, error)
     type(operating_point_t), intent(inout) :: point   !! gets notes on modes that are left out
     type(modes_choice_t), intent(in) :: choice
@@ -67,7 +67,12 @@ contains
     associate (machine => point%formulation%machine)
       call new_band_pencil(machine, new_element_coordinates(machine%elements, machine%coordinates), slopes%stiffness, held, &
                            pencil, error)
-      if (.not. allocated(error)) call choose_numbers(pencil, choice, wanted, error)
+      if (allocated(error)) return
+      if (pencil%rigid == pencil%modes) then
+        obstacle = 'nothing of it is elastic'
+        return
+      end if
+      call choose_numbers(pencil, choice, wanted, error)
       if (.not. allocated(error)) call find_covering(machine, pencil, slopes, held, choice, wanted, found, error)
       if (allocated(error)) return
       call find_obstacle(machine, found%damped, found%chosen, has_fallback, obstacle)
@@ -75,11 +80,13 @@ contains
       call put_modes(point, slopes, elastic, found, modes)
       linear = found%linear
       associate (flexible => pencil%modes - pencil%rigid)
-        call note_choice(choice, flexible, max(0, wanted(1) - 1 - pencil%rigid), count(modes%kind == mode_oscillating), point%notes)
+        call note_choice(choice, flexible, max(0, wanted(1) - 1 - pencil%rigid), count(modes%kind == mode_oscillating), &
+                         point%notes)
       end associate
       if (machine%elements%internal%count > most_internal) then
-        call append(point%notes, 'the modes of its ' // to_text(machine%elements%internal%count) // ' internal states that do ' // &
-                                 'not oscillate are left out; at most ' // to_text(most_internal) // ' have modes of their own')
+        call append(point%notes, 'the modes of its ' // to_text(machine%elements%internal%count) // ' internal states that ' // &
+                                 'do not oscillate are left out; at most ' // to_text(most_internal) // &
+                                 ' have modes of their own')
       end if
     end associate
   end subroutine find_large_modes
@@ -109,8 +116,9 @@ contains
       if (pencil%coordinates > most_by_default) wanted(2) = min(pencil%modes, pencil%rigid + default_modes)
     end if
     if (wanted(2) - wanted(1) < most .or. option == '') return
-    call raise(error, exit_input, option // ': these are ' // to_text(wanted(2) - wanted(1) + 1) // ' undamped modes; at most ' // &
-               to_text(most) // ' are allowed for this machine of ' // to_text(pencil%coordinates) // ' degrees of freedom')
+    call raise(error, exit_input, option // ': these are ' // to_text(wanted(2) - wanted(1) + 1) // ' undamped modes; ' // &
+               'at most ' // to_text(most) // ' are allowed for this machine of ' // to_text(pencil%coordinates) // &
+               ' degrees of freedom')
   end subroutine choose_numbers
 
   !> Finds the modes from so many undamped ones that others would have other frequencies.

@@ -1,7 +1,7 @@
-!> The modes of a machine at its operating point: of a small one by dense matrices, of a large one by band matrices. Where these are
-!> not certain to find all, dense ones do it, as far as they are affordable.
+!> The modes of a machine at its operating point: of a small one by dense matrices, of a large one by band matrices. Where these
+!> are not certain to find all, dense ones do it, as far as they are affordable.
 module nocdyn_machine_modes
-  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_large_modes, only: find_large_modes
   use nocdyn_linearisation, only: linearisation_t, linearise
   use nocdyn_mode_choice, only: keep_wanted, modes_choice_t
@@ -34,7 +34,7 @@ contains
       call find_large_modes(point, choice, elastic, coordinates <= most_fallback, linear, modes, obstacle, error)
       if (allocated(error) .or. obstacle == '') return
       if (coordinates > most_fallback) then
-        call raise(error, exit_failed, 'the modes of this machine need dense matrices, because ' // obstacle // &
+        call raise(error, exit_input, 'the modes of this machine need dense matrices, because ' // obstacle // &
                    ', and are found so for at most ' // to_text(most_fallback) // ' degrees of freedom; it has ' // &
                    to_text(coordinates))
         return

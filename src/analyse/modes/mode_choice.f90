@@ -3,7 +3,7 @@ module nocdyn_mode_choice
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: linearisation_t
   use nocdyn_modes, only: mode_oscillating, mode_t
-  use nocdyn_text, only: append, rounded_text, string_t, to_text
+  use nocdyn_text, only: append, counted, rounded_text, string_t, to_text
   use nocdyn_units, only: in_si, unit_hz
   implicit none (type, external)
   private
@@ -72,12 +72,13 @@ contains
     type(string_t), allocatable, intent(inout) :: notes(:)
 
     if (choice%has_range) then
-      call append(notes, to_text(modes) // ' oscillating modes are from ' // rounded_text(choice%range_hz(1), 8) // ' to ' // &
-                         rounded_text(choice%range_hz(2), 8) // ' Hz; of the ' // to_text(undamped) // &
-                         ' undamped ones, ' // to_text(below) // ' are below')
+      call append(notes, counted(modes, 'oscillating mode is', 'oscillating modes are') // ' from ' // &
+                         rounded_text(choice%range_hz(1), 8) // ' to ' // rounded_text(choice%range_hz(2), 8) // ' Hz; of ' // &
+                         to_text(undamped) // ' undamped ones, ' // counted(below, 'is below', 'are below'))
     else if (modes < undamped) then
-      call append(notes, 'these are the ' // to_text(modes) // ' oscillating modes of the lowest frequencies, of ' // &
-                         to_text(undamped) // ' undamped ones; others with --modes NUMBER or --range_hz LOW,HIGH')
+      call append(notes, counted(modes, 'oscillating mode is', 'oscillating modes are') // ' listed, of the lowest ' // &
+                         'frequencies of ' // to_text(undamped) // ' undamped ones; others with --modes NUMBER or ' // &
+                         '--range_hz LOW,HIGH')
     end if
   end subroutine note_choice
 

@@ -42,8 +42,8 @@ contains
     end do
   end subroutine negative_pivots
 
-  !> The rank of a matrix without negative eigenvalues: the pivots that are not rounding. Such a matrix has only zeros in the row of
-  !> a pivot that is zero, so that the row is left out.
+  !> The rank of a matrix without negative eigenvalues: the pivots that are not rounding. Such a matrix has only zeros in the row
+  !> of a pivot that is zero, so that the row is left out.
   pure subroutine semidefinite_rank(width, diagonal, band, rank)
     integer, intent(in) :: width, diagonal               !! as of `negative_pivots`
     real(wp), contiguous, intent(inout) :: band(:, :)    !! overwritten, [rows, n]
