@@ -1,10 +1,9 @@
 !> The undamped modes of a large machine: some of them, by Lanczos' method about shifts, and none missed.
 !>
 !> The squares of the frequencies are divided into intervals of a dozen modes, by Sturm's count. About the middle of each, the
-!> method of Lanczos with full orthogonalisation finds the modes of (K - s M)^-1 M; it starts again, orthogonal to what it has, until the
-!> interval has as many as were counted (T. Ericsson and A. Ruhe, Math. Comp. 35 (1980) 1251-1268; R. G. Grimes, J. G. Lewis and
-!> H. D. Simon, SIAM J. Matrix Anal. Appl. 15 (1994) 228-272). A frequency follows from the twists of its mode: its error is of
-!> second order.
+!> method of Lanczos with full orthogonalisation finds the modes of (K - s M)^-1 M, until there are as many as were counted
+!> (T. Ericsson and A. Ruhe, Math. Comp. 35 (1980) 1251-1268; R. G. Grimes, J. G. Lewis and H. D. Simon, SIAM J. Matrix Anal.
+!> Appl. 15 (1994) 228-272). A frequency follows from the twists of its mode: its error is of second order.
 module nocdyn_undamped_bands
   use nocdyn_band_pencil, only: band_pencil_t
   use nocdyn_errors, only: error_t, exit_failed, raise
