@@ -104,6 +104,8 @@ OPTIONS = {
     "--set": "a=1",
     "--case": "a",
     "--at": "rest",
+    "--modes": "1",
+    "--range_hz": "1,2",
     "--holzer": None,
     "--threads": "1",
     "--shard": "1/2",
@@ -117,9 +119,9 @@ OPTIONS = {
 def test_a_command_takes_the_options_that_its_help_names_and_no_others(nocdyn, command):
     help_text = nocdyn("help", command).stdout
     usage = help_text.split("\n\n")[0]
-    named = set(re.findall(r"(?<!\S)\[?(--[a-z]+)", usage))
+    named = set(re.findall(r"(?<!\S)\[?(--[a-z_]+)", usage))
     assert named <= set(OPTIONS)
-    assert set(re.findall(r"^  (--[a-z]+)", help_text, re.MULTILINE)) <= named
+    assert set(re.findall(r"^  (--[a-z_]+)", help_text, re.MULTILINE)) <= named
     for option, value in OPTIONS.items():
         words = [option] if value is None else [option, value]
         message = nocdyn(command, "missing", *words).stderr

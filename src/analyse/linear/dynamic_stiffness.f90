@@ -9,6 +9,7 @@
 module nocdyn_dynamic_stiffness
   use nocdyn_element_coordinates, only: element_coordinates_t
   use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_grouping, only: grouped, groups_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_complex, only: complex_band_factor, complex_band_solve, tridiagonal_factor, tridiagonal_solve
   use nocdyn_machine, only: machine_t
@@ -19,10 +20,12 @@ module nocdyn_dynamic_stiffness
   implicit none (type, external)
   private
 
-  public :: new_dynamic_stiffness, new_band_work
+  public :: list_mass, new_dynamic_stiffness, new_band_work
 
   real(wp), parameter :: most_entries = 4.0e7_wp   ! of a band, 0.6 GB
   real(wp), parameter :: stiff = 1.0e8_wp          ! over Omega^2 times the inertia: half of the digits
+
+  real(wp), parameter, public :: rigid_stiffness = 1.0e150_wp   !! of an element that does not turn [N m/rad]
 
   !> Some products of ratios, and where they are added in the band as one array.
   type :: products_t
@@ -40,7 +43,7 @@ module nocdyn_dynamic_stiffness
     type(products_t), private :: stiffness          !! U_e^T U_e of each element
     type(products_t), private :: mass               !! entries of the mass matrix, one "element" [kg m2]
   contains
-    procedure :: factor, factor_square, add_forces, add_twist, solve, find_moment
+    procedure :: factor, factor_square, fill_real, positive_moments, add_forces, add_twist, solve, find_moment
   end type dynamic_stiffness_t
 
   !> Work space of one thread.
@@ -55,13 +58,15 @@ module nocdyn_dynamic_stiffness
 contains
 
   !> The pattern of a machine's matrices. A machine with too wide a band is refused.
-  subroutine new_dynamic_stiffness(machine, incidence, frequency, stiffness, self, error)
+  subroutine new_dynamic_stiffness(machine, incidence, frequency, stiffness, self, error, moments_follow)
     type(machine_t), intent(in) :: machine
     type(element_coordinates_t), intent(in) :: incidence   !! of its elements
     real(wp), intent(in) :: frequency                      !! the lowest one [rad/s]
     real(wp), intent(in) :: stiffness(:)                   !! the largest |D_e| at low frequencies [N m/rad], [elements]
     type(dynamic_stiffness_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: moments_follow        !! whether each moment comes after the coordinates of its element, so
+                                                           !! that pivots need no row interchanges
     type(entries_t) :: entries
     integer, allocatable :: mass_row(:), mass_column(:), order(:)
     integer :: c, unknowns, upper
@@ -75,6 +80,7 @@ contains
     entries%row = [entries%row, mass_row]
     entries%column = [entries%column, mass_column]
     order = reverse_cuthill_mckee(unknowns, entries%row, entries%column)
+    if (present(moments_follow)) call put_moments_back(self, mass_row, mass_column, order)
     call half_bandwidths(order, entries, self%width, upper)
     self%width = max(self%width, upper)
     if ((3.0_wp * self%width + 1.0_wp) * unknowns > most_entries) then
@@ -87,6 +93,36 @@ contains
     self%stiffness%place = places(self, entries%row(:size(self%stiffness%value)), entries%column(:size(self%stiffness%value)))
     self%mass%place = places(self, mass_row, mass_column)
   end subroutine new_dynamic_stiffness
+
+  !> Orders the coordinates, and puts each moment behind the last coordinate of its element.
+  subroutine put_moments_back(self, mass_row, mass_column, order)
+    type(dynamic_stiffness_t), intent(in) :: self
+    integer, intent(in) :: mass_row(:), mass_column(:)   !! of the entries of the mass matrix
+    integer, allocatable, intent(inout) :: order(:)      !! unknown at each place
+    type(dynamic_stiffness_t) :: plain
+    type(entries_t) :: entries
+    type(groups_t) :: places
+    type(products_t) :: products
+    integer, allocatable :: coordinates(:)
+    integer :: behind(size(order)), c, e, position(self%coordinates)
+
+    if (all(self%unknown == 0)) return
+    plain%coordinates = self%coordinates
+    plain%incidence = self%incidence
+    allocate (plain%unknown(size(self%unknown)), source=0)
+    call list_pairs(plain, entries, products)
+    coordinates = reverse_cuthill_mckee(self%coordinates, [entries%row, mass_row], [entries%column, mass_column])
+    position(coordinates) = [(c, c=1, size(coordinates))]
+    behind(:self%coordinates) = position
+    do e = 1, size(self%unknown)
+      if (self%unknown(e) == 0) cycle
+      associate (members => self%incidence%coordinate(self%incidence%first(e):self%incidence%first(e + 1) - 1))
+        behind(self%unknown(e)) = maxval(position(members))
+      end associate
+    end do
+    places = grouped(self%coordinates, behind, [(c, c=1, size(order))])   ! each coordinate before its moments
+    order = places%member
+  end subroutine put_moments_back
 
   !> Index of entries in the band as one array.
   pure function places(self, row, column) result(place)
@@ -230,6 +266,27 @@ contains
       call complex_band_factor(self%width, self%width, work%band, work%pivots, singular)
     end if
   end subroutine factor_square
+
+  !> Sets the real part of the matrix, without factoring it. It is symmetric.
+  pure subroutine fill_real(self, square, stiffness, work, band)
+    class(dynamic_stiffness_t), intent(in) :: self
+    real(wp), intent(in) :: square             !! Omega^2, may be negative [rad2/s2]
+    complex(wp), intent(in) :: stiffness(:)    !! D_e [N m/rad], [elements]
+    type(band_work_t), intent(inout) :: work
+    real(wp), intent(inout) :: band(:, :)      !! as of `band_factor`, [3 width + 1, unknowns]
+
+    call fill(self, size(work%band), cmplx(square, kind=wp), stiffness, work%band, work%scale)
+    band = real(work%band, wp)
+  end subroutine fill_real
+
+  !> The number of moments of elements with positive stiffness that are unknowns: each makes one eigenvalue of the matrix
+  !> negative.
+  pure integer function positive_moments(self, stiffness) result(moments)
+    class(dynamic_stiffness_t), intent(in) :: self
+    complex(wp), intent(in) :: stiffness(:)    !! D_e [N m/rad], [elements]
+
+    moments = count(self%unknown > 0 .and. real(stiffness, wp) > 0)
+  end function positive_moments
 
   !> Sets the matrix, as one array.
   pure subroutine fill(self, n, square, stiffness, band, scale)

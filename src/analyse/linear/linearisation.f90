@@ -25,7 +25,7 @@ module nocdyn_linearisation
   implicit none (type, external)
   private
 
-  public :: fill_matrix, find_slopes, linearise, mass_matrix, undamped_loss, undamped_modes
+  public :: fill_matrix, find_slopes, has_turning_losses, held_elements, linearise, mass_matrix, undamped_loss, undamped_modes
 
   !> With negative stiffnesses, a mode is rigid if the square of its natural frequency is below this share of the highest one.
   real(wp), parameter :: rigid_share_of_squares = 1.0e-13_wp
@@ -58,7 +58,6 @@ contains
     type(slopes_t) :: slopes
     real(wp), allocatable :: jacobian(:, :)
     integer, allocatable :: held(:)
-    integer :: e
 
     call differentiate(formulation, t, y, pattern, jacobian)
     incidence = new_element_coordinates(formulation%machine%elements, formulation%machine%coordinates)
@@ -69,12 +68,21 @@ contains
     if (allocated(error)) return
     call move_alloc(held, self%held)
     call fill_matrix(formulation%machine%elements%internal, slopes, self)
-    associate (teeth => formulation%joints%teeth)
-      if (teeth%count > 0 .and. .not. any([(carries_nothing(formulation, teeth%joint(e)), e=1, teeth%count)])) then
-        call follow_losses(formulation, slopes, pattern, jacobian(1, :), self)
-      end if
-    end associate
+    if (has_turning_losses(formulation)) call follow_losses(formulation, slopes, pattern, jacobian(1, :), self)
   end subroutine linearise
+
+  !> Whether the moments of teeth with losses follow from the ones of all elements.
+  pure logical function has_turning_losses(formulation)
+    class(formulation_t), intent(in) :: formulation   !! started in its state
+    integer :: e
+
+    associate (teeth => formulation%joints%teeth)
+      has_turning_losses = teeth%count > 0
+      do e = 1, teeth%count
+        has_turning_losses = has_turning_losses .and. .not. carries_nothing(formulation, teeth%joint(e))
+      end do
+    end associate
+  end function has_turning_losses
 
   !> The elements of joints that hold.
   function held_elements(formulation) result(elements)

@@ -6,7 +6,7 @@
 !> iteration on the band matrix T, with the root of x^T T(lambda) x as the next value: T is symmetric, so that x is the left
 !> eigenvector too, and x^T T(lambda) x a two-sided Rayleigh functional.
 module nocdyn_mode_pairs
-  use nocdyn_dynamic_stiffness, only: band_work_t, dynamic_stiffness_t, new_band_work
+  use nocdyn_dynamic_stiffness, only: band_work_t, dynamic_stiffness_t, new_band_work, rigid_stiffness
   use nocdyn_eigenpairs, only: eigenpairs_t, find_eigenpairs
   use nocdyn_errors, only: error_t
   use nocdyn_kinds, only: wp
@@ -16,7 +16,7 @@ module nocdyn_mode_pairs
   implicit none (type, external)
   private
 
-  public :: find_pairs, move_pairs
+  public :: find_pairs, masses_times, move_pairs, refine, set_motion, set_sizes
 
   integer, parameter, public :: most_modes = 100   !! undamped ones that a large machine has, if the lines reach no further
 
@@ -24,6 +24,8 @@ module nocdyn_mode_pairs
   type, public :: mode_pairs_t
     real(wp) :: speed = 0.0_wp                   !! of the body whose speed is held [rad/s]
     type(slopes_t) :: slopes
+    integer, allocatable :: locked(:)            !! elements that do not turn, whose moments are unknowns of the matrix; not
+                                                 !! allocated: none
     real(wp) :: highest = 0.0_wp                 !! frequency of excitation: a large machine has no modes far above it [rad/s]
     type(linearisation_t) :: linear              !! the undamped modes
     complex(wp), allocatable :: value(:)         !! eigenvalues, imaginary part > 0 [1/s], [modes]
@@ -80,6 +82,7 @@ contains
       self%value(m) = pairs%value(kept(m))
       self%x(:, m) = pairs%speeds(:, kept(m))
       call refine(machine, matrix, work, self, m)
+      self%undamped(m) = undamped_of(machine, self, m)
     end do
   end subroutine find_pairs
 
@@ -111,6 +114,7 @@ contains
       self%x(:, m) = (1.0_wp - share) * before%x(:, m) + share * turn * after%x(:, other(m))
       call refine(machine, matrix, work, self, m, has_failed)
       if (has_failed) return
+      self%undamped(m) = undamped_of(machine, self, m)
     end do
   end subroutine move_pairs
 
@@ -148,10 +152,11 @@ contains
     linear%flexible = pack(linear%flexible, linear%flexible <= n)
   end subroutine leave_out_highest
 
+  !> Allocates the arrays of the modes, after `slopes` is set.
   subroutine set_sizes(machine, matrix, modes, self)
     type(machine_t), intent(in) :: machine
-    type(dynamic_stiffness_t), intent(in) :: matrix
-    integer, intent(in) :: modes
+    type(dynamic_stiffness_t), intent(in) :: matrix   !! of it
+    integer, intent(in) :: modes                      !! their number
     type(mode_pairs_t), intent(inout) :: self
 
     allocate (self%value(modes), self%undamped(modes), self%x(matrix%coordinates, modes), &
@@ -169,13 +174,14 @@ contains
     end do
   end function ascending
 
-  !> Refines a mode, and sets all that belongs to it. What is mostly an internal state may have no motion at all, and stays as it
-  !> is; so does a mode whose iteration goes astray, unless `has_failed` is there to tell it.
+  !> Refines a mode, and sets all that belongs to it but `undamped`. What is mostly an internal state may have no motion at all,
+  !> and stays as it is; so does a mode whose iteration goes astray, and one that does not oscillate where there is relative
+  !> damping, or whose eigenvalue is zero; `has_failed` tells it.
   subroutine refine(machine, matrix, work, self, m, has_failed)
     type(machine_t), intent(in) :: machine
     type(dynamic_stiffness_t), intent(in) :: matrix
     type(band_work_t), intent(inout) :: work
-    type(mode_pairs_t), intent(inout) :: self
+    type(mode_pairs_t), intent(inout) :: self   !! with `slopes`, and with `value`, `x` and `internal` of the mode
     integer, intent(in) :: m   !! mode
     logical, intent(out), optional :: has_failed
     real(wp), parameter :: alike = 0.5_wp
@@ -186,7 +192,8 @@ contains
     start = self%value(m)
     x = self%x(:, m)
     call set_motion(machine, matrix, self, m)
-    is_found = self%internal(m) == 0
+    is_found = self%internal(m) == 0 .and. abs(start) > 0
+    if (is_found .and. .not. aimag(start) > 0) is_found = .not. any(abs(self%slopes%loss) > 0)
     if (is_found) call iterate(machine, matrix, work, self, m, is_found)
     if (is_found) is_found = similarity(machine, x, self%x(:, m)) > alike
     if (.not. is_found) then
@@ -200,7 +207,6 @@ contains
       self%x(:, m) = self%x(:, m) / sqrt(norm)
       call set_motion(machine, matrix, self, m)
     end if
-    self%undamped(m) = undamped_of(machine, self, m)
   end subroutine refine
 
   !> Inverse iteration.
@@ -216,9 +222,10 @@ contains
     complex(wp), dimension(size(self%twist, 1)) :: slope, stiffness
     complex(wp) :: change, inertia
     integer :: step
-    logical :: singular
+    logical :: oscillates, singular
 
     is_found = .false.
+    oscillates = aimag(self%value(m)) > 0
     associate (value => self%value(m), twist => self%twist, angle => self%angle)
       do step = 1, most_steps
         call self%slopes%find_stiffness(machine%elements%internal, value, stiffness, slope)
@@ -227,12 +234,17 @@ contains
         if (.not. abs(change) > 0) return
         change = -(sum(stiffness * twist(:, m)**2) + value**2 * inertia) / change
         value = value + change
-        if (.not. aimag(value) > 0 .or. .not. abs(value) < huge(1.0_wp)) return
+        if ((aimag(value) > 0 .neqv. oscillates) .or. .not. abs(value) < huge(1.0_wp)) return
         is_found = step > 1 .and. abs(change) <= accuracy * abs(value)
         if (is_found) return
         call self%slopes%find_stiffness(machine%elements%internal, value, stiffness, slope)
+        if (allocated(self%locked)) stiffness(self%locked) = rigid_stiffness
         call matrix%factor_square(-value**2, stiffness, work, singular)
         if (singular) call matrix%factor_square(-(value * (1.0_wp + beside))**2, stiffness, work, singular)
+        if (singular) then   ! the value is exact
+          is_found = abs(change) <= accuracy * abs(value)
+          return
+        end if
         work%x(:) = (0.0_wp, 0.0_wp)   ! also of the moments of very stiff elements
         work%x(matrix%position(:matrix%coordinates)) = masses_times(machine, self%x(:, m))
         call matrix%solve(work)
@@ -247,9 +259,9 @@ contains
   !> Sets twists and angles of a mode from its coordinates.
   subroutine set_motion(machine, matrix, self, m)
     type(machine_t), intent(in) :: machine
-    type(dynamic_stiffness_t), intent(in) :: matrix
-    type(mode_pairs_t), intent(inout) :: self
-    integer, intent(in) :: m
+    type(dynamic_stiffness_t), intent(in) :: matrix   !! of it
+    type(mode_pairs_t), intent(inout) :: self         !! with `x` of the mode
+    integer, intent(in) :: m                          !! mode
     integer :: e, i
 
     associate (incidence => matrix%incidence)
@@ -282,8 +294,8 @@ contains
   !> M x.
   pure function masses_times(machine, x) result(product)
     type(machine_t), intent(in) :: machine
-    complex(wp), intent(in) :: x(:)   !! coordinates
-    complex(wp) :: product(size(x))
+    complex(wp), intent(in) :: x(:)     !! [coordinates]
+    complex(wp) :: product(size(x))     !! [coordinates]
     complex(wp) :: angle(machine%bodies)
     integer :: b, k
 

@@ -84,7 +84,10 @@ contains
     turn = (0.0_wp, 1.0_wp)
     if (aimag(value) > 0) turn = value / aimag(value)
     stiffness = self%stiffness + (value * self%damping + turn * self%loss)
-    if (present(slope)) slope = self%damping + self%loss / aimag(value)
+    if (present(slope)) then
+      slope = self%damping
+      if (aimag(value) > 0) slope = self%damping + self%loss / aimag(value)
+    end if
     do s = 1, internal%count
       if (internal%first(s) /= s) cycle
       associate (e => internal%element(s))

@@ -8,7 +8,7 @@ module nocdyn_modes
   implicit none (type, external)
   private
 
-  public :: find_modes
+  public :: fill_bodies, fill_mode, find_modes, order_of
 
   real(wp), parameter :: pi = acos(-1.0_wp)
 
@@ -49,6 +49,7 @@ contains
     complex(wp), allocatable :: twists(:, :)
     type(eigenpairs_t) :: pairs
     integer :: i, n
+    real(wp) :: rigid_part
     real(wp), allocatable :: angles(:, :)
 
     call find_eigenpairs(linear, pairs, error)
@@ -62,33 +63,32 @@ contains
     twists = matmul(cmplx(angles, kind=wp), pairs%vector(n + 1:n + size(linear%flexible), :))
     allocate (modes(size(pairs%value)))
     do i = 1, size(modes)
-      call fill_mode(linear, elastic, pairs%value(i), pairs%vector(:, i), twists(:, i), modes(i))
+      associate (rates => pairs%vector(:n, i))
+        modes(i)%undamped = linear%natural(maxloc(abs(rates), dim=1)) / (2.0_wp * pi)
+        rigid_part = 1.0_wp - sum(abs(rates(linear%flexible))**2) / max(sum(abs(rates)**2), tiny(1.0_wp))
+      end associate
       modes(i)%internal = pairs%internal(i)
-      if (modes(i)%internal > 0 .and. modes(i)%kind /= mode_oscillating) modes(i)%kind = mode_internal
+      call fill_mode(linear%stiffness(elastic), pairs%value(i), rigid_part, twists(:, i), modes(i))
       call fill_bodies(formulation, pairs%speeds(:, i), modes(i))
     end do
     modes = modes(order_of(modes))
   end subroutine find_modes
 
-  !> Sets the kind and the potential energies of a mode.
-  subroutine fill_mode(linear, elastic, eigenvalue, vector, twist, mode)
-    type(linearisation_t), intent(in) :: linear
-    integer, intent(in) :: elastic(:)
+  !> Sets the eigenvalue, the kind and the potential energies of a mode.
+  subroutine fill_mode(stiffness, eigenvalue, rigid_part, twist, mode)
+    real(wp), intent(in) :: stiffness(:)    !! k of the elastic elements [N m/rad], [elastic]
     complex(wp), intent(in) :: eigenvalue   !! [1/s]
-    complex(wp), intent(in) :: vector(:)    !! eigenvector
-    complex(wp), intent(in) :: twist(:)     !! [elastic]
-    type(mode_t), intent(inout) :: mode
-    real(wp) :: rigid_part
+    real(wp), intent(in) :: rigid_part      !! of the kinetic energy, 0 to 1
+    complex(wp), intent(in) :: twist(:)     !! of the elastic elements, of any size, [elastic]
+    type(mode_t), intent(inout) :: mode     !! with `internal`
 
     mode%eigenvalue = eigenvalue
-    associate (rates => vector(:size(linear%natural)))
-      mode%undamped = linear%natural(maxloc(abs(rates), dim=1)) / (2.0_wp * pi)
-      rigid_part = 1.0_wp - sum(abs(rates(linear%flexible))**2) / max(sum(abs(rates)**2), tiny(1.0_wp))
-    end associate
-    mode%potential = linear%stiffness(elastic) * abs(twist)**2
+    mode%potential = stiffness * abs(twist)**2
     if (sum(abs(mode%potential)) > 0.0_wp) mode%potential = mode%potential / sum(abs(mode%potential))
     if (aimag(eigenvalue) > 0.0_wp) then
       mode%kind = mode_oscillating
+    else if (mode%internal > 0) then
+      mode%kind = mode_internal
     else if (rigid_part > 0.5_wp) then
       mode%kind = mode_rigid
     else if (real(eigenvalue, wp) > 0.0_wp) then
@@ -101,7 +101,7 @@ contains
   !> Sets shape and kinetic energies of the bodies.
   subroutine fill_bodies(formulation, speeds, mode)
     class(formulation_t), intent(in) :: formulation
-    complex(wp), intent(in) :: speeds(:)   !! of the coordinates
+    complex(wp), intent(in) :: speeds(:)   !! of the coordinates, of any size
     type(mode_t), intent(inout) :: mode
 
     associate (map => formulation%machine%coordinates)

@@ -4,9 +4,11 @@ module nocdyn_modes_report
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
-  use nocdyn_linearisation, only: linearisation_t, linearise
+  use nocdyn_linearisation, only: linearisation_t
   use nocdyn_machine, only: machine_t
-  use nocdyn_modes, only: find_modes, kind_names, mode_diverging, mode_internal, mode_oscillating, mode_overdamped, mode_rigid, &
+  use nocdyn_machine_modes, only: find_machine_modes
+  use nocdyn_mode_choice, only: modes_choice_t
+  use nocdyn_modes, only: kind_names, mode_diverging, mode_internal, mode_oscillating, mode_overdamped, mode_rigid, &
     mode_t
   use nocdyn_shaft_errors, only: describe_error, has_shaft_nodes, noted_error, shaft_error
   use nocdyn_operating_point, only: operating_point_t
@@ -48,25 +50,18 @@ module nocdyn_modes_report
 contains
 
   !> Linearises at an operating point and finds the modes.
-  subroutine new_modes_report(point, self, error)
+  subroutine new_modes_report(point, choice, self, error)
     type(operating_point_t), intent(inout) :: point
+    type(modes_choice_t), intent(in) :: choice
     type(modes_report_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
-    type(linearisation_t) :: linear
     integer :: i
 
-    call linearise(point%formulation, point%t, point%y, linear, error)
+    allocate (self%elastic, source=point%formulation%machine%elastic())
+    call find_machine_modes(point, choice, self%elastic, self%linear, self%modes, error)
     if (allocated(error)) return
-    if (size(linear%matrix) == 0) then
-      call raise(error, exit_failed, point%notes(1)%text // ', so that nothing moves')
-      return
-    end if
     self%machine = point%formulation%machine
     call note_mean_slopes(self%machine, point%formulation%state%elements%applied_speed(1, :), point%notes)
-    self%linear = linear
-    allocate (self%elastic, source=self%machine%elastic())
-    call find_modes(point%formulation, linear, self%elastic, self%modes, error)
-    if (allocated(error)) return
     do i = 1, size(self%modes)
       associate (mode => self%modes(i))
         if (all(is_finite([real(mode%eigenvalue, wp), aimag(mode%eigenvalue), mode%undamped, mode%kinetic, mode%potential, &
@@ -79,7 +74,7 @@ contains
     call find_shaft_errors(self)
     call point%formulation%set_state(point%y)
     allocate (self%omega, source=point%formulation%omega(1, 1:))
-    call join_parts(linear%stiffness(self%elastic), self)
+    call join_parts(self%linear%stiffness(self%elastic), self)
     self%t = point%t
     self%point = point%text
     allocate (self%notes, source=point%notes)

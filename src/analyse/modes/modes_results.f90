@@ -6,6 +6,7 @@ module nocdyn_modes_results
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_machine, only: machine_t
+  use nocdyn_mode_choice, only: modes_choice_t
   use nocdyn_modes_files, only: modes_csv, put_modes
   use nocdyn_modes_report, only: modes_report_t, modes_text, new_modes_report
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
@@ -33,15 +34,17 @@ contains
     type(analysis_options_t), intent(in) :: options
     type(error_t), allocatable, intent(out) :: error
     type(operating_point_t) :: point
-    logical :: is_of_holzer
+    logical :: is_of_holzer, is_of_point
 
     if (options%at /= '') call find_operating_point(input, machine, options%at, point, error)
     if (options%at == '') call find_operating_point(input, machine, 'equilibrium', point, error)
-    if (.not. allocated(error)) call new_modes_report(point, self%report, error)
+    is_of_point = allocated(error)
+    if (.not. allocated(error)) call new_modes_report(point, modes_choice_t(options%modes, options%has_range, options%range_hz), &
+                                                      self%report, error)
     is_of_holzer = .not. allocated(error) .and. options%has_holzer
     if (is_of_holzer) call holzer_tables(self%report, self%holzer_text, self%holzer_csv, error)
     if (.not. allocated(error)) return
-    if (is_of_holzer .or. error%code == exit_failed) error%message = input%shown_file() // ': ' // error%message
+    if (.not. is_of_point .or. error%code == exit_failed) error%message = input%shown_file() // ': ' // error%message
   end subroutine solve
 
   subroutine list_tables(self, names)

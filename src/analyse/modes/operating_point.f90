@@ -18,8 +18,6 @@ module nocdyn_operating_point
 
   public :: find_operating_point
 
-  integer, parameter :: max_states = 3000   ! of a dense eigenvalue problem; it takes some minutes
-
   !> The state, and how reports call it.
   type, public :: operating_point_t
     class(formulation_t), allocatable :: formulation   !! reduced, one lane, without work integrals
@@ -31,7 +29,7 @@ module nocdyn_operating_point
 
 contains
 
-  !> Finds the operating point. Refuses machines with too many states for a dense eigenvalue problem.
+  !> Finds the operating point.
   subroutine find_operating_point(input, machine, at, point, error)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
@@ -41,11 +39,6 @@ contains
     type(group_t) :: run
     real(wp) :: time
 
-    if (2 * machine%coordinates%freedoms > max_states) then
-      call raise(error, exit_input, input%shown_file() // ': the modes of this machine are those of a dense matrix of ' // &
-                 to_text(2 * machine%coordinates%freedoms) // ' states; at most ' // to_text(max_states) // ' are allowed')
-      return
-    end if
     run = input%single('run')
     point%t = run%number('t_start')
     allocate (point%notes, source=machine%simplifications)

@@ -4,6 +4,7 @@ module nocdyn_analyses
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
+  use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_output_file, only: output_file_t
   use nocdyn_text, only: string_t
@@ -13,6 +14,9 @@ module nocdyn_analyses
   !> What the command line asks for beside the input.
   type, public :: analysis_options_t
     character(len=:), allocatable :: at       !! state about which the machine is linearised; '': the one of the analysis
+    integer :: modes = 0                      !! number of oscillating modes that are wanted, the lowest; 0: as many as usual
+    logical :: has_range = .false.            !! whether modes in a range are wanted
+    real(wp) :: range_hz(2) = 0.0_wp          !! their frequencies, from and to [Hz]
     logical :: has_holzer = .false.           !! whether tables of Holzer are wanted
     logical :: writes_files = .false.         !! whether files are written
     character(len=:), allocatable :: folder   !! of the results of a run of the input

@@ -167,7 +167,11 @@ contains
 
     call set_up_balance(formulation, t, balance, is_at_rest)
     call hold_floating(balance)
-    resting = new_resting_joints(balance)
+    if (balance%joints%count > 0) then   ! dense matrices
+      resting = new_resting_joints(balance)
+    else
+      call balance%differentiate_at_start()
+    end if
     call search_balance(balance, blocks)
     do i = 1, size(blocks)
       if (size(blocks(i)%values, 2) > 0) cycle

@@ -1,5 +1,6 @@
 !> What a command line says, the command with its operands and options; the table of all options.
 module nocdyn_arguments
+  use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -7,7 +8,7 @@ module nocdyn_arguments
   public :: option_index
 
   type, public :: option_t
-    character(len=9) :: name
+    character(len=10) :: name
     character(len=2) :: short = ''         !! another name, blank if there is none
     character(len=26) :: value = ''        !! what follows the name, blank if the option has no value
     logical :: may_repeat = .false.        !! whether it may be given more than once
@@ -19,6 +20,8 @@ module nocdyn_arguments
     option_t('--set', value='PATH=VALUE', may_repeat=.true.), &
     option_t('--case', value='NAME'), &
     option_t('--at', value='equilibrium|rest|TIME'), &
+    option_t('--modes', value='NUMBER'), &
+    option_t('--range_hz', value='LOW,HIGH'), &
     option_t('--holzer', may_repeat=.true.), &
     option_t('--threads', value='NUMBER'), &
     option_t('--shard', value='K/N'), &
@@ -32,6 +35,8 @@ module nocdyn_arguments
     type(string_t), allocatable :: operands(:)       !! files, or the topics of `help`
     type(string_t), allocatable :: overrides(:)      !! PATH=VALUE of every --set
     integer :: threads = 0                           !! of --threads, 0 without it
+    integer :: modes = 0                             !! of --modes, 0 without it
+    real(wp) :: range_hz(2) = 0.0_wp                 !! of --range_hz [Hz]
     integer :: shard = 0, shards = 0                 !! of --shard, 0 without it
     type(string_t), allocatable :: names(:)          !! long names of all options, in the order of the command line
     type(string_t), allocatable :: values(:)         !! of these options, '' if an option takes none

@@ -3,6 +3,8 @@ module nocdyn_command_line
   use nocdyn_arguments, only: arguments_t, option_index, option_t, options
   use nocdyn_commands, only: command_index, command_names, command_t, commands_with_option
   use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_kinds, only: wp
+  use nocdyn_literals, only: literal_ok, read_real
   use nocdyn_near_words, only: nearest_word
   use nocdyn_text, only: append, is_too_long, joined, longest_file_name, longest_path, &
     quoted, shortened, string_t, to_text
@@ -12,6 +14,7 @@ module nocdyn_command_line
   public :: command_line, parse_command_line
 
   integer, parameter :: max_threads = 4096, max_shards = 1000000
+  real(wp), parameter :: highest_hz = 1.0e12_wp
 
 contains
 
@@ -156,6 +159,11 @@ contains
     case ('--out')
       if (is_too_long(value)) call raise(error, exit_input, '--out ' // shortened(value) // ' is too long for a folder; ' // &
         'allowed: ' // to_text(longest_path) // ' bytes, ' // to_text(longest_file_name) // ' from slash to slash')
+    case ('--modes')
+      arguments%modes = digits_value(value)
+      if (arguments%modes < 1) call raise(error, exit_input, '--modes ' // value // ': allowed: a number from 1 on')
+    case ('--range_hz')
+      call parse_range(value, arguments%range_hz, error)
     case ('--shard')
       call parse_shard(value, arguments%shard, arguments%shards, error)
     case default
@@ -164,6 +172,25 @@ contains
     call append(arguments%names, trim(option%name))
     call append(arguments%values, value)
   end subroutine add_option
+
+  !> LOW,HIGH: a range of frequencies.
+  subroutine parse_range(value, range_hz, error)
+    character(len=*), intent(in) :: value
+    real(wp), intent(inout) :: range_hz(2)   !! [Hz]
+    type(error_t), allocatable, intent(out) :: error
+    integer :: comma, status(2)
+
+    comma = index(value, ',')
+    status = literal_ok - 1
+    if (comma > 0) then
+      call read_real(value(:comma - 1), range_hz(1), status(1))
+      call read_real(value(comma + 1:), range_hz(2), status(2))
+    end if
+    if (all(status == literal_ok)) then
+      if (range_hz(1) >= 0 .and. range_hz(2) > range_hz(1) .and. range_hz(2) <= highest_hz) return
+    end if
+    call raise(error, exit_input, '--range_hz ' // value // ': allowed: LOW,HIGH with 0 <= LOW < HIGH <= 1e12, frequencies in Hz')
+  end subroutine parse_range
 
   !> K/N: part K of N equal parts.
   subroutine parse_shard(value, shard, shards, error)
@@ -211,7 +238,7 @@ contains
     message = message // ' allowed: ' // joined(known, ', ')
   end function unknown_word
 
-  !> Refuses options that the command does not take.
+  !> Refuses options that the command does not take, and two that exclude each other.
   subroutine check_options(commands, arguments, error)
     type(command_t), intent(in) :: commands(:)
     type(arguments_t), intent(in) :: arguments
@@ -228,6 +255,9 @@ contains
         return
       end associate
     end do
+    if (arguments%is_given('--modes') .and. arguments%is_given('--range_hz')) then
+      call raise(error, exit_input, '--modes and --range_hz exclude each other')
+    end if
   end subroutine check_options
 
   !> Refuses a wrong number of operands.

@@ -111,6 +111,9 @@ contains
 
     options%at = ''
     if (arguments%is_given('--at')) options%at = arguments%value('--at')
+    options%modes = arguments%modes
+    options%has_range = arguments%is_given('--range_hz')
+    options%range_hz = arguments%range_hz
     options%has_holzer = arguments%is_given('--holzer')
     options%writes_files = folder /= ''
     options%folder = result_folder(arguments, input)

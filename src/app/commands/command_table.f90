@@ -66,13 +66,16 @@ contains
       '  --out DIR          write equilibrium.json to DIR, with several files to DIR/<name of the file>' // nl // &
       '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR' // nl // nl // &
       'Exit code 1: there is no steady state.', analysis_command)
-    call add_command(commands, 'modes', 'FILE...', '--out --set --case --at --holzer', &
+    call add_command(commands, 'modes', 'FILE...', '--out --set --case --at --modes --range_hz --holzer', &
       'natural frequencies, damping, shapes and energies of the modes', &
       'Linearises the machines and prints natural frequencies, damping ratios, time constants and the' // nl // &
       'distribution of the energy of each mode.' // nl // nl // &
       '  --at equilibrium   about the steady state (default); of several, the stable one nearest to the start' // nl // &
       '  --at rest          at the start angles, with zero speeds and mean torques' // nl // &
       '  --at TIME          at a time of the run [s], which is integrated up to there' // nl // &
+      '  --modes NUMBER     only so many oscillating modes, of the lowest frequencies; default: all, of a machine' // nl // &
+      '                     with more than 1000 degrees of freedom 100' // nl // &
+      '  --range_hz LOW,HIGH  only the oscillating modes in this range of frequencies [Hz]' // nl // &
       '  --holzer           print the table of Holzer of each undamped mode; with --out, write holzer.csv' // nl // &
       '  --out DIR          write modes.csv and modes.json to DIR, with several files to DIR/<name of the file>' // nl // &
       '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR', analysis_command)

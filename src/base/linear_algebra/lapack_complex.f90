@@ -6,7 +6,7 @@ module nocdyn_lapack_complex
   implicit none (type, external)
   private
 
-  public :: complex_band_factor, complex_band_solve, complex_solve, tridiagonal_factor, tridiagonal_solve
+  public :: complex_band_factor, complex_band_solve, complex_eigenvectors, complex_solve, tridiagonal_factor, tridiagonal_solve
 
   interface
     pure subroutine zgbtrf(m, n, kl, ku, ab, ldab, ipiv, info)
@@ -50,6 +50,16 @@ module nocdyn_lapack_complex
       complex(wp), intent(inout) :: a(lda, n), b(ldb, nrhs)
       integer, intent(out) :: ipiv(n), info
     end subroutine zgesv
+
+    subroutine zggev(jobvl, jobvr, n, a, lda, b, ldb, alpha, beta, vl, ldvl, vr, ldvr, work, lwork, rwork, info)
+      import :: wp
+      character, intent(in) :: jobvl, jobvr
+      integer, intent(in) :: n, lda, ldb, ldvl, ldvr, lwork
+      complex(wp), intent(inout) :: a(lda, n), b(ldb, n)
+      complex(wp), intent(out) :: alpha(n), beta(n), vl(ldvl, *), vr(ldvr, n), work(*)
+      real(wp), intent(out) :: rwork(*)
+      integer, intent(out) :: info
+    end subroutine zggev
   end interface
 
 contains
@@ -106,13 +116,33 @@ contains
   end subroutine tridiagonal_solve
 
   !> Solves A x = b (ZGESV).
-  pure subroutine complex_solve(matrix, x)
-    complex(wp), contiguous, intent(inout) :: matrix(:, :)   !! A, not singular, [n, n]; overwritten
-    complex(wp), contiguous, intent(inout) :: x(:)           !! b, on return x; [n]
+  pure subroutine complex_solve(matrix, x, singular)
+    complex(wp), contiguous, intent(inout) :: matrix(:, :)   !! A, [n, n]; overwritten
+    complex(wp), contiguous, intent(inout) :: x(:)           !! b, on return x, if A is not singular; [n]
+    logical, intent(out), optional :: singular               !! whether a pivot is exactly zero
     integer :: info, pivots(size(x))
 
     call zgesv(size(x), 1, matrix, size(x), pivots, x, size(x), info)
     if (info < 0) error stop 'nocdyn_lapack_complex: zgesv refused an argument'
+    if (present(singular)) singular = info > 0
   end subroutine complex_solve
+
+  !> Eigenvalues with A x = value B x, and the vectors x (ZGGEV).
+  subroutine complex_eigenvectors(a, b, values, vectors, has_failed)
+    complex(wp), contiguous, intent(inout) :: a(:, :), b(:, :)      !! overwritten, finite, [n, n]
+    complex(wp), intent(out) :: values(:)                           !! [n]
+    complex(wp), contiguous, intent(out) :: vectors(:, :)           !! as columns, [n, n]
+    logical, intent(out) :: has_failed                              !! LAPACK does not converge, or B is singular
+    integer, parameter :: rooms = 34
+    complex(wp) :: beta(size(values)), none(1, 1), work(rooms * size(values))
+    real(wp) :: real_work(8 * size(values))
+    integer :: info, n
+
+    n = size(values)
+    call zggev('N', 'V', n, a, n, b, n, values, beta, none, 1, vectors, n, work, size(work), real_work, info)
+    if (info < 0) error stop 'nocdyn_lapack_complex: zggev refused an argument'
+    has_failed = info /= 0 .or. .not. all(abs(beta) > 0)
+    if (.not. has_failed) values = values / beta
+  end subroutine complex_eigenvectors
 
 end module nocdyn_lapack_complex

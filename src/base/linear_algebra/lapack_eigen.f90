@@ -5,7 +5,8 @@ module nocdyn_lapack_eigen
   implicit none (type, external)
   private
 
-  public :: cholesky_factor, solve_triangular, singular_vectors, symmetric_eigenvectors, eigenvectors
+  public :: cholesky_factor, solve_triangular, singular_vectors, symmetric_eigenvectors, eigenvectors, &
+    tridiagonal_eigenvectors
 
   interface
     subroutine dpotrf(uplo, n, a, lda, info)
@@ -41,6 +42,15 @@ module nocdyn_lapack_eigen
       real(wp), intent(out) :: w(*), work(*)
       integer, intent(out) :: info
     end subroutine dsyev
+
+    subroutine dstev(jobz, n, d, e, z, ldz, work, info)
+      import :: wp
+      character, intent(in) :: jobz
+      integer, intent(in) :: n, ldz
+      real(wp), intent(inout) :: d(*), e(*)
+      real(wp), intent(out) :: z(ldz, *), work(*)
+      integer, intent(out) :: info
+    end subroutine dstev
 
     subroutine dgeev(jobvl, jobvr, n, a, lda, wr, wi, vl, ldvl, vr, ldvr, work, lwork, info)
       import :: wp
@@ -120,6 +130,26 @@ contains
     call dsyev('V', 'U', n, vectors, max(1, n), values, work, size(work), info)
     has_failed = info /= 0
   end subroutine symmetric_eigenvectors
+
+  !> Eigenvalues of a symmetric tridiagonal matrix, ascending, and orthonormal eigenvectors (DSTEV).
+  subroutine tridiagonal_eigenvectors(diagonal, beside, values, vectors, has_failed)
+    real(wp), intent(in) :: diagonal(:)                   !! [n]
+    real(wp), intent(in) :: beside(:)                     !! elements beside the diagonal, [n - 1] or more
+    real(wp), intent(out) :: values(:)                    !! [n]
+    real(wp), contiguous, intent(out) :: vectors(:, :)    !! as columns, [n, n]
+    logical, intent(out) :: has_failed                    !! LAPACK does not converge, or an element is not finite
+    real(wp) :: off(size(diagonal)), work(2 * size(diagonal))
+    integer :: info, n
+
+    n = size(diagonal)
+    values = diagonal
+    vectors(:, :) = 0.0_wp
+    off(:n - 1) = beside(:n - 1)
+    has_failed = .not. (all(is_finite(diagonal)) .and. all(is_finite(off(:n - 1))))
+    if (has_failed) return
+    call dstev('V', n, values, off, vectors, n, work, info)
+    has_failed = info /= 0
+  end subroutine tridiagonal_eigenvectors
 
   !> Eigenvalues of a real matrix and right eigenvectors; conjugate pairs follow each other (DGEEV).
   subroutine eigenvectors(matrix, values, vectors, has_failed, left_vectors)

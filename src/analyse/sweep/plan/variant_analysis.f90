@@ -8,9 +8,11 @@ module nocdyn_variant_analysis
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_margins, only: operating_distance
-  use nocdyn_linearisation, only: linearisation_t, linearise
+  use nocdyn_linearisation, only: linearisation_t
   use nocdyn_machine, only: machine_t
-  use nocdyn_modes, only: find_modes, mode_oscillating, mode_t
+  use nocdyn_machine_modes, only: find_machine_modes
+  use nocdyn_mode_choice, only: modes_choice_t
+  use nocdyn_modes, only: mode_oscillating, mode_t
   use nocdyn_named_analyses, only: assemble_analysed, new_analysis
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
   use nocdyn_response_analysis, only: analyse_response, response_analysis_t
@@ -79,8 +81,7 @@ contains
     call new_analysis('modes', command)
     call assemble_analysed('modes', command, input, machine, error)
     if (.not. allocated(error)) call find_operating_point(input, machine, 'equilibrium', point, error)
-    if (.not. allocated(error)) call linearise(point%formulation, point%t, point%y, linear, error)
-    if (.not. allocated(error)) call find_modes(point%formulation, linear, no_elements, all_modes, error)
+    if (.not. allocated(error)) call find_machine_modes(point, modes_choice_t(), no_elements, linear, all_modes, error)
     if (allocated(error)) return
     allocate (modes(count(all_modes%kind == mode_oscillating)))
     found = 0
