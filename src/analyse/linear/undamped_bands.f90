@@ -18,12 +18,12 @@ module nocdyn_undamped_bands
   integer, parameter :: some = 6, many = 12   ! modes of an interval
 
   !> What Lanczos' method has found in an interval.
-  type :: found_t
+  type :: interval_modes_t
     integer :: count = 0
     real(wp), allocatable :: square(:)       ! s [rad2/s2], [modes]
     real(wp), allocatable :: shape(:, :)     ! x, x^T M x = 1, [coordinates, modes]
     real(wp), allocatable :: momentum(:, :)  ! M x
-  end type found_t
+  end type interval_modes_t
 
 contains
 
@@ -152,7 +152,7 @@ contains
     integer :: start
     integer :: order(size(square))
     real(wp) :: shift
-    type(found_t) :: found
+    type(interval_modes_t) :: found
 
     call choose_shift(pencil, ends, shift)
     call pencil%factor(shift)
@@ -192,7 +192,7 @@ contains
     type(band_pencil_t), intent(inout) :: pencil     !! factored
     real(wp), intent(in) :: shifts(3)                !! the one of the inverse, and the ends of the interval [rad2/s2]
     integer, intent(in) :: start                     !! number of the start vector
-    type(found_t), intent(inout) :: found
+    type(interval_modes_t), intent(inout) :: found
     integer, parameter :: pause = 5                  ! steps between two looks
     real(wp), parameter :: negligible = 1.0e-13_wp   ! of the largest eigenvalue
     integer :: j, left, steps
@@ -238,7 +238,7 @@ contains
     real(wp), intent(in) :: diagonal(:), beside(:)   !! of the projected inverse, [vectors]
     real(wp), intent(in) :: basis(:, :)              !! [coordinates, vectors]
     logical, intent(in) :: is_last                   !! whether some are taken too
-    type(found_t), intent(inout) :: found
+    type(interval_modes_t), intent(inout) :: found
     real(wp), parameter :: accuracy = 1.0e-12_wp     ! relative
     integer :: k, n
     logical :: has_failed, is_wanted(size(diagonal))
