@@ -123,3 +123,15 @@ def test_too_many_modes_of_a_large_machine_are_refused(nocdyn):
     outcome = nocdyn("modes", path, "--range_hz", "0,30")
     assert outcome.returncode == 2
     assert "long.nml: --range_hz 0,30: these are 3915 undamped modes" in outcome.stderr
+
+
+@without_checks
+def test_decays_that_are_approximate_in_a_large_machine_are_told(nocdyn):
+    text = chain(1600, "&load name = 'l' body = 'b0' viscous = 2.0 /\n&motor name = 'm' body = 'b3' a = 10.0 b = 1.0 c = 0.0 /\n")
+    text = text.replace(f"damping = {DAMPING}", "relative_damping = 0.2")
+    outcome = nocdyn("modes", nocdyn.write("machine.nml", text), "--modes", "3")
+    assert outcome.returncode == 0
+    assert (
+        "note: 1 mode that does not oscillate has an approximate decay: relative damping has no frequency there\n"
+        in outcome.stdout
+    )

@@ -417,7 +417,7 @@ def test_a_machine_without_steady_state_is_refused_but_not_at_rest(nocdyn):
 
 def test_a_large_machine_that_needs_dense_matrices_is_refused(nocdyn):
     bodies = "".join(f"&body name = 'b{i}' inertia = 1.0 /\n" for i in range(1501))
-    outcome = nocdyn("modes", nocdyn.write("many.nml", bodies + "&run t_end = 1.0 /\n"))
+    outcome = nocdyn("modes", nocdyn.write("many.nml", bodies + "&run t_end = 1.0 /\n"), "--at", "0")
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert (
         "many.nml: the modes of this machine need dense matrices, because nothing of it is elastic, and are found so for at most "

@@ -15,7 +15,7 @@ module nocdyn_large_modes
   use nocdyn_modes, only: fill_bodies, fill_mode, mode_oscillating, mode_t, order_of
   use nocdyn_operating_point, only: operating_point_t
   use nocdyn_slopes, only: slopes_t
-  use nocdyn_text, only: append, to_text
+  use nocdyn_text, only: append, counted, string_t, to_text
   use nocdyn_undamped_bands, only: band_modes
   use nocdyn_units, only: from_si, in_si, unit_hz
   implicit none (type, external)
@@ -78,6 +78,7 @@ contains
       call find_obstacle(machine, found%damped, found%chosen, has_fallback, obstacle)
       if (obstacle /= '') return
       call put_modes(point, slopes, elastic, found, modes)
+      if (.not. has_fallback) call note_approximate(slopes, found, point%notes)
       linear = found%linear
       associate (flexible => pencil%modes - pencil%rigid)
         call note_choice(choice, flexible, max(0, wanted(1) - 1 - pencil%rigid), count(modes%kind == mode_oscillating), &
@@ -236,6 +237,28 @@ contains
       end do
     end associate
   end subroutine find_obstacle
+
+  !> Adds a note on modes that do not oscillate and would need dense matrices.
+  subroutine note_approximate(slopes, found, notes)
+    type(slopes_t), intent(in) :: slopes
+    type(found_t), intent(in) :: found
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    logical :: follows_mean
+    integer :: approximate
+
+    follows_mean = any(abs(slopes%mean_damping) > 0)
+    associate (damped => found%damped, chosen => found%chosen)
+      associate (value => damped%pairs%value(chosen))
+        approximate = count(.not. aimag(value) > 0 .and. abs(value) > negligible .and. &
+                            (follows_mean .or. .not. damped%is_exact(chosen)))
+      end associate
+    end associate
+    if (approximate == 0) return
+    call append(notes, counted(approximate, 'mode that does not oscillate has an approximate decay', &
+                               'modes that do not oscillate have approximate decays') // ': ' // &
+                       trim(merge('torques that follow the mean speed of a cycle are left out of them', &
+                                  'relative damping has no frequency there                           ', follows_mean)))
+  end subroutine note_approximate
 
   !> Whether two modes are one.
   pure logical function are_same(machine, pairs, m, k)
