@@ -75,7 +75,9 @@ def test_every_kind_of_element_names_its_signals(nocdyn, kind):
 
 
 def test_columns_of_field_units_have_them(nocdyn):
-    nocdyn.write("m.nml", BODIES + ELEMENTS["coupling"].format("x") + "\n&output units = 'rpm', 'deg' columns = 'omega_*' /\n")
+    nocdyn.write(
+        "m.nml", BODIES + ELEMENTS["coupling"].format("x") + "\n&output units = 'rpm', 'deg' columns = 't', 'omega_*' /\n"
+    )
     assert nocdyn("run", "m.nml", "--out", "out").returncode == 0
     columns = nocdyn.columns("out")
     assert labels(columns, "trajectory.csv") == header(nocdyn, "out/trajectory.csv")

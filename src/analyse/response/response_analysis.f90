@@ -2,6 +2,7 @@
 module nocdyn_response_analysis
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_backward_speeds, only: refuse_backward_speeds
+  use nocdyn_column_names, only: choose_signals
   use nocdyn_critical_speeds, only: crossing_t, find_crossings, keep_new, refine_peaks
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_excitation_lines, only: line_order, line_t
@@ -17,6 +18,7 @@ module nocdyn_response_analysis
     note_simplifications, note_steady_states
   use nocdyn_response_points, only: keep_points
   use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
+  use nocdyn_signals, only: signal_t
   use nocdyn_synthesis, only: new_synthesis
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
   use nocdyn_unstable_speeds, only: describe_first, find_unstable, mark_between, note_speeds, unstable_speed_t
@@ -33,6 +35,7 @@ module nocdyn_response_analysis
     type(crossing_t), allocatable :: crossings(:)
     type(unstable_speed_t), allocatable :: unstable(:)   !! speeds of the grid that are left out for it
     type(response_limit_t), allocatable :: limits(:)
+    integer, allocatable :: shown(:), shown_angles(:)   !! quantities and angles of the response that are written
     type(response_fatigue_t), allocatable :: fatigue(:)   !! after `add_fatigue`
     type(string_t), allocatable :: notes(:)
     real(wp) :: wall_time = 0.0_wp                   !! of the computation, without reading and writing files [s]
@@ -65,6 +68,7 @@ contains
       call place_error(input, self%settings, failed_speed, error)
       if (.not. allocated(error)) call choose_lines(input, self%settings, self%response%lines, error)
       if (.not. allocated(error)) call read_limits(input, self%response%quantities, self%limits, error)
+      if (.not. allocated(error)) call choose_shown(input, self, error)
       if (.not. allocated(error)) then
         call prepare_synthesis(self%response)
         call self%response%add_points(speeds, .true., error, failed_speed)
@@ -88,6 +92,28 @@ contains
     call system_clock(ended)
     self%wall_time = real(ended - began, wp) / real(rate, wp)
   end subroutine analyse_response
+
+  !> Chooses what is written.
+  subroutine choose_shown(input, self, error)
+    type(input_t), intent(in) :: input
+    type(response_analysis_t), intent(inout) :: self
+    type(error_t), allocatable, intent(out) :: error
+    type(signal_t), allocatable :: signals(:)
+    integer, allocatable :: chosen(:)
+    integer :: q
+
+    associate (quantities => self%response%quantities, angles => self%response%angles)
+      allocate (signals(size(quantities) + size(angles)))
+      do q = 1, size(quantities)
+        signals(q) = quantities(q)%signal_t
+      end do
+      signals(size(quantities) + 1:) = angles
+      call choose_signals(input, signals, chosen, self%notes, error)
+      if (allocated(error)) return
+      self%shown = pack(chosen, chosen <= size(quantities))
+      self%shown_angles = pack(chosen, chosen > size(quantities)) - size(quantities)
+    end associate
+  end subroutine choose_shown
 
   !> Adds the damage by &fatigue to a response.
   subroutine add_fatigue(input, self, error)

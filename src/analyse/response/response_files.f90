@@ -50,14 +50,15 @@ contains
     type(response_analysis_t), intent(in) :: analysis
     integer, intent(in) :: wanted(:)   !! indices of `units`
     type(column_list_t), intent(out) :: list
-    integer :: k, q
+    integer :: i, k, q
 
     call list%start(response_table, wanted)
     call list%add_named('omega', 'rad/s', 'speed that is held', 'body', analysis%body_name)
     call list%add_named('drive', '1', 'share of the torques of the drives that holds the speed')
     call list%add_named('drive_torque', 'N m', 'torque that holds the speed')
     associate (quantities => analysis%response%quantities, limits => analysis%limits)
-      do q = 1, size(quantities)
+      do i = 1, size(analysis%shown)
+        q = analysis%shown(i)
         associate (signal => quantities(q)%signal_t)
           call list%add(signal, 'mean')
           call list%add(signal, 'half_range')
@@ -69,7 +70,7 @@ contains
       end do
       do k = 1, size(limits)
         associate (signal => quantities(limits(k)%quantity)%signal_t)
-          if (any(limits(:k - 1)%quantity == limits(k)%quantity)) cycle
+          if (any(limits(:k - 1)%quantity == limits(k)%quantity) .or. all(analysis%shown /= limits(k)%quantity)) cycle
           if (has_continuous(analysis, signal%name)) call list%add(signal, 'limit')
           if (has_transient(analysis, signal%name)) call list%add(signal, 'transient_limit')
           if (has_peak(limits, limits(k)%quantity)) call list%add(signal, 'peak_limit')
@@ -130,7 +131,7 @@ contains
     type(response_analysis_t), intent(in) :: analysis
     integer, intent(in) :: i             !! point of the response
     real(wp), intent(out) :: row(:)
-    integer :: k, n, q
+    integer :: j, k, n, q
 
     n = 0
     associate (quantities => analysis%response%quantities, limits => analysis%limits, point => analysis%response%points(i), &
@@ -138,14 +139,15 @@ contains
       call put(speed)
       call put(point%state%factor)
       call put(point%state%torque)
-      do q = 1, size(quantities)
+      do j = 1, size(analysis%shown)
+        q = analysis%shown(j)
         row(n + 1:n + 3) = [point%mean(q), point%half_range(q), point%peak(q)]
         n = n + 3
         if (has_heat(quantities, q)) call put(sum(point%heat(quantities(q)%elements)))
         if (any(limits%quantity == q)) call put(worst_ratio(limits, point, q))
       end do
       do k = 1, size(limits)
-        if (any(limits(:k - 1)%quantity == limits(k)%quantity)) cycle
+        if (any(limits(:k - 1)%quantity == limits(k)%quantity) .or. all(analysis%shown /= limits(k)%quantity)) cycle
         if (has_continuous(analysis, quantities(limits(k)%quantity)%name)) then
           call put(minval(limits%continuous_limit(speed), mask=limits%quantity == limits(k)%quantity))
         end if
@@ -181,10 +183,9 @@ contains
     type(string_t), allocatable :: labels(:)
     integer, allocatable :: unit(:)
     real(wp), allocatable :: row(:)
-    integer :: i, l, n, named
+    integer :: i, l, n
 
-    associate (response => analysis%response)
-      named = response%machine%bodies - response%machine%nodes
+    associate (response => analysis%response, shown => analysis%shown, angles => analysis%shown_angles)
       call list_order_columns(analysis, wanted, list)
       call list%list_columns(labels, unit)
       allocate (row(size(labels)))
@@ -194,11 +195,11 @@ contains
           do l = 1, size(response%lines)
             row(:3) = [point%state%speed, point%frequency(l) / abs(point%state%speed), point%frequency(l) / turn]
             if (response%lines(l)%is_order) row(2) = response%lines(l)%order   ! without the rounding of the frequency
-            n = 3 + 2 * size(response%quantities)
-            row(4:n:2) = abs(point%quantity(l, :))
-            row(5:n:2) = phase(point%quantity(l, :))
-            row(n + 1::3) = abs(point%angle(l, :named))
-            row(n + 2::3) = phase(point%angle(l, :named))
+            n = 3 + 2 * size(shown)
+            row(4:n:2) = abs(point%quantity(l, shown))
+            row(5:n:2) = phase(point%quantity(l, shown))
+            row(n + 1::3) = abs(point%angle(l, angles))
+            row(n + 2::3) = phase(point%angle(l, angles))
             row(n + 3::3) = point%frequency(l) * row(n + 1::3)
             call write_row(file, from_si(row, unit))
           end do
@@ -218,19 +219,19 @@ contains
     call list%add_named('omega', 'rad/s', 'speed that is held', 'body', analysis%body_name)
     call list%add_named('order', '1', 'oscillations per turn of the body')
     call list%add_named('frequency', 'Hz', 'frequency')
-    do i = 1, size(analysis%response%quantities)
-      associate (signal => analysis%response%quantities(i)%signal_t)
+    do i = 1, size(analysis%shown)
+      associate (signal => analysis%response%quantities(analysis%shown(i))%signal_t)
         call list%add(signal)
         call list%add(signal, 'phase', 'deg')
       end associate
     end do
-    associate (signals => analysis%response%angles)
-      do i = 1, size(signals)
-        call list%add(signals(i))
-        call list%add(signals(i), 'phase', 'deg')
-        call list%add_named('omega_amplitude', 'rad/s', 'amplitude of the speed', 'body', signals(i)%element)
-      end do
-    end associate
+    do i = 1, size(analysis%shown_angles)
+      associate (signal => analysis%response%angles(analysis%shown_angles(i)))
+        call list%add(signal)
+        call list%add(signal, 'phase', 'deg')
+        call list%add_named('omega_amplitude', 'rad/s', 'amplitude of the speed', 'body', signal%element)
+      end associate
+    end do
   end subroutine list_order_columns
 
   !> The text of the file that says what the columns of both tables are.
@@ -338,10 +339,11 @@ contains
     type(json_t), intent(inout) :: json
     type(response_analysis_t), intent(in) :: analysis
     type(response_summary_t), intent(in) :: summary
-    integer :: q
+    integer :: i, q
 
     call json%open_list('largest')
-    do q = 1, size(summary%largest)
+    do i = 1, size(analysis%shown)
+      q = analysis%shown(i)
       associate (largest => summary%largest(q), points => analysis%response%points, one => analysis%response%quantities(q))
         call json%open()
         call json%put('quantity', one%name)

@@ -192,17 +192,18 @@ contains
     integer :: q, shown, width
 
     associate (quantities => analysis%response%quantities)
-      shown = min(size(quantities), most_quantities)
+      shown = min(size(analysis%shown), most_quantities)
       if (shown == 0) return
-      width = maxval([(text_width(quantities(q)%name // ' [' // quantities(q)%unit // ']'), q=1, shown)])
+      width = maxval([(text_width(quantities(analysis%shown(q))%name // ' [' // quantities(analysis%shown(q))%unit // ']'), &
+                       q=1, shown)])
       line = '  ' // padded('largest', width) // cell('half range') // cell('at [rpm]') // cell('peak') // cell('at [rpm]')
       if (any(summary%largest%ratio > 0)) line = line // cell('of limit') // cell('at [rpm]')
       call report%append_line(line // '  orders in the half range')
       do q = 1, shown
-        call put_largest_of(analysis, summary, q, width, report)
+        call put_largest_of(analysis, summary, analysis%shown(q), width, report)
       end do
-      if (shown < size(quantities)) then
-        call report%append_line('  (' // to_text(size(quantities) - shown) // ' more in response.json)')
+      if (shown < size(analysis%shown)) then
+        call report%append_line('  (' // to_text(size(analysis%shown) - shown) // ' more in response.json)')
       end if
     end associate
   end subroutine put_largest

@@ -12,7 +12,7 @@ module nocdyn_column_names
   implicit none (type, external)
   private
 
-  public :: choose_columns, count_columns, explain_no_signal, note_former_name
+  public :: choose_columns, choose_signals, count_columns, explain_no_signal, note_former_name
 
   integer, parameter :: most_names = 16   ! in a message
 
@@ -20,23 +20,70 @@ contains
 
   !> The columns that &output asks for, ascending: the time, and the ones of the patterns of `columns`; all but the ones of inner
   !> nodes if there are none.
-  subroutine choose_columns(input, signals, labels, chosen, notes, error)
+  subroutine choose_columns(input, signals, chosen, notes, error)
     type(input_t), intent(in) :: input
     type(signal_t), intent(in) :: signals(:)                     !! the time first, in the units of the table
-    type(string_t), intent(in) :: labels(:)                      !! their labels
     integer, allocatable, intent(out) :: chosen(:)
     type(string_t), allocatable, intent(inout) :: notes(:)       !! on former names
     type(error_t), allocatable, intent(out) :: error             !! patterns that match nothing
-    type(diagnostics_t) :: diagnostics
-    type(string_t), allocatable :: patterns(:)
-    character(len=:), allocatable :: former, hint, pattern
-    logical :: is_chosen(size(signals)), is_found, is_former
-    integer :: c, i, output
+    integer :: output
+    logical :: is_chosen(size(signals))
 
     output = input%position('output')
-    allocate (patterns, source=input%groups(output)%texts('columns'))
-    is_chosen = size(patterns) == 0 .and. .not. signals%is_inner()
+    if (input%groups(output)%has_value('columns')) then
+      call match_patterns(input, output, 'columns', signals, is_chosen, notes, error)
+    else
+      is_chosen = .not. signals%is_inner()
+    end if
     is_chosen(1) = .true.
+    allocate (chosen, source=places(is_chosen))
+  end subroutine choose_columns
+
+  !> The signals of a response that its key `signals` asks for; all without it.
+  subroutine choose_signals(input, signals, chosen, notes, error)
+    type(input_t), intent(in) :: input
+    type(signal_t), intent(in) :: signals(:)
+    integer, allocatable, intent(out) :: chosen(:)           !! ascending
+    type(string_t), allocatable, intent(inout) :: notes(:)   !! on former names
+    type(error_t), allocatable, intent(out) :: error         !! patterns that match nothing
+    logical :: is_chosen(size(signals))
+
+    is_chosen = .true.
+    if (input%groups(input%position('response'))%has_value('signals')) then
+      call match_patterns(input, input%position('response'), 'signals', signals, is_chosen, notes, error)
+    end if
+    allocate (chosen, source=places(is_chosen))
+  end subroutine choose_signals
+
+  pure function places(is_chosen) result(chosen)
+    logical, intent(in) :: is_chosen(:)
+    integer, allocatable :: chosen(:)
+    integer :: i
+
+    allocate (chosen, source=pack([(i, i=1, size(is_chosen))], is_chosen))
+  end function places
+
+  !> Finds the signals that match some pattern of a key, by their names with or without the unit, or by former names.
+  subroutine match_patterns(input, group, key, signals, is_chosen, notes, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: group              !! of the input
+    character(len=*), intent(in) :: key       !! 'columns' of &output, or 'signals' of &response
+    type(signal_t), intent(in) :: signals(:)  !! of a run the time first
+    logical, intent(out) :: is_chosen(:)         !! [signals]
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(diagnostics_t) :: diagnostics
+    type(string_t), allocatable :: labels(:), patterns(:)
+    character(len=:), allocatable :: file, former, hint, pattern
+    logical :: is_found, is_former, is_response
+    integer :: c, i
+
+    is_response = key == 'signals'
+    file = 'trajectory.csv'
+    if (is_response) file = 'response_orders.csv'
+    call label_signals(signals, labels)
+    allocate (patterns, source=input%groups(group)%texts(key))
+    is_chosen = .false.
     do i = 1, size(patterns)
       pattern = trim(adjustl(patterns(i)%text))
       is_found = .false.
@@ -44,23 +91,22 @@ contains
       do c = 1, size(signals)
         if (signals(c)%is_inner() .and. index(pattern, '[') == 0) cycle
         if (.not. (matches(pattern, labels(c)%text) .or. matches(pattern, signals(c)%name))) then
-          call former_name(signals(c), .false., former)
+          call former_name(signals(c), is_response, former)
           if (former == '') cycle
           if (.not. (matches(pattern, former) .or. matches(pattern, former // ' [' // signals(c)%unit // ']'))) cycle
-          if (.not. is_former) call note_former_name(input, output, 'columns', former, signals(c)%name, notes)
+          if (.not. is_former) call note_former_name(input, group, key, former, signals(c)%name, notes)
           is_former = .true.
         end if
         is_chosen(c) = .true.
         is_found = .true.
       end do
       if (is_found) cycle
-      call find_hint(pattern, signals, labels, hint)
-      call input%report(output, 'columns', 'columns(' // to_text(i) // ') = ' // quoted(pattern) // &
-                        ' matches no column of trajectory.csv' // hint, diagnostics)
+      call find_hint(pattern, signals(merge(1, 2, is_response):), labels, hint)
+      call input%report(group, key, key // '(' // to_text(i) // ') = ' // quoted(pattern) // ' matches no column of ' // file // &
+                        hint, diagnostics)
     end do
     call input%refuse(diagnostics, error)
-    allocate (chosen, source=pack([(c, c=1, size(signals))], is_chosen))
-  end subroutine choose_columns
+  end subroutine match_patterns
 
   !> Notes that an input has a name which a signal had before.
   subroutine note_former_name(input, group, key, former, name, notes)
@@ -81,13 +127,11 @@ contains
     type(string_t), allocatable, intent(inout) :: notes(:)  !! on former names
     type(error_t), allocatable, intent(out) :: error        !! patterns that match nothing
     type(signal_t), allocatable :: signals(:)
-    type(string_t), allocatable :: labels(:)
     integer, allocatable :: chosen(:), units(:)
 
     call list_signals(machine, signals)
     call turn_units(signals, output_units(input), units)
-    call label_signals(signals, labels)
-    call choose_columns(input, signals, labels, chosen, notes, error)
+    call choose_columns(input, signals, chosen, notes, error)
     count = size(chosen)
   end subroutine count_columns
 
@@ -98,12 +142,12 @@ contains
     type(string_t), intent(in) :: labels(:)
     character(len=:), allocatable, intent(out) :: text
     type(string_t), allocatable :: of_quantities(:)                                     ! e.g. 'phi_*'
-    type(string_t) :: names(size(signals) - 1), of_elements(size(signals) - 1)          ! e.g. 'phi_motor', '*_motor'
+    type(string_t) :: names(size(signals)), of_elements(size(signals))                  ! e.g. 'phi_motor', '*_motor'
     integer :: i
 
     allocate (of_quantities(0))
     do i = 1, size(names)
-      associate (one => signals(i + 1))
+      associate (one => signals(i))
         names(i)%text = one%name
         of_elements(i)%text = one%name
         if (one%element /= '') of_elements(i)%text = '*' // one%name(len(one%symbol) + 1:)

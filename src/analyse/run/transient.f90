@@ -203,7 +203,7 @@ contains
     allocate (observer%lowest(formulation%machine%bodies), source=huge(0.0_wp))
     allocate (observer%highest, source=-observer%lowest)
     allocate (observer%last_speeds, source=0.0_wp * observer%lowest)
-    call choose_columns(input, observer%table%signals, observer%table%labels, observer%chosen, notes, error)
+    call choose_columns(input, observer%table%signals, observer%chosen, notes, error)
     if (.not. allocated(error)) allocate (observer%written(size(observer%chosen)))
   end subroutine start_observer
 

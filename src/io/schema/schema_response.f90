@@ -30,6 +30,8 @@ module nocdyn_schema_response
       'number of speeds from the lowest to the highest; peaks between them are found'), &
     key_rule_t('response', 'orders', a_number, any_number, '', unset, positive, &
       'oscillations per turn of the body; those of the excitations if not given', fewest=1), &
+    key_rule_t('response', 'signals', a_text, any_number, '', unset, anything, &
+      "quantities that are written: names, or patterns with *, e.g. 'stress_*'; all if not given", fewest=1), &
     key_rule_t('response', 'operating', a_number, 2, 'rad/s', unset, not_zero, 'lowest and highest speed in operation'), &
     key_rule_t('response', 'margin', a_number, 1, '', '0.1', margins, &
       'a critical speed so near to the speeds in operation, as a share of it, is reported'), &
