@@ -10,6 +10,7 @@ module nocdyn_mode_pairs
   use nocdyn_eigenpairs, only: eigenpairs_t, find_eigenpairs
   use nocdyn_errors, only: error_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lapack, only: ascending_order
   use nocdyn_linearisation, only: fill_matrix, linearisation_t, undamped_modes
   use nocdyn_machine, only: machine_t
   use nocdyn_slopes, only: slopes_t
@@ -63,7 +64,7 @@ contains
     call find_eigenpairs(self%linear, pairs, error)
     if (allocated(error)) return
     kept = pack([(m, m=1, size(pairs%value))], aimag(pairs%value) > 0)
-    kept = kept(ascending(aimag(pairs%value(kept))))
+    kept = kept(ascending_order(aimag(pairs%value(kept))))
     call set_sizes(machine, matrix, size(kept), self)
     self%internal = pairs%internal(kept)
     ! The growth of what does not oscillate, by a negative stiffness or a strong negative damping: of positive real eigenvalues
@@ -162,17 +163,6 @@ contains
     allocate (self%value(modes), self%undamped(modes), self%x(matrix%coordinates, modes), &
               self%twist(size(self%slopes%stiffness), modes), self%angle(machine%bodies, modes))
   end subroutine set_sizes
-
-  pure function ascending(values) result(order)
-    real(wp), intent(in) :: values(:)
-    integer :: order(size(values))
-    integer :: i, rank
-
-    do i = 1, size(values)
-      rank = 1 + count(values < values(i)) + count(abs(values(:i - 1) - values(i)) <= 0)
-      order(rank) = i
-    end do
-  end function ascending
 
   !> Refines a mode, and sets all that belongs to it but `undamped`. What is mostly an internal state may have no motion at all,
   !> and stays as it is; so does a mode whose iteration goes astray, and one that does not oscillate where there is relative

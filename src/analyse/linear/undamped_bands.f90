@@ -8,6 +8,7 @@ module nocdyn_undamped_bands
   use nocdyn_band_pencil, only: band_pencil_t
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_kinds, only: wp
+  use nocdyn_lapack, only: ascending_order
   use nocdyn_lapack_eigen, only: tridiagonal_eigenvectors
   use nocdyn_linearisation, only: linearisation_t
   implicit none (type, external)
@@ -164,7 +165,7 @@ contains
     end do
     has_failed = found%count < size(square)
     if (has_failed) return
-    order = ascending(found%square)
+    order = ascending_order(found%square)
     square = found%square(order)
     shapes = found%shape(:, order)
   end subroutine find_about
@@ -302,16 +303,5 @@ contains
       p = p / length
     end associate
   end subroutine normalise
-
-  pure function ascending(values) result(order)
-    real(wp), intent(in) :: values(:)
-    integer :: order(size(values))
-    integer :: i, rank
-
-    do i = 1, size(values)
-      rank = 1 + count(values < values(i)) + count(abs(values(:i - 1) - values(i)) <= 0)
-      order(rank) = i
-    end do
-  end function ascending
 
 end module nocdyn_undamped_bands

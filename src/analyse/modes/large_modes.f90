@@ -8,6 +8,7 @@ module nocdyn_large_modes
   use nocdyn_element_coordinates, only: new_element_coordinates
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_kinds, only: wp
+  use nocdyn_lapack, only: ascending_order
   use nocdyn_linearisation, only: find_slopes, has_turning_losses, held_elements, linearisation_t
   use nocdyn_machine, only: machine_t
   use nocdyn_mode_choice, only: keep_numbers, modes_choice_t, note_choice
@@ -168,7 +169,7 @@ contains
 
     associate (value => damped%pairs%value, modes => size(damped%pairs%value))
       oscillating = pack([(i, i=1, modes)], aimag(value) > 0)
-      oscillating = oscillating(ascending(aimag(value(oscillating))))
+      oscillating = oscillating(ascending_order(aimag(value(oscillating))))
       ends = [0.0_wp, huge(1.0_wp)]
       is_covered = .true.
       if (choice%has_range) then
@@ -192,17 +193,6 @@ contains
       end do
     end associate
   end subroutine choose_modes
-
-  pure function ascending(values) result(order)
-    real(wp), intent(in) :: values(:)
-    integer :: order(size(values))
-    integer :: i, rank
-
-    do i = 1, size(values)
-      rank = 1 + count(values < values(i)) + count(abs(values(:i - 1) - values(i)) <= 0)
-      order(rank) = i
-    end do
-  end function ascending
 
   !> Why modes are not certain, '' if they are.
   subroutine find_obstacle(machine, damped, chosen, has_fallback, obstacle)

@@ -10,7 +10,7 @@ module nocdyn_lapack
   implicit none (type, external)
   private
 
-  public :: pivoted_rank, invert, solve_positive_definite, pseudo_inverse, sort_ascending
+  public :: pivoted_rank, invert, solve_positive_definite, pseudo_inverse, sort_ascending, ascending_order
 
   interface
     subroutine dgeqp3(m, n, a, lda, jpvt, tau, work, lwork, info)
@@ -160,5 +160,17 @@ contains
 
     call dlasrt('I', size(values), values, info)
   end subroutine sort_ascending
+
+  !> The order of numbers, as by `sort_ascending`; equal ones stay as they are.
+  pure function ascending_order(values) result(order)
+    real(wp), intent(in) :: values(:)   !! of any unit
+    integer :: order(size(values))
+    integer :: i, rank
+
+    do i = 1, size(values)
+      rank = 1 + count(values < values(i)) + count(abs(values(:i - 1) - values(i)) <= 0)
+      order(rank) = i
+    end do
+  end function ascending_order
 
 end module nocdyn_lapack

@@ -20,8 +20,8 @@ contains
     integer, intent(in) :: diagonal                      !! row of the main diagonal in `band`
     real(wp), contiguous, intent(inout) :: band(:, :)    !! overwritten, [rows, n]
     integer, intent(out) :: negatives
-    integer :: i, j, k, n
-    real(wp) :: factor, least, pivot
+    integer :: j, n
+    real(wp) :: least, pivot
 
     n = size(band, 2)
     negatives = 0
@@ -33,14 +33,27 @@ contains
       pivot = band(diagonal, j)
       if (.not. abs(pivot) > least) pivot = -least
       if (pivot < 0) negatives = negatives + 1
-      do i = j + 1, min(n, j + width)
-        factor = band(diagonal + j - i, i) / pivot
-        do k = i, min(n, j + width)
-          band(diagonal + i - k, k) = band(diagonal + i - k, k) - factor * band(diagonal + j - k, k)
-        end do
-      end do
+      call eliminate(width, diagonal, j, pivot, band)
     end do
   end subroutine negative_pivots
+
+  !> Eliminates an unknown by its pivot from the rows after it.
+  pure subroutine eliminate(width, diagonal, j, pivot, band)
+    integer, intent(in) :: width, diagonal               !! as of `negative_pivots`
+    integer, intent(in) :: j                             !! the unknown
+    real(wp), intent(in) :: pivot
+    real(wp), contiguous, intent(inout) :: band(:, :)    !! [rows, n]
+    integer :: i, k, last
+    real(wp) :: factor
+
+    last = min(size(band, 2), j + width)
+    do i = j + 1, last
+      factor = band(diagonal + j - i, i) / pivot
+      do k = i, last
+        band(diagonal + i - k, k) = band(diagonal + i - k, k) - factor * band(diagonal + j - k, k)
+      end do
+    end do
+  end subroutine eliminate
 
   !> The rank of a matrix without negative eigenvalues: the pivots that are not rounding. Such a matrix has only zeros in the row
   !> of a pivot that is zero, so that the row is left out.
@@ -49,23 +62,16 @@ contains
     real(wp), contiguous, intent(inout) :: band(:, :)    !! overwritten, [rows, n]
     integer, intent(out) :: rank
     real(wp), parameter :: rounding = 1.0e-12_wp         ! of the diagonal element before the elimination
-    integer :: i, j, k, n
-    real(wp) :: factor, start(size(band, 2))
+    integer :: j
+    real(wp) :: pivot, start(size(band, 2))
 
-    n = size(band, 2)
     start = band(diagonal, :)
     rank = 0
-    do j = 1, n
-      associate (pivot => band(diagonal, j))
-        if (.not. pivot > rounding * start(j)) cycle
-        rank = rank + 1
-        do i = j + 1, min(n, j + width)
-          factor = band(diagonal + j - i, i) / pivot
-          do k = i, min(n, j + width)
-            band(diagonal + i - k, k) = band(diagonal + i - k, k) - factor * band(diagonal + j - k, k)
-          end do
-        end do
-      end associate
+    do j = 1, size(band, 2)
+      pivot = band(diagonal, j)
+      if (.not. pivot > rounding * start(j)) cycle
+      rank = rank + 1
+      call eliminate(width, diagonal, j, pivot, band)
     end do
   end subroutine semidefinite_rank
 
