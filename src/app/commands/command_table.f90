@@ -111,7 +111,7 @@ contains
   subroutine list_sweeps(commands)
     type(command_t), allocatable, intent(inout) :: commands(:)
 
-    call add_command(commands, 'sweep', 'FILE', '--out --set --case --threads --shard --resume --csv --quiet', &
+    call add_command(commands, 'sweep', 'FILE', '--out --set --case --threads --compile --shard --resume --csv --quiet', &
       'run many variants of a machine', &
       'Runs all variants of a machine that &sweep and &vary of the file describe, and writes the quantities of' // nl // &
       '&record to sweep.nc, with summary.json and input.nml. A variant that fails is recorded with the reason.' // nl // nl // &
@@ -119,6 +119,7 @@ contains
       '  --set PATH=VALUE   override a key: sweep.samples=1000, vary(2).high=20, run.rtol=1e-9' // nl // &
       '  --case NAME        vary the machine of this &load_case, and write to DIR/NAME/sweep' // nl // &
       '  --threads NUMBER   default: OMP_NUM_THREADS, else the number of cores that the process may use' // nl // &
+      '  --compile WHEN     compile a program for the series of this machine: auto (if it pays), always, never' // nl // &
       "  --shard K/N        compute part K of N only, for 'nocdyn merge'" // nl // &
       '  --resume           continue an interrupted sweep' // nl // &
       "  --csv              write sweep.csv too; with shards, 'nocdyn merge' writes it" // nl // &

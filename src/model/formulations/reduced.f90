@@ -5,6 +5,9 @@
 !> u' = U q'. Their moments M give q'' = R M with R = (L_tau^T J L_tau)^-1 L_tau^T B, where the columns of B are
 !> the unit moments of the elements on their two bodies, and U = B^T L_tau.
 module nocdyn_reduced
+  use nocdyn_code_text, only: code_text_t
+  use nocdyn_compiled_code, only: loaded_code_t
+  use nocdyn_compiled_series, only: compiled_series_t
   use nocdyn_coordinate_formulation, only: coordinate_formulation_t
   use nocdyn_held_lanes, only: held_lanes_t, new_held_lanes
   use nocdyn_kinds, only: wp
@@ -13,6 +16,7 @@ module nocdyn_reduced
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced_jacobian, only: new_reduced_jacobian, reduced_jacobian_t
   use nocdyn_reduced_series, only: new_reduced_series, reduced_series_t
+  use nocdyn_series_code, only: code_obstacle, write_series_code
   use nocdyn_sparse_map, only: new_sparse_map, sparse_map_t, transposed_order
   use nocdyn_system, only: evaluation_fatal, pattern_t
   implicit none (type, external)
@@ -27,12 +31,14 @@ module nocdyn_reduced
     integer, allocatable, private :: response_entry(:)      !! entry of `incidence` of each entry of R
     type(reduced_jacobian_t), private :: element_jacobian   !! R diag U
     type(reduced_series_t), private :: series_kernel        !! Taylor recurrence, after `prepare_series`
+    type(compiled_series_t), private :: compiled            !! a program for the recurrence, if there is one
     real(wp), allocatable, private :: moment(:, :)             !! M [N m], [lanes, elements], work space
     real(wp), allocatable, private :: free_jacobian(:, :)      !! without locked joints, if there are joints, [lanes, positions]
   contains
     procedure :: formulate, update_inertia, pass_parameters, refresh_lane, refresh_parameters, derivative, jacobian
     procedure :: evaluate_at, hold_jacobian, spread_jacobian
     procedure :: jacobian_pattern, series_obstacle, prepare_series, series, find_sets
+    procedure :: write_code, attach_code, runs_code
   end type reduced_t
 
 contains
@@ -219,9 +225,38 @@ contains
     integer, intent(inout) :: status(self%lanes)
 
     call self%find_sets(status)
+    if (self%compiled%fits(self%series_kernel) .and. .not. self%held%is_active) then
+      call self%compiled%expand(self%series_kernel, self%state, self%twist_at_origin, columns, t, y)
+      return
+    end if
     call self%series_kernel%expand(self%state, self%twists, self%accelerations, self%twist_at_origin, self%incidence, &
                                    self%held, columns, t, y)
   end subroutine series
+
+  !> Writes a program for the Taylor recurrence, after `prepare_series`.
+  subroutine write_code(self, code, obstacle)
+    class(reduced_t), intent(in) :: self
+    type(code_text_t), intent(inout) :: code
+    character(len=:), allocatable, intent(out) :: obstacle   !! why there is none, ''
+
+    obstacle = code_obstacle(self%series_kernel)
+    if (obstacle == '') call write_series_code(self%series_kernel, self%state, code)
+  end subroutine write_code
+
+  !> Lets series be computed by a program that `write_code` of a block with the same structure has written.
+  subroutine attach_code(self, loaded)
+    class(reduced_t), intent(inout) :: self
+    type(loaded_code_t), intent(in) :: loaded
+
+    call self%compiled%attach(self%series_kernel, loaded)
+  end subroutine attach_code
+
+  !> Whether series are computed by a program, as long as no joint holds.
+  pure logical function runs_code(self)
+    class(reduced_t), intent(in) :: self
+
+    runs_code = self%compiled%fits(self%series_kernel)
+  end function runs_code
 
   !> Finds the joints that hold in each lane, and lanes without a motion that fits them.
   subroutine find_sets(self, status)

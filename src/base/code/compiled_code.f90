@@ -1,0 +1,66 @@
+!> Programs in C that nocdyn writes: what they begin with, compiled by the compiler of the system and loaded.
+module nocdyn_compiled_code
+  use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_funptr, c_int, c_null_char, c_null_funptr, c_ptr, c_size_t
+  implicit none (type, external)
+  private
+
+  public :: series_source, load_code
+
+  !> Procedures of a loaded program; it stays loaded.
+  type, public :: loaded_code_t
+    type(c_funptr) :: run = c_null_funptr              !! `nocdyn_series`
+    type(c_funptr) :: length_of_work = c_null_funptr   !! `nocdyn_series_work`
+  end type loaded_code_t
+
+  integer, parameter :: longest_message = 400
+
+  interface
+    type(c_ptr) function c_series_source(length) bind(c, name='nocdyn_series_source')
+      import :: c_ptr, c_size_t
+      integer(c_size_t), intent(out) :: length
+    end function c_series_source
+
+    integer(c_int) function c_load_code(text, length, name, other_name, procedure, other_procedure, message, capacity) &
+      bind(c, name='nocdyn_load_code')
+      import :: c_char, c_funptr, c_int, c_size_t
+      character(kind=c_char), intent(in) :: text(*)
+      integer(c_size_t), value, intent(in) :: length
+      character(kind=c_char), intent(in) :: name(*), other_name(*)
+      type(c_funptr), intent(out) :: procedure, other_procedure
+      character(kind=c_char), intent(out) :: message(*)
+      integer(c_size_t), value, intent(in) :: capacity
+    end function c_load_code
+  end interface
+
+contains
+
+  !> Taylor arithmetic in C, which the programs of series begin with.
+  function series_source() result(text)
+    character(len=:), allocatable :: text
+    character(kind=c_char), pointer :: characters(:)
+    integer(c_size_t) :: i, length
+    type(c_ptr) :: address
+
+    address = c_series_source(length)
+    call c_f_pointer(address, characters, [length])
+    allocate (character(len=length) :: text)
+    do i = 1, length
+      text(i:i) = characters(i)
+    end do
+  end function series_source
+
+  !> Compiles and loads a program, or loads it from the user's cache folder. Threads may call it.
+  subroutine load_code(text, loaded, failure)
+    character(len=*), intent(in) :: text
+    type(loaded_code_t), intent(out) :: loaded
+    character(len=:), allocatable, intent(out) :: failure   !! why it is not loaded, ''
+    character(len=longest_message, kind=c_char) :: message
+    integer(c_int) :: status
+
+    status = c_load_code(text, len(text, c_size_t), 'nocdyn_series' // c_null_char, 'nocdyn_series_work' // c_null_char, &
+                         loaded%run, loaded%length_of_work, message, int(longest_message, c_size_t))
+    failure = ''
+    if (status /= 0) failure = message(:index(message, c_null_char) - 1)
+  end subroutine load_code
+
+end module nocdyn_compiled_code
