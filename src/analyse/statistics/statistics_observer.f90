@@ -14,6 +14,7 @@ module nocdyn_statistics_observer
     statistic_max_abs, statistic_min, statistic_settling_time, statistic_t, statistic_time_of_max, statistic_time_of_min, &
     value_of_zero_column
   use nocdyn_observer, only: observer_t, piece_t, step_block_t
+  use nocdyn_plain_steps, only: plain_steps_t
   use nocdyn_quantities, only: form_applied
   use nocdyn_signals, only: is_largest_along, list_points, list_signals, signal_point_moment, signal_point_stress, &
     signal_source_t, signal_t, signal_work_in
@@ -44,7 +45,7 @@ module nocdyn_statistics_observer
     logical, allocatable, private :: is_complete(:)           !! lanes that have reached the end
   contains
     procedure :: results, value_of, has_begun, take_counters, on_start, on_output, on_steps, on_shift, on_jump
-    procedure :: observe_lanes, tracked_values, find_pace, on_piece
+    procedure :: observe_lanes, tracked_values, find_pace, on_piece, list_ranges
   end type statistics_observer_t
 
 contains
@@ -271,6 +272,17 @@ contains
     call observe_lane(self, lane, t, y)
     call self%recorded%start_lane(lane)
   end subroutine on_start
+
+  !> The ranges of the linear statistics, if there are no others.
+  subroutine list_ranges(self, order, steps, are_all)
+    class(statistics_observer_t), target, intent(inout) :: self
+    integer, intent(in) :: order
+    type(plain_steps_t), intent(inout) :: steps
+    logical, intent(out) :: are_all
+
+    are_all = .not. self%has_recorded
+    if (are_all) call self%linear%list_ranges(order, self%block%states + self%block%quadratures, steps, are_all)
+  end subroutine list_ranges
 
   !> Brings one lane to a time and state; the others stay where they started or ended.
   subroutine observe_lane(self, lane, t, y)

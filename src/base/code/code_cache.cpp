@@ -3,6 +3,7 @@
 //
 // A compiled program stays in the user's cache folder, with its source: it is loaded only if that source, which names the compiler
 // and the processor, is the same to the last byte. Nothing is loaded from a folder that others could write.
+#include <algorithm>
 #include <cerrno>
 #include <cstdint>
 #include <cstdio>
@@ -164,13 +165,14 @@ bool compile(const std::string &source, const std::string &library, std::string 
 
 }  // namespace
 
-// Compiles and loads a program, or loads it from the cache: its procedures with two names. 0 if it is loaded, else why it is not.
-extern "C" int nocdyn_load_code(const char *text, std::size_t length, const char *name, const char *other_name, void **procedure,
-                                void **other_procedure, char *message, std::size_t capacity) {
+// Compiles and loads a program, or loads it from the cache: its procedures with some names, which follow one another. 0 if it is
+// loaded, else why it is not.
+extern "C" int nocdyn_load_code(const char *text, std::size_t length, const char *names, int count, void **procedures,
+                                char *message, std::size_t capacity) {
   std::string failure, version;
   temporary_folder temporary;
   void *handle = nullptr;
-  *procedure = *other_procedure = nullptr;
+  std::fill(procedures, procedures + count, nullptr);
   if (run({compiler(), "--version"}, &version) != 0) {
     failure = "there is no compiler " + compiler();
   } else {
@@ -209,9 +211,11 @@ extern "C" int nocdyn_load_code(const char *text, std::size_t length, const char
     }
   }
   if (handle) {
-    *procedure = dlsym(handle, name);
-    *other_procedure = dlsym(handle, other_name);
-    if (!*procedure || !*other_procedure) failure = "the compiled program has no procedure " + std::string(name);
+    const char *name = names;
+    for (int i = 0; i < count; i++, name += std::strlen(name) + 1) {
+      procedures[i] = dlsym(handle, name);
+      if (!procedures[i]) failure = "the compiled program has no procedure " + std::string(name);
+    }
   }
   std::snprintf(message, capacity, "%s", failure.c_str());
   return failure.empty() ? 0 : 1;

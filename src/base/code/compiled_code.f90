@@ -8,8 +8,9 @@ module nocdyn_compiled_code
 
   !> Procedures of a loaded program; it stays loaded.
   type, public :: loaded_code_t
-    type(c_funptr) :: run = c_null_funptr              !! `nocdyn_series`
-    type(c_funptr) :: length_of_work = c_null_funptr   !! `nocdyn_series_work`
+    type(c_funptr) :: series = c_null_funptr   !! `nocdyn_series`
+    type(c_funptr) :: steps = c_null_funptr    !! `nocdyn_steps`
+    type(c_funptr) :: work = c_null_funptr     !! `nocdyn_work`
   end type loaded_code_t
 
   integer, parameter :: longest_message = 400
@@ -20,13 +21,14 @@ module nocdyn_compiled_code
       integer(c_size_t), intent(out) :: length
     end function c_series_source
 
-    integer(c_int) function c_load_code(text, length, name, other_name, procedure, other_procedure, message, capacity) &
+    integer(c_int) function c_load_code(text, length, names, count, procedures, message, capacity) &
       bind(c, name='nocdyn_load_code')
       import :: c_char, c_funptr, c_int, c_size_t
       character(kind=c_char), intent(in) :: text(*)
       integer(c_size_t), value, intent(in) :: length
-      character(kind=c_char), intent(in) :: name(*), other_name(*)
-      type(c_funptr), intent(out) :: procedure, other_procedure
+      character(kind=c_char), intent(in) :: names(*)   !! each followed by a null character
+      integer(c_int), value, intent(in) :: count
+      type(c_funptr), intent(out) :: procedures(*)     !! [count]
       character(kind=c_char), intent(out) :: message(*)
       integer(c_size_t), value, intent(in) :: capacity
     end function c_load_code
@@ -55,10 +57,13 @@ contains
     type(loaded_code_t), intent(out) :: loaded
     character(len=:), allocatable, intent(out) :: failure   !! why it is not loaded, ''
     character(len=longest_message, kind=c_char) :: message
+    type(c_funptr) :: procedures(3)
     integer(c_int) :: status
 
-    status = c_load_code(text, len(text, c_size_t), 'nocdyn_series' // c_null_char, 'nocdyn_series_work' // c_null_char, &
-                         loaded%run, loaded%length_of_work, message, int(longest_message, c_size_t))
+    status = c_load_code(text, len(text, c_size_t), 'nocdyn_series' // c_null_char // 'nocdyn_steps' // c_null_char // &
+                         'nocdyn_work' // c_null_char, size(procedures, kind=c_int), procedures, message, &
+                         int(longest_message, c_size_t))
+    loaded = loaded_code_t(procedures(1), procedures(2), procedures(3))
     failure = ''
     if (status /= 0) failure = message(:index(message, c_null_char) - 1)
   end subroutine load_code

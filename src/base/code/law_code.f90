@@ -2,7 +2,7 @@
 !>
 !> The coefficients of a variable that later ones read stand in an array of the work space, those of others in a local variable.
 module nocdyn_law_code
-  use nocdyn_code_text, only: code_text_t, list_of
+  use nocdyn_code_text, only: code_text_t, filled, list_of
   use nocdyn_law_tape, only: law_inputs_t, law_node_t, law_tape_t, op_add, op_arctangent, op_cosine, op_exponential, op_fixed, &
     op_harmonics, op_log_cosh, op_logarithm, op_multiply, op_power, op_reciprocal, op_scale, op_sech_squared, op_shift, op_sine, &
     op_square_root, op_subtract, op_tanh, op_wave, unlimited
@@ -80,7 +80,7 @@ contains
     kept = self%is_kept(node) .and. self%work%first(node) > 0 .and. self%law%tape%node(node)%operation >= op_fixed
   end function kept
 
-  !> Writes the members of the work space.
+  !> Writes where the coefficients begin in the work space, as members of an enumeration.
   subroutine declare_work(self, states, code)
     class(law_code_t), intent(in) :: self
     integer, intent(in) :: states(:)   !! nodes of the internal states, or 0
@@ -88,15 +88,24 @@ contains
     integer :: i
 
     do i = 1, size(states)
-      if (states(i) > 0) call code%line('  vd ' // member(self, states(i)) // '[' // to_text(self%law%elements) // '][P + 1];')
+      if (states(i) > 0) call declare(member(self, states(i)), '(P + 1)')
     end do
     do i = 1, size(self%work%nodes)
       associate (number => self%work%nodes(i))
-        if (self%kept(number)) call code%line('  vd ' // member(self, number) // '[' // to_text(self%law%elements) // '][P + 1];')
+        if (self%kept(number)) call declare(member(self, number), '(P + 1)')
         if (self%law%tape%node(number)%operation /= op_harmonics) cycle
-        call code%line('  harmonic_work ' // member(self, number) // 'h[' // to_text(self%law%elements) // '];')
+        call declare(member(self, number) // 'h', 'HARMONIC_WORK')
       end associate
     end do
+
+  contains
+
+    subroutine declare(name, size)
+      character(len=*), intent(in) :: name, size   !! size for each element
+
+      call code%line('  at_@, last_@ = at_' // name // ' + $ * ' // size // ' - 1,', [self%law%elements], name, name)
+    end subroutine declare
+
   end subroutine declare_work
 
   !> Writes the multiples of harmonics, and the factors of their derivatives.
@@ -134,106 +143,114 @@ contains
     text = 'b' // to_text(self%bank) // 'n' // to_text(node)
   end function member
 
-  !> Coefficient k of a node.
+  !> Coefficient k of a node, of variable e.
   function operand(self, node) result(text)
     class(law_code_t), intent(in) :: self
     integer, intent(in) :: node
     character(len=:), allocatable :: text
 
-    text = 'n' // to_text(node)
-    if (self%is_kept(node) .or. self%law%tape%node(node)%operation < op_fixed) text = text // '[k]'
+    if (self%law%tape%node(node)%operation < op_fixed) then
+      text = filled('n$[k + d$ * e]', [node, node])
+    else
+      text = filled('v$[e]', [node])
+    end if
   end function operand
 
-  !> Writes the statements that compute the variables; the inputs n1[], n2[], ... are there.
+  !> Writes the statements that compute the variables v1, v2, ... of g elements from i on. The coefficients n1, n2, ... of the
+  !> inputs and the steps d1, d2, ... to those of the next element are there.
   subroutine write_nodes(self, code)
     class(law_code_t), intent(in) :: self
     type(code_text_t), intent(inout) :: code
-    character(len=:), allocatable :: name, value
+    character(len=:), allocatable :: condition
     integer :: i
 
     do i = 1, size(self%work%nodes)
-      associate (number => self%work%nodes(i), node => self%law%tape%node(self%work%nodes(i)))
-        if (self%kept(number)) call code%line('    vd *n' // to_text(number) // ' = z->' // member(self, number) // '[i];')
+      associate (number => self%work%nodes(i))
+        if (.not. self%kept(number)) cycle
+        call code%line('  vd *n$ = z + at_@ + (P + 1) * i;', [number], member(self, number))
+        call code%line('  enum { d$ = ACROSS ? WORK : P + 1 };', [number])
       end associate
     end do
     do i = 1, size(self%work%nodes)
       associate (number => self%work%nodes(i), node => self%law%tape%node(self%work%nodes(i)))
-        value = value_of(self, number, node)
-        name = self%operand(number)
-        if (node%operation == op_wave) then
-          call code%line('    ' // value // ';')
-        else if (self%kept(number)) then
-          if (node%degree < unlimited) name = 'if (k <= ' // to_text(node%degree) // ') ' // name
-          call code%line('    ' // name // ' = ' // value // ';')
-        else if (node%degree < unlimited) then
-          call code%line('    const vd ' // name // ' = k > ' // to_text(node%degree) // ' ? (vd){} : ' // value // ';')
-        else
-          call code%line('    const vd ' // name // ' = ' // value // ';')
+        call code%line('  vd v$[MOST];', [number])
+        condition = ''
+        if (node%degree < unlimited) then
+          condition = filled('if (k <= $) ', [node%degree])
+          if (.not. self%kept(number)) call code%line('  EACH v$[e] = (vd){};', [number])
         end if
+        if (node%operation == op_wave) then
+          call code%line('  @;', a=statement(self, number, node))
+          call code%line('  EACH v$[e] = n$[k + d$ * e];', [number, number, number])
+          cycle
+        end if
+        call code%line('  @@;', a=condition, b=statement(self, number, node))
+        if (self%kept(number)) call code%line('  @EACH n$[k + d$ * e] = v$[e];', [number, number, number], condition)
       end associate
     end do
   end subroutine write_nodes
 
-  !> The expression of a node.
-  function value_of(self, number, node) result(text)
+  !> The statement that computes a node.
+  function statement(self, number, node) result(text)
     type(law_code_t), intent(in) :: self
     integer, intent(in) :: number
     type(law_node_t), intent(in) :: node
     character(len=:), allocatable :: text
-    character(len=:), allocatable :: a, argument, b, degree
-    integer :: terms
+    character(len=:), allocatable :: a, b, x
+    integer :: degree, terms
 
-    argument = 'n' // to_text(node%a)
-    a = ''
-    b = ''
-    degree = ''
-    if (node%a > 0) degree = to_text(self%law%tape%node(node%a)%degree)
+    x = filled('n$, d$', [node%a, node%a])   ! coefficients of the first operand, and of the node itself
+    a = filled('n$, d$, v$', [number, number, number])
+    degree = 0
+    if (node%a > 0) degree = self%law%tape%node(node%a)%degree
     select case (node%operation)
     case (op_fixed)
-      text = 'k == 0 ? ' // constant(self, node%a) // ' : (vd){}'
+      text = filled('EACH v$[e] = k == 0 ? @ : (vd){}', [number], constant(self, node%a))
     case (op_add, op_subtract)
-      text = self%operand(node%a) // merge(' + ', ' - ', node%operation == op_add) // self%operand(node%b)
+      text = filled('EACH v$[e] = @ @ @', [number], self%operand(node%a), merge('+', '-', node%operation == op_add), &
+                    self%operand(node%b))
     case (op_shift)
-      a = self%operand(node%a)
-      text = 'k == 0 ? ' // a // ' + ' // constant(self, node%b) // ' : ' // a
+      b = self%operand(node%a)
+      text = filled('EACH v$[e] = k == 0 ? @ + @ : @', [number], b, constant(self, node%b), b)
     case (op_scale)
-      text = constant(self, node%b) // ' * ' // self%operand(node%a)
+      text = filled('EACH v$[e] = @ * @', [number], constant(self, node%b), self%operand(node%a))
     case (op_multiply)
-      text = 'multiply(k, ' // argument // ', n' // to_text(node%b) // ')'
+      text = filled('multiply(g, k, @, n$, d$, v$)', [node%b, node%b, number], x)
     case (op_reciprocal)
-      text = 'reciprocal(k, ' // argument // ', n' // to_text(number) // ')'
+      text = filled('reciprocal(g, k, @, @)', [integer ::], x, a)
     case (op_wave)
-      text = 'wave(f, k, ' // argument // ', ' // constant(self, node%b) // ', n' // to_text(number) // ')'
+      text = filled('{ vd c[MOST]; EACH c[e] = @; wave(g, f, k, @, c, n$, d$); }', [number, number], constant(self, node%b), x)
     case (op_sine)
-      b = argument
-      if (self%work%first(min(number + 1, size(self%work%first))) > 0) b = 'n' // to_text(number + 1)
-      text = 'sine(f, k, ' // degree // ', ' // argument // ', ' // b // ', n' // to_text(number) // ')'
+      b = x
+      if (self%work%first(min(number + 1, size(self%work%first))) > 0) b = filled('n$, d$', [number + 1, number + 1])
+      text = filled('sine(g, f, k, $, @, @, @)', [degree], x, b, a)
     case (op_cosine)
-      text = 'cosine(f, k, ' // degree // ', ' // argument // ', n' // to_text(number - 1) // ')'
+      text = filled('cosine(g, f, k, $, @, n$, d$, v$)', [degree, number - 1, number - 1, number], x)
     case (op_tanh)
-      text = 'hyperbolic_tangent(k, ' // degree // ', ' // argument // ', n' // to_text(number + 1) // ')'
+      text = filled('hyperbolic_tangent(g, k, $, @, n$, d$, v$)', [degree, number + 1, number + 1, number], x)
     case (op_sech_squared)
-      text = 'sech_squared(k, n' // to_text(number - 1) // ')'
+      text = filled('sech_squared(g, k, n$, d$, v$)', [number - 1, number - 1, number])
     case (op_exponential)
-      text = 'exponential(k, ' // degree // ', ' // argument // ', n' // to_text(number) // ')'
+      text = filled('exponential(g, k, $, @, @)', [degree], x, a)
     case (op_square_root)
-      text = 'square_root(k, ' // argument // ', n' // to_text(number) // ')'
+      text = filled('square_root(g, k, @, @)', [integer ::], x, a)
     case (op_log_cosh)
-      text = 'log_cosh(f, k, ' // degree // ', ' // argument // ', n' // to_text(node%b) // ')'
+      text = filled('log_cosh(g, f, k, $, @, n$, d$, v$)', [degree, node%b, node%b, number], x)
     case (op_logarithm)
-      text = 'logarithm(f, k, ' // argument // ', n' // to_text(number) // ')'
-    case (op_power)
-      text = 'power(f, k, ' // argument // ', ' // constant(self, node%b) // ', n' // to_text(number) // ')'
+      text = filled('quotient(g, f->logarithms, k, @, @, @)', [integer ::], x, x, a)
     case (op_arctangent)
-      text = 'arctangent(f, k, ' // argument // ', n' // to_text(node%b) // ', n' // to_text(number) // ')'
+      text = filled('quotient(g, f->arctangents, k, @, n$, d$, @)', [node%b, node%b], x, a)
+    case (op_power)
+      text = filled('{ vd c[MOST]; EACH c[e] = @; power(g, f, k, @, c, @); }', [integer ::], constant(self, node%b), x, a)
     case default   ! op_harmonics
       terms = terms_of(node)
-      text = 'harmonics(f, k, ' // to_text(terms) // ', ' // member(self, number) // 'n, ' // member(self, number) // &
-             'f, s->stacked[' // to_text(self%bank) // '] + ' // to_text(2 * terms_before(self, number)) // ' * s->slots[' // &
-             to_text(self%bank) // '] + (W * ' // to_text(2 * terms) // ') * (' // to_text(self%law%elements) // &
-             ' * s->strip + i), ' // argument // ', &z->' // member(self, number) // 'h[i])'
+      b = member(self, number)
+      text = filled('harmonics(g, f, k, $, @n, @f, s->stacked[$] + $ * s->slots[$] + (W * $) * ($ * s->strip + i),', &
+                    [terms, self%bank, 2 * terms_before(self, number), self%bank, 2 * terms, self%law%elements], b, b)
+      text = filled('@ PARAMETER_STEP($), @,', [2 * terms], text, x)
+      text = filled('@ (harmonic_work *)(z + at_@h) + i, ACROSS ? WORK : HARMONIC_WORK, v$)', [number], text, b)
     end select
-  end function value_of
+  end function statement
 
   !> Terms of the harmonics before a node in `stacked`.
   pure integer function terms_before(self, number) result(terms)
@@ -247,14 +264,14 @@ contains
     end do
   end function terms_before
 
-  !> A constant of element i.
+  !> A constant of element i + e, or of element i in lanes e.
   function constant(self, node) result(text)
     type(law_code_t), intent(in) :: self
     integer, intent(in) :: node
     character(len=:), allocatable :: text
 
-    text = 'load(s->constant[' // to_text(self%bank) // '] + ' // to_text(self%law%column(node) - 1) // ' * s->slots[' // &
-           to_text(self%bank) // '] + W * i)'
+    text = filled('load(s->constant[$] + $ * s->slots[$] + W * i + PARAMETER_STEP(1) * e)', &
+                  [self%bank, self%law%column(node) - 1, self%bank])
   end function constant
 
 end module nocdyn_law_code

@@ -2,6 +2,7 @@
 module nocdyn_observer
   use nocdyn_chebyshev, only: interpolation_t
   use nocdyn_kinds, only: wp
+  use nocdyn_plain_steps, only: plain_steps_t
   implicit none (type, external)
   private
 
@@ -28,6 +29,7 @@ module nocdyn_observer
   contains
     procedure :: on_start, on_output, wants_stop, event_values, on_event
     procedure :: observe_lanes, tracked_values, find_pace, on_extremes, on_piece, on_steps, on_shift, on_jump
+    procedure :: list_ranges
   end type observer_t
 
   !> The steps that the lanes of a block have taken together; [lanes].
@@ -66,6 +68,16 @@ contains
     real(wp), intent(in) :: t
     real(wp), contiguous, intent(in) :: y(:)   !! before such a jump, [states + quadratures]
   end subroutine on_start
+
+  !> Lists the ranges that plain steps widen; then `on_steps` is not called for them.
+  subroutine list_ranges(self, order, steps, are_all)
+    class(observer_t), target, intent(inout) :: self
+    integer, intent(in) :: order                    !! of the series
+    type(plain_steps_t), intent(inout) :: steps
+    logical, intent(out) :: are_all                 !! whether the observer needs no more of such a step
+
+    are_all = .not. self%wants_steps
+  end subroutine list_ranges
 
   !> One output time of one lane; the calls of a lane come in the order of the times.
   subroutine on_output(self, lane, t, y)

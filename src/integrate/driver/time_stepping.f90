@@ -1,5 +1,6 @@
 !> The parts of the time-stepping loop of a block: all lanes take a step together, each with its own time and step size.
 module nocdyn_time_stepping
+  use, intrinsic :: iso_c_binding, only: c_int
   use nocdyn_dense_output, only: allocate_dense_output, dense_output_t
   use nocdyn_ensemble, only: ensemble_t
   use nocdyn_error_norm, only: measure_start
@@ -10,6 +11,7 @@ module nocdyn_time_stepping
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: any_differs, any_true
   use nocdyn_observer, only: observer_t, step_block_t
+  use nocdyn_plain_steps, only: plain_steps_t
   use nocdyn_root_functions, only: start_root_functions
   use nocdyn_solver_status, only: integration_not_finite, integration_rhs_failed, integration_running, reset_solver_status, &
     solver_status_t
@@ -40,6 +42,7 @@ module nocdyn_time_stepping
     logical :: may_shift = .false.                   !! whether the system may shift states
     logical :: wants_steps = .false.                 !! whether the observer receives the dense output of all steps
     logical :: wants_dense_steps = .false.           !! whether that is the result of `interpolate`
+    logical :: may_be_plain = .false.                !! whether the system may take plain steps
     logical :: is_exhausted = .false.                !! the ensemble has no variant left
     integer :: free = 0                              !! number of lanes that hold no variant
     logical :: inspects = .false.                    !! whether the accepted steps are inspected lane by lane
@@ -56,6 +59,8 @@ module nocdyn_time_stepping
     real(wp), allocatable :: next_time(:)            !! next output time of each lane [s], huge if none is left
     integer, allocatable :: next(:)                  !! index of the next output time of each lane
     real(wp), allocatable :: sample(:)               !! state of one lane, [components]
+    type(plain_steps_t) :: plain
+    integer(c_int), allocatable :: is_running(:), outcome(:)   !! of plain steps, [lanes]
     real(wp), allocatable :: coefficients(:, :, :)   !! of the dense output of the last step, [lanes, padded columns, degree]
   end type integrator_t
 

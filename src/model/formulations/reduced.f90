@@ -14,6 +14,7 @@ module nocdyn_reduced
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_law_tape, only: op_tanh
   use nocdyn_machine, only: machine_t
+  use nocdyn_plain_steps, only: plain_steps_t
   use nocdyn_reduced_jacobian, only: new_reduced_jacobian, reduced_jacobian_t
   use nocdyn_reduced_series, only: new_reduced_series, reduced_series_t
   use nocdyn_series_code, only: code_obstacle, write_series_code
@@ -38,7 +39,7 @@ module nocdyn_reduced
     procedure :: formulate, update_inertia, pass_parameters, refresh_lane, refresh_parameters, derivative, jacobian
     procedure :: evaluate_at, hold_jacobian, spread_jacobian
     procedure :: jacobian_pattern, series_obstacle, prepare_series, series, find_sets
-    procedure :: write_code, attach_code, runs_code
+    procedure :: write_code, attach_code, runs_code, takes_plain_steps, take_plain_steps
   end type reduced_t
 
 contains
@@ -257,6 +258,21 @@ contains
 
     runs_code = self%compiled%fits(self%series_kernel)
   end function runs_code
+
+  !> Only a program takes steps.
+  pure logical function takes_plain_steps(self)
+    class(reduced_t), intent(in) :: self
+
+    takes_plain_steps = self%joints%count == 0 .and. self%compiled%fits(self%series_kernel)
+  end function takes_plain_steps
+
+  subroutine take_plain_steps(self, steps)
+    class(reduced_t), intent(inout) :: self
+    type(plain_steps_t), intent(inout) :: steps
+
+    call self%norm%describe_map(steps)
+    call self%compiled%take_steps(self%series_kernel, self%state, self%twist_at_origin, steps)
+  end subroutine take_plain_steps
 
   !> Finds the joints that hold in each lane, and lanes without a motion that fits them.
   subroutine find_sets(self, status)

@@ -5,6 +5,7 @@ module nocdyn_compiled_series
   use nocdyn_compiled_code, only: loaded_code_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine_state, only: machine_state_t
+  use nocdyn_plain_steps, only: plain_steps_t
   use nocdyn_reduced_series, only: reduced_series_t
   use nocdyn_vector_functions, only: cosines, log_cosh_of, sines
   implicit none (type, external)
@@ -21,11 +22,20 @@ module nocdyn_compiled_series
       import :: c_char, c_double, c_long, c_ptr, function_table_t
       integer(c_long), value, intent(in) :: lanes, columns
       type(c_ptr), intent(in) :: numbers(*)               !! arrays of the machine, in the order of `list_numbers`
-      character(kind=c_char), intent(inout) :: space(*)   !! work space, of the length that `nocdyn_series_work` returns
+      character(kind=c_char), intent(inout) :: space(*)   !! work space, of the length that `nocdyn_work` returns
       type(function_table_t), intent(in) :: functions
       real(c_double), intent(in) :: t(*)                  !! [s], [lanes]
       real(c_double), intent(inout) :: y(*)               !! [lanes, columns, 0:P]
     end subroutine series_procedure
+
+    !> Takes plain steps.
+    subroutine steps_procedure(steps, numbers, space, functions) bind(c)
+      import :: c_char, c_ptr, function_table_t, plain_steps_t
+      type(plain_steps_t), intent(in) :: steps
+      type(c_ptr), intent(in) :: numbers(*)
+      character(kind=c_char), intent(inout) :: space(*)
+      type(function_table_t), intent(in) :: functions
+    end subroutine steps_procedure
 
     integer(c_long) function length_procedure() bind(c)
       import :: c_long
@@ -34,13 +44,15 @@ module nocdyn_compiled_series
 
   type, public :: compiled_series_t
     procedure(series_procedure), pointer, nopass, private :: run => null()
+    procedure(steps_procedure), pointer, nopass, private :: run_steps => null()
     integer, private :: order = 0                                  !! P
     integer, allocatable, private :: terms(:)                      !! of the elements, as in `reduced_series_t`
     type(function_table_t), private :: functions
     character(kind=c_char), allocatable, private :: space(:)
     type(c_ptr), allocatable, private :: numbers(:)
   contains
-    procedure :: attach, fits, expand
+    procedure :: attach, fits, expand, take_steps
+    procedure, private :: list_numbers
   end type compiled_series_t
 
 contains
@@ -53,8 +65,9 @@ contains
     procedure(length_procedure), pointer :: length_of_work
     integer :: banks
 
-    call c_f_procpointer(loaded%run, self%run)
-    call c_f_procpointer(loaded%length_of_work, length_of_work)
+    call c_f_procpointer(loaded%series, self%run)
+    call c_f_procpointer(loaded%steps, self%run_steps)
+    call c_f_procpointer(loaded%work, length_of_work)
     if (allocated(self%space)) deallocate (self%space, self%numbers)
     banks = size(series%banks%moved) + size(series%banks%timed)
     allocate (self%space(length_of_work()), source=char(0, c_char))
@@ -83,6 +96,29 @@ contains
     integer, intent(in) :: columns                                      !! components of the state, and padding
     real(wp), intent(in) :: t(series%lanes)                             !! [s]
     real(wp), intent(inout) :: y(series%lanes, columns, 0:series%order) !! coefficients; number 0 is given
+
+    call self%list_numbers(series, state, twist_at_origin)
+    call self%run(int(series%lanes, c_long), int(columns, c_long), self%numbers, self%space, self%functions, t, y)
+  end subroutine expand
+
+  !> Takes plain steps.
+  subroutine take_steps(self, series, state, twist_at_origin, steps)
+    class(compiled_series_t), intent(inout) :: self
+    type(reduced_series_t), target, intent(in) :: series
+    type(machine_state_t), target, intent(in) :: state
+    real(wp), contiguous, target, intent(in) :: twist_at_origin(:, :)   !! [rad], [lanes, elements]
+    type(plain_steps_t), intent(in) :: steps
+
+    call self%list_numbers(series, state, twist_at_origin)
+    call self%run_steps(steps, self%numbers, self%space, self%functions)
+  end subroutine take_steps
+
+  !> Where the numbers of the machine stand.
+  subroutine list_numbers(self, series, state, twist_at_origin)
+    class(compiled_series_t), intent(inout) :: self
+    type(reduced_series_t), target, intent(in) :: series
+    type(machine_state_t), target, intent(in) :: state
+    real(wp), contiguous, target, intent(in) :: twist_at_origin(:, :)   !! [rad], [lanes, elements]
     integer :: b
 
     self%numbers(1) = c_loc(series%law)
@@ -96,7 +132,6 @@ contains
       call list(state%banks(series%banks%timed(b))%law%law%constant, state%banks(series%banks%timed(b))%law%law%stacked, &
                 size(series%banks%moved) + b)
     end do
-    call self%run(int(series%lanes, c_long), int(columns, c_long), self%numbers, self%space, self%functions, t, y)
 
   contains
 
@@ -108,7 +143,7 @@ contains
       self%numbers(4 + 2 * number) = c_loc(stacked)
     end subroutine list
 
-  end subroutine expand
+  end subroutine list_numbers
 
   subroutine call_sines(n, x) bind(c)
     integer(c_int), intent(in) :: n

@@ -7,6 +7,7 @@ module nocdyn_series_code
   use nocdyn_compiled_code, only: series_source
   use nocdyn_element_laws, only: element_law_t
   use nocdyn_law_code, only: law_code_t, new_law_code
+  use nocdyn_laws, only: narrow
   use nocdyn_machine_state, only: machine_state_t
   use nocdyn_reduced_series, only: reduced_series_t
   use nocdyn_series_terms, only: has_cubic, has_forcing, has_history
@@ -15,12 +16,18 @@ module nocdyn_series_code
 
   public :: write_series_code, code_obstacle
 
-  !> Where the numbers of the elements stand in the work space.
+  integer, parameter :: most_elements = 6, most_across = 2   ! numbers side by side: of elements, of lanes
+  integer, parameter :: few_elements = 12                    ! of a machine whose lanes are computed side by side
+
+  !> Where the numbers of the elements stand in the work space, and which elements loops treat alike.
   type :: layout_t
+    logical :: is_across = .false.       !! whether numbers of lanes are computed side by side, not of elements
     integer, allocatable :: entries(:)   !! of U, [elements]
     integer, allocatable :: motion(:)    !! angle and speed, from 0, [elements + 1]
     integer, allocatable :: square(:)    !! square of the angle, [elements + 1]
-    integer, allocatable :: bank(:)      !! number of the general bank of the element in the code, -1: none, [elements]
+    integer, allocatable :: bank(:)      !! number of the bank of the element in the code, -1: its law is polynomial, [elements]
+    logical, allocatable :: is_phase(:)  !! whether it is the phase of an element before, [elements]
+    integer, allocatable :: first(:)     !! element of each run, and one beyond the last element
   end type layout_t
 
 contains
@@ -42,32 +49,31 @@ contains
     type(code_text_t), intent(inout) :: code
     type(law_code_t), allocatable :: laws(:)
     type(layout_t) :: layout
-    integer :: b, moved
+    integer :: b
 
-    moved = size(series%banks%moved)
-    allocate (laws(moved + size(series%banks%timed)))
+    allocate (laws(size(series%banks%moved) + size(series%banks%timed)))
     do b = 1, size(laws)
       associate (bank_law => state%banks(number_of(series, b))%law)
         laws(b) = new_law_code(b - 1, bank_law%law, bank_law%series, bank_law)
       end associate
     end do
-    call lay_out(series, state, layout)
+    call lay_out(series, state, laws, layout)
     call code%line('#define P $', [series%order])
     call code%line('#define W $', [series%w])
     call code%line('#define ELEMENTS $', [series%elements])
     call code%line('#define FREEDOMS $', [series%freedoms])
-    call code%line('#define INTERNAL $', [series%internal])
+    call code%line('#define COMPONENTS $   /* of the state */', [2 * series%freedoms + series%internal])
+    call code%line('#define ACROSS $   /* whether numbers side by side are of lanes, not of elements */', &
+                   [merge(1, 0, layout%is_across)])
+    call code%line('#define MOST $   /* of them */', [merge(most_across, most_elements, layout%is_across)])
     call code%line(series_source())
     call write_data(series, state, laws, layout, code)
-    do b = moved + 1, size(laws)
-      call write_forcing(state%banks(number_of(series, b))%law, laws(b), code)
-    end do
-    do b = 1, moved
+    do b = 1, size(laws)
       call write_bank(series, state%banks(number_of(series, b))%law, laws(b), code)
     end do
-    call write_start(series, layout, code)
-    call write_coefficient(series, state, laws, layout, code)
-    call write_entry(series, state, laws, code)
+    call write_runs(series, layout, code)
+    call write_strip(series, state, laws, layout, code)
+    call write_entries(series, laws, code)
   end subroutine write_series_code
 
   !> The number in the machine of a bank in the code.
@@ -82,26 +88,63 @@ contains
     end if
   end function number_of
 
-  subroutine lay_out(series, state, layout)
+  subroutine lay_out(series, state, laws, layout)
     type(reduced_series_t), intent(in) :: series
     type(machine_state_t), intent(in) :: state
+    type(law_code_t), intent(in) :: laws(:)
     type(layout_t), intent(out) :: layout
     integer :: b, e, first
 
+    layout%is_across = series%elements <= few_elements .and. series%strip >= most_across * narrow
     allocate (layout%motion(series%elements + 1), layout%square(series%elements + 1), source=0)
     allocate (layout%bank(series%elements), source=-1)
+    allocate (layout%is_phase(series%elements), source=.false.)
     layout%entries = series%twists%first(2:) - series%twists%first(:series%elements)
     do e = 1, series%elements
       layout%motion(e + 1) = layout%motion(e) + merge(series%order + 1, 1, iand(series%terms(e), has_history) > 0)
       layout%square(e + 1) = layout%square(e) + merge(series%order + 1, 0, iand(series%terms(e), has_cubic) > 0)
     end do
-    do b = 1, size(series%banks%moved)
-      first = series%banks%first(series%banks%moved(b))
-      associate (law => state%banks(series%banks%moved(b))%law)
-        layout%bank(first:first + law%ports * law%law%elements - 1) = b - 1
+    do b = 1, size(laws)
+      first = series%banks%first(number_of(series, b))
+      associate (law => state%banks(number_of(series, b))%law)
+        associate (elements => law%law%elements)
+          layout%bank(first:first + law%ports * elements - 1) = b - 1
+          if (law%ports > 1) layout%is_phase(first + elements:first + 2 * elements - 1) = .true.
+        end associate
       end associate
     end do
+    allocate (layout%first(1), source=1)
+    do e = 2, series%elements
+      if (.not. are_alike(e - 1, e)) layout%first = [layout%first, e]
+    end do
+    layout%first = [layout%first, series%elements + 1]
+
+  contains
+
+    !> Whether a loop treats two elements alike, and their phases.
+    pure logical function are_alike(a, b)
+      integer, intent(in) :: a, b
+      integer :: phase
+
+      are_alike = layout%bank(a) == layout%bank(b) .and. layout%entries(a) == layout%entries(b) .and. &
+                  series%terms(a) == series%terms(b) .and. (layout%is_phase(a) .eqv. layout%is_phase(b))
+      if (.not. are_alike .or. layout%bank(a) < 0 .or. layout%is_phase(a)) return
+      associate (law => state%banks(number_of(series, layout%bank(a) + 1))%law)
+        phase = law%law%elements
+        if (law%ports > 1) are_alike = layout%entries(a + phase) == layout%entries(b + phase) .and. &
+                                       series%terms(a + phase) == series%terms(b + phase)
+      end associate
+    end function are_alike
+
   end subroutine lay_out
+
+  !> Whether the moments of a bank follow from the time alone.
+  pure logical function is_forcing(series, bank)
+    type(reduced_series_t), intent(in) :: series
+    integer, intent(in) :: bank   !! number in the code, -1: none
+
+    is_forcing = bank >= size(series%banks%moved)
+  end function is_forcing
 
   !> Writes the tables and the work space.
   subroutine write_data(series, state, laws, layout, code)
@@ -110,288 +153,100 @@ contains
     type(law_code_t), intent(in) :: laws(:)
     type(layout_t), intent(in) :: layout
     type(code_text_t), intent(inout) :: code
-    integer :: b, no_states(0)
+    integer :: b
 
     call code%line('static const int twist_column[] = {@};', a=list_of(series%twists%column - 1))
     call code%line('static const int response_column[] = {@};', a=list_of(series%accelerations%column - 1))
     do b = 1, size(laws)
       call laws(b)%declare_tables(code)
     end do
-    call code%line('typedef struct {')
-    call code%line('  vd q[FREEDOMS], rate[FREEDOMS], moment[ELEMENTS], time[P + 1];')
+    call code%line('enum {   /* where numbers begin in the work space of eight lanes */')
+    call code%line('  at_c, last_c = at_c + (P + 1) * COMPONENTS - 1,')
+    call code%line('  at_ratio, last_ratio = at_ratio + $ - 1,', [size(series%twists%column)])
+    call code%line('  at_response, last_response = at_response + $ - 1,', [size(series%accelerations%column)])
+    call code%line('  at_law, last_law = at_law + $ * ELEMENTS - 1,', [size(series%law, 3)])
+    call code%line('  at_moment, last_moment = at_moment + ELEMENTS - 1,')
+    call code%line('  at_time, last_time = at_time + P,')
     associate (motions => layout%motion(series%elements + 1), squares => layout%square(series%elements + 1) + 1)
-      call code%line('  vd angle[$], speed[$], square[$];', [motions, motions, squares])
+      call code%line('  at_angle, last_angle = at_angle + $ - 1,', [motions])
+      call code%line('  at_speed, last_speed = at_speed + $ - 1,', [motions])
+      call code%line('  at_square, last_square = at_square + $ - 1,', [squares])
     end associate
     do b = 1, size(laws)
       associate (law => state%banks(number_of(series, b))%law)
-        if (b <= size(series%banks%moved)) then
-          call laws(b)%declare_work(law%state, code)
-        else
-          call laws(b)%declare_work(no_states, code)
-          call code%line('  vd forcing$[$][P];', [b - 1, law%law%elements])
-        end if
+        call laws(b)%declare_work(law%state, code)
+        if (is_forcing(series, b - 1)) call code%line('  at_forcing$, last_forcing$ = at_forcing$ + $ * P - 1,', &
+                                                        [b - 1, b - 1, b - 1, law%law%elements])
       end associate
     end do
-    call code%line('} work;')
+    call code%line('  WORK')
+    call code%line('};')
     call code%line('typedef struct {')
-    call code%line('  long lanes, columns, left, strip;   /* left: lanes from the first one of the eight on */')
-    call code%line('  const double *law, *ratio, *response, *origin;')
-    call code%line('  double *y;')
+    call code%line('  long lanes, left, strip;   /* left: lanes from the first one on */')
+    call code%line('  const double *law, *ratio, *response, *origin, *t, *y;')
     call code%line('  const double *constant[$], *stacked[$];', [max(size(laws), 1), max(size(laws), 1)])
     call code%line('  long slots[$];', [max(size(laws), 1)])
     call code%line('} strip;')
   end subroutine write_data
 
-  !> Writes the series of the moments of a bank that follow from the time alone.
-  subroutine write_forcing(inputs, law, code)
-    type(element_law_t), intent(in) :: inputs
-    type(law_code_t), intent(in) :: law
-    type(code_text_t), intent(inout) :: code
-
-    call code%line('INLINE void forcing_coefficient$(const int k, const int i, const functions *f, const strip *s, work *z) {', &
-                   [law%bank])
-    if (inputs%time > 0) call code%line('    const vd *n$ = z->time;', [inputs%time])
-    call law%write_nodes(code)
-    call code%line('    z->forcing$[i][k] = @;', [law%bank], law%operand(inputs%law%tape%applied))
-    call code%line('}')
-    call code%line('static void find_forcing$(const functions *f, const strip *s, work *z) {', [law%bank])
-    call code%line('  for (int i = 0; i < $; i++) {', [inputs%law%elements])
-    call code%line('    forcing_coefficient$(0, i, f, s, z);', [law%bank])
-    call code%line('    forcing_coefficient$(1, i, f, s, z);', [law%bank])
-    call code%line('    for (int k = 2; k < P; k++) forcing_coefficient$(k, i, f, s, z);', [law%bank])
-    call code%line('  }')
-    call code%line('}')
-  end subroutine write_forcing
-
-  !> The last element of the run of consecutive elements that a loop can treat alike.
-  pure integer function end_of_run(series, layout, e) result(last)
-    type(reduced_series_t), intent(in) :: series
-    type(layout_t), intent(in) :: layout
-    integer, intent(in) :: e
-
-    last = e
-    do while (last < series%elements)
-      if (layout%bank(last + 1) /= layout%bank(e) .or. series%terms(last + 1) /= series%terms(e) .or. &
-          layout%entries(last + 1) /= layout%entries(e)) exit
-      last = last + 1
-    end do
-  end function end_of_run
-
-  !> Writes the motion at the start of a step.
-  subroutine write_start(series, layout, code)
-    type(reduced_series_t), intent(in) :: series
-    type(layout_t), intent(in) :: layout
-    type(code_text_t), intent(inout) :: code
-    integer :: e, last
-
-    call code%line('static void start(const strip *s, work *z) {')
-    e = 1
-    do while (e <= series%elements)
-      last = end_of_run(series, layout, e)
-      if (series%terms(e) /= has_forcing) then
-        call code%line('  for (int i = 0; i < $; i++)', [last - e + 1])
-        call code%line('    begin_element($, @, s->origin + s->lanes * ($ + i), s->left, z->q, z->rate, @);', &
-                       [series%terms(e), e - 1], element_arguments(series, layout, e), motion_arguments(layout, e, 'i'))
-      end if
-      e = last + 1
-    end do
-    call code%line('}')
-  end subroutine write_start
-
-  !> Number of entries of U, ratios, columns, law of element i of a run that begins with e.
-  function element_arguments(series, layout, e) result(text)
-    type(reduced_series_t), intent(in) :: series
-    type(layout_t), intent(in) :: layout
-    integer, intent(in) :: e
-    character(len=:), allocatable :: text
-
-    associate (n => layout%entries(e), first => series%twists%first(e) - 1)
-      text = filled('$, s->ratio + W * ($ + $ * i), twist_column + $ + $ * i, s->law + W * ($ + i)', [n, first, n, first, n, e - 1])
-    end associate
-  end function element_arguments
-
-  !> Addresses of angle and speed of element i of a run that begins with e.
-  function motion_arguments(layout, e, i) result(text)
-    type(layout_t), intent(in) :: layout
-    integer, intent(in) :: e
-    character(len=*), intent(in) :: i
-    character(len=:), allocatable :: text
-
-    associate (first => layout%motion(e), step => layout%motion(e + 1) - layout%motion(e))
-      text = filled('z->angle + $ + $ * @, z->speed + $ + $ * @', [first, step, first, step], i, i)
-    end associate
-  end function motion_arguments
-
-  !> Writes what computes coefficients k + 1 of the state.
-  subroutine write_coefficient(series, state, laws, layout, code)
-    type(reduced_series_t), intent(in) :: series
-    type(machine_state_t), intent(in) :: state
-    type(law_code_t), intent(in) :: laws(:)
-    type(layout_t), intent(in) :: layout
-    type(code_text_t), intent(inout) :: code
-    integer :: c, e, last, n
-
-    call code%line('INLINE void coefficient(const int k, const functions *f, const strip *s, work *z) {')
-    call code%line('  double *y = s->y + s->lanes * s->columns * (k + 1);')
-    e = 1
-    do while (e <= series%elements)
-      last = end_of_run(series, layout, e)
-      if (layout%bank(e) < 0) then
-        call write_polynomial_run(series, state, laws, layout, e, last, code)
-      else
-        call write_bank_run(series, layout, e, last, state%banks(series%banks%moved(layout%bank(e) + 1))%law, &
-                            laws(layout%bank(e) + 1), code)
-      end if
-      e = last + 1
-    end do
-    associate (first => series%accelerations%first)
-      c = 1
-      do while (c <= series%freedoms)
-        last = c
-        n = first(c + 1) - first(c)
-        do while (last < series%freedoms)
-          if (first(last + 2) - first(last + 1) /= n) exit
-          last = last + 1
-        end do
-        call code%line('  for (int i = 0; i < $; i++)', [last - c + 1])
-        call code%line('    accelerate(k, $, s->response + W * ($ + $ * i), response_column + $ + $ * i, z->moment,', &
-                       [n, first(c) - 1, n, first(c) - 1, n])
-        call code%line('               z->rate + $ + i, y + s->lanes * ($ + i), y + s->lanes * (FREEDOMS + $ + i), s->left);', &
-                       [c - 1, c - 1, c - 1])
-        c = last + 1
-      end do
-    end associate
-    call code%line('}')
-  end subroutine write_coefficient
-
-  !> Writes the call that moves element i of a run that begins with e.
-  subroutine write_move(series, layout, e, forcing, moments, code)
-    type(reduced_series_t), intent(in) :: series
-    type(layout_t), intent(in) :: layout
-    integer, intent(in) :: e
-    character(len=*), intent(in) :: forcing   !! address of the moments that follow from the time
-    character(len=*), intent(in) :: moments   !! addresses of the results
-    type(code_text_t), intent(inout) :: code
-
-    call code%line('    move_element(k, $, @, @, z->rate,', [series%terms(e)], element_arguments(series, layout, e), forcing)
-    call code%line('                 @, z->square + $ + $ * i, @);', [layout%square(e), layout%square(e + 1) - layout%square(e)], &
-                   motion_arguments(layout, e, 'i'), moments)
-  end subroutine write_move
-
-  !> Writes the moments of elements with polynomial laws, and of those that follow from the time.
-  subroutine write_polynomial_run(series, state, laws, layout, first, last, code)
-    type(reduced_series_t), intent(in) :: series
-    type(machine_state_t), intent(in) :: state
-    type(law_code_t), intent(in) :: laws(:)
-    type(layout_t), intent(in) :: layout
-    integer, intent(in) :: first, last
-    type(code_text_t), intent(inout) :: code
-    character(len=:), allocatable :: forcing
-    integer :: b, begin, from, to
-
-    from = first
-    do while (from <= last)   ! a run may have elements of several banks
-      to = last
-      forcing = '0'
-      do b = size(series%banks%moved) + 1, size(laws)
-        begin = series%banks%first(number_of(series, b))
-        associate (end => begin + state%banks(number_of(series, b))%law%law%elements - 1)
-          if (from < begin .or. from > end) cycle
-          to = min(last, end)
-          forcing = filled('z->forcing$[$ + i]', [b - 1, from - begin])
-        end associate
-      end do
-      call code%line('  for (int i = 0; i < $; i++) {', [to - from + 1])
-      call code%line('    vd r, a;')
-      call write_move(series, layout, from, forcing, '&r, &a', code)
-      call code%line('    z->moment[$ + i] = r + a;', [from - 1])
-      call code%line('  }')
-      from = to + 1
-    end do
-  end subroutine write_polynomial_run
-
-  !> Writes the moments of elements of a bank with a general law, and the coefficients of its internal states. Phases are written
-  !> with their elements.
-  subroutine write_bank_run(series, layout, first, last, inputs, law, code)
-    type(reduced_series_t), intent(in) :: series
-    type(layout_t), intent(in) :: layout
-    integer, intent(in) :: first, last
-    type(element_law_t), intent(in) :: inputs
-    type(law_code_t), intent(in) :: law
-    type(code_text_t), intent(inout) :: code
-    integer :: begin, count, from, to
-
-    begin = series%banks%first(series%banks%moved(law%bank + 1))
-    count = inputs%law%elements
-    from = first
-    do while (from <= min(last, begin + count - 1))
-      to = min(last, begin + count - 1)
-      if (inputs%ports > 1) to = min(to, end_of_run(series, layout, from + count) - count)
-      call code%line('  for (int i = 0; i < $; i++) {', [to - from + 1])
-      call code%line('    vd r, a;')
-      call write_move(series, layout, from, '0', '&r, &a', code)
-      if (inputs%ports > 1) then
-        call code%line('    vd r2, a2;')
-        call write_move(series, layout, from + count, '0', '&r2, &a2', code)
-      end if
-      call code%line('    bank$(k, $ + i, f, s, z, y, @,', [law%bank, from - begin], motion_arguments(layout, from, 'i'))
-      if (inputs%ports > 1) then
-        call code%line('         @, &r, &a, &r2, &a2);', a=motion_arguments(layout, from + count, 'i'))
-        call code%line('    z->moment[$ + i] = r2 + a2;', [from + count - 1])
-      else
-        call code%line('         0, 0, &r, &a, 0, 0);')
-      end if
-      call code%line('    z->moment[$ + i] = r + a;', [from - 1])
-      call code%line('  }')
-      from = to + 1
-    end do
-  end subroutine write_bank_run
-
-  !> Writes what adds the moments of element i of a bank, and computes coefficients k + 1 of its internal states.
+  !> Writes the procedure of a bank: it adds the moments of g elements from element i on, and computes coefficients k + 1 of their
+  !> internal states; or it sets coefficient k of moments that follow from the time alone.
   subroutine write_bank(series, inputs, law, code)
     type(reduced_series_t), intent(in) :: series
     type(element_law_t), intent(in) :: inputs
     type(law_code_t), intent(in) :: law
     type(code_text_t), intent(inout) :: code
-    character(len=:), allocatable :: value
     integer :: i, state
 
-    call code%line('INLINE void bank$(const int k, const int i, const functions *f, const strip *s, work *z, double *y,', &
+    call code%line('INLINE void bank$(const int g, const int k, const int i, const functions *f, const strip *s, vd *z,', &
                    [law%bank])
-    call code%line('                  const vd *angle, const vd *speed, const vd *angle2, const vd *speed2,')
-    call code%line('                  vd *r, vd *a, vd *r2, vd *a2) {')
-    if (inputs%angle > 0) call code%line('    const vd *n$ = angle;', [inputs%angle])
-    if (inputs%speed > 0) call code%line('    const vd *n$ = speed;', [inputs%speed])
-    if (inputs%phase > 0) call code%line('    const vd *n$ = angle2;', [inputs%phase])
-    if (inputs%phase_speed > 0) call code%line('    const vd *n$ = speed2;', [inputs%phase_speed])
-    if (inputs%time > 0) call code%line('    const vd *n$ = z->time;', [inputs%time])
+    call code%line('                  const elements *u, const elements *phase, vd *r, vd *a, vd *phase_r, vd *phase_a) {')
+    call declare_input(inputs%angle, 'u->angle', 'u->dmotion')
+    call declare_input(inputs%speed, 'u->speed', 'u->dmotion')
+    call declare_input(inputs%phase, 'phase->angle', 'phase->dmotion')
+    call declare_input(inputs%phase_speed, 'phase->speed', 'phase->dmotion')
+    call declare_input(inputs%time, 'z + at_time', 'ACROSS ? WORK : 0')
     do i = 1, inputs%states
-      if (inputs%state(i) > 0) call code%line('    vd *n$ = z->b$n$[i];', [inputs%state(i), law%bank, inputs%state(i)])
+      if (inputs%state(i) > 0) then
+        call declare_input(inputs%state(i), filled('z + at_b$n$ + (P + 1) * i', [law%bank, inputs%state(i)]), &
+                           'ACROSS ? WORK : P + 1')
+      end if
     end do
     call law%write_nodes(code)
-    call add_result('r', inputs%law%tape%restoring)
-    call add_result('a', inputs%law%tape%applied)
-    call add_result('r2', inputs%law%tape%phase_restoring)
-    call add_result('a2', inputs%law%tape%phase_applied)
+    if (is_forcing(series, law%bank)) then
+      call code%line('  EACH z[at_forcing$ + P * i + k + (ACROSS ? WORK : P) * e] = @;', [law%bank], &
+                     law%operand(inputs%law%tape%applied))
+    else
+      call add_result('r', inputs%law%tape%restoring)
+      call add_result('a', inputs%law%tape%applied)
+      call add_result('phase_r', inputs%law%tape%phase_restoring)
+      call add_result('phase_a', inputs%law%tape%phase_applied)
+    end if
     do i = 1, inputs%states
       state = inputs%state(i)
-      value = filled('(1.0 / (k + 1)) * @', [integer ::], law%operand(inputs%law%tape%rate(i)))
-      if (state > 0) then
-        call code%line('    n$[k + 1] = @;', [state], value)
-        value = filled('n$[k + 1]', [state])
-      end if
-      call code%line('    store_lanes(@, y + s->lanes * (2 * FREEDOMS + $ + $ * i), s->left);', &
-                     [first_state(series, law) + i - 1, inputs%states], value)
+      call code%line('  EACH {')
+      call code%line('    const vd next = (1.0 / (k + 1)) * @;', a=law%operand(inputs%law%tape%rate(i)))
+      if (state > 0) call code%line('    n$[k + 1 + d$ * e] = next;', [state, state])
+      call code%line('    z[at_c + COMPONENTS * (k + 1) + 2 * FREEDOMS + $ + $ * i + (ACROSS ? WORK : $) * e] = next;', &
+                     [first_state(series, law) + i - 1, inputs%states, inputs%states])
+      call code%line('  }')
     end do
     call code%line('}')
 
   contains
 
+    subroutine declare_input(node, address, step)
+      integer, intent(in) :: node
+      character(len=*), intent(in) :: address, step
+
+      if (node > 0) call code%line('  vd *n$ = @; const long d$ = @;', [node, node], address, step)
+    end subroutine declare_input
+
     subroutine add_result(name, node)
       character(len=*), intent(in) :: name
       integer, intent(in) :: node
 
-      if (node > 0) call code%line('    *@ = *@ + @;', a=name, b=name, c=law%operand(node))
+      if (node > 0) call code%line('  EACH @[e] = @[e] + @;', a=name, b=name, c=law%operand(node))
     end subroutine add_result
 
   end subroutine write_bank
@@ -404,63 +259,256 @@ contains
     first_state = series%banks%first_internal(series%banks%moved(law%bank + 1)) - 1
   end function first_state
 
-  !> Writes the procedure that is called.
-  subroutine write_entry(series, state, laws, code)
+  !> The elements from element i of a run on that begins with e.
+  function elements_of(series, layout, e) result(text)
+    type(reduced_series_t), intent(in) :: series
+    type(layout_t), intent(in) :: layout
+    integer, intent(in) :: e
+    character(len=:), allocatable :: text
+
+    associate (n => layout%entries(e), first => series%twists%first(e) - 1, at => e - 1, motion => layout%motion(e), &
+               step => layout%motion(e + 1) - layout%motion(e), square => layout%square(e), &
+               square_step => layout%square(e + 1) - layout%square(e))
+      text = filled('{$, s->origin + s->lanes * ($ + i), twist_column + $ + $ * i, z + at_ratio + $ + $ * i,', &
+                    [n, at, first, n, first, n])
+      text = text // filled(' z + at_law + $ + i, z + at_c, z + at_angle + $ + $ * i, z + at_speed + $ + $ * i,', &
+                            [at, motion, step, motion, step])
+      text = text // filled(' z + at_square + $ + $ * i, ACROSS ? LANES : s->lanes, ACROSS ? 0 : $, ACROSS ? WORK : $,', &
+                            [square, square_step, n, n])
+      text = text // filled(' ACROSS ? WORK : 1, ACROSS ? WORK : 0, ACROSS ? WORK : $, ACROSS ? WORK : $}', [step, square_step])
+    end associate
+  end function elements_of
+
+  !> Writes the procedures of runs of elements: g of them from element i of the run on. Phases are moved with their elements.
+  subroutine write_runs(series, layout, code)
+    type(reduced_series_t), intent(in) :: series
+    type(layout_t), intent(in) :: layout
+    type(code_text_t), intent(inout) :: code
+    character(len=:), allocatable :: forcing
+    integer :: e, phase, run
+
+    do run = 1, size(layout%first) - 1
+      e = layout%first(run)
+      associate (bank => layout%bank(e))
+        call code%line('INLINE void begin_run$(const int g, const int i, const strip *s, vd *z) {', [run])
+        call code%line('  const elements u = @;', a=elements_of(series, layout, e))
+        call code%line('  begin_elements(g, $, &u, s->left, ACROSS ? -LANES : 0);', [series%terms(e)])
+        call code%line('}')
+        if (layout%is_phase(e)) cycle
+        forcing = '0, 0'
+        if (is_forcing(series, bank)) forcing = filled('z + at_forcing$ + P * ($ + i), ACROSS ? WORK : P', &
+                                                       [bank, e - first_of(series, bank)])
+        call code%line('INLINE void run$(const int g, const int k, const int i, const functions *f, const strip *s, vd *z) {', &
+                       [run])
+        call code%line('  const elements u = @;', a=elements_of(series, layout, e))
+        call code%line('  vd r[MOST], a[MOST];')
+        call code%line('  move_elements(g, k, $, &u, @, r, a);', [series%terms(e)], forcing)
+        phase = 0
+        if (bank >= 0 .and. .not. is_forcing(series, bank)) then
+          phase = phase_of(e)
+          if (phase > 0) then
+            call code%line('  const elements phase = @;', a=elements_of(series, layout, phase))
+            call code%line('  vd phase_r[MOST], phase_a[MOST];')
+            call code%line('  move_elements(g, k, $, &phase, 0, 0, phase_r, phase_a);', [series%terms(phase)])
+            call code%line('  bank$(g, k, $ + i, f, s, z, &u, &phase, r, a, phase_r, phase_a);', &
+                           [bank, e - first_of(series, bank)])
+            call code%line('  EACH z[at_moment + $ + i + (ACROSS ? WORK : 1) * e] = phase_r[e] + phase_a[e];', [phase - 1])
+          else
+            call code%line('  bank$(g, k, $ + i, f, s, z, &u, 0, r, a, 0, 0);', [bank, e - first_of(series, bank)])
+          end if
+        end if
+        call code%line('  EACH z[at_moment + $ + i + (ACROSS ? WORK : 1) * e] = r[e] + a[e];', [e - 1])
+        call code%line('}')
+      end associate
+    end do
+
+  contains
+
+    !> The phase of an element, 0 if it has none.
+    pure integer function phase_of(element)
+      integer, intent(in) :: element
+      integer :: last
+
+      phase_of = 0
+      do last = element, series%elements
+        if (layout%bank(last) /= layout%bank(element)) return
+        if (layout%is_phase(last)) exit
+      end do
+      if (last > series%elements) return
+      phase_of = last + element - first_of(series, layout%bank(element))
+    end function phase_of
+
+  end subroutine write_runs
+
+  !> The first element of a bank in the code.
+  pure integer function first_of(series, bank)
+    type(reduced_series_t), intent(in) :: series
+    integer, intent(in) :: bank
+
+    first_of = series%banks%first(number_of(series, bank + 1))
+  end function first_of
+
+  !> Writes calls of a procedure for all of n elements.
+  subroutine write_calls(layout, n, procedure, arguments, code)
+    type(layout_t), intent(in) :: layout
+    integer, intent(in) :: n
+    character(len=*), intent(in) :: procedure, arguments   !! its name, and arguments without the elements
+    type(code_text_t), intent(inout) :: code
+    integer :: calls, large, most
+
+    if (layout%is_across) then
+      call code%line('  for (int i = 0; i < $; i++) @(g, @);', [n], procedure, arguments)
+      return
+    end if
+    calls = (n + most_elements - 1) / most_elements   ! of `most` or of `most` - 1 elements
+    most = (n + calls - 1) / calls
+    large = n - calls * (most - 1)
+    call code%line('  for (int i = 0; i < $; i += $) @($, @);', [large * most, most, most], procedure, arguments)
+    if (large == calls) return
+    call code%line('  for (int i = $; i < $; i += $) @($, @);', [large * most, n, most - 1, most - 1], procedure, arguments)
+  end subroutine write_calls
+
+  !> Writes what computes coefficients k + 1 of the state.
+  subroutine write_coefficient(series, layout, code)
+    type(reduced_series_t), intent(in) :: series
+    type(layout_t), intent(in) :: layout
+    type(code_text_t), intent(inout) :: code
+    integer :: c, last, n, run
+
+    call code%line('INLINE void coefficient(const int g, const int k, const functions *f, const strip *s, vd *z) {')
+    do run = 1, size(layout%first) - 1
+      if (layout%is_phase(layout%first(run))) cycle
+      call write_calls(layout, layout%first(run + 1) - layout%first(run), filled('run$', [run]), 'k, i, f, s, z', code)
+    end do
+    associate (first => series%accelerations%first)
+      c = 1
+      do while (c <= series%freedoms)
+        last = c
+        n = first(c + 1) - first(c)
+        do while (last < series%freedoms)
+          if (first(last + 2) - first(last + 1) /= n) exit
+          last = last + 1
+        end do
+        call code%line('  for (int i = 0; i < $; i++)', [last - c + 1])
+        call code%line('    accelerate(g, k, $ + i, $, z + at_response + $ + $ * i, response_column + $ + $ * i, ' // &
+                       'z + at_moment, z + at_c, WORK);', [c - 1, n, first(c) - 1, n, first(c) - 1, n])
+        c = last + 1
+      end do
+    end associate
+    call code%line('}')
+  end subroutine write_coefficient
+
+  !> Writes the series of a strip.
+  subroutine write_strip(series, state, laws, layout, code)
     type(reduced_series_t), intent(in) :: series
     type(machine_state_t), intent(in) :: state
     type(law_code_t), intent(in) :: laws(:)
+    type(layout_t), intent(in) :: layout
     type(code_text_t), intent(inout) :: code
-    integer :: b, i
+    integer :: b, i, run
 
-    call code%line('long nocdyn_series_work(void) { return sizeof(work) + sizeof(vd); }')
-    call code%line('void nocdyn_series(long lanes, long columns, const double *const *numbers, char *space, const functions *f,')
-    call code%line('                   const double *t, double *y) {')
-    call code%line('  work *z = (work *)(((unsigned long)space + sizeof(vd) - 1) / sizeof(vd) * sizeof(vd));')
-    call code%line('  const long strips = (lanes + W - 1) / W;')
-    call code%line('  strip of, *s = &of;')
-    call code%line('  s->lanes = lanes;')
-    call code%line('  s->columns = columns;')
-    do b = 1, size(laws)
-      call code%line('  s->slots[$] = W * $ * strips;', [b - 1, laws(b)%law%elements])
-    end do
-    call code%line('  z->time[1] = 1.0 + (vd){};')
-    call code%line('  for (long first = 0; first < lanes; first += LANES) {')
-    call code%line('    const long strip = first / W, within = first % W;')
-    call code%line('    s->left = lanes - first;')
-    call code%line('    s->strip = strip;')
-    call code%line('    s->law = numbers[0] + W * ELEMENTS * $ * strip + within;', [size(series%law, 3)])
-    call code%line('    s->ratio = numbers[1] + W * $ * strip + within;', [size(series%twists%column)])
-    call code%line('    s->response = numbers[2] + W * $ * strip + within;', [size(series%accelerations%column)])
-    call code%line('    s->origin = numbers[3] + first;')
-    call code%line('    s->y = y + first;')
-    do b = 1, size(laws)
-      call code%line('    s->constant[$] = numbers[$] + W * $ * strip + within;', [b - 1, 2 + 2 * b, laws(b)%law%elements])
-      call code%line('    s->stacked[$] = numbers[$] + within;', [b - 1, 3 + 2 * b])
-    end do
-    call code%line('    z->time[0] = load_lanes(t + first, s->left);')
-    call code%line('    for (int i = 0; i < FREEDOMS; i++) {')
-    call code%line('      z->rate[i] = load_lanes(s->y + lanes * i, s->left);')
-    call code%line('      z->q[i] = load_lanes(s->y + lanes * (FREEDOMS + i), s->left);')
-    call code%line('    }')
+    call write_coefficient(series, layout, code)
+    call code%line('/* The series of a strip, in z */')
+    call code%line('INLINE void expand(const int g, const functions *f, const strip *s, vd *z) {')
+    call code%line('  EACH {')
+    call code%line('    const long left = s->left - LANES * e;')
+    call code%line('    vd *w = z + WORK * e;')
+    call code%line('    w[at_time] = load_lanes(s->t + LANES * e, left);')
+    call code%line('    w[at_time + 1] = 1.0 + (vd){};')
+    call code%line('    for (int i = 0; i < COMPONENTS; i++) w[at_c + i] = load_lanes(s->y + s->lanes * i + LANES * e, left);')
+    call code%line('    for (int i = 0; i < $; i++) w[at_ratio + i] = load(s->ratio + W * i + LANES * e);', &
+                   [size(series%twists%column)])
+    call code%line('    for (int i = 0; i < $; i++) w[at_response + i] = load(s->response + W * i + LANES * e);', &
+                   [size(series%accelerations%column)])
+    call code%line('    for (int i = 0; i < $ * ELEMENTS; i++) w[at_law + i] = load(s->law + W * i + LANES * e);', &
+                   [size(series%law, 3)])
     do b = 1, size(series%banks%moved)
       associate (inputs => state%banks(series%banks%moved(b))%law)
         do i = 1, inputs%states
           if (inputs%state(i) == 0) cycle
-          call code%line('    for (int i = 0; i < $; i++)', [inputs%law%elements])
-          call code%line('      z->b$n$[i][0] = load_lanes(s->y + lanes * (2 * FREEDOMS + $ + $ * i), s->left);', &
-                         [b - 1, inputs%state(i), first_state(series, laws(b)) + i - 1, inputs%states])
+          call code%line('    for (int i = 0; i < $; i++) w[at_b$n$ + (P + 1) * i] = w[at_c + 2 * FREEDOMS + $ + $ * i];', &
+                         [inputs%law%elements, b - 1, inputs%state(i), first_state(series, laws(b)) + i - 1, inputs%states])
         end do
       end associate
     end do
-    call code%line('    start(s, z);')
-    do b = size(series%banks%moved) + 1, size(laws)
-      call code%line('    find_forcing$(f, s, z);', [b - 1])
+    call code%line('  }')
+    do run = 1, size(layout%first) - 1
+      if (series%terms(layout%first(run)) == has_forcing) cycle
+      call write_calls(layout, layout%first(run + 1) - layout%first(run), filled('begin_run$', [run]), 'i, s, z', code)
     end do
-    call code%line('    coefficient(0, f, s, z);')
-    call code%line('    coefficient(1, f, s, z);')
-    call code%line('    for (int k = 2; k < P; k++) coefficient(k, f, s, z);')
+    do b = size(series%banks%moved) + 1, size(laws)
+      associate (n => laws(b)%law%elements)
+        call write_calls(layout, n, filled('bank$', [b - 1]), '0, i, f, s, z, 0, 0, 0, 0, 0, 0', code)
+        call write_calls(layout, n, filled('bank$', [b - 1]), '1, i, f, s, z, 0, 0, 0, 0, 0, 0', code)
+        call code%line('  for (int k = 2; k < P; k++) {')
+        call write_calls(layout, n, filled('bank$', [b - 1]), 'k, i, f, s, z, 0, 0, 0, 0, 0, 0', code)
+        call code%line('  }')
+      end associate
+    end do
+    call code%line('  coefficient(g, 0, f, s, z);')
+    call code%line('  coefficient(g, 1, f, s, z);')
+    call code%line('  for (int k = 2; k < P; k++) coefficient(g, k, f, s, z);')
+    call code%line('}')
+  end subroutine write_strip
+
+  !> Writes the procedures that are called.
+  subroutine write_entries(series, laws, code)
+    type(reduced_series_t), intent(in) :: series
+    type(law_code_t), intent(in) :: laws(:)
+    type(code_text_t), intent(inout) :: code
+    integer :: b
+
+    call code%line('/* The series from lane `first` on; returns how many times eight lanes they are of. */')
+    call code%line('static long expand_from(const long first, const long lanes, const double *const *numbers, vd *z,')
+    call code%line('                        const functions *f, const double *t, const double *y) {')
+    call code%line('  const long strips = (lanes + W - 1) / W, number = first / W, within = first % W;')
+    call code%line('  const strip s = {lanes, lanes - first, number,')
+    call code%line('    numbers[0] + W * ELEMENTS * $ * number + within, numbers[1] + W * $ * number + within,', &
+                   [size(series%law, 3), size(series%twists%column)])
+    call code%line('    numbers[2] + W * $ * number + within, numbers[3] + first, t + first, y + first, {', &
+                   [size(series%accelerations%column)])
+    do b = 1, size(laws)
+      call code%line('      numbers[$] + W * $ * number + within,', [2 + 2 * b, laws(b)%law%elements])
+    end do
+    call code%line('    }, {')
+    do b = 1, size(laws)
+      call code%line('      numbers[$] + within,', [3 + 2 * b])
+    end do
+    call code%line('    }, {')
+    do b = 1, size(laws)
+      call code%line('      W * $ * strips,', [laws(b)%law%elements])
+    end do
+    call code%line('    }};')
+    call code%line('  if (ACROSS && s.left > LANES) {')
+    call code%line('    expand(MOST, f, &s, z);')
+    call code%line('    return MOST;')
+    call code%line('  }')
+    call code%line('  expand(1, f, &s, z);')
+    call code%line('  return 1;')
+    call code%line('}')
+    call code%line('long nocdyn_work(void) { return sizeof(vd) * (WORK * (ACROSS ? MOST : 1) + 1); }')
+    call code%line('static vd *aligned(char *space) { ' // &
+                   'return (vd *)(((unsigned long)space + sizeof(vd) - 1) / sizeof(vd) * sizeof(vd)); }')
+    call code%line('void nocdyn_series(long lanes, long columns, const double *const *numbers, char *space, const functions *f,')
+    call code%line('                   const double *t, double *y) {')
+    call code%line('  vd *z = aligned(space);')
+    call code%line('  for (long first = 0, g; first < lanes; first += LANES * g) {')
+    call code%line('    g = expand_from(first, lanes, numbers, z, f, t, y);')
+    call code%line('    for (int e = 0; e < g; e++)')
+    call code%line('      for (int k = 1; k <= P; k++)')
+    call code%line('        for (int i = 0; i < COMPONENTS; i++)')
+    call code%line('          store_lanes(z[at_c + COMPONENTS * k + i + WORK * e], ' // &
+                   'y + lanes * (columns * k + i) + first + LANES * e,')
+    call code%line('                      lanes - first - LANES * e);')
     call code%line('  }')
     call code%line('}')
-  end subroutine write_entry
+    call code%line('void nocdyn_steps(const steps *s, const double *const *numbers, char *space, const functions *f) {')
+    call code%line('  vd *z = aligned(space);')
+    call code%line('  for (long first = 0, g; first < s->lanes; first += LANES * g) {')
+    call code%line('    g = expand_from(first, s->lanes, numbers, z, f, s->t, s->y);')
+    call code%line('    for (int e = 0; e < g; e++) take_steps(s, first + LANES * e, z + at_c + WORK * e);')
+    call code%line('  }')
+    call code%line('}')
+  end subroutine write_entries
 
 end module nocdyn_series_code
