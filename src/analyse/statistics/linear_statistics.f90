@@ -3,7 +3,6 @@
 !> Bounds on x, computed from its coefficients in vector loops over the lanes, tell in which steps x may exceed the extremes so
 !> far; only in these steps it is evaluated at the nodes of the interpolation.
 module nocdyn_linear_statistics
-  use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_funloc, c_int, c_loc, c_long, c_ptr
   use nocdyn_chebyshev, only: max_degree, new_interpolation
   use nocdyn_column_statistics, only: accumulator_t, column_statistics_t, start_range, widen_range, width
   use nocdyn_damage_sums, only: damage_sum_t
@@ -14,7 +13,6 @@ module nocdyn_linear_statistics
   use nocdyn_step_strips, only: add_integrals, bound_excursions, expand, expand_single, exclude_monotonic, &
     fill_chord_gaps, strip_t, values_at
   use nocdyn_observer, only: step_block_t
-  use nocdyn_plain_steps, only: plain_range_t, plain_steps_t
   use nocdyn_quadrature, only: gauss_legendre_rule
   use nocdyn_signals, only: signal_source_t
   implicit none (type, external)
@@ -28,9 +26,8 @@ module nocdyn_linear_statistics
     real(wp), allocatable, private :: chord_gap(:)   !! largest value of s - s^p for s from 0 to 1, p = 1 to degree
     real(wp), allocatable, private :: y_last(:, :), y_new_last(:, :), c_last(:, :, :)   !! of an incomplete last strip, padded
     type(strip_t), private :: strip
-    type(plain_range_t), allocatable, private :: ranges(:)   !! of the accumulators, for plain steps
   contains
-    procedure :: start_lane, add_steps, add_state, finish_lane, read_components, list_ranges
+    procedure :: start_lane, add_steps, add_state, finish_lane, read_components
   end type linear_statistics_t
 
 contains
@@ -64,77 +61,6 @@ contains
       end associate
     end do
   end subroutine read_components
-
-  !> Lists the ranges for plain steps, if they are all that there is to accumulate.
-  subroutine list_ranges(self, degree, components, steps, are_all)
-    class(linear_statistics_t), target, intent(inout) :: self
-    integer, intent(in) :: degree                 !! of the steps
-    integer, intent(in) :: components             !! of the state, with padding
-    type(plain_steps_t), intent(inout) :: steps
-    logical, intent(out) :: are_all
-    integer :: i
-
-    are_all = size(self%damages) == 0
-    do i = 1, size(self%accumulators)
-      associate (acc => self%accumulators(i))
-        are_all = are_all .and. acc%has_range() .and. .not. (acc%has_sums .or. acc%has_history .or. acc%from > self%t_start)
-      end associate
-    end do
-    if (.not. are_all) return
-    if (.not. allocated(self%chord_gap)) call allocate_work(self, components, degree)
-    if (allocated(self%ranges)) deallocate (self%ranges)
-    allocate (self%ranges(size(self%accumulators)))
-    do i = 1, size(self%accumulators)
-      associate (acc => self%accumulators(i), range => self%ranges(i), columns => self%columns)
-        associate (first => columns%first(acc%column))
-          range%number = i
-          range%entries = columns%first(acc%column + 1) - first
-          range%has_time = merge(1, 0, acc%has_time)
-          range%has_max_abs = merge(1, 0, acc%has_max_abs)
-          range%component = c_loc(columns%component(first))
-          range%factor = c_loc(columns%factor(1, first, 1))
-          range%factor_step = size(columns%factor(:, :, 1), kind=c_long)
-          range%offset = c_loc(columns%offset(1, acc%column, 1))
-          range%offset_step = size(columns%offset(:, :, 1), kind=c_long)
-        end associate
-        range%highest = c_loc(acc%highest)
-        range%lowest = c_loc(acc%lowest)
-        range%highest_time = c_loc(acc%highest_time)
-        range%lowest_time = c_loc(acc%lowest_time)
-        range%no_highest = c_loc(acc%no_highest)
-        range%no_lowest = c_loc(acc%no_lowest)
-      end associate
-    end do
-    steps%ranges = size(self%ranges)
-    steps%range = c_loc(self%ranges)
-    steps%chord_gap = c_loc(self%chord_gap)
-    select type (self)
-    type is (linear_statistics_t)
-      steps%observer = c_loc(self)
-    end select
-    steps%look = c_funloc(look_inside_plain_step)
-  end subroutine list_ranges
-
-  !> Widens a range by the extremes inside a plain step.
-  subroutine look_inside_plain_step(statistics, number, lane, sides, times, ends, c) bind(c)
-    type(c_ptr), value, intent(in) :: statistics
-    integer(c_int), intent(in) :: number, lane     !! of the range; lane
-    integer(c_int), intent(in) :: sides(2)         !! whether x, or -x, may exceed the extremes so far
-    real(c_double), intent(in) :: times(3)         !! start, size and end of the step [s]
-    real(c_double), intent(in) :: ends(2)          !! x at its ends
-    real(c_double), intent(in) :: c(*)             !! x = ends(1) + sum of c(p) (time - start)^p
-    type(linear_statistics_t), pointer :: self
-    real(wp) :: values(max_degree + 1)
-
-    call c_f_pointer(statistics, self)
-    associate (strip => self%strip, acc => self%accumulators(number), degree => size(self%chord_gap))
-      strip%x_start(1) = ends(1)
-      strip%c(1, :degree) = c(:degree)
-      call values_at(strip, 1, degree, self%rules(degree)%nodes, 0.0_wp, times(2), values)
-      values(degree + 1) = ends(2)
-      call widen_range(acc, self%rules(degree), lane, values, times(1), times(3), sides(1) > 0, sides(2) > 0)
-    end associate
-  end subroutine look_inside_plain_step
 
   !> Starts a variant in a lane of the block.
   subroutine start_lane(self, block, lane, y)

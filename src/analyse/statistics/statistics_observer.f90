@@ -14,14 +14,15 @@ module nocdyn_statistics_observer
     statistic_max_abs, statistic_min, statistic_settling_time, statistic_t, statistic_time_of_max, statistic_time_of_min, &
     value_of_zero_column
   use nocdyn_observer, only: observer_t, piece_t, step_block_t
+  use nocdyn_plain_ranges, only: plain_ranges_t
   use nocdyn_plain_steps, only: plain_steps_t
   use nocdyn_quantities, only: form_applied
   use nocdyn_signals, only: is_largest_along, list_points, list_signals, signal_point_moment, signal_point_stress, &
-    signal_source_t, signal_t, signal_work_in
+    signal_source_t, signal_t
   implicit none (type, external)
   private
 
-  public :: new_statistics_observer, needs_work_integrals
+  public :: new_statistics_observer
 
   !> The requested times must be, or contain, the start and the end of the variants.
   !>
@@ -33,6 +34,7 @@ module nocdyn_statistics_observer
     real(wp), private :: t_start = 0.0_wp, t_end = 0.0_wp     !! of every variant [s]
     type(linear_statistics_t), private :: linear
     type(sampled_statistics_t), private :: sampled
+    type(plain_ranges_t), private :: plain
     integer, allocatable, private :: first_part(:)            !! of each statistic, [statistics + 1]
     integer, allocatable, private :: linear_index(:)          !! of each part in `linear`, or 0; [parts]
     integer, allocatable, private :: sampled_index(:)         !! in `sampled`, or 0
@@ -49,18 +51,6 @@ module nocdyn_statistics_observer
   end type statistics_observer_t
 
 contains
-
-  !> Whether a statistic is of a work, or of the energy balance, and so needs the work integrals.
-  pure logical function needs_work_integrals(statistics)
-    type(statistic_t), intent(in) :: statistics(:)
-    integer :: i
-
-    needs_work_integrals = .false.
-    do i = 1, size(statistics)
-      if (.not. allocated(statistics(i)%signal)) cycle
-      needs_work_integrals = needs_work_integrals .or. statistics(i)%signal%source%kind >= signal_work_in
-    end do
-  end function needs_work_integrals
 
   !> An observer of a block, which stays where it is.
   function new_statistics_observer(block, statistics, t_start, t_end, may_bend) result(self)
@@ -281,7 +271,7 @@ contains
     logical, intent(out) :: are_all
 
     are_all = .not. self%has_recorded
-    if (are_all) call self%linear%list_ranges(order, self%block%states + self%block%quadratures, steps, are_all)
+    if (are_all) call self%plain%list(self%linear, order, steps, are_all)
   end subroutine list_ranges
 
   !> Brings one lane to a time and state; the others stay where they started or ended.

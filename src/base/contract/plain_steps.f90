@@ -26,6 +26,16 @@ module nocdyn_plain_steps
     type(c_ptr) :: no_highest = c_null_ptr, no_lowest = c_null_ptr   !! huge where an extreme is not needed, else -huge; [lanes]
   end type plain_range_t
 
+  !> A lane that steps by series where there is a choice of kinds of steps, and has nothing to decide: its steps are counted together.
+  type, bind(c), public :: calm_lane_t
+    integer(c_int) :: steps = 0         !! accepted steps without a decision, unless they show signs of stiffness
+    integer(c_int) :: uncounted = 0     !! of these, those that have been made
+    integer(c_int) :: signs = 0         !! consecutive signs that implicit steps may cost less
+    integer(c_int) :: is_in_doubt = 0   !! whether there was a weak sign
+    integer(c_int) :: waits = 0         !! whether signs lead to nothing yet
+    integer(c_int) :: has_moved = 0     !! whether the last attempt was accepted
+  end type calm_lane_t
+
   !> All lanes of a block.
   type, bind(c), public :: plain_steps_t
     integer(c_long) :: lanes = 0, columns = 0           !! columns of the state, with padding
@@ -40,6 +50,9 @@ module nocdyn_plain_steps
     type(c_ptr) :: outcome = c_null_ptr                 !! no_step and so on, [lanes]
     type(c_ptr) :: first = c_null_ptr, column = c_null_ptr           !! of the map from the state to the measures
     type(c_ptr) :: coefficient = c_null_ptr, offset = c_null_ptr     !! [lanes, entries], [lanes, measures]
+    type(c_ptr) :: wanted = c_null_ptr                  !! steps that the series allow [s], [lanes]
+    type(c_ptr) :: calm = c_null_ptr                    !! calm_lane_t [lanes], or null: the steps are no choice
+    real(c_double) :: near = 0.0_c_double, weak = 0.0_c_double   !! |h lambda|, a sign of stiffness, and a weak one
     type(c_ptr) :: range = c_null_ptr                   !! [ranges]
     type(c_ptr) :: chord_gap = c_null_ptr               !! largest s - s^p, s from 0 to 1, p = 1 to the order
     type(c_ptr) :: observer = c_null_ptr                !! argument of `look`

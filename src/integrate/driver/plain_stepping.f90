@@ -9,7 +9,6 @@ module nocdyn_plain_stepping
   use nocdyn_solver_status, only: integration_done, integration_running, solver_status_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
-  use nocdyn_taylor_stepper, only: taylor_stepper_t
   use nocdyn_time_stepping, only: integrator_t, shift_states
   implicit none (type, external)
   private
@@ -25,19 +24,14 @@ contains
     class(system_t), intent(in) :: system
     real(wp), intent(in) :: times(:)   !! output times [s]
     class(observer_t), intent(inout) :: observer
-    logical :: is_taylor
 
-    is_taylor = .false.
-    select type (stepper)
-    type is (taylor_stepper_t)
-      is_taylor = .true.
-    end select
-    integrator%may_be_plain = is_taylor .and. system%lanes > 1 .and. system%measures > 0 .and. system%quadratures == 0 .and. &
+    integrator%may_be_plain = stepper%series_order > 0 .and. system%lanes > 1 .and. system%measures > 0 .and. &
+                              system%quadratures == 0 .and. &
                               size(times) == 2 .and. .not. integrator%first_step > 0 .and. &
                               .not. (integrator%has_switches .or. integrator%has_events .or. integrator%has_extremes .or. &
                                      system%limits_steps .or. system%projects .or. system%hides_bends)
     if (.not. integrator%may_be_plain) return
-    call observer%list_ranges(stepper%order, integrator%plain, integrator%may_be_plain)
+    call observer%list_ranges(stepper%series_order, integrator%plain, integrator%may_be_plain)
     if (.not. integrator%may_be_plain) return
     allocate (integrator%outcome(system%lanes), integrator%is_running(system%lanes), source=0_c_int)
     integrator%plain%lanes = system%lanes
@@ -53,11 +47,14 @@ contains
     type(solver_status_t), target, intent(inout) :: solver_status
     logical, intent(out) :: are_taken   !! whether all running lanes have taken a step
     integer :: lane, left
+    logical :: is_able
 
     are_taken = .false.
     if (.not. integrator%may_be_plain) return
     if (.not. system%takes_plain_steps()) return
     if (maxval(solver_status%steps) + 1 >= integrator%max_steps) return
+    call stepper%describe_plain_steps(integrator%plain, is_able)
+    if (.not. is_able) return
     associate (attempt => integrator%attempt)
       call describe_state(integrator)
       integrator%is_running(:) = merge(1_c_int, 0_c_int, integrator%occupied .and. solver_status%code == integration_running)
@@ -82,7 +79,7 @@ contains
         end do
       end if
       if (integrator%may_shift .and. any_true(attempt%lanes, integrator%accepted)) call shift_states(integrator, system, observer)
-      call stepper%accept(integrator%accepted)
+      call stepper%accept_plain_steps(integrator%accepted)
     end associate
   end subroutine take_plain_steps
 
@@ -100,6 +97,7 @@ contains
       plain%y = c_loc(attempt%y)
       plain%size = c_loc(control%size)
       plain%h = c_loc(attempt%h)
+      plain%wanted = c_loc(control%h)
       plain%running = c_loc(integrator%is_running)
       plain%outcome = c_loc(integrator%outcome)
     end associate

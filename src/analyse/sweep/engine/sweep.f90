@@ -8,7 +8,7 @@ module nocdyn_sweep
   use nocdyn_kinds, only: wp
   use nocdyn_run_settings, only: choose_settings
   use nocdyn_scheduler, only: scheduler_t
-  use nocdyn_statistics_observer, only: needs_work_integrals
+  use nocdyn_statistics, only: needs_work_integrals
   use nocdyn_sweep_block, only: new_sweep_block, sweep_block_t
   use nocdyn_sweep_code, only: sweep_code_t
   use nocdyn_sweep_plan, only: sweep_plan_t
