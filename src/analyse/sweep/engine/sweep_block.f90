@@ -188,9 +188,7 @@ contains
     found = count > 0
     self%none_left = .not. found
     if (.not. found) return
-    if (allocated(self%block%stepper)) then
-      if (self%block%stepper%series_order > 0) call self%block%code%offer(self%block%machines%formulation)
-    end if
+    call offer_code(self%block)
     self%newest = findloc(self%chunks%is_open, .false., dim=1)
     associate (open => self%chunks(self%newest))
       call allocate_chunk(open%chunk, first, count, self%block%plan%design%varied, self%block%plan%results())
@@ -259,9 +257,10 @@ contains
     real(wp) :: now
 
     now = time_now()
-    if (allocated(self%block%stepper)) call self%block%code%count_work(self%block%machines%formulation, &
-                                                                       self%block%stepper%series_order, open%chunk%count, &
-                                                                       sum(open%chunk%steps))
+    if (allocated(self%block%stepper)) then
+      call self%block%code%count_work(self%block%machines%formulation, self%block%stepper%series_order, open%chunk%count, &
+                                      sum(open%chunk%steps))
+    end if
     associate (scheduler => self%block%scheduler)
       call omp_set_lock(scheduler%lock)
       call scheduler%submit(open%chunk, now - self%submitted)
@@ -269,7 +268,16 @@ contains
     end associate
     self%submitted = now
     open%is_open = .false.
+    call offer_code(self%block)
   end subroutine submit
+
+  !> Lets the block have a program for its series, if one is due.
+  subroutine offer_code(block)
+    type(sweep_block_t), intent(inout) :: block
+
+    if (.not. allocated(block%stepper)) return
+    if (block%stepper%series_order > 0) call block%code%offer(block%machines%formulation)
+  end subroutine offer_code
 
   !> Sets the next variant that fits the lanes in one of them.
   subroutine next(self, system, lane, t, y, found)

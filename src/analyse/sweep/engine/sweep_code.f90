@@ -30,6 +30,7 @@ module nocdyn_sweep_code
     integer, private :: counted = 0                !! variants whose work is known
     real(wp), private :: work = 0.0_wp             !! of these [ns]
     integer, private :: programs = 0               !! that were written
+    logical, private :: is_busy = .false.          !! whether a thread makes one
     type(loaded_code_t), private :: loaded
   contains
     procedure :: count_work, offer, unmet_wish
@@ -84,11 +85,12 @@ contains
       if (formulation%runs_code()) return
       !$omp critical (sweep_code)
       if (self%is_loaded) call formulation%attach_code(self%loaded)
-      is_due = self%programs < most_programs .and. .not. allocated(self%obstacle) .and. .not. formulation%runs_code()
+      is_due = .not. (self%is_busy .or. self%programs == most_programs .or. allocated(self%obstacle) .or. formulation%runs_code())
       if (is_due .and. self%choice == compile_auto) then
         is_due = self%work * self%variants > least_work * self%counted
       end if
       if (is_due) self%programs = self%programs + 1
+      self%is_busy = self%is_busy .or. is_due
       !$omp end critical (sweep_code)
       if (.not. is_due) return
       !$omp critical (texts)
@@ -97,6 +99,7 @@ contains
       !$omp end critical (texts)
       if (obstacle == '') call load_code(text, loaded, obstacle)
       !$omp critical (sweep_code)
+      self%is_busy = .false.
       if (obstacle /= '') then
         self%obstacle = obstacle
       else

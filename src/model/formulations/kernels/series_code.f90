@@ -439,15 +439,13 @@ contains
     do b = size(series%banks%moved) + 1, size(laws)
       associate (n => laws(b)%law%elements)
         call write_calls(layout, n, filled('bank$', [b - 1]), '0, i, f, s, z, 0, 0, 0, 0, 0, 0', code)
-        call write_calls(layout, n, filled('bank$', [b - 1]), '1, i, f, s, z, 0, 0, 0, 0, 0, 0', code)
-        call code%line('  for (int k = 2; k < P; k++) {')
+        call code%line('  for (int k = 1; k < P; k++) {')
         call write_calls(layout, n, filled('bank$', [b - 1]), 'k, i, f, s, z, 0, 0, 0, 0, 0, 0', code)
         call code%line('  }')
       end associate
     end do
     call code%line('  coefficient(g, 0, f, s, z);')
-    call code%line('  coefficient(g, 1, f, s, z);')
-    call code%line('  for (int k = 2; k < P; k++) coefficient(g, k, f, s, z);')
+    call code%line('  for (int k = 1; k < P; k++) coefficient(g, k, f, s, z);')
     call code%line('}')
   end subroutine write_strip
 
