@@ -163,7 +163,7 @@ def test_a_sweep_that_has_no_program_says_why(nocdyn, compiler):
 def test_auto_compiles_where_the_work_is_worth_it(nocdyn, compiler):
     sweep(nocdyn, "little", compiler)
     assert compiler.count == 0
-    words = ("--set", "sweep.samples=40000", "--set", "run.t_end=20", "--set", "run.rtol=1e-6", "--set", "run.atol=1e-6")
+    words = ("--set", "sweep.samples=40000", "--set", "run.t_end=30", "--set", "run.rtol=1e-6", "--set", "run.atol=1e-6")
     sweep(nocdyn, "much", compiler, *words)
     assert compiler.count == 1
 
