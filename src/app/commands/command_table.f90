@@ -25,8 +25,9 @@ contains
 
     call list_analyses(commands)
     call list_torsional_analyses(commands)
-    call add_command(commands, 'matrices', 'FILE', '--set --case', 'print the matrices of the method for a machine', &
+    call add_command(commands, 'matrices', 'FILE', '--code --set --case', 'print the matrices of the method for a machine', &
       'Prints every matrix and vector of the method for the machine at its start, with its equation number.' // nl // nl // &
+      '  --code             print the equations of motion as a program in C instead, to be built into others' // nl // &
       '  --case NAME        look at the machine of this &load_case', analysis_command)
     call list_sweeps(commands)
     call add_command(commands, 'new', 'FILE', '', 'write a commented input to start from', &

@@ -4,7 +4,11 @@ module nocdyn_compiled_code
   implicit none (type, external)
   private
 
-  public :: series_source, load_code
+  public :: code_part, load_code
+
+  integer, parameter, public :: series_part = 1    !! Taylor arithmetic
+  integer, parameter, public :: steps_part = 2     !! plain steps of a block of lanes
+  integer, parameter, public :: machine_part = 3   !! derivative and steps of one machine
 
   !> Procedures of a loaded program; it stays loaded.
   type, public :: loaded_code_t
@@ -16,10 +20,11 @@ module nocdyn_compiled_code
   integer, parameter :: longest_message = 400
 
   interface
-    type(c_ptr) function c_series_source(length) bind(c, name='nocdyn_series_source')
-      import :: c_ptr, c_size_t
+    type(c_ptr) function c_code_part(part, length) bind(c, name='nocdyn_code_part')
+      import :: c_int, c_ptr, c_size_t
+      integer(c_int), value, intent(in) :: part
       integer(c_size_t), intent(out) :: length
-    end function c_series_source
+    end function c_code_part
 
     integer(c_int) function c_load_code(text, length, names, count, procedures, message, capacity) &
       bind(c, name='nocdyn_load_code')
@@ -36,20 +41,21 @@ module nocdyn_compiled_code
 
 contains
 
-  !> Taylor arithmetic in C, which the programs of series begin with.
-  function series_source() result(text)
+  !> A part of programs that is the same for all machines.
+  function code_part(part) result(text)
+    integer, intent(in) :: part   !! series_part and so on
     character(len=:), allocatable :: text
     character(kind=c_char), pointer :: characters(:)
     integer(c_size_t) :: i, length
     type(c_ptr) :: address
 
-    address = c_series_source(length)
+    address = c_code_part(int(part, c_int), length)
     call c_f_pointer(address, characters, [length])
     allocate (character(len=length) :: text)
     do i = 1, length
       text(i:i) = characters(i)
     end do
-  end function series_source
+  end function code_part
 
   !> Compiles and loads a program, or loads it from the user's cache folder. Threads may call it.
   subroutine load_code(text, loaded, failure)

@@ -14,12 +14,14 @@ module nocdyn_reduced
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_law_tape, only: op_tanh
   use nocdyn_machine, only: machine_t
+  use nocdyn_machine_code, only: write_machine_code
   use nocdyn_plain_steps, only: plain_steps_t
   use nocdyn_reduced_jacobian, only: new_reduced_jacobian, reduced_jacobian_t
   use nocdyn_reduced_series, only: new_reduced_series, reduced_series_t
   use nocdyn_series_code, only: code_obstacle, write_series_code
   use nocdyn_sparse_map, only: new_sparse_map, sparse_map_t, transposed_order
   use nocdyn_system, only: evaluation_fatal, pattern_t
+  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -39,7 +41,7 @@ module nocdyn_reduced
     procedure :: formulate, update_inertia, pass_parameters, refresh_lane, refresh_parameters, derivative, jacobian
     procedure :: evaluate_at, hold_jacobian, spread_jacobian
     procedure :: jacobian_pattern, series_obstacle, prepare_series, series, find_sets
-    procedure :: write_code, attach_code, runs_code, takes_plain_steps, take_plain_steps
+    procedure :: write_code, write_program, attach_code, runs_code, takes_plain_steps, take_plain_steps
   end type reduced_t
 
 contains
@@ -243,6 +245,33 @@ contains
     obstacle = code_obstacle(self%series_kernel)
     if (obstacle == '') call write_series_code(self%series_kernel, self%state, code)
   end subroutine write_code
+
+  !> Writes a program of its own for a block of equal lanes, after `prepare_series`, with the branches of the start.
+  subroutine write_program(self, t_start, code, obstacle)
+    class(reduced_t), intent(inout) :: self
+    real(wp), intent(in) :: t_start   !! [s]
+    type(code_text_t), intent(inout) :: code
+    character(len=:), allocatable, intent(out) :: obstacle   !! why there is none, ''
+    real(wp) :: y(self%lanes, self%states)
+    type(string_t) :: names(self%states)
+    integer :: i
+
+    obstacle = code_obstacle(self%series_kernel)
+    if (self%joints%count > 0) obstacle = 'joints that lock or move, and teeth with losses, have no code'
+    if (obstacle /= '') return
+    if (self%switches > 0) call code%line('/* The laws are those at the start: the program does not follow these boundaries.')
+    do i = 1, self%switches
+      call code%line('   - @@', a=self%switch_name(i), b=trim(merge(' */', '   ', i == self%switches)))
+    end do
+    y = self%start()
+    do i = 1, self%lanes
+      call self%start_lane(i, t_start, y(i, :))
+    end do
+    do i = 1, self%states
+      names(i)%text = self%component_name(i)
+    end do
+    call write_machine_code(self%series_kernel, self%state, self%twist_at_origin, t_start, y(1, :), names, code)
+  end subroutine write_program
 
   !> Lets series be computed by a program that `write_code` of a block with the same structure has written.
   subroutine attach_code(self, loaded)

@@ -3,32 +3,22 @@
 !> The code depends on the structure of the machine alone: which elements, laws and maps there are. All numbers are arguments.
 !> Consecutive elements with equal terms are loops, so that it stays short however large the machine is.
 module nocdyn_series_code
+  use nocdyn_code_layout, only: find_laws, first_of, is_forcing, lay_out, layout_t, number_of
   use nocdyn_code_text, only: code_text_t, filled, list_of
-  use nocdyn_compiled_code, only: series_source
+  use nocdyn_compiled_code, only: code_part, series_part, steps_part
   use nocdyn_element_laws, only: element_law_t
-  use nocdyn_law_code, only: law_code_t, new_law_code
+  use nocdyn_law_code, only: law_code_t
   use nocdyn_laws, only: narrow
   use nocdyn_machine_state, only: machine_state_t
   use nocdyn_reduced_series, only: reduced_series_t
-  use nocdyn_series_terms, only: has_cubic, has_forcing, has_history
+  use nocdyn_series_terms, only: has_forcing
   implicit none (type, external)
   private
 
-  public :: write_series_code, code_obstacle
+  public :: write_series_code, write_recurrence, code_obstacle
 
   integer, parameter :: most_elements = 6, most_across = 2   ! numbers side by side: of elements, of lanes
   integer, parameter :: few_elements = 12                    ! of a machine whose lanes are computed side by side
-
-  !> Where the numbers of the elements stand in the work space, and which elements loops treat alike.
-  type :: layout_t
-    logical :: is_across = .false.       !! whether numbers of lanes are computed side by side, not of elements
-    integer, allocatable :: entries(:)   !! of U, [elements]
-    integer, allocatable :: motion(:)    !! angle and speed, from 0, [elements + 1]
-    integer, allocatable :: square(:)    !! square of the angle, [elements + 1]
-    integer, allocatable :: bank(:)      !! number of the bank of the element in the code, -1: its law is polynomial, [elements]
-    logical, allocatable :: is_phase(:)  !! whether it is the phase of an element before, [elements]
-    integer, allocatable :: first(:)     !! element of each run, and one beyond the last element
-  end type layout_t
 
 contains
 
@@ -42,109 +32,49 @@ contains
     if (size(series%with_work) > 0) text = 'work is integrated'
   end function code_obstacle
 
-  !> Writes the program. Its procedure `nocdyn_series` is described in `nocdyn_compiled_series`.
+  !> Writes the program for blocks of lanes. Its procedures are described in `nocdyn_compiled_series`.
   subroutine write_series_code(series, state, code)
     type(reduced_series_t), intent(in) :: series
     type(machine_state_t), intent(in) :: state
     type(code_text_t), intent(inout) :: code
     type(law_code_t), allocatable :: laws(:)
     type(layout_t) :: layout
+
+    call find_laws(series, state, laws)
+    call lay_out(series, state, laws, layout)
+    layout%is_across = series%elements <= few_elements .and. series%strip >= most_across * narrow
+    call write_recurrence(series, state, laws, layout, narrow, series%w, code)
+    call write_entries(series, laws, code)
+  end subroutine write_series_code
+
+  !> Writes what computes the series, `expand`.
+  subroutine write_recurrence(series, state, laws, layout, lanes, w, code)
+    type(reduced_series_t), intent(in) :: series
+    type(machine_state_t), intent(in) :: state
+    type(law_code_t), intent(in) :: laws(:)
+    type(layout_t), intent(in) :: layout
+    integer, intent(in) :: lanes, w   !! that are computed together; lanes of a strip of the numbers
+    type(code_text_t), intent(inout) :: code
     integer :: b
 
-    allocate (laws(size(series%banks%moved) + size(series%banks%timed)))
-    do b = 1, size(laws)
-      associate (bank_law => state%banks(number_of(series, b))%law)
-        laws(b) = new_law_code(b - 1, bank_law%law, bank_law%series, bank_law)
-      end associate
-    end do
-    call lay_out(series, state, laws, layout)
     call code%line('#define P $', [series%order])
-    call code%line('#define W $', [series%w])
+    call code%line('#define LANES $', [lanes])
+    call code%line('#define W $', [w])
     call code%line('#define ELEMENTS $', [series%elements])
     call code%line('#define FREEDOMS $', [series%freedoms])
     call code%line('#define COMPONENTS $   /* of the state */', [2 * series%freedoms + series%internal])
     call code%line('#define ACROSS $   /* whether numbers side by side are of lanes, not of elements */', &
                    [merge(1, 0, layout%is_across)])
     call code%line('#define MOST $   /* of them */', [merge(most_across, most_elements, layout%is_across)])
-    call code%line(series_source())
+    call code%line(code_part(series_part))
+    if (lanes > 1) call code%line(code_part(steps_part))
     call write_data(series, state, laws, layout, code)
     do b = 1, size(laws)
       call write_bank(series, state%banks(number_of(series, b))%law, laws(b), code)
     end do
     call write_runs(series, layout, code)
     call write_strip(series, state, laws, layout, code)
-    call write_entries(series, laws, code)
-  end subroutine write_series_code
-
-  !> The number in the machine of a bank in the code.
-  pure integer function number_of(series, b) result(number)
-    type(reduced_series_t), intent(in) :: series
-    integer, intent(in) :: b
-
-    if (b <= size(series%banks%moved)) then
-      number = series%banks%moved(b)
-    else
-      number = series%banks%timed(b - size(series%banks%moved))
-    end if
-  end function number_of
-
-  subroutine lay_out(series, state, laws, layout)
-    type(reduced_series_t), intent(in) :: series
-    type(machine_state_t), intent(in) :: state
-    type(law_code_t), intent(in) :: laws(:)
-    type(layout_t), intent(out) :: layout
-    integer :: b, e, first
-
-    layout%is_across = series%elements <= few_elements .and. series%strip >= most_across * narrow
-    allocate (layout%motion(series%elements + 1), layout%square(series%elements + 1), source=0)
-    allocate (layout%bank(series%elements), source=-1)
-    allocate (layout%is_phase(series%elements), source=.false.)
-    layout%entries = series%twists%first(2:) - series%twists%first(:series%elements)
-    do e = 1, series%elements
-      layout%motion(e + 1) = layout%motion(e) + merge(series%order + 1, 1, iand(series%terms(e), has_history) > 0)
-      layout%square(e + 1) = layout%square(e) + merge(series%order + 1, 0, iand(series%terms(e), has_cubic) > 0)
-    end do
-    do b = 1, size(laws)
-      first = series%banks%first(number_of(series, b))
-      associate (law => state%banks(number_of(series, b))%law)
-        associate (elements => law%law%elements)
-          layout%bank(first:first + law%ports * elements - 1) = b - 1
-          if (law%ports > 1) layout%is_phase(first + elements:first + 2 * elements - 1) = .true.
-        end associate
-      end associate
-    end do
-    allocate (layout%first(1), source=1)
-    do e = 2, series%elements
-      if (.not. are_alike(e - 1, e)) layout%first = [layout%first, e]
-    end do
-    layout%first = [layout%first, series%elements + 1]
-
-  contains
-
-    !> Whether a loop treats two elements alike, and their phases.
-    pure logical function are_alike(a, b)
-      integer, intent(in) :: a, b
-      integer :: phase
-
-      are_alike = layout%bank(a) == layout%bank(b) .and. layout%entries(a) == layout%entries(b) .and. &
-                  series%terms(a) == series%terms(b) .and. (layout%is_phase(a) .eqv. layout%is_phase(b))
-      if (.not. are_alike .or. layout%bank(a) < 0 .or. layout%is_phase(a)) return
-      associate (law => state%banks(number_of(series, layout%bank(a) + 1))%law)
-        phase = law%law%elements
-        if (law%ports > 1) are_alike = layout%entries(a + phase) == layout%entries(b + phase) .and. &
-                                       series%terms(a + phase) == series%terms(b + phase)
-      end associate
-    end function are_alike
-
-  end subroutine lay_out
-
-  !> Whether the moments of a bank follow from the time alone.
-  pure logical function is_forcing(series, bank)
-    type(reduced_series_t), intent(in) :: series
-    integer, intent(in) :: bank   !! number in the code, -1: none
-
-    is_forcing = bank >= size(series%banks%moved)
-  end function is_forcing
+  end subroutine write_recurrence
 
   !> Writes the tables and the work space.
   subroutine write_data(series, state, laws, layout, code)
@@ -339,14 +269,6 @@ contains
     end function phase_of
 
   end subroutine write_runs
-
-  !> The first element of a bank in the code.
-  pure integer function first_of(series, bank)
-    type(reduced_series_t), intent(in) :: series
-    integer, intent(in) :: bank
-
-    first_of = series%banks%first(number_of(series, bank + 1))
-  end function first_of
 
   !> Writes calls of a procedure for all of n elements.
   subroutine write_calls(layout, n, procedure, arguments, code)
