@@ -19,7 +19,10 @@ MACHINE = """\
 &run t_end = 0.4 rtol = 1e-11 atol = 1e-11 /
 &output points = 3 /
 """
-LOSSES = MACHINE + "&body name = 'out' inertia = 1.0 /\n&gear name = 'g' bodies = 'rotor', 'out' radii = 0.1, 0.2 efficiency = 0.9 /\n"
+TEETH = """\
+&body name = 'out' inertia = 1.0 /
+&gear name = 'teeth' bodies = 'rotor', 'out' radii = 0.1, 0.2 efficiency = 0.9 /
+"""
 
 
 def test_a_program_moves_the_machine_as_a_run_does(nocdyn):
@@ -44,7 +47,7 @@ def test_boundaries_that_a_program_does_not_follow_are_named(nocdyn):
 
 
 def test_teeth_with_losses_have_no_code(nocdyn):
-    file = nocdyn.write("machine.nml", LOSSES)
+    file = nocdyn.write("machine.nml", MACHINE + TEETH)
     outcome = nocdyn("matrices", "--code", file)
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert outcome.stderr == f"nocdyn: {file}: joints that lock or move, and teeth with losses, have no code\n"

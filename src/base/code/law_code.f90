@@ -26,6 +26,7 @@ module nocdyn_law_code
 
 contains
 
+  !> The law of a bank, with its work space for series.
   function new_law_code(bank, law, work, inputs) result(self)
     integer, intent(in) :: bank
     type(law_t), intent(in) :: law
@@ -52,6 +53,8 @@ contains
             is_kept(number + 1) = .true.
           case (op_cosine, op_sech_squared)
             is_kept(number - 1) = .true.
+          case default
+            ! it needs no other series
           end select
           if (node%operation >= op_reciprocal .and. node%operation /= op_harmonics) is_kept(number) = .true.
         end associate

@@ -1,6 +1,6 @@
-!> Plain steps: what an integrator, a system and an observer share where a system takes whole steps by itself, by a program that was
-!> compiled for it. They are the steps of the method `taylor` in which nothing has to be decided: the series is finite, its step not
-!> too small, and no switch, event, output time or sampled function lies in it.
+!> Plain steps: what an integrator, a system and an observer share where a system takes whole steps by itself, by a program that
+!> was compiled for it. They are the steps of the method `taylor` in which nothing has to be decided: the series is finite, its
+!> step not too small, and no switch, event, output time or sampled function lies in it.
 !>
 !> The types are laid out as `steps` and `range` of base/code/series.inc.
 module nocdyn_plain_steps
@@ -26,7 +26,7 @@ module nocdyn_plain_steps
     type(c_ptr) :: no_highest = c_null_ptr, no_lowest = c_null_ptr   !! huge where an extreme is not needed, else -huge; [lanes]
   end type plain_range_t
 
-  !> A lane that steps by series where there is a choice of kinds of steps, and has nothing to decide: its steps are counted together.
+  !> A lane that steps by series where kinds of steps can be chosen, and has nothing to decide: its steps are counted together.
   type, bind(c), public :: calm_lane_t
     integer(c_int) :: steps = 0         !! accepted steps without a decision, unless they show signs of stiffness
     integer(c_int) :: uncounted = 0     !! of these, those that have been made

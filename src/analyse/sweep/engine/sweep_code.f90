@@ -1,7 +1,7 @@
 !> Programs for the series of a sweep: when it pays to write and compile one, and what the threads share of it.
 !>
-!> The work of a sweep is counted, not timed: what the variants so far have taken, in steps times the cost of a step, tells what all
-!> will take. Results have the same bits with a program as without, so it does not matter when the threads change to it.
+!> The work of a sweep is counted, not timed: what the variants so far have taken, in steps times the cost of a step, tells what
+!> all will take. Results have the same bits with a program as without, so it does not matter when the threads change to it.
 module nocdyn_sweep_code
   use nocdyn_code_text, only: code_text_t
   use nocdyn_compiled_code, only: load_code, loaded_code_t
@@ -25,7 +25,7 @@ module nocdyn_sweep_code
   type, public :: sweep_code_t
     integer, private :: choice = compile_auto
     integer, private :: variants = 0               !! that are to be computed
-    character(len=:), allocatable, private :: obstacle      !! why there is no program; not allocated: there is one, or none was asked for
+    character(len=:), allocatable, private :: obstacle   !! why there is no program; not allocated: none was refused
     logical, private :: is_loaded = .false.
     integer, private :: counted = 0                !! variants whose work is known
     real(wp), private :: work = 0.0_wp             !! of these [ns]
@@ -38,6 +38,7 @@ module nocdyn_sweep_code
 
 contains
 
+  !> The choice of a command line, before anything is compiled.
   pure type(sweep_code_t) function new_sweep_code(choice, variants) result(self)
     character(len=*), intent(in) :: choice   !! of `compile_choices`; '': the first one
     integer, intent(in) :: variants          !! that are to be computed
