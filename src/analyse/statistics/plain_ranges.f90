@@ -6,6 +6,7 @@ module nocdyn_plain_ranges
   use nocdyn_kinds, only: wp
   use nocdyn_linear_statistics, only: linear_statistics_t
   use nocdyn_plain_steps, only: plain_range_t, plain_steps_t
+  use nocdyn_quadrature, only: gauss_legendre_rule
   use nocdyn_step_strips, only: fill_chord_gaps, strip_t, values_at
   implicit none (type, external)
   private
@@ -13,7 +14,7 @@ module nocdyn_plain_ranges
   type, public :: plain_ranges_t
     type(accumulator_t), pointer, private :: accumulators(:) => null()
     type(plain_range_t), allocatable, private :: ranges(:)   !! of the accumulators
-    real(wp), allocatable, private :: chord_gap(:)
+    real(wp), allocatable, private :: chord_gap(:), node(:), weight(:)   !! as in `linear_statistics_t`
     type(interpolation_t), private :: rule                   !! of the degree of the steps
     type(strip_t), private :: strip                          !! its first place is used
   contains
@@ -34,14 +35,17 @@ contains
     are_all = size(statistics%damages) == 0
     do i = 1, size(statistics%accumulators)
       associate (acc => statistics%accumulators(i))
-        are_all = are_all .and. acc%has_range() .and. .not. (acc%has_sums .or. acc%has_history .or. acc%from > statistics%t_start)
+        are_all = are_all .and. .not. (acc%has_history .or. acc%from > statistics%t_start)
       end associate
     end do
     if (.not. are_all) return
-    if (allocated(self%ranges)) deallocate (self%ranges, self%chord_gap)
+    if (allocated(self%ranges)) deallocate (self%ranges, self%chord_gap, self%node, self%weight)
     self%accumulators => statistics%accumulators
     allocate (self%ranges(size(statistics%accumulators)), self%chord_gap(degree))
     call fill_chord_gaps(self%chord_gap)
+    allocate (self%node(degree + 1), self%weight(degree + 1))
+    call gauss_legendre_rule(degree + 1, self%node, self%weight)
+    self%node(:) = 2 * self%node - 1
     self%rule = new_interpolation(degree)
     do i = 1, size(self%ranges)
       call describe(self%accumulators(i), i)
@@ -49,6 +53,8 @@ contains
     steps%ranges = size(self%ranges)
     steps%range = c_loc(self%ranges)
     steps%chord_gap = c_loc(self%chord_gap)
+    steps%node = c_loc(self%node)
+    steps%weight = c_loc(self%weight)
     select type (self)
     type is (plain_ranges_t)
       steps%observer = c_loc(self)
@@ -64,6 +70,8 @@ contains
       associate (range => self%ranges(number), columns => statistics%columns, first => statistics%columns%first(acc%column))
         range%number = number
         range%entries = columns%first(acc%column + 1) - first
+        range%has_range = merge(1, 0, acc%has_range())
+        range%has_sums = merge(1, 0, acc%has_sums)
         range%has_time = merge(1, 0, acc%has_time)
         range%has_max_abs = merge(1, 0, acc%has_max_abs)
         range%component = c_loc(columns%component(first))
@@ -77,6 +85,10 @@ contains
         range%lowest_time = c_loc(acc%lowest_time)
         range%no_highest = c_loc(acc%no_highest)
         range%no_lowest = c_loc(acc%no_lowest)
+        range%integral = c_loc(acc%integral)
+        range%square = c_loc(acc%square)
+        range%linear = c_loc(statistics%linear(1, acc%column))
+        range%cubic = c_loc(statistics%cubic(1, acc%column))
       end associate
     end subroutine describe
 

@@ -17,6 +17,7 @@ module nocdyn_plain_steps
   type, bind(c), public :: plain_range_t
     integer(c_int) :: number = 0                        !! for the observer
     integer(c_int) :: entries = 0                       !! even
+    integer(c_int) :: has_range = 0, has_sums = 0       !! whether extremes, and integrals, are needed
     integer(c_int) :: has_time = 0, has_max_abs = 0     !! whether times of extremes, and the largest size, are needed
     type(c_ptr) :: component = c_null_ptr               !! of the state, integers [entries]
     type(c_ptr) :: factor = c_null_ptr                  !! [8, entries] of the first eight lanes
@@ -24,6 +25,8 @@ module nocdyn_plain_steps
     integer(c_long) :: factor_step = 0, offset_step = 0 !! numbers to the next eight lanes
     type(c_ptr) :: highest = c_null_ptr, lowest = c_null_ptr, highest_time = c_null_ptr, lowest_time = c_null_ptr   !! [lanes]
     type(c_ptr) :: no_highest = c_null_ptr, no_lowest = c_null_ptr   !! huge where an extreme is not needed, else -huge; [lanes]
+    type(c_ptr) :: integral = c_null_ptr, square = c_null_ptr   !! of f(x) = (linear + cubic x^2) x and its square, [lanes]
+    type(c_ptr) :: linear = c_null_ptr, cubic = c_null_ptr      !! [lanes]
   end type plain_range_t
 
   !> A lane that steps by series where kinds of steps can be chosen, and has nothing to decide: its steps are counted together.
@@ -55,6 +58,7 @@ module nocdyn_plain_steps
     real(c_double) :: near = 0.0_c_double, weak = 0.0_c_double   !! |h lambda|, a sign of stiffness, and a weak one
     type(c_ptr) :: range = c_null_ptr                   !! [ranges]
     type(c_ptr) :: chord_gap = c_null_ptr               !! largest s - s^p, s from 0 to 1, p = 1 to the order
+    type(c_ptr) :: node = c_null_ptr, weight = c_null_ptr   !! of Gauss's rule with a point more than the order, -1 to 1
     type(c_ptr) :: observer = c_null_ptr                !! argument of `look`
     type(c_funptr) :: look = c_null_funptr              !! called where a range may be exceeded inside a step
   end type plain_steps_t
