@@ -129,6 +129,7 @@ contains
     scheduler%left = whole_argument(2)
     scheduler%size = whole_argument(3)
     call omp_init_lock(scheduler%lock)
+    call omp_init_lock(code%lock)
     allocate (block)
     call new_sweep_block(plan, setup%lanes, setup%has_energy_balance, scheduler, code, block)
     call create_journal(text_argument(4), 'sweep.journal', new_sweep_header(plan, 1, 1), scheduler%journal, error)

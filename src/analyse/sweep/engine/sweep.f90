@@ -60,10 +60,12 @@ contains
     type(sweep_code_t), target, intent(inout) :: code
 
     call omp_init_lock(scheduler%lock)
+    call omp_init_lock(code%lock)
     !$omp parallel num_threads(threads) default(shared)
     call compute_chunks(plan, setup, scheduler, code)
     !$omp end parallel
     call scheduler%finalise()
+    call omp_destroy_lock(code%lock)
     call omp_destroy_lock(scheduler%lock)
   end subroutine compute_variants
 

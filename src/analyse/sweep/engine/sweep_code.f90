@@ -3,12 +3,13 @@
 !> The work of a sweep is counted, not timed: what the variants so far have taken, in steps times the cost of a step, tells what
 !> all will take. Results have the same bits with a program as without, so it does not matter when the threads change to it.
 module nocdyn_sweep_code
-  use nocdyn_code_text, only: code_text_t
   use nocdyn_compiled_code, only: load_code, loaded_code_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_methods, only: taylor_cost
   use nocdyn_reduced, only: reduced_t
+  use nocdyn_serial_work, only: write_code
+  use omp_lib, only: omp_lock_kind, omp_set_lock, omp_unset_lock
   implicit none (type, external)
   private
 
@@ -23,6 +24,7 @@ module nocdyn_sweep_code
 
   !> What the threads of a process share.
   type, public :: sweep_code_t
+    integer(omp_lock_kind) :: lock                 !! of OpenMP, while there are threads
     integer, private :: choice = compile_auto
     integer, private :: variants = 0               !! that are to be computed
     character(len=:), allocatable, private :: obstacle   !! why there is no program; not allocated: none was refused
@@ -64,10 +66,10 @@ contains
     integer, intent(in) :: variants, steps   !! numbers of variants, and of their steps
 
     if (order == 0 .or. self%choice /= compile_auto) return
-    !$omp critical (sweep_code)
+    call omp_set_lock(self%lock)
     self%counted = self%counted + variants
     self%work = self%work + steps * taylor_cost(formulation, order)
-    !$omp end critical (sweep_code)
+    call omp_unset_lock(self%lock)
   end subroutine count_work
 
   !> Attaches a program to a block whose series are prepared, if there is one or one is due: the first thread that needs it makes
@@ -75,7 +77,6 @@ contains
   subroutine offer(self, formulation)
     class(sweep_code_t), intent(inout) :: self
     class(formulation_t), intent(inout) :: formulation
-    type(code_text_t) :: code
     type(loaded_code_t) :: loaded
     character(len=:), allocatable :: obstacle, text
     logical :: is_due
@@ -84,7 +85,7 @@ contains
     select type (formulation)
     class is (reduced_t)
       if (formulation%runs_code()) return
-      !$omp critical (sweep_code)
+      call omp_set_lock(self%lock)
       if (self%is_loaded) call formulation%attach_code(self%loaded)
       is_due = .not. (self%is_busy .or. self%programs == most_programs .or. allocated(self%obstacle) .or. formulation%runs_code())
       if (is_due .and. self%choice == compile_auto) then
@@ -92,14 +93,11 @@ contains
       end if
       if (is_due) self%programs = self%programs + 1
       self%is_busy = self%is_busy .or. is_due
-      !$omp end critical (sweep_code)
+      call omp_unset_lock(self%lock)
       if (.not. is_due) return
-      !$omp critical (texts)
-      call formulation%write_code(code, obstacle)
-      text = code%text()
-      !$omp end critical (texts)
+      call write_code(formulation, text, obstacle)
       if (obstacle == '') call load_code(text, loaded, obstacle)
-      !$omp critical (sweep_code)
+      call omp_set_lock(self%lock)
       self%is_busy = .false.
       if (obstacle /= '') then
         self%obstacle = obstacle
@@ -108,7 +106,7 @@ contains
         self%is_loaded = .true.
         call formulation%attach_code(loaded)
       end if
-      !$omp end critical (sweep_code)
+      call omp_unset_lock(self%lock)
     end select
   end subroutine offer
 
