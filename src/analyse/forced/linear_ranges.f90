@@ -14,7 +14,7 @@ module nocdyn_linear_ranges
   implicit none (type, external)
   private
 
-  public :: find_excursions
+  public :: curved_elements, find_excursions
 
   integer, parameter :: samples = 96   ! of half a turn: the share of a kink is right to some per cent
   real(wp), parameter :: pi = acos(-1.0_wp)
@@ -161,7 +161,7 @@ contains
     twist = (0.0_wp, 0.0_wp)
     associate (rows => response%machine%elements%rows)
       do k = rows%first(element), rows%first(element + 1) - 1
-        if (rows%body(k) > 0) twist = twist + rows%coefficient(k) * point%angle(:, rows%body(k))
+        if (rows%body(k) > 0) twist = twist + rows%coefficient(k) * point%angle(:, response%angle_place(rows%body(k)))
       end do
     end associate
     do l = 1, size(twist)

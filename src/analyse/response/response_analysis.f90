@@ -2,7 +2,6 @@
 module nocdyn_response_analysis
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_backward_speeds, only: refuse_backward_speeds
-  use nocdyn_column_names, only: choose_signals
   use nocdyn_critical_speeds, only: crossing_t, find_crossings, keep_new, refine_peaks
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_excitation_lines, only: line_order, line_t
@@ -12,13 +11,14 @@ module nocdyn_response_analysis
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_mode_branches, only: most_coordinates, new_speed_modes, speed_modes_t
+  use nocdyn_moment_forms, only: moment_form_t
+  use nocdyn_response_choice, only: choose_quantities, choose_shown, find_couplings
   use nocdyn_response_fatigue, only: find_response_fatigue, response_fatigue_t
   use nocdyn_response_limits, only: read_limits, response_limit_t
   use nocdyn_response_notes, only: note_linear_ranges, note_overloads, note_rated_speeds, note_shaft_modes, note_separation, &
     note_simplifications, note_steady_states
   use nocdyn_response_points, only: keep_points
   use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
-  use nocdyn_signals, only: signal_t
   use nocdyn_synthesis, only: new_synthesis
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
   use nocdyn_unstable_speeds, only: describe_first, find_unstable, mark_between, note_speeds, unstable_speed_t
@@ -52,6 +52,7 @@ contains
     type(machine_t), intent(in) :: machine   !! one lane
     type(response_analysis_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
+    type(moment_form_t), allocatable :: forms(:)
     integer(int64) :: began, ended, rate
     real(wp) :: failed_speed
 
@@ -68,16 +69,18 @@ contains
       call place_error(input, self%settings, failed_speed, error)
       if (.not. allocated(error)) call choose_lines(input, self%settings, self%response%lines, error)
       if (.not. allocated(error)) call read_limits(input, self%response%quantities, self%limits, error)
-      if (.not. allocated(error)) call choose_shown(input, self, error)
+      if (.not. allocated(error)) call choose_shown(input, self%response, self%shown, self%shown_angles, self%notes, error)
       if (.not. allocated(error)) then
+        forms = self%response%quantities
+        call choose_quantities(input, self%response, self%shown, self%shown_angles, self%limits%quantity)
         call prepare_synthesis(self%response)
-        call self%response%add_points(speeds, .true., error, failed_speed)
+        call self%response%add_points(speeds, .true., error, failed_speed, only_states=.true.)
         call place_error(input, self%settings, failed_speed, error)
       end if
     end associate
     if (.not. allocated(error)) call refuse_backward_speeds(input, self%settings, machine, self%response, error)
     if (allocated(error)) return
-    call find_peaks(self, error, failed_speed)
+    call find_peaks(self, forms, error, failed_speed)
     if (allocated(error)) then
       call place_error(input, self%settings, failed_speed, error)
     else
@@ -92,28 +95,6 @@ contains
     call system_clock(ended)
     self%wall_time = real(ended - began, wp) / real(rate, wp)
   end subroutine analyse_response
-
-  !> Chooses what is written.
-  subroutine choose_shown(input, self, error)
-    type(input_t), intent(in) :: input
-    type(response_analysis_t), intent(inout) :: self
-    type(error_t), allocatable, intent(out) :: error
-    type(signal_t), allocatable :: signals(:)
-    integer, allocatable :: chosen(:)
-    integer :: q
-
-    associate (quantities => self%response%quantities, angles => self%response%angles)
-      allocate (signals(size(quantities) + size(angles)))
-      do q = 1, size(quantities)
-        signals(q) = quantities(q)%signal_t
-      end do
-      signals(size(quantities) + 1:) = angles
-      call choose_signals(input, signals, chosen, self%notes, error)
-      if (allocated(error)) return
-      self%shown = pack(chosen, chosen <= size(quantities))
-      self%shown_angles = pack(chosen, chosen > size(quantities)) - size(quantities)
-    end associate
-  end subroutine choose_shown
 
   !> Adds the damage by &fatigue to a response.
   subroutine add_fatigue(input, self, error)
@@ -184,9 +165,10 @@ contains
     if (text == '') text = 'none'
   end subroutine list_orders
 
-  !> Finds modes, critical speeds and peaks between the speeds of the grid.
-  subroutine find_peaks(self, error, failed_speed)
+  !> Finds modes, critical speeds, oscillations and their peaks between the speeds of the grid.
+  subroutine find_peaks(self, forms, error, failed_speed)
     type(response_analysis_t), intent(inout) :: self
+    type(moment_form_t), intent(in) :: forms(:)   !! all quantities of the machine
     type(error_t), allocatable, intent(out) :: error
     real(wp), intent(inout) :: failed_speed
     real(wp) :: unrefined
@@ -201,6 +183,8 @@ contains
       if (.not. allocated(error)) call leave_out_unstable(self, error, failed_speed)
       if (allocated(error)) return
     end if
+    call find_couplings(forms, self%modes, self%response, self%crossings)
+    call self%response%solve_oscillations()
     call refine_peaks(self%response, self%crossings, unrefined, error, failed_speed)
     if (.not. allocated(error) .and. unrefined > 0) then
       call append(self%notes, 'there are too many peaks between the speeds of the grid to refine all: some may be higher by ' // &

@@ -185,7 +185,8 @@ contains
     real(wp), allocatable :: row(:)
     integer :: i, l, n
 
-    associate (response => analysis%response, shown => analysis%shown, angles => analysis%shown_angles)
+    associate (response => analysis%response, shown => analysis%shown, &
+               angles => analysis%response%angle_place(analysis%response%angles(analysis%shown_angles)%source%index))
       call list_order_columns(analysis, wanted, list)
       call list%list_columns(labels, unit)
       allocate (row(size(labels)))
