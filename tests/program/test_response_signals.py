@@ -109,7 +109,7 @@ def test_notes_and_damage_do_not_depend_on_what_is_written(nocdyn):
     noted, (damaged,) = gap_and_damage(nocdyn, "'phi_*'")
     assert any("leaves contact" in note for note in notes)
     assert noted == notes
-    assert damaged["largest_damage_per_hour"] == pytest.approx(damage["largest_damage_per_hour"], rel=REFINED)
+    assert damaged["largest_damage_per_hour"] == pytest.approx(damage["largest_damage_per_hour"], rel=5 * REFINED)  # slope 5
 
 
 @pytest.mark.parametrize(

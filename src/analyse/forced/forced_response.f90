@@ -30,14 +30,15 @@ module nocdyn_forced_response
     type(line_t), allocatable :: lines(:)
     type(moment_form_t), allocatable :: quantities(:)  !! that are computed: all, or the ones of `keep`
     type(signal_t), allocatable :: angles(:)           !! of the bodies, without nodes of shafts
+    type(moment_form_t), allocatable :: left_out(:)    !! moments that are not computed, but compared with others
     integer, allocatable :: angle_place(:)             !! of each body among the angles that are computed, or 0, [bodies]
     type(synthesis_t) :: synthesis
     logical :: has_oscillations = .true.               !! whether these are computed, beside the steady states and frequencies
     type(response_point_t), allocatable :: points(:)   !! ascending by the size of the speed
-    real(wp), allocatable :: left_out(:)               !! speeds of the grid at which there is no steady state [rad/s]
+    real(wp), allocatable :: speeds_left_out(:)        !! speeds of the grid at which there is no steady state [rad/s]
     character(len=:), allocatable :: left_out_message  !! why, at the first one
   contains
-    procedure :: add_points, add_quantity, frequencies, keep, solve_oscillations, speeds, values_at_a_speed
+    procedure :: add_points, add_quantity, frequencies, keep, largest_left_out, solve_oscillations, speeds, values_at_a_speed
   end type forced_response_t
 
   !> Work space of one thread.
@@ -89,7 +90,7 @@ contains
     self%angles = pack(signals, signals%source%kind == signal_angle .and. &
                        signals%source%index <= machine%bodies - machine%nodes)
     self%angle_place = [(b, b=1, machine%bodies)]
-    allocate (self%points(0), self%left_out(0))
+    allocate (self%points(0), self%speeds_left_out(0), self%left_out(0))
   end subroutine new_forced_response
 
   !> Computes only some of the quantities, and the angles of some bodies. The angles that powers need are among them.
@@ -166,8 +167,8 @@ contains
       has_state(i) = .not. allocated(error)
       if (has_state(i)) cycle
       if (.not. are_of_grid) cycle
-      if (size(self%left_out) == 0) self%left_out_message = error%message
-      self%left_out = [self%left_out, speeds(i)]
+      if (size(self%speeds_left_out) == 0) self%left_out_message = error%message
+      self%speeds_left_out = [self%speeds_left_out, speeds(i)]
     end do
     if (size(self%points) == 0 .and. .not. any(has_state)) then
       failed_speed = speeds(1)
@@ -230,22 +231,17 @@ contains
     type(forced_response_t), intent(in) :: self
     type(response_point_t), intent(inout) :: points(:)
     type(work_t) :: work
-    integer :: i, q
-    logical :: is_needed(self%machine%elements%count)   ! by the quantities
+    integer :: i
 
-    is_needed = .false.
-    do q = 1, size(self%quantities)
-      is_needed(self%quantities(q)%elements) = .true.
-    end do
     if (real(size(points), wp) * size(self%lines) * self%matrix%coordinates < worth_threads) then
-      call prepare_work(self, is_needed, work)
+      call prepare_work(self, self%quantities, work)
       do i = 1, size(points)
         call solve_point(self, points(i), work)
       end do
       return
     end if
     !$omp parallel private(work)
-    call prepare_work(self, is_needed, work)
+    call prepare_work(self, self%quantities, work)
     !$omp do schedule(dynamic, 4)
     do i = 1, size(points)
       call solve_point(self, points(i), work)
@@ -255,12 +251,17 @@ contains
     !$omp end parallel
   end subroutine solve_points
 
-  subroutine prepare_work(self, is_needed, work)
+  subroutine prepare_work(self, quantities, work)
     type(forced_response_t), intent(in) :: self
-    logical, intent(in) :: is_needed(:)   !! whether the moment of an element is, [elements]
+    type(moment_form_t), intent(in) :: quantities(:)   !! that are computed
     type(work_t), intent(out) :: work
-    integer :: e
+    integer :: e, q
+    logical :: is_needed(self%machine%elements%count)
 
+    is_needed = .false.
+    do q = 1, size(quantities)
+      is_needed(quantities(q)%elements) = .true.
+    end do
     work%band = new_band_work(self%matrix)
     work%elements = pack([(e, e=1, size(is_needed))], is_needed)
     associate (elements => size(is_needed))
@@ -308,13 +309,11 @@ contains
     type(work_t), intent(in) :: work
     complex(wp) :: amplitude(size(self%lines))
     real(wp) :: highest, lowest, mean
-    integer :: l, p
+    integer :: p
 
     associate (one => self%quantities(q))
       do p = 1, size(one%weight, 1)
-        do l = 1, size(amplitude)
-          amplitude(l) = one%total(p, work%moment(:, l))
-        end do
+        amplitude = amplitudes(one, p, work)
         mean = sum(one%weight(p, :) * point%state%mean(one%elements)) + one%by_held_torque * point%state%torque
         if (one%source%body > 0) then   ! a power, to the first order
           associate (speed => point%state%omega(one%source%body), angle => point%angle(:, self%angle_place(one%source%body)))
@@ -333,6 +332,47 @@ contains
       end do
     end associate
   end subroutine find_quantity
+
+  !> The largest half range of the moments in `left_out` at a speed. The sum of its amplitudes bounds each.
+  real(wp) function largest_left_out(self, point) result(largest)
+    class(forced_response_t), intent(in) :: self
+    type(response_point_t), intent(in) :: point
+    type(response_point_t) :: again
+    type(work_t) :: work
+    real(wp) :: bound(size(self%left_out)), highest, lowest
+    integer :: l, p, q
+
+    call prepare_work(self, self%left_out, work)
+    again = point
+    do l = 1, size(self%lines)
+      call solve_line(self, l, again, work)
+    end do
+    do q = 1, size(bound)
+      bound(q) = maxval([(sum(abs(amplitudes(self%left_out(q), p, work))), p=1, size(self%left_out(q)%weight, 1))])
+    end do
+    largest = 0.0_wp
+    do while (any(bound > largest))
+      q = maxloc(bound, dim=1)
+      do p = 1, size(self%left_out(q)%weight, 1)
+        call self%synthesis%extremes(amplitudes(self%left_out(q), p, work), lowest, highest)
+        largest = max(largest, 0.5_wp * (highest - lowest))
+      end do
+      bound(q) = 0.0_wp
+    end do
+  end function largest_left_out
+
+  !> A quantity at one of its points, without the speed of a power.
+  pure function amplitudes(quantity, point, work)
+    type(moment_form_t), intent(in) :: quantity
+    integer, intent(in) :: point
+    type(work_t), intent(in) :: work
+    complex(wp) :: amplitudes(size(work%moment, 2))
+    integer :: l
+
+    do l = 1, size(amplitudes)
+      amplitudes(l) = quantity%total(point, work%moment(:, l))
+    end do
+  end function amplitudes
 
   !> Moments, angles and heat of one line.
   pure subroutine solve_line(self, l, point, work)

@@ -99,8 +99,8 @@ contains
       call describe_speeds(speed, speeds)
       call append(notes, 'the steady state is unstable at ' // speeds // ': ' // text // '; ' // consequence)
     end if
-    if (size(response%left_out) > 0) then
-      call describe_speeds(response%left_out, speeds)
+    if (size(response%speeds_left_out) > 0) then
+      call describe_speeds(response%speeds_left_out, speeds)
       call append(notes, 'there is no steady state at ' // speeds // ', which are left out: ' // &
                          response%left_out_message)
     end if

@@ -10,7 +10,7 @@ module nocdyn_response_choice
   use nocdyn_gap_couplings, only: gap_couplings_t
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_linear_ranges, only: curved_elements
+  use nocdyn_linear_ranges, only: curved_elements, is_compared
   use nocdyn_machine, only: machine_t
   use nocdyn_mode_branches, only: speed_modes_t
   use nocdyn_moment_forms, only: kind_moment, kind_reaction, moment_form_t
@@ -50,7 +50,7 @@ contains
   end subroutine choose_shown
 
   !> Leaves only the quantities and angles that something needs; numbers those that are written and limited anew. Variants may
-  !> record any, and a curved law is compared with the largest moment of all.
+  !> record any. The moments of curved laws are compared with the largest of all.
   subroutine choose_quantities(input, response, shown, shown_angles, limited)
     type(input_t), intent(in) :: input
     type(forced_response_t), intent(inout) :: response
@@ -65,18 +65,35 @@ contains
     kept = .false.
     kept(shown) = .true.
     kept(limited) = .true.
-    if (size(input%groups_named('record')) > 0 .or. size(curved_elements(response%machine)) > 0) then
-      bodies = .true.
-      kept = .true.
-    end if
-    if (all(kept) .and. all(bodies)) return
+    if (all(kept) .or. size(input%groups_named('record')) > 0) return
     call keep_damaged(input, response%quantities, kept)
     call keep_noted(response%machine, response%quantities, kept)
+    call compare_curved(response, kept, bodies)
     place = unpack([(q, q=1, count(kept))], kept, 0)
     shown = place(shown)
     limited = place(limited)
     call response%keep(kept, bodies)
   end subroutine choose_quantities
+
+  !> Keeps the angles of curved laws, and what is compared with their moments.
+  subroutine compare_curved(response, kept, bodies)
+    type(forced_response_t), intent(inout) :: response
+    logical, intent(in) :: kept(:)        !! [quantities]
+    logical, intent(inout) :: bodies(:)   !! whose angles are kept, [bodies]
+    integer, allocatable :: curved(:)
+    integer :: i, k, q
+
+    allocate (curved, source=curved_elements(response%machine))
+    if (size(curved) == 0) return
+    response%left_out = response%quantities(pack([(q, q=1, size(kept))], .not. kept .and. is_compared(response%quantities)))
+    associate (rows => response%machine%elements%rows)
+      do i = 1, size(curved)
+        do k = rows%first(curved(i)), rows%first(curved(i) + 1) - 1
+          if (rows%body(k) > 0) bodies(rows%body(k)) = .true.
+        end do
+      end do
+    end associate
+  end subroutine compare_curved
 
   !> Keeps what groups &fatigue ask for.
   subroutine keep_damaged(input, quantities, kept)
