@@ -15,6 +15,7 @@ module nocdyn_forced_response
   use nocdyn_signals, only: list_signals, signal_angle, signal_t
   use nocdyn_synthesis, only: new_synthesis, synthesis_t
   use nocdyn_text, only: to_text
+  use nocdyn_wanted_modes, only: modes_choice_t
   implicit none (type, external)
   private
 
@@ -34,6 +35,7 @@ module nocdyn_forced_response
     integer, allocatable :: angle_place(:)             !! of each body among the angles that are computed, or 0, [bodies]
     type(synthesis_t) :: synthesis
     logical :: has_oscillations = .true.               !! whether these are computed, beside the steady states and frequencies
+    type(modes_choice_t) :: choice                     !! of modes, for large machines
     type(response_point_t), allocatable :: points(:)   !! ascending by the size of the speed
     real(wp), allocatable :: speeds_left_out(:)        !! speeds of the grid at which there is no steady state [rad/s]
     character(len=:), allocatable :: left_out_message  !! why, at the first one

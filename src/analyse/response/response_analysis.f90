@@ -10,7 +10,7 @@ module nocdyn_response_analysis
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_mode_branches, only: most_coordinates, new_speed_modes, speed_modes_t
+  use nocdyn_mode_branches, only: new_speed_modes, speed_modes_t
   use nocdyn_moment_forms, only: moment_form_t
   use nocdyn_response_choice, only: choose_quantities, choose_shown, find_couplings
   use nocdyn_response_fatigue, only: find_response_fatigue, response_fatigue_t
@@ -19,6 +19,7 @@ module nocdyn_response_analysis
     note_simplifications, note_steady_states
   use nocdyn_response_points, only: keep_points
   use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
+  use nocdyn_state_modes, only: most_coordinates
   use nocdyn_synthesis, only: new_synthesis
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
   use nocdyn_unstable_speeds, only: describe_first, find_unstable, mark_between, note_speeds, unstable_speed_t
@@ -176,8 +177,8 @@ contains
 
     if (self%response%matrix%coordinates > most_coordinates) then
       call append(self%notes, 'this machine has ' // to_text(self%response%matrix%coordinates) // ' degrees of freedom: ' // &
-                              'natural frequencies are not computed for more than ' // to_text(most_coordinates) // &
-                              ', and peaks are sought from the speeds of the grid')
+                              'neither critical speeds nor peaks between the speeds of the grid are found for more than ' // &
+                              to_text(most_coordinates) // '; nocdyn campbell has natural frequencies')
     else
       call new_speed_modes(self%response, self%modes, error)
       if (.not. allocated(error)) call leave_out_unstable(self, error, failed_speed)

@@ -15,7 +15,8 @@ module nocdyn_response_notes
   use nocdyn_response_choice, only: has_gap, lose_of
   use nocdyn_response_settings, only: response_settings_t
   use nocdyn_shaft_errors, only: describe_error, has_shaft_nodes, noted_error, shaft_error
-  use nocdyn_mode_branches, only: most_coordinates, speed_modes_t
+  use nocdyn_mode_branches, only: speed_modes_t
+  use nocdyn_state_modes, only: most_coordinates
   use nocdyn_damping_notes, only: note_mean_slopes, note_stand_ins
   use nocdyn_text, only: append, joined, quoted, rounded_text, string_t, to_text
   use nocdyn_tooth_losses, only: tooth_losses_t
