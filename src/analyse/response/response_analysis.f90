@@ -26,7 +26,7 @@ module nocdyn_response_analysis
   implicit none (type, external)
   private
 
-  public :: analyse_response, add_fatigue, list_orders
+  public :: analyse_response, add_fatigue, list_orders, wants_grid
 
   type, public :: response_analysis_t
     type(response_settings_t) :: settings
@@ -36,6 +36,7 @@ module nocdyn_response_analysis
     type(crossing_t), allocatable :: crossings(:)
     type(unstable_speed_t), allocatable :: unstable(:)   !! speeds of the grid that are left out for it
     type(response_limit_t), allocatable :: limits(:)
+    logical :: writes_grid = .false.                 !! whether the tables are written to one file
     integer, allocatable :: shown(:), shown_angles(:)   !! quantities and angles of the response that are written
     type(response_fatigue_t), allocatable :: fatigue(:)   !! after `add_fatigue`
     type(string_t), allocatable :: notes(:)
@@ -64,6 +65,7 @@ contains
     call read_response_settings(input, machine, self%settings, error)
     if (allocated(error)) return
     self%body_name = machine%names(self%settings%body)%text
+    self%writes_grid = wants_grid(input)
     associate (speeds => self%settings%speeds)
       failed_speed = speeds(1)
       call new_forced_response(machine, self%settings%body, speeds, self%response, error)
@@ -96,6 +98,15 @@ contains
     call system_clock(ended)
     self%wall_time = real(ended - began, wp) / real(rate, wp)
   end subroutine analyse_response
+
+  !> Whether an input asks for one file of all tables.
+  pure logical function wants_grid(input)
+    type(input_t), intent(in) :: input
+
+    wants_grid = .false.
+    if (size(input%groups_named('response')) == 0) return
+    wants_grid = input%groups(input%position('response'))%text('format') == 'netcdf'
+  end function wants_grid
 
   !> Adds the damage by &fatigue to a response.
   subroutine add_fatigue(input, self, error)
