@@ -55,6 +55,7 @@ contains
     type(response_analysis_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
     type(moment_form_t), allocatable :: forms(:)
+    integer, allocatable :: limited(:)   ! quantities
     integer(int64) :: began, ended, rate
     real(wp) :: failed_speed
 
@@ -75,7 +76,9 @@ contains
       if (.not. allocated(error)) call choose_shown(input, self%response, self%shown, self%shown_angles, self%notes, error)
       if (.not. allocated(error)) then
         forms = self%response%quantities
-        call choose_quantities(input, self%response, self%shown, self%shown_angles, self%limits%quantity)
+        limited = self%limits%quantity
+        call choose_quantities(input, self%response, self%shown, self%shown_angles, limited)
+        self%limits%quantity = limited
         call prepare_synthesis(self%response)
         call self%response%add_points(speeds, .true., error, failed_speed, only_states=.true.)
         call place_error(input, self%settings, failed_speed, error)
