@@ -261,8 +261,8 @@ contains
         work%x(matrix%position(:matrix%coordinates)) = masses_times(machine, self%x(:, m))
         call matrix%solve(work)
         self%x(:, m) = work%x(matrix%position(:matrix%coordinates))
-        self%x(:, m) = self%x(:, m) / self%x(maxloc(abs(self%x(:, m)), dim=1), m)
-        if (.not. all(abs(self%x(:, m)) <= 2.0_wp)) return   ! not a number
+        self%x(:, m) = self%x(:, m) / self%x(maxloc(square_of(self%x(:, m)), dim=1), m)
+        if (.not. all(square_of(self%x(:, m)) <= 4.0_wp)) return   ! not a number
         call set_motion(machine, matrix, self, m)
       end do
     end associate
@@ -344,9 +344,17 @@ contains
     associate (value => self%value(m), twist => self%twist(:, m), angle => self%angle(:, m))
       call self%slopes%find_stiffness(machine%elements%internal, value, stiffness, slope)
       norm = sum(slope * twist**2) + 2.0_wp * value * sum(machine%inertia(1, :) * angle**2)
-      size_of_norm = sum(abs(slope) * abs(twist)**2) + 2.0_wp * abs(value) * sum(machine%inertia(1, :) * abs(angle)**2)
+      size_of_norm = sum((abs(real(slope, wp)) + abs(aimag(slope))) * square_of(twist)) &
+                     + 2.0_wp * abs(value) * sum(machine%inertia(1, :) * square_of(angle))
     end associate
   end subroutine find_norm
+
+  !> The square of the magnitude, without the care of `abs` for numbers near the end of their range.
+  elemental real(wp) function square_of(z)
+    complex(wp), intent(in) :: z
+
+    square_of = real(z, wp)**2 + aimag(z)**2
+  end function square_of
 
   !> The natural frequency of the undamped mode with most of the kinetic energy.
   real(wp) function undamped_of(machine, self, m) result(natural)
