@@ -14,7 +14,7 @@ NOT_FINITE = re.compile(r"(?<![\w'.])[-+]?(?:nan|inf|infinity)(?!\w)", re.IGNORE
 QUOTED = re.compile(rb"'[^'\n]*'|\"[^\"\n]*\"|=[^/\n]*")
 FINISHED = (
     "trajectory.csv", "trajectory.nc", "cycles.csv", "equilibrium.json", "modes.csv", "modes.json", "sweep.nc", "sweep.csv",
-    "response.csv", "response_orders.csv", "response.json", "campbell.csv", "campbell.json", "report.html",
+    "response.csv", "response_orders.csv", "response.nc", "response.json", "campbell.csv", "campbell.json", "report.html",
 )  # fmt: skip
 DIRECTIONS = "\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
 

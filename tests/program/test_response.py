@@ -501,7 +501,7 @@ def test_a_chain_of_bodies_needs_no_dense_matrix(nocdyn):
     text += "&excitation name = 'x' body = 'b0' kind = 'orders' orders = 1 amplitudes = 1 /\n&run t_end = 1 /\n"
     text += "&response body = 'b0' speed = 10, 20 count = 10 /\n"
     content = analysis(nocdyn, "response", text)
-    assert "natural frequencies are not computed for more than 600" in content["notes"][0]
+    assert "neither critical speeds nor peaks between the speeds of the grid are found for more than 600" in content["notes"][0]
 
 
 def test_a_peak_beyond_its_limit_is_told_beside_a_barred_range(nocdyn):

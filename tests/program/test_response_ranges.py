@@ -73,9 +73,7 @@ def test_the_duffing_oscillator_at_resonance_is_told(nocdyn):
     assert nocdyn.values(name="response.csv")["half_range_total_moment_spring"][1] == pytest.approx(3.6056, rel=1e-3)
 
 
-def test_a_load_whose_speed_swings_beyond_its_law_is_told(nocdyn):
-    """Smooth friction about a small speed: its slope there is not that over the swing."""
-    text = """\
+BRAKE = """\
 &body name = 'a' inertia = 1 speed = 1 /
 &body name = 'b' inertia = 1 speed = 1 /
 &coupling name = 'spring' bodies = 'a', 'b' stiffness = 1 damping = 0.1 /
@@ -85,7 +83,11 @@ def test_a_load_whose_speed_swings_beyond_its_law_is_told(nocdyn):
 &response body = 'a' speed = 0.9, 1 count = 2 /
 &run t_end = 1 /
 """
-    (note,) = (n for n in notes(nocdyn, text) if "'brake'" in n)
+
+
+def test_a_load_whose_speed_swings_beyond_its_law_is_told(nocdyn):
+    """Smooth friction about a small speed: its slope there is not that over the swing."""
+    (note,) = (n for n in notes(nocdyn, BRAKE) if "'brake'" in n)
     found = re.search(r"at (\S+) rpm its slope over the speed is on average (\S+) % (above|below)", note)
     speed = nocdyn.values(name="response.csv")["omega_a"]
     swing = nocdyn.values(name="response_orders.csv")["omega_amplitude_b"]
@@ -94,6 +96,21 @@ def test_a_load_whose_speed_swings_beyond_its_law_is_told(nocdyn):
         slope = 0.5 * (1 - tanh(mean) ** 2)
         changes.append(100 * (equivalent(lambda v: 0.5 * tanh(v), mean, amplitude) / slope - 1))
     assert any(float(found[2]) == pytest.approx(abs(change), rel=0.02) for change in changes)
+
+
+SHAKEN = """\
+&body name = 'c' inertia = 1 speed = 1 /
+&coupling name = 'soft' bodies = 'a', 'c' stiffness = 1 damping = 0.1 /
+&excitation name = 'y' body = 'c' kind = 'orders' orders = 50 amplitudes = 1e6 /
+"""
+
+
+@pytest.mark.parametrize("more", ["", SHAKEN])
+def test_a_swing_is_compared_with_moments_that_are_not_written(nocdyn, more):
+    text = BRAKE + more
+    every = notes(nocdyn, text)
+    assert any("'brake'" in note for note in every) == (more == "")
+    assert notes(nocdyn, text.replace("&response", "&response signals = 'phi_a'")) == every
 
 
 CLUTCH = """\
@@ -117,3 +134,4 @@ def test_a_clutch_that_would_slip_is_told_with_its_torque(nocdyn):
     assert f"clutch 'dry' does not hold at {sum(p > 200 for p in peaks)} of {len(peaks)} speeds" in note
     assert float(re.search(r"up to (\S+) N m at", note)[1]) == pytest.approx(max(peaks), rel=1e-3)
     assert "rpm; allowed: -200 to 200 N m;" in note
+    assert note in notes(nocdyn, CLUTCH.format(200.0).replace("&response", "&response signals = 'phi_m'"))

@@ -75,6 +75,12 @@ def test_recorded_responses_are_those_of_the_machine_alone(nocdyn):
         assert float(row["stress_shaft_ratio"]) == stress["ratio_to_limit"]
 
 
+def test_records_do_not_depend_on_what_a_response_writes(nocdyn):
+    machine = MACHINE.replace("DAMPING", LOSSY)
+    some = machine.replace("&response ", "&response signals = 'phi_one' ")
+    assert sweep(nocdyn, some + GRID + RESPONSES) == sweep(nocdyn, machine + GRID + RESPONSES)
+
+
 def test_recorded_modes_are_those_of_the_machine_alone(nocdyn):
     machine = MACHINE.replace("DAMPING", VISCOUS)
     for row in sweep(nocdyn, machine + GRID + MODES):

@@ -72,7 +72,8 @@ def calculate(
     results.of["modes"], results.of["holzer"] = _modes(program, words, stamps)
     for command in ("campbell", "response"):
         if "\n&response\n" in check["complete_input"]:
-            results.of[command] = _analyse(program, command, words, stamps)
+            in_csv = ["--set", "response.format=csv"] if _writes_netcdf(check) else []
+            results.of[command] = _analyse(program, command, [*words, *in_csv], stamps)
         else:
             results.of[command] = Calculation(command, "left out", "the input has no &response")
     results.of["run"] = _run(program, results, words)
@@ -100,6 +101,11 @@ def _check(program: Program, words: Sequence[str], case: str = "") -> dict:
 def _folder(file: str, check: dict) -> Path:
     output = f90nml.reads(check["complete_input"]).get("output", {})
     return Path(output.get("directory") or Path("results") / Path(file).stem)
+
+
+def _writes_netcdf(check: dict) -> bool:
+    """Whether a response is asked for in a form that reports do not read."""
+    return f90nml.reads(check["complete_input"])["response"].get("format") == "netcdf"
 
 
 def _analyse(program: Program, command: str, words: Sequence[str], stamps: Stamps) -> Calculation:

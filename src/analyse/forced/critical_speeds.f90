@@ -26,6 +26,8 @@ module nocdyn_critical_speeds
     real(wp) :: speed = 0.0_wp        !! of the reference body [rad/s]
     real(wp) :: frequency = 0.0_wp    !! [rad/s]
     real(wp) :: damping_ratio = 0.0_wp
+    integer :: quantity = 0           !! moment of the coupling with most of the potential energy of the mode, 0: none has any;
+                                      !! set where a response needs it
   end type crossing_t
 
   !> Where maxima are expected.

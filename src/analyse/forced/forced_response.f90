@@ -15,6 +15,7 @@ module nocdyn_forced_response
   use nocdyn_signals, only: list_signals, signal_angle, signal_t
   use nocdyn_synthesis, only: new_synthesis, synthesis_t
   use nocdyn_text, only: to_text
+  use nocdyn_wanted_modes, only: modes_choice_t
   implicit none (type, external)
   private
 
@@ -28,22 +29,26 @@ module nocdyn_forced_response
     type(held_speeds_t) :: held
     type(dynamic_stiffness_t) :: matrix
     type(line_t), allocatable :: lines(:)
-    type(moment_form_t), allocatable :: quantities(:)
+    type(moment_form_t), allocatable :: quantities(:)  !! that are computed: all, or the ones of `keep`
     type(signal_t), allocatable :: angles(:)           !! of the bodies, without nodes of shafts
+    type(moment_form_t), allocatable :: left_out(:)    !! moments that are not computed, but compared with others
+    integer, allocatable :: angle_place(:)             !! of each body among the angles that are computed, or 0, [bodies]
     type(synthesis_t) :: synthesis
     logical :: has_oscillations = .true.               !! whether these are computed, beside the steady states and frequencies
+    type(modes_choice_t) :: choice                     !! of modes, for large machines
     type(response_point_t), allocatable :: points(:)   !! ascending by the size of the speed
-    real(wp), allocatable :: left_out(:)               !! speeds of the grid at which there is no steady state [rad/s]
+    real(wp), allocatable :: speeds_left_out(:)        !! speeds of the grid at which there is no steady state [rad/s]
     character(len=:), allocatable :: left_out_message  !! why, at the first one
   contains
-    procedure :: add_points, speeds, frequencies, values_at_a_speed
+    procedure :: add_points, add_quantity, frequencies, keep, largest_left_out, solve_oscillations, speeds, values_at_a_speed
   end type forced_response_t
 
   !> Work space of one thread.
   type :: work_t
     type(band_work_t) :: band
+    integer, allocatable :: elements(:)         !! whose moments are needed
     complex(wp), allocatable :: stiffness(:)    !! [elements]
-    complex(wp), allocatable :: moment(:, :)    !! [elements, lines]
+    complex(wp), allocatable :: moment(:, :)    !! of the elements that are needed, [elements, lines]
     complex(wp), allocatable :: series(:)       !! twists in series with the elements [rad], [elements]
   end type work_t
 
@@ -61,6 +66,7 @@ contains
     type(signal_t), allocatable :: signals(:)
     real(wp), parameter :: beside = 1.01_wp   ! a second speed, which tells orders from frequencies
     real(wp), parameter :: unexcited = 1.0e100_wp   ! [rad/s]: no stiffness is large
+    integer :: b
     real(wp) :: lowest   ! frequency [rad/s]
 
     self%machine = machine
@@ -85,8 +91,37 @@ contains
     call list_signals(machine, signals)
     self%angles = pack(signals, signals%source%kind == signal_angle .and. &
                        signals%source%index <= machine%bodies - machine%nodes)
-    allocate (self%points(0), self%left_out(0))
+    self%angle_place = [(b, b=1, machine%bodies)]
+    allocate (self%points(0), self%speeds_left_out(0), self%left_out(0))
   end subroutine new_forced_response
+
+  !> Computes only some of the quantities, and the angles of some bodies. The angles that powers need are among them.
+  subroutine keep(self, quantities, bodies)
+    class(forced_response_t), intent(inout) :: self
+    logical, intent(in) :: quantities(:)   !! [quantities]
+    logical, intent(in) :: bodies(:)       !! [bodies]
+    integer :: b, q
+    logical :: is_needed(size(bodies))
+
+    self%quantities = self%quantities(pack([(q, q=1, size(quantities))], quantities))
+    is_needed = bodies
+    do q = 1, size(self%quantities)
+      if (self%quantities(q)%source%body > 0) is_needed(self%quantities(q)%source%body) = .true.
+    end do
+    self%angle_place = unpack([(b, b=1, count(is_needed))], is_needed, 0)
+  end subroutine keep
+
+  !> Adds a quantity, before oscillations are computed.
+  subroutine add_quantity(self, quantity)
+    class(forced_response_t), intent(inout) :: self
+    type(moment_form_t), intent(in) :: quantity
+
+    self%quantities = [self%quantities, quantity]
+    associate (body => quantity%source%body)
+      if (body == 0) return
+      if (self%angle_place(body) == 0) self%angle_place(body) = maxval(self%angle_place) + 1
+    end associate
+  end subroutine add_quantity
 
   !> The first of some speeds that has a steady state.
   subroutine hold_first(held, speeds, state, error)
@@ -109,15 +144,16 @@ contains
 
   !> Computes the response at more speeds, and puts it between the others. Speeds without a steady state are left out, unless all
   !> are.
-  subroutine add_points(self, speeds, are_of_grid, error, failed_speed)
+  subroutine add_points(self, speeds, are_of_grid, error, failed_speed, only_states)
     class(forced_response_t), intent(inout) :: self
     real(wp), intent(in) :: speeds(:)        !! of the reference body [rad/s]
     logical, intent(in) :: are_of_grid
     type(error_t), allocatable, intent(out) :: error
     real(wp), intent(out) :: failed_speed    !! at which there is no steady state; set with `error`
+    logical, intent(in), optional :: only_states   !! whether the oscillations wait for `solve_oscillations`
     type(response_point_t), allocatable :: new(:)
     integer :: i
-    logical :: has_state(size(speeds))
+    logical :: has_state(size(speeds)), is_complete
 
     failed_speed = 0.0_wp
     call refuse_too_many(self, size(speeds), are_of_grid, error)
@@ -133,8 +169,8 @@ contains
       has_state(i) = .not. allocated(error)
       if (has_state(i)) cycle
       if (.not. are_of_grid) cycle
-      if (size(self%left_out) == 0) self%left_out_message = error%message
-      self%left_out = [self%left_out, speeds(i)]
+      if (size(self%speeds_left_out) == 0) self%left_out_message = error%message
+      self%speeds_left_out = [self%speeds_left_out, speeds(i)]
     end do
     if (size(self%points) == 0 .and. .not. any(has_state)) then
       failed_speed = speeds(1)
@@ -142,15 +178,32 @@ contains
     end if
     if (allocated(error)) deallocate (error)
     call keep_points(new, has_state)
-    call solve_points(self, new)
+    do i = 1, size(new)
+      call set_lines(self, new(i))
+    end do
+    is_complete = .not. self%has_oscillations
+    if (present(only_states)) is_complete = is_complete .or. only_states
+    if (.not. is_complete) call solve_points(self, new)
     call merge_points(self%points, new)
   end subroutine add_points
 
-  !> Numbers that are kept of each speed.
+  !> Computes the oscillations at all points, which have their states only.
+  subroutine solve_oscillations(self)
+    class(forced_response_t), intent(inout) :: self
+    type(response_point_t), allocatable :: points(:)
+
+    call move_alloc(self%points, points)
+    call solve_points(self, points)
+    call move_alloc(points, self%points)
+  end subroutine solve_oscillations
+
+  !> Amplitudes that are kept of each speed.
   pure real(wp) function values_at_a_speed(self) result(values)
     class(forced_response_t), intent(in) :: self
 
-    values = max(1.0_wp, real(size(self%lines), wp) * (size(self%quantities) + self%machine%bodies))
+    values = real(size(self%lines), wp)
+    if (self%has_oscillations) values = values * (size(self%quantities) + maxval(self%angle_place))
+    values = max(1.0_wp, values)
   end function values_at_a_speed
 
   !> Refuses more numbers than memory and files should have.
@@ -159,14 +212,15 @@ contains
     integer, intent(in) :: speeds       !! that are added
     logical, intent(in) :: are_of_grid
     type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: of_state = 6.0_wp   ! complex numbers of each element in a steady state
     character(len=:), allocatable :: advice
 
-    associate (each => self%values_at_a_speed(), all => size(self%points) + speeds)
+    associate (each => self%values_at_a_speed() + of_state * self%machine%elements%count, all => size(self%points) + speeds)
       if (each * all <= most_values) return
       if (are_of_grid .and. 2 * each <= most_values) then
-        advice = 'allowed: at most count = ' // to_text(int(most_values / each)) // ' or fewer orders'
+        advice = 'allowed: at most count = ' // to_text(int(most_values / each)) // ', fewer orders or fewer signals'
       else
-        advice = 'allowed: fewer orders or a shorter range of speeds'
+        advice = 'allowed: fewer orders, fewer signals or a shorter range of speeds'
       end if
       call raise(error, exit_input, 'the response of ' // to_text(size(self%lines)) // ' orders and frequencies at ' // &
                  to_text(all) // ' speeds is ' // to_text(nint(each * all / 1.0e6_wp)) // &
@@ -182,31 +236,51 @@ contains
     integer :: i
 
     if (real(size(points), wp) * size(self%lines) * self%matrix%coordinates < worth_threads) then
-      call prepare_work(self, work)
+      call prepare_work(self, self%quantities, work)
       do i = 1, size(points)
         call solve_point(self, points(i), work)
       end do
       return
     end if
     !$omp parallel private(work)
-    call prepare_work(self, work)
+    call prepare_work(self, self%quantities, work)
     !$omp do schedule(dynamic, 4)
     do i = 1, size(points)
       call solve_point(self, points(i), work)
     end do
     !$omp end do
-    deallocate (work%stiffness, work%moment, work%series)
+    deallocate (work%elements, work%stiffness, work%moment, work%series)
     !$omp end parallel
   end subroutine solve_points
 
-  subroutine prepare_work(self, work)
+  subroutine prepare_work(self, quantities, work)
     type(forced_response_t), intent(in) :: self
+    type(moment_form_t), intent(in) :: quantities(:)   !! that are computed
     type(work_t), intent(out) :: work
+    integer :: e, q
+    logical :: is_needed(self%machine%elements%count)
 
+    is_needed = .false.
+    do q = 1, size(quantities)
+      is_needed(quantities(q)%elements) = .true.
+    end do
     work%band = new_band_work(self%matrix)
-    allocate (work%stiffness(self%machine%elements%count), work%moment(self%machine%elements%count, size(self%lines)), &
-              work%series(self%machine%elements%count))
+    work%elements = pack([(e, e=1, size(is_needed))], is_needed)
+    associate (elements => size(is_needed))
+      allocate (work%stiffness(elements), work%series(elements), work%moment(elements, size(self%lines)), &
+                source=(0.0_wp, 0.0_wp))
+    end associate
   end subroutine prepare_work
+
+  !> The harmonics in a steady state, and the frequencies of the lines.
+  subroutine set_lines(self, point)
+    type(forced_response_t), intent(in) :: self
+    type(response_point_t), intent(inout) :: point
+    integer :: l
+
+    call list_sources(self%machine, point%state, point%sources)
+    point%frequency = [(point%sources(self%lines(l)%source(1))%frequency, l=1, size(self%lines))]
+  end subroutine set_lines
 
   !> Solves for every line at one speed.
   subroutine solve_point(self, point, work)
@@ -215,14 +289,8 @@ contains
     type(work_t), intent(inout) :: work
     integer :: l, q
 
-    call list_sources(self%machine, point%state, point%sources)
     associate (lines => size(self%lines), quantities => size(self%quantities))
-      allocate (point%frequency(lines))
-      do l = 1, lines
-        point%frequency(l) = point%sources(self%lines(l)%source(1))%frequency
-      end do
-      if (.not. self%has_oscillations) return
-      allocate (point%quantity(lines, quantities), point%angle(lines, self%machine%bodies))
+      allocate (point%quantity(lines, quantities), point%angle(lines, maxval(self%angle_place)))
       allocate (point%heat(self%machine%elements%count), source=0.0_wp)
       allocate (point%mean(quantities), point%lowest(quantities), point%highest(quantities))
       do l = 1, lines
@@ -243,16 +311,14 @@ contains
     type(work_t), intent(in) :: work
     complex(wp) :: amplitude(size(self%lines))
     real(wp) :: highest, lowest, mean
-    integer :: l, p
+    integer :: p
 
     associate (one => self%quantities(q))
       do p = 1, size(one%weight, 1)
-        do l = 1, size(amplitude)
-          amplitude(l) = one%total(p, work%moment(:, l))
-        end do
+        amplitude = amplitudes(one, p, work)
         mean = sum(one%weight(p, :) * point%state%mean(one%elements)) + one%by_held_torque * point%state%torque
         if (one%source%body > 0) then   ! a power, to the first order
-          associate (speed => point%state%omega(one%source%body), angle => point%angle(:, one%source%body))
+          associate (speed => point%state%omega(one%source%body), angle => point%angle(:, self%angle_place(one%source%body)))
             amplitude = speed * amplitude + mean * (0.0_wp, 1.0_wp) * point%frequency * angle
             mean = mean * speed
           end associate
@@ -268,6 +334,47 @@ contains
       end do
     end associate
   end subroutine find_quantity
+
+  !> The largest half range of the moments in `left_out` at a speed. The sum of its amplitudes bounds each.
+  real(wp) function largest_left_out(self, point) result(largest)
+    class(forced_response_t), intent(in) :: self
+    type(response_point_t), intent(in) :: point
+    type(response_point_t) :: again
+    type(work_t) :: work
+    real(wp) :: bound(size(self%left_out)), highest, lowest
+    integer :: l, p, q
+
+    call prepare_work(self, self%left_out, work)
+    again = point
+    do l = 1, size(self%lines)
+      call solve_line(self, l, again, work)
+    end do
+    do q = 1, size(bound)
+      bound(q) = maxval([(sum(abs(amplitudes(self%left_out(q), p, work))), p=1, size(self%left_out(q)%weight, 1))])
+    end do
+    largest = 0.0_wp
+    do while (any(bound > largest))
+      q = maxloc(bound, dim=1)
+      do p = 1, size(self%left_out(q)%weight, 1)
+        call self%synthesis%extremes(amplitudes(self%left_out(q), p, work), lowest, highest)
+        largest = max(largest, 0.5_wp * (highest - lowest))
+      end do
+      bound(q) = 0.0_wp
+    end do
+  end function largest_left_out
+
+  !> A quantity at one of its points, without the speed of a power.
+  pure function amplitudes(quantity, point, work)
+    type(moment_form_t), intent(in) :: quantity
+    integer, intent(in) :: point
+    type(work_t), intent(in) :: work
+    complex(wp) :: amplitudes(size(work%moment, 2))
+    integer :: l
+
+    do l = 1, size(amplitudes)
+      amplitudes(l) = quantity%total(point, work%moment(:, l))
+    end do
+  end function amplitudes
 
   !> Moments, angles and heat of one line.
   pure subroutine solve_line(self, l, point, work)
@@ -287,7 +394,9 @@ contains
       work%band%x(:) = (0.0_wp, 0.0_wp)
       call add_sources(self, sources(line%source), work)
       call self%matrix%solve(work%band)
-      do e = 1, size(work%stiffness)
+      work%moment(:, l) = (0.0_wp, 0.0_wp)
+      do i = 1, size(work%elements)
+        e = work%elements(i)
         call self%matrix%find_moment(e, work%stiffness(e), work%series(e), work%band, twist, work%moment(e, l))
         point%heat(e) = point%heat(e) + 0.5_wp * frequency * aimag(work%stiffness(e)) * (real(twist, wp)**2 + aimag(twist)**2)
       end do
@@ -321,18 +430,19 @@ contains
     end do
   end subroutine add_sources
 
-  !> The angles of the bodies.
+  !> The angles of the bodies that are kept.
   pure subroutine set_angles(self, work, angle)
     type(forced_response_t), intent(in) :: self
     type(work_t), intent(in) :: work
-    complex(wp), intent(out) :: angle(:)   !! [rad], [bodies]
+    complex(wp), intent(out) :: angle(:)   !! [rad], [bodies that are kept]
     integer :: b, k
 
-    associate (map => self%machine%coordinates)
-      do b = 1, size(angle)
-        angle(b) = (0.0_wp, 0.0_wp)
+    angle = (0.0_wp, 0.0_wp)
+    associate (map => self%machine%coordinates, place => self%angle_place)
+      do b = 1, size(place)
+        if (place(b) == 0) cycle
         do k = map%first(b), map%first(b + 1) - 1
-          angle(b) = angle(b) + map%ratio(1, k) * work%band%x(self%matrix%position(map%coordinate(k)))
+          angle(place(b)) = angle(place(b)) + map%ratio(1, k) * work%band%x(self%matrix%position(map%coordinate(k)))
         end do
       end do
     end associate

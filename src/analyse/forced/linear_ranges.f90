@@ -10,11 +10,12 @@ module nocdyn_linear_ranges
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_state, only: machine_state_t, new_machine_state
+  use nocdyn_moment_forms, only: kind_moment, kind_reaction, moment_form_t
   use nocdyn_response_points, only: response_point_t
   implicit none (type, external)
   private
 
-  public :: find_excursions
+  public :: curved_elements, find_excursions, is_compared
 
   integer, parameter :: samples = 96   ! of half a turn: the share of a kink is right to some per cent
   real(wp), parameter :: pi = acos(-1.0_wp)
@@ -97,6 +98,7 @@ contains
     real(wp), dimension(size(excursions)) :: amplitude, equivalent, tangent
     real(wp) :: largest, moved, weight
     integer :: element(size(excursions)), k
+    logical :: is_complete
 
     element = excursions%element
     associate (here => response%points(point), is_elastic => excursions(1)%is_elastic)
@@ -106,7 +108,8 @@ contains
       state%elements%angle(1, :) = here%state%twist
       state%elements%speed(1, :) = here%state%rate
       call find_equivalent(machine, state, t, element, is_elastic, amplitude, equivalent, tangent)
-      largest = maxval([0.0_wp, here%half_range([(k, k=1, size(response%quantities))])])
+      largest = largest_half_range(response%quantities, here)
+      is_complete = size(response%left_out) == 0
       do k = 1, size(excursions)
         weight = 1.0_wp
         associate (bank => machine%banks(bank_number(machine, element(k)))%bank)
@@ -119,11 +122,20 @@ contains
           call keep_worst(abs(equivalent(k) - tangent(k)) / (abs(tangent(k)) + negligible * abs(equivalent(k) - tangent(k))))
         else
           if (moved <= share * largest) cycle
+          call complete_largest()
+          if (moved <= share * largest) cycle
           call keep_worst(moved)
         end if
       end do
     end associate
   contains
+    !> The moments that are not computed count too.
+    subroutine complete_largest()
+
+      if (.not. is_complete) largest = max(largest, response%largest_left_out(response%points(point)))
+      is_complete = .true.
+    end subroutine complete_largest
+
     subroutine keep_worst(size)
       real(wp), intent(in) :: size
 
@@ -138,6 +150,25 @@ contains
       end associate
     end subroutine keep_worst
   end subroutine compare
+
+  !> The largest half range of the moments that are compared.
+  pure real(wp) function largest_half_range(quantities, point) result(largest)
+    type(moment_form_t), intent(in) :: quantities(:)
+    type(response_point_t), intent(in) :: point
+    integer :: q
+
+    largest = 0.0_wp
+    do q = 1, size(quantities)
+      if (is_compared(quantities(q))) largest = max(largest, point%half_range(q))
+    end do
+  end function largest_half_range
+
+  !> Whether the changes of other moments are compared with this one: moments of couplings and reactions.
+  elemental logical function is_compared(quantity)
+    type(moment_form_t), intent(in) :: quantity
+
+    is_compared = quantity%kind == kind_moment .or. quantity%kind == kind_reaction
+  end function is_compared
 
   pure integer function bank_number(machine, element) result(number)
     type(machine_t), intent(in) :: machine
@@ -161,7 +192,7 @@ contains
     twist = (0.0_wp, 0.0_wp)
     associate (rows => response%machine%elements%rows)
       do k = rows%first(element), rows%first(element + 1) - 1
-        if (rows%body(k) > 0) twist = twist + rows%coefficient(k) * point%angle(:, rows%body(k))
+        if (rows%body(k) > 0) twist = twist + rows%coefficient(k) * point%angle(:, response%angle_place(rows%body(k)))
       end do
     end associate
     do l = 1, size(twist)

@@ -9,13 +9,12 @@ module nocdyn_mode_branches
   use nocdyn_held_speeds, only: held_speeds_t, held_state_t
   use nocdyn_kinds, only: wp
   use nocdyn_mode_links, only: find_links
-  use nocdyn_mode_pairs, only: find_pairs, mode_pairs_t, move_pairs
+  use nocdyn_mode_pairs, only: mode_pairs_t, move_pairs
+  use nocdyn_state_modes, only: find_pairs_at
   implicit none (type, external)
   private
 
-  public :: find_pairs_at, new_speed_modes
-
-  integer, parameter, public :: most_coordinates = 600   !! of a machine whose modes are computed at every speed
+  public :: new_speed_modes
 
   !> The oscillating modes, in the order of their frequencies at the first speed; then those that begin at other speeds.
   type, public :: speed_modes_t
@@ -89,21 +88,6 @@ contains
     call set_modes(tracks, self)
     self%is_electrical = [(response%machine%is_electrical(self%internal(m)), m=1, self%modes)]
   end subroutine new_speed_modes
-
-  !> Finds the modes at a steady state.
-  subroutine find_pairs_at(response, state, pairs, error, known)
-    type(forced_response_t), intent(in) :: response
-    type(held_state_t), intent(in) :: state
-    type(mode_pairs_t), intent(out) :: pairs
-    type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
-    type(mode_pairs_t), intent(in), optional :: known   !! as of `find_pairs`
-
-    associate (points => response%points)
-      call find_pairs(response%machine, response%matrix, state%slopes, maxval([0.0_wp, points(size(points))%frequency]), pairs, &
-                      error, known)
-    end associate
-    pairs%speed = state%speed
-  end subroutine find_pairs_at
 
   !> Connects the modes of two points, and finds the ones of all points between.
   recursive subroutine connect(response, tracks, a, b, error)

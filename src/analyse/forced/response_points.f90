@@ -15,9 +15,10 @@ module nocdyn_response_points
     type(held_state_t), allocatable :: state
     type(source_t), allocatable :: sources(:)
     real(wp), allocatable :: frequency(:)          !! Omega [rad/s], [lines]
-    complex(wp), allocatable :: quantity(:, :)     !! [lines, quantities]
-    complex(wp), allocatable :: angle(:, :)        !! [rad], [lines, bodies]
-    real(wp), allocatable :: heat(:)               !! mean power lost by the oscillations [W], [elements]
+    complex(wp), allocatable :: quantity(:, :)     !! [lines, quantities that are computed]
+    complex(wp), allocatable :: angle(:, :)        !! [rad], [lines, bodies of `angle_place`]
+    real(wp), allocatable :: heat(:)               !! mean power lost by the oscillations [W], of the elements of the
+                                                   !! quantities, [elements]
     real(wp), allocatable :: mean(:)               !! [quantities]
     real(wp), allocatable :: lowest(:), highest(:) !! of the oscillations of all lines, without the mean, [quantities]
   contains

@@ -3,8 +3,9 @@ module nocdyn_unstable_speeds
   use nocdyn_errors, only: error_t
   use nocdyn_forced_response, only: forced_response_t
   use nocdyn_kinds, only: wp
-  use nocdyn_mode_branches, only: find_pairs_at, speed_modes_t
+  use nocdyn_mode_branches, only: speed_modes_t
   use nocdyn_mode_pairs, only: mode_pairs_t
+  use nocdyn_state_modes, only: find_pairs_at
   use nocdyn_text, only: append, rounded_text, string_t, to_text
   use nocdyn_units, only: from_si, unit_rpm
   implicit none (type, external)
@@ -99,8 +100,8 @@ contains
       call describe_speeds(speed, speeds)
       call append(notes, 'the steady state is unstable at ' // speeds // ': ' // text // '; ' // consequence)
     end if
-    if (size(response%left_out) > 0) then
-      call describe_speeds(response%left_out, speeds)
+    if (size(response%speeds_left_out) > 0) then
+      call describe_speeds(response%speeds_left_out, speeds)
       call append(notes, 'there is no steady state at ' // speeds // ', which are left out: ' // &
                          response%left_out_message)
     end if

@@ -6,6 +6,7 @@
 !> iteration on the band matrix T, with the root of x^T T(lambda) x as the next value: T is symmetric, so that x is the left
 !> eigenvector too, and x^T T(lambda) x a two-sided Rayleigh functional.
 module nocdyn_mode_pairs
+  use nocdyn_band_pencil, only: band_pencil_t, new_band_pencil
   use nocdyn_dynamic_stiffness, only: band_work_t, dynamic_stiffness_t, new_band_work, rigid_stiffness
   use nocdyn_eigenpairs, only: eigenpairs_t, find_eigenpairs
   use nocdyn_errors, only: error_t
@@ -14,10 +15,11 @@ module nocdyn_mode_pairs
   use nocdyn_linearisation, only: fill_matrix, linearisation_t, undamped_modes
   use nocdyn_machine, only: machine_t
   use nocdyn_slopes, only: slopes_t
+  use nocdyn_undamped_bands, only: band_modes
   implicit none (type, external)
   private
 
-  public :: find_pairs, masses_times, move_pairs, refine, set_motion, set_sizes
+  public :: find_pairs, keep_pairs, masses_times, move_pairs, refine, set_motion, set_sizes
 
   integer, parameter, public :: most_modes = 100   !! undamped ones that a large machine has, if the lines reach no further
 
@@ -29,6 +31,7 @@ module nocdyn_mode_pairs
                                                  !! allocated: none
     real(wp) :: highest = 0.0_wp                 !! frequency of excitation: a large machine has no modes far above it [rad/s]
     type(linearisation_t) :: linear              !! the undamped modes
+    integer :: numbers(2) = 0                    !! the first and the last of these, if band matrices find them; else 0
     complex(wp), allocatable :: value(:)         !! eigenvalues, imaginary part > 0 [1/s], [modes]
     complex(wp), allocatable :: x(:, :)          !! coordinates, with x^T T'(lambda) x = 1, [coordinates, modes]
     complex(wp), allocatable :: twist(:, :)      !! [elements, modes]
@@ -126,12 +129,18 @@ contains
     type(mode_pairs_t), intent(inout) :: self
     type(error_t), allocatable, intent(out) :: error
     type(mode_pairs_t), intent(in), optional :: known
+    type(band_pencil_t) :: pencil
+    integer :: none(0)
     logical :: is_known
 
     is_known = present(known)
     if (is_known) is_known = all(abs(known%slopes%stiffness - self%slopes%stiffness) <= 0)
+    if (present(known)) self%numbers = known%numbers
     if (is_known) then
       self%linear = known%linear
+    else if (self%numbers(2) > 0) then
+      call new_band_pencil(machine, matrix%incidence, self%slopes%stiffness, none, pencil, error)
+      if (.not. allocated(error)) call band_modes(pencil, self%numbers(1), self%numbers(2), none, self%linear, error)
     else
       call undamped_modes(machine, matrix%incidence, self%slopes%stiffness, self%linear, error)
       if (.not. allocated(error)) call leave_out_highest(self%highest, self%linear)
@@ -152,6 +161,19 @@ contains
     linear%natural = linear%natural(:n)
     linear%flexible = pack(linear%flexible, linear%flexible <= n)
   end subroutine leave_out_highest
+
+  !> Leaves only some modes, in this order.
+  subroutine keep_pairs(kept, self)
+    integer, intent(in) :: kept(:)   !! modes
+    type(mode_pairs_t), intent(inout) :: self
+
+    self%value = self%value(kept)
+    self%x = self%x(:, kept)
+    self%twist = self%twist(:, kept)
+    self%angle = self%angle(:, kept)
+    self%undamped = self%undamped(kept)
+    self%internal = self%internal(kept)
+  end subroutine keep_pairs
 
   !> Allocates the arrays of the modes, after `slopes` is set.
   subroutine set_sizes(machine, matrix, modes, self)
@@ -239,8 +261,8 @@ contains
         work%x(matrix%position(:matrix%coordinates)) = masses_times(machine, self%x(:, m))
         call matrix%solve(work)
         self%x(:, m) = work%x(matrix%position(:matrix%coordinates))
-        self%x(:, m) = self%x(:, m) / self%x(maxloc(abs(self%x(:, m)), dim=1), m)
-        if (.not. all(abs(self%x(:, m)) <= 2.0_wp)) return   ! not a number
+        self%x(:, m) = self%x(:, m) / self%x(maxloc(square_of(self%x(:, m)), dim=1), m)
+        if (.not. all(square_of(self%x(:, m)) <= 4.0_wp)) return   ! not a number
         call set_motion(machine, matrix, self, m)
       end do
     end associate
@@ -322,9 +344,17 @@ contains
     associate (value => self%value(m), twist => self%twist(:, m), angle => self%angle(:, m))
       call self%slopes%find_stiffness(machine%elements%internal, value, stiffness, slope)
       norm = sum(slope * twist**2) + 2.0_wp * value * sum(machine%inertia(1, :) * angle**2)
-      size_of_norm = sum(abs(slope) * abs(twist)**2) + 2.0_wp * abs(value) * sum(machine%inertia(1, :) * abs(angle)**2)
+      size_of_norm = sum((abs(real(slope, wp)) + abs(aimag(slope))) * square_of(twist)) &
+                     + 2.0_wp * abs(value) * sum(machine%inertia(1, :) * square_of(angle))
     end associate
   end subroutine find_norm
+
+  !> The square of the magnitude, without the care of `abs` for numbers near the end of their range.
+  elemental real(wp) function square_of(z)
+    complex(wp), intent(in) :: z
+
+    square_of = real(z, wp)**2 + aimag(z)**2
+  end function square_of
 
   !> The natural frequency of the undamped mode with most of the kinetic energy.
   real(wp) function undamped_of(machine, self, m) result(natural)
@@ -332,10 +362,14 @@ contains
     type(mode_pairs_t), intent(in) :: self
     integer, intent(in) :: m
     complex(wp) :: momentum(size(self%x, 1))
+    real(wp), parameter :: most = 0.6_wp   ! of the kinetic energy, of which no other mode can have so much
     integer :: k
     real(wp) :: largest, part
 
     momentum = masses_times(machine, self%x(:, m))
+    k = minloc(abs(self%linear%natural - abs(self%value(m))), dim=1)
+    natural = self%linear%natural(k)
+    if (abs(sum(self%linear%shapes(:, k) * momentum))**2 > most * abs(sum(conjg(self%x(:, m)) * momentum))) return
     natural = 0.0_wp
     largest = -1.0_wp
     do k = 1, size(self%linear%natural)

@@ -281,16 +281,31 @@ contains
 
   !> Makes a vector orthogonal to others, with the masses.
   pure subroutine make_orthogonal(q, p, x)
-    real(wp), intent(in) :: q(:, :), p(:, :)   !! vectors, orthonormal, and M times them; [coordinates, vectors]
-    real(wp), intent(inout) :: x(:)            !! [coordinates]
+    real(wp), contiguous, intent(in) :: q(:, :), p(:, :)   !! vectors, orthonormal, and M times them; [coordinates, vectors]
+    real(wp), contiguous, intent(inout) :: x(:)            !! [coordinates]
     integer :: k, round
 
     do round = 1, 2   ! twice is enough
       do k = 1, size(q, 2)
-        x = x - dot_product(p(:, k), x) * q(:, k)
+        x = x - inner_product(p(:, k), x) * q(:, k)
       end do
     end do
   end subroutine make_orthogonal
+
+  !> The inner product in partial sums, which fill a vector of the processor.
+  pure real(wp) function inner_product(a, b)
+    real(wp), contiguous, intent(in) :: a(:), b(:)
+    integer, parameter :: lanes = 16
+    integer :: i, whole
+    real(wp) :: sums(lanes)
+
+    whole = size(a) - modulo(size(a), lanes)
+    sums = 0.0_wp
+    do i = 1, whole, lanes
+      sums = sums + a(i:i + lanes - 1) * b(i:i + lanes - 1)
+    end do
+    inner_product = sum(sums) + dot_product(a(whole + 1:), b(whole + 1:))
+  end function inner_product
 
   pure subroutine normalise(pencil, x, q, p)
     type(band_pencil_t), intent(in) :: pencil

@@ -5,7 +5,7 @@
 module nocdyn_campbell
   use nocdyn_backward_speeds, only: refuse_backward_speeds
   use nocdyn_critical_speeds, only: crossing_t, find_crossings
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: error_t
   use nocdyn_excitation_lines, only: line_t
   use nocdyn_forced_response, only: forced_response_t, new_forced_response
   use nocdyn_input, only: input_t
@@ -16,9 +16,11 @@ module nocdyn_campbell
   use nocdyn_mode_pairs, only: most_modes
   use nocdyn_response_notes, only: note_shaft_modes, note_simplifications, note_steady_states
   use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
-  use nocdyn_mode_branches, only: most_coordinates, new_speed_modes, speed_modes_t
-  use nocdyn_text, only: append, string_t, to_text
+  use nocdyn_mode_branches, only: new_speed_modes, speed_modes_t
+  use nocdyn_state_modes, only: has_choice, most_coordinates
+  use nocdyn_text, only: append, counted, rounded_text, string_t, to_text
   use nocdyn_unstable_speeds, only: find_unstable, note_speeds, unstable_speed_t
+  use nocdyn_wanted_modes, only: default_modes, modes_choice_t
   implicit none (type, external)
   private
 
@@ -42,9 +44,10 @@ module nocdyn_campbell
 contains
 
   !> Computes the diagram of an input.
-  subroutine analyse_campbell(input, machine, self, error)
+  subroutine analyse_campbell(input, machine, choice, self, error)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine   !! one lane
+    type(modes_choice_t), intent(in) :: choice
     type(campbell_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: failed_speed
@@ -56,7 +59,13 @@ contains
     failed_speed = self%settings%speeds(1)
     call new_forced_response(machine, self%settings%body, self%settings%speeds, self%response, error)
     self%response%has_oscillations = .false.
-    if (.not. allocated(error)) call choose_lines(self, error)
+    if (.not. allocated(error)) then
+      self%response%choice = choice
+      if (.not. has_choice(choice) .and. self%response%matrix%coordinates > most_coordinates) then
+        self%response%choice%count = default_modes
+      end if
+      call choose_lines(self)
+    end if
     if (.not. allocated(error)) call self%response%add_points(self%settings%speeds, .true., error, failed_speed)
     call place_error(input, self%settings, failed_speed, error)
     if (.not. allocated(error)) call refuse_backward_speeds(input, self%settings, machine, self%response, error)
@@ -65,10 +74,7 @@ contains
     call place_error(input, self%settings, failed_speed, error)
     if (allocated(error)) return
     call note_simplifications(machine, self%notes)
-    if (self%response%matrix%coordinates > self%modes%modes .and. self%modes%modes >= most_modes) then
-      call append(self%notes, 'the highest modes are left out: there are ' // to_text(self%modes%modes) // ', for ' // &
-                              to_text(self%response%matrix%coordinates) // ' degrees of freedom')
-    end if
+    call note_left_out(self%response%choice, self%modes%modes, self%response%matrix%coordinates, self%notes)
     allocate (is_unstable(size(self%speed)))
     call find_unstable(self%speed, self%modes, self%unstable, is_unstable)
     call note_speeds(self%response, self%unstable, 'nothing stays near the steady state there', self%notes)
@@ -77,17 +83,35 @@ contains
     self%distance = [(operating_distance(self%settings, self%crossings(i)%speed), i=1, size(self%crossings))]
   end subroutine analyse_campbell
 
+  !> Adds a note on the modes that are left out.
+  subroutine note_left_out(choice, modes, coordinates, notes)
+    type(modes_choice_t), intent(in) :: choice
+    integer, intent(in) :: modes         !! that are followed
+    integer, intent(in) :: coordinates
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    character(len=:), allocatable :: text
+
+    if (has_choice(choice)) then
+      text = counted(modes, 'mode is', 'modes are') // ' followed over the speed, '
+      if (choice%has_range) then
+        text = text // 'from ' // rounded_text(choice%range_hz(1), 8) // ' to ' // rounded_text(choice%range_hz(2), 8) // &
+               ' Hz at the first speed'
+      else
+        text = text // 'of the lowest frequencies at the first speed'
+      end if
+      call append(notes, text // ', of ' // to_text(coordinates) // ' degrees of freedom; whether other modes grow is not ' // &
+                         'known; others with --modes NUMBER or --range_hz LOW,HIGH')
+    else if (coordinates > modes .and. modes >= most_modes) then
+      call append(notes, 'the highest modes are left out: there are ' // to_text(modes) // ', for ' // to_text(coordinates) // &
+                         ' degrees of freedom')
+    end if
+  end subroutine note_left_out
+
   !> The orders that the input names, excited or not; else the lines of the excitations.
-  subroutine choose_lines(self, error)
+  subroutine choose_lines(self)
     type(campbell_t), intent(inout) :: self
-    type(error_t), allocatable, intent(out) :: error
     type(line_t) :: none(0)
 
-    if (self%response%matrix%coordinates > most_coordinates) then
-      call raise(error, exit_input, 'this machine has ' // to_text(self%response%matrix%coordinates) // &
-                 ' degrees of freedom; natural frequencies are computed for at most ' // to_text(most_coordinates))
-      return
-    end if
     if (size(self%settings%orders) > 0) then
       self%response%lines = none
       self%order = self%settings%orders

@@ -16,6 +16,7 @@ module nocdyn_campbell_results
   use nocdyn_text, only: counted, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_units, only: from_si, unit_hz, unit_rpm
+  use nocdyn_wanted_modes, only: modes_choice_t
   implicit none (type, external)
   private
 
@@ -37,7 +38,8 @@ contains
     type(analysis_options_t), intent(in) :: options
     type(error_t), allocatable, intent(out) :: error
 
-    call analyse_campbell(input, machine, self%campbell, error)
+    call analyse_campbell(input, machine, modes_choice_t(options%modes, options%has_range, options%range_hz), self%campbell, &
+                          error)
     if (.not. allocated(error)) self%body = machine%names(self%campbell%settings%body)%text
   end subroutine solve
 

@@ -4,10 +4,11 @@ module nocdyn_machine_modes
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_large_modes, only: find_large_modes
   use nocdyn_linearisation, only: linearisation_t, linearise
-  use nocdyn_mode_choice, only: keep_wanted, modes_choice_t
+  use nocdyn_mode_choice, only: keep_wanted
   use nocdyn_modes, only: find_modes, mode_t
   use nocdyn_operating_point, only: operating_point_t
   use nocdyn_text, only: to_text
+  use nocdyn_wanted_modes, only: modes_choice_t
   implicit none (type, external)
   private
 

@@ -5,16 +5,11 @@ module nocdyn_mode_choice
   use nocdyn_modes, only: mode_oscillating, mode_t
   use nocdyn_text, only: append, counted, rounded_text, string_t, to_text
   use nocdyn_units, only: in_si, unit_hz
+  use nocdyn_wanted_modes, only: keep_numbers, modes_choice_t
   implicit none (type, external)
   private
 
-  public :: keep_numbers, keep_wanted, note_choice
-
-  type, public :: modes_choice_t
-    integer :: count = 0                              !! the lowest so many; 0: not given
-    logical :: has_range = .false.
-    real(wp) :: range_hz(2) = [0.0_wp, 0.0_wp]        !! frequencies from and to, if there is a range [Hz]
-  end type modes_choice_t
+  public :: keep_wanted, note_choice
 
 contains
 
@@ -51,17 +46,6 @@ contains
     call keep_numbers(first, last, linear)
     modes = pack(modes, is_kept)
   end subroutine keep_wanted
-
-  !> Keeps the undamped modes from one number to another.
-  subroutine keep_numbers(first, last, linear)
-    integer, intent(in) :: first, last
-    type(linearisation_t), intent(inout) :: linear
-
-    linear%shapes = linear%shapes(:, first:last)
-    linear%twists = linear%twists(:, first:last)
-    linear%natural = linear%natural(first:last)
-    linear%flexible = pack(linear%flexible, linear%flexible >= first .and. linear%flexible <= last) - first + 1
-  end subroutine keep_numbers
 
   !> Adds a note on the modes that are left out.
   subroutine note_choice(choice, undamped, below, modes, notes)

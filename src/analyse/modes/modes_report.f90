@@ -7,7 +7,6 @@ module nocdyn_modes_report
   use nocdyn_linearisation, only: linearisation_t
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_modes, only: find_machine_modes
-  use nocdyn_mode_choice, only: modes_choice_t
   use nocdyn_modes, only: kind_names, mode_diverging, mode_internal, mode_oscillating, mode_overdamped, mode_rigid, &
     mode_t
   use nocdyn_shaft_errors, only: describe_error, has_shaft_nodes, noted_error, shaft_error
@@ -17,6 +16,7 @@ module nocdyn_modes_report
   use nocdyn_text, only: append, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_units, only: from_si, in_si, unit_hz, unit_rpm
+  use nocdyn_wanted_modes, only: modes_choice_t
   implicit none (type, external)
   private
 

@@ -6,13 +6,13 @@ module nocdyn_modes_results
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_machine, only: machine_t
-  use nocdyn_mode_choice, only: modes_choice_t
   use nocdyn_modes_files, only: modes_csv, put_modes
   use nocdyn_modes_report, only: modes_report_t, modes_text, new_modes_report
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: output_units
   use nocdyn_text, only: append, string_t
+  use nocdyn_wanted_modes, only: modes_choice_t
   implicit none (type, external)
   private
 

@@ -2,7 +2,6 @@
 module nocdyn_response_analysis
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_backward_speeds, only: refuse_backward_speeds
-  use nocdyn_column_names, only: choose_signals
   use nocdyn_critical_speeds, only: crossing_t, find_crossings, keep_new, refine_peaks
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_excitation_lines, only: line_order, line_t
@@ -11,21 +10,23 @@ module nocdyn_response_analysis
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_mode_branches, only: most_coordinates, new_speed_modes, speed_modes_t
+  use nocdyn_mode_branches, only: new_speed_modes, speed_modes_t
+  use nocdyn_moment_forms, only: moment_form_t
+  use nocdyn_response_choice, only: choose_quantities, choose_shown, find_couplings
   use nocdyn_response_fatigue, only: find_response_fatigue, response_fatigue_t
   use nocdyn_response_limits, only: read_limits, response_limit_t
   use nocdyn_response_notes, only: note_linear_ranges, note_overloads, note_rated_speeds, note_shaft_modes, note_separation, &
     note_simplifications, note_steady_states
   use nocdyn_response_points, only: keep_points
   use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
-  use nocdyn_signals, only: signal_t
+  use nocdyn_state_modes, only: most_coordinates
   use nocdyn_synthesis, only: new_synthesis
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
   use nocdyn_unstable_speeds, only: describe_first, find_unstable, mark_between, note_speeds, unstable_speed_t
   implicit none (type, external)
   private
 
-  public :: analyse_response, add_fatigue, list_orders
+  public :: analyse_response, add_fatigue, list_orders, wants_grid
 
   type, public :: response_analysis_t
     type(response_settings_t) :: settings
@@ -35,6 +36,7 @@ module nocdyn_response_analysis
     type(crossing_t), allocatable :: crossings(:)
     type(unstable_speed_t), allocatable :: unstable(:)   !! speeds of the grid that are left out for it
     type(response_limit_t), allocatable :: limits(:)
+    logical :: writes_grid = .false.                 !! whether the tables are written to one file
     integer, allocatable :: shown(:), shown_angles(:)   !! quantities and angles of the response that are written
     type(response_fatigue_t), allocatable :: fatigue(:)   !! after `add_fatigue`
     type(string_t), allocatable :: notes(:)
@@ -52,6 +54,8 @@ contains
     type(machine_t), intent(in) :: machine   !! one lane
     type(response_analysis_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
+    type(moment_form_t), allocatable :: forms(:)
+    integer, allocatable :: limited(:)   ! quantities
     integer(int64) :: began, ended, rate
     real(wp) :: failed_speed
 
@@ -62,22 +66,27 @@ contains
     call read_response_settings(input, machine, self%settings, error)
     if (allocated(error)) return
     self%body_name = machine%names(self%settings%body)%text
+    self%writes_grid = wants_grid(input)
     associate (speeds => self%settings%speeds)
       failed_speed = speeds(1)
       call new_forced_response(machine, self%settings%body, speeds, self%response, error)
       call place_error(input, self%settings, failed_speed, error)
       if (.not. allocated(error)) call choose_lines(input, self%settings, self%response%lines, error)
       if (.not. allocated(error)) call read_limits(input, self%response%quantities, self%limits, error)
-      if (.not. allocated(error)) call choose_shown(input, self, error)
+      if (.not. allocated(error)) call choose_shown(input, self%response, self%shown, self%shown_angles, self%notes, error)
       if (.not. allocated(error)) then
+        forms = self%response%quantities
+        limited = self%limits%quantity
+        call choose_quantities(input, self%response, self%shown, self%shown_angles, limited)
+        self%limits%quantity = limited
         call prepare_synthesis(self%response)
-        call self%response%add_points(speeds, .true., error, failed_speed)
+        call self%response%add_points(speeds, .true., error, failed_speed, only_states=.true.)
         call place_error(input, self%settings, failed_speed, error)
       end if
     end associate
     if (.not. allocated(error)) call refuse_backward_speeds(input, self%settings, machine, self%response, error)
     if (allocated(error)) return
-    call find_peaks(self, error, failed_speed)
+    call find_peaks(self, forms, error, failed_speed)
     if (allocated(error)) then
       call place_error(input, self%settings, failed_speed, error)
     else
@@ -93,27 +102,14 @@ contains
     self%wall_time = real(ended - began, wp) / real(rate, wp)
   end subroutine analyse_response
 
-  !> Chooses what is written.
-  subroutine choose_shown(input, self, error)
+  !> Whether an input asks for one file of all tables.
+  pure logical function wants_grid(input)
     type(input_t), intent(in) :: input
-    type(response_analysis_t), intent(inout) :: self
-    type(error_t), allocatable, intent(out) :: error
-    type(signal_t), allocatable :: signals(:)
-    integer, allocatable :: chosen(:)
-    integer :: q
 
-    associate (quantities => self%response%quantities, angles => self%response%angles)
-      allocate (signals(size(quantities) + size(angles)))
-      do q = 1, size(quantities)
-        signals(q) = quantities(q)%signal_t
-      end do
-      signals(size(quantities) + 1:) = angles
-      call choose_signals(input, signals, chosen, self%notes, error)
-      if (allocated(error)) return
-      self%shown = pack(chosen, chosen <= size(quantities))
-      self%shown_angles = pack(chosen, chosen > size(quantities)) - size(quantities)
-    end associate
-  end subroutine choose_shown
+    wants_grid = .false.
+    if (size(input%groups_named('response')) == 0) return
+    wants_grid = input%groups(input%position('response'))%text('format') == 'netcdf'
+  end function wants_grid
 
   !> Adds the damage by &fatigue to a response.
   subroutine add_fatigue(input, self, error)
@@ -184,9 +180,10 @@ contains
     if (text == '') text = 'none'
   end subroutine list_orders
 
-  !> Finds modes, critical speeds and peaks between the speeds of the grid.
-  subroutine find_peaks(self, error, failed_speed)
+  !> Finds modes, critical speeds, oscillations and their peaks between the speeds of the grid.
+  subroutine find_peaks(self, forms, error, failed_speed)
     type(response_analysis_t), intent(inout) :: self
+    type(moment_form_t), intent(in) :: forms(:)   !! all quantities of the machine
     type(error_t), allocatable, intent(out) :: error
     real(wp), intent(inout) :: failed_speed
     real(wp) :: unrefined
@@ -194,13 +191,15 @@ contains
 
     if (self%response%matrix%coordinates > most_coordinates) then
       call append(self%notes, 'this machine has ' // to_text(self%response%matrix%coordinates) // ' degrees of freedom: ' // &
-                              'natural frequencies are not computed for more than ' // to_text(most_coordinates) // &
-                              ', and peaks are sought from the speeds of the grid')
+                              'neither critical speeds nor peaks between the speeds of the grid are found for more than ' // &
+                              to_text(most_coordinates) // '; nocdyn campbell has natural frequencies')
     else
       call new_speed_modes(self%response, self%modes, error)
       if (.not. allocated(error)) call leave_out_unstable(self, error, failed_speed)
       if (allocated(error)) return
     end if
+    call find_couplings(forms, self%modes, self%response, self%crossings)
+    call self%response%solve_oscillations()
     call refine_peaks(self%response, self%crossings, unrefined, error, failed_speed)
     if (.not. allocated(error) .and. unrefined > 0) then
       call append(self%notes, 'there are too many peaks between the speeds of the grid to refine all: some may be higher by ' // &

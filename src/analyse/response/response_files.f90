@@ -2,7 +2,9 @@
 module nocdyn_response_files
   use nocdyn_column_lists, only: column_list_t
   use nocdyn_csv, only: write_header, write_row
+  use nocdyn_grid_file, only: grid_file_t
   use nocdyn_input, only: input_t
+  use nocdyn_input_text, only: input_text
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_margins, only: put_margin, put_mode
@@ -16,9 +18,10 @@ module nocdyn_response_files
   implicit none (type, external)
   private
 
-  public :: put_response_csv, put_orders_csv, response_columns_json, put_response
+  public :: put_response_csv, put_orders_csv, put_response_grid, response_columns_json, put_response
 
   character(len=*), parameter, public :: response_table = 'response.csv', orders_table = 'response_orders.csv'
+  character(len=*), parameter, public :: response_grid = 'response.nc'   !! in place of both
 
   real(wp), parameter :: degree = acos(-1.0_wp) / 180.0_wp, turn = 2.0_wp * acos(-1.0_wp)
 
@@ -52,7 +55,7 @@ contains
     type(column_list_t), intent(out) :: list
     integer :: i, k, q
 
-    call list%start(response_table, wanted)
+    call list%start(trim(merge(response_grid // ' ', response_table, analysis%writes_grid)), wanted)
     call list%add_named('omega', 'rad/s', 'speed that is held', 'body', analysis%body_name)
     call list%add_named('drive', '1', 'share of the torques of the drives that holds the speed')
     call list%add_named('drive_torque', 'N m', 'torque that holds the speed')
@@ -183,30 +186,75 @@ contains
     type(string_t), allocatable :: labels(:)
     integer, allocatable :: unit(:)
     real(wp), allocatable :: row(:)
-    integer :: i, l, n
+    integer :: i, l
 
-    associate (response => analysis%response, shown => analysis%shown, angles => analysis%shown_angles)
-      call list_order_columns(analysis, wanted, list)
-      call list%list_columns(labels, unit)
-      allocate (row(size(labels)))
-      call write_header(file, labels)
-      do i = 1, size(response%points)
-        associate (point => response%points(i))
-          do l = 1, size(response%lines)
-            row(:3) = [point%state%speed, point%frequency(l) / abs(point%state%speed), point%frequency(l) / turn]
-            if (response%lines(l)%is_order) row(2) = response%lines(l)%order   ! without the rounding of the frequency
-            n = 3 + 2 * size(shown)
-            row(4:n:2) = abs(point%quantity(l, shown))
-            row(5:n:2) = phase(point%quantity(l, shown))
-            row(n + 1::3) = abs(point%angle(l, angles))
-            row(n + 2::3) = phase(point%angle(l, angles))
-            row(n + 3::3) = point%frequency(l) * row(n + 1::3)
-            call write_row(file, from_si(row, unit))
-          end do
-        end associate
+    call list_order_columns(analysis, wanted, list)
+    call list%list_columns(labels, unit)
+    allocate (row(size(labels)))
+    call write_header(file, labels)
+    do i = 1, size(analysis%response%points)
+      do l = 1, size(analysis%response%lines)
+        call fill_order_row(analysis, i, l, row)
+        call write_row(file, from_si(row, unit))
+      end do
+    end do
+  end subroutine put_orders_csv
+
+  !> The row of one speed and line.
+  subroutine fill_order_row(analysis, i, l, row)
+    type(response_analysis_t), intent(in) :: analysis
+    integer, intent(in) :: i, l          !! point and line of the response
+    real(wp), intent(out) :: row(:)
+    integer :: n
+
+    associate (response => analysis%response, point => analysis%response%points(i), shown => analysis%shown, &
+               angles => analysis%response%angle_place(analysis%response%angles(analysis%shown_angles)%source%index))
+      row(:3) = [point%state%speed, point%frequency(l) / abs(point%state%speed), point%frequency(l) / turn]
+      if (response%lines(l)%is_order) row(2) = response%lines(l)%order   ! without the rounding of the frequency
+      n = 3 + 2 * size(shown)
+      row(4:n:2) = abs(point%quantity(l, shown))
+      row(5:n:2) = phase(point%quantity(l, shown))
+      row(n + 1::3) = abs(point%angle(l, angles))
+      row(n + 2::3) = phase(point%angle(l, angles))
+      row(n + 3::3) = point%frequency(l) * row(n + 1::3)
+    end associate
+  end subroutine fill_order_row
+
+  !> Writes the columns of response.csv over the speed, and the ones of response_orders.csv over speed and line, to one file.
+  subroutine put_response_grid(analysis, input, wanted, folder, file)
+    type(response_analysis_t), intent(in) :: analysis
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: wanted(:)               !! units of speeds and angles: indices of `units`
+    character(len=*), intent(in) :: folder
+    class(grid_file_t), intent(inout) :: file      !! not open
+    type(column_list_t) :: list, order_list
+    type(string_t), allocatable :: labels(:), order_labels(:)
+    integer, allocatable :: order_unit(:), unit(:)
+    real(wp), allocatable :: order_row(:), row(:)
+    integer :: i, l
+
+    call list_columns(analysis, wanted, list)
+    call list%list_columns(labels, unit)
+    call list_order_columns(analysis, wanted, order_list)
+    call order_list%list_columns(order_labels, order_unit)
+    allocate (row(size(labels)), order_row(size(order_labels)))
+    associate (speed => labels(1)%text, points => size(analysis%response%points), lines => size(analysis%response%lines))
+      call file%open(folder, response_grid, [string_t(speed(:index(speed, ' [', back=.true.) - 1)), string_t('line')], &
+                     [points, lines], input%title(), input_text(input))
+      call file%begin_table(labels, 1)
+      do i = 1, points
+        call fill_row(analysis, i, row)
+        call file%put_row(from_si(row, unit))
+      end do
+      call file%begin_table(order_labels(2:), 2)
+      do i = 1, points
+        do l = 1, lines
+          call fill_order_row(analysis, i, l, order_row)
+          call file%put_row(from_si(order_row(2:), order_unit(2:)))
+        end do
       end do
     end associate
-  end subroutine put_orders_csv
+  end subroutine put_response_grid
 
   !> The columns of response_orders.csv.
   subroutine list_order_columns(analysis, wanted, list)
@@ -215,7 +263,7 @@ contains
     type(column_list_t), intent(out) :: list
     integer :: i
 
-    call list%start(orders_table, wanted)
+    call list%start(trim(merge(response_grid // '        ', orders_table, analysis%writes_grid)), wanted)
     call list%add_named('omega', 'rad/s', 'speed that is held', 'body', analysis%body_name)
     call list%add_named('order', '1', 'oscillations per turn of the body')
     call list%add_named('frequency', 'Hz', 'frequency')

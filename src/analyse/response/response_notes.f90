@@ -1,11 +1,9 @@
 !> Notes on a forced response: where it may be other than its reader expects.
 module nocdyn_response_notes
-  use nocdyn_bank, only: bank_of
   use nocdyn_critical_speeds, only: crossing_t
   use nocdyn_element_sets, only: element_names
   use nocdyn_errors, only: error_t
   use nocdyn_forced_response, only: forced_response_t
-  use nocdyn_gap_couplings, only: gap_couplings_t
   use nocdyn_held_speeds, only: held_state_t
   use nocdyn_input, only: input_t
   use nocdyn_steady_texts, only: allowed_torques
@@ -13,10 +11,12 @@ module nocdyn_response_notes
   use nocdyn_linear_ranges, only: excursion_t, find_excursions
   use nocdyn_linearisation, only: linearisation_t, undamped_modes
   use nocdyn_machine, only: machine_t
-  use nocdyn_moment_forms, only: kind_moment, kind_reaction
+  use nocdyn_moment_forms, only: kind_reaction, moment_form_t
+  use nocdyn_response_choice, only: has_gap, lose_of
   use nocdyn_response_settings, only: response_settings_t
   use nocdyn_shaft_errors, only: describe_error, has_shaft_nodes, noted_error, shaft_error
-  use nocdyn_mode_branches, only: most_coordinates, speed_modes_t
+  use nocdyn_mode_branches, only: speed_modes_t
+  use nocdyn_state_modes, only: most_coordinates
   use nocdyn_damping_notes, only: note_mean_slopes, note_stand_ins
   use nocdyn_text, only: append, joined, quoted, rounded_text, string_t, to_text
   use nocdyn_tooth_losses, only: tooth_losses_t
@@ -172,7 +172,7 @@ contains
     type(forced_response_t), intent(in) :: response
     type(string_t), allocatable, intent(inout) :: notes(:)
     integer, parameter :: most_names = 5
-    integer :: b, e, i, worst, worst_point
+    integer :: b, e, i, q, worst, worst_point
     real(wp) :: largest, lost
     type(string_t), allocatable :: names(:)
 
@@ -183,8 +183,9 @@ contains
       class is (tooth_losses_t)
         do e = 1, bank%count
           call append(names, bank%names(e)%text)
+          q = findloc(lose_of(bank, e, response%quantities), .true., dim=1)
           do i = 1, size(response%points)
-            lost = lost_torque(response, bank, e, response%points(i)%state)
+            lost = lost_torque(response%quantities(q), bank, e, response%points(i)%state)
             if (lost <= largest) cycle
             largest = lost
             worst = size(names)
@@ -200,22 +201,14 @@ contains
   end subroutine note_losses
 
   !> The torque that teeth would take from their first wheel in a steady state [N m].
-  pure real(wp) function lost_torque(response, losses, element, state) result(lost)
-    type(forced_response_t), intent(in) :: response
+  pure real(wp) function lost_torque(quantity, losses, element, state) result(lost)
+    type(moment_form_t), intent(in) :: quantity   !! that they lose a share of
     type(tooth_losses_t), intent(in) :: losses
-    integer, intent(in) :: element              !! numbered within the bank
+    integer, intent(in) :: element                !! numbered within the bank
     type(held_state_t), intent(in) :: state
-    integer :: q
     real(wp) :: share, slope, torque
 
-    q = size(response%quantities) - response%machine%constraints%rows() + losses%row(element)
-    if (losses%row(element) == 0) then
-      do q = 1, size(response%quantities)
-        if (response%quantities(q)%kind == kind_moment .and. &
-            response%quantities(q)%element == losses%names(element)%text) exit
-      end do
-    end if
-    associate (one => response%quantities(q), speed => state%rate(losses%first - 1 + element))
+    associate (one => quantity, speed => state%rate(losses%first - 1 + element))
       torque = losses%factor(element) * (sum(one%weight(1, :) * state%mean(one%elements)) + one%by_held_torque * state%torque)
       call losses%share(element, torque * speed < 0, speed, share, slope)
     end associate
@@ -231,8 +224,7 @@ contains
 
     do q = 1, size(response%quantities)
       associate (one => response%quantities(q))
-        if (one%kind /= kind_moment .or. size(one%elements) /= 1) cycle
-        if (.not. has_gap(response, one%elements(1))) cycle
+        if (.not. has_gap(response%machine, one)) cycle
         open = 0
         do i = 1, size(response%points)
           associate (point => response%points(i))
@@ -286,10 +278,9 @@ contains
     real(wp) :: excess, most
 
     associate (constraints => response%machine%constraints, points => response%points)
-      row = 0
       do q = 1, size(response%quantities)
         if (response%quantities(q)%kind /= kind_reaction) cycle
-        row = row + 1
+        row = response%quantities(q)%source%index
         slipping = 0
         worst = 1
         most = 0.0_wp
@@ -312,17 +303,6 @@ contains
       end do
     end associate
   end subroutine note_overloads
-
-  logical function has_gap(response, element)
-    type(forced_response_t), intent(in) :: response
-    integer, intent(in) :: element
-
-    has_gap = .false.
-    select type (bank => response%machine%banks(bank_of(response%machine%banks, element))%bank)
-    class is (gap_couplings_t)
-      has_gap = .true.
-    end select
-  end function has_gap
 
   !> Rated speeds of the rule iacs_m68 that are far from the ones of the body of &response, to which they belong.
   subroutine note_rated_speeds(input, settings, notes)

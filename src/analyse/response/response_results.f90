@@ -2,14 +2,15 @@
 module nocdyn_response_results
   use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_errors, only: error_t
+  use nocdyn_grid_file, only: grid_file_t
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_machine, only: machine_t
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: output_units
-  use nocdyn_response_analysis, only: add_fatigue, analyse_response, response_analysis_t
-  use nocdyn_response_files, only: orders_table, put_orders_csv, put_response_csv, response_columns_json, put_response, &
-    response_table
+  use nocdyn_response_analysis, only: add_fatigue, analyse_response, response_analysis_t, wants_grid
+  use nocdyn_response_files, only: orders_table, put_orders_csv, put_response, put_response_csv, put_response_grid, &
+    response_columns_json, response_grid, response_table
   use nocdyn_response_report, only: response_text
   use nocdyn_response_summary, only: response_summary_t, summarise_response
   use nocdyn_text, only: string_t
@@ -22,7 +23,7 @@ module nocdyn_response_results
     type(response_analysis_t), private :: analysis
     type(response_summary_t), private :: summary
   contains
-    procedure :: solve, list_tables, put_table, put_report, text => printed
+    procedure :: solve, list_tables, put_table, grid_name, other_names, put_grid, put_report, text => printed
   end type response_results_t
 
 contains
@@ -43,8 +44,36 @@ contains
     class(response_results_t), intent(in) :: self
     type(string_t), allocatable, intent(out) :: names(:)
 
-    names = [string_t(response_table), string_t(orders_table), string_t(columns_name)]
+    names = [string_t(columns_name)]
+    if (.not. self%analysis%writes_grid) names = [string_t(response_table), string_t(orders_table), string_t(columns_name)]
   end subroutine list_tables
+
+  pure function grid_name(self, input) result(name)
+    class(response_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    character(len=:), allocatable :: name
+
+    name = ''
+    if (wants_grid(input)) name = response_grid
+  end function grid_name
+
+  function other_names(self, input) result(names)
+    class(response_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    type(string_t), allocatable :: names(:)
+
+    names = [string_t(response_grid)]
+    if (wants_grid(input)) names = [string_t(response_table), string_t(orders_table)]
+  end function other_names
+
+  subroutine put_grid(self, input, folder, file)
+    class(response_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: folder
+    class(grid_file_t), intent(inout) :: file
+
+    call put_response_grid(self%analysis, input, output_units(input), folder, file)
+  end subroutine put_grid
 
   subroutine put_table(self, input, name, file)
     class(response_results_t), intent(in) :: self

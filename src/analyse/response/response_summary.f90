@@ -8,7 +8,7 @@ module nocdyn_response_summary
   use nocdyn_response_analysis, only: response_analysis_t
   use nocdyn_response_limits, only: no_limit, response_limit_t
   use nocdyn_response_points, only: response_point_t
-  use nocdyn_moment_forms, only: kind_moment, kind_reaction, kind_stress
+  use nocdyn_moment_forms, only: kind_reaction, kind_stress
   implicit none (type, external)
   private
 
@@ -107,25 +107,10 @@ contains
     type(response_analysis_t), intent(in) :: analysis
     type(critical_t), intent(inout) :: critical
     real(wp), parameter :: near = 0.02_wp   ! of the critical speed, without damping
-    integer :: coupling, e, i, j, k, start
-    real(wp) :: speed(size(analysis%response%points)), energy, most
+    integer :: i, k, start
+    real(wp) :: speed(size(analysis%response%points))
 
-    ! the coupling with most of the potential energy of a mode, 0 if no coupling has any
-    coupling = 0
-    most = 0.0_wp
-    do j = 1, size(analysis%response%quantities)
-      if (analysis%response%quantities(j)%kind /= kind_moment) cycle
-      energy = 0.0_wp
-      do k = 1, size(analysis%response%quantities(j)%elements)
-        e = analysis%response%quantities(j)%elements(k)
-        energy = energy + abs(analysis%response%points(1)%state%slopes%stiffness(e)) * &
-                 abs(analysis%modes%twists(e, critical%crossing%mode))**2
-      end do
-      if (energy <= most) cycle
-      coupling = j
-      most = energy
-    end do
-    critical%quantity = coupling
+    critical%quantity = critical%crossing%quantity
     critical%speed = critical%crossing%speed
     critical%is_unbounded = critical%crossing%damping_ratio <= undamped
     if (critical%quantity == 0 .or. critical%is_unbounded) return

@@ -2,6 +2,7 @@
 !> analysis is a type that extends `analysis_t` and a row in the table of commands.
 module nocdyn_analyses
   use nocdyn_errors, only: error_t
+  use nocdyn_grid_file, only: grid_file_t
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
@@ -34,6 +35,8 @@ module nocdyn_analyses
     procedure(solve_interface), deferred :: solve
     procedure :: list_tables
     procedure :: put_table
+    procedure :: grid_name, other_names
+    procedure :: put_grid
     procedure :: put_report
     procedure(text_interface), deferred :: text
   end type analysis_t
@@ -79,6 +82,34 @@ contains
 
     error stop 'nocdyn_analyses: an analysis with tables overrides put_table'
   end subroutine put_table
+
+  !> The name of the file of tables that an input asks for in place of some; '': none.
+  pure function grid_name(self, input) result(name)
+    class(analysis_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    character(len=:), allocatable :: name
+
+    name = ''
+  end function grid_name
+
+  !> The files in which an analysis in another form would have its tables.
+  function other_names(self, input) result(names)
+    class(analysis_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    type(string_t), allocatable :: names(:)
+
+    allocate (names(0))
+  end function other_names
+
+  !> Writes these tables to that file, which is not open.
+  subroutine put_grid(self, input, folder, file)
+    class(analysis_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: folder
+    class(grid_file_t), intent(inout) :: file
+
+    error stop 'nocdyn_analyses: an analysis with a grid overrides put_grid'
+  end subroutine put_grid
 
   !> Fills the report: the file COMMAND.json, and what sweeps record by paths.
   subroutine put_report(self, input, json)

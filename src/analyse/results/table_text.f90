@@ -77,7 +77,7 @@ contains
   pure subroutine clear_rounding(labels, values)
     type(string_t), intent(in) :: labels(:)      !! of the rows, with their units
     real(wp), intent(inout) :: values(:, :)      !! [rows, columns]
-    real(wp) :: sizes(size(labels))              ! largest number of the row
+    real(wp) :: largest, sizes(size(labels))     ! number of the unit, of the row
     logical :: is_left(size(labels)), is_of_unit(size(labels))
     integer :: i, first
 
@@ -86,9 +86,10 @@ contains
     do while (any(is_left))
       first = findloc(is_left, .true., dim=1)
       is_of_unit = is_left .and. [(unit_of(labels(i)%text) == unit_of(labels(first)%text), i=1, size(labels))]
+      largest = maxval(sizes, mask=is_of_unit)
       do i = 1, size(labels)
         if (.not. is_of_unit(i)) cycle
-        where (abs(values(i, :)) <= max(invisible * sizes(i), rounding * maxval(sizes, mask=is_of_unit))) values(i, :) = 0.0_wp
+        where (abs(values(i, :)) <= max(invisible * sizes(i), rounding * largest)) values(i, :) = 0.0_wp
       end do
       is_left = is_left .and. .not. is_of_unit
     end do

@@ -97,7 +97,7 @@ contains
       '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR' // nl // &
       '  --quiet            print nothing but errors' // nl // nl // &
       'A limit that is exceeded is no error: response.json says limits_exceeded.', analysis_command)
-    call add_command(commands, 'campbell', 'FILE...', '--out --set --case --quiet', &
+    call add_command(commands, 'campbell', 'FILE...', '--out --set --case --quiet --modes --range_hz', &
       'natural frequencies over a range of speeds, and where the orders meet them', &
       'Follows the natural frequencies of the machine, linearised about its steady states, over the speeds of' // nl // &
       '&response, and finds the speeds at which its orders, or those of the excitations, meet them. Writes' // nl // &
@@ -106,6 +106,9 @@ contains
       '                     default: &output directory, else results/<name of the file>' // nl // &
       '  --set PATH=VALUE   override a key: response.count=501' // nl // &
       '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR' // nl // &
+      '  --modes NUMBER     only so many modes, of the lowest frequencies at the first speed; default: all, of a' // nl // &
+      '                     machine with more than 600 degrees of freedom 100' // nl // &
+      '  --range_hz LOW,HIGH  only the modes in this range of frequencies at the first speed [Hz]' // nl // &
       '  --quiet            print nothing but errors', analysis_command)
   end subroutine list_torsional_analyses
 

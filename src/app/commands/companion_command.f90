@@ -1,4 +1,4 @@
-!> What another program beside this one does: the commands sweep and merge, and runs that write NetCDF.
+!> What another program beside this one does: the commands sweep and merge, and runs and responses that write NetCDF.
 module nocdyn_companion_command
   use nocdyn_arguments, only: arguments_t
   use nocdyn_command_line, only: command_line

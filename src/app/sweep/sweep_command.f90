@@ -1,8 +1,10 @@
 !> nocdyn sweep: computes all variants of a machine in one process.
 module nocdyn_sweep_command
+  use nocdyn_analysis_command, only: analyse
   use nocdyn_arguments, only: arguments_t
   use nocdyn_console, only: report_error
   use nocdyn_errors, only: error_t, exit_done
+  use nocdyn_grid_netcdf, only: netcdf_grid_t
   use nocdyn_journal_scheduler, only: initialise_scheduler, journal_scheduler_t
   use nocdyn_posix, only: catch_interrupts
   use nocdyn_run_command, only: run_inputs
@@ -15,8 +17,7 @@ module nocdyn_sweep_command
   implicit none (type, external)
   private
 
-  public :: run_netcdf_command, sweep_command
-
+  public :: respond_netcdf_command, run_netcdf_command, sweep_command
 
 contains
 
@@ -56,6 +57,14 @@ contains
     thread_count = arguments%threads
     if (thread_count == 0) thread_count = omp_get_max_threads()
   end function thread_count
+
+  !> Computes the forced responses of all files.
+  subroutine respond_netcdf_command(arguments, code)
+    type(arguments_t), intent(in) :: arguments
+    integer, intent(out) :: code   !! the highest exit code of all files
+
+    call analyse(arguments, code, netcdf_grid_t())
+  end subroutine respond_netcdf_command
 
   !> Runs all files.
   subroutine run_netcdf_command(arguments, code)

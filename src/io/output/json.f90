@@ -231,14 +231,16 @@ contains
     class(json_t), intent(inout) :: self
     character(len=*), intent(in) :: key
     real(wp), intent(in) :: values(:)
-    type(string_t) :: items(size(values))
     integer :: i
 
+    call self%begin_member(key)
+    call self%buffer%append('[')
     do i = 1, size(values)
-      items(i)%text = number_text(values(i))
-      call self%keep(key // '[' // to_text(i) // ']', values(i))
+      if (i > 1) call self%buffer%append(', ')
+      call self%buffer%append(number_text(values(i)))
+      if (self%keeps_numbers) call self%keep(key // '[' // to_text(i) // ']', values(i))   ! its path costs more than the number
     end do
-    call put_list(self, key, items)
+    call self%buffer%append(']')
   end subroutine put_numbers
 
   function number_text(value) result(text)

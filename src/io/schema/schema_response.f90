@@ -9,6 +9,7 @@ module nocdyn_schema_response
 
   type(allowed_t), parameter :: speed_counts = allowed_t(low=2.0_wp, high=1.0e6_wp)
   type(allowed_t), parameter :: rules = allowed_t(words='iacs_m68')
+  type(allowed_t), parameter :: formats = allowed_t(words='csv netcdf')
   type(allowed_t), parameter :: strengths = allowed_t(low=4.0e8_wp, high=8.0e8_wp)
   type(allowed_t), parameter :: factors = allowed_t(low=0.1_wp, high=1.5_wp)
   type(allowed_t), parameter :: margins = allowed_t(low=0.0_wp, high=0.9_wp)
@@ -32,6 +33,8 @@ module nocdyn_schema_response
       'oscillations per turn of the body; those of the excitations if not given', fewest=1), &
     key_rule_t('response', 'signals', a_text, any_number, '', unset, anything, &
       "quantities that are written: names, or patterns with *, e.g. 'stress_*'; all if not given", fewest=1), &
+    key_rule_t('response', 'format', a_word, 1, '', "'csv'", formats, &
+      'response.csv and response_orders.csv, or response.nc, which nocdyn-sweep writes'), &
     key_rule_t('response', 'operating', a_number, 2, 'rad/s', unset, not_zero, 'lowest and highest speed in operation'), &
     key_rule_t('response', 'margin', a_number, 1, '', '0.1', margins, &
       'a critical speed so near to the speeds in operation, as a share of it, is reported'), &

@@ -91,24 +91,25 @@ contains
     end if
   end subroutine put_text
 
-  !> Defines a variable over one dimension.
-  subroutine define(file, name, kind, dimension, long_name, variable)
+  !> Defines a variable.
+  subroutine define(file, name, kind, dimensions, long_name, variable)
     class(netcdf_file_t), intent(inout) :: file
     character(len=*), intent(in) :: name, long_name
-    integer, intent(in) :: kind, dimension
+    integer, intent(in) :: kind
+    integer, intent(in) :: dimensions(:)   !! the one that changes fastest first
     integer, intent(inout) :: variable
     character(len=:), allocatable :: possible
     integer :: status
 
     possible = name
-    status = nf90_def_var(file%id, possible, kind, [dimension], variable)
+    status = nf90_def_var(file%id, possible, kind, dimensions, variable)
     if (status == nf90_ebadname) then   ! names must be UTF-8; this is Latin-1, for example
       possible = ascii(name)
-      status = nf90_def_var(file%id, possible, kind, [dimension], variable)
+      status = nf90_def_var(file%id, possible, kind, dimensions, variable)
     end if
     do while (status == nf90_enameinuse)   ! only changed letters differ
       possible = possible // '_'
-      status = nf90_def_var(file%id, possible, kind, [dimension], variable)
+      status = nf90_def_var(file%id, possible, kind, dimensions, variable)
     end do
     call check(file, status)
     call put_text(file, variable, 'long_name', long_name)

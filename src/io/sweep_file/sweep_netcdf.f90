@@ -64,17 +64,17 @@ contains
         call check(file, nf90_def_dim(file%id, 'variant', header%variants, file%variant_dimension))
         call check(file, nf90_def_dim(file%id, 'failure', nf90_unlimited, file%failure_dimension))
         call check(file, nf90_def_dim(file%id, 'reason_length', longest, file%reason_dimension))
-        call define(file, 'variant', nf90_int, file%variant_dimension, 'number of the variant', file%variant)
+        call define(file, 'variant', nf90_int, [file%variant_dimension], 'number of the variant', file%variant)
         call define_quantities(file, header%parameters, 'parameter', file%parameters)
         call define_quantities(file, header%results, 'result', file%results)
       end associate
       ! defines the variables for the status of the variants and for the reasons of those that are not done
-      call define(file, 'status', nf90_byte, file%variant_dimension, 'how the variant ended', file%status)
+      call define(file, 'status', nf90_byte, [file%variant_dimension], 'how the variant ended', file%status)
       call check(file, nf90_put_att(file%id, file%status, 'flag_values', [integer(int8) :: 0, 1, 2]))
       call put_text(file, file%status, 'flag_meanings', &
                     trim(status_words(0)) // ' ' // trim(status_words(1)) // ' ' // trim(status_words(2)))
-      call define(file, 'steps', nf90_int, file%variant_dimension, 'steps of the integration', file%steps)
-      call define(file, 'failed_variant', nf90_int, file%failure_dimension, 'number of a variant that is not done', &
+      call define(file, 'steps', nf90_int, [file%variant_dimension], 'steps of the integration', file%steps)
+      call define(file, 'failed_variant', nf90_int, [file%failure_dimension], 'number of a variant that is not done', &
                   file%failed_variant)
       ! by default the cache of the library would hold many chunks that are never read again
       call check(file, nf90_def_var(file%id, 'reason', nf90_char, [file%reason_dimension, file%failure_dimension], file%reason, &
@@ -111,7 +111,7 @@ contains
     allocate (variables(size(quantities)))
     do i = 1, size(quantities)
       name = new_name(file, quantities(i)%label)
-      call define(file, name, nf90_double, file%variant_dimension, quantities(i)%long_name, variables(i))
+      call define(file, name, nf90_double, [file%variant_dimension], quantities(i)%long_name, variables(i))
       if (quantities(i)%unit /= '') call put_text(file, variables(i), 'units', quantities(i)%unit)
       call put_text(file, variables(i), 'label', quantities(i)%label)
       call put_text(file, variables(i), 'role', role)

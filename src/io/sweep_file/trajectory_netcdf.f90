@@ -48,7 +48,7 @@ contains
     do i = 1, size(labels)
       if (.not. allocated(self%file%failure)) then
         bracket = index(labels(i)%text, ' [', back=.true.)
-        call define(self%file, new_name(self%file, labels(i)%text(:bracket - 1)), nf90_double, dimension, &
+        call define(self%file, new_name(self%file, labels(i)%text(:bracket - 1)), nf90_double, [dimension], &
                     labels(i)%text(:bracket - 1), self%variables(i))
         call check(self%file, nf90_def_var_chunking(self%file%id, self%variables(i), nf90_chunked, [block]))
         call check(self%file, nf90_def_var_fill(self%file%id, self%variables(i), 1, 0))

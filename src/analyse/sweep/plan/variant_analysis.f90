@@ -11,7 +11,6 @@ module nocdyn_variant_analysis
   use nocdyn_linearisation, only: linearisation_t
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_modes, only: find_machine_modes
-  use nocdyn_mode_choice, only: modes_choice_t
   use nocdyn_modes, only: mode_oscillating, mode_t
   use nocdyn_named_analyses, only: assemble_analysed, new_analysis
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
@@ -21,6 +20,7 @@ module nocdyn_variant_analysis
   use nocdyn_signals, only: former_name
   use nocdyn_text, only: to_text
   use nocdyn_units, only: from_si
+  use nocdyn_wanted_modes, only: modes_choice_t
   implicit none (type, external)
   private
 

@@ -1,0 +1,111 @@
+"""nocdyn campbell of machines with many bodies: closed forms, all modes of smaller ones, and what is refused."""
+
+import json
+from math import pi, sin, sqrt
+
+import pytest
+from conftest import TRAPS_EXCEPTIONS
+
+EXACT = 1e-10
+STIFFNESS, DAMPING = 1e4, 1.0
+without_checks = pytest.mark.skipif(TRAPS_EXCEPTIONS, reason="the debug build checks every index")
+
+
+def chain(count, law=f"damping = {DAMPING}", extra="", asked="count = 5 orders = 1, 2"):
+    lines = [f"&body name = 'b{i}' inertia = 1.0 /" for i in range(count)]
+    lines += [f"&coupling name = 'c{i}' bodies = 'b{i}', 'b{i + 1}' stiffness = {STIFFNESS} {law} /" for i in range(count - 1)]
+    return "\n".join([*lines, extra, f"&response body = 'b0' speed = 1, 3 {asked} /", "&run t_end = 1.0 /"]) + "\n"
+
+
+def damped(count, number):
+    """Frequency [Hz] and damping ratio of a mode of the chain."""
+    natural = 2 * sqrt(STIFFNESS) * sin(pi * number / (2 * count))
+    ratio = DAMPING / STIFFNESS * natural / 2
+    return natural * sqrt(1 - ratio**2) / (2 * pi), ratio
+
+
+def campbell(nocdyn, text, *options):
+    outcome = nocdyn("campbell", nocdyn.write("machine.nml", text), "--out", "out", *options)
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    return json.loads((nocdyn.folder / "out/campbell.json").read_text()), nocdyn.values(name="campbell.csv").by_name()
+
+
+@pytest.mark.parametrize("count", [30, pytest.param(610, marks=without_checks)])
+def test_the_lowest_modes_are_those_of_the_chain_at_every_speed(nocdyn, count):
+    content, table = campbell(nocdyn, chain(count), "--modes", "6")
+    assert len(content["modes"]) == 6 and "frequency_7" not in table
+    for number in range(1, 7):
+        frequency, ratio = damped(count, number)
+        assert table[f"frequency_{number}"] == pytest.approx([frequency] * len(table["omega_b0"]), rel=EXACT)
+        assert table[f"damping_ratio_{number}"] == pytest.approx([ratio] * len(table["omega_b0"]), rel=EXACT)
+    (note,) = (note for note in content["notes"] if "followed" in note)
+    assert note.startswith(f"6 modes are followed over the speed, of the lowest frequencies at the first speed, of {count} ")
+
+
+@without_checks
+def test_orders_meet_the_modes_of_a_large_machine(nocdyn):
+    content, _ = campbell(nocdyn, chain(610), "--modes", "8")
+    expected = sorted(2 * pi * damped(610, number)[0] / order for order in (1, 2) for number in range(1, 9))
+    found = sorted(crossing["speed_rad_s"] for crossing in content["crossings"])
+    assert found == pytest.approx([speed for speed in expected if 1 < speed < 3], rel=1e-6)
+
+
+@without_checks
+def test_a_machine_of_more_than_600_degrees_of_freedom_has_its_100_lowest_modes(nocdyn):
+    content, table = campbell(nocdyn, chain(610, asked="count = 2 orders = 1"))
+    assert len(content["modes"]) == 100
+    assert table["frequency_100"][0] == pytest.approx(damped(610, 100)[0], rel=EXACT)
+    assert any(note.startswith("100 modes are followed over the speed") for note in content["notes"])
+
+
+LOADED = """\
+&motor name = 'm' body = 'b0' kind = 'constant' torque = 5 /
+&load name = 'l' body = 'b209' quadratic = 0.5 /
+"""
+
+
+def grid_rows(table):
+    return [list(table["omega_b0"]).index(speed) for speed in (1.0, 1.5, 2.0, 2.5, 3.0)]
+
+
+@pytest.mark.parametrize(("options", "below"), [(("--modes", "9"), 0), (("--range_hz", "1.5,3"), None)])
+def test_chosen_modes_are_among_all_and_move_with_them(nocdyn, options, below):
+    """Springs stiffen with the load, which grows with the speed; bands follow the modes of 210 bodies."""
+    text = chain(210, law=f"cubic_stiffness = 3e9 damping = {DAMPING}", extra=LOADED)
+    _, every = campbell(nocdyn, text)
+    content, some = campbell(nocdyn, text, *options)
+    number = len(content["modes"])
+    if below is None:
+        below = sum(1 for label in every if label.startswith("frequency_") and every[label][0] < 1.5)
+        assert number == sum(1 for label in every if label.startswith("frequency_") and 1.5 <= every[label][0] <= 3)
+    speeds = grid_rows(every)
+    among = grid_rows(some)
+    for mode in range(1, number + 1):
+        for column in ("frequency", "damping_ratio", "undamped_frequency"):
+            all_values, values = every[f"{column}_{mode + below}"], some[f"{column}_{mode}"]
+            assert [values[i] for i in among] == pytest.approx([all_values[i] for i in speeds], rel=EXACT)
+        frequency = some[f"frequency_{mode}"]
+        assert frequency[among[4]] > 1.05 * frequency[among[0]]
+
+
+@without_checks
+@pytest.mark.parametrize(
+    ("text", "options", "message"),
+    [
+        (
+            chain(5001, asked="count = 2 orders = 1"),
+            ("--modes", "1001"),
+            "--modes 1001: these are 1002 undamped modes; at most 999 are allowed for this machine of 5001 degrees of freedom",
+        ),
+        (
+            chain(610, extra="&load name = 'l' body = 'b300' viscous = 200 /"),
+            ("--modes", "20"),
+            "the modes of this machine need dense matrices, because damping",
+        ),
+    ],
+)
+def test_what_bands_do_not_find_is_refused(nocdyn, text, options, message):
+    outcome = nocdyn("campbell", nocdyn.write("machine.nml", text), "--out", "out", *options)
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert f": &response: {message}" in outcome.stderr
+    assert not (nocdyn.folder / "out").exists()
