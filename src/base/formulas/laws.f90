@@ -32,6 +32,7 @@ module nocdyn_laws
     integer :: groups = 0                  !! of a strip
     integer, allocatable :: constants(:)   !! nodes that are constants, ascending
     integer, allocatable :: column(:)      !! of each constant in `constant`, [nodes]
+    integer, allocatable :: of_branch(:)   !! columns of the constants that depend on a branch, ascending
     integer, allocatable :: stack(:)       !! where the coefficients of harmonics begin in `stacked`, [nodes]
     real(wp), allocatable :: constant(:, :)   !! values of the constants, [slots of all strips, constants]
     real(wp), allocatable :: stacked(:)    !! coefficients of harmonics, [w, terms, groups of all strips] each
@@ -71,6 +72,7 @@ contains
     self%constants = tape%constants()
     allocate (self%column(tape%count), self%stack(tape%count), source=0)
     self%column(self%constants) = [(i, i=1, size(self%constants))]
+    self%of_branch = pack(self%column(self%constants), tape%node(self%constants)%has_branch)
     allocate (self%constant(self%w * self%groups * self%strips, size(self%constants)), source=0.0_wp)
     next = 1
     do i = 1, tape%count
@@ -119,14 +121,15 @@ contains
     integer, intent(in) :: branch(:)                !! of the switches of the element, 1 to the number of choices
     logical, intent(in) :: is_branch_only           !! whether the parameters are as before
     type(curve_t), intent(in), optional :: curve    !! of the element, on the segment branch(1)
-    integer :: a, at, copies, i
+    integer :: a, at, copies, i, k
     real(wp) :: y
 
     at = self%slot(lane, element)
     copies = self%copies(lane, element)
-    do i = 1, size(self%constants)
+    do k = 1, merge(size(self%of_branch), size(self%constants), is_branch_only)
+      i = k
+      if (is_branch_only) i = self%of_branch(k)
       associate (node => self%tape%node(self%constants(i)), constant => self%constant(at, i))
-        if (is_branch_only .and. .not. node%has_branch) cycle
         select case (node%operation)
         case (op_literal)
           constant = node%value
@@ -148,6 +151,7 @@ contains
         self%constant(at + 1:at + copies, i) = constant
       end associate
     end do
+    if (size(self%stacked) == 0) return
     do i = at, at + copies
       call stack_harmonics(self, i, is_branch_only)
     end do

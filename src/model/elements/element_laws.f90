@@ -73,7 +73,7 @@ contains
       self%numbers = new_law_numbers(self%law, motion(tape))
     end associate
     do slot = 1, size(self%law%constant, 1)
-      call self%numbers%set_constants(self%law, slot)
+      call self%numbers%set_constants(self%law, slot, .false.)
     end do
   end subroutine make_ready
 
@@ -95,7 +95,7 @@ contains
     type(curve_t), intent(in), optional :: curve    !! of the element, on the segment branch(1)
 
     call self%law%refresh(lane, element, parameters, branch, is_branch_only, curve)
-    if (self%is_ready) call self%numbers%set_constants(self%law, self%law%slot(lane, element))
+    if (self%is_ready) call self%numbers%set_constants(self%law, self%law%slot(lane, element), is_branch_only)
   end subroutine refresh
 
   !> Adds the moments, and sets the rates of the internal states. Phases follow all elements.
