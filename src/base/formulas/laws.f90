@@ -30,6 +30,7 @@ module nocdyn_laws
     integer :: strips = 1
     integer :: w = narrow                   !! numbers of a group: the lanes of a strip, or some elements of one lane
     integer :: groups = 0                  !! of a strip
+    integer, allocatable, private :: first_slot(:)   !! of each lane, counted through all strips
     integer, allocatable :: constants(:)   !! nodes that are constants, ascending
     integer, allocatable :: column(:)      !! of each constant in `constant`, [nodes]
     integer, allocatable :: of_branch(:)   !! columns of the constants that depend on a branch, ascending
@@ -69,6 +70,7 @@ contains
     self%strips = (lanes + strip - 1) / strip
     self%w = max(strip, narrow)
     self%groups = (strip * elements + self%w - 1) / self%w
+    self%first_slot = [((i - 1) / strip * self%w * self%groups + modulo(i - 1, strip) + 1, i=1, lanes)]
     self%constants = tape%constants()
     allocate (self%column(tape%count), self%stack(tape%count), source=0)
     self%column(self%constants) = [(i, i=1, size(self%constants))]
@@ -95,9 +97,7 @@ contains
     class(law_t), intent(in) :: self
     integer, intent(in) :: lane, element
 
-    associate (before => (lane - 1) / self%strip)
-      slot = before * self%w * self%groups + (element - 1) * self%strip + lane - before * self%strip
-    end associate
+    slot = self%first_slot(lane) + (element - 1) * self%strip
   end function slot
 
   !> How many slots after the slot of an element in one lane are copies of it.
