@@ -19,6 +19,7 @@ module nocdyn_stepper
     integer :: series_order = 0                !! order of the Taylor series that the system must have; 0: it needs none
     logical :: chooses_steps = .false.         !! whether `choose_steps` is called before every attempt
     logical :: estimates_errors = .true.       !! whether there are error estimates, at least of some lanes
+    logical :: reads_slope = .true.            !! whether `start` and `resume` need attempt%slope
     logical :: passes_series = .false.         !! whether `pass_steps` does not need the coefficients of `interpolate`
   contains
     procedure :: choose_steps
@@ -39,7 +40,7 @@ module nocdyn_stepper
       class(system_t), intent(in) :: system
     end subroutine prepare_interface
 
-    !> Starts lanes at attempt%y, where attempt%slope = f(t, y) has been evaluated.
+    !> Starts lanes at attempt%y, where attempt%slope = f(t, y) has been evaluated if the stepper reads it.
     subroutine start_interface(self, attempt, starting)
       import :: stepper_t, step_attempt_t
       class(stepper_t), intent(inout) :: self

@@ -82,6 +82,7 @@ contains
     stepper%chooses_steps = .true.
     stepper%estimates_errors = .false.
     stepper%passes_series = .true.
+    stepper%reads_slope = .false.
   end function taylor_stepper
 
   subroutine prepare(self, system)
