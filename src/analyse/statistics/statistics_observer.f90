@@ -429,7 +429,7 @@ contains
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: shift(:)
 
-    call self%linear%columns%copy_lane(self%block, lane)
+    call self%linear%copy_lane(self%block, lane)
   end subroutine on_shift
 
   !> Takes the state after a jump.
