@@ -7,6 +7,7 @@ module nocdyn_column_bounds
   use nocdyn_kinds, only: wp
   use nocdyn_law_bounds, only: has_bounds, largest, law_bounds_t, new_law_bounds, variable_bounds_t
   use nocdyn_observer, only: step_block_t
+  use nocdyn_polynomial_laws, only: polynomial_laws_t
   use nocdyn_quantities, only: form_angle, form_applied, form_elastic, form_observed, form_speed
   use nocdyn_reduced, only: reduced_t
   use nocdyn_signals, only: signal_element, signal_member, signal_reaction, signal_source_t
@@ -19,6 +20,7 @@ module nocdyn_column_bounds
     type(signal_source_t), allocatable, private :: columns(:)
     integer, allocatable, private :: elements(:)           !! of the machine, whose moments count
     integer, allocatable, private :: bank(:)               !! of these, 0 if its law is a polynomial
+    logical, allocatable, private :: has_angle(:), has_speed(:)   !! whether their angle or speed counts
     real(wp), allocatable, private :: weight(:, :)         !! of their moments in each column, [elements, columns]
     integer, allocatable, private :: first(:), last(:)     !! of the elements that have a weight, [columns]
     type(law_bounds_t), allocatable, private :: laws(:)    !! of the banks
@@ -89,9 +91,29 @@ contains
         where (self%elements >= bank%first .and. self%elements <= bank%last()) self%bank = b
       end associate
     end do
+    call find_motions(self, block%machine%laws)
     allocate (self%restoring(size(self%elements)), self%applied(size(self%elements)), self%angle(size(self%elements)), &
               self%speed(size(self%elements)), self%internal(block%internal))
   end function new_column_bounds
+
+  !> Finds the angles and speeds that count.
+  subroutine find_motions(self, laws)
+    type(column_bounds_t), intent(inout) :: self
+    type(polynomial_laws_t), intent(in) :: laws
+    integer :: i
+
+    allocate (self%has_angle(size(self%elements)), source=any(self%columns%form == form_angle))
+    allocate (self%has_speed(size(self%elements)), source=any(self%columns%form == form_speed))
+    do i = 1, size(self%elements)
+      associate (e => self%elements(i))
+        if (max(abs(laws%linear(1, e)), abs(laws%cubic(1, e))) > 0) self%has_angle(i) = .true.
+        if (max(abs(laws%by_speed(1, e)), abs(laws%by_speed_squared(1, e))) > 0) self%has_speed(i) = .true.
+      end associate
+      if (self%bank(i) == 0) cycle
+      if (self%laws(self%bank(i))%angle > 0) self%has_angle(i) = .true.
+      if (self%laws(self%bank(i))%speed > 0) self%has_speed(i) = .true.
+    end do
+  end subroutine find_motions
 
   !> The weights of the moments of all elements, or of their motions, in the columns.
   subroutine find_weights(block, columns, weight)
@@ -144,8 +166,8 @@ contains
         self%internal(i) = bounds_of(y(1, block%mechanical + i), c(1, block%mechanical + i, :))
       end do
       do i = 1, size(self%elements)
-        self%angle(i) = bounds_of_motion(block, self%elements(i), .false., y, c)
-        self%speed(i) = bounds_of_motion(block, self%elements(i), .true., y, c)
+        if (self%has_angle(i)) self%angle(i) = bounds_of_motion(block, self%elements(i), .false., y, c)
+        if (self%has_speed(i)) self%speed(i) = bounds_of_motion(block, self%elements(i), .true., y, c)
         call bound_moments(self, block, steps, i, is_bounded)
         if (.not. is_bounded) exit
       end do

@@ -37,6 +37,8 @@ module nocdyn_extremes
     logical, private :: has_room = .false.                 !! whether `room` is known
     logical, private :: has_left_out = .false.             !! whether the last step was left out
     real(wp), private :: left_at = 0.0_wp                  !! its end [s]
+    real(wp), allocatable, private :: left(:, :)           !! state there, [1, components]
+    real(wp), allocatable, private :: end_room(:)          !! as `room`, by the values at the end of a step
     real(wp), allocatable, private :: slopes(:), bends(:)  !! bounds in the last step
   end type extremes_t
 
@@ -71,7 +73,8 @@ contains
                 extremes%y(lanes, attempt%components), extremes%y_lane(attempt%components), source=0.0_wp)
       allocate (extremes%start(lanes), extremes%t(lanes), extremes%theta(lanes), extremes%fastest(lanes), extremes%scale(lanes), &
                 source=0.0_wp)
-      allocate (extremes%room(functions), source=0.0_wp)
+      allocate (extremes%room(functions), extremes%end_room(functions), source=0.0_wp)
+      if (observer%bounds_functions) allocate (extremes%left, source=extremes%y)
       allocate (extremes%slopes(functions), extremes%bends(functions), source=0.0_wp)
     end associate
     allocate (extremes%from(1), source=-huge(1.0_wp))
@@ -182,6 +185,8 @@ contains
     type(step_block_t), intent(in) :: steps
     type(step_attempt_t), intent(in) :: attempt
     real(wp), contiguous, intent(in) :: c(:, :, :)
+    real(wp), parameter :: far = 0.25_wp * huge(1.0_wp)   ! without a bound
+    real(wp) :: fastest, scale   ! at the end of the step
     integer :: last
 
     associate (pieces => extremes%pieces(1), room => extremes%room, slopes => extremes%slopes)
@@ -192,35 +197,45 @@ contains
       end if
       last = attempt%degree(1) + 1
       call observer%bound_functions(1, steps, attempt%y, c(:, :, :attempt%degree(1)), slopes, extremes%bends)
-      room(:) = max(-1.0_wp, room - slopes)
+      room(:) = max(-far, room - min(slopes, far))
       if (extremes%has_room .and. all(room >= 0 .or. slopes <= 0)) then
         ! the values at its end may be asked for
         extremes%left_at = end_of_nodes(extremes%start(1), steps%t_new(1))
         extremes%t(:) = extremes%left_at
         call find_states_at(extremes, steps, attempt, c)
+        extremes%left(:, :) = extremes%y
         extremes%has_left_out = .true.
         extremes%is_known(1) = .false.
         extremes%active(1) = .false.
         return
       end if
-      call observe_left(extremes, observer)
-      call observe_starts(extremes, observer, steps, attempt, c)
       extremes%t(:) = end_of_nodes(extremes%start(1), steps%t_new(1))
       call observe(extremes, observer, steps, attempt, c)
       extremes%y_lane(:) = extremes%y(1, :)
       call observer%tracked_values(1, extremes%t(1), extremes%y_lane, extremes%values(:, last, 1))
-      call pieces%find_open(extremes%last(:, 1), extremes%values(:, last, 1), slopes, extremes%bends)
-      call pieces%include_values(extremes%values(:, last, 1))
-      if (any(pieces%is_open(:, 0))) return
+      call observer%find_pace(1, fastest, scale)
+      call pieces%find_room(extremes%values(:, last, 1), extremes%end_room)
+      ! a function that starts by r inside its range, and ends by e, cannot leave it if its slope is at most r + e
+      if (.not. (extremes%has_room .and. all(room + extremes%end_room >= 0 .or. slopes <= 0))) then
+        call observe_left(extremes, observer)
+        call observe_starts(extremes, observer, steps, attempt, c)
+        call pieces%find_open(extremes%last(:, 1), extremes%values(:, last, 1), slopes, extremes%bends)
+        call pieces%include_values(extremes%values(:, last, 1))
+        if (any(pieces%is_open(:, 0))) return
+        call pieces%find_room(extremes%values(:, last, 1), extremes%end_room)
+      end if
+      extremes%has_left_out = .false.
+      extremes%is_known(1) = .true.
       extremes%last(:, 1) = extremes%values(:, last, 1)
-      call pieces%find_room(extremes%last(:, 1), room)
+      room(:) = extremes%end_room
       extremes%has_room = .true.
-      call observer%find_pace(1, extremes%fastest(1), extremes%scale(1))
+      extremes%fastest(1) = fastest
+      extremes%scale(1) = scale
       extremes%active(1) = .false.
     end associate
   end subroutine exclude_step
 
-  !> Observes the end of a step that was left out, where `y` still is; to be called before the states are shifted.
+  !> Observes the end of a step that was left out; to be called before the states are shifted.
   subroutine observe_left(extremes, observer)
     type(extremes_t), intent(inout) :: extremes
     class(observer_t), intent(inout) :: observer
@@ -228,8 +243,8 @@ contains
     if (.not. extremes%has_left_out) return
     extremes%has_left_out = .false.
     extremes%t(:) = extremes%left_at
-    call observer%observe_lanes(extremes%t, extremes%y)
-    extremes%y_lane(:) = extremes%y(1, :)
+    call observer%observe_lanes(extremes%t, extremes%left)
+    extremes%y_lane(:) = extremes%left(1, :)
     call observer%tracked_values(1, extremes%t(1), extremes%y_lane, extremes%last(:, 1))
     call observer%find_pace(1, extremes%fastest(1), extremes%scale(1))
     extremes%is_known(1) = .true.
