@@ -124,9 +124,16 @@ contains
 
     have_same_range = (x%has_max .eqv. y%has_max) .and. (x%has_min .eqv. y%has_min) .and. &
                       (x%has_max_abs .eqv. y%has_max_abs) .and. &
-                      all(abs([x%from - y%from, x%bound(1) - y%bound(1), x%highest(1) - y%highest(1), x%lowest(1) - y%lowest(1), &
-                               x%no_highest(1) - y%no_highest(1), x%no_lowest(1) - y%no_lowest(1)]) <= 0)
+                      all(are_equal([x%from, x%bound(1), x%highest(1), x%lowest(1), x%no_highest(1), x%no_lowest(1)], &
+                                    [y%from, y%bound(1), y%highest(1), y%lowest(1), y%no_highest(1), y%no_lowest(1)]))
   end function have_same_range
+
+  !> Whether two numbers are equal, without their difference, which may overflow.
+  elemental logical function are_equal(x, y)
+    real(wp), intent(in) :: x, y
+
+    are_equal = x <= y .and. x >= y
+  end function are_equal
 
   !> Copies the range of an accumulator, also to the one with the same x.
   pure subroutine copy_range(self, number, accumulators)
