@@ -135,7 +135,7 @@ contains
     type(step_block_t), intent(in) :: steps
     real(wp), contiguous, intent(in) :: y(:, :)      !! at the starts, [lanes, padded columns]
     real(wp), contiguous, intent(in) :: c(:, :, :)   !! solution y + sum over p of c(:, :, p) theta^p
-    real(wp), intent(out) :: slopes(:), bends(:)     !! huge: not bounded; [tracked]
+    real(wp), intent(out) :: slopes(:), bends(:)     !! huge if there is none, [tracked]
 
     slopes = huge(slopes)
     bends = huge(bends)
