@@ -85,8 +85,8 @@ contains
         range%lowest_time = c_loc(acc%lowest_time)
         range%no_highest = c_loc(acc%no_highest)
         range%no_lowest = c_loc(acc%no_lowest)
-        range%integral = c_loc(acc%integral)
-        range%square = c_loc(acc%square)
+        if (acc%has_sums) range%integral = c_loc(acc%integral)
+        if (acc%has_sums) range%square = c_loc(acc%square)
         range%linear = c_loc(statistics%linear(1, acc%column))
         range%cubic = c_loc(statistics%cubic(1, acc%column))
       end associate

@@ -5,7 +5,7 @@ module nocdyn_time_stepping
   use nocdyn_ensemble, only: ensemble_t
   use nocdyn_error_norm, only: forget_sizes, measure_start
   use nocdyn_events, only: allocate_events, events_t
-  use nocdyn_extremes, only: allocate_extremes, extremes_t, start_extremes
+  use nocdyn_extremes, only: allocate_extremes, extremes_t, observe_left, start_extremes
   use nocdyn_first_step, only: guess_first_steps
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
@@ -98,6 +98,7 @@ contains
       allocate (integrator%t_new(lanes), integrator%next_time(lanes), source=times(1))
       allocate (integrator%steps%t(lanes), integrator%steps%h(lanes), integrator%steps%scale(lanes), &
                 integrator%steps%theta_end(lanes), integrator%steps%t_new(lanes), source=0.0_wp)
+      allocate (integrator%steps%degree(lanes), source=1)
       allocate (integrator%next(lanes), source=2)
       allocate (integrator%sample(integrator%attempt%components), source=0.0_wp)
       allocate (integrator%coefficients(lanes, size(integrator%attempt%y, 2), stepper%degree), source=0.0_wp)
@@ -344,6 +345,7 @@ contains
       if (.not. any_true(attempt%lanes, integrator%far)) return
       do lane = 1, attempt%lanes
         if (.not. (integrator%far(lane) .and. integrator%accepted(lane))) cycle
+        if (integrator%has_extremes) call observe_left(integrator%extremes, observer)
         call system%shift_state(lane, attempt%y, integrator%sample)
         call observer%on_shift(lane, integrator%sample)
       end do
