@@ -74,7 +74,8 @@ contains
     self%constants = tape%constants()
     allocate (self%column(tape%count), self%stack(tape%count), source=0)
     self%column(self%constants) = [(i, i=1, size(self%constants))]
-    self%of_branch = pack(self%column(self%constants), tape%node(self%constants)%has_branch)
+    self%of_branch = pack([(i, i=1, size(self%constants))], [(tape%node(self%constants(i))%has_branch, &
+                                                              i=1, size(self%constants))])
     allocate (self%constant(self%w * self%groups * self%strips, size(self%constants)), source=0.0_wp)
     next = 1
     do i = 1, tape%count
