@@ -83,6 +83,26 @@ int run(const std::vector<std::string> &words, std::string *output) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
+// The file of a program with its size and time, which change with its version; "" if it is not there. To ask the compiler itself
+// takes milliseconds.
+std::string file_of(const std::string &program) {
+  std::vector<std::string> paths;
+  std::istringstream folders(environment("PATH"));
+  if (program.find('/') != std::string::npos)
+    paths.push_back(program);
+  else
+    for (std::string folder; std::getline(folders, folder, ':');)
+      if (!folder.empty()) paths.push_back(folder + "/" + program);
+  for (const std::string &path : paths) {
+    struct stat about;
+    if (access(path.c_str(), X_OK) != 0 || stat(path.c_str(), &about) != 0 || !S_ISREG(about.st_mode)) continue;
+    std::error_code failure;
+    return fs::canonical(path, failure).string() + ", " + std::to_string(about.st_size) + " bytes, time " +
+           std::to_string(about.st_mtim.tv_sec) + "." + std::to_string(about.st_mtim.tv_nsec);
+  }
+  return "";
+}
+
 std::string first_line(const std::string &text) { return text.substr(0, text.find('\n')); }
 
 // What a compiled program depends on beside its source: name and abilities of the processor.
@@ -169,14 +189,15 @@ bool compile(const std::string &source, const std::string &library, std::string 
 // loaded, else why it is not.
 extern "C" int nocdyn_load_code(const char *text, std::size_t length, const char *names, int count, void **procedures,
                                 char *message, std::size_t capacity) {
-  std::string failure, version;
+  std::string failure;
+  const std::string version = file_of(compiler());
   temporary_folder temporary;
   void *handle = nullptr;
   std::fill(procedures, procedures + count, nullptr);
-  if (run({compiler(), "--version"}, &version) != 0) {
+  if (version.empty()) {
     failure = "there is no compiler " + compiler();
   } else {
-    std::string source = "/* " + compiler() + ": " + first_line(version) + "; " + processor();
+    std::string source = "/* " + compiler() + ": " + version + "; " + processor();
     for (const std::string &option : options) source += option + " ";
     source += "*/\n" + std::string(text, length);
     std::string folder = cache_folder();
