@@ -203,8 +203,9 @@ extern "C" int nocdyn_load_code(const char *text, std::size_t length, const char
     std::string folder = cache_folder();
     const bool is_kept = !folder.empty();
     if (!is_kept) {
-      char name_of_folder[] = "/tmp/nocdyn-XXXXXX";
-      if (mkdtemp(name_of_folder)) folder = temporary.path = name_of_folder;
+      std::error_code missing;
+      std::string name_of_folder = (fs::temp_directory_path(missing) / "nocdyn-XXXXXX").string();
+      if (!missing && mkdtemp(name_of_folder.data())) folder = temporary.path = name_of_folder;
     }
     const std::string stem = folder + "/" + hash(source), c_file = stem + ".c", library = stem + ".so", lock_file = stem + ".lock";
     const int lock = open(lock_file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);

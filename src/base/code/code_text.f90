@@ -99,11 +99,7 @@ contains
     text = ''
     start = 0
     do i = 1, size(numbers)
-      if (len(text) - start > width) then
-        text = text // new_line(text)
-        start = len(text)
-      end if
-      text = text // to_text(numbers(i)) // ', '
+      call append_number(text, start, to_text(numbers(i)))
     end do
     text = text // '0'   ! no array is empty
   end function list_of_integers
@@ -116,13 +112,22 @@ contains
     text = ''
     start = 0
     do i = 1, size(numbers)
-      if (len(text) - start > width) then
-        text = text // new_line(text)
-        start = len(text)
-      end if
-      text = text // to_text(numbers(i)) // ', '
+      call append_number(text, start, to_text(numbers(i)))
     end do
     text = text // '0'
   end function list_of_reals
+
+  !> Adds a number to a list, on a new line if the present one is full.
+  subroutine append_number(text, start, number)
+    character(len=:), allocatable, intent(inout) :: text
+    integer, intent(inout) :: start   !! characters before the present line
+    character(len=*), intent(in) :: number
+
+    if (len(text) - start > width) then
+      text = text // new_line(text)
+      start = len(text)
+    end if
+    text = text // number // ', '
+  end subroutine append_number
 
 end module nocdyn_code_text

@@ -21,7 +21,7 @@ module nocdyn_law_code
     type(law_work_t) :: work
     logical, allocatable, private :: is_kept(:)    !! whether the work space has all coefficients of a node
   contains
-    procedure :: obstacle, declare_work, declare_tables, write_nodes, operand, kept
+    procedure :: declare_work, declare_tables, write_nodes, operand, kept
   end type law_code_t
 
 contains
@@ -61,19 +61,6 @@ contains
       end do
     end associate
   end function new_law_code
-
-  !> An operation that has no code, '' if there is none.
-  function obstacle(self) result(text)
-    class(law_code_t), intent(in) :: self
-    character(len=:), allocatable :: text
-    integer :: i
-
-    text = ''
-    do i = 1, size(self%work%nodes)
-      if (self%law%tape%node(self%work%nodes(i))%operation <= op_arctangent) cycle
-      text = 'operation ' // to_text(self%law%tape%node(self%work%nodes(i))%operation)
-    end do
-  end function obstacle
 
   !> Whether the work space has all coefficients of a node of its own, which is no input of the motion.
   pure logical function kept(self, node)
