@@ -114,6 +114,7 @@ OPTIONS = {
     "--code": None,
     "--resume": None,
     "--csv": None,
+    "--strict": None,
     "--quiet": None,
 }
 

@@ -220,14 +220,6 @@ def test_a_limit_of_a_shaft_holds_inside_too(nocdyn):
     assert one["quantity"] == "total_moment_s_max" and one["peak_ratio_to_limit"] == pytest.approx(inside / 15, rel=1e-12)
 
 
-def test_limits_that_a_run_ignores_are_noted(nocdyn):
-    nocdyn.write("machine.nml", RING + "&limit coupling = 'shaft' vibratory_moment = 5 moment = 9 /\n")
-    outcome = nocdyn("run", "machine.nml", "--out", "out", "--quiet")
-    assert outcome.returncode == 0
-    (note,) = [note for note in nocdyn.summary("out")["machine"]["notes"] if "compares nothing" in note]
-    assert note.startswith("machine.nml:9: &limit: a run compares nothing with vibratory_moment, which is for steady")
-
-
 @pytest.mark.parametrize(("crankcase", "is_noted"), [("0", True), ("1e5", False)])
 def test_absolute_pressures_need_that_of_the_crankcase(nocdyn, crankcase, is_noted):
     nocdyn.write(

@@ -59,6 +59,7 @@ REFERENCE = {
     },
 }
 CASES = {"reciprocating_compressor": "reconnection", "generator_set": "two_phase", "ice_propeller": "case_2"}
+FIRST = {"reciprocating_compressor": "full_load", "generator_set": "full_load", "ice_propeller": "open_water"}  # of steady speeds
 
 # By the same program: natural frequencies without damping and motors [Hz], the lowest first; of the propulsion line the first,
 FREQUENCIES = {
@@ -291,7 +292,7 @@ def test_no_energy_is_lost(run_of, name):
 def test_the_natural_frequencies_are_those_of_the_reference(nocdyn, name):
     outcome = nocdyn("campbell", input_of(name), "--out", "out", "-q")
     assert outcome.returncode == 0, outcome.stderr
-    modes = json.loads((nocdyn.folder / "out/campbell.json").read_text())["modes"]
+    modes = json.loads((nocdyn.folder / f"out/{FIRST[name]}/campbell.json").read_text())["modes"]
     found = [mode["undamped_frequency_Hz"][0] for mode in modes if "mostly" not in mode]
     found = [frequency for frequency in found if frequency > 0]
     expected = FREQUENCIES[name]
@@ -301,7 +302,7 @@ def test_the_natural_frequencies_are_those_of_the_reference(nocdyn, name):
 @pytest.mark.parametrize("name", STEADY_SPEEDS)
 def test_the_torques_balance_at_the_steady_speed(nocdyn, name):
     assert nocdyn("equilibrium", input_of(name), "--out", "steady").returncode == 0
-    states = json.loads((nocdyn.folder / "steady/equilibrium.json").read_text())["steady_states"]
+    states = json.loads((nocdyn.folder / f"steady/{FIRST[name]}/equilibrium.json").read_text())["steady_states"]
     column, speed = STEADY_SPEEDS[name]
     assert any(state["values"][column] == pytest.approx(speed, rel=1e-9) and state["stability"] == "stable" for state in states)
 
@@ -310,7 +311,7 @@ def rows_of_orders(nocdyn, name):
     """By order and speed [rpm]: the row of response_orders.csv."""
     outcome = nocdyn("response", input_of(name), "--out", "out", "-q")
     assert outcome.returncode == 0, outcome.stderr
-    with open(nocdyn.folder / "out/response_orders.csv", newline="") as file:
+    with open(nocdyn.folder / f"out/{FIRST[name]}/response_orders.csv", newline="") as file:
         rows = [{label.split(" [")[0]: float(value) for label, value in row.items()} for row in csv.DictReader(file)]
     speed = next(iter(rows[0]))
     return {(round(row["order"], 9), round(row[speed] * 30 / pi, 9)): row for row in rows}

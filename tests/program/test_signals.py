@@ -78,8 +78,9 @@ def test_a_limit_of_any_quantity_is_compared_in_runs_and_responses(nocdyn, large
     )
     assert nocdyn("run", "m.nml", "--out", "out").returncode == 0
     summary = json.loads((nocdyn.folder / "out/summary.json").read_text())
-    (limit,) = summary["limits"]
-    assert (limit["column"], limit["limit"], summary["limits_exceeded"]) == ("power_s [W]", largest, exceeded)
+    (limit,) = [line for line in summary["verdict"]["lines"] if line["criterion"] == "power, largest"]
+    assert (limit["quantity"], limit["unit"], limit["limit"]) == ("power_s", "W", largest)
+    assert summary["limits_exceeded"] == exceeded
     assert nocdyn("response", "m.nml", "--out", "speeds").returncode == 0
     assert json.loads((nocdyn.folder / "speeds/response.json").read_text())["limits_exceeded"] == exceeded
 

@@ -31,7 +31,7 @@ ANALYSES = {"limit_groups", "solve", "margins"}  # wrong limits, which the base 
 REPORTS = {  # of recorded paths, in the critical section
     *("csv", "energy_balance", "hidden_file", "holzer", "holzer_report", "machine_report", "output_file", "table_text"),
     *(f"{command}_{part}" for command in ("campbell", "response", "modes") for part in ("files", "report", "results")),
-    *("equilibrium_report", "equilibrium_results"),
+    *("equilibrium_report", "equilibrium_results", "response_verdict", "verdicts"),
 }
 ALLOWED = REPORTS | BEFORE_THREADS | VALUES_OF_A_VARIANT | NAMES_IN_FAILURES | PROGRAMS | ANALYSES | {"serial_work"}
 

@@ -14,6 +14,7 @@ module nocdyn_run_fatigue
   !> One group &fatigue. A shaft has a signal for each of its points, else there is one.
   type, public :: fatigue_item_t
     character(len=:), allocatable :: name, element, unit
+    character(len=:), allocatable :: kind       !! 'coupling', 'shaft'
     real(wp) :: repeats = 1.0_wp
     integer :: first = 1, last = 0          !! signals
     integer, private :: bank = 0, shaft = 0 !! of a shaft
@@ -43,7 +44,8 @@ contains
     do i = 1, size(groups)
       associate (group => input%groups(groups(i)), item => fatigue%items(i))
         item%name = group%name
-        item%element = group%text(trim(element_kind(group)))
+        item%kind = trim(element_kind(group))
+        item%element = group%text(item%kind)
         item%unit = trim(quantity_units(quantity_of(group)))
         item%repeats = group%number('repeats')
         item%first = count + 1

@@ -78,7 +78,7 @@ contains
     allocate (is_unstable(size(self%speed)))
     call find_unstable(self%speed, self%modes, self%unstable, is_unstable)
     call note_speeds(self%response, self%unstable, 'nothing stays near the steady state there', self%notes)
-    call note_steady_states(self%settings, self%response, self%notes)
+    call note_steady_states(self%response, self%notes)
     call note_shaft_modes(machine, self%modes, self%crossings, .true., self%notes)
     self%distance = [(operating_distance(self%settings, self%crossings(i)%speed), i=1, size(self%crossings))]
   end subroutine analyse_campbell

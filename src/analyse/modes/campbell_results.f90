@@ -9,13 +9,14 @@ module nocdyn_campbell_results
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_margins, only: margin_text, mode_text, put_margin, put_mode
+  use nocdyn_margins, only: add_coverage, add_critical, add_nearest, margin_text, mode_text, put_margin, put_mode, unknown_ratio
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: output_units
   use nocdyn_table_text, only: cell
   use nocdyn_text, only: counted, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_units, only: from_si, unit_hz, unit_rpm
+  use nocdyn_verdicts, only: verdict_t
   use nocdyn_wanted_modes, only: modes_choice_t
   implicit none (type, external)
   private
@@ -24,7 +25,7 @@ module nocdyn_campbell_results
     type(campbell_t), private :: campbell
     character(len=:), allocatable, private :: body   !! whose speed is held
   contains
-    procedure :: solve, list_tables, put_table, put_report, text => printed
+    procedure :: solve, list_tables, put_table, find_verdict, put_report, text => printed
   end type campbell_results_t
 
   integer, parameter :: most_modes = 20, most_crossings = 60   ! that are printed; all are in campbell.json
@@ -89,12 +90,32 @@ contains
     end do
   end subroutine put_table
 
+  !> Critical speeds in operation or near it: a diagram does not know what responds there.
+  subroutine find_verdict(self, input, verdict)
+    class(campbell_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    type(verdict_t), intent(out) :: verdict
+    integer :: i
+
+    associate (campbell => self%campbell)
+      do i = 1, size(campbell%crossings)
+        if (campbell%modes%is_electrical(campbell%crossings(i)%mode)) cycle
+        call add_critical('campbell', campbell%settings, campbell%crossings(i), line_word(campbell, campbell%crossings(i)%line), &
+                          campbell%distance(i), unknown_ratio, '', verdict)
+      end do
+      call add_nearest('campbell', campbell%settings, campbell%modes, campbell%crossings, verdict)
+      call add_coverage('campbell', campbell%settings, campbell%unstable, verdict)
+    end associate
+  end subroutine find_verdict
+
   subroutine put_report(self, input, json)
     class(campbell_results_t), intent(in) :: self
     type(input_t), intent(in) :: input
     type(json_t), intent(inout) :: json
+    type(verdict_t) :: verdict
 
-    call put_campbell(json, input, self%body, self%campbell)
+    call self%find_verdict(input, verdict)
+    call put_campbell(json, input, self%body, self%campbell, verdict)
   end subroutine put_report
 
   subroutine printed(self, input, text)
@@ -102,7 +123,7 @@ contains
     type(input_t), intent(in) :: input
     character(len=:), allocatable, intent(out) :: text
 
-    text = campbell_text(input%shown_file(), self%body, self%campbell)
+    text = campbell_text(input%shown_case(), self%body, self%campbell)
   end subroutine printed
 
   !> "order_2.5"; a line with a fixed frequency has its number.
@@ -115,16 +136,31 @@ contains
     if (self%is_order(line)) name = 'order_' // rounded_text(self%order(line), 8)
   end function line_name
 
+  !> What tables call a line: its order, or 'fixed' or 'slip'.
+  function line_word(self, line) result(word)
+    type(campbell_t), intent(in) :: self
+    integer, intent(in) :: line
+    character(len=:), allocatable :: word
+
+    if (self%is_order(line)) then
+      word = rounded_text(self%order(line), 6)
+    else
+      word = self%response%lines(line)%word()
+    end if
+  end function line_word
+
   !> The members of campbell.json.
-  subroutine put_campbell(json, input, body, self)
+  subroutine put_campbell(json, input, body, self, verdict)
     type(json_t), intent(inout) :: json
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: body
     type(campbell_t), intent(in) :: self
+    type(verdict_t), intent(in) :: verdict
     real(wp), allocatable :: unstable(:)
     integer :: i
 
     call json%open_report(input%file, input%title())
+    call verdict%put(json)
     call json%put('notes', self%notes)
     if (size(self%unstable) > 0) then
       unstable = self%unstable%speed
@@ -245,12 +281,8 @@ contains
     do i = 1, min(size(self%crossings), most_crossings)
       associate (crossing => self%crossings(i))
         line = '  ' // repeat(' ', 4 - len(to_text(crossing%mode))) // to_text(crossing%mode)
-        if (self%is_order(crossing%line)) then
-          line = line // cell(rounded_text(self%order(crossing%line), 6))
-        else
-          line = line // cell(self%response%lines(crossing%line)%word())
-        end if
-        line = line // cell(rpm(crossing%speed)) // cell(from_si(crossing%frequency, unit_hz))
+        line = line // cell(line_word(self, crossing%line)) // cell(rpm(crossing%speed)) // &
+               cell(from_si(crossing%frequency, unit_hz))
         line = line // margin_text(self%settings, self%modes, crossing%mode, self%distance(i)) // &
                mode_text(self%response%machine, self%modes, crossing%mode)
         call report%append_line(line)

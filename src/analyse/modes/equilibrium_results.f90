@@ -36,7 +36,7 @@ contains
       call find_stability(formulation, t_infinity, equilibria)
       call new_equilibrium_report(formulation, equilibria, notes, output_units(input), self%report, error)
     end if
-    if (allocated(error)) error%message = input%shown_file() // ': ' // error%message
+    if (allocated(error)) error%message = input%shown_case() // ': ' // error%message
   end subroutine solve
 
   subroutine put_report(self, input, json)
@@ -52,7 +52,7 @@ contains
     type(input_t), intent(in) :: input
     character(len=:), allocatable, intent(out) :: text
 
-    text = equilibrium_text(input%shown_file(), self%report)
+    text = equilibrium_text(input%shown_case(), self%report)
   end subroutine printed
 
 end module nocdyn_equilibrium_results

@@ -44,7 +44,7 @@ contains
     is_of_holzer = .not. allocated(error) .and. options%has_holzer
     if (is_of_holzer) call holzer_tables(self%report, self%holzer_text, self%holzer_csv, error)
     if (.not. allocated(error)) return
-    if (.not. is_of_point .or. error%code == exit_failed) error%message = input%shown_file() // ': ' // error%message
+    if (.not. is_of_point .or. error%code == exit_failed) error%message = input%shown_case() // ': ' // error%message
   end subroutine solve
 
   subroutine list_tables(self, names)
@@ -82,7 +82,7 @@ contains
     type(input_t), intent(in) :: input
     character(len=:), allocatable, intent(out) :: text
 
-    text = modes_text(input%shown_file(), self%report, output_units(input))
+    text = modes_text(input%shown_case(), self%report, output_units(input))
     if (allocated(self%holzer_text)) text = text // new_line('a') // self%holzer_text
   end subroutine printed
 

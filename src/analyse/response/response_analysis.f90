@@ -91,7 +91,7 @@ contains
       call place_error(input, self%settings, failed_speed, error)
     else
       call note_speeds(self%response, self%unstable, 'they are left out', self%notes)
-      call note_steady_states(self%settings, self%response, self%notes)
+      call note_steady_states(self%response, self%notes)
       if (self%modes%modes > 0) call note_shaft_modes(machine, self%modes, self%crossings, .false., self%notes)
       call note_separation(self%response, self%notes)
       call note_linear_ranges(self%response, self%notes)

@@ -24,7 +24,7 @@ module nocdyn_response_fatigue
 
   !> The damage by one group &fatigue.
   type, public :: response_fatigue_t
-    character(len=:), allocatable :: name, element
+    character(len=:), allocatable :: name, kind, element   !! of the group; 'coupling', 'shaft'; its name
     character(len=:), allocatable :: quantity          !! label and unit; a shaft's moment is the one of its first end
     real(wp), allocatable :: rate(:)                   !! damage per hour [1/h], [points]
     logical :: exceeds_strength = .false.              !! whether a mean leaves no strength at some speed
@@ -65,7 +65,8 @@ contains
       kind = kind_moment
       associate (group => input%groups(groups(i)))
         fatigue(i)%name = group%name
-        fatigue(i)%element = group%text(trim(element_kind(group)))
+        fatigue(i)%kind = trim(element_kind(group))
+        fatigue(i)%element = group%text(fatigue(i)%kind)
         fatigue(i)%curve = read_curve(group)
         fatigue(i)%speeds = group%numbers('profile_speeds')
         fatigue(i)%hours = group%numbers('profile_hours')

@@ -14,6 +14,7 @@ module nocdyn_response_files
   use nocdyn_moment_forms, only: kind_moment, moment_form_t
   use nocdyn_response_summary, only: critical_t, response_summary_t, worst_ratio
   use nocdyn_text, only: string_t
+  use nocdyn_verdicts, only: verdict_t
   use nocdyn_units, only: from_si
   implicit none (type, external)
   private
@@ -310,16 +311,17 @@ contains
   end function phase
 
   !> The members of response.json.
-  subroutine put_response(json, input, analysis, summary)
+  subroutine put_response(json, input, analysis, summary, verdict)
     type(json_t), intent(inout) :: json
     type(input_t), intent(in) :: input
     type(response_analysis_t), intent(in) :: analysis
     type(response_summary_t), intent(in) :: summary
+    type(verdict_t), intent(in) :: verdict
     real(wp), allocatable :: unstable(:)
     integer :: i
 
     call json%open_report(input%file, input%title())
-    call json%put('limits_exceeded', summary%limits_exceeded)
+    call verdict%put(json)
     call json%put('wall_time_s', analysis%wall_time)
     call json%put('notes', analysis%notes)
     if (size(analysis%unstable) > 0) then

@@ -12,7 +12,7 @@ module nocdyn_response_limits
   use nocdyn_limit_groups, only: limited_kind, limited_signal
   use nocdyn_moment_forms, only: moment_form_t
   use nocdyn_signals, only: find_signal, signal_t
-  use nocdyn_text, only: quoted
+  use nocdyn_text, only: quoted, rounded_text
   implicit none (type, external)
   private
 
@@ -32,7 +32,8 @@ module nocdyn_response_limits
     real(wp), private :: tensile_strength = 0.0_wp    !! sigma_B [Pa]
     real(wp), private :: c_k = 1.0_wp, diameter = 0.0_wp, rated = 0.0_wp   !! [1], [m], [rad/s]
   contains
-    procedure :: continuous_limit, transient_limit, peak_limit, ratio, allows_passing
+    procedure :: continuous_limit, transient_limit, peak_limit, ratio, allows_passing, has_continuous, has_transient
+    procedure :: write_rule, write_place
   end type response_limit_t
 
 contains
@@ -190,6 +191,39 @@ contains
 
     limit = self%peak
   end function peak_limit
+
+  !> Whether there is a limit for continuous operation.
+  elemental logical function has_continuous(self)
+    class(response_limit_t), intent(in) :: self
+
+    has_continuous = self%has_rule .or. self%vibratory < no_limit
+  end function has_continuous
+
+  !> Whether there is a limit for passing a range of speeds.
+  elemental logical function has_transient(self)
+    class(response_limit_t), intent(in) :: self
+
+    has_transient = self%has_rule .or. self%transient < no_limit
+  end function has_transient
+
+  !> The rule that the limit for continuous operation comes from, '' if it is the user's own.
+  pure subroutine write_rule(self, text)
+    class(response_limit_t), intent(in) :: self
+    character(len=:), allocatable, intent(out) :: text
+
+    text = ''
+    if (self%has_rule) text = 'IACS UR M68'
+  end subroutine write_rule
+
+  !> A speed in the terms of the rule, "lambda 0.84"; '' without a rule.
+  pure subroutine write_place(self, speed, text)
+    class(response_limit_t), intent(in) :: self
+    real(wp), intent(in) :: speed   !! [rad/s]
+    character(len=:), allocatable, intent(out) :: text
+
+    text = ''
+    if (self%has_rule) text = 'lambda ' // rounded_text(abs(speed) / self%rated, 2)
+  end subroutine write_place
 
   !> tau_C [Pa].
   elemental real(wp) function m68_stress(self, speed) result(stress)

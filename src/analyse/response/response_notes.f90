@@ -78,13 +78,12 @@ contains
   end subroutine note_shaft_modes
 
   !> Notes on the speeds and the steady states: what nocdyn campbell has too.
-  subroutine note_steady_states(settings, response, notes)
-    type(response_settings_t), intent(in) :: settings
+  subroutine note_steady_states(response, notes)
     type(forced_response_t), intent(in) :: response
     type(string_t), allocatable, intent(inout) :: notes(:)
     real(wp), parameter :: rounding = 1.0e-9_wp
     integer :: e, held, i, open
-    real(wp) :: factor(size(response%points)), supply(size(response%points)), computed(2), needed(2)
+    real(wp) :: factor(size(response%points)), supply(size(response%points))
     integer, allocatable :: elastic(:)
     type(string_t), allocatable :: names(:)
 
@@ -127,16 +126,6 @@ contains
                          rounded_text(maxval(supply), 4) // ' times their frequency')
     end if
     call note_damping(response, notes)
-    ! critical speeds within the margin of operation are not found beyond the speeds that are computed
-    if (size(settings%operating) == 0) return
-    computed = abs([settings%speeds(1), settings%speeds(size(settings%speeds))])
-    needed = abs(settings%operating) * [1.0_wp - settings%margin, 1.0_wp + settings%margin]
-    if (computed(1) <= needed(1) .and. computed(2) >= needed(2)) return
-    computed = from_si(computed, unit_rpm)
-    needed = from_si(needed, unit_rpm)
-    call append(notes, 'operation with its margin is from ' // rounded_text(needed(1), 5) // ' to ' // &
-                       rounded_text(needed(2), 5) // ' rpm: critical speeds in it are sought only from ' // &
-                       rounded_text(computed(1), 5) // ' to ' // rounded_text(computed(2), 5) // ' rpm, the speeds of &response')
   end subroutine note_steady_states
 
   !> Notes on the damping of the modes of a run at the highest speed.

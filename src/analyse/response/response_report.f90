@@ -26,9 +26,9 @@ contains
     type(response_analysis_t), intent(in) :: analysis
     type(response_summary_t), intent(in) :: summary
     character(len=:), allocatable :: text
-    character(len=:), allocatable :: line, range
+    character(len=:), allocatable :: range
     type(text_buffer_t) :: report
-    integer :: i, q
+    integer :: i
 
     do i = 1, size(analysis%notes)
       call report%append_line(file // ': note: ' // analysis%notes(i)%text)
@@ -41,28 +41,6 @@ contains
     end associate
     call put_criticals(analysis, summary, report)
     call put_largest(analysis, summary, report)
-    ! ranges of speeds in which limits are exceeded
-    do i = 1, size(summary%barred)
-      associate (range => summary%barred(i))
-        line = '  barred by ' // analysis%response%quantities(analysis%limits(range%limit)%quantity)%name // ': ' // &
-               rpm(range%from) // ' to ' // rpm(range%to) // ' rpm'
-        if (.not. range%is_allowed) then
-          line = line // '; the rule allows no barred range from 0.8 of the rated speed on'
-        else if (.not. range%can_be_passed) then
-          line = line // '; the limit for passing through is exceeded too'
-        end if
-        call report%append_line(line)
-      end associate
-    end do
-    do q = 1, size(summary%largest)
-      associate (largest => summary%largest(q))
-        if (largest%peak_ratio <= 1.0_wp) cycle
-        call report%append_line('  ' // analysis%response%quantities(q)%name // ' exceeds its limit of the peak: ' // &
-                                ratio_text(largest%peak_ratio) // ' at ' // &
-                                rpm(analysis%response%points(largest%peak_point)%state%speed) // ' rpm')
-      end associate
-    end do
-    if (size(analysis%limits) > 0 .and. .not. summary%limits_exceeded) call report%append_line('  all limits are kept')
     call put_fatigue(analysis, report)
     text = report%text()
   end function response_text

@@ -13,7 +13,9 @@ module nocdyn_response_results
     response_columns_json, response_grid, response_table
   use nocdyn_response_report, only: response_text
   use nocdyn_response_summary, only: response_summary_t, summarise_response
+  use nocdyn_response_verdict, only: find_response_verdict
   use nocdyn_text, only: string_t
+  use nocdyn_verdicts, only: verdict_t
   implicit none (type, external)
   private
 
@@ -23,7 +25,7 @@ module nocdyn_response_results
     type(response_analysis_t), private :: analysis
     type(response_summary_t), private :: summary
   contains
-    procedure :: solve, list_tables, put_table, grid_name, other_names, put_grid, put_report, text => printed
+    procedure :: solve, list_tables, put_table, grid_name, other_names, put_grid, find_verdict, put_report, text => printed
   end type response_results_t
 
 contains
@@ -91,12 +93,22 @@ contains
     end select
   end subroutine put_table
 
+  subroutine find_verdict(self, input, verdict)
+    class(response_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    type(verdict_t), intent(out) :: verdict
+
+    call find_response_verdict(input, self%analysis, self%summary, verdict)
+  end subroutine find_verdict
+
   subroutine put_report(self, input, json)
     class(response_results_t), intent(in) :: self
     type(input_t), intent(in) :: input
     type(json_t), intent(inout) :: json
+    type(verdict_t) :: verdict
 
-    call put_response(json, input, self%analysis, self%summary)
+    call self%find_verdict(input, verdict)
+    call put_response(json, input, self%analysis, self%summary, verdict)
   end subroutine put_report
 
   subroutine printed(self, input, text)
@@ -104,7 +116,7 @@ contains
     type(input_t), intent(in) :: input
     character(len=:), allocatable, intent(out) :: text
 
-    text = response_text(input%shown_file(), self%analysis, self%summary)
+    text = response_text(input%shown_case(), self%analysis, self%summary)
   end subroutine printed
 
 end module nocdyn_response_results

@@ -43,13 +43,13 @@ module nocdyn_response_summary
     real(wp) :: from = 0.0_wp, to = 0.0_wp      !! [rad/s]
     logical :: can_be_passed = .true.           !! whether the limit for passing them quickly is kept
     logical :: is_allowed = .true.              !! whether the rule of the limit accepts a barred range there
+    integer :: worst = 0                        !! point with the largest ratio to the limit
   end type barred_range_t
 
   type, public :: response_summary_t
     type(critical_t), allocatable :: criticals(:)
     type(largest_t), allocatable :: largest(:)          !! [quantities]
     type(barred_range_t), allocatable :: barred(:)
-    logical :: limits_exceeded = .false.
   end type response_summary_t
 
 contains
@@ -99,7 +99,6 @@ contains
     do i = 1, size(analysis%limits)
       call find_barred(analysis%response%points, analysis%limits(i), i, self%barred)
     end do
-    self%limits_exceeded = any(self%largest%ratio > 1.0_wp)
   end function summarise_response
 
   !> Follows the amplitude of a line uphill from its crossing with a mode.
@@ -179,9 +178,11 @@ contains
     do while (i <= size(points))
       if (excess(i) > 0) then
         range%from = edge(speed, excess, i, i - 1)
+        range%worst = i
         range%can_be_passed = .true.
         range%is_allowed = .true.
         do
+          if (excess(i) > excess(range%worst)) range%worst = i
           range%is_allowed = range%is_allowed .and. limit%allows_passing(speed(i))
           range%can_be_passed = range%can_be_passed .and. half_range(i) <= limit%transient_limit(speed(i))
           range%to = edge(speed, excess, i, i + 1)

@@ -9,6 +9,7 @@ module nocdyn_analyses
   use nocdyn_machine, only: machine_t
   use nocdyn_output_file, only: output_file_t
   use nocdyn_text, only: string_t
+  use nocdyn_verdicts, only: verdict_t
   implicit none (type, external)
   private
 
@@ -38,6 +39,7 @@ module nocdyn_analyses
     procedure :: grid_name, other_names
     procedure :: put_grid
     procedure :: put_report
+    procedure :: find_verdict
     procedure(text_interface), deferred :: text
   end type analysis_t
 
@@ -110,6 +112,13 @@ contains
 
     error stop 'nocdyn_analyses: an analysis with a grid overrides put_grid'
   end subroutine put_grid
+
+  !> What the analysis says of limits. By default nothing.
+  subroutine find_verdict(self, input, verdict)
+    class(analysis_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    type(verdict_t), intent(out) :: verdict
+  end subroutine find_verdict
 
   !> Fills the report: the file COMMAND.json, and what sweeps record by paths.
   subroutine put_report(self, input, json)

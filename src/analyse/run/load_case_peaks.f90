@@ -1,6 +1,6 @@
 !> What the runs of several load cases say together: the largest values with their cases, and the damage of all of them.
 module nocdyn_load_case_peaks
-  use nocdyn_input, only: load_case_t
+  use nocdyn_case_results, only: case_result_t
   use nocdyn_kinds, only: wp
   use nocdyn_run_fatigue, only: run_fatigue_t
   use nocdyn_run_summary, only: run_summary_t
@@ -12,8 +12,7 @@ module nocdyn_load_case_peaks
   public :: find_peaks, sum_damage
 
   !> The run of one load case.
-  type, public :: case_run_t
-    type(load_case_t) :: load_case
+  type, extends(case_result_t), public :: case_run_t
     type(run_summary_t) :: summary
   end type case_run_t
 
@@ -27,7 +26,7 @@ module nocdyn_load_case_peaks
 
   !> The damage of one &fatigue in all load cases, each as often as it occurs.
   type, public :: life_t
-    character(len=:), allocatable :: name, element, unit
+    character(len=:), allocatable :: name, kind, element, unit   !! of the group; of the element; of the quantity
     real(wp) :: position = 0.0_wp             !! along a shaft [m]
     logical :: is_shaft = .false.             !! whether there are several points of it
     real(wp) :: damage = 0.0_wp               !! where it is largest
@@ -199,6 +198,7 @@ contains
           if (item%name /= life%name) cycle
           damage = run%load_case%repeats * item%repeats * fatigue%counters(item%first:item%last)%damage
           positions = fatigue%position(item%first:item%last)
+          life%kind = item%kind
           life%element = item%element
           life%unit = item%unit
           life%exceeds_strength = life%exceeds_strength .or. any(fatigue%counters(item%first:item%last)%has_failed)

@@ -1,5 +1,6 @@
 !> The table over load cases: as printed, for cases.json and for cases.csv.
 module nocdyn_load_case_report
+  use nocdyn_case_results, only: combine_verdicts, is_complete, put_cases, status_done
   use nocdyn_csv, only: text_cell, write_header, write_numbers
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
@@ -10,10 +11,11 @@ module nocdyn_load_case_report
   use nocdyn_table_text, only: cell, padded, text_width
   use nocdyn_text, only: counted, quoted, rounded_text, string_t, strings
   use nocdyn_text_buffer, only: text_buffer_t
+  use nocdyn_verdicts, only: is_exceeded, is_kept, is_not_assessed, new_verdict_line, verdict_line_t, verdict_t
   implicit none (type, external)
   private
 
-  public :: load_cases_json, load_cases_text, put_load_cases_csv
+  public :: find_verdict, load_cases_json, load_cases_text, put_load_cases_csv
 
   integer, parameter :: most_lines = 25   ! printed
   integer, parameter :: digits = 4        ! of printed damages
@@ -27,25 +29,14 @@ contains
     type(case_run_t), intent(in) :: runs(:)
     character(len=:), allocatable :: text
     type(json_t) :: json
-    integer :: c, i
+    type(verdict_t) :: verdict
+    integer :: i
     type(peak_t), allocatable :: peaks(:)
 
     call json%open_report(input%file, input%title())
-    call json%put('is_complete', is_complete(runs))
-    call json%open_list('load_cases')
-    do c = 1, size(runs)
-      associate (load_case => runs(c)%load_case, summary => runs(c)%summary)
-        call json%open()
-        call json%put('name', load_case%name)
-        call json%put('title', load_case%title)
-        call json%put('repeats', load_case%repeats)
-        call json%put('folder', load_case%name)
-        call json%put('status', trim(summary%status))
-        if (allocated(summary%message)) call json%put('message', summary%message)
-        call json%close()
-      end associate
-    end do
-    call json%close_list()
+    call find_verdict(runs, verdict)
+    call verdict%put(json)
+    call put_cases(json, runs%case_result_t)
     call find_peaks(runs, peaks)
     call json%open_list('peaks')
     do i = 1, size(peaks)
@@ -63,13 +54,30 @@ contains
     text = json%text()
   end function load_cases_json
 
-  !> Whether all load cases have been run to their ends.
-  pure logical function is_complete(runs)
+  !> What all runs say of limits, and their damage together.
+  subroutine find_verdict(runs, verdict)
     type(case_run_t), intent(in) :: runs(:)
-    integer :: c
+    type(verdict_t), intent(out) :: verdict
+    type(life_t), allocatable :: lives(:)
+    type(verdict_line_t) :: line
+    integer :: i
 
-    is_complete = all([(runs(c)%summary%status == 'done', c=1, size(runs))])
-  end function is_complete
+    call combine_verdicts('run', runs%case_result_t, verdict)
+    call sum_damage(runs, lives)
+    do i = 1, size(lives)
+      line = new_verdict_line('run', lives(i)%kind // ' ' // quoted(lives(i)%element), '', 'damage ' // quoted(lives(i)%name), '')
+      call line%compare(lives(i)%damage, 1.0_wp, '1')
+      line%detail = 'all load cases'
+      if (lives(i)%exceeds_strength) then
+        line%finding = is_exceeded
+        line%reason = 'the mean of a cycle exceeds the strength'
+      else if (line%finding == is_kept .and. .not. is_complete(runs%case_result_t)) then
+        line%finding = is_not_assessed
+        line%reason = 'load cases are missing'
+      end if
+      call verdict%add(line)
+    end do
+  end subroutine find_verdict
 
   subroutine put_lives(json, runs)
     type(json_t), intent(inout) :: json
@@ -87,7 +95,7 @@ contains
       call json%put('unit', lives(i)%unit)
       if (lives(i)%is_shaft) call json%put('position', lives(i)%position)
       call json%put('damage', lives(i)%damage)
-      if (lives(i)%damage > 0 .and. is_complete(runs)) call json%put('repeats_to_failure', 1 / lives(i)%damage)
+      if (lives(i)%damage > 0 .and. is_complete(runs%case_result_t)) call json%put('repeats_to_failure', 1 / lives(i)%damage)
       call json%put('mean_exceeds_strength', lives(i)%exceeds_strength)
       call json%open('damage_of_load_cases')
       do c = 1, size(runs)
@@ -125,11 +133,14 @@ contains
     type(case_run_t), intent(in) :: runs(:)
     character(len=:), allocatable :: text
     type(text_buffer_t) :: report
+    type(verdict_t) :: verdict
     type(peak_t), allocatable :: peaks(:)
     type(string_t), allocatable :: labels(:)
     integer, allocatable :: ranks(:), shown(:)
     integer :: i, width
 
+    call find_verdict(runs, verdict)
+    call verdict%write_table(report)
     call find_peaks(runs, peaks)
     allocate (labels(size(peaks)))
     do i = 1, size(peaks)
@@ -163,18 +174,18 @@ contains
       line = 'fatigue ' // quoted(lives(i)%name) // ': damage of all load cases ' // rounded_text(lives(i)%damage, digits)
       if (lives(i)%is_shaft) line = line // ' at ' // rounded_text(lives(i)%position, digits) // ' m'
       if (lives(i)%damage > 1) line = line // ', above 1: the part does not last'
-      if (is_complete(runs) .and. lives(i)%damage > 0 .and. lives(i)%damage <= 1) then
+      if (is_complete(runs%case_result_t) .and. lives(i)%damage > 0 .and. lives(i)%damage <= 1) then
         line = line // ', all of them may occur ' // rounded_text(1 / lives(i)%damage, digits) // ' times'
       end if
       line = line // parts_text(runs, lives(i)%of_case)
       if (lives(i)%exceeds_strength) line = line // '; the mean of a cycle exceeds the strength'
       call report%append_line(line)
     end do
-    if (is_complete(runs)) return
+    if (is_complete(runs%case_result_t)) return
     line = ''
     do c = 1, size(runs)
-      if (runs(c)%summary%status == 'done') cycle
-      line = line // ', ' // runs(c)%load_case%name // ' (' // trim(runs(c)%summary%status) // ')'
+      if (runs(c)%status == status_done) cycle
+      line = line // ', ' // runs(c)%load_case%name // ' (' // trim(runs(c)%status) // ')'
     end do
     call report%append_line('incomplete: ' // line(3:))
   end subroutine append_lives

@@ -12,7 +12,6 @@ module nocdyn_run_summary
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: constraint_count, machine_notes, named_coordinates
   use nocdyn_run_fatigue, only: run_fatigue_t
-  use nocdyn_run_limits, only: put_run_limits, run_limit_t
   use nocdyn_solver_status, only: max_switch_times, solver_status_t
   use nocdyn_run_settings, only: put_settings
   use nocdyn_signals, only: signal_t
@@ -20,6 +19,7 @@ module nocdyn_run_summary
   use nocdyn_table_text, only: cell_digits
   use nocdyn_text, only: append, counted, longest_path, rounded_text, selected, shortened, string_t, strings, &
     to_text
+  use nocdyn_verdicts, only: verdict_t
   implicit none (type, external)
   private
 
@@ -57,7 +57,7 @@ module nocdyn_run_summary
     character(len=:), allocatable :: method         !! of integration
     type(solver_status_t) :: solver_status
     type(energy_balance_t), allocatable :: energy_balance  !! from the start to the last row; not allocated if there are no rows
-    type(run_limit_t), allocatable :: limits(:)     !! by &limit; not allocated before the first row
+    type(verdict_t) :: verdict                      !! on limits and damage
     type(run_fatigue_t) :: fatigue                  !! by &fatigue; no items before the first row
     real(wp) :: wall_time = 0.0_wp                  !! of integration and writing of the trajectory [s]
     type(named_event_t), allocatable :: events(:)   !! of joints; not allocated if there are no joints
@@ -156,6 +156,7 @@ contains
 
     call json%open_report(input%file, input%title(), summary%status, summary%message)
     if (allocated(input%load_case)) call json%put('load_case', input%load_case%name)
+    call summary%verdict%put(json)
     call json%open('machine')
     call json%put('bodies', summary%bodies)
     call json%put('gears', summary%gears)
@@ -165,7 +166,6 @@ contains
     call json%put('notes', summary%notes)
     call json%close()
     call put_settings(json, input%single('run'))
-    if (allocated(summary%limits)) call put_run_limits(json, summary%limits)
     if (allocated(summary%fatigue%items)) call put_fatigue(json, summary%fatigue)
     associate (solver_status => summary%solver_status)
       call json%open('counts')

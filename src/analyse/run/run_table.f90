@@ -4,7 +4,6 @@ module nocdyn_run_table
   use nocdyn_fatigue_report, only: fatigue_text
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_run_limits, only: run_limits_text
   use nocdyn_quantities, only: rank_force, rank_loss, rank_moment, rank_reaction, rank_speed, rank_stress, rank_torque
   use nocdyn_run_summary, only: run_summary_t
   use nocdyn_table_text, only: append_table, clear_rounding
@@ -16,6 +15,7 @@ module nocdyn_run_table
   public :: columns_to_show, summary_table
 
   integer, parameter :: most_lines = 25   ! of columns and of the energy balance
+  integer, parameter :: fewest_columns = 6
   integer, parameter :: sorts = 5         ! of columns, see `sort_of`
 
 contains
@@ -25,20 +25,29 @@ contains
   function summary_table(input, summary) result(text)
     type(input_t), intent(in) :: input
     type(run_summary_t), intent(in) :: summary
-    character(len=:), allocatable :: text
-    type(text_buffer_t) :: report, energies
+    character(len=:), allocatable :: lives, text
+    type(text_buffer_t) :: report, energies, verdict
     integer :: left   ! lines
 
     if (allocated(summary%energy_balance)) call append_energy_balance(energies, summary%energy_balance)
     text = energies%text()
-    left = most_lines - count(transfer(text, 'a', len(text)) == new_line('a'))
+    call summary%verdict%write_table(verdict)
+    lives = ''
+    if (allocated(summary%fatigue%items)) lives = fatigue_text(summary%fatigue)
+    left = max(fewest_columns, most_lines - line_count(text) - line_count(verdict%text()) - line_count(lives))
     if (input%title() /= '') call report%append_line(input%title())
+    call report%append(verdict%text())
     call append_columns(report, summary, left)
     call report%append(text)
-    if (allocated(summary%limits)) call report%append(run_limits_text(summary%limits, ''))
-    if (allocated(summary%fatigue%items)) call report%append(fatigue_text(summary%fatigue))
+    call report%append(lives)
     text = report%text()
   end function summary_table
+
+  pure integer function line_count(text)
+    character(len=*), intent(in) :: text
+
+    line_count = count(transfer(text, 'a', len(text)) == new_line('a'))
+  end function line_count
 
   subroutine append_columns(report, summary, most)
     type(text_buffer_t), intent(inout) :: report

@@ -19,7 +19,7 @@ module nocdyn_transient
   use nocdyn_output_times, only: check_output_times, output_note, output_times
   use nocdyn_output_units, only: output_units
   use nocdyn_row_intervals, only: choose_row_count, note_sparse_rows
-  use nocdyn_run_limits, only: check_run_limits, note_other_limits
+  use nocdyn_run_verdict, only: add_damage, add_end, add_run_limits, column_extreme_t
   use nocdyn_run_settings, only: check_size, choose_settings
   use nocdyn_run_statistics, only: find_extremes, list_statistics, take_fatigue
   use nocdyn_run_summary, only: check_energy_balance, check_extremes, describe_machine, run_summary_t
@@ -122,7 +122,6 @@ contains
     summary%method = trim(settings%method)
     call describe_machine(formulation%machine, summary)
     if (output_note(input) /= '') call append(notes, output_note(input))
-    call note_other_limits(input, notes)
     call note_damping(formulation%machine, notes)
     do i = 1, size(notes)
       call append(summary%notes, notes(i)%text)
@@ -251,8 +250,6 @@ contains
       call find_extremes(observer, input, table%unit, observer%row, observer%rows, summary%extremes)
       call take_fatigue(observer, input, table%columns%formulation%machine, size(table%labels), summary%fatigue)
     end associate
-    call check_run_limits(input, summary%signals, summary%labels, summary%extremes%lowest, summary%extremes%highest, &
-                          summary%limits)
     if (.not. allocated(error)) call check_extremes(summary%extremes, summary%labels, error)
     call check_energy_balance(summary%extremes, observer%vibration%largest, &
                               observer%atol * observer%largest_moment, summary%notes)
@@ -266,12 +263,33 @@ contains
                                   summary%signals, max(abs(extremes%lowest), abs(extremes%highest)), &
                                   extremes%lowest_time, extremes%highest_time, summary%transient)
       end associate
-      return
+    else
+      summary%message = error%message
+      summary%status = 'failed'
+      if (summary%solver_status%code(1) == integration_interrupted) summary%status = 'interrupted'
     end if
-    summary%message = error%message
-    summary%status = 'failed'
-    if (summary%solver_status%code(1) == integration_interrupted) summary%status = 'interrupted'
+    call find_verdict(input, summary)
   end subroutine complete_summary
+
+  !> Compares the extremes and the damage with the limits of the input.
+  subroutine find_verdict(input, summary)
+    type(input_t), intent(in) :: input
+    type(run_summary_t), intent(inout) :: summary
+    type(column_extreme_t) :: extremes(size(summary%signals))
+    integer :: i
+    logical :: is_high
+
+    do i = 1, size(extremes)
+      is_high = abs(summary%extremes%highest(i)) > abs(summary%extremes%lowest(i))
+      extremes(i)%size = max(abs(summary%extremes%lowest(i)), abs(summary%extremes%highest(i)))
+      extremes(i)%time = merge(summary%extremes%highest_time(i), summary%extremes%lowest_time(i), is_high)
+      if (.not. allocated(summary%transient%has_highest)) cycle
+      extremes(i)%is_of_start = merge(summary%transient%has_highest(i), summary%transient%has_lowest(i), is_high)
+    end do
+    if (summary%extremes%have_begun) call add_run_limits(input, summary%signals, extremes, summary%verdict)
+    if (.not. allocated(input%load_case)) call add_damage(summary%fatigue, summary%verdict)   ! that of all cases together counts
+    if (summary%status /= 'done') call add_end(input, summary%message, summary%verdict)
+  end subroutine find_verdict
 
   !> One output time: a row of the table.
   subroutine on_output(self, lane, t, y)

@@ -29,6 +29,7 @@ module nocdyn_arguments
     option_t('--shard', value='K/N'), &
     option_t('--resume', may_repeat=.true.), &
     option_t('--csv', may_repeat=.true.), &
+    option_t('--strict', may_repeat=.true.), &
     option_t('--quiet', short='-q', may_repeat=.true.), &
     option_t('--help', short='-h', may_repeat=.true.)]
 

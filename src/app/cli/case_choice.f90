@@ -8,9 +8,27 @@ module nocdyn_case_choice
   implicit none (type, external)
   private
 
-  public :: choose_case, wanted_case
+  public :: choose_case, find_wanted, wanted_case
 
 contains
+
+  !> Which load cases a command computes: the one of --case, else all that are for it.
+  subroutine find_wanted(arguments, machine, wanted, error)
+    type(arguments_t), intent(in) :: arguments
+    type(input_t), intent(in) :: machine               !! with the load cases of its file
+    integer, allocatable, intent(out) :: wanted(:)     !! of its load cases; none of a file without any
+    type(error_t), allocatable, intent(out) :: error   !! there is no load case of this name, or none is for the command
+    integer :: c, chosen
+
+    call choose_case(arguments, machine, chosen, error)
+    if (allocated(error)) return
+    wanted = pack([(c, c=1, size(machine%load_cases))], &
+                  [(chosen == c .or. (chosen == 0 .and. machine%load_cases(c)%is_for(arguments%command)), &
+                    c=1, size(machine%load_cases))])
+    if (size(wanted) > 0 .or. size(machine%load_cases) == 0) return
+    call raise(error, exit_input, machine%shown_file() // ': no &load_case has ' // quoted(arguments%command) // &
+               ' among its analyses; allowed: --case NAME, or a load case with it')
+  end subroutine find_wanted
 
   !> The name of the only load case that is wanted, '' if it is not one alone.
   pure function wanted_case(arguments) result(name)

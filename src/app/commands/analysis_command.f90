@@ -2,7 +2,8 @@
 module nocdyn_analysis_command
   use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_arguments, only: arguments_t
-  use nocdyn_case_choice, only: choose_case, wanted_case
+  use nocdyn_case_choice, only: find_wanted, wanted_case
+  use nocdyn_case_results, only: case_result_t, combine_verdicts, put_cases, status_failed, status_refused
   use nocdyn_check_results, only: check_results_t
   use nocdyn_companion_command, only: become_companion
   use nocdyn_console, only: print_text, report_error
@@ -20,17 +21,29 @@ module nocdyn_analysis_command
   use nocdyn_posix, only: is_interrupted, remove_file, stop_at_interrupts
   use nocdyn_result_files, only: result_files_t
   use nocdyn_result_folders, only: out_folder, refuse_shared_folders, result_folder
+  use nocdyn_strictness, only: be_strict
   use nocdyn_sweep_plan, only: add_plan_diagnostics, has_sweep, make_plan, sweep_plan_t
-  use nocdyn_text, only: append, listed, shown_path, string_t, to_text
+  use nocdyn_text, only: append, counted, listed, shown_path, string_t, to_text
+  use nocdyn_text_buffer, only: text_buffer_t
+  use nocdyn_verdicts, only: verdict_t
   implicit none (type, external)
   private
 
   public :: analysis_command, analyse
 
+  !> A machine to analyse.
+  type :: job_t
+    type(input_t) :: input
+    character(len=:), allocatable :: folder   !! of its results, '': nothing is written
+    logical :: is_alone = .false.             !! whether it is the only one of its file
+  end type job_t
+
   !> An input file that has been read.
   type :: reading_t
-    type(input_t) :: input
+    type(input_t) :: machine                      !! with the load cases of the file
     type(input_t), allocatable :: load_cases(:)   !! of `check`
+    type(job_t), allocatable :: jobs(:)           !! the machine itself, or load cases
+    character(len=:), allocatable :: folder       !! of the file
     type(error_t), allocatable :: error
   end type reading_t
 
@@ -69,16 +82,19 @@ contains
     integer, intent(out) :: code
     class(grid_file_t), intent(in), optional :: netcdf   !! as in `analyse`
     type(reading_t), allocatable :: readings(:)
-    type(string_t), allocatable :: folders(:)
-    type(machine_t) :: machine
+    type(string_t), allocatable :: files(:), folders(:)
     type(error_t), allocatable :: error
-    character(len=:), allocatable :: words
-    integer :: i
+    integer :: i, k
 
     code = exit_done
-    allocate (readings(size(arguments%operands)), folders(size(arguments%operands)))
+    allocate (readings(size(arguments%operands)), files(0), folders(0))
     do i = 1, size(readings)
-      call read_one(arguments, i, kind%always_writes, readings(i), folders(i)%text)
+      call read_one(arguments, i, kind%always_writes, readings(i))
+      if (allocated(readings(i)%error)) cycle
+      do k = 1, size(readings(i)%jobs)
+        call append(files, arguments%operands(i)%text)
+        call append(folders, readings(i)%jobs(k)%folder)
+      end do
     end do
     if (.not. present(netcdf)) then
       call refuse_pipes(arguments, kind, readings)
@@ -87,24 +103,13 @@ contains
         return
       end if
     end if
-    call refuse_shared_folders(arguments%operands, folders, error)
+    call refuse_shared_folders(files, folders, error)
     if (allocated(error)) then
       call report_error(error, code)
       return
     end if
     do i = 1, size(readings)
-      associate (reading => readings(i))
-        words = shown_path(arguments%operands(i)%text) // ': interrupted, without results'
-        call stop_at_interrupts('nocdyn: ' // words // new_line('a'))
-        if (.not. allocated(reading%error)) call assemble_analysed(arguments%command, kind, reading%input, machine, &
-                                                                     reading%error)
-        if (.not. allocated(reading%error)) call check_signals(reading%input, machine, reading%error)
-        if (.not. allocated(reading%error)) call analyse_one(arguments, kind, reading%input, machine, folders(i)%text, &
-                                                             reading%error, netcdf)
-        if (arguments%command == 'check') call check_load_cases(kind, reading)
-        if (is_interrupted() .and. allocated(reading%error)) reading%error%message = words
-        if (allocated(reading%error)) call report_error(reading%error, code)
-      end associate
+      call analyse_file(arguments, i, kind, readings(i), code, netcdf)
       if (is_interrupted()) exit
     end do
     if (i >= size(readings)) return
@@ -112,13 +117,109 @@ contains
     call report_error(error, code)
   end subroutine analyse_files
 
+  !> Analyses the machine of a file, or its load cases. Cases that fail do not stop the others.
+  subroutine analyse_file(arguments, number, kind, reading, code, netcdf)
+    type(arguments_t), intent(in) :: arguments
+    integer, intent(in) :: number                       !! of the file
+    class(analysis_t), intent(in) :: kind               !! the analysis, before its solution
+    type(reading_t), intent(inout) :: reading
+    integer, intent(inout) :: code
+    class(grid_file_t), intent(in), optional :: netcdf  !! as in `analyse`
+    type(case_result_t), allocatable :: results(:)
+    character(len=:), allocatable :: words
+    integer :: k
+
+    words = shown_path(arguments%operands(number)%text) // ': interrupted, without results'
+    call stop_at_interrupts('nocdyn: ' // words // new_line('a'))
+    if (allocated(reading%error)) then
+      if (arguments%command == 'check') call check_load_cases(kind, reading)
+      call report_error(reading%error, code)
+      return
+    end if
+    allocate (results(size(reading%jobs)))
+    do k = 1, size(results)
+      if (allocated(reading%jobs(k)%input%load_case)) results(k)%load_case = reading%jobs(k)%input%load_case
+      if (is_interrupted()) then
+        results(k)%status = 'not run'
+        cycle
+      end if
+      call analyse_job(arguments, kind, reading%jobs(k), results(k), reading%error, netcdf)
+      if (arguments%command == 'check') call check_load_cases(kind, reading)
+      if (is_interrupted() .and. allocated(reading%error)) reading%error%message = words
+      if (.not. allocated(reading%error)) cycle
+      call report_error(reading%error, code)
+      deallocate (reading%error)
+    end do
+    call conclude(arguments, reading, results, code)
+  end subroutine analyse_file
+
+  !> Analyses one machine.
+  subroutine analyse_job(arguments, kind, job, result, error, netcdf)
+    type(arguments_t), intent(in) :: arguments
+    class(analysis_t), intent(in) :: kind
+    type(job_t), intent(in) :: job
+    type(case_result_t), intent(inout) :: result
+    type(error_t), allocatable, intent(out) :: error
+    class(grid_file_t), intent(in), optional :: netcdf     !! as in `analyse`
+    type(machine_t) :: machine
+
+    call assemble_analysed(arguments%command, kind, job%input, machine, error)
+    if (.not. allocated(error)) call check_signals(job%input, machine, error)
+    if (.not. allocated(error)) call analyse_one(arguments, kind, job, machine, result%verdict, error, netcdf)
+    if (.not. allocated(error)) return
+    result%status = status_refused
+    if (error%code == exit_failed) result%status = status_failed
+    result%message = error%message
+  end subroutine analyse_job
+
+  !> The verdict of all load cases of a file, printed and written.
+  subroutine conclude(arguments, reading, results, code)
+    type(arguments_t), intent(in) :: arguments
+    type(reading_t), intent(in) :: reading
+    type(case_result_t), intent(in) :: results(:)   !! of its inputs
+    integer, intent(inout) :: code
+    type(verdict_t) :: verdict
+    type(text_buffer_t) :: report
+    type(error_t), allocatable :: error
+    type(result_files_t) :: files
+    type(json_t) :: json
+    character(len=:), allocatable :: name
+
+    if (size(results) == 1) then
+      call be_strict(arguments, reading%jobs(1)%input%shown_case(), results(1)%verdict, code)
+      if (.not. allocated(reading%jobs(1)%input%load_case) .or. arguments%is_given('--case')) return
+    end if
+    call combine_verdicts(arguments%command, results, verdict)
+    name = arguments%command // '_cases.json'
+    if (reading%folder /= '') then
+      call json%open_report(reading%machine%file, reading%machine%title())
+      call verdict%put(json)
+      call put_cases(json, results)
+      call json%close()
+      call files%open(reading%folder, [string_t(name)])
+      call files%files(1)%put(json%text())
+      call files%finish(error)
+      if (allocated(error)) call report_error(error, code)
+    end if
+    if (.not. arguments%is_given('--quiet')) then
+      call verdict%write_table(report)
+      if (reading%folder /= '' .and. .not. allocated(error)) then
+        call report%append_line(reading%machine%shown_file() // ': ' // counted(size(results), 'load case', 'load cases') // &
+                                '; ' // name // ' is in ' // shown_path(reading%folder))
+      end if
+      call print_text(report%text())
+    end if
+    if (size(results) > 1) call be_strict(arguments, reading%machine%shown_file(), verdict, code)
+  end subroutine conclude
+
   !> Whether an input is to be analysed, but not by a program that cannot write NetCDF.
   pure logical function needs_companion(kind, reading)
     class(analysis_t), intent(in) :: kind
     type(reading_t), intent(in) :: reading
+    integer :: k
 
     needs_companion = .not. allocated(reading%error)
-    if (needs_companion) needs_companion = kind%grid_name(reading%input) /= ''
+    if (needs_companion) needs_companion = any([(kind%grid_name(reading%jobs(k)%input) /= '', k=1, size(reading%jobs))])
   end function needs_companion
 
   !> Refuses inputs that another program would have to read again and cannot.
@@ -131,23 +232,24 @@ contains
     do i = 1, size(readings)
       if (.not. needs_companion(kind, readings(i))) cycle
       inquire (file=arguments%operands(i)%text, size=bytes)
-      if (bytes <= 0) call raise(readings(i)%error, exit_input, readings(i)%input%shown_file() // &
+      if (bytes <= 0) call raise(readings(i)%error, exit_input, readings(i)%machine%shown_file() // &
                                  ": format = 'netcdf' needs an input that can be read twice, not a pipe")
     end do
   end subroutine refuse_pipes
 
   !> Analyses one machine, prints the report, and writes the files.
-  subroutine analyse_one(arguments, kind, input, machine, folder, error, netcdf)
+  subroutine analyse_one(arguments, kind, job, machine, verdict, error, netcdf)
     type(arguments_t), intent(in) :: arguments
     class(analysis_t), intent(in) :: kind
-    type(input_t), intent(in) :: input
+    type(job_t), intent(in) :: job
     type(machine_t), intent(in) :: machine
-    character(len=*), intent(in) :: folder   !! '': nothing is written
+    type(verdict_t), intent(inout) :: verdict
     type(error_t), allocatable, intent(out) :: error
     class(grid_file_t), intent(in), optional :: netcdf   !! as in `analyse`
     class(analysis_t), allocatable :: analysis
     type(analysis_options_t) :: options
     type(string_t), allocatable :: names(:)
+    type(text_buffer_t) :: report
     character(len=:), allocatable :: text
 
     options%at = ''
@@ -157,25 +259,29 @@ contains
     options%range_hz = arguments%range_hz
     options%has_code = arguments%is_given('--code')
     options%has_holzer = arguments%is_given('--holzer')
-    options%writes_files = folder /= ''
-    options%folder = result_folder(arguments, input)
+    options%writes_files = job%folder /= ''
+    options%folder = result_folder(arguments, job%input)
     allocate (analysis, source=kind)
-    call analysis%solve(input, machine, options, error)
+    call analysis%solve(job%input, machine, options, error)
     if (allocated(error)) return
     if (allocated(analysis%refusal)) then
-      call analysis%text(input, text)
+      call analysis%text(job%input, text)
       call print_text(text)
       error = analysis%refusal
       return
     end if
-    if (folder /= '' .and. analysis%has_report) then
-      call write_files(arguments%command, analysis, input, folder, names, error, netcdf)
+    if (job%folder /= '' .and. analysis%has_report) then
+      call write_files(arguments%command, analysis, job%input, job%folder, names, error, netcdf)
       if (allocated(error)) return
     end if
+    call analysis%find_verdict(job%input, verdict)
     if (arguments%is_given('--quiet')) return
-    call analysis%text(input, text)
-    call print_text(text)
-    if (analysis%always_writes) call print_text(input%shown_file() // ': ' // shown_path(folder) // ' has ' // &
+    if (job%is_alone .or. .not. analysis%always_writes) then   ! tables of one machine, or that are written nowhere
+      call verdict%write_table(report)
+      call analysis%text(job%input, text)
+      call print_text(report%text() // text)
+    end if
+    if (analysis%always_writes) call print_text(job%input%shown_case() // ': ' // shown_path(job%folder) // ' has ' // &
                                                 listed(names, ' and '))
   end subroutine analyse_one
 
@@ -238,7 +344,7 @@ contains
 
     if (.not. allocated(reading%load_cases)) return
     is_right = .not. allocated(reading%error)
-    call check_input(reading%input, known)
+    call check_input(reading%machine, known)
     do c = 1, size(reading%load_cases)
       if (.not. allocated(reading%load_cases(c)%groups)) cycle
       call refuse_mistakes(reading%load_cases(c), own, known)
@@ -255,8 +361,8 @@ contains
     type(sweep_plan_t) :: plan
     integer :: c
 
-    if (.not. has_sweep(reading%input)) return
-    call make_plan(reading%input, plan, reading%error)
+    if (.not. has_sweep(reading%machine)) return
+    call make_plan(reading%machine, plan, reading%error)
     do c = 1, size(reading%load_cases)
       if (.not. allocated(reading%error)) return
       call make_plan(reading%load_cases(c), plan, error)
@@ -264,35 +370,70 @@ contains
     end do
   end subroutine check_sweep
 
-  !> Reads and checks a file, and finds the folder of its results.
-  subroutine read_one(arguments, number, always_writes, reading, folder)
+  !> Reads and checks a file, and finds what is analysed and the folders of the results.
+  subroutine read_one(arguments, number, always_writes, reading)
     type(arguments_t), intent(in) :: arguments
     integer, intent(in) :: number         !! of the file
     logical, intent(in) :: always_writes  !! as of `analysis_t`
     type(reading_t), intent(inout) :: reading
-    character(len=:), allocatable, intent(out) :: folder
     type(diagnostics_t) :: diagnostics
-    integer :: chosen
+    type(input_t), allocatable :: load_cases(:)
+    type(error_t), allocatable :: own
+    integer, allocatable :: wanted(:)
+    integer :: k
 
-    folder = out_folder(arguments, arguments%operands(number)%text)
-    call read_input(arguments%operands(number)%text, arguments%overrides, reading%input, reading%error, &
-                    diagnostics, reading%load_cases, wanted_case(arguments))
-    if (allocated(reading%error)) call add_plan_diagnostics(reading%input, diagnostics, reading%error)
-    if (.not. allocated(reading%error)) call choose_case(arguments, reading%input, chosen, reading%error)
+    reading%folder = out_folder(arguments, arguments%operands(number)%text)
+    call read_input(arguments%operands(number)%text, arguments%overrides, reading%machine, reading%error, &
+                    diagnostics, load_cases, wanted_case(arguments))
+    if (allocated(reading%error)) call add_plan_diagnostics(reading%machine, diagnostics, reading%error)
+    if (.not. allocated(reading%error)) call find_inputs(arguments, reading%machine, wanted, reading%error)
     if (allocated(reading%error)) then
-      if (arguments%command == 'check' .and. allocated(reading%load_cases)) then   ! the machine itself can be read
-        call refuse_mistakes(reading%input, reading%error)
+      if (arguments%command == 'check' .and. allocated(load_cases)) then   ! the machine itself can be read
+        call refuse_mistakes(reading%machine, reading%error)
+        call move_alloc(load_cases, reading%load_cases)
       end if
       return
     end if
-    if (always_writes) folder = result_folder(arguments, reading%input)
-    if (chosen > 0) then
-      if (folder /= '') folder = folder // '/' // reading%load_cases(chosen)%load_case%name
-      reading%input = reading%load_cases(chosen)
-      deallocate (reading%load_cases)   ! the others are not looked at
-      allocate (reading%load_cases(0))
+    if (always_writes) reading%folder = result_folder(arguments, reading%machine)
+    allocate (reading%jobs(max(1, size(wanted))))
+    reading%jobs%is_alone = size(reading%jobs) == 1
+    if (size(wanted) == 0) then
+      reading%jobs(1)%input = reading%machine
+      reading%jobs(1)%folder = reading%folder
+      if (arguments%command == 'check') call move_alloc(load_cases, reading%load_cases)
     end if
-    call refuse_mistakes(reading%input, reading%error)
+    do k = 1, size(wanted)
+      reading%jobs(k)%input = load_cases(wanted(k))
+      reading%jobs(k)%folder = case_folder(reading%folder, load_cases(wanted(k)))
+    end do
+    do k = 1, size(reading%jobs)
+      call refuse_mistakes(reading%jobs(k)%input, own)
+      call add_error(reading%error, own)
+    end do
   end subroutine read_one
+
+  !> Which load cases are analysed; `check` and `matrices` look at the machine itself.
+  subroutine find_inputs(arguments, machine, wanted, error)
+    type(arguments_t), intent(in) :: arguments
+    type(input_t), intent(in) :: machine
+    integer, allocatable, intent(out) :: wanted(:)
+    type(error_t), allocatable, intent(out) :: error
+
+    if (any(arguments%command == ['check   ', 'matrices']) .and. .not. arguments%is_given('--case')) then
+      allocate (wanted(0))
+    else
+      call find_wanted(arguments, machine, wanted, error)
+    end if
+  end subroutine find_inputs
+
+  !> The folder of a load case in the one of its file; '' if nothing is written.
+  pure function case_folder(folder, input) result(own)
+    character(len=*), intent(in) :: folder
+    type(input_t), intent(in) :: input
+    character(len=:), allocatable :: own
+
+    own = ''
+    if (folder /= '') own = folder // '/' // input%load_case%name
+  end function case_folder
 
 end module nocdyn_analysis_command

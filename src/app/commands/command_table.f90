@@ -16,6 +16,8 @@ module nocdyn_command_table
   public :: list_commands
 
   character(len=*), parameter :: nl = new_line('a')
+  character(len=*), parameter :: case_help = &
+    '  --case NAME        look at this &load_case only; default: all of them, each to DIR/NAME'
 
 contains
 
@@ -43,12 +45,14 @@ contains
   subroutine list_analyses(commands)
     type(command_t), allocatable, intent(inout) :: commands(:)
 
-    call add_command(commands, 'run', 'FILE...', '--out --set --case --quiet', 'integrate machines and write their results', &
+    call add_command(commands, 'run', 'FILE...', '--out --set --case --strict --quiet', &
+      'integrate machines and write their results', &
       'Integrates every input file and writes trajectory.csv (or trajectory.nc), summary.json and input.nml.' // nl // nl // &
       '  --out DIR          write to DIR, with several files to DIR/<name of the file>;' // nl // &
       '                     default: &output directory, else results/<name of the file>' // nl // &
       '  --set PATH=VALUE   override a key: run.rtol=1e-9, load.work.viscous=80, gear.reducer.radii=2,3' // nl // &
       '  --case NAME        run only this &load_case; default: all of them, each to DIR/NAME' // nl // &
+      '  --strict           exit code 1 if a limit is exceeded' // nl // &
       '  --quiet            print nothing but errors' // nl // nl // &
       'A file with errors does not stop the others; the exit code is the highest of all files. After Ctrl-C or a' // nl // &
       'failed computation, the rows up to there are in trajectory.partial.csv.', run_command)
@@ -65,7 +69,7 @@ contains
       'twists of the couplings that transmit them. If there are several steady states, all are printed with' // nl // &
       'their stability. Excitations enter with their mean.' // nl // nl // &
       '  --out DIR          write equilibrium.json to DIR, with several files to DIR/<name of the file>' // nl // &
-      '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR' // nl // nl // &
+      case_help // nl // nl // &
       'Exit code 1: there is no steady state.', analysis_command)
     call add_command(commands, 'modes', 'FILE...', '--out --set --case --at --modes --range_hz --holzer', &
       'natural frequencies, damping, shapes and energies of the modes', &
@@ -79,13 +83,13 @@ contains
       '  --range_hz LOW,HIGH  only the oscillating modes in this range of frequencies [Hz]' // nl // &
       '  --holzer           print the table of Holzer of each undamped mode; with --out, write holzer.csv' // nl // &
       '  --out DIR          write modes.csv and modes.json to DIR, with several files to DIR/<name of the file>' // nl // &
-      '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR', analysis_command)
+      case_help, analysis_command)
   end subroutine list_analyses
 
   subroutine list_torsional_analyses(commands)
     type(command_t), allocatable, intent(inout) :: commands(:)
 
-    call add_command(commands, 'response', 'FILE...', '--out --set --case --quiet', &
+    call add_command(commands, 'response', 'FILE...', '--out --set --case --strict --quiet', &
       'forced response by orders over a range of speeds, critical speeds, limits', &
       'Computes by &response what the orders of the excitations do at every speed: the steady state at the speed,' // nl // &
       'which the motors hold, and the oscillations about it, of each order and of all together. Prints the' // nl // &
@@ -94,9 +98,10 @@ contains
       '  --out DIR          write to DIR, with several files to DIR/<name of the file>;' // nl // &
       '                     default: &output directory, else results/<name of the file>' // nl // &
       '  --set PATH=VALUE   override a key: response.count=501' // nl // &
-      '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR' // nl // &
+      case_help // nl // &
+      '  --strict           exit code 1 if a limit is exceeded' // nl // &
       '  --quiet            print nothing but errors' // nl // nl // &
-      'A limit that is exceeded is no error: response.json says limits_exceeded.', analysis_command)
+      'The verdict on the limits comes first, the worst line at its head; response.json has it too.', analysis_command)
     call add_command(commands, 'campbell', 'FILE...', '--out --set --case --quiet --modes --range_hz', &
       'natural frequencies over a range of speeds, and where the orders meet them', &
       'Follows the natural frequencies of the machine, linearised about its steady states, over the speeds of' // nl // &
@@ -105,7 +110,7 @@ contains
       '  --out DIR          write to DIR, with several files to DIR/<name of the file>;' // nl // &
       '                     default: &output directory, else results/<name of the file>' // nl // &
       '  --set PATH=VALUE   override a key: response.count=501' // nl // &
-      '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR' // nl // &
+      case_help // nl // &
       '  --modes NUMBER     only so many modes, of the lowest frequencies at the first speed; default: all, of a' // nl // &
       '                     machine with more than 600 degrees of freedom 100' // nl // &
       '  --range_hz LOW,HIGH  only the modes in this range of frequencies at the first speed [Hz]' // nl // &

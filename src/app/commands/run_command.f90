@@ -1,24 +1,26 @@
 !> nocdyn run: integrates machines, or their load cases, and writes the results. Files with errors do not stop the others.
 module nocdyn_run_command
   use nocdyn_arguments, only: arguments_t
-  use nocdyn_case_choice, only: choose_case, wanted_case
+  use nocdyn_case_choice, only: find_wanted, wanted_case
   use nocdyn_companion_command, only: become_companion
   use nocdyn_console, only: print_text, report_error
   use nocdyn_errors, only: add_error, error_t, exit_done, exit_failed, exit_input, raise
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_load_case_peaks, only: case_run_t
-  use nocdyn_load_case_report, only: load_cases_json, load_cases_text, put_load_cases_csv
+  use nocdyn_load_case_report, only: find_verdict, load_cases_json, load_cases_text, put_load_cases_csv
   use nocdyn_machine_parts, only: refuse_mistakes
   use nocdyn_posix, only: catch_interrupts, is_interrupted, remove_file
   use nocdyn_result_files, only: result_files_t
   use nocdyn_result_folders, only: refuse_shared_folders, refuse_sweep_folder, result_folder
   use nocdyn_run_files, only: partial_file, run_to_files, wants_netcdf
-  use nocdyn_run_limits, only: run_limits_text
   use nocdyn_run_summary, only: method_line, run_summary_t, summary_line
   use nocdyn_run_table, only: summary_table
+  use nocdyn_strictness, only: be_strict
   use nocdyn_text, only: append, counted, quoted, shown_path, string_t, to_text
+  use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_trajectory_file, only: trajectory_file_t
+  use nocdyn_verdicts, only: verdict_t
   implicit none (type, external)
   private
 
@@ -103,6 +105,7 @@ contains
         call run_load_cases(arguments, readings(i), code, netcdf)
       else
         call run_input(arguments, readings(i)%inputs(1), readings(i)%folder, code, summary, netcdf)
+        call be_strict(arguments, readings(i)%inputs(1)%shown_file(), summary%verdict, code)
       end if
       left = left - 1
       if (is_interrupted()) exit
@@ -119,6 +122,7 @@ contains
     integer, intent(inout) :: code
     class(trajectory_file_t), intent(in), optional :: netcdf   !! as in `run_inputs`
     type(case_run_t), allocatable :: runs(:)
+    type(verdict_t) :: verdict
     type(error_t), allocatable :: error
     character(len=:), allocatable :: left
     integer :: c
@@ -128,10 +132,13 @@ contains
     do c = 1, size(runs)
       runs(c)%load_case = reading%inputs(c)%load_case
       if (is_interrupted()) then
-        runs(c)%summary%status = 'not run'
+        runs(c)%status = 'not run'
         left = left // ', ' // quoted(runs(c)%load_case%name)
       else
         call run_input(arguments, reading%inputs(c), reading%folders(c)%text, code, runs(c)%summary, netcdf)
+        runs(c)%status = runs(c)%summary%status
+        if (allocated(runs(c)%summary%message)) runs(c)%message = runs(c)%summary%message
+        runs(c)%verdict = runs(c)%summary%verdict
       end if
     end do
     if (left /= '') then
@@ -144,10 +151,13 @@ contains
     if (allocated(error)) then
       call report_error(error, code)
     else if (.not. arguments%is_given('--quiet')) then
-      call print_text(load_cases_text(runs) // reading%inputs(1)%shown_file() // ': ' // &
+      if (.not. arguments%is_given('--case')) call print_text(load_cases_text(runs))
+      call print_text(reading%inputs(1)%shown_file() // ': ' // &
                       counted(size(runs), 'load case', 'load cases') // '; cases.json and cases.csv are in ' // &
                       shown_path(reading%folder))
     end if
+    call find_verdict(runs, verdict)
+    call be_strict(arguments, reading%inputs(1)%shown_file(), verdict, code)
   end subroutine run_load_cases
 
   subroutine read_one(arguments, number, has_netcdf, reading)
@@ -157,14 +167,15 @@ contains
     type(file_runs_t), intent(inout) :: reading
     type(input_t) :: machine
     type(input_t), allocatable :: load_cases(:)
-    integer :: bytes, c, chosen, k
+    integer :: bytes, c, k
+    integer, allocatable :: wanted(:)
     type(error_t), allocatable :: own
 
     allocate (reading%inputs(0), reading%folders(0))
     associate (file => arguments%operands(number)%text)
       call read_input(file, arguments%overrides, machine, reading%error, load_cases=load_cases, &
                       only_case=wanted_case(arguments))
-      if (.not. allocated(reading%error)) call choose_case(arguments, machine, chosen, reading%error)
+      if (.not. allocated(reading%error)) call find_wanted(arguments, machine, wanted, reading%error)
       if (.not. allocated(reading%error)) then
         reading%folder = result_folder(arguments, machine)
         call refuse_sweep_folder(machine%file, reading%folder, reading%error)
@@ -181,15 +192,12 @@ contains
     end associate
     ! takes what is to be run, each with the folder of its results
     deallocate (reading%inputs)
-    allocate (reading%inputs(merge(1, size(load_cases), chosen > 0 .or. size(load_cases) == 0)))
+    allocate (reading%inputs(max(1, size(wanted))))
     if (size(load_cases) == 0) reading%inputs(1) = machine
     if (size(load_cases) == 0) call append(reading%folders, reading%folder)
-    k = 0
-    do c = 1, size(load_cases)
-      if (chosen > 0 .and. c /= chosen) cycle
-      k = k + 1
-      reading%inputs(k) = load_cases(c)
-      call append(reading%folders, reading%folder // '/' // load_cases(c)%load_case%name)
+    do k = 1, size(wanted)
+      reading%inputs(k) = load_cases(wanted(k))
+      call append(reading%folders, reading%folder // '/' // load_cases(wanted(k))%load_case%name)
     end do
     ! Refuses a file with mistakes in the machine or any of the load cases that are wanted, and load cases whose folders hold
     ! other results.
@@ -223,6 +231,7 @@ contains
     type(run_summary_t), intent(out) :: summary
     class(trajectory_file_t), intent(in), optional :: netcdf   !! as in `run_inputs`
     type(error_t), allocatable :: error
+    type(text_buffer_t) :: report
     character(len=:), allocatable :: reached
     integer :: i
 
@@ -242,8 +251,12 @@ contains
       do i = 1, size(summary%notes)
         call print_text(input%shown_case() // ': note: ' // summary%notes(i)%text)
       end do
-      if (shows_table(arguments, input)) call print_text(summary_table(input, summary))
-      if (.not. shows_table(arguments, input)) call print_text(run_limits_text(summary%limits, input%shown_case() // ': '))
+      if (shows_table(arguments, input)) then
+        call print_text(summary_table(input, summary))
+      else if (.not. allocated(input%load_case)) then
+        call summary%verdict%write_table(report)
+        call print_text(report%text())
+      end if
       if (len(method_line(input, summary)) > 0) call print_text(method_line(input, summary))
       call print_text(summary_line(input, summary, folder))
     end if

@@ -18,7 +18,10 @@ module nocdyn_input
     real(wp) :: repeats = 1.0_wp                  !! how often it occurs in the life of the machine
     integer :: line = 0                           !! of its group
     type(string_t), allocatable :: overrides(:)   !! PATH=VALUE, which it sets
+    type(string_t), allocatable :: analyses(:)    !! commands that compute it; none: all
     logical, allocatable :: lacks(:)              !! whether it leaves out a group, of the groups of the file
+  contains
+    procedure :: is_for
   end type load_case_t
 
   !> A whole input file with the overrides of the command line: the machine itself, or one of its load cases.
@@ -46,6 +49,16 @@ module nocdyn_input
   end type input_t
 
 contains
+
+  !> Whether a command computes a load case.
+  pure logical function is_for(self, analysis)
+    class(load_case_t), intent(in) :: self
+    character(len=*), intent(in) :: analysis   !! name of the command
+    integer :: i
+
+    is_for = size(self%analyses) == 0
+    if (.not. is_for) is_for = any([(self%analyses(i)%text == analysis, i=1, size(self%analyses))])
+  end function is_for
 
   !> Indices of the groups of one kind.
   pure function groups_named(self, kind, law) result(indices)

@@ -79,6 +79,7 @@ contains
         load_case%repeats = group%number('repeats')
         load_case%line = group%line
         allocate (load_case%overrides, source=group%texts('set'))
+        allocate (load_case%analyses, source=group%texts('analyses'))
         allocate (load_case%lacks(size(input%groups)))
         load_case%lacks(:) = members%lacks(c, :) .or. (any(members%has, dim=1) .and. .not. members%has(c, :))
         call leave_frame(input, members, merge(members%runs(c), members%common_run, members%runs(c) > 0), load_case%lacks)
@@ -159,10 +160,22 @@ contains
     end do
     if (members%common_run > 0) return
     do c = 1, size(names)
-      if (members%runs(c) == 0) call input%report(members%groups(c), 'name', 'there is no &run for it; needed: one with ' // &
-        'load_case = ' // quoted(shortened(names(c)%text)) // ', or one without load_case, for all', diagnostics)
+      if (members%runs(c) > 0 .or. .not. wants_run(input%groups(members%groups(c)))) cycle
+      call input%report(members%groups(c), 'name', 'there is no &run for it; needed: one with load_case = ' // &
+                        quoted(shortened(names(c)%text)) // ', or one without load_case, for all', diagnostics)
     end do
   end subroutine find_runs
+
+  !> Whether a load case is run over the time.
+  logical function wants_run(group)
+    type(group_t), intent(in) :: group   !! &load_case
+    type(string_t), allocatable :: analyses(:)
+    integer :: i
+
+    allocate (analyses, source=group%texts('analyses'))
+    wants_run = size(analyses) == 0
+    if (.not. wants_run) wants_run = any([(analyses(i)%text == 'run', i=1, size(analyses))])
+  end function wants_run
 
   !> Refuses values of a load case that are not the ones of its machine, its run or its output.
   subroutine check_values(input, group, diagnostics)
