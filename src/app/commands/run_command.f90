@@ -5,6 +5,7 @@ module nocdyn_run_command
   use nocdyn_companion_command, only: become_companion
   use nocdyn_console, only: print_text, report_error
   use nocdyn_errors, only: add_error, error_t, exit_done, exit_failed, exit_input, raise
+  use nocdyn_grid_file, only: grid_file_t
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_load_case_peaks, only: case_run_t
@@ -18,7 +19,6 @@ module nocdyn_run_command
   use nocdyn_run_summary, only: method_line, run_summary_t, summary_line
   use nocdyn_run_table, only: summary_table
   use nocdyn_text, only: append, counted, quoted, shown_path, string_t, to_text
-  use nocdyn_trajectory_file, only: trajectory_file_t
   implicit none (type, external)
   private
 
@@ -48,7 +48,7 @@ contains
   subroutine run_inputs(arguments, code, netcdf)
     type(arguments_t), intent(in) :: arguments
     integer, intent(out) :: code
-    class(trajectory_file_t), intent(in), optional :: netcdf   !! not open
+    class(grid_file_t), intent(in), optional :: netcdf   !! not open
     type(file_runs_t), allocatable :: readings(:)
     type(error_t), allocatable :: error
     integer :: i, k
@@ -88,7 +88,7 @@ contains
     type(arguments_t), intent(in) :: arguments
     type(file_runs_t), intent(in) :: readings(:)
     integer, intent(inout) :: code
-    class(trajectory_file_t), intent(in), optional :: netcdf   !! as in `run_inputs`
+    class(grid_file_t), intent(in), optional :: netcdf   !! as in `run_inputs`
     type(run_summary_t) :: summary
     type(error_t), allocatable :: error
     integer :: i, left
@@ -117,7 +117,7 @@ contains
     type(arguments_t), intent(in) :: arguments
     type(file_runs_t), intent(in) :: reading
     integer, intent(inout) :: code
-    class(trajectory_file_t), intent(in), optional :: netcdf   !! as in `run_inputs`
+    class(grid_file_t), intent(in), optional :: netcdf   !! as in `run_inputs`
     type(case_run_t), allocatable :: runs(:)
     type(error_t), allocatable :: error
     character(len=:), allocatable :: left
@@ -221,7 +221,7 @@ contains
     character(len=*), intent(in) :: folder
     integer, intent(inout) :: code
     type(run_summary_t), intent(out) :: summary
-    class(trajectory_file_t), intent(in), optional :: netcdf   !! as in `run_inputs`
+    class(grid_file_t), intent(in), optional :: netcdf   !! as in `run_inputs`
     type(error_t), allocatable :: error
     character(len=:), allocatable :: reached
     integer :: i
