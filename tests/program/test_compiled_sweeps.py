@@ -186,4 +186,4 @@ def test_auto_compiles_where_the_work_is_worth_it(nocdyn, compiler):
 def test_other_choices_are_refused(nocdyn):
     outcome = nocdyn("sweep", "sweep.nml", "--compile", "sometimes")
     assert outcome.returncode == 2
-    assert outcome.stderr == "nocdyn: --compile sometimes: allowed: auto, always, never\n"
+    assert outcome.stderr == "nocdyn: --compile sometimes: allowed: auto|always|never\n"
