@@ -1,10 +1,11 @@
 """nocdyn campbell of machines with many bodies: closed forms, all modes of smaller ones, and what is refused."""
 
 import json
+import resource
 from math import pi, sin, sqrt
 
 import pytest
-from conftest import TRAPS_EXCEPTIONS
+from conftest import SOURCE, TRAPS_EXCEPTIONS, fast_only
 
 EXACT = 1e-10
 STIFFNESS, DAMPING = 1e4, 1.0
@@ -86,6 +87,21 @@ def test_chosen_modes_are_among_all_and_move_with_them(nocdyn, options, below):
             assert [values[i] for i in among] == pytest.approx([all_values[i] for i in speeds], rel=EXACT)
         frequency = some[f"frequency_{mode}"]
         assert frequency[among[4]] > 1.05 * frequency[among[0]]
+
+
+@fast_only
+def test_torques_that_no_coupling_carries_cost_little(nocdyn):
+    """As many degrees of freedom, and no twists beyond some speed: the processor time tells whether they are sought in vain."""
+    text = (SOURCE / "docs/tutorial/ship_plant.nml").read_text()
+    nocdyn.write("diesel.csv", (SOURCE / "docs/tutorial/diesel.csv").read_text())
+    times = []
+    for highest in ("1e6", "1e16"):
+        file = nocdyn.write("ship.nml", text.replace("speed_rpm = 25, 140", f"speed_rpm = 25, {highest}"))
+        before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+        outcome = nocdyn("check", file)
+        assert (outcome.returncode, outcome.stderr) == (0, "")
+        times.append(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before)
+    assert times[1] < 2.5 * times[0]
 
 
 @without_checks
