@@ -1,5 +1,5 @@
-!> A file of tables over one or two dimensions, such as the rows of a run over the time, which appears whole or not at all. Its form
-!> is elsewhere, for some need a library.
+!> A file of tables over one or two dimensions, such as the rows of a run over the time, which appears whole or not at all. Its
+!> forms are elsewhere, for one needs a library.
 module nocdyn_grid_file
   use nocdyn_errors, only: error_t
   use nocdyn_kinds, only: wp

@@ -1,6 +1,6 @@
 !> Tables over one or two dimensions as NetCDF-4: each column is a variable.
 !>
-!> A single dimension has no fixed size, for a run can fail: its columns are stored in chunks, of the rows that are written at once.
+!> A single dimension has no fixed size, for a run can fail: its columns are stored in chunks, of the rows written at once.
 module nocdyn_grid_netcdf
   use netcdf, only: nf90_chunked, nf90_def_dim, nf90_def_var_chunking, nf90_def_var_fill, nf90_double, nf90_enddef, nf90_global, &
     nf90_put_var, nf90_unlimited
