@@ -146,6 +146,21 @@ def test_without_a_compiler_there_is_a_note_if_a_program_was_asked_for(nocdyn, c
     assert results(nocdyn, "always") == results(nocdyn, "auto")
 
 
+@pytest.mark.parametrize("kind", ["missing", "file"])
+def test_without_a_folder_for_programs_a_sweep_goes_on_without_one(nocdyn, compiler, tmp_path, kind):
+    compiler.folder.mkdir(mode=0o777)
+    compiler.folder.chmod(0o777)
+    folder = tmp_path / "temporary"
+    if kind == "file":
+        folder.touch()
+    compiler.environment["TMPDIR"] = str(folder)
+    printed = sweep(nocdyn, "out", compiler, "--compile", "always")
+    reason = "there is neither a private cache folder nor a temporary folder"
+    assert f"note: no program was compiled for the series: {reason}\n" in printed
+    assert compiler.count == 0
+    assert list(compiler.folder.iterdir()) == []
+
+
 def test_a_compiler_that_fails_is_named_with_what_it_says(nocdyn, tmp_path):
     compiler = Compiler(tmp_path, before="echo 'no room' >&2; exit 1")
     printed = sweep(nocdyn, "out", compiler, "--compile", "always")
@@ -171,4 +186,4 @@ def test_auto_compiles_where_the_work_is_worth_it(nocdyn, compiler):
 def test_other_choices_are_refused(nocdyn):
     outcome = nocdyn("sweep", "sweep.nml", "--compile", "sometimes")
     assert outcome.returncode == 2
-    assert outcome.stderr == "nocdyn: --compile sometimes: allowed: auto, always, never\n"
+    assert outcome.stderr == "nocdyn: --compile sometimes: allowed: auto|always|never\n"

@@ -1,10 +1,11 @@
 """nocdyn campbell of machines with many bodies: closed forms, all modes of smaller ones, and what is refused."""
 
 import json
+import random
 from math import pi, sin, sqrt
 
 import pytest
-from conftest import TRAPS_EXCEPTIONS
+from conftest import TRAPS_EXCEPTIONS, fast_only
 
 EXACT = 1e-10
 STIFFNESS, DAMPING = 1e4, 1.0
@@ -86,6 +87,46 @@ def test_chosen_modes_are_among_all_and_move_with_them(nocdyn, options, below):
             assert [values[i] for i in among] == pytest.approx([all_values[i] for i in speeds], rel=EXACT)
         frequency = some[f"frequency_{mode}"]
         assert frequency[among[4]] > 1.05 * frequency[among[0]]
+
+
+def electrical_machine(seed):
+    """A tree of more bodies than modes are computed of, with fluxes of motors and with Maxwell couplings."""
+    dice = random.Random(seed)
+    bodies = 130
+    lines = [f"&body name='b{i}' inertia={10 ** dice.uniform(-1, 0.5):.6g} speed_rpm=1000 /" for i in range(bodies)]
+    for i in range(1, bodies):
+        other = i - 1 if dice.random() < 0.8 else dice.randrange(i)
+        law = "damping=0.5"
+        if dice.random() < 0.1:
+            law = f"maxwell_stiffness={10 ** dice.uniform(3, 5):.6g} maxwell_time={10 ** dice.uniform(-4, -1):.4g}"
+        lines.append(f"&coupling name='k{i}' bodies='b{other}','b{i}' stiffness={10 ** dice.uniform(4, 6):.6g} {law} /")
+    motor = "kind='induction_dq' voltage=400 frequency_hz=50 poles=6 rated_power=22e3 rated_speed_rpm=975 efficiency=0.93"
+    for i in range(2):
+        body = dice.randrange(bodies)
+        lines.append(f"&motor name='m{i}' body='b{body}' {motor} power_factor=0.84 breakdown_ratio=2.5 /")
+    lines.append(f"&load name='l' body='b{dice.randrange(bodies)}' quadratic=0.02 /")
+    return "\n".join([*lines, "&run t_end=1 /"]) + "\n"
+
+
+@fast_only
+@pytest.mark.parametrize("seed", [0, 2])
+def test_modes_of_fluxes_and_maxwell_couplings_are_exact(nocdyn, seed):
+    """Frequencies and damping ratios of `nocdyn modes`, also where the highest modes are left out."""
+    text = electrical_machine(seed)
+    for command in ("equilibrium", "modes"):
+        assert nocdyn(command, nocdyn.write("machine.nml", text), "--out", "out").returncode == 0
+    states = json.loads((nocdyn.folder / "out/equilibrium.json").read_text())["steady_states"]
+    speeds = [state["values"]["omega_b0 [rad/s]"] for state in states if state["stability"] == "stable"]
+    speed = min(speeds, key=lambda speed: abs(speed - 2 * pi * 50 / 3))
+    modes = json.loads((nocdyn.folder / "out/modes.json").read_text())["modes"]
+    exact = [complex(mode["frequency_Hz"], mode["damping_ratio"]) for mode in modes if mode["kind"] == "oscillating"]
+    _, table = campbell(nocdyn, text + f"&response body='b0' speed={speed!r},{1.1 * speed!r} count=2 orders=1 /\n")
+    numbers = range(1, 1 + sum(label.startswith("frequency_") for label in table))
+    found = [complex(table[f"frequency_{k}"][0], table[f"damping_ratio_{k}"][0]) for k in numbers]
+    found = [value for value in found if value.real > 0]  # others begin at a higher speed
+    assert len(found) >= 100
+    for value in found:
+        assert min(abs(value - other) / abs(other) for other in exact) < 1e-9
 
 
 @without_checks

@@ -1,5 +1,6 @@
 """The equations of motion as a program in C: it moves the machine as a run does, by itself."""
 
+import re
 import shutil
 import subprocess
 
@@ -39,6 +40,13 @@ def test_a_program_moves_the_machine_as_a_run_does(nocdyn):
         assert states[f"speed of '{body}'"] == pytest.approx(columns[f"omega_{body}"][-1], rel=1e-9)
         assert states[f"angle of '{body}'"] == pytest.approx(columns[f"phi_{body}"][-1], rel=1e-9)
     assert states["t [s]"] == pytest.approx(0.4, rel=1e-12)
+
+
+def test_every_procedure_of_a_program_is_called(nocdyn):
+    code = nocdyn("matrices", "--code", nocdyn.write("machine.nml", MACHINE)).stdout
+    procedures = re.findall(r"^INLINE void (\w+[0-9])\(", code, flags=re.MULTILINE)
+    assert procedures
+    assert [name for name in procedures if len(re.findall(rf"\b{name}\(", code)) == 1] == []
 
 
 def test_boundaries_that_a_program_does_not_follow_are_named(nocdyn):

@@ -9,7 +9,8 @@ module nocdyn_mode_branches
   use nocdyn_held_speeds, only: held_speeds_t, held_state_t
   use nocdyn_kinds, only: wp
   use nocdyn_mode_links, only: find_links
-  use nocdyn_mode_pairs, only: mode_pairs_t, move_pairs
+  use nocdyn_dense_pairs, only: move_pairs
+  use nocdyn_mode_pairs, only: mode_pairs_t
   use nocdyn_state_modes, only: find_pairs_at
   implicit none (type, external)
   private

@@ -12,7 +12,8 @@ module nocdyn_state_modes
   use nocdyn_lapack, only: ascending_order
   use nocdyn_linearisation, only: linearisation_t
   use nocdyn_mode_links, only: find_links
-  use nocdyn_mode_pairs, only: find_pairs, keep_pairs, mode_pairs_t
+  use nocdyn_dense_pairs, only: find_pairs
+  use nocdyn_mode_pairs, only: keep_pairs, mode_pairs_t
   use nocdyn_text, only: to_text
   use nocdyn_undamped_bands, only: band_modes
   use nocdyn_units, only: from_si, in_si, unit_hz

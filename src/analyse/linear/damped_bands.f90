@@ -9,7 +9,7 @@ module nocdyn_damped_bands
   use nocdyn_eigenpairs, only: eigenpairs_t, find_eigenpairs
   use nocdyn_elements, only: internal_states_t
   use nocdyn_errors, only: error_t
-  use nocdyn_internal_modes, only: refine_internal
+  use nocdyn_internal_modes, only: most_internal, refine_internal
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: fill_matrix, linearisation_t
   use nocdyn_machine, only: machine_t
@@ -20,8 +20,6 @@ module nocdyn_damped_bands
   private
 
   public :: find_damped
-
-  integer, parameter, public :: most_internal = 100   !! internal states that have modes of their own
 
   !> The modes, oscillating or not.
   type, public :: damped_modes_t

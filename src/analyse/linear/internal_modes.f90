@@ -15,6 +15,8 @@ module nocdyn_internal_modes
 
   public :: refine_internal
 
+  integer, parameter, public :: most_internal = 100   !! internal states that have modes of their own
+
 contains
 
   !> Refines the eigenvalue and the motion of one.
@@ -52,6 +54,10 @@ contains
       z = z * step
       if (k <= settling) cycle   ! the states first, then the value
       value = value - step
+      if (aimag(start) > 0 .and. aimag(value) < 0) then   ! the other one of the pair
+        value = conjg(value)
+        z = conjg(z)
+      end if
       if (.not. abs(value - start) <= far * abs(start)) return
       is_exact = abs(step) <= accuracy * abs(value)
       if (is_exact) exit

@@ -13,7 +13,7 @@ module nocdyn_campbell
   use nocdyn_lapack, only: sort_ascending
   use nocdyn_machine, only: machine_t
   use nocdyn_margins, only: operating_distance
-  use nocdyn_mode_pairs, only: most_modes
+  use nocdyn_dense_pairs, only: most_modes
   use nocdyn_response_notes, only: note_shaft_modes, note_simplifications, note_steady_states
   use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
   use nocdyn_mode_branches, only: new_speed_modes, speed_modes_t

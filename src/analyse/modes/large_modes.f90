@@ -1,7 +1,7 @@
 !> The modes of a large machine at its operating point, by band matrices.
 module nocdyn_large_modes
   use nocdyn_band_pencil, only: band_pencil_t, new_band_pencil
-  use nocdyn_damped_bands, only: most_internal
+  use nocdyn_internal_modes, only: most_internal
   use nocdyn_element_coordinates, only: new_element_coordinates
   use nocdyn_errors, only: error_t
   use nocdyn_kinds, only: wp

@@ -22,6 +22,7 @@ module nocdyn_static_twists
   real(wp), parameter :: balanced = 1.0e-13_wp   ! torques below this share of their terms are rounding
   real(wp), parameter :: angle_rounding = 16 * epsilon(1.0_wp)   ! relative error of the angles of which a twist is the difference
   real(wp), parameter :: max_twist = 1.0e8_wp     ! rad: the iteration diverges
+  real(wp), parameter :: most_damping = 1.0e12_wp
 
   !> The minimisation problem: the stiffness matrix of the coordinates that are not free, and the torques. Where every stiffness
   !> is as before, the factors serve again: a linear machine is factored once for all its steady states.
@@ -34,6 +35,7 @@ module nocdyn_static_twists
     integer, allocatable :: pivots(:)
     real(wp), allocatable :: factored(:)  !! stiffnesses of the factors [N m/rad], [elastic elements]; not allocated: none
     real(wp), allocatable :: diagonal_scale(:)   !! what is damped: the largest diagonal elements so far, [unknowns]
+    real(wp), allocatable :: diagonal(:), row_sum(:)   !! of the matrix without damping, and sums of magnitudes, [unknowns]
     real(wp), allocatable :: external_torque(:)   !! torques of all other elements [N m], [coordinates]
     real(wp), allocatable :: external_scale(:)   !! sum of their absolute terms, [coordinates]
     real(wp) :: floor = 0.0_wp   !! smallest torque that is not rounding [N m]
@@ -86,11 +88,31 @@ contains
         is_found = all(abs(step) <= 4 * spacing(abs(q)))
       else
         call evaluate_angles(balance, q, self)
-        damping = max(10.0_wp * damping, 1.0e-6_wp)
+        call raise_damping(self, damping)
       end if
-      if (is_found .or. damping > 1.0e12_wp .or. maxval(abs(q)) > max_twist) exit
+      if (is_found .or. damping > most_damping .or. maxval(abs(q)) > max_twist) exit
     end do
   end subroutine find_twists
+
+  !> Raises the damping after a step that was too large, at least to where the step can be smaller than the largest twist: with
+  !> (K + damping D) step = torque no torque is larger than (sum of |K| + damping D) times the largest component of the step.
+  pure subroutine raise_damping(self, damping)
+    type(twist_problem_t), intent(in) :: self   !! after `evaluate_angles` and `solve`
+    real(wp), intent(inout) :: damping
+    real(wp), parameter :: reserve = 0.5_wp     ! for rounding
+    real(wp) :: least
+
+    least = 0.0_wp
+    if (size(self%unknown) > 0) then
+      associate (scale => max(self%diagonal_scale, self%diagonal))
+        least = maxval((reserve * abs(self%torque(self%unknown)) / max_twist - self%row_sum) / merge(scale, 1.0_wp, scale > 0))
+      end associate
+    end if
+    damping = max(10.0_wp * damping, 1.0e-6_wp)
+    do while (damping < least .and. damping <= most_damping)
+      damping = 10.0_wp * damping
+    end do
+  end subroutine raise_damping
 
   !> Elastic elements whose twists are not determined: at the solution, rigid motions of the elements with stiffness twist them.
   function undetermined_elements(balance) result(undetermined)
@@ -176,7 +198,8 @@ contains
     self%unknown = self%unknown(order)
     allocate (self%position(size(number)), source=0)
     self%position(self%unknown) = [(c, c=1, size(self%unknown))]
-    allocate (self%band(3 * self%width + 1, size(self%unknown)), self%diagonal_scale(size(self%unknown)), source=0.0_wp)
+    allocate (self%band(3 * self%width + 1, size(self%unknown)), self%diagonal_scale(size(self%unknown)), &
+              self%diagonal(size(self%unknown)), self%row_sum(size(self%unknown)), source=0.0_wp)
     allocate (self%external_torque(size(number)), self%torque(size(number)), source=0.0_wp)
     allocate (self%external_scale, self%tolerance, source=self%external_torque)
     allocate (self%pivots(size(self%unknown)))
@@ -298,7 +321,9 @@ contains
         end do
       end do
     end associate
-    self%diagonal_scale = max(self%diagonal_scale, self%band(diagonal, :))
+    self%diagonal = self%band(diagonal, :)
+    self%row_sum = sum(abs(self%band), dim=1)   ! it is symmetric
+    self%diagonal_scale = max(self%diagonal_scale, self%diagonal)
     self%band(diagonal, :) = self%band(diagonal, :) + damping * merge(self%diagonal_scale, 1.0_wp, self%diagonal_scale > 0.0_wp)
   end subroutine fill
 

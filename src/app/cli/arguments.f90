@@ -1,5 +1,6 @@
 !> What a command line says, the command with its operands and options; the table of all options.
 module nocdyn_arguments
+  use nocdyn_compiled_code, only: compile_choices
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -25,7 +26,7 @@ module nocdyn_arguments
     option_t('--holzer', may_repeat=.true.), &
     option_t('--code', may_repeat=.true.), &
     option_t('--threads', value='NUMBER'), &
-    option_t('--compile', value='auto|always|never'), &
+    option_t('--compile', value=trim(compile_choices(1)) // '|' // trim(compile_choices(2)) // '|' // trim(compile_choices(3))), &
     option_t('--shard', value='K/N'), &
     option_t('--resume', may_repeat=.true.), &
     option_t('--csv', may_repeat=.true.), &

@@ -164,7 +164,7 @@ contains
       if (arguments%modes < 1) call raise(error, exit_input, '--modes ' // value // ': allowed: a number from 1 on')
     case ('--compile')
       if (index('|' // trim(option%value) // '|', '|' // value // '|') == 0) then
-        call raise(error, exit_input, '--compile ' // value // ': allowed: auto, always, never')
+        call raise(error, exit_input, '--compile ' // value // ': allowed: ' // trim(option%value))
       end if
     case ('--range_hz')
       call parse_range(value, arguments%range_hz, error)

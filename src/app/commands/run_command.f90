@@ -5,6 +5,7 @@ module nocdyn_run_command
   use nocdyn_companion_command, only: become_companion
   use nocdyn_console, only: print_text, report_error
   use nocdyn_errors, only: add_error, error_t, exit_done, exit_failed, exit_input, raise
+  use nocdyn_grid_file, only: grid_file_t
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_load_case_peaks, only: case_run_t
@@ -19,7 +20,6 @@ module nocdyn_run_command
   use nocdyn_strictness, only: be_strict
   use nocdyn_text, only: append, counted, quoted, shown_path, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
-  use nocdyn_trajectory_file, only: trajectory_file_t
   use nocdyn_verdicts, only: verdict_t
   implicit none (type, external)
   private
@@ -50,7 +50,7 @@ contains
   subroutine run_inputs(arguments, code, netcdf)
     type(arguments_t), intent(in) :: arguments
     integer, intent(out) :: code
-    class(trajectory_file_t), intent(in), optional :: netcdf   !! not open
+    class(grid_file_t), intent(in), optional :: netcdf   !! not open
     type(file_runs_t), allocatable :: readings(:)
     type(error_t), allocatable :: error
     integer :: i, k
@@ -90,7 +90,7 @@ contains
     type(arguments_t), intent(in) :: arguments
     type(file_runs_t), intent(in) :: readings(:)
     integer, intent(inout) :: code
-    class(trajectory_file_t), intent(in), optional :: netcdf   !! as in `run_inputs`
+    class(grid_file_t), intent(in), optional :: netcdf   !! as in `run_inputs`
     type(run_summary_t) :: summary
     type(error_t), allocatable :: error
     integer :: i, left
@@ -120,7 +120,7 @@ contains
     type(arguments_t), intent(in) :: arguments
     type(file_runs_t), intent(in) :: reading
     integer, intent(inout) :: code
-    class(trajectory_file_t), intent(in), optional :: netcdf   !! as in `run_inputs`
+    class(grid_file_t), intent(in), optional :: netcdf   !! as in `run_inputs`
     type(case_run_t), allocatable :: runs(:)
     type(verdict_t) :: verdict
     type(error_t), allocatable :: error
@@ -229,7 +229,7 @@ contains
     character(len=*), intent(in) :: folder
     integer, intent(inout) :: code
     type(run_summary_t), intent(out) :: summary
-    class(trajectory_file_t), intent(in), optional :: netcdf   !! as in `run_inputs`
+    class(grid_file_t), intent(in), optional :: netcdf   !! as in `run_inputs`
     type(error_t), allocatable :: error
     type(text_buffer_t) :: report
     character(len=:), allocatable :: reached

@@ -3,9 +3,11 @@
 module nocdyn_run_files
   use nocdyn_column_lists, only: columns_file
   use nocdyn_console, only: new_status_line, status_line_t
+  use nocdyn_csv_grid, only: csv_grid_t
   use nocdyn_disk_room, only: check_room
   use nocdyn_errors, only: error_t
   use nocdyn_fatigue_report, only: put_cycles_csv
+  use nocdyn_grid_file, only: grid_file_t
   use nocdyn_input, only: input_t
   use nocdyn_input_text, only: input_text
   use nocdyn_kinds, only: wp
@@ -16,7 +18,6 @@ module nocdyn_run_files
   use nocdyn_run_summary, only: columns_json, run_summary_t, summary_json
   use nocdyn_sweep_plan, only: sweep_plan_t
   use nocdyn_text, only: append, counted, string_t, to_text
-  use nocdyn_trajectory_file, only: csv_trajectory_t, trajectory_file_t
   use nocdyn_transient, only: run_output_t, run_transient
   implicit none (type, external)
   private
@@ -33,7 +34,7 @@ module nocdyn_run_files
   !> Writes the rows and shows the progress while the run is integrated.
   type, extends(run_output_t) :: trajectory_writer_t
     character(len=:), allocatable :: folder
-    class(trajectory_file_t), allocatable :: file
+    class(grid_file_t), allocatable :: file
     character(len=:), allocatable :: input_title, input_text   !! for the file
     integer :: form = 1                      !! column of `trajectory_names`
     character(len=:), allocatable :: title   !! of the progress line
@@ -71,12 +72,12 @@ contains
     logical, intent(in) :: is_quiet               !! whether there is no progress line
     type(run_summary_t), intent(out) :: summary
     type(error_t), allocatable, intent(out) :: error
-    class(trajectory_file_t), intent(in), optional :: netcdf   !! not open; of programs that can write NetCDF
+    class(grid_file_t), intent(in), optional :: netcdf   !! not open; of programs that can write NetCDF
     type(trajectory_writer_t), target :: writer
     type(error_t), allocatable :: write_error
 
     if (.not. wants_netcdf(input)) then
-      allocate (csv_trajectory_t :: writer%file)
+      allocate (csv_grid_t :: writer%file)
     else if (present(netcdf)) then
       allocate (writer%file, source=netcdf)
       writer%form = 2
@@ -167,7 +168,9 @@ contains
 
     call check_rows(self%place, rows, size(labels), self%form == 2, self%folder, error)
     if (allocated(error)) return
-    call self%file%open(self%folder, labels, rows, self%input_title, self%input_text)
+    call self%file%open(self%folder, trim(trajectory_names(1, self%form)), [string_t('t')], [rows], self%input_title, &
+                        self%input_text)
+    call self%file%begin_table(labels, 1)
     self%has_started = .true.
   end subroutine start
 

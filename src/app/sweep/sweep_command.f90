@@ -12,7 +12,6 @@ module nocdyn_sweep_command
   use nocdyn_sweep_code, only: new_sweep_code, sweep_code_t
   use nocdyn_sweep_job, only: finish_job, print_code_note, start_job, sweep_job_t
   use nocdyn_sweep_threads, only: usable_threads, refuse_ranks, print_thread_note
-  use nocdyn_trajectory_netcdf, only: netcdf_trajectory_t
   use omp_lib, only: omp_get_max_threads
   implicit none (type, external)
   private
@@ -71,7 +70,7 @@ contains
     type(arguments_t), intent(in) :: arguments
     integer, intent(out) :: code   !! the highest exit code of all files
 
-    call run_inputs(arguments, code, netcdf_trajectory_t())
+    call run_inputs(arguments, code, netcdf_grid_t())
   end subroutine run_netcdf_command
 
 end module nocdyn_sweep_command

@@ -5,6 +5,7 @@ module nocdyn_sweep_results
   use nocdyn_column_lists, only: columns_file
   use nocdyn_console, only: print_text, report_error
   use nocdyn_errors, only: error_t, exit_done, exit_failed, exit_file, exit_input, raise
+  use nocdyn_grid_netcdf, only: netcdf_grid_t
   use nocdyn_posix_files, only: folder_names, remove_empty_folder
   use nocdyn_input, only: input_t
   use nocdyn_input_text, only: input_text
@@ -24,7 +25,6 @@ module nocdyn_sweep_results
   use nocdyn_sweep_csv, only: sweep_csv_name, write_sweep_csv
   use nocdyn_targets, only: set_targets
   use nocdyn_text, only: shown_path, string_t, to_text
-  use nocdyn_trajectory_netcdf, only: netcdf_trajectory_t
   use nocdyn_varied_numbers, only: varied_numbers_t
   implicit none (type, external)
   private
@@ -130,7 +130,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(input_t) :: input
     type(run_summary_t) :: summary
-    type(netcdf_trajectory_t) :: netcdf
+    type(netcdf_grid_t) :: netcdf
     real(wp) :: values(size(plan%numbers%targets))
     character(len=:), allocatable :: message
     integer :: i, status

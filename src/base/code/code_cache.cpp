@@ -33,15 +33,6 @@ constexpr int days_kept = 30;   // of a program that is not used
 const std::vector<std::string> options = {"-x", "c", "-std=gnu11", "-O2", "-march=native", "-ffp-contract=off", "-fno-math-errno",
                                           "-fPIC", "-shared", "-w"};
 
-// A folder for this process alone, removed at the end, if there is no cache.
-struct temporary_folder {
-  std::string path;
-  ~temporary_folder() {
-    std::error_code failure;
-    if (!path.empty()) fs::remove_all(path, failure);
-  }
-};
-
 std::string environment(const char *name) {
   const char *value = std::getenv(name);
   return value ? value : "";
@@ -183,15 +174,83 @@ bool compile(const std::string &source, const std::string &library, std::string 
   return false;
 }
 
+// The folder of programs: the user's cache folder, or else one for this process alone, which is removed at the end. Its path is
+// empty if there is neither.
+struct program_folder {
+  std::string path = cache_folder();
+  bool is_cache = !path.empty();
+
+  program_folder() {
+    if (is_cache) return;
+    std::error_code missing;
+    std::string name = (fs::temp_directory_path(missing) / "nocdyn-XXXXXX").string();
+    if (!missing && mkdtemp(name.data())) path = name;
+  }
+  program_folder(const program_folder &) = delete;
+  program_folder &operator=(const program_folder &) = delete;
+  ~program_folder() {
+    std::error_code failure;
+    if (is_cache)
+      remove_old(path);
+    else if (!path.empty())
+      fs::remove_all(path, failure);
+  }
+};
+
+// A file that one process has at a time; others wait for it. Its number is negative if it cannot be opened.
+struct file_lock {
+  const int number;
+
+  explicit file_lock(const std::string &path) : number(open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600)) {
+    while (number >= 0 && flock(number, LOCK_EX) != 0 && errno == EINTR) {}
+  }
+  file_lock(const file_lock &) = delete;
+  file_lock &operator=(const file_lock &) = delete;
+  ~file_lock() {
+    if (number >= 0) close(number);
+  }
+};
+
+// Whether there is a library of this very source, or one can be compiled.
+bool find_or_compile(const std::string &source, const std::string &c_file, const std::string &library, std::string &failure) {
+  if (access(library.c_str(), R_OK) == 0 && read_file(c_file) == source) {
+    utimensat(AT_FDCWD, library.c_str(), nullptr, 0);
+    utimensat(AT_FDCWD, c_file.c_str(), nullptr, 0);
+    return true;
+  }
+  unlink(library.c_str());
+  if (write_file(c_file, source)) return compile(c_file, library, failure);
+  failure = "the file " + c_file + " cannot be written";
+  return false;
+}
+
+// Loads the library of a source; null if there is none.
+void *load(const std::string &source, std::string &failure) {
+  const program_folder folder;
+  if (folder.path.empty()) {
+    failure = "there is neither a private cache folder nor a temporary folder";
+    return nullptr;
+  }
+  const std::string stem = folder.path + "/" + hash(source), library = stem + ".so";
+  const file_lock lock(stem + ".lock");   // another process that compiles the program is waited for
+  if (lock.number < 0) {
+    failure = "the folder " + folder.path + " cannot be written: " + std::strerror(errno);
+    return nullptr;
+  }
+  if (!find_or_compile(source, stem + ".c", library, failure)) return nullptr;
+  void *handle = dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (!handle) failure = dlerror();
+  return handle;
+}
+
 }  // namespace
 
-// Compiles and loads a program, or loads it from the cache: its procedures with some names, which follow one another. 0 if it is
-// loaded, else why it is not.
+// Compiles and loads a program, or loads it from the cache, and gives its procedures with some names, which follow one another. 0
+// if it is loaded; else the message says why it is not.
 extern "C" int nocdyn_load_code(const char *text, std::size_t length, const char *names, int count, void **procedures,
                                 char *message, std::size_t capacity) {
   std::string failure;
   const std::string version = file_of(compiler());
-  temporary_folder temporary;
   void *handle = nullptr;
   std::fill(procedures, procedures + count, nullptr);
   if (version.empty()) {
@@ -199,45 +258,11 @@ extern "C" int nocdyn_load_code(const char *text, std::size_t length, const char
   } else {
     std::string source = "/* " + compiler() + ": " + version + "; " + processor();
     for (const std::string &option : options) source += option + " ";
-    source += "*/\n" + std::string(text, length);
-    std::string folder = cache_folder();
-    const bool is_kept = !folder.empty();
-    if (!is_kept) {
-      std::error_code missing;
-      std::string name_of_folder = (fs::temp_directory_path(missing) / "nocdyn-XXXXXX").string();
-      if (!missing && mkdtemp(name_of_folder.data())) folder = temporary.path = name_of_folder;
-    }
-    const std::string stem = folder + "/" + hash(source), c_file = stem + ".c", library = stem + ".so", lock_file = stem + ".lock";
-    const int lock = open(lock_file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
-    if (lock < 0) {
-      failure = "the folder " + folder + " cannot be written: " + std::strerror(errno);
-    } else {
-      while (flock(lock, LOCK_EX) != 0 && errno == EINTR) {}   // another process that compiles the program is waited for
-      bool is_there = access(library.c_str(), R_OK) == 0 && read_file(c_file) == source;
-      if (is_there) {
-        utimensat(AT_FDCWD, library.c_str(), nullptr, 0);
-        utimensat(AT_FDCWD, c_file.c_str(), nullptr, 0);
-      } else {
-        unlink(library.c_str());
-        if (!write_file(c_file, source))
-          failure = "the folder " + folder + " cannot be written";
-        else
-          is_there = compile(c_file, library, failure);
-      }
-      if (is_there) {
-        handle = dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
-        if (!handle) failure = dlerror();
-      }
-      if (is_kept) remove_old(folder);
-      close(lock);
-    }
+    handle = load(source + "*/\n" + std::string(text, length), failure);
   }
-  if (handle) {
-    const char *name = names;
-    for (int i = 0; i < count; i++, name += std::strlen(name) + 1) {
-      procedures[i] = dlsym(handle, name);
-      if (!procedures[i]) failure = "the compiled program has no procedure " + std::string(name);
-    }
+  for (int i = 0; handle && i < count; i++, names += std::strlen(names) + 1) {
+    procedures[i] = dlsym(handle, names);
+    if (!procedures[i]) failure = "the compiled program has no procedure " + std::string(names);
   }
   std::snprintf(message, capacity, "%s", failure.c_str());
   return failure.empty() ? 0 : 1;

@@ -6,6 +6,10 @@ module nocdyn_compiled_code
 
   public :: code_part, load_code
 
+  !> When a program is compiled: if it pays, always if it can, never.
+  character(len=6), parameter, public :: compile_choices(3) = ['auto  ', 'always', 'never ']
+  integer, parameter, public :: compile_auto = 1, compile_always = 2, compile_never = 3
+
   integer, parameter, public :: series_part = 1    !! Taylor arithmetic
   integer, parameter, public :: steps_part = 2     !! plain steps of a block of lanes
   integer, parameter, public :: machine_part = 3   !! derivative and steps of one machine

@@ -7,7 +7,7 @@ module nocdyn_law_code
     op_harmonics, op_log_cosh, op_logarithm, op_multiply, op_power, op_reciprocal, op_scale, op_sech_squared, op_shift, op_sine, &
     op_square_root, op_subtract, op_tanh, op_wave, unlimited
   use nocdyn_law_work, only: law_work_t
-  use nocdyn_laws, only: law_t
+  use nocdyn_laws, only: law_t, terms_of
   use nocdyn_text, only: to_text
   implicit none (type, external)
   private
@@ -118,12 +118,6 @@ contains
     end do
   end subroutine declare_tables
 
-  pure integer function terms_of(node)
-    type(law_node_t), intent(in) :: node
-
-    terms_of = (node%last - node%first + 1) / 3
-  end function terms_of
-
   !> Name of the member of the work space of a node.
   function member(self, node) result(text)
     class(law_code_t), intent(in) :: self
@@ -187,7 +181,7 @@ contains
     type(law_node_t), intent(in) :: node
     character(len=:), allocatable :: text
     character(len=:), allocatable :: a, b, x
-    integer :: degree, terms
+    integer :: before, degree, terms
 
     x = filled('n$, d$', [node%a, node%a])   ! coefficients of the first operand, and of the node itself
     a = filled('n$, d$, v$', [number, number, number])
@@ -234,25 +228,14 @@ contains
       text = filled('{ vd c[MOST]; EACH c[e] = @; power(g, f, k, @, c, @); }', [integer ::], constant(self, node%b), x, a)
     case default   ! op_harmonics
       terms = terms_of(node)
+      before = (self%law%stack(number) - 1) / size(self%law%constant, 1)   ! coefficients of each slot in `stacked`
       b = member(self, number)
       text = filled('harmonics(g, f, k, $, @n, @f, s->stacked[$] + $ * s->slots[$] + (W * $) * ($ * s->strip + i),', &
-                    [terms, self%bank, 2 * terms_before(self, number), self%bank, 2 * terms, self%law%elements], b, b)
+                    [terms, self%bank, before, self%bank, 2 * terms, self%law%elements], b, b)
       text = filled('@ PARAMETER_STEP($), @,', [2 * terms], text, x)
       text = filled('@ (harmonic_work *)(z + at_@h) + i, ACROSS ? WORK : HARMONIC_WORK, v$)', [number], text, b)
     end select
   end function statement
-
-  !> Terms of the harmonics before a node in `stacked`.
-  pure integer function terms_before(self, number) result(terms)
-    type(law_code_t), intent(in) :: self
-    integer, intent(in) :: number
-    integer :: i
-
-    terms = 0
-    do i = 1, number - 1
-      if (self%law%tape%node(i)%operation == op_harmonics) terms = terms + terms_of(self%law%tape%node(i))
-    end do
-  end function terms_before
 
   !> A constant of element i + e, or of element i in lanes e.
   function constant(self, node) result(text)

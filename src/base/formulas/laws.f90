@@ -11,7 +11,7 @@ module nocdyn_laws
   implicit none (type, external)
   private
 
-  public :: new_law, strip_lanes
+  public :: new_law, strip_lanes, terms_of
 
   integer, parameter, public :: narrow = 8, wide = 32   !! numbers of a group
 

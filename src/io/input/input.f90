@@ -94,8 +94,10 @@ contains
     class(input_t), intent(in) :: self
     character(len=*), intent(in) :: kind
     type(group_t) :: group
+    integer :: i
 
-    group = self%groups(self%position(kind))
+    i = self%position(kind)   ! in the next line gfortran asks for it again for each component
+    group = self%groups(i)
   end function single
 
   !> The title of the file.

@@ -1,4 +1,5 @@
-!> A file of tables over one or two dimensions, which appears whole or not at all. Its form is elsewhere, for it needs a library.
+!> A file of tables over one or two dimensions, such as the rows of a run over the time, which appears whole or not at all. Its
+!> forms are elsewhere, for one needs a library.
 module nocdyn_grid_file
   use nocdyn_errors, only: error_t
   use nocdyn_kinds, only: wp
@@ -12,6 +13,7 @@ module nocdyn_grid_file
     procedure(open_interface), deferred :: open
     procedure(begin_table_interface), deferred :: begin_table
     procedure(put_row_interface), deferred :: put_row
+    procedure(has_failed_interface), deferred :: has_failed
     procedure(complete_interface), deferred :: complete
     procedure(complete_interface), deferred :: finish
     procedure(discard_interface), deferred :: discard
@@ -25,7 +27,7 @@ module nocdyn_grid_file
       class(grid_file_t), intent(inout) :: self
       character(len=*), intent(in) :: folder, name   !! of the finished file
       type(string_t), intent(in) :: dimensions(:)    !! their names, the one that changes slowest first
-      integer, intent(in) :: sizes(:)                !! of these
+      integer, intent(in) :: sizes(:)                !! of these; of a single one the most that there may be
       character(len=*), intent(in) :: title          !! of the input
       character(len=*), intent(in) :: input          !! the text of input.nml
     end subroutine open_interface
@@ -43,6 +45,12 @@ module nocdyn_grid_file
       class(grid_file_t), intent(inout) :: self
       real(wp), intent(in) :: row(:)   !! [columns]
     end subroutine put_row_interface
+
+    !> Whether there has been a failure since `open`.
+    pure logical function has_failed_interface(self)
+      import :: grid_file_t
+      class(grid_file_t), intent(in) :: self
+    end function has_failed_interface
 
     !> `complete` closes the file, which keeps its hidden name, and `finish` renames it too. After a failure since `open` there is
     !> an error and no file.

@@ -1,6 +1,9 @@
 !> Tables over one or two dimensions as NetCDF-4: each column is a variable.
+!>
+!> A single dimension has no fixed size, for a run can fail: its columns are stored in chunks, of the rows written at once.
 module nocdyn_grid_netcdf
-  use netcdf, only: nf90_def_dim, nf90_def_var_fill, nf90_double, nf90_enddef, nf90_global, nf90_put_var
+  use netcdf, only: nf90_chunked, nf90_def_dim, nf90_def_var_chunking, nf90_def_var_fill, nf90_double, nf90_enddef, nf90_global, &
+    nf90_put_var, nf90_unlimited
   use nocdyn_errors, only: error_t
   use nocdyn_grid_file, only: grid_file_t
   use nocdyn_kinds, only: wp
@@ -10,7 +13,8 @@ module nocdyn_grid_netcdf
   implicit none (type, external)
   private
 
-  integer, parameter :: block_numbers = 2**23   ! of one write, about
+  integer, parameter :: block_numbers = 2**18   ! of one write, about
+  integer, parameter :: least_rows = 64         ! of one write
 
   type, extends(grid_file_t), public :: netcdf_grid_t
     type(netcdf_file_t), private :: file
@@ -23,7 +27,7 @@ module nocdyn_grid_netcdf
     integer, private :: written = 0                 !! places in the first dimension
   contains
     procedure :: open => open_netcdf
-    procedure :: begin_table, put_row, complete, finish, discard
+    procedure :: begin_table, put_row, has_failed, complete, finish, discard
   end type netcdf_grid_t
 
 contains
@@ -34,7 +38,7 @@ contains
     type(string_t), intent(in) :: dimensions(:)
     integer, intent(in) :: sizes(:)
     character(len=*), intent(in) :: title, input
-    integer :: i
+    integer :: i, extent
 
     call create(self%file, folder, name)
     self%sizes = sizes
@@ -45,7 +49,8 @@ contains
     call put_text(self%file, nf90_global, 'input', input)
     do i = 1, size(sizes)
       if (allocated(self%file%failure)) return
-      call check(self%file, nf90_def_dim(self%file%id, new_name(self%file, dimensions(i)%text), sizes(i), self%dimensions(i)))
+      extent = merge(sizes(i), nf90_unlimited, size(sizes) > 1)
+      call check(self%file, nf90_def_dim(self%file%id, new_name(self%file, dimensions(i)%text), extent, self%dimensions(i)))
     end do
   end subroutine open_netcdf
 
@@ -53,21 +58,24 @@ contains
     class(netcdf_grid_t), intent(inout) :: self
     type(string_t), intent(in) :: labels(:)
     integer, intent(in) :: rank
-    integer :: bracket, i
+    integer :: blocks, bracket, i, places
 
     call write_rows(self)
     self%rank = rank
     self%inner = product(self%sizes(2:rank))
     self%written = 0
     if (allocated(self%rows)) deallocate (self%rows, self%variables)
-    associate (places => max(1, min(self%sizes(1), block_numbers / (self%inner * size(labels)))))
-      allocate (self%rows(places * self%inner, size(labels)), self%variables(size(labels)))
-    end associate
+    blocks = (self%sizes(1) - 1) / max(1, max(least_rows, block_numbers / size(labels)) / self%inner) + 1
+    places = (self%sizes(1) - 1) / blocks + 1   ! equal blocks: a file in chunks has room for whole ones
+    allocate (self%rows(places * self%inner, size(labels)), self%variables(size(labels)))
     do i = 1, size(labels)
       if (allocated(self%file%failure)) return
       bracket = index(labels(i)%text, ' [', back=.true.)
       call define(self%file, new_name(self%file, labels(i)%text(:bracket - 1)), nf90_double, self%dimensions(rank:1:-1), &
                   labels(i)%text(:bracket - 1), self%variables(i))
+      if (size(self%sizes) == 1) then
+        call check(self%file, nf90_def_var_chunking(self%file%id, self%variables(i), nf90_chunked, [places]))
+      end if
       call check(self%file, nf90_def_var_fill(self%file%id, self%variables(i), 1, 0))
       call put_text(self%file, self%variables(i), 'units', labels(i)%text(bracket + 2:len(labels(i)%text) - 1))
     end do
@@ -82,6 +90,12 @@ contains
     self%rows(self%count, :) = row
     if (self%count == size(self%rows, 1)) call write_rows(self)
   end subroutine put_row
+
+  pure logical function has_failed(self)
+    class(netcdf_grid_t), intent(in) :: self
+
+    has_failed = allocated(self%file%failure)
+  end function has_failed
 
   subroutine write_rows(self)
     class(netcdf_grid_t), intent(inout) :: self

@@ -3,6 +3,8 @@
 module nocdyn_moment_forms
   use nocdyn_bank, only: role_coupling
   use nocdyn_coordinates, only: coordinates_t
+  use nocdyn_element_rows, only: element_rows_t
+  use nocdyn_geared_groups, only: find_groups, geared_group_t
   use nocdyn_grouping, only: grouped, groups_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -29,6 +31,15 @@ module nocdyn_moment_forms
   contains
     procedure :: total
   end type moment_form_t
+
+  !> Reactions by moments of 1 of single elements.
+  type :: reaction_terms_t
+    integer :: count = 0
+    integer, allocatable :: place(:, :)      ! row and element of each, [2, at least count]
+    real(wp), allocatable :: weight(:)       ! [at least count]
+  contains
+    procedure :: add, set_forms
+  end type reaction_terms_t
 
 contains
 
@@ -111,36 +122,110 @@ contains
     end associate
   end subroutine set_terms
 
-  !> The reactions, which are linear in the moments of all elements.
+  !> The reactions, which are linear in the moments of all elements. Each depends on the moments on bodies of its own group alone,
+  !> so that elements on different groups are taken together.
   subroutine set_reactions(machine, reference, forms)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: reference
     type(moment_form_t), intent(inout) :: forms(:)   !! [rows]
     type(coordinates_t) :: coordinates
-    real(wp) :: lambda(size(forms)), torque(0:machine%bodies)
-    integer :: e, r
+    type(geared_group_t), allocatable :: groups(:)
+    type(reaction_terms_t) :: terms
+    integer, allocatable :: element(:), group_of(:)
+    logical :: is_left(machine%elements%count)
+    real(wp) :: lambda(size(forms)), torque(machine%bodies)
+    integer :: r
 
     if (size(forms) == 0) return
     coordinates = machine%coordinates
-    do r = 1, size(forms)
-      forms(r)%kind = kind_reaction
-      allocate (forms(r)%elements(0), forms(r)%weight(1, 0))
-    end do
-    do e = 1, machine%elements%count
-      torque = 0.0_wp
-      call machine%elements%rows%add_moment(e, 1.0_wp, torque(1:))
-      call coordinates%reactions_of_torques(1, torque(1:), lambda)
+    call find_groups(machine%constraints, groups, group_of)
+    is_left = .true.
+    do while (any(is_left))
+      call take_elements(machine%elements%rows, groups, group_of, is_left, element, torque)
+      call coordinates%reactions_of_torques(1, torque, lambda)
       do r = 1, size(forms)
-        if (.not. abs(lambda(r)) > 0) cycle
-        forms(r)%elements = [forms(r)%elements, e]
-        forms(r)%weight = reshape([forms(r)%weight, lambda(r)], [1, size(forms(r)%elements)])
+        if (abs(lambda(r)) > 0) call terms%add(r, element(group_of(machine%constraints%body(machine%constraints%first(r)))), &
+                                               lambda(r))
       end do
     end do
+    call terms%set_forms(machine%elements%count, forms)
     torque = 0.0_wp
     torque(reference) = 1.0_wp
-    call coordinates%reactions_of_torques(1, torque(1:), lambda)
+    call coordinates%reactions_of_torques(1, torque, lambda)
     forms%by_held_torque = lambda
   end subroutine set_reactions
+
+  !> Takes elements of those that are left, at most one of each group with rows, and their torques with moments of 1.
+  subroutine take_elements(rows, groups, group_of, is_left, element, torque)
+    type(element_rows_t), intent(in) :: rows
+    type(geared_group_t), intent(in) :: groups(:)
+    integer, intent(in) :: group_of(:)                !! [bodies]
+    logical, intent(inout) :: is_left(:)              !! [elements]
+    integer, allocatable, intent(out) :: element(:)   !! that is taken of each group, 0: none; [groups]
+    real(wp), intent(out) :: torque(:)                !! [bodies]
+    integer :: e, g, k
+    logical :: is_free
+
+    allocate (element(size(groups)), source=0)
+    torque = 0.0_wp
+    do e = 1, size(is_left)
+      if (.not. is_left(e)) cycle
+      is_free = .true.
+      do k = rows%first(e), rows%first(e + 1) - 1
+        if (rows%body(k) > 0) is_free = is_free .and. element(group_of(rows%body(k))) == 0
+      end do
+      if (.not. is_free) cycle
+      is_left(e) = .false.
+      call rows%add_moment(e, 1.0_wp, torque)
+      do k = rows%first(e), rows%first(e + 1) - 1
+        if (rows%body(k) == 0) cycle
+        g = group_of(rows%body(k))
+        if (size(groups(g)%rows) > 0) element(g) = e
+      end do
+    end do
+  end subroutine take_elements
+
+  !> Adds a term.
+  subroutine add(self, row, element, weight)
+    class(reaction_terms_t), intent(inout) :: self
+    integer, intent(in) :: row, element
+    real(wp), intent(in) :: weight
+    integer, parameter :: first_size = 64
+    integer, allocatable :: longer(:, :)
+    real(wp), allocatable :: longer_weight(:)
+
+    if (.not. allocated(self%weight)) allocate (self%place(2, first_size), self%weight(first_size))
+    if (self%count == size(self%weight)) then
+      allocate (longer(2, 2 * self%count), longer_weight(2 * self%count))
+      longer(:, :self%count) = self%place
+      longer_weight(:self%count) = self%weight
+      call move_alloc(longer, self%place)
+      call move_alloc(longer_weight, self%weight)
+    end if
+    self%count = self%count + 1
+    self%place(:, self%count) = [row, element]
+    self%weight(self%count) = weight
+  end subroutine add
+
+  !> Gives each row its terms, in the order of the elements.
+  subroutine set_forms(self, elements, forms)
+    class(reaction_terms_t), intent(inout) :: self
+    integer, intent(in) :: elements                  !! number of the elements of the machine
+    type(moment_form_t), intent(inout) :: forms(:)   !! [rows]
+    type(groups_t) :: of_elements, of_rows
+    integer :: i, r
+
+    if (self%count == 0) allocate (self%place(2, 0), self%weight(0))
+    of_elements = grouped(elements, self%place(2, :self%count), [(i, i=1, self%count)])
+    of_rows = grouped(size(forms), self%place(1, of_elements%member), of_elements%member)
+    do r = 1, size(forms)
+      forms(r)%kind = kind_reaction
+      associate (of_row => of_rows%member(of_rows%start(r):of_rows%start(r + 1) - 1))
+        forms(r)%elements = self%place(2, of_row)
+        forms(r)%weight = reshape(self%weight(of_row), [1, size(of_row)])
+      end associate
+    end do
+  end subroutine set_forms
 
   !> The value at one point, of complex moments of the elements.
   pure complex(wp) function total(self, point, moment)

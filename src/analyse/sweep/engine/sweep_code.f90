@@ -3,7 +3,7 @@
 !> The work of a sweep is counted, not timed: what the variants so far have taken, in steps times the cost of a step, tells what
 !> all will take. Results have the same bits with a program as without, so it does not matter when the threads change to it.
 module nocdyn_sweep_code
-  use nocdyn_compiled_code, only: load_code, loaded_code_t
+  use nocdyn_compiled_code, only: compile_always, compile_auto, compile_choices, compile_never, load_code, loaded_code_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_methods, only: taylor_cost
@@ -14,10 +14,6 @@ module nocdyn_sweep_code
   private
 
   public :: new_sweep_code
-
-  !> When a program is compiled: if it pays, always if it can, never.
-  character(len=6), parameter, public :: compile_choices(3) = ['auto  ', 'always', 'never ']
-  integer, parameter :: compile_auto = 1, compile_always = 2, compile_never = 3
 
   real(wp), parameter :: least_work = 2.0e9_wp   ! of a sweep that a program is compiled for [ns]
   integer, parameter :: most_programs = 4        ! of a sweep: the terms of its variants can grow

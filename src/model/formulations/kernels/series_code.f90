@@ -209,6 +209,14 @@ contains
     end associate
   end function elements_of
 
+  !> Whether the moment of an element follows from its motion.
+  pure logical function has_motion(series, e)
+    type(reduced_series_t), intent(in) :: series
+    integer, intent(in) :: e
+
+    has_motion = series%terms(e) /= has_forcing
+  end function has_motion
+
   !> Writes the procedures of runs of elements: g of them from element i of the run on. Phases are moved with their elements.
   subroutine write_runs(series, layout, code)
     type(reduced_series_t), intent(in) :: series
@@ -220,10 +228,12 @@ contains
     do run = 1, size(layout%first) - 1
       e = layout%first(run)
       associate (bank => layout%bank(e))
-        call code%line('INLINE void begin_run$(const int g, const int i, const strip *s, vd *z) {', [run])
-        call code%line('  const elements u = @;', a=elements_of(series, layout, e))
-        call code%line('  begin_elements(g, $, &u, s->left, ACROSS ? -LANES : 0);', [series%terms(e)])
-        call code%line('}')
+        if (has_motion(series, e)) then
+          call code%line('INLINE void begin_run$(const int g, const int i, const strip *s, vd *z) {', [run])
+          call code%line('  const elements u = @;', a=elements_of(series, layout, e))
+          call code%line('  begin_elements(g, $, &u, s->left, ACROSS ? -LANES : 0);', [series%terms(e)])
+          call code%line('}')
+        end if
         if (layout%is_phase(e)) cycle
         forcing = '0, 0'
         if (is_forcing(series, bank)) forcing = filled('z + at_forcing$ + P * ($ + i), ACROSS ? WORK : P', &
@@ -355,7 +365,7 @@ contains
     end do
     call code%line('  }')
     do run = 1, size(layout%first) - 1
-      if (series%terms(layout%first(run)) == has_forcing) cycle
+      if (.not. has_motion(series, layout%first(run))) cycle
       call write_calls(layout, layout%first(run + 1) - layout%first(run), filled('begin_run$', [run]), 'i, s, z', code)
     end do
     do b = size(series%banks%moved) + 1, size(laws)
