@@ -95,6 +95,7 @@ program chunk_costs
   use nocdyn_input_reader, only: read_input
   use nocdyn_kinds, only: wp
   use nocdyn_sweep, only: prepare_sweep, sweep_setup_t
+  use nocdyn_sweep_code, only: sweep_code_t
   use nocdyn_sweep_block, only: new_sweep_block, sweep_block_t
   use nocdyn_sweep_journal, only: create_journal
   use nocdyn_sweep_plan, only: make_plan, new_sweep_header, sweep_plan_t
@@ -106,6 +107,7 @@ program chunk_costs
   type(sweep_setup_t) :: setup
   type(sweep_block_t), allocatable, target :: block
   type(counting_scheduler_t), target :: scheduler
+  type(sweep_code_t), target :: code
   real(wp) :: computing
 
   call set_up()
@@ -127,8 +129,9 @@ contains
     scheduler%left = whole_argument(2)
     scheduler%size = whole_argument(3)
     call omp_init_lock(scheduler%lock)
+    call omp_init_lock(code%lock)
     allocate (block)
-    call new_sweep_block(plan, setup%lanes, setup%has_energy_balance, scheduler, block)
+    call new_sweep_block(plan, setup%lanes, setup%has_energy_balance, scheduler, code, block)
     call create_journal(text_argument(4), 'sweep.journal', new_sweep_header(plan, 1, 1), scheduler%journal, error)
     if (allocated(error)) call give_up(error%message)
   end subroutine set_up

@@ -19,7 +19,7 @@ MPIRUN = ["mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none
 
 @dataclass
 class Sweeper:
-    """One way to run sweeps: a method, threads and ranks."""
+    """One way to run sweeps: a method, threads and ranks, a program for the series or none."""
 
     folder: Path  # of the programs
     scratch: Path
@@ -28,12 +28,14 @@ class Sweeper:
     threads: int = 1
     ranks: int = 0  # 0: without MPI
     atol_of_rtol: float = 1.0
+    compiles: bool = False  # once: later sweeps find the program in the cache
     whole: list[float] = field(default_factory=list)  # seconds of each whole process, the files written
 
     @property
     def label(self) -> str:
         of = f", {self.ranks} rank{'s' * (self.ranks > 1)}" if self.ranks else f", {self.threads} threads" * (self.threads > 1)
-        return f"{'nocdyn-mpi' if self.ranks else 'nocdyn'} {self.method}{of}"
+        program = ", compiled" if self.compiles else ""
+        return f"{'nocdyn-mpi' if self.ranks else 'nocdyn'} {self.method}{program}{of}"
 
     def contestant(self) -> SweepContestant:
         program = "nocdyn-mpi sweep" if self.ranks else "nocdyn sweep"
@@ -75,7 +77,9 @@ class Sweeper:
             for name, value in (("method", self.method), ("rtol", repr(tolerance)), ("atol", repr(self.atol_of_rtol * tolerance)))
             for word in ("--set", f"run.{name}={value}")
         ]
-        command = [*before, *program, "sweep", file, "--out", out, "--threads", self.threads, "--quiet", *settings, *options]
+        choice = ["--compile", "always" if self.compiles else "never"]
+        words = ["--out", out, "--threads", self.threads, "--quiet", *choice, *settings, *options]
+        command = [*before, *program, "sweep", file, *words]
         return out, report_of(command)
 
 
@@ -107,6 +111,8 @@ def sweepers(folder: Path, scratch: Path, family: Family, methods: list[str], mo
     found, workers = [], range(1, most + 1)
     if (folder / "nocdyn-sweep").exists():
         found += [Sweeper(folder, scratch, family, method, threads) for threads in workers for method in methods]
+        if "taylor" in methods:
+            found += [Sweeper(folder, scratch, family, "taylor", threads, compiles=True) for threads in workers]
     if (folder / "nocdyn-mpi").exists() and most > 1:
         found += [Sweeper(folder, scratch, family, method, ranks=ranks) for ranks in workers for method in methods]
     return found

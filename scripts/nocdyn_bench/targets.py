@@ -126,12 +126,15 @@ def throughput_verdicts(workload: Throughput) -> list[Verdict]:
     rules = {
         "W2": [
             ("nocdyn rk45", "hand-written loop", 6.0),
-            ("nocdyn taylor", "hand-written loop", 15.0),
-            ("nocdyn taylor", "heyoka with the peak", 6.0),
-            ("nocdyn taylor, 2 threads", "nocdyn taylor", 1.95),
+            ("nocdyn taylor, compiled", "hand-written loop", 15.0),
+            ("nocdyn taylor, compiled", "heyoka with the peak", 6.0),
+            ("nocdyn taylor, compiled, 2 threads", "nocdyn taylor, compiled", 1.95),
         ],
-        "W5_sweep": [("nocdyn taylor", "heyoka with the peak", 5.0), ("nocdyn taylor", "heyoka, final state only", 3.0)],
-        "W6_sweep": [("nocdyn taylor", "heyoka with the peak", 12.0)],
+        "W5_sweep": [
+            ("nocdyn taylor, compiled", "heyoka with the peak", 5.0),
+            ("nocdyn taylor, compiled", "heyoka, final state only", 3.0),
+        ],
+        "W6_sweep": [("nocdyn taylor, compiled", "heyoka with the peak", 12.0)],
     }
     memory = [little_memory(workload)] if workload.counts else []
     return [*(faster(workload, *rule) for rule in rules[workload.name]), *memory]

@@ -35,7 +35,8 @@ def one_line(text):
         (
             ["sweep", CASE_1, "--resum"],
             "'--resum' is not an option of nocdyn sweep; did you mean '--resume'? "
-            "allowed: '--out', '--set', '--case', '--threads', '--shard', '--resume', '--csv', '--quiet', '--help'\n",
+            "allowed: '--out', '--set', '--case', '--threads', '--compile', '--shard', '--resume', '--csv', '--quiet', "
+            "'--help'\n",
         ),
         (["new", "a.nml", "--force"], "'--force' is not an option of nocdyn new; allowed: '--help'\n"),
         (["run", CASE_1, "--out"], "--out needs a value: --out DIR\n"),
@@ -109,6 +110,8 @@ OPTIONS = {
     "--holzer": None,
     "--threads": "1",
     "--shard": "1/2",
+    "--compile": "never",
+    "--code": None,
     "--resume": None,
     "--csv": None,
     "--quiet": None,

@@ -23,7 +23,16 @@ KERNEL = "kernel"
 # Procedures with more arguments, by file, and why.
 MANY_ARGUMENTS = {
     "src/analyse/statistics/linear_statistics.f90": (KERNEL, "bound_excess"),
-    "src/analyse/statistics/step_strips.f90": (KERNEL, "add_integrals", "add_pair", "expand", "expand_single", "set_pair"),
+    "src/analyse/statistics/range_filter.f90": (KERNEL, "bound_components"),
+    "src/analyse/statistics/step_strips.f90": (
+        KERNEL,
+        "add_integrals",
+        "add_pair",
+        "exclude_by_hull",
+        "expand",
+        "expand_single",
+        "set_pair",
+    ),
     "src/integrate/core/stage_sums.f90": (KERNEL, "sum_few_terms", "sum_many_terms"),
     "src/integrate/dense_output/extremes.f90": (KERNEL, "find_states"),
     "src/model/constraints/coordinates.f90": (

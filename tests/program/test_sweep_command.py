@@ -455,7 +455,7 @@ def test_the_program_for_sweeps_has_help_and_version(nocdyn, words, same):
 
 def test_help_on_sweep_names_its_options_and_no_others(nocdyn):
     text = nocdyn("help", "sweep").stdout
-    options = {"--out", "--set", "--case", "--threads", "--shard", "--resume", "--csv", "--quiet"}
+    options = {"--out", "--set", "--case", "--threads", "--compile", "--shard", "--resume", "--csv", "--quiet"}
     assert set(re.findall(r"--\w+", text)) == options
 
 

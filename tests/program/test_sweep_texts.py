@@ -26,13 +26,14 @@ VALUES_OF_A_VARIANT = {
     "input",
 }
 NAMES_IN_FAILURES = {"solver_status", "formulation", "system"}
+PROGRAMS = {"code_text", "law_code", "machine_code", "reduced", "series_code"}  # in the critical section
 ANALYSES = {"limit_groups", "solve", "margins"}  # wrong limits, which the base machine has too; modes at a time; reports
 REPORTS = {  # of recorded paths, in the critical section
     *("csv", "energy_balance", "hidden_file", "holzer", "holzer_report", "machine_report", "output_file", "table_text"),
     *(f"{command}_{part}" for command in ("campbell", "response", "modes") for part in ("files", "report", "results")),
     *("equilibrium_report", "equilibrium_results"),
 }
-ALLOWED = REPORTS | BEFORE_THREADS | VALUES_OF_A_VARIANT | NAMES_IN_FAILURES | ANALYSES | {"serial_work"}
+ALLOWED = REPORTS | BEFORE_THREADS | VALUES_OF_A_VARIANT | NAMES_IN_FAILURES | PROGRAMS | ANALYSES | {"serial_work"}
 
 LENGTHS = re.compile(r"^(\S+):\S+ [bBdD] slen\.[0-9.]+$", re.MULTILINE)
 

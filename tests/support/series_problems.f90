@@ -41,7 +41,8 @@ module nocdyn_series_problems
   type, extends(system_t), public :: burst_t
     real(wp), allocatable :: limit(:)
     integer, allocatable :: answer(:)    !! evaluation_... or answer_nan
-    integer :: expansions = 0
+    integer :: expansions = 0            !! calls of `series`
+    integer :: evaluations = 0           !! calls of `derivative`
   contains
     procedure :: derivative => burst_derivative
     procedure :: jacobian => burst_jacobian
@@ -186,6 +187,7 @@ contains
     real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)
     integer, intent(inout) :: status(self%lanes)
 
+    self%evaluations = self%evaluations + 1
     dydt(:, 1) = y(:, 1)**2
     where (y(:, 1) > self%limit .and. t >= 0) status = max(evaluation_ok, self%answer)
   end subroutine burst_derivative

@@ -140,13 +140,14 @@ contains
   end function settings_of
 
   !> The statistics of all lanes of a machine, each of which is one variant, from 0 to `t_end`.
-  subroutine run_block(machine, method, tolerance, t_end, statistics, values, solver_status)
+  subroutine run_block(machine, method, tolerance, t_end, statistics, values, solver_status, is_run)
     type(machine_t), intent(in) :: machine
     character(len=*), intent(in) :: method
     real(wp), intent(in) :: tolerance, t_end
     type(statistic_t), intent(in) :: statistics(:)
     real(wp), allocatable, intent(out) :: values(:, :)   !! [statistics, lanes]
     type(solver_status_t), intent(out) :: solver_status
+    logical, intent(in), optional :: is_run   !! as in `new_statistics_observer`
     class(formulation_t), allocatable, target :: formulation
     type(statistics_observer_t), target :: observer
     type(statistic_t), allocatable :: own(:)
@@ -156,7 +157,7 @@ contains
 
     call new_formulation('reduced', machine, formulation)
     allocate (own, source=statistics)
-    observer = new_statistics_observer(formulation, own, 0.0_wp, t_end, may_bend=.true.)
+    observer = new_statistics_observer(formulation, own, 0.0_wp, t_end, may_bend=.true., is_run=is_run)
     y = formulation%start()
     call integrate(formulation, settings_of(method, tolerance), [0.0_wp, t_end], y, observer, solver_status, error)
     if (allocated(error)) error stop 'nocdyn_test_sweep_blocks: ' // error%message

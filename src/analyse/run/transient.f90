@@ -83,7 +83,7 @@ module nocdyn_transient
     integer, allocatable :: chosen(:)        !! columns that are written
     real(wp), allocatable :: written(:)      !! their values in the row
     type(vibration_t) :: vibration           !! its energy in the rows
-    real(wp) :: largest_moment = 0.0_wp      !! of the elements [N m]
+    real(wp) :: largest_moment = 0.0_wp      !! of the elements in the rows [N m]
     real(wp) :: atol = 0.0_wp                !! absolute tolerance, at most `rest` [rad]
     real(wp) :: last_time = 0.0_wp           !! of the rows [s]
     real(wp), allocatable :: last_speeds(:)  !! of the bodies at that time [rad/s]
@@ -93,7 +93,7 @@ module nocdyn_transient
     real(wp) :: failure_time = 0.0_wp        !! of that row [s]
     class(run_output_t), pointer :: output => null()
   contains
-    procedure :: on_output, wants_stop, find_pace
+    procedure :: on_output, wants_stop
   end type run_observer_t
 
 contains
@@ -196,7 +196,7 @@ contains
     observer%end_time = times(size(times))
     call list_statistics(input, formulation%machine, times(1), statistics)
     observer%statistics_observer_t = new_statistics_observer(formulation, statistics, times(1), times(size(times)), &
-                                                             may_bend=.false.)
+                                                             may_bend=.false., is_run=.true.)
     observer%table = new_trajectory_table(formulation, times(1), output_units(input))
     observer%vibration = new_vibration(formulation%machine)
     allocate (observer%row(size(observer%table%signals)), source=0.0_wp)
@@ -279,6 +279,7 @@ contains
     integer, intent(in) :: lane
     real(wp), intent(in) :: t                  !! [s]
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+    real(wp) :: fastest, moments
 
     if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
     if (self%not_finite > 0) return
@@ -287,6 +288,8 @@ contains
     self%failure_time = t
     if (self%not_finite > 0) return
     self%rows = self%rows + 1
+    call self%table%columns%find_pace(1, fastest, moments)
+    self%largest_moment = max(self%largest_moment, moments)
     associate (formulation => self%table%columns%formulation)
       call self%vibration%include_energy(formulation%machine, formulation%state%elements%stored(1, :), formulation%omega(1, 1:))
       self%lowest(:) = min(self%lowest, formulation%omega(1, 1:))
@@ -298,16 +301,6 @@ contains
     self%last_time = t
     call self%table%keep_energies(at_last_row, y)
   end subroutine on_output
-
-  !> How fast the columns oscillate where they were evaluated last.
-  subroutine find_pace(self, lane, fastest, scale)
-    class(run_observer_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    real(wp), intent(out) :: fastest, scale   !! [rad/s], [N m]
-
-    call self%statistics_observer_t%find_pace(lane, fastest, scale)
-    self%largest_moment = max(self%largest_moment, scale)
-  end subroutine find_pace
 
   !> Whether the caller wants the run to end.
   logical function wants_stop(self, t)

@@ -33,8 +33,8 @@ module nocdyn_column_statistics
     real(wp), allocatable :: highest(:), lowest(:), highest_time(:), lowest_time(:)   !! of x; times [s]
     real(wp), allocatable :: no_highest(:), no_lowest(:)   !! huge where it is not needed, or for `max_abs` only; else -huge
     real(wp), allocatable :: bound(:)                      !! huge before `from`: x is not of interest; -huge after it
-    real(wp), allocatable :: integral(:), square(:)        !! of the column and of its square over time
-    type(settling_history_t), allocatable :: history(:)    !! of x
+    real(wp), allocatable :: integral(:), square(:)        !! of the column and of its square over time, if `has_sums`
+    type(settling_history_t), allocatable :: history(:)    !! of x, if `has_history`
   contains
     procedure :: has_range
   end type accumulator_t
@@ -95,11 +95,12 @@ contains
       do i = 1, size(self%accumulators)
         allocate (self%accumulators(i)%highest(padded), source=0.0_wp)
         allocate (self%accumulators(i)%first, self%accumulators(i)%lowest, self%accumulators(i)%highest_time, &
-          self%accumulators(i)%lowest_time, self%accumulators(i)%integral, self%accumulators(i)%square, &
-          source=self%accumulators(i)%highest)
+          self%accumulators(i)%lowest_time, source=self%accumulators(i)%highest)
         allocate (self%accumulators(i)%bound(padded), source=-huge(0.0_wp))
         allocate (self%accumulators(i)%no_highest, self%accumulators(i)%no_lowest, source=self%accumulators(i)%bound)
-        allocate (self%accumulators(i)%history(padded))
+        if (self%accumulators(i)%has_sums) allocate (self%accumulators(i)%integral, self%accumulators(i)%square, &
+                                                     source=self%accumulators(i)%highest)
+        if (self%accumulators(i)%has_history) allocate (self%accumulators(i)%history(padded))
       end do
     end associate
     call add_damages(self, lanes)
@@ -195,9 +196,9 @@ contains
         acc%highest(lane) = -huge(0.0_wp)
         acc%lowest(lane) = huge(0.0_wp)
         acc%bound(lane) = huge(0.0_wp)
-        acc%integral(lane) = 0.0_wp
-        acc%square(lane) = 0.0_wp
-        call acc%history(lane)%clear()
+        if (acc%has_sums) acc%integral(lane) = 0.0_wp
+        if (acc%has_sums) acc%square(lane) = 0.0_wp
+        if (acc%has_history) call acc%history(lane)%clear()
       end associate
     end do
     do i = 1, size(self%damages)

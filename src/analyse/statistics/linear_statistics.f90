@@ -9,9 +9,10 @@ module nocdyn_linear_statistics
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_linear_columns, only: linear_columns_t, new_linear_columns, strip_of
+  use nocdyn_range_filter, only: new_range_filter, range_filter_t
   use nocdyn_statistics, only: statistic_t
-  use nocdyn_step_strips, only: add_integrals, bound_excursions, expand, expand_single, exclude_monotonic, &
-    fill_chord_gaps, strip_t, values_at
+  use nocdyn_step_strips, only: add_integrals, bound_excursions, exclude_by_hull, exclude_monotonic, expand, &
+    expand_single, fill_chord_gaps, fill_hull, find_part, strip_t, values_at
   use nocdyn_observer, only: step_block_t
   use nocdyn_quadrature, only: gauss_legendre_rule
   use nocdyn_signals, only: signal_source_t
@@ -23,11 +24,14 @@ module nocdyn_linear_statistics
   type, extends(column_statistics_t), public :: linear_statistics_t
     type(linear_columns_t) :: columns
     real(wp), allocatable, private :: gauss(:), weights(:)   !! nodes, -1 to 1: exact for x and for its square
+    real(wp), allocatable, private :: hull(:, :)     !! as in `fill_hull`
     real(wp), allocatable, private :: chord_gap(:)   !! largest value of s - s^p for s from 0 to 1, p = 1 to degree
     real(wp), allocatable, private :: y_last(:, :), y_new_last(:, :), c_last(:, :, :)   !! of an incomplete last strip, padded
     type(strip_t), private :: strip
+    type(range_filter_t), private :: filter                  !! of the accumulators of a single lane
+    logical, private :: is_filter_current = .false.          !! whether it has their ranges and the factors of the columns
   contains
-    procedure :: start_lane, add_steps, add_state, finish_lane, read_components
+    procedure :: start_lane, copy_lane, add_steps, add_state, finish_lane, read_components
   end type linear_statistics_t
 
 contains
@@ -70,7 +74,7 @@ contains
     real(wp), contiguous, intent(in) :: y(:)
     integer :: i
 
-    call self%columns%copy_lane(block, lane)
+    call self%copy_lane(block, lane)
     call self%columns%find_laws(block%machine, lane, self%linear, self%cubic)
     call self%start_accumulators(lane)
     do i = 1, size(self%accumulators)
@@ -85,6 +89,16 @@ contains
       end associate
     end do
   end subroutine start_lane
+
+  !> Copies the parameters of a lane of the block.
+  subroutine copy_lane(self, block, lane)
+    class(linear_statistics_t), intent(inout) :: self
+    class(formulation_t), intent(in) :: block
+    integer, intent(in) :: lane
+
+    call self%columns%copy_lane(block, lane)
+    self%is_filter_current = .false.
+  end subroutine copy_lane
 
   !> Takes the end of a variant.
   subroutine finish_lane(self, block, lane, y)
@@ -108,6 +122,7 @@ contains
     integer :: i
     real(wp) :: x
 
+    self%is_filter_current = .false.
     do i = 1, size(self%accumulators)
       associate (acc => self%accumulators(i))
         if (acc%bound(lane) > 0) cycle   ! it has not begun
@@ -126,31 +141,12 @@ contains
     type(step_block_t), intent(in) :: steps
     real(wp), contiguous, intent(in) :: y(:, :), y_new(:, :)   !! starts and ends of the steps, [lanes, padded components]
     real(wp), contiguous, intent(in) :: c(:, :, :)             !! coefficients of the steps, [lanes, padded components, degree]
-    integer :: before, column, i, number, place
+    integer :: column, i, number
 
     if (size(self%accumulators) + size(self%damages) == 0) return
     if (.not. allocated(self%chord_gap)) call allocate_work(self, size(c, 2), size(c, 3))
     if (size(c, 1) == 1) then
-      ! adds the last step of a block of one lane: its columns are put side by side in strips, instead of lanes
-      self%strip%before = 0
-      self%strip%t_end(:) = steps%t_new(1)
-      self%strip%scale(:) = steps%scale(1)
-      do before = 0, size(self%accumulators) - 1, width
-        do place = 1, min(width, size(self%accumulators) - before)
-          call place_column(self, self%accumulators(before + place)%column, place, y, y_new, c)
-        end do
-        call widen_side_by_side(self, before, steps, size(c, 3))
-      end do
-      self%strip%lanes = 1
-      do i = 1, size(self%accumulators)
-        if (.not. self%accumulators(i)%has_sums) cycle
-        call place_column(self, self%accumulators(i)%column, 1, y, y_new, c)
-        call integrate_strip(self, self%accumulators(i), steps, size(c, 3))
-      end do
-      do i = 1, size(self%damages)
-        call place_column(self, self%damages(i)%column, 1, y, y_new, c)
-        call count_strip(self, self%damages(i), steps, size(c, 3))
-      end do
+      call add_single_step(self, steps, y, y_new, c)
       return
     end if
     do number = 1, strip_of(size(c, 1))
@@ -175,6 +171,41 @@ contains
     end do
   end subroutine add_steps
 
+  !> Adds the last step of a block of one lane: its columns are put side by side in strips, instead of lanes.
+  subroutine add_single_step(self, steps, y, y_new, c)
+    class(linear_statistics_t), intent(inout) :: self
+    type(step_block_t), intent(in) :: steps
+    real(wp), contiguous, intent(in) :: y(:, :), y_new(:, :), c(:, :, :)
+    integer :: before, i, place
+
+    self%strip%before = 0
+    self%strip%t_end(:) = steps%t_new(1)
+    self%strip%scale(:) = steps%scale(1)
+    if (.not. self%is_filter_current) then
+      call self%filter%refresh(self%columns, self%accumulators)
+      self%is_filter_current = .true.
+    end if
+    call self%filter%find_candidates(self%accumulators, steps, self%chord_gap, y, y_new, c)
+    do before = 0, self%filter%found - 1, width
+      associate (chosen => self%filter%candidates(before + 1:min(before + width, self%filter%found)))
+        do place = 1, size(chosen)
+          call place_column(self, self%accumulators(chosen(place))%column, place, y, y_new, c)
+        end do
+        call widen_side_by_side(self, chosen, steps, size(c, 3))
+      end associate
+    end do
+    self%strip%lanes = 1
+    do i = 1, size(self%accumulators)
+      if (.not. self%accumulators(i)%has_sums) cycle
+      call place_column(self, self%accumulators(i)%column, 1, y, y_new, c)
+      call integrate_strip(self, self%accumulators(i), steps, size(c, 3))
+    end do
+    do i = 1, size(self%damages)
+      call place_column(self, self%damages(i)%column, 1, y, y_new, c)
+      call count_strip(self, self%damages(i), steps, size(c, 3))
+    end do
+  end subroutine add_single_step
+
   !> Computes x of a column of a single lane in its last step, in a place of the strip.
   subroutine place_column(self, column, place, y, y_new, c)
     class(linear_statistics_t), intent(inout) :: self
@@ -187,51 +218,47 @@ contains
     end associate
   end subroutine place_column
 
-  !> Widens the ranges of some accumulators of a single lane, whose columns are in the strip.
-  subroutine widen_side_by_side(self, before, steps, degree)
+  !> Widens the ranges of some accumulators of a single lane, whose columns are in the strip, by what is inside the step.
+  subroutine widen_side_by_side(self, chosen, steps, degree)
     class(linear_statistics_t), intent(inout) :: self
-    integer, intent(in) :: before   !! accumulators before these
+    integer, intent(in) :: chosen(:)   !! their numbers
     type(step_block_t), intent(in) :: steps
     integer, intent(in) :: degree
-    real(wp), dimension(width) :: bound, highest, lowest, highest_time, lowest_time, no_highest, no_lowest, rise, fall
-    integer :: count, i
+    real(wp), dimension(width) :: bound, highest, lowest, no_highest, no_lowest, rise, fall
+    integer :: i
 
-    count = min(width, size(self%accumulators) - before)
-    associate (strip => self%strip, chosen => self%accumulators(before + 1:before + count))
-      call bound_excursions(degree, self%chord_gap, strip%scale, strip%c, strip%above, strip%below)
-      bound = huge(0.0_wp)   ! in places without a column
-      highest = 0.0_wp
-      lowest = 0.0_wp
-      do i = 1, count
-        bound(i) = chosen(i)%bound(1)
-        highest(i) = chosen(i)%highest(1)
-        lowest(i) = chosen(i)%lowest(1)
-        highest_time(i) = chosen(i)%highest_time(1)
-        lowest_time(i) = chosen(i)%lowest_time(1)
-      end do
-      call widen_by_ends(.true., strip%t_end, strip%x_end, bound, highest, lowest, highest_time, lowest_time)
-      no_highest = huge(0.0_wp)
-      no_lowest = huge(0.0_wp)
-      do i = 1, count
-        chosen(i)%highest(1) = highest(i)
-        chosen(i)%lowest(1) = lowest(i)
-        chosen(i)%highest_time(1) = highest_time(i)
-        chosen(i)%lowest_time(1) = lowest_time(i)
-        if (.not. chosen(i)%has_range()) cycle
-        no_highest(i) = min(chosen(i)%no_highest(1), merge(-lowest(i), huge(0.0_wp), chosen(i)%has_max_abs))
-        no_lowest(i) = min(chosen(i)%no_lowest(1), merge(highest(i), huge(0.0_wp), chosen(i)%has_max_abs))
-      end do
-      call bound_excess(.false., strip, bound, highest, lowest, no_highest, no_lowest, rise, fall)
-      if (any_positive(rise, fall)) call exclude_monotonic(degree, self%chord_gap, strip%scale, strip%c, rise, fall)
-      do i = 1, count
-        if (steps%theta_end(1) < 1 .or. chosen(i)%bound(1) > 0) then   ! the bounds are not valid
+    call bound_excursions(degree, self%chord_gap, self%strip%scale, self%strip%c, self%strip%above, self%strip%below)
+    bound = huge(0.0_wp)   ! in places without a column
+    highest = 0.0_wp
+    lowest = 0.0_wp
+    no_highest = huge(0.0_wp)
+    no_lowest = huge(0.0_wp)
+    do i = 1, size(chosen)
+      associate (acc => self%accumulators(chosen(i)))
+        bound(i) = acc%bound(1)
+        highest(i) = acc%highest(1)
+        lowest(i) = acc%lowest(1)
+        if (.not. acc%has_range()) cycle
+        no_highest(i) = min(acc%no_highest(1), merge(-lowest(i), huge(0.0_wp), acc%has_max_abs))
+        no_lowest(i) = min(acc%no_lowest(1), merge(highest(i), huge(0.0_wp), acc%has_max_abs))
+      end associate
+    end do
+    call bound_excess(.false., self%strip, bound, highest, lowest, no_highest, no_lowest, rise, fall)
+    if (any_positive(rise, fall)) call exclude_monotonic(degree, self%chord_gap, self%strip%scale, self%strip%c, rise, fall)
+    if (any_positive(rise, fall)) then
+      call exclude_by_hull(degree, self%hull, self%strip%scale, self%strip%x_start, self%strip%c, highest, lowest, rise, fall)
+    end if
+    do i = 1, size(chosen)
+      associate (acc => self%accumulators(chosen(i)))
+        if (steps%theta_end(1) < 1 .or. acc%bound(1) > 0) then   ! the bounds are not valid
           rise(i) = 1.0_wp
           fall(i) = 1.0_wp
         end if
-        if (max(rise(i), fall(i)) <= 0 .or. strip%t_end(i) <= chosen(i)%from .or. .not. chosen(i)%has_range()) cycle
-        call look_inside(self, chosen(i), i, 1, steps, degree, rise(i) > 0, fall(i) > 0)
-      end do
-    end associate
+        if (max(rise(i), fall(i)) <= 0 .or. self%strip%t_end(i) <= acc%from .or. .not. acc%has_range()) cycle
+        call look_inside(self, acc, i, 1, steps, degree, rise(i) > 0, fall(i) > 0)
+        call self%filter%copy_range(chosen(i), self%accumulators)
+      end associate
+    end do
   end subroutine widen_side_by_side
 
   !> Work space for a degree of the solution inside the steps.
@@ -244,8 +271,11 @@ contains
     allocate (self%gauss(degree + 1), self%weights(degree + 1))
     call gauss_legendre_rule(degree + 1, self%gauss, self%weights)
     self%gauss(:) = 2 * self%gauss - 1
+    self%filter = new_range_filter(self%columns, self%accumulators, columns)
     allocate (self%chord_gap(degree))
     call fill_chord_gaps(self%chord_gap)
+    allocate (self%hull(degree, degree))
+    call fill_hull(self%hull)
     allocate (self%y_last(width, columns), self%y_new_last(width, columns), self%c_last(width, columns, degree), source=0.0_wp)
   end subroutine allocate_work
 
@@ -405,18 +435,6 @@ contains
     if (acc%bound(lane) > 0) call start_range(acc, lane, values(1), t_start)
     call widen_range(acc, self%rules(degree), lane, values, t_start, steps%t_new(lane), rises, falls)
   end subroutine look_inside
-
-  !> The part of a step after `from` and before its end: scale s at its ends, and when it starts [s].
-  pure subroutine find_part(lane, from, steps, begin, end, t_start)
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: from     !! [s]
-    type(step_block_t), intent(in) :: steps
-    real(wp), intent(out) :: begin, end, t_start
-
-    t_start = max(steps%t(lane), from)
-    begin = steps%scale(lane) * ((t_start - steps%t(lane)) / steps%h(lane))
-    end = steps%scale(lane) * steps%theta_end(lane)
-  end subroutine find_part
 
   !> Counts the cycles of a column, a multiple of x, in the steps of the strip. Where x is monotonic, only its ends count.
   subroutine count_strip(self, sum, steps, degree)

@@ -27,7 +27,7 @@ module nocdyn_sampled_statistics
     integer, allocatable :: columns(:)                      !! that are sampled, of those given
     type(integration_t), private :: integration(max_degree) !! of the degrees that there have been
   contains
-    procedure :: track, add_piece
+    procedure :: track, has_only_extremes, add_piece
   end type sampled_statistics_t
 
 contains
@@ -67,6 +67,15 @@ contains
       from = pack(from, from > minval(from))
     end do
   end subroutine track
+
+  !> Whether there are only extremes, all from one time on.
+  pure logical function has_only_extremes(self)
+    class(sampled_statistics_t), intent(in) :: self
+
+    has_only_extremes = size(self%accumulators) > 0 .and. size(self%damages) == 0
+    if (has_only_extremes) has_only_extremes = .not. any(self%accumulators%has_sums .or. self%accumulators%has_history) .and. &
+                                               all(abs(self%accumulators%from - self%accumulators(1)%from) <= 0)
+  end function has_only_extremes
 
   !> Adds a piece of a lane's step to the accumulators and damages that begin where its part of the step does.
   subroutine add_piece(self, lane, piece, rule, values_of, replaced)

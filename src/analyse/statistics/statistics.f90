@@ -2,13 +2,14 @@
 module nocdyn_statistics
   use nocdyn_kinds, only: wp
   use nocdyn_sn_curves, only: sn_curve_t
-  use nocdyn_signals, only: find_signal, signal_t
+  use nocdyn_signals, only: find_signal, signal_t, signal_work_in
   use nocdyn_text, only: to_text
   use nocdyn_units, only: units
   implicit none (type, external)
   private
 
-  public :: new_statistic, new_fatigue_statistic, find_columns, is_of_fatigue, is_time_of_extreme, is_torque, value_of_zero_column
+  public :: new_statistic, new_fatigue_statistic, find_columns, is_of_fatigue, is_time_of_extreme, is_torque, &
+    needs_work_integrals, value_of_zero_column
 
   integer, parameter, public :: statistic_final = 1           !! at the end
   integer, parameter, public :: statistic_max = 2             !! in continuous time, as all statistics
@@ -156,5 +157,17 @@ contains
     value = 0.0_wp
     if (is_time_of_extreme(statistic%kind)) value = statistic%from
   end function value_of_zero_column
+
+  !> Whether a statistic is of a work, or of the energy balance, and so needs the work integrals.
+  pure logical function needs_work_integrals(statistics)
+    type(statistic_t), intent(in) :: statistics(:)
+    integer :: i
+
+    needs_work_integrals = .false.
+    do i = 1, size(statistics)
+      if (.not. allocated(statistics(i)%signal)) cycle
+      needs_work_integrals = needs_work_integrals .or. statistics(i)%signal%source%kind >= signal_work_in
+    end do
+  end function needs_work_integrals
 
 end module nocdyn_statistics

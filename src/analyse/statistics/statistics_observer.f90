@@ -3,37 +3,45 @@ module nocdyn_statistics_observer
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use nocdyn_chebyshev, only: interpolation_t
   use nocdyn_damage_counters, only: damage_counter_t
+  use nocdyn_column_bounds, only: can_bound, column_bounds_t, new_column_bounds
+  use nocdyn_energy_statistics, only: energy_statistics_t, has_energies, is_energy, new_energy_statistics
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_linear_columns, only: has_law, is_linear, is_proportional
   use nocdyn_linear_statistics, only: linear_statistics_t, new_linear_statistics
-  use nocdyn_machine, only: machine_t
   use nocdyn_signal_values, only: new_signal_values, signal_values_t
   use nocdyn_sampled_statistics, only: new_sampled_statistics, sampled_statistics_t
+  use nocdyn_statistic_parts, only: list_parts
   use nocdyn_statistics, only: find_columns, is_of_fatigue, is_time_of_extreme, is_torque, statistic_final, statistic_max, &
     statistic_max_abs, statistic_min, statistic_settling_time, statistic_t, statistic_time_of_max, statistic_time_of_min, &
     value_of_zero_column
   use nocdyn_observer, only: observer_t, piece_t, step_block_t
+  use nocdyn_plain_ranges, only: plain_ranges_t
+  use nocdyn_plain_steps, only: plain_steps_t
   use nocdyn_quantities, only: form_applied
-  use nocdyn_signals, only: is_largest_along, list_points, list_signals, signal_point_moment, signal_point_stress, &
-    signal_source_t, signal_t, signal_work_in
+  use nocdyn_signals, only: list_signals, signal_source_t, signal_t
   implicit none (type, external)
   private
 
-  public :: new_statistics_observer, needs_work_integrals
+  public :: new_statistics_observer
 
   !> The requested times must be, or contain, the start and the end of the variants.
   !>
-  !> A statistic is computed by `linear` if its column allows it, else by `sampled`. A torque that the machine of the block does
-  !> not have is 0 at all times. A statistic of a whole shaft has a part for each of its points, of which the worst one counts.
+  !> A statistic is computed by `linear` if its column allows it, or by `energies` in a run, else by `sampled`. A torque that the
+  !> machine of the block does not have is 0 at all times. A statistic of a whole shaft has a part for each of its points, of
+  !> which the worst one counts.
   type, extends(observer_t), public :: statistics_observer_t
     character(len=:), allocatable :: missing                  !! the first quantity without a column that is no torque, or ''
     class(formulation_t), pointer, private :: block => null()
     real(wp), private :: t_start = 0.0_wp, t_end = 0.0_wp     !! of every variant [s]
     type(linear_statistics_t), private :: linear
+    type(energy_statistics_t), private :: energies
     type(sampled_statistics_t), private :: sampled
+    type(plain_ranges_t), private :: plain
+    type(column_bounds_t), private :: bounds                  !! of the sampled columns of a run
     integer, allocatable, private :: first_part(:)            !! of each statistic, [statistics + 1]
     integer, allocatable, private :: linear_index(:)          !! of each part in `linear`, or 0; [parts]
+    integer, allocatable, private :: energy_index(:)          !! in `energies`, or 0
     integer, allocatable, private :: sampled_index(:)         !! in `sampled`, or 0
     real(wp), allocatable, private :: default_value(:)        !! where a statistic has no column, [statistics]
     integer, allocatable, private :: kind(:)                  !! statistic_..., [statistics]
@@ -44,29 +52,18 @@ module nocdyn_statistics_observer
     logical, allocatable, private :: is_complete(:)           !! lanes that have reached the end
   contains
     procedure :: results, value_of, has_begun, take_counters, on_start, on_output, on_steps, on_shift, on_jump
-    procedure :: observe_lanes, tracked_values, find_pace, on_piece
+    procedure :: observe_lanes, tracked_values, bound_functions, find_pace, on_piece, list_ranges
   end type statistics_observer_t
 
 contains
 
-  !> Whether a statistic is of a work, or of the energy balance, and so needs the work integrals.
-  pure logical function needs_work_integrals(statistics)
-    type(statistic_t), intent(in) :: statistics(:)
-    integer :: i
-
-    needs_work_integrals = .false.
-    do i = 1, size(statistics)
-      if (.not. allocated(statistics(i)%signal)) cycle
-      needs_work_integrals = needs_work_integrals .or. statistics(i)%signal%source%kind >= signal_work_in
-    end do
-  end function needs_work_integrals
-
   !> An observer of a block, which stays where it is.
-  function new_statistics_observer(block, statistics, t_start, t_end, may_bend) result(self)
+  function new_statistics_observer(block, statistics, t_start, t_end, may_bend, is_run) result(self)
     class(formulation_t), target, intent(inout) :: block   !! with work integrals if `needs_work_integrals`
     type(statistic_t), intent(inout) :: statistics(:)      !! each with t_start <= from < t_end; get their columns
     real(wp), intent(in) :: t_start, t_end                 !! of every variant [s]
     logical, intent(in) :: may_bend                        !! whether variants differ in cubic stiffnesses
+    logical, intent(in), optional :: is_run                !! whether the machine of a run is the only variant; absent: no
     type(statistics_observer_t) :: self
     type(statistic_t), allocatable :: parts(:)
     type(signal_source_t), allocatable :: columns(:)
@@ -81,7 +78,7 @@ contains
     call list_signals(block%machine, signals)
     columns = signals%source
     call find_columns(signals, statistics)
-    call list_parts(self, statistics, columns, parts)
+    call list_parts(block%machine, statistics, columns, parts, self%first_part, self%is_along)
     self%missing = ''
     do i = size(statistics), 1, -1
       if (allocated(statistics(i)%shaft) .or. statistics(i)%column > 0) cycle
@@ -90,7 +87,7 @@ contains
     allocate (self%default_value, source=value_of_zero_column(statistics))
     allocate (self%kind(size(statistics)))
     self%kind(:) = statistics%kind
-    call distribute(self, parts, columns, may_bend)
+    call distribute(self, parts, columns, may_bend, is_run)
     call record_columns(self, columns(self%sampled%columns))
     allocate (self%is_complete(block%lanes), source=.false.)
   end function new_statistics_observer
@@ -109,120 +106,22 @@ contains
     end associate
   end subroutine record_columns
 
-  !> The parts of all statistics. The points of shafts become columns after the ones of the table. An extreme of the largest
-  !> moment or stress along a shaft has its column as the first part, then the extremes at the points, and the times of these.
-  subroutine list_parts(self, statistics, columns, parts)
-    type(statistics_observer_t), intent(inout) :: self
-    type(statistic_t), intent(in) :: statistics(:)
-    type(signal_source_t), allocatable, intent(inout) :: columns(:)
-    type(statistic_t), allocatable, intent(out) :: parts(:)
-    type(signal_source_t), allocatable :: points(:)
-    integer :: count, first, i, k
-
-    allocate (parts(size(statistics)), self%first_part(size(statistics) + 1), self%is_along(size(statistics)))
-    count = 0
-    do i = 1, size(statistics)
-      self%first_part(i) = count + 1
-      associate (statistic => statistics(i))
-        call find_points(self%block%machine, statistic, columns, points, self%is_along(i))
-        if (self%is_along(i) .or. size(points) == 0 .and. .not. allocated(statistic%shaft)) then
-          call add_part(statistic, statistic%column, statistic%kind, parts, count)
-        end if
-        call add_columns(points, columns, first)
-        if (self%is_along(i) .and. is_time_of_extreme(statistic%kind)) then
-          do k = first, first + size(points) - 1
-            call add_part(statistic, k, extreme_of(statistic%kind), parts, count)
-          end do
-        end if
-        do k = first, first + size(points) - 1
-          call add_part(statistic, k, statistic%kind, parts, count)
-        end do
-      end associate
-    end do
-    self%first_part(size(statistics) + 1) = count + 1
-    call resize(parts, count)
-  end subroutine list_parts
-
-  !> Adds a part of a statistic.
-  subroutine add_part(statistic, column, kind, parts, count)
-    type(statistic_t), intent(in) :: statistic
-    integer, intent(in) :: column, kind
-    type(statistic_t), allocatable, intent(inout) :: parts(:)
-    integer, intent(inout) :: count   !! of the parts so far
-
-    if (count == size(parts)) call resize(parts, 2 * count)
-    count = count + 1
-    parts(count) = statistic
-    parts(count)%column = column
-    parts(count)%kind = kind
-  end subroutine add_part
-
-  subroutine resize(parts, count)
-    type(statistic_t), allocatable, intent(inout) :: parts(:)
-    integer, intent(in) :: count
-    type(statistic_t) :: none
-    type(statistic_t), allocatable :: resized(:)
-    integer :: kept
-
-    kept = min(count, size(parts))
-    allocate (resized(count), source=none)
-    resized(:kept) = parts(:kept)
-    call move_alloc(resized, parts)
-  end subroutine resize
-
-  !> Adds the columns of the points of a shaft, unless they are there.
-  pure subroutine add_columns(points, columns, first)
-    type(signal_source_t), intent(in) :: points(:)
-    type(signal_source_t), allocatable, intent(inout) :: columns(:)
-    integer, intent(out) :: first   !! column of the first point
-    integer :: c
-
-    first = size(columns) + 1
-    if (size(points) == 0) return
-    do c = 1, size(columns)
-      if (columns(c)%kind == points(1)%kind .and. columns(c)%bank == points(1)%bank .and. &
-          columns(c)%quantity == points(1)%quantity .and. columns(c)%index == points(1)%index) first = min(first, c)
-    end do
-    if (first > size(columns)) columns = [columns, points]
-  end subroutine add_columns
-
-  !> The points of a shaft that a statistic is of, or an extreme of the largest moment or stress along it.
-  subroutine find_points(machine, statistic, columns, points, is_along)
-    type(machine_t), intent(in) :: machine
-    type(statistic_t), intent(in) :: statistic
-    type(signal_source_t), intent(in) :: columns(:)
-    type(signal_source_t), allocatable, intent(out) :: points(:)   !! columns; none if it is of no shaft
-    logical, intent(out) :: is_along                        !! whether it is such an extreme
-    logical :: is_stress
-
-    is_along = .false.
-    is_stress = statistic%is_stress
-    if (allocated(statistic%shaft)) then
-      call list_points(machine, statistic%shaft, merge(signal_point_stress, signal_point_moment, is_stress), points)
-      return
-    end if
-    if (statistic%column > 0 .and. any(extreme_of(statistic%kind) == [statistic_max, statistic_min, statistic_max_abs])) then
-      associate (column => columns(statistic%column))
-        is_along = is_largest_along(machine, column, is_stress)
-        if (is_along) call list_points(machine, machine%banks(column%bank)%bank%names(column%index)%text, &
-                                       merge(signal_point_stress, signal_point_moment, is_stress), points)
-      end associate
-    end if
-    if (.not. is_along) allocate (points(0))
-  end subroutine find_points
-
   !> Chooses how each statistic is computed. The time of the largest moment is not the one of the largest twist in a coupling that
   !> softens. A value at the end is the one of the row of a run, to the last bit.
-  subroutine distribute(self, statistics, columns, may_bend)
+  subroutine distribute(self, statistics, columns, may_bend, is_run)
     type(statistics_observer_t), intent(inout) :: self
     type(statistic_t), intent(in) :: statistics(:)
     type(signal_source_t), intent(in) :: columns(:)   !! of the trajectory table, and points of shafts
     logical, intent(in) :: may_bend            !! as in `new_statistics_observer`
-    logical, dimension(size(statistics)) :: is_of_linear, is_of_sampled
-    logical :: is_multiple
+    logical, intent(in), optional :: is_run
+    logical, dimension(size(statistics)) :: is_of_energies, is_of_linear, is_of_sampled
+    logical :: is_multiple, of_run
     integer :: i
 
+    of_run = .false.
+    if (present(is_run)) of_run = is_run
     is_of_linear = .false.
+    is_of_energies = .false.
     do i = 1, size(statistics)
       if (statistics(i)%column == 0 .or. statistics(i)%kind == statistic_settling_time) cycle
       associate (column => columns(statistics(i)%column))
@@ -233,15 +132,23 @@ contains
         if (has_law(self%block%machine, column)) then
           if (is_time_of_extreme(statistics(i)%kind) .or. is_of_fatigue(statistics(i)%kind)) is_of_linear(i) = is_multiple
         end if
+        if (.not. of_run) cycle
+        if (is_energy(column)) is_of_energies(i) = has_energies(self%block)
       end associate
     end do
-    is_of_sampled = statistics%column > 0 .and. .not. is_of_linear
+    is_of_sampled = statistics%column > 0 .and. .not. (is_of_linear .or. is_of_energies)
     allocate (self%linear_index, source=indices_among(is_of_linear))
+    allocate (self%energy_index, source=indices_among(is_of_energies))
     allocate (self%sampled_index, source=indices_among(is_of_sampled))
     self%linear = new_linear_statistics(self%block, columns, pack(statistics, is_of_linear), self%t_start, self%t_end)
+    self%energies = new_energy_statistics(self%block, columns, pack(statistics, is_of_energies), self%t_start, self%t_end)
     self%sampled = new_sampled_statistics(self%block%lanes, pack(statistics, is_of_sampled), self%t_start, self%t_end)
     call self%sampled%track(self%block%machine, columns, may_bend, self)
-    if (self%tracked == 0) call self%linear%read_components(self%first_read, self%last_read)
+    if (of_run .and. self%sampled%has_only_extremes()) then
+      self%bounds_functions = can_bound(self%block, columns(self%sampled%columns))
+      if (self%bounds_functions) self%bounds = new_column_bounds(self%block, columns(self%sampled%columns))
+    end if
+    if (self%tracked == 0 .and. .not. any(is_of_energies)) call self%linear%read_components(self%first_read, self%last_read)
   end subroutine distribute
 
   !> Numbers the true elements of a mask from 1 on; 0 for the others.
@@ -266,11 +173,23 @@ contains
 
     self%is_complete(lane) = .false.
     call self%linear%start_lane(self%block, lane, y)
+    call self%energies%start_run(self%block, y)
     call self%sampled%start_accumulators(lane)
     if (.not. self%has_recorded) return
     call observe_lane(self, lane, t, y)
     call self%recorded%start_lane(lane)
   end subroutine on_start
+
+  !> The ranges of the linear statistics, if there are no others.
+  subroutine list_ranges(self, order, steps, are_all)
+    class(statistics_observer_t), target, intent(inout) :: self
+    integer, intent(in) :: order
+    type(plain_steps_t), intent(inout) :: steps
+    logical, intent(out) :: are_all
+
+    are_all = .not. (self%has_recorded .or. any(self%energy_index > 0))
+    if (are_all) call self%plain%list(self%linear, order, steps, are_all)
+  end subroutine list_ranges
 
   !> Brings one lane to a time and state; the others stay where they started or ended.
   subroutine observe_lane(self, lane, t, y)
@@ -300,12 +219,16 @@ contains
     end do
   end subroutine results
 
-  !> Whether a lane has come to the time from which on the first statistic is taken that is not linear.
+  !> Whether a lane has come to the time from which on the first statistic is taken that is not linear: of energies in a run.
   pure logical function has_begun(self, lane)
     class(statistics_observer_t), intent(in) :: self
     integer, intent(in) :: lane
 
-    has_begun = self%sampled%accumulators(1)%bound(lane) <= 0
+    if (size(self%energies%accumulators) > 0) then
+      has_begun = self%energies%accumulators(1)%bound(lane) <= 0
+    else
+      has_begun = self%sampled%accumulators(1)%bound(lane) <= 0
+    end if
   end function has_begun
 
   !> A statistic of the variant in a lane, up to the last step.
@@ -321,6 +244,7 @@ contains
     part = worst_part(self, statistic, lane)
     value = self%default_value(statistic)
     if (self%linear_index(part) > 0) value = self%linear%value(self%linear_index(part), lane)
+    if (self%energy_index(part) > 0) value = self%energies%value(self%energy_index(part), lane)
     if (self%sampled_index(part) > 0) value = self%sampled%value(self%sampled_index(part), lane)
   end function value_of
 
@@ -375,20 +299,6 @@ contains
     end associate
   end function value_along
 
-  !> The extreme of which a statistic is the time; other statistics as they are.
-  pure integer function extreme_of(kind)
-    integer, intent(in) :: kind   !! statistic_...
-
-    extreme_of = kind
-    if (kind == statistic_time_of_max) then
-      extreme_of = statistic_max
-    else if (kind == statistic_time_of_min) then
-      extreme_of = statistic_min
-    else if (is_time_of_extreme(kind)) then
-      extreme_of = statistic_max_abs
-    end if
-  end function extreme_of
-
   !> The part of a statistic that counts: that with the largest damage; without any damage, with the largest range.
   pure integer function worst_part(self, statistic, lane) result(worst)
     class(statistics_observer_t), intent(in) :: self
@@ -429,7 +339,7 @@ contains
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: shift(:)
 
-    call self%linear%columns%copy_lane(self%block, lane)
+    call self%linear%copy_lane(self%block, lane)
   end subroutine on_shift
 
   !> Takes the state after a jump.
@@ -444,6 +354,7 @@ contains
     else
       call self%linear%start_lane(self%block, lane, y)
     end if
+    call self%energies%add_state(self%block, t, y)
   end subroutine on_jump
 
   subroutine on_steps(self, steps, y, y_new, c)
@@ -452,6 +363,7 @@ contains
     real(wp), contiguous, intent(in) :: y(:, :), y_new(:, :), c(:, :, :)
 
     call self%linear%add_steps(steps, y, y_new, c)
+    call self%energies%add_step(self%block, steps, y, c)
   end subroutine on_steps
 
   subroutine observe_lanes(self, t, y)
@@ -470,6 +382,16 @@ contains
 
     call self%recorded%fill_row(lane, t, y, values)
   end subroutine tracked_values
+
+  subroutine bound_functions(self, lane, steps, y, c, slopes, bends)
+    class(statistics_observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    type(step_block_t), intent(in) :: steps
+    real(wp), contiguous, intent(in) :: y(:, :), c(:, :, :)
+    real(wp), intent(out) :: slopes(:), bends(:)
+
+    call self%bounds%bound(self%block, steps, y, c, slopes, bends)
+  end subroutine bound_functions
 
   subroutine find_pace(self, lane, fastest, scale)
     class(statistics_observer_t), intent(inout) :: self

@@ -3,10 +3,12 @@ module nocdyn_step_strips
   use nocdyn_chebyshev, only: max_degree
   use nocdyn_kinds, only: wp
   use nocdyn_column_statistics, only: width
+  use nocdyn_observer, only: step_block_t
   implicit none (type, external)
   private
 
-  public :: fill_chord_gaps, expand, expand_single, bound_excursions, exclude_monotonic, values_at, add_integrals
+  public :: fill_chord_gaps, fill_hull, expand, expand_single, bound_excursions, exclude_monotonic, exclude_by_hull, find_part
+  public :: values_at, add_integrals
 
   !> The last steps of the lanes of a strip, and x in them.
   type, public :: strip_t
@@ -32,6 +34,21 @@ contains
       chord_gap(p) = (1.0_wp / p)**(1.0_wp / (p - 1)) * (1.0_wp - 1.0_wp / p)
     end do
   end subroutine fill_chord_gaps
+
+  !> The weights of powers in the control points of Bernstein's form: s^p is the sum of hull(j, p) B_j(s), with hull(0, p) = 0.
+  pure subroutine fill_hull(hull)
+    real(wp), intent(out) :: hull(:, :)   !! [j, p], both up to the degree
+    real(wp) :: weight
+    integer :: j, p
+
+    do j = 1, size(hull, 1)
+      weight = 1.0_wp
+      do p = 1, size(hull, 2)
+        weight = weight * max(0, j - p + 1) / (size(hull, 1) - p + 1)
+        hull(j, p) = weight
+      end do
+    end do
+  end subroutine fill_hull
 
   !> Computes x = offset + sum of factor * y at the ends of the steps, and its coefficients, in the lanes from `at` on.
   pure subroutine expand(lanes, states, degree, at, chord_gap, entries, component, factor, offset, y, y_new, c, strip)
@@ -160,6 +177,51 @@ contains
       fall(i) = merge(fall(i), -1.0_wp, least * most <= 0)
     end do
   end subroutine exclude_monotonic
+
+  !> Excludes the steps in which the control points between the ends are inside the range so far: x is in their convex hull.
+  pure subroutine exclude_by_hull(degree, hull, scale, x_start, c, highest, lowest, rise, fall)
+    integer, intent(in) :: degree
+    real(wp), intent(in) :: hull(degree, degree)
+    real(wp), intent(in), dimension(width) :: scale, x_start, highest, lowest
+    real(wp), intent(in) :: c(width, degree)
+    real(wp), intent(inout) :: rise(width), fall(width)
+    real(wp), parameter :: rounding = 1.0e-14_wp
+    real(wp), dimension(width) :: most, least, point, power, size
+    real(wp) :: term(width, max_degree)
+    integer :: j, p
+
+    power = 1.0_wp
+    size = abs(x_start)
+    do p = 1, degree
+      power = power * scale
+      term(:, p) = power * c(:, p)
+      size = size + abs(term(:, p))
+    end do
+    most = -huge(most)
+    least = huge(least)
+    do j = 1, degree - 1
+      point = x_start
+      do p = 1, j
+        point = point + hull(j, p) * term(:, p)
+      end do
+      most = max(most, point)
+      least = min(least, point)
+    end do
+    where (most + rounding * size <= highest) rise = -1.0_wp
+    where (least - rounding * size >= lowest) fall = -1.0_wp
+  end subroutine exclude_by_hull
+
+  !> The part of a step after `from` and before its end: scale s at its ends, and when it starts [s].
+  pure subroutine find_part(lane, from, steps, begin, end, t_start)
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: from     !! [s]
+    type(step_block_t), intent(in) :: steps
+    real(wp), intent(out) :: begin, end, t_start
+
+    t_start = max(steps%t(lane), from)
+    begin = steps%scale(lane) * ((t_start - steps%t(lane)) / steps%h(lane))
+    end = steps%scale(lane) * steps%theta_end(lane)
+  end subroutine find_part
 
   !> x of one lane at the nodes of the part of its step between two values of scale s.
   pure subroutine values_at(strip, i, degree, nodes, begin, end, values)

@@ -23,7 +23,9 @@ module nocdyn_arguments
     option_t('--modes', value='NUMBER'), &
     option_t('--range_hz', value='LOW,HIGH'), &
     option_t('--holzer', may_repeat=.true.), &
+    option_t('--code', may_repeat=.true.), &
     option_t('--threads', value='NUMBER'), &
+    option_t('--compile', value='auto|always|never'), &
     option_t('--shard', value='K/N'), &
     option_t('--resume', may_repeat=.true.), &
     option_t('--csv', may_repeat=.true.), &

@@ -162,6 +162,10 @@ contains
     case ('--modes')
       arguments%modes = digits_value(value)
       if (arguments%modes < 1) call raise(error, exit_input, '--modes ' // value // ': allowed: a number from 1 on')
+    case ('--compile')
+      if (index('|' // trim(option%value) // '|', '|' // value // '|') == 0) then
+        call raise(error, exit_input, '--compile ' // value // ': allowed: auto, always, never')
+      end if
     case ('--range_hz')
       call parse_range(value, arguments%range_hz, error)
     case ('--shard')

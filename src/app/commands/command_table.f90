@@ -25,8 +25,9 @@ contains
 
     call list_analyses(commands)
     call list_torsional_analyses(commands)
-    call add_command(commands, 'matrices', 'FILE', '--set --case', 'print the matrices of the method for a machine', &
+    call add_command(commands, 'matrices', 'FILE', '--code --set --case', 'print the matrices of the method for a machine', &
       'Prints every matrix and vector of the method for the machine at its start, with its equation number.' // nl // nl // &
+      '  --code             print the equations of motion as a program in C instead, to be built into others' // nl // &
       '  --case NAME        look at the machine of this &load_case', analysis_command)
     call list_sweeps(commands)
     call add_command(commands, 'new', 'FILE', '', 'write a commented input to start from', &
@@ -114,7 +115,7 @@ contains
   subroutine list_sweeps(commands)
     type(command_t), allocatable, intent(inout) :: commands(:)
 
-    call add_command(commands, 'sweep', 'FILE', '--out --set --case --threads --shard --resume --csv --quiet', &
+    call add_command(commands, 'sweep', 'FILE', '--out --set --case --threads --compile --shard --resume --csv --quiet', &
       'run many variants of a machine', &
       'Runs all variants of a machine that &sweep and &vary of the file describe, and writes the quantities of' // nl // &
       '&record to sweep.nc, with summary.json and input.nml. A variant that fails is recorded with the reason.' // nl // nl // &
@@ -122,6 +123,7 @@ contains
       '  --set PATH=VALUE   override a key: sweep.samples=1000, vary(2).high=20, run.rtol=1e-9' // nl // &
       '  --case NAME        vary the machine of this &load_case, and write to DIR/NAME/sweep' // nl // &
       '  --threads NUMBER   default: OMP_NUM_THREADS, else the number of cores that the process may use' // nl // &
+      '  --compile WHEN     compile a program for the series of this machine: auto (if it pays), always, never' // nl // &
       "  --shard K/N        compute part K of N only, for 'nocdyn merge'" // nl // &
       '  --resume           continue an interrupted sweep' // nl // &
       "  --csv              write sweep.csv too; with shards, 'nocdyn merge' writes it" // nl // &

@@ -12,7 +12,8 @@ module nocdyn_mpi_command
   use nocdyn_mpi_root, only: mpi_root_t
   use nocdyn_mpi_worker, only: mpi_worker_t
   use nocdyn_posix, only: catch_interrupts
-  use nocdyn_sweep_job, only: start_job, finish_job, sweep_job_t
+  use nocdyn_sweep_code, only: new_sweep_code, sweep_code_t
+  use nocdyn_sweep_job, only: print_code_note, start_job, finish_job, sweep_job_t
   use nocdyn_journal_scheduler, only: initialise_scheduler
   use nocdyn_sweep_header, only: sweep_header_t
   use nocdyn_sweep_journal, only: continue_journal, journal_name, rank_journal_name, sweep_journal_t
@@ -49,7 +50,7 @@ contains
     else if (rank == root) then
       call run_root(arguments, usable_threads(max(1, arguments%threads)), code)
     else
-      call run_worker(rank, usable_threads(max(1, arguments%threads)), code)
+      call run_worker(rank, usable_threads(max(1, arguments%threads)), arguments%value('--compile'), code)
     end if
   end subroutine mpi_command
 
@@ -60,6 +61,7 @@ contains
     integer, intent(out) :: code
     type(sweep_job_t), target :: job
     type(mpi_root_t) :: scheduler
+    type(sweep_code_t) :: program_code
     type(error_t), allocatable :: error
     character(len=:), allocatable :: file, sources, text
     integer :: ranks
@@ -82,15 +84,19 @@ contains
     scheduler%other_ranks = ranks - 1
     call initialise_scheduler(scheduler, job%journals(1), threads, job%setup%lanes)
     call scheduler%begin(job%variants, job%counts, job%progress)
-    call compute_variants(job%plan, job%setup, threads, scheduler)
+    program_code = new_sweep_code(arguments%value('--compile'), int(job%variants%left))
+    call compute_variants(job%plan, job%setup, threads, scheduler, program_code)
+    call print_code_note(job, program_code)
     call finish_job(job, scheduler, threads, ranks, code)
   end subroutine run_root
 
   !> Other ranks: they compute with the input that rank 0 broadcasts and keep journals of their own. The file of a list they read
   !> themselves.
-  subroutine run_worker(rank, threads, code)
+  subroutine run_worker(rank, threads, compile_choice, code)
     integer, intent(in) :: rank, threads
+    character(len=*), intent(in) :: compile_choice   !! of --compile
     integer, intent(out) :: code
+    type(sweep_code_t) :: program_code
     type(input_t) :: input
     type(sweep_plan_t) :: plan
     type(sweep_setup_t) :: setup
@@ -125,7 +131,8 @@ contains
       call worker%finalise()
     else
       call initialise_scheduler(worker, journal, threads, setup%lanes)
-      call compute_variants(plan, setup, threads, worker)
+      program_code = new_sweep_code(compile_choice, plan%design%variants)
+      call compute_variants(plan, setup, threads, worker, program_code)
     end if
   end subroutine run_worker
 

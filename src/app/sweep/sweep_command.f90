@@ -9,7 +9,8 @@ module nocdyn_sweep_command
   use nocdyn_posix, only: catch_interrupts
   use nocdyn_run_command, only: run_inputs
   use nocdyn_sweep, only: compute_variants
-  use nocdyn_sweep_job, only: start_job, finish_job, sweep_job_t
+  use nocdyn_sweep_code, only: new_sweep_code, sweep_code_t
+  use nocdyn_sweep_job, only: finish_job, print_code_note, start_job, sweep_job_t
   use nocdyn_sweep_threads, only: usable_threads, refuse_ranks, print_thread_note
   use nocdyn_trajectory_netcdf, only: netcdf_trajectory_t
   use omp_lib, only: omp_get_max_threads
@@ -26,6 +27,7 @@ contains
     integer, intent(out) :: code
     type(sweep_job_t), target :: job
     type(journal_scheduler_t) :: scheduler
+    type(sweep_code_t) :: program_code
     type(error_t), allocatable :: error
     integer :: threads
 
@@ -42,7 +44,9 @@ contains
     if (.not. arguments%is_given('--quiet')) call print_thread_note(job%plan%input%shown_file(), thread_count(arguments))
     call initialise_scheduler(scheduler, job%journals(1), threads, job%setup%lanes)
     call scheduler%begin(job%variants, job%counts, job%progress)
-    call compute_variants(job%plan, job%setup, threads, scheduler)
+    program_code = new_sweep_code(arguments%value('--compile'), int(job%variants%left))
+    call compute_variants(job%plan, job%setup, threads, scheduler, program_code)
+    call print_code_note(job, program_code)
     call finish_job(job, scheduler, threads, 1, code)
   end subroutine sweep_command
 

@@ -16,6 +16,7 @@ module nocdyn_sweep_job
   use nocdyn_run_files, only: check_variants
   use nocdyn_scheduler, only: sweep_counts_t, sweep_progress_t
   use nocdyn_sweep, only: prepare_sweep, sweep_setup_t
+  use nocdyn_sweep_code, only: sweep_code_t
   use nocdyn_sweep_csv, only: sweep_csv_name
   use nocdyn_sweep_differences, only: header_difference
   use nocdyn_sweep_header, only: sweep_header_t, sweep_netcdf_name
@@ -29,7 +30,7 @@ module nocdyn_sweep_job
   implicit none (type, external)
   private
 
-  public :: start_job, finish_job
+  public :: start_job, finish_job, print_code_note
 
   !> "tolerance.nml: 51200 of 100000 variants, 31000 per second, 2 s left, 3 failed"
   type, extends(sweep_progress_t), public :: console_sweep_progress_t
@@ -233,6 +234,18 @@ contains
       call print_text(message)
     end if
   end subroutine check_finished_results
+
+  !> Says why the series have no program, if that was asked for.
+  subroutine print_code_note(job, code)
+    type(sweep_job_t), intent(inout) :: job
+    type(sweep_code_t), intent(in) :: code
+    character(len=:), allocatable :: reason
+
+    call code%unmet_wish(reason)
+    if (reason == '' .or. job%arguments%is_given('--quiet')) return
+    call job%progress%line%clear()
+    call print_text(job%plan%input%shown_file() // ': note: no program was compiled for the series: ' // reason)
+  end subroutine print_code_note
 
   !> Writes and prints the results, or says why there are none.
   subroutine finish_job(job, scheduler, threads, ranks, code)

@@ -2,6 +2,7 @@
 module nocdyn_observer
   use nocdyn_chebyshev, only: interpolation_t
   use nocdyn_kinds, only: wp
+  use nocdyn_plain_steps, only: plain_steps_t
   implicit none (type, external)
   private
 
@@ -21,13 +22,15 @@ module nocdyn_observer
     logical, allocatable :: bends(:)        !! whether a tracked function may bend more than the solution; by default none does
     real(wp), allocatable :: tracked_from(:)   !! times from which they are tracked [s], ascending; not allocated: the start
     logical :: takes_pieces = .false.       !! whether `on_piece` receives them, and `on_extremes` nothing
+    logical :: bounds_functions = .false.   !! whether `bound_functions` is asked, of a single lane; only extremes are then taken
     logical :: wants_steps = .false.        !! whether `on_steps` is called
     logical :: takes_shifts = .false.       !! whether `on_shift` is overridden; a system shifts no states without
     integer :: first_read = 1               !! components whose polynomials `on_steps` reads; may change from variant to variant
     integer :: last_read = huge(0)
   contains
     procedure :: on_start, on_output, wants_stop, event_values, on_event
-    procedure :: observe_lanes, tracked_values, find_pace, on_extremes, on_piece, on_steps, on_shift, on_jump
+    procedure :: observe_lanes, tracked_values, bound_functions, find_pace, on_extremes, on_piece, on_steps, on_shift, on_jump
+    procedure :: list_ranges
   end type observer_t
 
   !> The steps that the lanes of a block have taken together; [lanes].
@@ -36,6 +39,7 @@ module nocdyn_observer
     logical :: may_be_cut = .false.         !! whether `theta_end` may be less than 1
     logical, allocatable :: taken(:)        !! whether the lane has taken a step; only then it has dense output
     logical, allocatable :: crosses(:)      !! whether the step ends where the system changes its branch
+    integer, allocatable :: degree(:)       !! of the dense output, the largest one of the block at most
     real(wp), allocatable :: t(:)           !! start [s]
     real(wp), allocatable :: h(:)           !! step size [s]: theta = (time - t) / h
     real(wp), allocatable :: scale(:)       !! the solution is a polynomial in scale * theta: scale is 1 or h
@@ -66,6 +70,16 @@ contains
     real(wp), intent(in) :: t
     real(wp), contiguous, intent(in) :: y(:)   !! before such a jump, [states + quadratures]
   end subroutine on_start
+
+  !> Lists the ranges that plain steps widen; then `on_steps` is not called for them.
+  subroutine list_ranges(self, order, steps, are_all)
+    class(observer_t), target, intent(inout) :: self
+    integer, intent(in) :: order                    !! of the series
+    type(plain_steps_t), intent(inout) :: steps
+    logical, intent(out) :: are_all                 !! whether the observer needs no more of such a step
+
+    are_all = .not. self%wants_steps
+  end subroutine list_ranges
 
   !> One output time of one lane; the calls of a lane come in the order of the times.
   subroutine on_output(self, lane, t, y)
@@ -124,6 +138,20 @@ contains
 
     error stop 'nocdyn_observer: an observer with tracked functions overrides tracked_values'
   end subroutine tracked_values
+
+  !> Bounds of the sizes of the first two derivatives of the tracked functions in the last step of a lane by theta. Steps in which
+  !> they show that no function can leave its range so far are not sampled.
+  subroutine bound_functions(self, lane, steps, y, c, slopes, bends)
+    class(observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    type(step_block_t), intent(in) :: steps
+    real(wp), contiguous, intent(in) :: y(:, :)      !! at the starts, [lanes, padded columns]
+    real(wp), contiguous, intent(in) :: c(:, :, :)   !! solution y + sum over p of c(:, :, p) theta^p
+    real(wp), intent(out) :: slopes(:), bends(:)     !! huge if there is none, [tracked]
+
+    slopes = huge(slopes)
+    bends = huge(bends)
+  end subroutine bound_functions
 
   !> How fast tracked functions that bend may oscillate with the time, or with angles, where they were evaluated last, and a size
   !> of which a small part is rounding in them.

@@ -18,6 +18,7 @@
 !> digits.
 module nocdyn_system
   use nocdyn_kinds, only: wp
+  use nocdyn_plain_steps, only: plain_steps_t
   use nocdyn_text, only: to_text
   implicit none (type, external)
   private
@@ -54,6 +55,7 @@ module nocdyn_system
     procedure :: jacobian_pattern, component_name, prepare_integration, measure, measure_name, find_far
     procedure :: project_state, evaluation_obstacle, limit_steps, shift_state, restore_state, series_obstacle
     procedure :: prepare_series, series, evaluation_cost, series_cost, start_lane, indicator_values
+    procedure :: takes_plain_steps, take_plain_steps
     procedure :: set_indicator, block_indicators, find_fastest_wave, find_fastest_waves, change_branch, switch_name
   end type system_t
 
@@ -228,6 +230,21 @@ contains
 
     cost = order * (250.0_wp + 0.1_wp * self%states)
   end function series_cost
+
+  !> Whether `take_plain_steps` may be called now.
+  pure logical function takes_plain_steps(self)
+    class(system_t), intent(in) :: self
+
+    takes_plain_steps = .false.
+  end function takes_plain_steps
+
+  !> Takes a step of the method `taylor` in the running lanes where nothing has to be decided.
+  subroutine take_plain_steps(self, steps)
+    class(system_t), intent(inout) :: self
+    type(plain_steps_t), intent(inout) :: steps   !! without the map to the measures
+
+    error stop 'nocdyn_system: a system that takes plain steps overrides take_plain_steps'
+  end subroutine take_plain_steps
 
   !> Called where a lane starts, at (t, y): a system with switches chooses its branches here.
   subroutine start_lane(self, lane, t, y)

@@ -86,17 +86,24 @@ contains
     end do
   end subroutine find_guards
 
-  !> Copies the constants of a slot of the law.
-  pure subroutine set_constants(self, law, slot)
+  !> Copies the constants of a slot of the law, or those alone that depend on a branch.
+  pure subroutine set_constants(self, law, slot, is_branch_only)
     class(law_numbers_t), intent(inout) :: self
     type(law_t), intent(in) :: law
     integer, intent(in) :: slot   !! counted through all strips
+    logical, intent(in) :: is_branch_only
     integer :: i
 
     if (slot > size(self%x, 2)) return
-    do i = 1, size(law%constants)
-      self%x(law%constants(i), slot) = law%constant(slot, i)
-    end do
+    if (is_branch_only) then
+      do i = 1, size(law%of_branch)
+        self%x(law%constants(law%of_branch(i)), slot) = law%constant(slot, law%of_branch(i))
+      end do
+    else
+      do i = 1, size(law%constants)
+        self%x(law%constants(i), slot) = law%constant(slot, i)
+      end do
+    end if
   end subroutine set_constants
 
   !> Adds the moments of all elements, and sets the rates of the internal states.

@@ -17,13 +17,21 @@ contains
     integer, intent(in) :: node   !! of the list; if it is 0, nothing is set
     integer, intent(in) :: k, strip, parts, part
     real(wp), intent(in) :: x(law%lanes, parts, law%elements)   !! of which `part` is taken, in the unit of the variable
-    integer :: at, e, i
+    integer :: at, e, g, i
 
     if (node == 0) return
     if (work%first(node) == 0) return
     if (law%strip == 1) then
-      do i = 0, law%w * work%groups - 1
-        work%pool(work%address(node, k, i / law%w + 1) + modulo(i, law%w)) = x(1, part, min(i + 1, law%elements))
+      e = 0   ! elements before the group
+      do g = 1, work%groups
+        at = work%address(node, k, g) - 1
+        do i = 1, min(law%w, law%elements - e)
+          work%pool(at + i) = x(1, part, e + i)
+        end do
+        do i = i, law%w
+          work%pool(at + i) = x(1, part, law%elements)
+        end do
+        e = e + law%w
       end do
       return
     end if
@@ -81,12 +89,17 @@ contains
     integer, intent(in) :: node   !! of the list; if it is 0, nothing is added
     integer, intent(in) :: k, strip, parts, part
     real(wp), intent(inout) :: x(law%lanes, parts, law%elements)   !! to whose `part` it is added, in the unit of the variable
-    integer :: at, e, i
+    integer :: at, e, g, i
 
     if (node == 0) return
     if (law%strip == 1) then
-      do i = 0, law%elements - 1
-        x(1, part, i + 1) = x(1, part, i + 1) + work%pool(work%address(node, k, i / law%w + 1) + modulo(i, law%w))
+      e = 0
+      do g = 1, work%groups
+        at = work%address(node, k, g) - 1
+        do i = 1, min(law%w, law%elements - e)
+          x(1, part, e + i) = x(1, part, e + i) + work%pool(at + i)
+        end do
+        e = e + law%w
       end do
       return
     end if

@@ -30,8 +30,10 @@ module nocdyn_laws
     integer :: strips = 1
     integer :: w = narrow                   !! numbers of a group: the lanes of a strip, or some elements of one lane
     integer :: groups = 0                  !! of a strip
+    integer, allocatable, private :: first_slot(:)   !! of each lane, counted through all strips
     integer, allocatable :: constants(:)   !! nodes that are constants, ascending
     integer, allocatable :: column(:)      !! of each constant in `constant`, [nodes]
+    integer, allocatable :: of_branch(:)   !! columns of the constants that depend on a branch, ascending
     integer, allocatable :: stack(:)       !! where the coefficients of harmonics begin in `stacked`, [nodes]
     real(wp), allocatable :: constant(:, :)   !! values of the constants, [slots of all strips, constants]
     real(wp), allocatable :: stacked(:)    !! coefficients of harmonics, [w, terms, groups of all strips] each
@@ -68,9 +70,12 @@ contains
     self%strips = (lanes + strip - 1) / strip
     self%w = max(strip, narrow)
     self%groups = (strip * elements + self%w - 1) / self%w
+    self%first_slot = [((i - 1) / strip * self%w * self%groups + modulo(i - 1, strip) + 1, i=1, lanes)]
     self%constants = tape%constants()
     allocate (self%column(tape%count), self%stack(tape%count), source=0)
     self%column(self%constants) = [(i, i=1, size(self%constants))]
+    self%of_branch = pack([(i, i=1, size(self%constants))], [(tape%node(self%constants(i))%has_branch, &
+                                                              i=1, size(self%constants))])
     allocate (self%constant(self%w * self%groups * self%strips, size(self%constants)), source=0.0_wp)
     next = 1
     do i = 1, tape%count
@@ -93,9 +98,7 @@ contains
     class(law_t), intent(in) :: self
     integer, intent(in) :: lane, element
 
-    associate (before => (lane - 1) / self%strip)
-      slot = before * self%w * self%groups + (element - 1) * self%strip + lane - before * self%strip
-    end associate
+    slot = self%first_slot(lane) + (element - 1) * self%strip
   end function slot
 
   !> How many slots after the slot of an element in one lane are copies of it.
@@ -119,14 +122,15 @@ contains
     integer, intent(in) :: branch(:)                !! of the switches of the element, 1 to the number of choices
     logical, intent(in) :: is_branch_only           !! whether the parameters are as before
     type(curve_t), intent(in), optional :: curve    !! of the element, on the segment branch(1)
-    integer :: a, at, copies, i
+    integer :: a, at, copies, i, k
     real(wp) :: y
 
     at = self%slot(lane, element)
     copies = self%copies(lane, element)
-    do i = 1, size(self%constants)
+    do k = 1, merge(size(self%of_branch), size(self%constants), is_branch_only)
+      i = k
+      if (is_branch_only) i = self%of_branch(k)
       associate (node => self%tape%node(self%constants(i)), constant => self%constant(at, i))
-        if (is_branch_only .and. .not. node%has_branch) cycle
         select case (node%operation)
         case (op_literal)
           constant = node%value
@@ -148,6 +152,7 @@ contains
         self%constant(at + 1:at + copies, i) = constant
       end associate
     end do
+    if (size(self%stacked) == 0) return
     do i = at, at + copies
       call stack_harmonics(self, i, is_branch_only)
     end do

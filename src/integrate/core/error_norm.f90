@@ -11,7 +11,7 @@ module nocdyn_error_norm
   implicit none (type, external)
   private
 
-  public :: measure_start, remember, measure_error, worst_measure, quadrature_tolerance
+  public :: measure_start, forget_sizes, remember, measure_error, worst_measure, quadrature_tolerance
 
   real(wp), parameter :: low_order_share = 0.01_wp  !! weight of the second estimate in the error norm of Hairer's DOP853
   real(wp), parameter :: quadrature_leniency = 100.0_wp    !! ratio of the errors allowed in quadratures to those in states
@@ -36,6 +36,17 @@ contains
       control%size(:, i) = merge(abs(control%new_size(:, i)), control%size(:, i), starting)
     end do
   end subroutine measure_start
+
+  !> Forgets the sizes of the lanes that start: those that `remember` sets first are the ones of `measure_start`.
+  pure subroutine forget_sizes(control, starting)
+    type(step_control_t), intent(inout) :: control
+    logical, intent(in) :: starting(:)   !! [lanes]
+    integer :: i
+
+    do i = 1, size(control%size, 2)
+      control%size(:, i) = merge(0.0_wp, control%size(:, i), starting)
+    end do
+  end subroutine forget_sizes
 
   !> Sizes for the next step: the absolute values, or those before if they were larger, forgotten within some dozens of steps. An
   !> oscillation is then as large where it passes through zero as elsewhere.

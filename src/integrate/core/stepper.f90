@@ -1,6 +1,7 @@
 !> The interface of a one-step method.
 module nocdyn_stepper
   use nocdyn_kinds, only: wp
+  use nocdyn_plain_steps, only: plain_steps_t
   use nocdyn_observer, only: observer_t, step_block_t
   use nocdyn_step_attempt, only: step_attempt_t
   use nocdyn_step_control, only: step_control_t
@@ -18,6 +19,7 @@ module nocdyn_stepper
     integer :: series_order = 0                !! order of the Taylor series that the system must have; 0: it needs none
     logical :: chooses_steps = .false.         !! whether `choose_steps` is called before every attempt
     logical :: estimates_errors = .true.       !! whether there are error estimates, at least of some lanes
+    logical :: reads_slope = .true.            !! whether `start` and `resume` need attempt%slope
     logical :: passes_series = .false.         !! whether `pass_steps` does not need the coefficients of `interpolate`
   contains
     procedure :: choose_steps
@@ -26,7 +28,7 @@ module nocdyn_stepper
     procedure(take_step_interface), deferred :: take_step
     procedure(interpolate_interface), deferred :: interpolate
     procedure(accept_interface), deferred :: accept
-    procedure :: resume, pass_steps
+    procedure :: resume, pass_steps, describe_plain_steps, accept_plain_steps
   end type stepper_t
 
   abstract interface
@@ -38,7 +40,7 @@ module nocdyn_stepper
       class(system_t), intent(in) :: system
     end subroutine prepare_interface
 
-    !> Starts lanes at attempt%y, where attempt%slope = f(t, y) has been evaluated.
+    !> Starts lanes at attempt%y, where attempt%slope = f(t, y) has been evaluated if the stepper reads it.
     subroutine start_interface(self, attempt, starting)
       import :: stepper_t, step_attempt_t
       class(stepper_t), intent(inout) :: self
@@ -94,6 +96,23 @@ contains
 
     call self%start(attempt, resuming)
   end subroutine resume
+
+  !> Describes its part of plain steps before each, if it can use them.
+  subroutine describe_plain_steps(self, steps, is_able)
+    class(stepper_t), target, intent(inout) :: self
+    type(plain_steps_t), intent(inout) :: steps
+    logical, intent(out) :: is_able
+
+    is_able = .false.
+  end subroutine describe_plain_steps
+
+  !> Takes note of plain steps.
+  subroutine accept_plain_steps(self, accepted)
+    class(stepper_t), intent(inout) :: self
+    logical, intent(in) :: accepted(:)   !! [lanes]
+
+    call self%accept(accepted)
+  end subroutine accept_plain_steps
 
   !> Passes the last steps of all lanes to an observer.
   subroutine pass_steps(self, steps, attempt, coefficients, observer)

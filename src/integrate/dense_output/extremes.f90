@@ -3,19 +3,17 @@
 !> In every step of a lane each function is replaced by the polynomial through its values at Chebyshev-Lobatto nodes, as many as
 !> the dense output of the step has coefficients: a linear function of the state is represented exactly. Functions that bend more
 !> than the solution are replaced piece by piece (`nocdyn_step_pieces`). The extremes of the polynomial are found to machine
-!> precision wherever it can exceed those so far.
+!> precision wherever it can exceed those so far. Steps in which bounds show that no function can leave its range are not sampled.
 module nocdyn_extremes
   use nocdyn_chebyshev, only: interpolation_t, max_degree, new_interpolation, raise_to_maximum, time_at
   use nocdyn_kinds, only: wp
   use nocdyn_observer, only: observer_t, piece_t, ranges_t, step_block_t
   use nocdyn_step_attempt, only: step_attempt_t
-  use nocdyn_step_pieces, only: new_step_pieces, step_pieces_t
+  use nocdyn_step_pieces, only: before_jump, new_step_pieces, step_pieces_t
   implicit none (type, external)
   private
 
-  public :: allocate_extremes, start_extremes, restart_extremes, update_extremes, end_extremes
-
-  real(wp), parameter :: before_jump = 64.0_wp   ! spacings of the time between the last node and a jump
+  public :: allocate_extremes, start_extremes, restart_extremes, update_extremes, end_extremes, observe_left
 
   type, public :: extremes_t
     type(ranges_t), allocatable :: ranges(:)               !! [lanes]
@@ -34,6 +32,14 @@ module nocdyn_extremes
     integer, allocatable, private :: bending(:)            !! functions that may bend more than the solution
     logical, allocatable, private :: replaced(:)           !! whose polynomials count in a piece, [functions]
     real(wp), allocatable, private :: fastest(:), scale(:) !! waves [rad/s] and scale of these where pieces begin, [lanes]
+    ! of a single lane whose observer bounds the functions, [functions]:
+    real(wp), allocatable, private :: room(:)              !! by how much they may change without leaving their ranges
+    logical, private :: has_room = .false.                 !! whether `room` is known
+    logical, private :: has_left_out = .false.             !! whether the last step was left out
+    real(wp), private :: left_at = 0.0_wp                  !! its end [s]
+    real(wp), allocatable, private :: left(:, :)           !! state there, [1, components]
+    real(wp), allocatable, private :: end_room(:)          !! as `room`, by the values at the end of a step
+    real(wp), allocatable, private :: slopes(:), bends(:)  !! bounds in the last step
   end type extremes_t
 
 contains
@@ -67,6 +73,9 @@ contains
                 extremes%y(lanes, attempt%components), extremes%y_lane(attempt%components), source=0.0_wp)
       allocate (extremes%start(lanes), extremes%t(lanes), extremes%theta(lanes), extremes%fastest(lanes), extremes%scale(lanes), &
                 source=0.0_wp)
+      allocate (extremes%room(functions), extremes%end_room(functions), source=0.0_wp)
+      if (observer%bounds_functions) allocate (extremes%left, source=extremes%y)
+      allocate (extremes%slopes(functions), extremes%bends(functions), source=0.0_wp)
     end associate
     allocate (extremes%from(1), source=-huge(1.0_wp))
     if (allocated(observer%tracked_from)) extremes%from = observer%tracked_from
@@ -90,6 +99,8 @@ contains
     integer, intent(in) :: lane
 
     extremes%is_known(lane) = .false.
+    extremes%has_room = .false.
+    extremes%has_left_out = .false.
   end subroutine restart_extremes
 
   !> Follows the functions through the last steps of the lanes, in the parts of them from each time in `tracked_from` on.
@@ -110,17 +121,10 @@ contains
       extremes%start(:) = max(steps%t, extremes%from(i))
       ! begins the parts of the steps of the active lanes with their first pieces
       where (extremes%active .and. extremes%start > steps%t) extremes%is_known = .false.
-      if (any(extremes%active .and. .not. extremes%is_known)) then
-        extremes%t(:) = extremes%start
-        call observe(extremes, observer, steps, attempt, c)
-      end if
+      if (observer%bounds_functions) call exclude_step(extremes, observer, steps, attempt, c)
+      call observe_starts(extremes, observer, steps, attempt, c)
       do lane = 1, size(extremes%active)
         if (.not. extremes%active(lane)) cycle
-        if (.not. extremes%is_known(lane)) then
-          extremes%y_lane(:) = extremes%y(lane, :)
-          call observer%tracked_values(lane, extremes%t(lane), extremes%y_lane, extremes%last(:, lane))
-          call observer%find_pace(lane, extremes%fastest(lane), extremes%scale(lane))
-        end if
         if (.not. extremes%have_begun(lane)) then
           extremes%ranges(lane)%lowest(:) = extremes%last(:, lane)
           extremes%ranges(lane)%highest(:) = extremes%last(:, lane)
@@ -143,13 +147,117 @@ contains
             if (has_moved) extremes%last(:, lane) = extremes%values(:, extremes%degree(lane) + 1, lane)
             if (.not. pieces%is_done) cycle
             extremes%active(lane) = .false.
-            extremes%is_known(lane) = .true.
+            if (observer%bounds_functions) call pieces%find_room(extremes%last(:, lane), extremes%room)
+            extremes%has_room = observer%bounds_functions
             call observer%find_pace(lane, extremes%fastest(lane), extremes%scale(lane))
           end associate
         end do
       end do
     end do
   end subroutine update_extremes
+
+  !> Observes the active lanes where their parts of the steps begin, if the values there are not known.
+  subroutine observe_starts(extremes, observer, steps, attempt, c)
+    type(extremes_t), intent(inout) :: extremes
+    class(observer_t), intent(inout) :: observer
+    type(step_block_t), intent(in) :: steps
+    type(step_attempt_t), intent(in) :: attempt
+    real(wp), contiguous, intent(in) :: c(:, :, :)
+    integer :: lane
+
+    if (.not. any(extremes%active .and. .not. extremes%is_known)) return
+    extremes%t(:) = extremes%start
+    call observe(extremes, observer, steps, attempt, c)
+    do lane = 1, size(extremes%active)
+      if (.not. extremes%active(lane) .or. extremes%is_known(lane)) cycle
+      extremes%y_lane(:) = extremes%y(lane, :)
+      call observer%tracked_values(lane, extremes%t(lane), extremes%y_lane, extremes%last(:, lane))
+      call observer%find_pace(lane, extremes%fastest(lane), extremes%scale(lane))
+      extremes%is_known(lane) = .true.
+    end do
+  end subroutine observe_starts
+
+  !> Leaves out the step of a single lane if no function can leave its range in it; else opens the functions that may. As long as
+  !> they cannot have come to the ends of their ranges they are not evaluated at all.
+  subroutine exclude_step(extremes, observer, steps, attempt, c)
+    type(extremes_t), intent(inout) :: extremes
+    class(observer_t), intent(inout) :: observer
+    type(step_block_t), intent(in) :: steps
+    type(step_attempt_t), intent(in) :: attempt
+    real(wp), contiguous, intent(in) :: c(:, :, :)
+    real(wp), parameter :: far = 0.25_wp * huge(1.0_wp)   ! without a bound
+    real(wp) :: fastest, scale   ! at the end of the step
+    integer :: last
+
+    associate (pieces => extremes%pieces(1), room => extremes%room, slopes => extremes%slopes)
+      pieces%is_open(:, 0) = .true.
+      if (.not. extremes%have_begun(1) .or. steps%crosses(1) .or. steps%theta_end(1) < 1) then
+        call observe_left(extremes, observer)
+        return
+      end if
+      last = attempt%degree(1) + 1
+      call observer%bound_functions(1, steps, attempt%y, c(:, :, :attempt%degree(1)), slopes, extremes%bends)
+      room(:) = max(-far, room - min(slopes, far))
+      if (extremes%has_room .and. all(room >= 0 .or. slopes <= 0)) then
+        ! the values at its end may be asked for
+        extremes%left_at = end_of_nodes(extremes%start(1), steps%t_new(1))
+        extremes%t(:) = extremes%left_at
+        call find_states_at(extremes, steps, attempt, c)
+        extremes%left(:, :) = extremes%y
+        extremes%has_left_out = .true.
+        extremes%is_known(1) = .false.
+        extremes%active(1) = .false.
+        return
+      end if
+      extremes%t(:) = end_of_nodes(extremes%start(1), steps%t_new(1))
+      call observe(extremes, observer, steps, attempt, c)
+      extremes%y_lane(:) = extremes%y(1, :)
+      call observer%tracked_values(1, extremes%t(1), extremes%y_lane, extremes%values(:, last, 1))
+      call observer%find_pace(1, fastest, scale)
+      call pieces%find_room(extremes%values(:, last, 1), extremes%end_room)
+      ! a function that starts by r inside its range, and ends by e, cannot leave it if its slope is at most r + e
+      if (.not. (extremes%has_room .and. all(room + extremes%end_room >= 0 .or. slopes <= 0))) then
+        call observe_left(extremes, observer)
+        call observe_starts(extremes, observer, steps, attempt, c)
+        call pieces%find_open(extremes%last(:, 1), extremes%values(:, last, 1), slopes, extremes%bends)
+        call pieces%include_values(extremes%values(:, last, 1))
+        if (any(pieces%is_open(:, 0))) return
+        call pieces%find_room(extremes%values(:, last, 1), extremes%end_room)
+      end if
+      extremes%has_left_out = .false.
+      extremes%is_known(1) = .true.
+      extremes%last(:, 1) = extremes%values(:, last, 1)
+      room(:) = extremes%end_room
+      extremes%has_room = .true.
+      extremes%fastest(1) = fastest
+      extremes%scale(1) = scale
+      extremes%active(1) = .false.
+    end associate
+  end subroutine exclude_step
+
+  !> Observes the end of a step that was left out; to be called before the states are shifted.
+  subroutine observe_left(extremes, observer)
+    type(extremes_t), intent(inout) :: extremes
+    class(observer_t), intent(inout) :: observer
+
+    if (.not. extremes%has_left_out) return
+    extremes%has_left_out = .false.
+    extremes%t(:) = extremes%left_at
+    call observer%observe_lanes(extremes%t, extremes%left)
+    extremes%y_lane(:) = extremes%left(1, :)
+    call observer%tracked_values(1, extremes%t(1), extremes%y_lane, extremes%last(:, 1))
+    call observer%find_pace(1, extremes%fastest(1), extremes%scale(1))
+    extremes%is_known(1) = .true.
+  end subroutine observe_left
+
+  !> The time of the last node of a piece, with its rounding [s].
+  pure real(wp) function end_of_nodes(begin, end)
+    real(wp), intent(in) :: begin, end   !! [s]
+    real(wp) :: half
+
+    half = 0.5_wp * (end - begin)
+    end_of_nodes = begin + half + half
+  end function end_of_nodes
 
   !> Takes the functions after a jump at the end of a lane: constants in a piece without a length.
   subroutine end_extremes(extremes, observer, attempt, lane)
@@ -181,6 +289,17 @@ contains
     type(step_attempt_t), intent(in) :: attempt
     real(wp), contiguous, intent(in) :: c(:, :, :)
 
+    call find_states_at(extremes, steps, attempt, c)
+    call observer%observe_lanes(extremes%t, extremes%y)
+  end subroutine observe
+
+  !> Sets `y` to the states of the active lanes at the times `t`, of the other lanes to where their steps start.
+  subroutine find_states_at(extremes, steps, attempt, c)
+    type(extremes_t), intent(inout) :: extremes
+    type(step_block_t), intent(in) :: steps
+    type(step_attempt_t), intent(in) :: attempt
+    real(wp), contiguous, intent(in) :: c(:, :, :)
+
     extremes%theta(:) = 0.0_wp
     where (extremes%active) extremes%theta = min(1.0_wp, (extremes%t - steps%t) / steps%h)
     if (attempt%lanes == 1) then
@@ -189,8 +308,7 @@ contains
       call find_states(attempt%lanes, size(attempt%y, 2), attempt%components, maxval(extremes%degree), extremes%theta, &
                        extremes%active, attempt%y, c, extremes%y)
     end if
-    call observer%observe_lanes(extremes%t, extremes%y)
-  end subroutine observe
+  end subroutine find_states_at
 
   !> The state of a single lane at t + theta h, as `find_states`: with components in vectors.
   pure subroutine find_state(columns, components, degree, theta, start, c, y)

@@ -9,13 +9,16 @@ module nocdyn_step_pieces
   implicit none (type, external)
   private
 
-  public :: new_step_pieces
+  public :: new_step_pieces, count_pieces
+
+  real(wp), parameter, public :: before_jump = 64.0_wp   !! spacings of the time between the last node and a jump
 
   integer, parameter :: most_halvings = 12
   real(wp), parameter :: wave_part = 0.5_wp       ! of a wave in a piece, times the degree of the polynomials [rad]
   real(wp), parameter :: tolerance = 2.0e-5_wp    ! of the last terms, relative to the range of the function so far
   real(wp), parameter :: least_range = 1.0e-3_wp  ! that counts, relative to the largest absolute value so far
   real(wp), parameter :: rounding = 1.0e-6_wp     ! a range that does not count, relative to the scale of the functions
+  real(wp), parameter :: noise = 64 * epsilon(1.0_wp)   ! rounding of values, relative to the largest one
   real(wp), parameter :: progress = 0.7_wp        ! larger terms after a halving, relative to those before, are noise
 
   type, public :: step_pieces_t
@@ -29,7 +32,7 @@ module nocdyn_step_pieces
     real(wp), allocatable, private :: terms(:, :)           !! last terms there, [functions, 0:halvings]
     real(wp), allocatable, private :: lowest(:), highest(:) !! values so far, [functions]
   contains
-    procedure :: restart, start_step, replaces, advance
+    procedure :: restart, include_values, find_room, find_open, start_step, replaces, advance
   end type step_pieces_t
 
 contains
@@ -51,6 +54,40 @@ contains
     self%highest(:) = -huge(0.0_wp)
   end subroutine restart
 
+  !> Adds values of the functions to their ranges.
+  pure subroutine include_values(self, values)
+    class(step_pieces_t), intent(inout) :: self
+    real(wp), intent(in) :: values(:)   !! [functions]
+
+    self%lowest(:) = min(self%lowest, values)
+    self%highest(:) = max(self%highest, values)
+  end subroutine include_values
+
+  !> How far values of the functions are inside their ranges, less the rounding of other values.
+  pure subroutine find_room(self, values, room)
+    class(step_pieces_t), intent(in) :: self
+    real(wp), intent(in) :: values(:)
+    real(wp), intent(inout) :: room(:)   !! negative outside, [functions]
+
+    room(:) = min(self%highest - values, values - self%lowest) - noise * max(self%highest, -self%lowest)
+  end subroutine find_room
+
+  !> Opens the functions that may leave their ranges in a step, closes the others: they leave the chord by an eighth of the bound
+  !> of their second derivative at most.
+  pure subroutine find_open(self, start, end, slopes, bends)
+    class(step_pieces_t), intent(inout) :: self
+    real(wp), intent(in) :: start(:), end(:)         !! values at the ends of the step, [functions]
+    real(wp), intent(in) :: slopes(:), bends(:)      !! bounds of the derivatives over the length of the step
+    real(wp) :: margin
+    integer :: i
+
+    do i = 1, size(start)
+      margin = 0.0_wp   ! of a constant
+      if (slopes(i) > 0) margin = 0.125_wp * bends(i) + noise * max(self%highest(i), -self%lowest(i))
+      self%is_open(i, 0) = max(start(i), end(i)) + margin > self%highest(i) .or. min(start(i), end(i)) - margin < self%lowest(i)
+    end do
+  end subroutine find_open
+
   !> Begins with the first piece of a step, or of a part of one.
   pure subroutine start_step(self, t_start, t_end, fastest, degree)
     class(step_pieces_t), intent(inout) :: self
@@ -61,11 +98,19 @@ contains
     self%t_start = t_start
     self%t_end = t_end
     self%piece = 1
-    self%pieces = ceiling(max(1.0_wp, min(0.5_wp * huge(1), (t_end - t_start) * fastest / (wave_part * degree))))
+    self%pieces = count_pieces(t_start, t_end, fastest, degree)
     self%is_done = .false.
     self%begin = t_start
     call start_piece(self)
   end subroutine start_step
+
+  !> The number of pieces of a step, or of a part of one, before they are halved.
+  pure integer function count_pieces(t_start, t_end, fastest, degree) result(pieces)
+    real(wp), intent(in) :: t_start, t_end, fastest   !! as in `start_step`
+    integer, intent(in) :: degree
+
+    pieces = ceiling(max(1.0_wp, min(0.5_wp * huge(1), (t_end - t_start) * fastest / (wave_part * degree))))
+  end function count_pieces
 
   pure subroutine start_piece(self)
     class(step_pieces_t), intent(inout) :: self

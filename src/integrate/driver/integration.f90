@@ -9,6 +9,7 @@ module nocdyn_integration
   use nocdyn_masks, only: all_true, any_differs, any_true
   use nocdyn_methods, only: select_method
   use nocdyn_observer, only: observer_t
+  use nocdyn_plain_stepping, only: prepare_plain_steps, take_plain_steps
   use nocdyn_solver_status, only: allocate_solver_status, count_step, integration_done, integration_interrupted, &
     integration_not_finite, integration_rhs_failed, integration_running, integration_step_too_small, &
     integration_too_many_steps, solver_status_t
@@ -73,7 +74,7 @@ contains
     class(observer_t), intent(inout) :: observer
     type(solver_status_t), intent(out) :: solver_status
     type(integrator_t) :: integrator
-    logical :: is_interrupted
+    logical :: are_taken, is_interrupted
 
     if (size(times) < 2) error stop 'nocdyn_integration: times needs a start and an end'
     if (.not. all(times(2:) > times(:size(times) - 1))) error stop 'nocdyn_integration: times must ascend'
@@ -81,30 +82,43 @@ contains
     call allocate_solver_status(solver_status, system%lanes)
     if (stepper%series_order > 0) call system%prepare_series(stepper%series_order)
     call prepare_integrator(integrator, stepper, system, settings, times, observer)
+    call prepare_plain_steps(integrator, stepper, system, times, observer)
     do
       call fill_lanes(integrator, stepper, system, ensemble, times, observer, solver_status)
       if (integrator%free == system%lanes) exit
-      call begin_attempts(integrator, stepper, system, solver_status)
-      call stepper%take_step(system, integrator%attempt)
-      call test_errors(integrator, stepper, system, observer, solver_status)
-      if (any_true(system%lanes, integrator%accepted)) then
-        if (integrator%inspects .or. integrator%wants_steps) then
-          call process_steps(integrator, system, times, observer, solver_status)
-        end if
-        if (integrator%wants_steps) then
-          call stepper%pass_steps(integrator%steps, integrator%attempt, integrator%coefficients, observer)
-        end if
-        call advance_lanes(integrator, times)
-        if (system%projects) call project_states(integrator, system)
-        if (integrator%may_shift) call shift_states(integrator, system, observer)
-        call stepper%accept(integrator%accepted)
-        if (integrator%has_switches) call change_branches(integrator, stepper, system, times, observer, solver_status)
-      end if
+      call take_plain_steps(integrator, stepper, system, observer, solver_status, are_taken)
+      if (.not. are_taken) call attempt_steps(integrator, stepper, system, times, observer, solver_status)
       call interrupt_if_asked(integrator, observer, solver_status, is_interrupted)
       call release_lanes(integrator, system, ensemble, observer, solver_status)
       if (is_interrupted) exit
     end do
   end subroutine integrate_with
+
+  !> Attempts a step in all running lanes.
+  subroutine attempt_steps(integrator, stepper, system, times, observer, solver_status)
+    type(integrator_t), intent(inout) :: integrator
+    class(stepper_t), intent(inout) :: stepper
+    class(system_t), intent(inout) :: system
+    real(wp), contiguous, intent(in) :: times(:)   !! output times [s]
+    class(observer_t), intent(inout) :: observer
+    type(solver_status_t), intent(inout) :: solver_status
+
+    call begin_attempts(integrator, stepper, system, solver_status)
+    call stepper%take_step(system, integrator%attempt)
+    call test_errors(integrator, stepper, system, observer, solver_status)
+    if (.not. any_true(system%lanes, integrator%accepted)) return
+    if (integrator%inspects .or. integrator%wants_steps) then
+      call process_steps(integrator, system, times, observer, solver_status)
+    end if
+    if (integrator%wants_steps) then
+      call stepper%pass_steps(integrator%steps, integrator%attempt, integrator%coefficients, observer)
+    end if
+    call advance_lanes(integrator, times)
+    if (system%projects) call project_states(integrator, system)
+    if (integrator%may_shift) call shift_states(integrator, system, observer)
+    call stepper%accept(integrator%accepted)
+    if (integrator%has_switches) call change_branches(integrator, stepper, system, times, observer, solver_status)
+  end subroutine attempt_steps
 
   !> Ends all running lanes if the observer wants to stop at the time that the slowest lane has reached.
   subroutine interrupt_if_asked(integrator, observer, solver_status, is_interrupted)

@@ -7,6 +7,7 @@ module nocdyn_methods
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_rosenbrock_stepper, only: rosenbrock_stepper
   use nocdyn_rosenbrock_tables, only: rodas4, rodas5p
+  use nocdyn_step_costs, only: taylor_cost
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
   use nocdyn_taylor_stepper, only: taylor_stepper
@@ -15,7 +16,7 @@ module nocdyn_methods
   implicit none (type, external)
   private
 
-  public :: select_method
+  public :: select_method, taylor_cost
 
   !> The names that `select_method` accepts; 'rosenbrock' is another name of 'rodas4'.
   character(len=10), parameter, public :: method_names(7) = &

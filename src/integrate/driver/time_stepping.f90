@@ -1,15 +1,17 @@
 !> The parts of the time-stepping loop of a block: all lanes take a step together, each with its own time and step size.
 module nocdyn_time_stepping
+  use, intrinsic :: iso_c_binding, only: c_int
   use nocdyn_dense_output, only: allocate_dense_output, dense_output_t
   use nocdyn_ensemble, only: ensemble_t
-  use nocdyn_error_norm, only: measure_start
+  use nocdyn_error_norm, only: forget_sizes, measure_start
   use nocdyn_events, only: allocate_events, events_t
-  use nocdyn_extremes, only: allocate_extremes, extremes_t, start_extremes
+  use nocdyn_extremes, only: allocate_extremes, extremes_t, observe_left, start_extremes
   use nocdyn_first_step, only: guess_first_steps
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: any_differs, any_true
   use nocdyn_observer, only: observer_t, step_block_t
+  use nocdyn_plain_steps, only: plain_steps_t
   use nocdyn_root_functions, only: start_root_functions
   use nocdyn_solver_status, only: integration_not_finite, integration_rhs_failed, integration_running, reset_solver_status, &
     solver_status_t
@@ -40,6 +42,7 @@ module nocdyn_time_stepping
     logical :: may_shift = .false.                   !! whether the system may shift states
     logical :: wants_steps = .false.                 !! whether the observer receives the dense output of all steps
     logical :: wants_dense_steps = .false.           !! whether that is the result of `interpolate`
+    logical :: may_be_plain = .false.                !! whether the system may take plain steps
     logical :: is_exhausted = .false.                !! the ensemble has no variant left
     integer :: free = 0                              !! number of lanes that hold no variant
     logical :: inspects = .false.                    !! whether the accepted steps are inspected lane by lane
@@ -47,6 +50,8 @@ module nocdyn_time_stepping
     logical, allocatable :: running(:)               !! lanes that took part in the last attempt
     logical, allocatable :: rejected(:)              !! lanes whose last attempt was complete, but with too large an error
     logical, allocatable :: starting(:)              !! lanes that start a variant, or restart on a new branch
+    logical, allocatable :: unevaluated(:)           !! lanes that have started without an evaluation
+    logical :: evaluates_starts = .true.             !! whether there are none, and starts are measured
     logical, allocatable :: accepted(:)              !! lanes whose last attempt was accepted
     logical, allocatable :: wanted(:)                !! lanes whose dense output of the last step is needed
     logical, allocatable :: inspected(:)             !! lanes whose dense output is evaluated lane by lane
@@ -56,6 +61,8 @@ module nocdyn_time_stepping
     real(wp), allocatable :: next_time(:)            !! next output time of each lane [s], huge if none is left
     integer, allocatable :: next(:)                  !! index of the next output time of each lane
     real(wp), allocatable :: sample(:)               !! state of one lane, [components]
+    type(plain_steps_t) :: plain
+    integer(c_int), allocatable :: is_running(:), outcome(:)   !! of plain steps, [lanes]
     real(wp), allocatable :: coefficients(:, :, :)   !! of the dense output of the last step, [lanes, padded columns, degree]
   end type integrator_t
 
@@ -85,11 +92,13 @@ contains
     associate (lanes => system%lanes)
       integrator%free = lanes
       allocate (integrator%occupied(lanes), integrator%running(lanes), integrator%starting(lanes), integrator%accepted(lanes), &
-                integrator%rejected(lanes), integrator%wanted(lanes), integrator%inspected(lanes), integrator%far(lanes), &
-                integrator%steps%taken(lanes), integrator%steps%crosses(lanes), source=.false.)
+                integrator%rejected(lanes), integrator%unevaluated(lanes), integrator%wanted(lanes), &
+                integrator%inspected(lanes), integrator%far(lanes), integrator%steps%taken(lanes), &
+                integrator%steps%crosses(lanes), source=.false.)
       allocate (integrator%t_new(lanes), integrator%next_time(lanes), source=times(1))
       allocate (integrator%steps%t(lanes), integrator%steps%h(lanes), integrator%steps%scale(lanes), &
                 integrator%steps%theta_end(lanes), integrator%steps%t_new(lanes), source=0.0_wp)
+      allocate (integrator%steps%degree(lanes), source=1)
       allocate (integrator%next(lanes), source=2)
       allocate (integrator%sample(integrator%attempt%components), source=0.0_wp)
       allocate (integrator%coefficients(lanes, size(integrator%attempt%y, 2), stepper%degree), source=0.0_wp)
@@ -100,6 +109,8 @@ contains
     integrator%may_shift = system%may_shift .and. observer%takes_shifts
     integrator%has_switches = system%switches > 0
     integrator%has_jumps = system%follows_waves
+    ! where one of many lanes starts, all would be evaluated
+    integrator%evaluates_starts = stepper%reads_slope .or. system%lanes == 1 .or. system%follows_waves
     if (integrator%has_switches) then
       call allocate_switching(integrator%switching, system, stepper%degree, integrator%attempt, times(size(times)) - times(1))
     end if
@@ -180,7 +191,11 @@ contains
         call observer%on_jump(lane, attempt%t(lane), integrator%sample)
       end do
       call evaluate_starts(integrator, system, solver_status)
-      call measure_start(integrator%control, system, attempt, integrator%starting)
+      if (integrator%evaluates_starts) then
+        call measure_start(integrator%control, system, attempt, integrator%starting)
+      else
+        call forget_sizes(integrator%control, integrator%starting)
+      end if
       call stepper%start(attempt, integrator%starting)
       do lane = 1, attempt%lanes
         if (.not. integrator%starting(lane)) cycle
@@ -196,15 +211,29 @@ contains
     end associate
   end subroutine start_lanes
 
-  !> Evaluates the slope at the states of the lanes in `starting`, and ends those where that fails.
+  !> Evaluates the slope at the states of the lanes in `starting`, and ends those where that fails. If nobody reads the slope,
+  !> the lanes are only noted.
   subroutine evaluate_starts(integrator, system, solver_status)
+    type(integrator_t), intent(inout) :: integrator
+    class(system_t), intent(inout) :: system
+    type(solver_status_t), intent(inout) :: solver_status
+
+    integrator%attempt%active(:) = integrator%starting
+    if (integrator%evaluates_starts) then
+      call end_failed_starts(integrator, system, solver_status)
+    else
+      integrator%unevaluated(:) = integrator%unevaluated .or. integrator%starting
+    end if
+  end subroutine evaluate_starts
+
+  !> Ends the lanes in `starting` where the slope cannot be evaluated.
+  subroutine end_failed_starts(integrator, system, solver_status)
     type(integrator_t), intent(inout) :: integrator
     class(system_t), intent(inout) :: system
     type(solver_status_t), intent(inout) :: solver_status
     integer :: lane
 
     associate (attempt => integrator%attempt)
-      attempt%active(:) = integrator%starting
       call evaluate_start(attempt, system, integrator%starting, attempt%slope)
       do lane = 1, attempt%lanes
         if (.not. integrator%starting(lane) .or. attempt%active(lane)) cycle
@@ -214,7 +243,26 @@ contains
         solver_status%component(lane) = attempt%component(lane)
       end do
     end associate
-  end subroutine evaluate_starts
+  end subroutine end_failed_starts
+
+  !> Evaluates the slope in the lanes that have started without it and for which no step has been chosen, as their series failed.
+  !> The others count an evaluation, as they would alone.
+  subroutine evaluate_later(integrator, system, solver_status)
+    type(integrator_t), intent(inout) :: integrator
+    class(system_t), intent(inout) :: system
+    type(solver_status_t), intent(inout) :: solver_status
+
+    associate (attempt => integrator%attempt)
+      integrator%starting(:) = integrator%unevaluated .and. integrator%running .and. .not. integrator%control%h > 0
+      attempt%evaluations(:) = attempt%evaluations + merge(1, 0, integrator%unevaluated .and. .not. integrator%starting)
+      integrator%unevaluated(:) = .false.
+      if (.not. any_true(attempt%lanes, integrator%starting)) return
+      attempt%active(:) = integrator%starting
+      call end_failed_starts(integrator, system, solver_status)
+      integrator%running(:) = integrator%running .and. solver_status%code == integration_running
+      attempt%active(:) = integrator%running
+    end associate
+  end subroutine evaluate_later
 
   !> Begins the next attempt of the lanes that are still running.
   subroutine begin_attempts(integrator, stepper, system, solver_status)
@@ -233,6 +281,9 @@ contains
       end if
       if (stepper%chooses_steps) then
         call stepper%choose_steps(system, attempt, integrator%control)
+        if (.not. integrator%evaluates_starts) then
+          if (any_true(attempt%lanes, integrator%unevaluated)) call evaluate_later(integrator, system, solver_status)
+        end if
         if (integrator%first_step > 0) then
           where (solver_status%steps == 0) integrator%control%h = min(integrator%control%h, integrator%first_step)
         end if
@@ -294,6 +345,7 @@ contains
       if (.not. any_true(attempt%lanes, integrator%far)) return
       do lane = 1, attempt%lanes
         if (.not. (integrator%far(lane) .and. integrator%accepted(lane))) cycle
+        if (integrator%has_extremes) call observe_left(integrator%extremes, observer)
         call system%shift_state(lane, attempt%y, integrator%sample)
         call observer%on_shift(lane, integrator%sample)
       end do

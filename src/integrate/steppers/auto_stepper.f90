@@ -3,12 +3,14 @@
 !>
 !> Each lane chooses by itself. A lane of a system without a series begins with explicit steps.
 module nocdyn_auto_stepper
+  use, intrinsic :: iso_c_binding, only: c_loc
   use nocdyn_explicit_stepper, only: explicit_stepper
   use nocdyn_explicit_tables, only: explicit_table_t
   use nocdyn_kinds, only: wp
   use nocdyn_method_choice, only: begin_trial, by_series, by_stages, by_systems, choice_t, count_attempt, count_steps, &
     kind_data_t, longest_shared_period, near_limit, needed_step, note_stiffness, restart_choice, settle, shared_period, &
     stiff_signs, wants_trial, weak_sign
+  use nocdyn_plain_steps, only: calm_lane_t, plain_steps_t
   use nocdyn_rosenbrock_stepper, only: rosenbrock_stepper
   use nocdyn_rosenbrock_tables, only: rosenbrock_table_t
   use nocdyn_step_attempt, only: step_attempt_t
@@ -24,21 +26,12 @@ module nocdyn_auto_stepper
 
   integer, parameter :: stride = 3   !! explicit steps for each estimate of the dominant eigenvalue
 
-  !> Lanes that step by series and have nothing to decide: their steps are counted together, and their choices are left alone.
-  type :: calm_lane_t
-    integer :: steps = 0               !! accepted steps without a decision, unless they show signs of stiffness
-    integer :: uncounted = 0           !! of these, those that have been made
-    integer :: signs = 0               !! as in `choice_t`, of implicit steps
-    logical :: is_in_doubt = .false.   !! as in `choice_t`
-    logical :: waits = .false.         !! whether signs lead to nothing yet
-  end type calm_lane_t
-
   type, extends(stepper_t), public :: auto_stepper_t
     private
     type(stepper_kinds_t) :: steppers
     type(kind_data_t) :: data
     type(choice_t), allocatable :: choice(:)   !! [lanes]
-    type(calm_lane_t), allocatable :: calm(:)  !! [lanes]
+    type(calm_lane_t), allocatable :: calm(:)  !! of lanes that step by series and have nothing to decide, [lanes]
     logical :: are_calm = .false.              !! all active lanes step by series, and have nothing to decide
     logical, allocatable :: expanded(:)        !! lanes of other kinds whose series is wanted
     logical, allocatable :: active(:)          !! lanes at the start of the attempt
@@ -48,6 +41,7 @@ module nocdyn_auto_stepper
     real(wp), allocatable :: lambda(:)         !! dominant eigenvalues by the series [1/s]
   contains
     procedure :: prepare, start, choose_steps, take_step, interpolate, accept, resume
+    procedure :: describe_plain_steps, accept_plain_steps
   end type auto_stepper_t
 
 contains
@@ -136,7 +130,7 @@ contains
       if (self%calm(lane)%uncounted > 0) then
         call count_steps(self%choice(lane), self%calm(lane)%uncounted)
         self%choice(lane)%signs(by_systems) = self%calm(lane)%signs
-        self%choice(lane)%is_in_doubt = self%calm(lane)%is_in_doubt
+        self%choice(lane)%is_in_doubt = self%calm(lane)%is_in_doubt > 0
         self%calm(lane)%uncounted = 0
       end if
       self%expanded(lane) = .false.
@@ -185,11 +179,11 @@ contains
     type(kind_data_t), intent(in) :: data
 
     calm%signs = choice%signs(by_systems)
-    calm%is_in_doubt = choice%is_in_doubt
-    calm%waits = choice%wait(by_systems) > 0
+    calm%is_in_doubt = merge(1, 0, choice%is_in_doubt)
+    calm%waits = merge(1, 0, choice%wait(by_systems) > 0)
     if (choice%kind /= by_series .or. choice%before > 0) return
     calm%steps = huge(calm%steps)
-    if (calm%waits) then
+    if (calm%waits > 0) then
       calm%steps = choice%wait(by_systems)
     else if (choice%is_in_doubt) then
       calm%steps = choice%doubt
@@ -224,9 +218,9 @@ contains
       if (.not. attempt%active(lane)) cycle
       if (self%steppers%series%plans_step(lane)) then
         associate (calm => self%calm(lane), size_of_step => control%h(lane) * self%lambda(lane))
-          if (calm%waits) cycle
+          if (calm%waits > 0) cycle
           are_calm = are_calm .and. merge(calm%signs + 1, 0, size_of_step > near) < stiff_signs &
-                     .and. (calm%is_in_doubt .or. .not. size_of_step > weak)
+                     .and. (calm%is_in_doubt > 0 .or. .not. size_of_step > weak)
         end associate
       else
         are_calm = .false.
@@ -239,7 +233,7 @@ contains
       associate (calm => self%calm(lane), size_of_step => control%h(lane) * self%lambda(lane))
         calm%uncounted = calm%uncounted + 1
         calm%signs = merge(calm%signs + 1, 0, size_of_step > near)
-        calm%is_in_doubt = calm%is_in_doubt .or. size_of_step > weak
+        calm%is_in_doubt = merge(1, int(calm%is_in_doubt), size_of_step > weak)
       end associate
     end do
     self%are_calm = .true.
@@ -374,6 +368,30 @@ contains
     end if
     call self%steppers%accept(accepted)
   end subroutine accept
+
+  !> Plain steps are those of calm lanes.
+  subroutine describe_plain_steps(self, steps, is_able)
+    class(auto_stepper_t), target, intent(inout) :: self
+    type(plain_steps_t), intent(inout) :: steps
+    logical, intent(out) :: is_able
+
+    is_able = self%data%has(by_series)
+    if (.not. is_able) return
+    self%calm%has_moved = merge(1, 0, self%has_moved)
+    where (.not. self%was_tried) self%calm%has_moved = 2
+    steps%calm = c_loc(self%calm)
+    steps%near = near_limit * self%data%limit(by_series)
+    steps%weak = weak_sign * self%data%limit(by_series)
+  end subroutine describe_plain_steps
+
+  subroutine accept_plain_steps(self, accepted)
+    class(auto_stepper_t), intent(inout) :: self
+    logical, intent(in) :: accepted(:)
+
+    self%was_tried(:) = self%was_tried .or. accepted
+    self%has_moved(:) = self%has_moved .or. accepted
+    call self%steppers%series%accept(accepted)
+  end subroutine accept_plain_steps
 
   !> Restarts lanes with the kind of step that they have; what they know of the other kinds is kept.
   subroutine resume(self, attempt, resuming)

@@ -17,6 +17,7 @@ module nocdyn_taylor_stepper
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: all_true, any_differs
   use nocdyn_observer, only: observer_t, step_block_t
+  use nocdyn_plain_steps, only: plain_steps_t
   use nocdyn_series_sums, only: scale_series, sum_series
   use nocdyn_stage_sums, only: padded_columns
   use nocdyn_step_attempt, only: attempt_not_finite, attempt_ok, attempt_recoverable, disable_lane, disable_non_finite_lanes, &
@@ -61,7 +62,7 @@ module nocdyn_taylor_stepper
     type(series_defects_t) :: defects
   contains
     procedure :: choose_steps, prepare, start, take_step, interpolate, accept, pass_steps, plans_step
-    procedure :: find_eigenvalues, stability_limit, cost
+    procedure :: find_eigenvalues, stability_limit, cost, describe_plain_steps
   end type taylor_stepper_t
 
 contains
@@ -81,6 +82,7 @@ contains
     stepper%chooses_steps = .true.
     stepper%estimates_errors = .false.
     stepper%passes_series = .true.
+    stepper%reads_slope = .false.
   end function taylor_stepper
 
   subroutine prepare(self, system)
@@ -407,6 +409,15 @@ contains
     steps%scale(:) = steps%h
     call observer%on_steps(steps, attempt%y, attempt%y_new, self%series(:, :, 1:))
   end subroutine pass_steps
+
+  !> Every step by a series may be plain.
+  subroutine describe_plain_steps(self, steps, is_able)
+    class(taylor_stepper_t), target, intent(inout) :: self
+    type(plain_steps_t), intent(inout) :: steps
+    logical, intent(out) :: is_able
+
+    is_able = .true.
+  end subroutine describe_plain_steps
 
   !> Whether the series of a lane can be used, after `choose_steps`.
   pure logical function plans_step(self, lane)

@@ -70,6 +70,7 @@ contains
     character(len=*), intent(in) :: kind
 
     do position = 1, size(self%groups)
+      if (len(self%groups(position)%kind) /= len(kind)) cycle   ! compared at once
       if (self%groups(position)%kind == kind) return
     end do
     error stop 'nocdyn_input: position() is for groups that occur once'

@@ -197,7 +197,7 @@ contains
     character(len=*), intent(in) :: key, value
 
     call self%begin_member(key)
-    call self%buffer%append(escaped(value))
+    call append_string(self%buffer, value)
   end subroutine put_text
 
   !> A list of texts, on one line.
@@ -326,7 +326,8 @@ contains
     character(len=*), intent(in) :: key
 
     call self%begin_item()
-    call self%buffer%append(escaped(key) // ': ')
+    call append_string(self%buffer, key)
+    call self%buffer%append(': ')
   end subroutine begin_member
 
   !> Begins a line, after a comma if the member or item is not the first.
@@ -337,6 +338,27 @@ contains
     call self%buffer%append(new_line('a') // repeat('  ', self%depth))
     self%is_first = .false.
   end subroutine begin_item
+
+  !> Appends a JSON string with its quotes; most texts need no escapes.
+  subroutine append_string(buffer, text)
+    type(text_buffer_t), intent(inout) :: buffer
+    character(len=*), intent(in) :: text
+    integer :: i, others
+
+    others = 0
+    do i = 1, len(text)
+      associate (code => iachar(text(i:i)))
+        others = others + merge(1, 0, code < 32 .or. code > 126 .or. code == iachar('"') .or. code == iachar('\'))
+      end associate
+    end do
+    if (others > 0) then
+      call buffer%append(escaped(text))
+      return
+    end if
+    call buffer%append('"')
+    call buffer%append(text)
+    call buffer%append('"')
+  end subroutine append_string
 
   !> A JSON string with its quotes. Control characters, which no input contains, become blanks.
   function escaped(text)

@@ -73,7 +73,7 @@ contains
       self%numbers = new_law_numbers(self%law, motion(tape))
     end associate
     do slot = 1, size(self%law%constant, 1)
-      call self%numbers%set_constants(self%law, slot)
+      call self%numbers%set_constants(self%law, slot, .false.)
     end do
   end subroutine make_ready
 
@@ -95,7 +95,7 @@ contains
     type(curve_t), intent(in), optional :: curve    !! of the element, on the segment branch(1)
 
     call self%law%refresh(lane, element, parameters, branch, is_branch_only, curve)
-    if (self%is_ready) call self%numbers%set_constants(self%law, self%law%slot(lane, element))
+    if (self%is_ready) call self%numbers%set_constants(self%law, self%law%slot(lane, element), is_branch_only)
   end subroutine refresh
 
   !> Adds the moments, and sets the rates of the internal states. Phases follow all elements.
@@ -357,6 +357,9 @@ contains
         do i = 1, size(tape%guard)
           do e = 1, law%elements
             switch = (tape%guarded_switch(i) - 1) * law%elements + e
+            if (tape%guarded_branch(i) > 0) then
+              if (is_absent(last - first + 1, tape%guarded_branch(i), branch(first:last, switch))) cycle
+            end if
             call keep_lower(last - first + 1, tape%guarded_branch(i), branch(first:last, switch), &
                             work%pool(work%address(tape%guard(i), 0, e)), &
                             law%constant(law%slot(first, e), law%column(tape%guard_shift(i))), g(first:last, switch))
@@ -365,6 +368,14 @@ contains
       end do
     end associate
   end subroutine lowest_guards
+
+  !> Whether no lane is on a branch.
+  pure logical function is_absent(lanes, branch, present_branch)
+    integer, intent(in) :: lanes, branch
+    integer, intent(in) :: present_branch(lanes)
+
+    is_absent = count(present_branch == branch) == 0
+  end function is_absent
 
   !> Lowers g to a guard, with its boundary shifted outwards, where a branch is the present one.
   pure subroutine keep_lower(lanes, branch, present_branch, guard, shift, g)

@@ -5,8 +5,10 @@
 !> rigid motion's speed its distance from the speed at the start, and the size of its angle 1 rad, since a torque that depends on
 !> an angle depends on its phase. So a rotation that is added to the whole machine changes no size and no error.
 module nocdyn_error_measures
+  use, intrinsic :: iso_c_binding, only: c_loc
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
+  use nocdyn_plain_steps, only: plain_steps_t
   use nocdyn_sparse_map, only: new_sparse_map, sparse_map_t
   implicit none (type, external)
   private
@@ -22,7 +24,7 @@ module nocdyn_error_measures
     type(sparse_map_t), private :: map                !! from the states to the quantities
     real(wp), allocatable, private :: offset(:, :)    !! of their sizes, [lanes, count]
   contains
-    procedure :: measure, start_lane, twist_of, state_of, pass_parameters
+    procedure :: measure, describe_map, start_lane, twist_of, state_of, pass_parameters
   end type error_measures_t
 
   real(wp), parameter :: rounding = 1.0e-6_wp   !! of a large angle within a step: rtol times this is above its rounding
@@ -77,6 +79,18 @@ contains
       sizes(:, phases:) = 1.0_wp + rounding * abs(sizes(:, phases:))
     end associate
   end subroutine measure
+
+  !> Describes the map of several lanes for plain steps.
+  subroutine describe_map(self, steps)
+    class(error_measures_t), target, intent(in) :: self
+    type(plain_steps_t), intent(inout) :: steps
+
+    steps%phases = self%count - size(self%free)
+    steps%first = c_loc(self%map%first)
+    steps%column = c_loc(self%map%column)
+    steps%coefficient = c_loc(self%map%coefficient)
+    steps%offset = c_loc(self%offset)
+  end subroutine describe_map
 
   !> Counts the sizes of a lane that starts at the state y.
   pure subroutine start_lane(self, lane, y, twist_at_zero, rest)

@@ -5,16 +5,23 @@
 !> u' = U q'. Their moments M give q'' = R M with R = (L_tau^T J L_tau)^-1 L_tau^T B, where the columns of B are
 !> the unit moments of the elements on their two bodies, and U = B^T L_tau.
 module nocdyn_reduced
+  use nocdyn_code_text, only: code_text_t
+  use nocdyn_compiled_code, only: loaded_code_t
+  use nocdyn_compiled_series, only: compiled_series_t
   use nocdyn_coordinate_formulation, only: coordinate_formulation_t
   use nocdyn_held_lanes, only: held_lanes_t, new_held_lanes
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_law_tape, only: op_tanh
   use nocdyn_machine, only: machine_t
+  use nocdyn_machine_code, only: write_machine_code
+  use nocdyn_plain_steps, only: plain_steps_t
   use nocdyn_reduced_jacobian, only: new_reduced_jacobian, reduced_jacobian_t
   use nocdyn_reduced_series, only: new_reduced_series, reduced_series_t
+  use nocdyn_series_code, only: code_obstacle, write_series_code
   use nocdyn_sparse_map, only: new_sparse_map, sparse_map_t, transposed_order
   use nocdyn_system, only: evaluation_fatal, pattern_t
+  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -27,12 +34,14 @@ module nocdyn_reduced
     integer, allocatable, private :: response_entry(:)      !! entry of `incidence` of each entry of R
     type(reduced_jacobian_t), private :: element_jacobian   !! R diag U
     type(reduced_series_t), private :: series_kernel        !! Taylor recurrence, after `prepare_series`
+    type(compiled_series_t), private :: compiled            !! a program for the recurrence, if there is one
     real(wp), allocatable, private :: moment(:, :)             !! M [N m], [lanes, elements], work space
     real(wp), allocatable, private :: free_jacobian(:, :)      !! without locked joints, if there are joints, [lanes, positions]
   contains
     procedure :: formulate, update_inertia, pass_parameters, refresh_lane, refresh_parameters, derivative, jacobian
     procedure :: evaluate_at, hold_jacobian, spread_jacobian
     procedure :: jacobian_pattern, series_obstacle, prepare_series, series, find_sets
+    procedure :: write_code, write_program, attach_code, runs_code, takes_plain_steps, take_plain_steps
   end type reduced_t
 
 contains
@@ -219,9 +228,80 @@ contains
     integer, intent(inout) :: status(self%lanes)
 
     call self%find_sets(status)
+    if (self%compiled%fits(self%series_kernel) .and. .not. self%held%is_active) then
+      call self%compiled%expand(self%series_kernel, self%state, self%twist_at_origin, columns, t, y)
+      return
+    end if
     call self%series_kernel%expand(self%state, self%twists, self%accelerations, self%twist_at_origin, self%incidence, &
                                    self%held, columns, t, y)
   end subroutine series
+
+  !> Writes a program for the Taylor recurrence, after `prepare_series`.
+  subroutine write_code(self, code, obstacle)
+    class(reduced_t), intent(in) :: self
+    type(code_text_t), intent(inout) :: code
+    character(len=:), allocatable, intent(out) :: obstacle   !! why there is none, ''
+
+    obstacle = code_obstacle(self%series_kernel)
+    if (obstacle == '') call write_series_code(self%series_kernel, self%state, code)
+  end subroutine write_code
+
+  !> Writes a program of its own for a block of equal lanes, after `prepare_series`, with the branches of the start.
+  subroutine write_program(self, t_start, code, obstacle)
+    class(reduced_t), intent(inout) :: self
+    real(wp), intent(in) :: t_start   !! [s]
+    type(code_text_t), intent(inout) :: code
+    character(len=:), allocatable, intent(out) :: obstacle   !! why there is none, ''
+    real(wp) :: y(self%lanes, self%states)
+    type(string_t) :: names(self%states)
+    integer :: i
+
+    obstacle = code_obstacle(self%series_kernel)
+    if (self%joints%count > 0) obstacle = 'joints that lock or move, and teeth with losses, have no code'
+    if (obstacle /= '') return
+    if (self%switches > 0) call code%line('/* The laws are those at the start: the program does not follow these boundaries.')
+    do i = 1, self%switches
+      call code%line('   - @@', a=self%switch_name(i), b=trim(merge(' */', '   ', i == self%switches)))
+    end do
+    y = self%start()
+    do i = 1, self%lanes
+      call self%start_lane(i, t_start, y(i, :))
+    end do
+    do i = 1, self%states
+      names(i)%text = self%component_name(i)
+    end do
+    call write_machine_code(self%series_kernel, self%state, self%twist_at_origin, t_start, y(1, :), names, code)
+  end subroutine write_program
+
+  !> Lets series be computed by a program that `write_code` of a block with the same structure has written.
+  subroutine attach_code(self, loaded)
+    class(reduced_t), intent(inout) :: self
+    type(loaded_code_t), intent(in) :: loaded
+
+    call self%compiled%attach(self%series_kernel, loaded)
+  end subroutine attach_code
+
+  !> Whether series are computed by a program, as long as no joint holds.
+  pure logical function runs_code(self)
+    class(reduced_t), intent(in) :: self
+
+    runs_code = self%compiled%fits(self%series_kernel)
+  end function runs_code
+
+  !> Only a program takes steps.
+  pure logical function takes_plain_steps(self)
+    class(reduced_t), intent(in) :: self
+
+    takes_plain_steps = self%joints%count == 0 .and. self%compiled%fits(self%series_kernel)
+  end function takes_plain_steps
+
+  subroutine take_plain_steps(self, steps)
+    class(reduced_t), intent(inout) :: self
+    type(plain_steps_t), intent(inout) :: steps
+
+    call self%norm%describe_map(steps)
+    call self%compiled%take_steps(self%series_kernel, self%state, self%twist_at_origin, steps)
+  end subroutine take_plain_steps
 
   !> Finds the joints that hold in each lane, and lanes without a motion that fits them.
   subroutine find_sets(self, status)

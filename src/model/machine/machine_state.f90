@@ -234,6 +234,14 @@ contains
     real(wp), intent(inout) :: watts(machine%lanes, size(machine%with_work))   !! [W]
     integer :: e, k, l
 
+    if (machine%lanes == 1) then   ! without loops of one turn
+      associate (elements => machine%with_work, applied => self%elements%applied, speed => self%elements%speed)
+        do k = 1, size(elements)
+          watts(1, k) = applied(1, elements(k)) * speed(1, elements(k))
+        end do
+      end associate
+      return
+    end if
     do k = 1, size(machine%with_work)
       e = machine%with_work(k)
       do l = 1, machine%lanes

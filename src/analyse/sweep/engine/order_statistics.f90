@@ -1,8 +1,9 @@
-!> Minimum, maximum, median, 5 % and 95 % quantiles of every result of a sweep, in memory that does not grow with the sweep.
+!> Minimum, maximum, median, 5 % and 95 % quantiles of every result of a sweep, in memory that does not grow beyond megabytes.
 !>
 !> Radix selection: the bits of a number are rearranged so that they sort like unsigned integers. A few passes over the
-!> journals find these bits digit by digit, from the leading one, by histograms of the next digit. The quantile p of n values is
-!> the value at (n - 1) p, counted from 0 in ascending order and interpolated between neighbours, as in numpy.quantile.
+!> journals, or over the chunks of a small sweep that the first pass keeps, find these bits digit by digit, from the leading
+!> one, by histograms of the next digit. The quantile p of n values is the value at (n - 1) p, counted from 0 in ascending order
+!> and interpolated between neighbours, as in numpy.quantile.
 module nocdyn_order_statistics
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_quiet_nan, ieee_value
   use, intrinsic :: iso_fortran_env, only: int64
@@ -25,6 +26,8 @@ module nocdyn_order_statistics
   real(wp), parameter :: quantiles(3) = [0.05_wp, 0.5_wp, 0.95_wp]
   integer, parameter :: wanted = 2 * size(quantiles)   ! both neighbours of each quantile
 
+  integer, parameter :: million = 2**20
+
   ! the 64 bits of a number in five digits, the first of which has 12 bits
   integer, parameter :: digit_bits = 13, passes = 5, values_of_digit = 2**digit_bits
 
@@ -41,20 +44,29 @@ module nocdyn_order_statistics
 contains
 
   !> Computes the order statistics of each result over the variants that are done.
-  subroutine find_order_statistics(journals, statistics, error)
+  subroutine find_order_statistics(journals, statistics, error, most_kept)
     type(sweep_journal_t), intent(inout) :: journals(:)   !! at least one; all with the same results
     type(order_statistics_t), allocatable, intent(out) :: statistics(:)
     type(error_t), allocatable, intent(out) :: error
+    integer, intent(in), optional :: most_kept   !! numbers of a sweep that is read once and kept; absent: a million
     type(selection_t), allocatable :: selections(:)
-    integer :: i, pass
+    type(chunk_t), allocatable :: kept(:)
+    integer :: i, most, pass
     real(wp) :: found(size(quantiles))
 
     allocate (statistics(size(journals(1)%header%results)), selections(size(journals(1)%header%results)))
     do i = 1, size(selections)
       allocate (selections(i)%histogram(0:values_of_digit - 1, wanted))
     end do
+    most = million
+    if (present(most_kept)) most = most_kept
+    associate (header => journals(1)%header)
+      if (real(header%variants, wp) * (size(header%results) + size(header%parameters)) <= most) then
+        allocate (kept(sum(journals%entries)))
+      end if
+    end associate
     do pass = 1, passes
-      call count_digits(journals, pass, selections, statistics, error)
+      call count_digits(journals, kept, pass, selections, statistics, error)
       if (allocated(error)) return
       do i = 1, size(selections)
         if (pass == 1) then   ! both neighbours of every quantile
@@ -81,29 +93,50 @@ contains
   end subroutine find_order_statistics
 
   !> One pass over the journals: histograms of one digit; the first pass also counts and finds extremes.
-  subroutine count_digits(journals, pass, selections, statistics, error)
+  subroutine count_digits(journals, kept, pass, selections, statistics, error)
     type(sweep_journal_t), intent(inout) :: journals(:)
+    type(chunk_t), allocatable, intent(inout) :: kept(:)   !! the chunks of a small sweep, after the first pass
     integer, intent(in) :: pass
     type(selection_t), intent(inout) :: selections(:)
     type(order_statistics_t), intent(inout) :: statistics(:)   !! counts and extremes
     type(error_t), allocatable, intent(out) :: error
     type(chunk_t) :: chunk
-    integer :: i, j, k
+    integer :: i, j, k, number
 
     do i = 1, size(selections)
       selections(i)%histogram = 0
     end do
+    if (pass > 1 .and. allocated(kept)) then
+      do number = 1, size(kept)
+        call count_results(kept(number), pass, selections, statistics)
+      end do
+      return
+    end if
+    number = 0
     do j = 1, size(journals)
       do k = 1, journals(j)%entries
         call journals(j)%read_entry(k, chunk, error)
         if (allocated(error)) return
-        do i = 1, size(selections)
-          if (pass == 1) call update_extremes(chunk, i, statistics(i))
-          call count_chunk(chunk, i, digit_bits * (passes - pass), selections(i))
-        end do
+        call count_results(chunk, pass, selections, statistics)
+        number = number + 1
+        if (allocated(kept)) kept(number) = chunk
       end do
     end do
   end subroutine count_digits
+
+  !> Takes the results of a chunk into the histograms; in the first pass into counts and extremes too.
+  pure subroutine count_results(chunk, pass, selections, statistics)
+    type(chunk_t), intent(in) :: chunk
+    integer, intent(in) :: pass
+    type(selection_t), intent(inout) :: selections(:)
+    type(order_statistics_t), intent(inout) :: statistics(:)
+    integer :: i
+
+    do i = 1, size(selections)
+      if (pass == 1) call update_extremes(chunk, i, statistics(i))
+      call count_chunk(chunk, i, digit_bits * (passes - pass), selections(i))
+    end do
+  end subroutine count_results
 
   !> Takes the values of a chunk into count and extremes.
   pure subroutine update_extremes(chunk, result, statistics)

@@ -1,11 +1,12 @@
 !> The work of the threads of a sweep that one thread at a time does: checking the values of a variant, writing a
-!> report, explaining a failure.
+!> report, explaining a failure, writing a program.
 !>
 !> gfortran 12 keeps the length of an allocatable text that a function returns in static memory of the caller, which all threads
 !> share, with `-frecursive` as without it. What threads run at the same time therefore calls no such functions. What does call
 !> them stands in the critical section `texts`, or has the lock of the scheduler, as the journal and the progress have.
 module nocdyn_serial_work
   use nocdyn_analyses, only: analysis_options_t, analysis_t
+  use nocdyn_code_text, only: code_text_t
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
@@ -14,12 +15,13 @@ module nocdyn_serial_work
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_named_analyses, only: assemble_analysed, new_analysis
+  use nocdyn_reduced, only: reduced_t
   use nocdyn_solver_status, only: failure_message, solver_status_t
   use nocdyn_targets, only: set_targets, target_t
   implicit none (type, external)
   private
 
-  public :: analyse_for_report, check_values, explain_failure
+  public :: analyse_for_report, check_values, explain_failure, write_code
 
 contains
 
@@ -47,6 +49,19 @@ contains
     message = failure_message(solver_status, lane, formulation, settings%rtol, settings%atol)
     !$omp end critical (texts)
   end subroutine explain_failure
+
+  !> Writes the program of a block for its series.
+  subroutine write_code(block, text, obstacle)
+    class(reduced_t), intent(in) :: block
+    character(len=:), allocatable, intent(out) :: text
+    character(len=:), allocatable, intent(out) :: obstacle   !! why there is none, ''
+    type(code_text_t) :: code
+
+    !$omp critical (texts)
+    call block%write_code(code, obstacle)
+    text = code%text()
+    !$omp end critical (texts)
+  end subroutine write_code
 
   !> The report of an analysis of the machine of an input, with its numbers.
   subroutine analyse_for_report(word, input, report, error)

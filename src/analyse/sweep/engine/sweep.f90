@@ -8,8 +8,9 @@ module nocdyn_sweep
   use nocdyn_kinds, only: wp
   use nocdyn_run_settings, only: choose_settings
   use nocdyn_scheduler, only: scheduler_t
-  use nocdyn_statistics_observer, only: needs_work_integrals
+  use nocdyn_statistics, only: needs_work_integrals
   use nocdyn_sweep_block, only: new_sweep_block, sweep_block_t
+  use nocdyn_sweep_code, only: sweep_code_t
   use nocdyn_sweep_plan, only: sweep_plan_t
   use nocdyn_text, only: string_t
   use omp_lib, only: omp_destroy_lock, omp_init_lock, omp_set_num_threads
@@ -51,30 +52,34 @@ contains
   end subroutine prepare_sweep
 
   !> Computes the variants that `scheduler` hands out, by threads with a block of lanes each.
-  subroutine compute_variants(plan, setup, threads, scheduler)
+  subroutine compute_variants(plan, setup, threads, scheduler, code)
     type(sweep_plan_t), target, intent(in) :: plan
     type(sweep_setup_t), intent(in) :: setup   !! of the plan
     integer, intent(in) :: threads
     class(scheduler_t), target, intent(inout) :: scheduler
+    type(sweep_code_t), target, intent(inout) :: code
 
     call omp_init_lock(scheduler%lock)
+    call omp_init_lock(code%lock)
     !$omp parallel num_threads(threads) default(shared)
-    call compute_chunks(plan, setup, scheduler)
+    call compute_chunks(plan, setup, scheduler, code)
     !$omp end parallel
     call scheduler%finalise()
+    call omp_destroy_lock(code%lock)
     call omp_destroy_lock(scheduler%lock)
   end subroutine compute_variants
 
   !> One thread's work.
-  subroutine compute_chunks(plan, setup, scheduler)
+  subroutine compute_chunks(plan, setup, scheduler, code)
     type(sweep_plan_t), target, intent(in) :: plan
     type(sweep_setup_t), intent(in) :: setup
     class(scheduler_t), target, intent(inout) :: scheduler
+    type(sweep_code_t), target, intent(inout) :: code
     type(sweep_block_t), allocatable, target :: block
 
     call omp_set_num_threads(1)   ! of what computes in threads of its own: the response over the speeds
     allocate (block)
-    call new_sweep_block(plan, setup%lanes, setup%has_energy_balance, scheduler, block)
+    call new_sweep_block(plan, setup%lanes, setup%has_energy_balance, scheduler, code, block)
     call block%compute_chunks()
     call block%machines%release()
   end subroutine compute_chunks

@@ -20,6 +20,7 @@ module nocdyn_sweep_block
   use nocdyn_statistics, only: statistic_t
   use nocdyn_statistics_observer, only: new_statistics_observer, statistics_observer_t
   use nocdyn_stepper, only: stepper_t
+  use nocdyn_sweep_code, only: sweep_code_t
   use nocdyn_sweep_chunk, only: allocate_chunk, chunk_t, status_done, status_failed, status_refused
   use nocdyn_sweep_plan, only: sweep_plan_t
   use nocdyn_system, only: system_t
@@ -70,6 +71,7 @@ module nocdyn_sweep_block
   type, public :: sweep_block_t
     type(sweep_plan_t), pointer :: plan => null()
     class(scheduler_t), pointer :: scheduler => null()
+    type(sweep_code_t), pointer :: code => null()
     type(variant_machines_t) :: machines
     type(block_observer_t) :: observer
     class(stepper_t), allocatable :: stepper            !! as it is before an integration
@@ -84,16 +86,18 @@ module nocdyn_sweep_block
 contains
 
   !> A block of lanes of the base machine, which must not be moved. `release` of its machines frees it.
-  subroutine new_sweep_block(plan, lanes, with_energy_balance, scheduler, block)
+  subroutine new_sweep_block(plan, lanes, with_energy_balance, scheduler, code, block)
     type(sweep_plan_t), target, intent(in) :: plan
     integer, intent(in) :: lanes
     logical, intent(in) :: with_energy_balance   !! whether the work integrals are among the states
     class(scheduler_t), target, intent(inout) :: scheduler
+    type(sweep_code_t), target, intent(inout) :: code
     type(sweep_block_t), target, intent(out) :: block
     real(wp) :: typical(plan%design%varied), values(size(plan%numbers%targets))
 
     block%plan => plan
     block%scheduler => scheduler
+    block%code => code
     block%observer%scheduler => scheduler
     call plan%values(1, typical)
     call plan%numbers%target_values(typical, values)
@@ -102,6 +106,8 @@ contains
     if (size(plan%statistics) == 0) return
     call prepare_integration(plan%input, block%machines%formulation, plan, block%settings, block%times, block%stepper, &
                              block%observer%statistics_observer_t, block%message)
+    if (block%message /= '') return
+    if (block%stepper%series_order > 0) call block%machines%formulation%prepare_series(block%stepper%series_order)
   end subroutine new_sweep_block
 
   !> Settings, stepper and observer of the variants that a formulation is integrated for. Statistics that begin outside of the
@@ -182,6 +188,7 @@ contains
     found = count > 0
     self%none_left = .not. found
     if (.not. found) return
+    call offer_code(self%block)
     self%newest = findloc(self%chunks%is_open, .false., dim=1)
     associate (open => self%chunks(self%newest))
       call allocate_chunk(open%chunk, first, count, self%block%plan%design%varied, self%block%plan%results())
@@ -250,6 +257,10 @@ contains
     real(wp) :: now
 
     now = time_now()
+    if (allocated(self%block%stepper)) then
+      call self%block%code%count_work(self%block%machines%formulation, self%block%stepper%series_order, open%chunk%count, &
+                                      sum(open%chunk%steps))
+    end if
     associate (scheduler => self%block%scheduler)
       call omp_set_lock(scheduler%lock)
       call scheduler%submit(open%chunk, now - self%submitted)
@@ -257,7 +268,16 @@ contains
     end associate
     self%submitted = now
     open%is_open = .false.
+    call offer_code(self%block)
   end subroutine submit
+
+  !> Lets the block have a program for its series, if one is due.
+  subroutine offer_code(block)
+    type(sweep_block_t), intent(inout) :: block
+
+    if (.not. allocated(block%stepper)) return
+    if (block%stepper%series_order > 0) call block%code%offer(block%machines%formulation)
+  end subroutine offer_code
 
   !> Sets the next variant that fits the lanes in one of them.
   subroutine next(self, system, lane, t, y, found)

@@ -29,7 +29,6 @@ module nocdyn_reduced_series
 
   !> Column k of an array holds the coefficients number k: the k-th derivatives over k factorial.
   type, public :: reduced_series_t
-    private
     integer :: order = 0                        !! of the series of the state
     integer :: last = 0                         !! coefficient of the moments that will be asked for
     integer :: lanes = 1, elements = 0, freedoms = 0

@@ -18,12 +18,12 @@ module nocdyn_series_banks
   public :: new_series_banks
 
   type, public :: series_banks_t
-    integer, private :: order = 0               !! of the series
-    integer, allocatable, private :: moved(:)   !! banks whose moments follow from the motion
-    integer, allocatable, private :: timed(:)   !! banks whose moments follow from the time alone
-    integer, allocatable, private :: first(:)   !! element of each bank, [banks]
-    integer, allocatable, private :: first_internal(:)   !! internal state of each bank, [banks]
-    integer, private :: lanes = 1, internal = 0          !! internal states of all elements
+    integer :: order = 0               !! of the series
+    integer, allocatable :: moved(:)   !! banks whose moments follow from the motion
+    integer, allocatable :: timed(:)   !! banks whose moments follow from the time alone
+    integer, allocatable :: first(:)   !! element of each bank, [banks]
+    integer, allocatable :: first_internal(:)   !! internal state of each bank, [banks]
+    integer :: lanes = 1, internal = 0          !! internal states of all elements
     logical, allocatable :: has_angle(:)        !! whether some law reads the angle, [groups of all elements]
     logical, allocatable :: has_motion(:)       !! whether some moment follows from the motion, [groups]
     logical, allocatable :: has_forcing(:)      !! whether some moment follows from the time alone, [groups]
