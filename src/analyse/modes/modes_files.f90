@@ -1,7 +1,6 @@
 !> The files on the modes of a machine: modes.csv and modes.json.
 module nocdyn_modes_files
   use nocdyn_bank, only: bank_of
-  use nocdyn_csv, only: write_numbers
   use nocdyn_equilibrium, only: t_infinity
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
@@ -64,12 +63,12 @@ contains
     if (mode%internal == 0) call file%put(to_text(mode%undamped))
     call file%put(',' // to_text(mode%damping_ratio()) // ',')
     if (mode%time_constant() < huge(1.0_wp)) call file%put(to_text(mode%time_constant()))
-    call write_numbers(file, [real(mode%eigenvalue, wp), aimag(mode%eigenvalue)], ',')
+    call file%put_numbers([real(mode%eigenvalue, wp), aimag(mode%eigenvalue)], ',')
     if (has_shape) then
-      call write_numbers(file, abs(mode%shape), ',')
-      call write_numbers(file, phases(mode%shape), ',')
-      call write_numbers(file, mode%kinetic, ',')
-      call write_numbers(file, mode%potential, ',')
+      call file%put_numbers(abs(mode%shape), ',')
+      call file%put_numbers(phases(mode%shape), ',')
+      call file%put_numbers(mode%kinetic, ',')
+      call file%put_numbers(mode%potential, ',')
     else
       call file%put(repeat(',', 2 * size(mode%shape) + size(mode%kinetic) + size(mode%potential)))
     end if
