@@ -307,7 +307,7 @@ def test_trajectories_of_tied_variants_are_those_of_the_variants(nocdyn):
         ),
         ("&record mode = 1 response = 'shaft' statistic = 'peak' /", "mode and response"),
         ("&record quantity = 'omega_one' mode = 1 statistic = 'final' /", "quantity and mode"),
-        ("&record mode = 1 order = 2 statistic = 'frequency' /", "order needs response"),
+        ("&record mode = 1 order = 2 statistic = 'frequency' /", "is of the mode alone; allowed: no order"),
         (
             "&record mode = 1 statistic = 'peak' /",
             "statistic = 'peak' does not belong to mode; allowed: 'frequency', 'damping_ratio'",

@@ -1,6 +1,6 @@
 !> The results of the fatigue of a run: for summary.json, for the printed table, and as cycles.csv.
 module nocdyn_fatigue_report
-  use nocdyn_csv, only: text_cell, write_header, write_numbers
+  use nocdyn_csv, only: text_cell, write_header
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_output_file, only: output_file_t
@@ -85,7 +85,7 @@ contains
         allocate (rows, source=classes%list())
         do c = 1, size(rows, 2)
           call file%put(text_cell(item%name) // ',' // item%unit)
-          call write_numbers(file, rows(:, c), ',')
+          call file%put_numbers(rows(:, c), ',')
           call file%put(new_line('a'))
         end do
         deallocate (rows)

@@ -131,13 +131,19 @@ contains
     complex(wp), intent(inout) :: values(:)
     real(wp), intent(in), optional :: most(:)   !! larger parts stay, [values]
     real(wp), parameter :: rounding = 1.0e-13_wp
-    real(wp) :: limit(size(values)), parts(size(values), 2)
+    integer :: i
+    real(wp) :: imaginary_part, largest, limit, real_part
 
-    parts = reshape([real(values, wp), aimag(values)], shape(parts))
-    limit = rounding * maxval(abs(values))
-    if (present(most)) limit = min(limit, most)
-    where (abs(parts) <= spread(limit, 2, 2)) parts = 0.0_wp
-    values = cmplx(parts(:, 1), parts(:, 2), wp)
+    largest = rounding * maxval(abs(values))
+    do i = 1, size(values)
+      limit = largest
+      if (present(most)) limit = min(largest, most(i))
+      real_part = real(values(i), wp)
+      imaginary_part = aimag(values(i))
+      if (abs(real_part) <= limit) real_part = 0.0_wp
+      if (abs(imaginary_part) <= limit) imaginary_part = 0.0_wp
+      values(i) = cmplx(real_part, imaginary_part, wp)
+    end do
   end subroutine clear_rounding
 
 end module nocdyn_eigenpairs

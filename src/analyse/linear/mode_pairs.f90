@@ -105,7 +105,7 @@ contains
     logical, intent(out) :: is_found
     integer, parameter :: most_steps = 25
     real(wp), parameter :: accuracy = 1.0e-12_wp, beside = 1.0e-13_wp
-    complex(wp), dimension(size(self%twist, 1)) :: slope, stiffness
+    complex(wp), dimension(size(self%twist, 1)) :: held, slope, stiffness
     complex(wp) :: change, inertia
     integer :: step
     logical :: oscillates, singular
@@ -113,8 +113,8 @@ contains
     is_found = .false.
     oscillates = aimag(self%value(m)) > 0
     associate (value => self%value(m), twist => self%twist, angle => self%angle)
+      call self%slopes%find_stiffness(machine%elements%internal, value, stiffness, slope)
       do step = 1, most_steps
-        call self%slopes%find_stiffness(machine%elements%internal, value, stiffness, slope)
         inertia = sum(machine%inertia(1, :) * angle(:, m)**2)
         change = sum(slope * twist(:, m)**2) + 2.0_wp * value * inertia
         if (.not. abs(change) > 0) return
@@ -124,9 +124,10 @@ contains
         is_found = step > 1 .and. abs(change) <= accuracy * abs(value)
         if (is_found) return
         call self%slopes%find_stiffness(machine%elements%internal, value, stiffness, slope)
-        if (allocated(self%locked)) stiffness(self%locked) = rigid_stiffness
-        call matrix%factor_square(-value**2, stiffness, work, singular)
-        if (singular) call matrix%factor_square(-(value * (1.0_wp + beside))**2, stiffness, work, singular)
+        held = stiffness
+        if (allocated(self%locked)) held(self%locked) = rigid_stiffness
+        call matrix%factor_square(-value**2, held, work, singular)
+        if (singular) call matrix%factor_square(-(value * (1.0_wp + beside))**2, held, work, singular)
         if (singular) then   ! the value is exact
           is_found = abs(change) <= accuracy * abs(value)
           return
@@ -148,14 +149,16 @@ contains
     type(dynamic_stiffness_t), intent(in) :: matrix   !! of it
     type(mode_pairs_t), intent(inout) :: self         !! with `x` of the mode
     integer, intent(in) :: m                          !! mode
+    complex(wp) :: twist
     integer :: e, i
 
     associate (incidence => matrix%incidence)
       do e = 1, size(self%twist, 1)
-        self%twist(e, m) = (0.0_wp, 0.0_wp)
+        twist = (0.0_wp, 0.0_wp)
         do i = incidence%first(e), incidence%first(e + 1) - 1
-          self%twist(e, m) = self%twist(e, m) + incidence%ratio(1, i) * self%x(incidence%coordinate(i), m)
+          twist = twist + incidence%ratio(1, i) * self%x(incidence%coordinate(i), m)
         end do
+        self%twist(e, m) = twist
       end do
     end associate
     self%angle(:, m) = angles_of(machine, self%x(:, m))
@@ -165,14 +168,16 @@ contains
     type(machine_t), intent(in) :: machine
     complex(wp), intent(in) :: x(:)   !! coordinates
     complex(wp) :: angle(machine%bodies)
+    complex(wp) :: sum_of_parts
     integer :: b, k
 
     associate (map => machine%coordinates)
       do b = 1, size(angle)
-        angle(b) = (0.0_wp, 0.0_wp)
+        sum_of_parts = (0.0_wp, 0.0_wp)
         do k = map%first(b), map%first(b + 1) - 1
-          angle(b) = angle(b) + map%ratio(1, k) * x(map%coordinate(k))
+          sum_of_parts = sum_of_parts + map%ratio(1, k) * x(map%coordinate(k))
         end do
+        angle(b) = sum_of_parts
       end do
     end associate
   end function angles_of

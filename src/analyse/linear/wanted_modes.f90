@@ -196,6 +196,7 @@ contains
     integer, intent(in) :: first, last
     type(linearisation_t), intent(inout) :: linear
 
+    if (first == 1 .and. last == size(linear%natural)) return
     linear%shapes = linear%shapes(:, first:last)
     linear%twists = linear%twists(:, first:last)
     linear%natural = linear%natural(first:last)

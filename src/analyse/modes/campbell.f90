@@ -4,19 +4,19 @@
 !> their shapes.
 module nocdyn_campbell
   use nocdyn_backward_speeds, only: refuse_backward_speeds
-  use nocdyn_critical_speeds, only: crossing_t, find_crossings
+  use nocdyn_critical_speeds, only: crossing_t
   use nocdyn_errors, only: error_t
   use nocdyn_excitation_lines, only: line_t
+  use nocdyn_followed_modes, only: follow_modes, frequencies_of
   use nocdyn_forced_response, only: forced_response_t, new_forced_response
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lapack, only: sort_ascending
   use nocdyn_machine, only: machine_t
   use nocdyn_margins, only: operating_distance
   use nocdyn_dense_pairs, only: most_modes
   use nocdyn_response_notes, only: note_shaft_modes, note_simplifications, note_steady_states
   use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
-  use nocdyn_mode_branches, only: new_speed_modes, speed_modes_t
+  use nocdyn_mode_branches, only: speed_modes_t
   use nocdyn_state_modes, only: has_choice, most_coordinates
   use nocdyn_text, only: append, counted, rounded_text, string_t, to_text
   use nocdyn_unstable_speeds, only: find_unstable, note_speeds, unstable_speed_t
@@ -44,18 +44,20 @@ module nocdyn_campbell
 contains
 
   !> Computes the diagram of an input.
-  subroutine analyse_campbell(input, machine, choice, self, error)
+  subroutine analyse_campbell(input, machine, choice, self, error, orders)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine   !! one lane
     type(modes_choice_t), intent(in) :: choice
     type(campbell_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
+    real(wp), intent(in), optional :: orders(:)   !! in place of those of the input
     real(wp) :: failed_speed
     integer :: i
     logical, allocatable :: is_unstable(:)
 
     call read_response_settings(input, machine, self%settings, error)
     if (allocated(error)) return
+    if (present(orders)) self%settings%orders = orders
     failed_speed = self%settings%speeds(1)
     call new_forced_response(machine, self%settings%body, self%settings%speeds, self%response, error)
     self%response%has_oscillations = .false.
@@ -70,9 +72,12 @@ contains
     call place_error(input, self%settings, failed_speed, error)
     if (.not. allocated(error)) call refuse_backward_speeds(input, self%settings, machine, self%response, error)
     if (allocated(error)) return
-    call follow_modes(self, error, failed_speed)
+    call follow_modes(self%response, self%settings%orders, self%modes, self%crossings, error, failed_speed)
     call place_error(input, self%settings, failed_speed, error)
     if (allocated(error)) return
+    self%speed = self%response%speeds()
+    self%is_of_grid = self%response%points%is_of_grid
+    self%frequency = frequencies_of(self%response, self%settings%orders)
     call note_simplifications(machine, self%notes)
     call note_left_out(self%response%choice, self%modes%modes, self%response%matrix%coordinates, self%notes)
     allocate (is_unstable(size(self%speed)))
@@ -121,41 +126,5 @@ contains
       self%is_order = self%response%lines%is_order
     end if
   end subroutine choose_lines
-
-  !> Finds the modes at all speeds and the crossings. Where modes move with the speed, the crossings become speeds of their own,
-  !> until they stay.
-  subroutine follow_modes(self, error, failed_speed)
-    type(campbell_t), intent(inout) :: self
-    type(error_t), allocatable, intent(out) :: error
-    real(wp), intent(out) :: failed_speed
-    integer, parameter :: rounds = 3
-    real(wp), allocatable :: more(:)
-    integer :: l, round
-
-    failed_speed = self%settings%speeds(1)
-    do round = 1, rounds
-      call new_speed_modes(self%response, self%modes, error)
-      if (allocated(error)) return
-      ! sets the arrays over all points
-      self%speed = self%response%speeds()
-      self%is_of_grid = self%response%points%is_of_grid
-      if (size(self%response%lines) > 0) then
-        self%frequency = self%response%frequencies()
-      else
-        if (allocated(self%frequency)) deallocate (self%frequency)
-        allocate (self%frequency(size(self%order), size(self%speed)))
-        do l = 1, size(self%order)
-          self%frequency(l, :) = self%order(l) * abs(self%speed)
-        end do
-      end if
-      call find_crossings(self%speed, self%frequency, self%modes, self%crossings)
-      if (self%modes%is_constant .or. round == rounds .or. size(self%crossings) == 0) return
-      more = self%crossings%speed
-      call sort_ascending(more)
-      if (self%speed(1) < 0) more = more(size(more):1:-1)
-      call self%response%add_points(more, .false., error, failed_speed)
-      if (allocated(error)) return
-    end do
-  end subroutine follow_modes
 
 end module nocdyn_campbell

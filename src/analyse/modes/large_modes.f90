@@ -7,7 +7,7 @@ module nocdyn_large_modes
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: find_slopes, has_turning_losses, held_elements, linearisation_t
   use nocdyn_mode_choice, only: note_choice
-  use nocdyn_modes, only: fill_bodies, fill_mode, mode_oscillating, mode_t, order_of
+  use nocdyn_modes, only: fill_bodies, fill_mode, mode_oscillating, mode_t, sort_modes
   use nocdyn_operating_point, only: operating_point_t
   use nocdyn_slopes, only: slopes_t
   use nocdyn_text, only: append, counted, string_t, to_text
@@ -120,7 +120,7 @@ contains
         call fill_bodies(point%formulation, pairs%x(:, m), modes(i))
       end associate
     end do
-    modes = modes(order_of(modes))
+    call sort_modes(modes)
   end subroutine put_modes
 
 end module nocdyn_large_modes

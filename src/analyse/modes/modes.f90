@@ -8,7 +8,7 @@ module nocdyn_modes
   implicit none (type, external)
   private
 
-  public :: fill_bodies, fill_mode, find_modes, order_of
+  public :: fill_bodies, fill_mode, find_modes, sort_modes
 
   real(wp), parameter :: pi = acos(-1.0_wp)
 
@@ -71,7 +71,7 @@ contains
       call fill_mode(linear%stiffness(elastic), pairs%value(i), rigid_part, twists(:, i), modes(i))
       call fill_bodies(formulation, pairs%speeds(:, i), modes(i))
     end do
-    modes = modes(order_of(modes))
+    call sort_modes(modes)
   end subroutine find_modes
 
   !> Sets the eigenvalue, the kind and the potential energies of a mode.
@@ -103,13 +103,15 @@ contains
     class(formulation_t), intent(in) :: formulation
     complex(wp), intent(in) :: speeds(:)   !! of the coordinates, of any size
     type(mode_t), intent(inout) :: mode
+    real(wp) :: size_of(formulation%machine%bodies)
 
     associate (map => formulation%machine%coordinates)
       mode%shape = cmplx(map%body_speeds(1, real(speeds, wp)), map%body_speeds(1, aimag(speeds)), wp)
     end associate
     call clear_rounding(mode%shape)
-    mode%kinetic = formulation%machine%inertia(1, :) * abs(mode%shape)**2
-    associate (total => sum(mode%kinetic), largest => mode%shape(maxloc(abs(mode%shape), dim=1)))
+    size_of = abs(mode%shape)
+    mode%kinetic = formulation%machine%inertia(1, :) * size_of**2
+    associate (total => sum(mode%kinetic), largest => mode%shape(maxloc(size_of, dim=1)))
       if (total <= 0.0_wp) return
       mode%kinetic = mode%kinetic / total
       mode%shape = mode%shape / largest
@@ -117,20 +119,30 @@ contains
     call clear_rounding(mode%shape)
   end subroutine fill_bodies
 
-  !> Order in which the modes are reported.
-  function order_of(modes) result(order)
-    type(mode_t), intent(in) :: modes(:)
-    integer :: order(size(modes))
+  !> Brings the modes into the order in which they are reported.
+  subroutine sort_modes(modes)
+    type(mode_t), allocatable, intent(inout) :: modes(:)
     real(wp) :: value(size(modes))
     integer :: i, rank
+    type(mode_t), allocatable :: sorted(:)
 
     value = merge(aimag(modes%eigenvalue), abs(modes%eigenvalue), modes%kind == mode_oscillating)
+    allocate (sorted(size(modes)))
     do i = 1, size(modes)
       rank = 1 + count(modes%kind < modes(i)%kind) + count(modes%kind == modes(i)%kind .and. value < value(i)) &
              + count(modes(:i - 1)%kind == modes(i)%kind .and. abs(value(:i - 1) - value(i)) <= 0.0_wp)
-      order(rank) = i
+      associate (mode => modes(i), place => sorted(rank))
+        place%kind = mode%kind
+        place%internal = mode%internal
+        place%eigenvalue = mode%eigenvalue
+        place%undamped = mode%undamped
+        call move_alloc(mode%shape, place%shape)
+        call move_alloc(mode%kinetic, place%kinetic)
+        call move_alloc(mode%potential, place%potential)
+      end associate
     end do
-  end function order_of
+    call move_alloc(sorted, modes)
+  end subroutine sort_modes
 
   !> Frequency of the damped oscillation [Hz].
   pure real(wp) function frequency(self)

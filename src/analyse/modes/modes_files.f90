@@ -7,37 +7,35 @@ module nocdyn_modes_files
   use nocdyn_kinds, only: wp
   use nocdyn_modes, only: kind_names, mode_oscillating, mode_t
   use nocdyn_modes_report, only: modes_report_t
+  use nocdyn_output_file, only: output_file_t
   use nocdyn_printable, only: as_utf_8
   use nocdyn_shaft_errors, only: noted_error
   use nocdyn_text, only: string_t, to_text
-  use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
 
-  public :: modes_csv, put_modes
+  public :: put_modes, write_modes
 
   real(wp), parameter :: degree = acos(-1.0_wp) / 180.0_wp
 
 contains
 
-  !> The text of modes.csv: a row for every mode.
-  function modes_csv(self) result(text)
+  !> Writes modes.csv: a row for every mode.
+  subroutine write_modes(file, self)
+    type(output_file_t), intent(inout) :: file
     type(modes_report_t), intent(in) :: self
-    character(len=:), allocatable :: text
-    type(text_buffer_t) :: table
     integer :: i
 
-    call table%append('mode,kind,frequency [Hz],undamped_frequency [Hz],damping_ratio,time_constant [s],' // &
-                      'real [1/s],imaginary [rad/s]')
+    call file%put('mode,kind,frequency [Hz],undamped_frequency [Hz],damping_ratio,time_constant [s],' // &
+                  'real [1/s],imaginary [rad/s]')
     call put_names('shape_', self%body_names, ' [1]')
     call put_names('phase_', self%body_names, ' [deg]')
     call put_names('kinetic_', self%kinetic_names, ' [1]')
     call put_names('potential_', self%elastic_names, ' [1]')
-    call table%append(new_line('a'))
+    call file%put(new_line('a'))
     do i = 1, size(self%modes)
-      call put_row(self%modes(i), count(self%modes(:i)%kind == mode_oscillating), i <= self%shapes, table)
+      call put_row(file, self%modes(i), count(self%modes(:i)%kind == mode_oscillating), i <= self%shapes)
     end do
-    text = table%text()
 
   contains
 
@@ -47,45 +45,35 @@ contains
       integer :: b
 
       do b = 1, size(names)
-        call table%append(',' // prefix // as_utf_8(names(b)%text) // unit)
+        call file%put(',' // prefix // as_utf_8(names(b)%text) // unit)
       end do
     end subroutine put_names
 
-  end function modes_csv
+  end subroutine write_modes
 
   !> Modes that do not oscillate have no number, and those that neither decay nor grow no time constant.
-  subroutine put_row(mode, number, has_shape, table)
+  subroutine put_row(file, mode, number, has_shape)
+    type(output_file_t), intent(inout) :: file
     type(mode_t), intent(in) :: mode
     integer, intent(in) :: number
     logical, intent(in) :: has_shape   !! whether there are a shape and shares; else their cells are empty
-    type(text_buffer_t), intent(inout) :: table
 
-    if (mode%kind == mode_oscillating) call table%append(to_text(number))
-    call table%append(',' // trim(kind_names(mode%kind)) // ',' // to_text(mode%frequency()) // ',')
-    if (mode%internal == 0) call table%append(to_text(mode%undamped))
-    call table%append(',' // to_text(mode%damping_ratio()) // ',')
-    if (mode%time_constant() < huge(1.0_wp)) call table%append(to_text(mode%time_constant()))
-    call put_values([real(mode%eigenvalue, wp), aimag(mode%eigenvalue)], table)
+    if (mode%kind == mode_oscillating) call file%put(to_text(number))
+    call file%put(',' // trim(kind_names(mode%kind)) // ',' // to_text(mode%frequency()) // ',')
+    if (mode%internal == 0) call file%put(to_text(mode%undamped))
+    call file%put(',' // to_text(mode%damping_ratio()) // ',')
+    if (mode%time_constant() < huge(1.0_wp)) call file%put(to_text(mode%time_constant()))
+    call file%put_numbers([real(mode%eigenvalue, wp), aimag(mode%eigenvalue)], ',')
     if (has_shape) then
-      call put_values(abs(mode%shape), table)
-      call put_values(phases(mode%shape), table)
-      call put_values(mode%kinetic, table)
-      call put_values(mode%potential, table)
+      call file%put_numbers(abs(mode%shape), ',')
+      call file%put_numbers(phases(mode%shape), ',')
+      call file%put_numbers(mode%kinetic, ',')
+      call file%put_numbers(mode%potential, ',')
     else
-      call table%append(repeat(',', 2 * size(mode%shape) + size(mode%kinetic) + size(mode%potential)))
+      call file%put(repeat(',', 2 * size(mode%shape) + size(mode%kinetic) + size(mode%potential)))
     end if
-    call table%append(new_line('a'))
+    call file%put(new_line('a'))
   end subroutine put_row
-
-  subroutine put_values(values, table)
-    real(wp), intent(in) :: values(:)
-    type(text_buffer_t), intent(inout) :: table
-    integer :: i
-
-    do i = 1, size(values)
-      call table%append(',' // to_text(values(i)))
-    end do
-  end subroutine put_values
 
   !> The phase lead to the largest motion [deg], -180 to 180; 0 for a body that does not move.
   pure elemental real(wp) function phases(motion)

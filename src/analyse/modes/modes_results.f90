@@ -6,7 +6,7 @@ module nocdyn_modes_results
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_machine, only: machine_t
-  use nocdyn_modes_files, only: modes_csv, put_modes
+  use nocdyn_modes_files, only: put_modes, write_modes
   use nocdyn_modes_report, only: modes_report_t, modes_text, new_modes_report
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
   use nocdyn_output_file, only: output_file_t
@@ -65,7 +65,7 @@ contains
     if (name == holzer_name) then
       call file%put(self%holzer_csv)
     else
-      call file%put(modes_csv(self%report))
+      call write_modes(file, self%report)
     end if
   end subroutine put_table
 

@@ -2,15 +2,16 @@
 module nocdyn_response_analysis
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_backward_speeds, only: refuse_backward_speeds
-  use nocdyn_critical_speeds, only: crossing_t, find_crossings, keep_new, refine_peaks
+  use nocdyn_critical_speeds, only: crossing_t, keep_new, refine_peaks
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_excitation_lines, only: line_order, line_t
+  use nocdyn_followed_modes, only: follow_modes
   use nocdyn_forced_response, only: forced_response_t, new_forced_response
   use nocdyn_harmonic_notes, only: note_left_out_harmonics
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_mode_branches, only: new_speed_modes, speed_modes_t
+  use nocdyn_mode_branches, only: speed_modes_t
   use nocdyn_moment_forms, only: moment_form_t
   use nocdyn_response_choice, only: choose_quantities, choose_shown, find_couplings
   use nocdyn_response_fatigue, only: find_response_fatigue, response_fatigue_t
@@ -32,7 +33,7 @@ module nocdyn_response_analysis
     type(response_settings_t) :: settings
     character(len=:), allocatable :: body_name       !! of the body whose speed is held
     type(forced_response_t) :: response
-    type(speed_modes_t) :: modes                     !! at the speeds of the grid
+    type(speed_modes_t) :: modes                     !! at the speeds of the grid, and at critical ones where modes move
     type(crossing_t), allocatable :: crossings(:)
     type(unstable_speed_t), allocatable :: unstable(:)   !! speeds of the grid that are left out for it
     type(response_limit_t), allocatable :: limits(:)
@@ -186,7 +187,7 @@ contains
     type(moment_form_t), intent(in) :: forms(:)   !! all quantities of the machine
     type(error_t), allocatable, intent(out) :: error
     real(wp), intent(inout) :: failed_speed
-    real(wp) :: unrefined
+    real(wp) :: no_orders(0), unrefined
     logical, allocatable :: is_unstable(:)
 
     if (self%response%matrix%coordinates > most_coordinates) then
@@ -194,7 +195,7 @@ contains
                               'neither critical speeds nor peaks between the speeds of the grid are found for more than ' // &
                               to_text(most_coordinates) // '; nocdyn campbell has natural frequencies')
     else
-      call new_speed_modes(self%response, self%modes, error)
+      call follow_modes(self%response, no_orders, self%modes, self%crossings, error, failed_speed)
       if (.not. allocated(error)) call leave_out_unstable(self, error, failed_speed)
       if (allocated(error)) return
     end if
@@ -229,8 +230,8 @@ contains
       call raise(error, exit_failed, 'the steady state is unstable: ' // text)
       return
     end if
-    call find_crossings(self%response%speeds(), self%response%frequencies(), self%modes, self%crossings)
     if (size(self%unstable) == 0) return
+    self%unstable = pack(self%unstable, pack(self%response%points%is_of_grid, is_unstable))
     self%crossings = pack(self%crossings, [(.not. is_between(self%crossings(i)%speed), i=1, size(self%crossings))])
     call keep_points(self%response%points, .not. is_unstable)
 

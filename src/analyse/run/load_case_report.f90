@@ -1,7 +1,7 @@
 !> The table over load cases: as printed, for cases.json and for cases.csv.
 module nocdyn_load_case_report
   use nocdyn_case_results, only: combine_verdicts, is_complete, put_cases, status_done
-  use nocdyn_csv, only: text_cell, write_header, write_numbers
+  use nocdyn_csv, only: text_cell, write_header
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
@@ -120,7 +120,7 @@ contains
       do i = 2, size(runs(c)%summary%chosen)
         associate (extremes => runs(c)%summary%extremes, column => runs(c)%summary%chosen(i))
           call file%put(text_cell(runs(c)%load_case%name) // ',' // runs(c)%summary%labels(column)%text)
-          call write_numbers(file, [extremes%lowest(column), extremes%lowest_time(column), extremes%highest(column), &
+          call file%put_numbers([extremes%lowest(column), extremes%lowest_time(column), extremes%highest(column), &
                                     extremes%highest_time(column)], ',')
           call file%put(new_line('a'))
         end associate

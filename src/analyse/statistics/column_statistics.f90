@@ -110,12 +110,11 @@ contains
   subroutine add_accumulators(self, columns)
     class(column_statistics_t), intent(inout) :: self
     integer, intent(in) :: columns
-    type(accumulator_t), allocatable :: found(:)
-    integer, allocatable :: first(:), next(:)   ! statistics of each column
+    integer :: leader(size(self%statistics))   ! the first statistic of each accumulator
+    integer :: next(size(self%statistics)), first(columns)   ! statistics of each column
     integer :: c, count, i, k, of_column
 
-    allocate (found(size(self%statistics)), next(size(self%statistics)))
-    allocate (first(columns), source=0)
+    first = 0
     do i = size(self%statistics), 1, -1
       next(i) = first(self%column(i))
       first(self%column(i)) = i
@@ -129,26 +128,37 @@ contains
         associate (statistic => self%statistics(i))
           if (statistic%kind /= statistic_final .and. .not. is_of_fatigue(statistic%kind)) then
             do k = of_column + 1, count
-              if (abs(found(k)%from - statistic%from) <= 0) exit
+              if (abs(self%statistics(leader(k))%from - statistic%from) <= 0) exit
             end do
+            if (k > count) leader(k) = i
             count = max(count, k)
-            found(k)%column = c
-            found(k)%from = statistic%from
             self%acc(i) = k
-            found(k)%has_max = found(k)%has_max .or. statistic%kind == statistic_max .or. statistic%kind == statistic_time_of_max
-            found(k)%has_min = found(k)%has_min .or. statistic%kind == statistic_min .or. statistic%kind == statistic_time_of_min
-            found(k)%has_max_abs = found(k)%has_max_abs .or. statistic%kind == statistic_max_abs .or. &
-                                   statistic%kind == statistic_time_of_max_abs
-            found(k)%has_time = found(k)%has_time .or. is_time_of_extreme(statistic%kind)
-            found(k)%has_sums = found(k)%has_sums .or. statistic%kind == statistic_mean .or. statistic%kind == statistic_rms
-            found(k)%has_history = found(k)%has_history .or. statistic%kind == statistic_settling_time
           end if
         end associate
         i = next(i)
       end do
     end do
-    allocate (self%accumulators, source=found(:count))
+    allocate (self%accumulators(count))
+    do i = 1, size(self%statistics)
+      if (self%acc(i) > 0) call add_need(self%statistics(i), self%column(i), self%accumulators(self%acc(i)))
+    end do
   end subroutine add_accumulators
+
+  !> Lets an accumulator have what a statistic of its column needs.
+  pure subroutine add_need(statistic, column, acc)
+    type(statistic_t), intent(in) :: statistic
+    integer, intent(in) :: column
+    type(accumulator_t), intent(inout) :: acc
+
+    acc%column = column
+    acc%from = statistic%from
+    acc%has_max = acc%has_max .or. statistic%kind == statistic_max .or. statistic%kind == statistic_time_of_max
+    acc%has_min = acc%has_min .or. statistic%kind == statistic_min .or. statistic%kind == statistic_time_of_min
+    acc%has_max_abs = acc%has_max_abs .or. statistic%kind == statistic_max_abs .or. statistic%kind == statistic_time_of_max_abs
+    acc%has_time = acc%has_time .or. is_time_of_extreme(statistic%kind)
+    acc%has_sums = acc%has_sums .or. statistic%kind == statistic_mean .or. statistic%kind == statistic_rms
+    acc%has_history = acc%has_history .or. statistic%kind == statistic_settling_time
+  end subroutine add_need
 
   !> One damage for each column and &fatigue.
   subroutine add_damages(self, lanes)

@@ -295,7 +295,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     class(grid_file_t), intent(in), optional :: netcdf     !! as in `analyse`
     class(grid_file_t), allocatable :: grid
-    type(result_files_t) :: files
+    type(result_files_t), target :: files
     type(string_t), allocatable :: former(:)
     type(json_t) :: json
     character(len=:), allocatable :: name
@@ -307,8 +307,8 @@ contains
     do i = 1, size(names) - 1
       call analysis%put_table(input, names(i)%text, files%files(i))
     end do
+    call json%write_to(files%files(size(names)))
     call analysis%put_report(input, json)
-    call files%files(size(names))%put(json%text())
     name = analysis%grid_name(input)
     if (name /= '') then
       if (.not. present(netcdf)) error stop 'nocdyn_analysis_command: this program does not write NetCDF'

@@ -14,6 +14,7 @@ module nocdyn_lapack_lu
   public :: lu_factor, lu_solve, band_factor, band_solve
 
   integer, parameter :: small_order = 64   ! above it blocks pay if an optimised LAPACK is linked
+  integer, parameter :: small_band = 16    ! diagonals of U above the main one
 
   interface
     subroutine dgetrf(m, n, a, lda, ipiv, info)
@@ -142,8 +143,40 @@ contains
     integer :: n, info
 
     n = size(factors, 2)
+    if (lower + upper <= small_band) then
+      call substitute_band(n, lower, lower + upper, factors, pivots, x)
+      return
+    end if
     call dgbtrs('N', n, lower, upper, 1, factors, size(factors, 1), pivots, x, n, info)
     if (info /= 0) error stop 'nocdyn_lapack_lu: dgbtrs refused an argument'
   end subroutine band_solve
+
+  !> Forward and backward substitution, as DGBTRS, which calls two procedures for each row of a few elements.
+  pure subroutine substitute_band(n, lower, upper, factors, pivots, x)
+    integer, intent(in) :: n, lower, upper   !! diagonals of L below, of U above the main one
+    real(wp), intent(in) :: factors(lower + upper + 1, n)
+    integer, intent(in) :: pivots(n)
+    real(wp), intent(inout) :: x(n)
+    real(wp) :: pivot
+    integer :: i, j
+
+    do j = 1, n - 1
+      pivot = x(pivots(j))
+      x(pivots(j)) = x(j)
+      x(j) = pivot
+      !GCC$ novector
+      do i = 1, min(lower, n - j)
+        x(j + i) = x(j + i) - factors(upper + 1 + i, j) * pivot
+      end do
+    end do
+    do i = n, 1, -1
+      pivot = x(i)
+      !GCC$ novector
+      do j = min(n, i + upper), i + 1, -1   ! the order of DTBSV, whose loop over rows is the inner one
+        pivot = pivot - factors(upper + 1 + i - j, j) * x(j)
+      end do
+      x(i) = pivot / factors(upper + 1, i)
+    end do
+  end subroutine substitute_band
 
 end module nocdyn_lapack_lu

@@ -3,11 +3,11 @@ module nocdyn_csv
   use nocdyn_kinds, only: wp
   use nocdyn_output_file, only: output_file_t
   use nocdyn_printable, only: as_utf_8
-  use nocdyn_text, only: number_width, string_t, write_number
+  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
-  public :: text_cell, write_header, write_row, write_numbers
+  public :: text_cell, write_header, write_row
 
 contains
 
@@ -38,24 +38,9 @@ contains
     type(output_file_t), intent(inout) :: file
     real(wp), intent(in) :: values(:)   !! [columns]
 
-    call write_numbers(file, values(:1), '')
-    call write_numbers(file, values(2:), ',')
+    call file%put_numbers(values(:1), '')
+    call file%put_numbers(values(2:), ',')
     call file%put(new_line('a'))
   end subroutine write_row
-
-  !> Writes numbers with a text before each.
-  subroutine write_numbers(file, values, separator)
-    type(output_file_t), intent(inout) :: file
-    real(wp), intent(in) :: values(:)
-    character(len=*), intent(in) :: separator
-    character(len=number_width) :: number
-    integer :: i, length
-
-    do i = 1, size(values)
-      call write_number(values(i), number, length)
-      call file%put(separator)
-      call file%put(number(:length))
-    end do
-  end subroutine write_numbers
 
 end module nocdyn_csv

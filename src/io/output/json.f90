@@ -2,6 +2,7 @@
 module nocdyn_json
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use nocdyn_kinds, only: wp
+  use nocdyn_output_file, only: output_file_t
   use nocdyn_printable, only: as_utf_8
   use nocdyn_text, only: string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
@@ -12,6 +13,7 @@ module nocdyn_json
   public :: has_utf_8
 
   integer, parameter :: most_levels = 16
+  integer, parameter :: most_held = 65536   ! characters that wait for being written to a file
 
   !> Nested objects and lists in the order of the calls, indented by two blanks per level.
   type, public :: json_t
@@ -20,6 +22,7 @@ module nocdyn_json
     real(wp), allocatable :: numbers(:)              !! [at least `count`]
     integer :: count = 0
     type(text_buffer_t), private :: buffer
+    type(output_file_t), pointer, private :: file => null()   !! that gets the text
     integer, private :: depth = 0                    !! number of open objects and lists
     logical, private :: is_first = .true.            !! the next member or item is the first one
     character(len=:), allocatable, private :: path   !! of what is open; allocated if numbers are kept
@@ -30,7 +33,7 @@ module nocdyn_json
     procedure :: open => open_object
     procedure :: open_report
     procedure :: close => close_object
-    procedure :: open_list, close_list, text
+    procedure :: open_list, close_list, write_to, text
     generic :: put => put_text, put_texts, put_number, put_numbers, put_flag, put_integer, put_integers, put_members
     procedure, private :: put_text, put_texts, put_number, put_numbers, put_flag, put_integer, put_integers, put_members
     procedure, private :: begin_member, begin_item, begin_level, end_level, keep
@@ -74,7 +77,19 @@ contains
 
     call self%end_level('}')
     if (self%depth == 0) call self%buffer%append(new_line('a'))
+    if (.not. associated(self%file)) return
+    if (self%depth > 0 .and. self%buffer%length < most_held) return
+    call self%file%put(self%buffer%text())
+    call self%buffer%clear()
   end subroutine close_object
+
+  !> Writes the text to a file as it grows, before the first object is opened; `text` has no use then.
+  subroutine write_to(self, file)
+    class(json_t), intent(inout) :: self
+    type(output_file_t), target, intent(inout) :: file   !! open until the outermost object is closed
+
+    self%file => file
+  end subroutine write_to
 
   !> Begins a list of objects.
   subroutine open_list(self, key)
@@ -222,7 +237,7 @@ contains
     real(wp), intent(in) :: value
 
     call self%begin_member(key)
-    call self%buffer%append(number_text(value))
+    call append_number(self%buffer, value)
     call self%keep(key, value)
   end subroutine put_number
 
@@ -237,19 +252,22 @@ contains
     call self%buffer%append('[')
     do i = 1, size(values)
       if (i > 1) call self%buffer%append(', ')
-      call self%buffer%append(number_text(values(i)))
+      call append_number(self%buffer, values(i))
       if (self%keeps_numbers) call self%keep(key // '[' // to_text(i) // ']', values(i))   ! its path costs more than the number
     end do
     call self%buffer%append(']')
   end subroutine put_numbers
 
-  function number_text(value) result(text)
+  subroutine append_number(buffer, value)
+    type(text_buffer_t), intent(inout) :: buffer
     real(wp), intent(in) :: value
-    character(len=:), allocatable :: text
 
-    text = 'null'
-    if (ieee_is_finite(value)) text = to_text(value)
-  end function number_text
+    if (ieee_is_finite(value)) then
+      call buffer%append_number(value)
+    else
+      call buffer%append('null')
+    end if
+  end subroutine append_number
 
   !> A logical value.
   subroutine put_flag(self, key, value)

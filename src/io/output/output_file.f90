@@ -2,7 +2,9 @@
 module nocdyn_output_file
   use nocdyn_errors, only: error_t
   use nocdyn_hidden_file, only: hidden_file_t
+  use nocdyn_kinds, only: wp
   use nocdyn_posix, only: close_file, create_file, last_failure, write_bytes
+  use nocdyn_text, only: number_width, write_number
   implicit none (type, external)
   private
 
@@ -17,7 +19,7 @@ module nocdyn_output_file
     integer, private :: descriptor = -1                     !! -1 if the file is not open
   contains
     procedure :: open => open_hidden
-    procedure :: put
+    procedure :: put, put_numbers
     procedure :: close => close_hidden
     procedure :: close_whole
     procedure, private :: flush_buffer
@@ -66,6 +68,22 @@ contains
       if (self%used == buffer_size) call self%flush_buffer()
     end do
   end subroutine put
+
+  !> Writes numbers that read back as the same values, with a text before each.
+  subroutine put_numbers(self, values, separator)
+    class(output_file_t), intent(inout) :: self
+    real(wp), intent(in) :: values(:)
+    character(len=*), intent(in) :: separator   !! at most `number_width` characters
+    integer :: i, length
+
+    do i = 1, size(values)
+      if (self%used + 2 * number_width > buffer_size) call self%flush_buffer()
+      if (len(separator) > 0) self%buffer(self%used + 1:self%used + len(separator)) = separator
+      self%used = self%used + len(separator)
+      call write_number(values(i), self%buffer(self%used + 1:), length)
+      self%used = self%used + length
+    end do
+  end subroutine put_numbers
 
   subroutine flush_buffer(self)
     class(output_file_t), intent(inout) :: self

@@ -39,6 +39,8 @@ module nocdyn_schema_sweep
     kind_rule_t('record', 'cycles',        'of fatigue: number of cycles, where the damage is largest'), &
     kind_rule_t('record', 'frequency',     'of mode: with damping, about the steady state'), &
     kind_rule_t('record', 'damping_ratio', 'of mode'), &
+    kind_rule_t('record', 'crossing',      'of mode: speed at which order meets it, in the speeds of &response'), &
+    kind_rule_t('record', 'crossing_margin', 'of mode: distance of that speed to the speeds in operation, as a share'), &
     kind_rule_t('record', 'peak',          'of response: largest amplitude of the order, or half range of all orders'), &
     kind_rule_t('record', 'peak_speed',    'of response: where the peak is'), &
     kind_rule_t('record', 'margin',        'of response: distance of the peak to the speeds in operation, as a share'), &
@@ -74,7 +76,8 @@ module nocdyn_schema_sweep
     key_rule_t('record', 'mode', an_integer, 1, '', unset, from_1, 'number of an oscillation, as nocdyn modes counts them'), &
     key_rule_t('record', 'response', a_text, 1, '', unset, anything, &
       'coupling, shaft or mesh, or a column of response.csv, in the forced response by &response'), &
-    key_rule_t('record', 'order', a_number, 1, '', unset, positive, 'order of the response; all together if not given'), &
+    key_rule_t('record', 'order', a_number, 1, '', unset, positive, &
+      'order of the response, all together if not given; or that meets a mode'), &
     key_rule_t('record', 'path', a_text, any_number, '', unset, anything, &
                "numbers of reports: a command and what its report has, such as 'modes.modes[2].frequency_Hz'"), &
     key_rule_t('record', 'from', a_number, 1, 's', unset, anything, &
@@ -94,7 +97,7 @@ module nocdyn_schema_sweep
     relation_rule_t('record', requires, 'quantity fatigue mode response', 'statistic'), &
     relation_rule_t('record', requires, 'statistic', 'quantity fatigue mode response'), &
     relation_rule_t('record', requires, 'from', 'quantity'), &
-    relation_rule_t('record', requires, 'order', 'response'), &
+    relation_rule_t('record', requires, 'order', 'response mode'), &
     relation_rule_t('vary', less_than, 'low', 'high', 'count')]
 
   type(alias_t), parameter, public :: sweep_aliases(*) = [ &

@@ -268,7 +268,18 @@ contains
 
     allocate (others(room))
     do i = 1, kept
-      others(i) = signals(i)
+      associate (one => signals(i), other => others(i))
+        other%source = one%source
+        other%rank = one%rank
+        call move_alloc(one%name, other%name)
+        call move_alloc(one%symbol, other%symbol)
+        call move_alloc(one%element_kind, other%element_kind)
+        call move_alloc(one%element, other%element)
+        call move_alloc(one%point, other%point)
+        call move_alloc(one%unit, other%unit)
+        call move_alloc(one%caption, other%caption)
+        call move_alloc(one%positive, other%positive)
+      end associate
     end do
     call move_alloc(others, signals)
   end subroutine resize

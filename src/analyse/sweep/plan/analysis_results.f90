@@ -15,10 +15,13 @@ module nocdyn_analysis_results
   integer, parameter, public :: analysis_margin = 5          !! distance of that speed to the speeds in operation
   integer, parameter, public :: analysis_ratio = 6           !! largest ratio to a limit over the speeds
 
-  character(len=*), parameter, public :: analysis_names(6) = [character(len=13) :: 'frequency', 'damping_ratio', 'peak', &
-    'peak_speed', 'margin', 'ratio']
-  character(len=*), parameter, public :: analysis_owners(6) = [character(len=8) :: 'mode', 'mode', 'response', 'response', &
-    'response', 'response']   !! the key of &record that each belongs to
+  integer, parameter, public :: analysis_crossing = 7        !! speed at which an order meets a mode, as nocdyn campbell has it
+  integer, parameter, public :: analysis_crossing_margin = 8 !! distance of that speed to the speeds in operation
+
+  character(len=*), parameter, public :: analysis_names(8) = [character(len=15) :: 'frequency', 'damping_ratio', 'peak', &
+    'peak_speed', 'margin', 'ratio', 'crossing', 'crossing_margin']
+  character(len=*), parameter, public :: analysis_owners(8) = [character(len=8) :: 'mode', 'mode', 'response', 'response', &
+    'response', 'response', 'mode', 'mode']   !! the key of &record that each belongs to
 
   integer, parameter, public :: of_path = -1
 
@@ -27,6 +30,7 @@ module nocdyn_analysis_results
     integer :: result = 0                           !! its number among the results of a variant
     integer :: statistic = analysis_frequency       !! analysis_...
     integer :: mode = 0                             !! number of an oscillating mode; 0: of the response; or `of_path`
+    logical :: is_crossing = .false.                !! whether an order meets the mode
     character(len=:), allocatable :: command, path  !! of a number of a report: the command and the path in its report
     type(signal_t) :: signal                        !! of the response
     character(len=:), allocatable :: quantity       !! element, or column of response.csv without its unit
@@ -40,21 +44,32 @@ module nocdyn_analysis_results
 contains
 
   !> Of an oscillating mode.
-  subroutine new_mode_result(mode, statistic, self)
+  subroutine new_mode_result(mode, order, statistic, self)
     integer, intent(in) :: mode, statistic
+    real(wp), intent(in) :: order   !! that meets it; 0 for other statistics
     type(analysis_result_t), intent(out) :: self
 
     self%mode = mode
+    self%order = order
     self%statistic = statistic
-    self%label = 'mode_' // to_text(mode) // '_' // trim(analysis_names(statistic))
+    self%is_crossing = any(statistic == [analysis_crossing, analysis_crossing_margin])
+    self%label = 'mode_' // to_text(mode) // '_'
+    if (order > 0) self%label = self%label // 'order_' // to_text(order) // '_'
+    self%label = self%label // trim(analysis_names(statistic))
     self%quantity = ''
     self%unit = ''
-    if (statistic == analysis_frequency) then
+    select case (statistic)
+    case (analysis_frequency)
       self%unit = 'Hz'
       self%long_name = 'frequency of mode ' // to_text(mode) // ' with damping'
-    else
+    case (analysis_damping_ratio)
       self%long_name = 'damping ratio of mode ' // to_text(mode)
-    end if
+    case (analysis_crossing)
+      self%unit = 'rad/s'
+      self%long_name = 'speed at which order ' // to_text(order) // ' meets mode ' // to_text(mode)
+    case default   ! analysis_crossing_margin
+      self%long_name = 'distance to operation of the speed at which order ' // to_text(order) // ' meets mode ' // to_text(mode)
+    end select
   end subroutine new_mode_result
 
   !> A number of the report of an analysis.

@@ -1,8 +1,8 @@
 !> The results of modes and of the forced response that the groups &record ask for.
 module nocdyn_recorded_analyses
   use nocdyn_analyses, only: analysis_t
-  use nocdyn_analysis_results, only: analysis_margin, analysis_names, analysis_owners, analysis_peak_speed, analysis_ratio, &
-    analysis_result_t, new_mode_result, new_path_result, new_response_result
+  use nocdyn_analysis_results, only: analysis_crossing, analysis_crossing_margin, analysis_margin, analysis_names, &
+    analysis_owners, analysis_peak_speed, analysis_ratio, analysis_result_t, new_mode_result, new_path_result, new_response_result
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_errors, only: error_t
   use nocdyn_excitation_lines, only: line_order
@@ -55,7 +55,7 @@ contains
 
     allocate (self%wanted_units, source=output_units(input))
     allocate (self%quantities(0), self%limits(0))
-    if (asks_for(input, 'mode')) then
+    if (asks_for(input, 'mode') .and. asks_for_steady_modes(input)) then
       call oscillating_modes(input, 0, modes, failure)
       if (.not. allocated(failure)) self%oscillations = size(modes)
     end if
@@ -70,6 +70,17 @@ contains
     call new_forced_response(machine, self%settings%body, self%settings%speeds, response, failure)
     if (.not. allocated(failure)) call move_alloc(response, self%response)
   end subroutine new_analysis_reader
+
+  !> Whether a &record asks for modes about the steady state.
+  logical function asks_for_steady_modes(input)
+    type(input_t), intent(in) :: input
+    integer, allocatable :: records(:)
+    integer :: i
+
+    allocate (records, source=input%groups_named('record'))
+    asks_for_steady_modes = any([(input%groups(records(i))%has_value('mode') .and. &
+                                  .not. input%groups(records(i))%has_value('order'), i=1, size(records))])
+  end function asks_for_steady_modes
 
   !> The reports of the base machine that paths name; without numbers if there is none.
   subroutine read_reports(input, reports)
@@ -175,7 +186,14 @@ contains
         cycle
       end if
       if (owner == 'mode') then
-        call new_mode_result(input%groups(record)%whole_number('mode'), k, one)
+        call check_order(input, record, k, diagnostics)
+        if (any(k == [analysis_crossing, analysis_crossing_margin])) then
+          call new_mode_result(input%groups(record)%whole_number('mode'), &
+                               input%groups(record)%number('order', absent=0.0_wp), k, one)
+          if (k == analysis_crossing) call turn_unit(self, one)
+        else
+          call new_mode_result(input%groups(record)%whole_number('mode'), 0.0_wp, k, one)
+        end if
       else
         call self%check_statistic(input, record, k, diagnostics)
         call make_response_result(self, input, record, k, one)
@@ -205,6 +223,7 @@ contains
     integer, intent(in) :: record
     type(diagnostics_t), intent(inout) :: diagnostics
 
+    if (input%groups(record)%has_value('order')) return   ! a mode that an order meets over the speed
     if (input%groups(record)%whole_number('mode') <= self%oscillations) return
     call input%report(record, 'mode', 'mode = ' // to_text(input%groups(record)%whole_number('mode')) // &
                       ' is out of range; the machine of the input has ' // to_text(self%oscillations) // &
@@ -284,10 +303,44 @@ contains
       call new_response_result(name, column, first%unit, input%groups(record)%number('order', absent=0.0_wp), statistic, one)
       one%signal = first%signal_t
     end associate
-    if (statistic /= analysis_peak_speed) return
+    if (statistic == analysis_peak_speed) call turn_unit(self, one)
+  end subroutine make_response_result
+
+  !> Gives a result the unit that the input asks for.
+  subroutine turn_unit(self, one)
+    class(analysis_reader_t), intent(in) :: self
+    type(analysis_result_t), intent(inout) :: one
+
     one%in_unit = unit_for(one%unit, self%wanted_units)
     if (one%in_unit > 0) one%unit = trim(units(one%in_unit)%name)
-  end subroutine make_response_result
+  end subroutine turn_unit
+
+  !> Refuses statistics of a mode with an order that has no meaning for them, or without one, or without the speeds in operation.
+  subroutine check_order(input, record, statistic, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record
+    integer, intent(in) :: statistic
+    type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=:), allocatable :: what
+    integer, allocatable :: groups(:)
+    logical :: is_crossing
+
+    what = 'statistic = ' // quoted(trim(analysis_names(statistic)))
+    is_crossing = any(statistic == [analysis_crossing, analysis_crossing_margin])
+    if (is_crossing .and. .not. input%groups(record)%has_value('order')) then
+      call input%report(record, 'statistic', what // ' is where an order meets the mode; needed: order', diagnostics)
+    else if (input%groups(record)%has_value('order') .and. .not. is_crossing) then
+      call input%report(record, 'order', what // ' is of the mode alone; allowed: no order', diagnostics)
+    end if
+    if (.not. is_crossing) return
+    allocate (groups, source=input%groups_named('response'))
+    if (size(groups) == 0) then
+      call input%report(record, 'statistic', what // ' needs &response with its speeds', diagnostics)
+    else if (statistic == analysis_crossing_margin .and. .not. input%groups(groups(1))%has_value('operating')) then
+      call input%report(record, 'statistic', what // ' is the distance to the speeds in operation; needed: operating of ' // &
+                        '&response', diagnostics)
+    end if
+  end subroutine check_order
 
   !> Appends a result that is not recorded yet.
   subroutine append_new(input, record, key, others, one, results, diagnostics)

@@ -1,8 +1,9 @@
 !> Computes the results of a machine that need no motion.
 module nocdyn_variant_analysis
   use nocdyn_analyses, only: analysis_t
-  use nocdyn_analysis_results, only: analysis_damping_ratio, analysis_frequency, analysis_margin, analysis_peak, &
-    analysis_peak_speed, analysis_ratio, analysis_result_t
+  use nocdyn_analysis_results, only: analysis_crossing, analysis_damping_ratio, analysis_frequency, analysis_margin, &
+    analysis_peak, analysis_peak_speed, analysis_ratio, analysis_result_t
+  use nocdyn_campbell, only: analyse_campbell, campbell_t
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_excitation_lines, only: line_order
   use nocdyn_input, only: input_t
@@ -44,14 +45,18 @@ contains
     integer :: i
 
     values = 0.0_wp
-    if (any(results%mode > 0)) then
-      call oscillating_modes(input, maxval(results%mode), modes, error)
+    if (any(results%mode > 0 .and. .not. results%is_crossing)) then
+      call oscillating_modes(input, maxval(results%mode, mask=.not. results%is_crossing), modes, error)
       if (allocated(error)) return
     end if
     if (any(results%mode == 0)) then
       call new_analysis('response', command)
       call assemble_analysed('response', command, input, machine, error)
       if (.not. allocated(error)) call analyse_response(input, machine, analysis, error)
+      if (allocated(error)) return
+    end if
+    if (any(results%is_crossing)) then
+      call find_crossings(input, results, values, error)
       if (allocated(error)) return
     end if
     do i = 1, size(results)
@@ -64,6 +69,39 @@ contains
       if (allocated(error)) return
     end do
   end subroutine analyse_variant
+
+  !> The speeds at which orders meet modes, as the diagram of Campbell has them, whether anything excites the orders or not.
+  subroutine find_crossings(input, results, values, error)
+    type(input_t), intent(in) :: input
+    type(analysis_result_t), intent(in) :: results(:)
+    real(wp), intent(inout) :: values(:)   !! [results]
+    type(error_t), allocatable, intent(out) :: error
+    class(analysis_t), allocatable :: command
+    type(machine_t) :: machine
+    type(campbell_t) :: campbell
+    integer :: c, i
+    real(wp), allocatable :: orders(:)
+
+    call new_analysis('campbell', command)
+    call assemble_analysed('campbell', command, input, machine, error)
+    if (allocated(error)) return
+    orders = pack(results%order, results%is_crossing)   ! one may come more than once
+    call analyse_campbell(input, machine, modes_choice_t(), campbell, error, orders)
+    if (allocated(error)) return
+    do i = 1, size(results)
+      if (.not. results(i)%is_crossing) cycle
+      associate (crossings => campbell%crossings)
+        c = findloc(crossings%mode == results(i)%mode .and. abs(orders(crossings%line) - results(i)%order) <= 0, .true., dim=1)
+        if (c == 0) then
+          call raise(error, exit_failed, 'order ' // to_text(results(i)%order) // ' does not meet mode ' // &
+                     to_text(results(i)%mode) // ' in the speeds of &response')
+          return
+        end if
+        values(i) = crossings(c)%speed
+        if (results(i)%statistic /= analysis_crossing) values(i) = operating_distance(campbell%settings, crossings(c)%speed)
+      end associate
+    end do
+  end subroutine find_crossings
 
   !> The oscillating modes about the steady state, by their frequencies.
   subroutine oscillating_modes(input, needed, modes, error)
