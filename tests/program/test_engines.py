@@ -1,9 +1,11 @@
 """Engines and orders from the input file to the results: files, refusals, sweeps."""
 
 import csv
+import json
 import re
 from math import cos, exp, pi, radians, sin
 
+import numpy as np
 import pytest
 
 MACHINE = """&body name = 'crank' inertia = 1.0e9 speed = 100.0 /
@@ -96,6 +98,55 @@ def test_pressure_turns_the_crank(nocdyn):
         assert torque == pytest.approx(1e4 * cos(theta) * 0.01 * pi * lever, abs=2e-2)  # the curve between the points
 
 
+RADIUS, ROD, OFFSET = 0.1, 0.2145922746781116, 0.01  # m; lambda = 0.466
+SLIDER_CRANK = f"crank_radius = {RADIUS} rod_length = {ROD} offset = {OFFSET}"
+
+
+def motion(theta):
+    """Slope and curvature of the position of a piston over the angle of its crank [m]."""
+    p, slope = RADIUS * np.sin(theta) - OFFSET, RADIUS * np.cos(theta)
+    reach = np.sqrt(ROD**2 - p**2)
+    first = -RADIUS * np.sin(theta) - p * slope / reach
+    return first, -slope - (slope**2 - p * RADIUS * np.sin(theta)) / reach - (p * slope) ** 2 / reach**3
+
+
+def test_a_reciprocating_mass_has_all_orders_of_the_slider_crank(nocdyn):
+    engine = f"&engine name = 'e' stroke = 2 cylinders = 'crank' firing_deg = 90 reciprocating_mass = 2 {SLIDER_CRANK} /"
+    table = run(nocdyn, engine)
+    first, second = motion(table["phi_crank [rad]"] - pi / 2)
+    assert table["torque_e_1 [N m]"] == pytest.approx(-2 * first * second * table["omega_crank [rad/s]"] ** 2, abs=1e-8)
+
+
+PARTS = """&body name = 'c' inertia = {} speed = 100 /
+&body name = 'f' inertia = 2 /
+&coupling name = 'k' bodies = 'c', 'f' stiffness = 1e5 damping = 5 /
+&load name = 'l' body = 'f' viscous = 0.1 /
+&run t_end = 0.1 /
+&response body = 'c' speed = 50, 150 count = 5 /
+"""
+
+
+def orders_of(nocdyn, text):
+    """Orders of a response and their complex moments in the coupling, and the number of crossings of a Campbell diagram."""
+    nocdyn.done(text, command="response")
+    table = nocdyn.values(name="response_orders.csv")
+    moments = table["total_moment_k"] * np.exp(1j * np.radians(table["phase_total_moment_k"]))
+    nocdyn.done(text, command="campbell")
+    crossings = json.loads((nocdyn.folder / "out/campbell.json").read_text())["crossings"]
+    return table["order"], moments, len(crossings)
+
+
+def test_an_engine_has_the_response_and_the_orders_of_a_crank(nocdyn):
+    """In a response a crank has its mean inertia, which the body of an engine has already, and its torques."""
+    mean = float(np.mean(2 * motion(np.arange(720) * pi / 360)[0] ** 2))
+    engine = f"&engine name = 'e' stroke = 2 cylinders = 'c' firing = 0 reciprocating_mass = 2 {SLIDER_CRANK} /\n"
+    crank = f"&crank name = 'e' body = 'c' piston_mass = 2 {SLIDER_CRANK} /\n"
+    orders, moments, crossings = orders_of(nocdyn, engine + PARTS.format(0.3 + mean))
+    orders_of_crank, moments_of_crank, crossings_of_crank = orders_of(nocdyn, crank + PARTS.format(0.3))
+    assert list(orders) == list(orders_of_crank) and max(orders) > 6 and crossings == crossings_of_crank > 6
+    assert moments == pytest.approx(moments_of_crank, abs=1e-9 * max(abs(moments)))
+
+
 @pytest.mark.parametrize(
     "engine, complaint",
     [
@@ -140,6 +191,11 @@ def test_pressure_turns_the_crank(nocdyn):
             FIRST.format("reciprocating_mass = 2 crank_radius = 0.5 rod_length = 0.4"),
             "rod_length = 0.4 is out of range; allowed: > crank_radius = 0.5",
         ),
+        (
+            FIRST.format("reciprocating_mass = 2 crank_radius = 0.3 rod_length = 0.4 offset = -0.2"),
+            "offset = -0.2 m: the rod of 0.4 m does not reach the piston at all angles; allowed: crank_radius + |offset| below",
+        ),
+        (FIRST.format("offset = 0.01"), "offset needs pressures, pressure_file or reciprocating_mass"),
         (FIRST.format("pressure_file = 'p.csv'"), "orders and pressure_file are both given; allowed: one of them"),
         (
             "&engine name = 'e' stroke = 4 cylinders = 'crank' firing_deg = 0 /",
@@ -256,7 +312,7 @@ def final_torques(nocdyn, machine, target, low, high):
         found = [next(float(value) for key, value in row.items() if "torque_e_1" in key) for row in csv.DictReader(file)]
     for value, final in zip((low, (low + high) / 2, high), found):
         table = run(nocdyn, machine, "--set", f"{target}={value:g}")
-        assert table["torque_e_1 [N m]"][-1] == pytest.approx(final, abs=1e-9)
+        assert table["torque_e_1 [N m]"][-1] == pytest.approx(final, rel=1e-10, abs=1e-9)  # rtol of the runs
     return found
 
 
@@ -267,11 +323,13 @@ def final_torques(nocdyn, machine, target, low, high):
         ("firing_deg(1)", 0, 180),
         ("misfire", 0, 2),
         ("reciprocating_mass", 0, 5),
+        ("crank_radius", 0.04, 0.14),
+        ("offset", -0.03, 0.03),
         ("mean_torque", 0, 50),
     ],
 )
 def test_keys_of_engines_vary_in_sweeps(nocdyn, key, low, high):
-    engine = FIRST.format("reciprocating_mass = 2 crank_radius = 0.1 rod_length = 0.4")
+    engine = FIRST.format("reciprocating_mass = 2 crank_radius = 0.1 rod_length = 0.4 offset = 0.01")
     assert len(set(final_torques(nocdyn, engine, f"engine.e.{key}", low, high))) > 1
 
 

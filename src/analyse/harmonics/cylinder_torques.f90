@@ -121,7 +121,8 @@ contains
   type(cylinder_t) function cylinder(group)
     type(group_t), intent(in) :: group
 
-    cylinder = cylinder_t(group%number('bore', absent=0.0_wp), group%number('crank_radius'), group%number('rod_length'))
+    cylinder = cylinder_t(group%number('bore', absent=0.0_wp), group%number('crank_radius'), group%number('rod_length'), &
+                          group%number('offset', absent=0.0_wp))
   end function cylinder
 
   !> Sets the harmonics of the inertia torque, if the engine has a reciprocating mass.
@@ -129,10 +130,11 @@ contains
     type(group_t), intent(in) :: group
     type(order_torque_t), intent(inout) :: torque
 
+    integer :: k
+
     if (.not. group%has_value('reciprocating_mass')) return
-    torque%square_order = [1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp]
-    torque%square_sine = inertia_harmonics(cylinder(group), group%number('reciprocating_mass'))
-    torque%square_cosine = 0.0_wp * torque%square_sine
+    call inertia_harmonics(cylinder(group), group%number('reciprocating_mass'), torque%square_sine, torque%square_cosine)
+    torque%square_order = [(real(k, wp), k=1, size(torque%square_sine))]
   end subroutine add_inertia
 
   !> The torque of a cylinder that fires at another angle, its gas torque times a factor.

@@ -268,8 +268,10 @@ module nocdyn_schema_torques
     key_rule_t('engine', 'bore', a_number, 1, 'm', unset, positive, 'diameter of the pistons'), &
     key_rule_t('engine', 'crank_radius', a_number, 1, 'm', unset, positive, 'half the travel of the pistons'), &
     key_rule_t('engine', 'rod_length', a_number, 1, 'm', unset, positive, 'length of the connecting rods'), &
+    key_rule_t('engine', 'offset', a_number, 1, 'm', '0', anything, &
+      'distance of the line of the pistons from the axis of the crank, as in &crank'), &
     key_rule_t('engine', 'reciprocating_mass', a_number, 1, 'kg', unset, not_negative, &
-      'mass that moves with one piston; its inertia torque has the orders 1 to 4'), &
+      'mass that moves with one piston; its inertia torque has all orders of the slider-crank'), &
     key_rule_t('engine', 'misfire', an_integer, 1, '', '0', not_negative, &
       'number of a cylinder that does not fire, 0: all fire'), &
     key_rule_t('engine', 'cylinder_scatter', a_number, any_number, '', unset, above_minus_1, &
@@ -337,7 +339,7 @@ module nocdyn_schema_torques
     relation_rule_t('engine', requires, 'pressures pressure_file reciprocating_mass', 'crank_radius'), &
     relation_rule_t('engine', requires, 'pressures pressure_file reciprocating_mass', 'rod_length'), &
     relation_rule_t('engine', requires, 'bore crankcase_pressure harmonics_up_to', 'pressures pressure_file'), &
-    relation_rule_t('engine', requires, 'crank_radius rod_length', 'pressures pressure_file reciprocating_mass'), &
+    relation_rule_t('engine', requires, 'crank_radius rod_length offset', 'pressures pressure_file reciprocating_mass'), &
     relation_rule_t('engine', less_than, 'crank_radius', 'rod_length'), &
     relation_rule_t('engine', equal_lengths, 'cylinders firing', ''), &
     relation_rule_t('engine', columns, 'orders amplitudes phases', 'table_file speeds loads misfire_amplitudes misfire_phases'), &

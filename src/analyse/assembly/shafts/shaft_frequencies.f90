@@ -16,7 +16,7 @@ module nocdyn_shaft_frequencies
   real(wp), parameter :: pi = acos(-1.0_wp)
   integer, parameter :: least_modes = 4   ! that are exact where nothing faster is excited
   real(wp), parameter :: reserve = 1.2_wp
-  real(wp), parameter :: inertia_orders = 4.0_wp   ! of slider-cranks; the following ones are small
+  real(wp), parameter :: inertia_orders = 6.0_wp   ! of slider-cranks; the following ones are small
   real(wp), parameter :: cardan_orders = 4.0_wp
   real(wp), parameter :: least_rise = 0.05_wp      ! of the range of a table: less is no oscillation
 
