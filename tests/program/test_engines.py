@@ -131,8 +131,8 @@ def orders_of(nocdyn, text):
     nocdyn.done(text, command="response")
     table = nocdyn.values(name="response_orders.csv")
     moments = table["total_moment_k"] * np.exp(1j * np.radians(table["phase_total_moment_k"]))
-    nocdyn.done(text, command="campbell")
-    crossings = json.loads((nocdyn.folder / "out/campbell.json").read_text())["crossings"]
+    nocdyn("campbell", "machine.nml", "--out", "speeds")
+    crossings = json.loads((nocdyn.folder / "speeds/campbell.json").read_text())["crossings"]
     return table["order"], moments, len(crossings)
 
 
@@ -145,6 +145,74 @@ def test_an_engine_has_the_response_and_the_orders_of_a_crank(nocdyn):
     orders_of_crank, moments_of_crank, crossings_of_crank = orders_of(nocdyn, crank + PARTS.format(0.3))
     assert list(orders) == list(orders_of_crank) and max(orders) > 6 and crossings == crossings_of_crank > 6
     assert moments == pytest.approx(moments_of_crank, abs=1e-9 * max(abs(moments)))
+
+
+EFFORT_ORDERS = {0: (200, 90), 0.5: (900, 17), 2: (500, 90), 12: (30, 0)}  # amplitude [N m], phase [deg]
+EFFORT = "&engine name = 'e' stroke = 4 cylinders = 'c', 'c' firing_deg = 90, 450 {} /\n"
+
+
+def effort(degrees):
+    """A torque over the angle of a crank with these orders."""
+    return sum(a * np.sin(np.radians(order * degrees + phase)) for order, (a, phase) in EFFORT_ORDERS.items())
+
+
+def write_effort(nocdyn, degrees):
+    rows = zip(map(float, degrees), map(float, effort(degrees)), strict=True)
+    nocdyn.write("t.csv", "crank_angle_deg, torque\n" + "".join(f"{angle!r}, {torque!r}\n" for angle, torque in rows))
+
+
+def by_orders():
+    orders, pairs = list(EFFORT_ORDERS)[1:], list(EFFORT_ORDERS.values())[1:]
+    amplitudes, phases = ([pair[i] for pair in pairs] for i in range(2))
+    text = f"orders = {orders} amplitudes = {amplitudes} phases_deg = {phases} mean_torque = 400"
+    return EFFORT.format(text.replace("[", "").replace("]", ""))
+
+
+@pytest.mark.parametrize("degrees", [np.arange(0, 720, 5), np.arange(-360, 361, 10), 7.5 + np.arange(0, 720, 12)])
+def test_an_engine_by_its_crank_effort_is_the_one_by_its_harmonics(nocdyn, degrees):
+    write_effort(nocdyn, degrees)
+    tables = []
+    for engine in (EFFORT.format("torque_file = 't.csv'"), by_orders()):
+        nocdyn.done(engine + PARTS.format(0.3))
+        run_columns = nocdyn.values()
+        orders, moments, _ = orders_of(nocdyn, engine + PARTS.format(0.3))
+        speeds = nocdyn.values(name="response_orders.csv")["omega_c"]
+        chosen = np.isin(orders, [2, 12]) & np.isin(speeds, [50, 75, 100, 125, 150])
+        assert max(abs(moments[~np.isin(orders, [2, 12])])) < 1e-9 * max(abs(moments))
+        tables.append((run_columns["torque_e_2"], run_columns["total_moment_k"], moments[chosen]))
+    for of_table, of_orders in zip(*tables, strict=True):
+        assert of_table == pytest.approx(of_orders, abs=1e-9 * max(abs(of_orders)))
+
+
+def test_a_crank_effort_with_uneven_angles_is_a_cubic(nocdyn):
+    degrees = np.delete(np.arange(0, 720, 1), [100, 250, 251])
+    write_effort(nocdyn, degrees)
+    table = run(nocdyn, EFFORT.format("torque_file = 't.csv'").replace("'c'", "'crank'"))
+    expected = effort(np.degrees(table["phi_crank [rad]"]) - 90)
+    assert table["torque_e_1 [N m]"] == pytest.approx(expected, abs=1)  # of the cubic, and of its orders above 24
+    assert max(abs(table["torque_e_1 [N m]"] - expected)) > 1e-6
+
+
+def test_pressures_and_their_crank_effort_are_the_same_engine(nocdyn):
+    """A constant pressure has the torque of the lever, whose harmonics fall fast."""
+    angles = np.arange(0, 360, 3)
+    torques = ", ".join(repr(float(torque)) for torque in -1e5 * 0.01 * pi * motion(np.radians(angles))[0])
+    degrees = f"crank_angles_deg = {', '.join(map(str, angles))} "
+    engine = "&engine name = 'e' stroke = 2 cylinders = 'crank' firing_deg = 0 misfire = 0 "
+    by_pressure = run(nocdyn, f"{engine} {degrees} pressures = {len(angles)}*1e5 bore = 0.2 {SLIDER_CRANK} /")
+    by_effort = run(nocdyn, f"{engine} {degrees} torques = {torques} /")
+    assert max(abs(by_pressure["torque_e_1"])) > 300
+    assert by_effort["torque_e_1"] == pytest.approx(by_pressure["torque_e_1"], abs=1e-9)
+    again = nocdyn("run", "out/input.nml", "--out", "again")
+    assert again.returncode == 0 and nocdyn.table("again") == nocdyn.table("out")
+
+
+def test_a_cylinder_that_does_not_fire_has_its_own_crank_effort(nocdyn):
+    points = ", ".join(str(45 * i) for i in range(8))
+    text = f"&engine name = 'e' stroke = 2 cylinders = 'crank' firing_deg = 0 crank_angles_deg = {points} torques = 8*50 {{}} /"
+    assert run(nocdyn, text.format(""))["torque_e_1"] == pytest.approx(50)
+    assert run(nocdyn, text.format("misfire = 1"))["torque_e_1"] == pytest.approx(0)
+    assert run(nocdyn, text.format("misfire = 1 misfire_torques = 8*-4"))["torque_e_1"] == pytest.approx(-4)
 
 
 @pytest.mark.parametrize(
@@ -195,11 +263,25 @@ def test_an_engine_has_the_response_and_the_orders_of_a_crank(nocdyn):
             FIRST.format("reciprocating_mass = 2 crank_radius = 0.3 rod_length = 0.4 offset = -0.2"),
             "offset = -0.2 m: the rod of 0.4 m does not reach the piston at all angles; allowed: crank_radius + |offset| below",
         ),
+        (FIRST.format("torque_file = 't.csv'"), "orders and torque_file are both given; allowed: one of them"),
+        (
+            "&engine name = 'e' stroke = 4 cylinders = 'crank' firing_deg = 0 torques = 8*1 /",
+            "crank_angles is missing; needed: 8 values, one for each of torques",
+        ),
+        (
+            "&engine name = 'e' stroke = 2 cylinders = 'crank' firing_deg = 0 crank_angles = 0, 1, 2, 3, 4, 5, 5.5, 6 /",
+            "crank_angles needs pressures or torques",
+        ),
+        (
+            "&engine name = 'e' stroke = 4 cylinders = 'crank' firing_deg = 0 torques = 7*1, 2 "
+            "crank_angles = 0, 1, 2, 3, 4, 5, 5.5, 6 /",
+            "crank_angles from 0 to 6 are not those of one cycle; needed: a range of",
+        ),
         (FIRST.format("offset = 0.01"), "offset needs pressures, pressure_file or reciprocating_mass"),
         (FIRST.format("pressure_file = 'p.csv'"), "orders and pressure_file are both given; allowed: one of them"),
         (
             "&engine name = 'e' stroke = 4 cylinders = 'crank' firing_deg = 0 /",
-            "it has no torque; needed: orders, table_file, pressures, pressure_file, reciprocating_mass or mean_torque",
+            "it has no torque; needed: orders, table_file, pressures, pressure_file, torques, torque_file, reciprocating_mass or",
         ),
         (
             FIRST.format("").replace("'crank', 'crank'", "'crank', 'cranc'"),
@@ -290,6 +372,11 @@ def test_harmonics_that_are_left_out_are_noted_in_runs_and_responses(nocdyn):
         shares[orders] = [float(share) for share in found]
     assert shares[24] == []
     assert shares[4][0] > 1.5 * shares[8][0] > 1
+    degrees = ", ".join(str(10 * i) for i in range(36))
+    effort = f"&engine name = 'e' stroke = 2 cylinders = 'crank' firing = 0 crank_angles_deg = {degrees} torques = 90, 35*0 "
+    for key, noted in (("harmonics_up_to = 5 /", True), ("/", False)):
+        outcome = nocdyn.done(MACHINE.format(effort + key))
+        assert ("leaves out up to" in outcome.stdout) == noted
     shaft = "&body name = 'end' inertia = 2 /\n&coupling name = 'k' bodies = 'crank', 'end' stiffness = 1e5 damping = 10 /\n"
     shaft += "&response body = 'crank' speed = 5, 20 count = 3 /\n"
     nocdyn.write("r.nml", MACHINE.format(text.replace("KEY", "harmonics_up_to = 4")) + shaft)
@@ -331,6 +418,13 @@ def final_torques(nocdyn, machine, target, low, high):
 def test_keys_of_engines_vary_in_sweeps(nocdyn, key, low, high):
     engine = FIRST.format("reciprocating_mass = 2 crank_radius = 0.1 rod_length = 0.4 offset = 0.01")
     assert len(set(final_torques(nocdyn, engine, f"engine.e.{key}", low, high))) > 1
+
+
+def test_crank_efforts_vary_in_sweeps(nocdyn):
+    points = ", ".join(str(90 * i) for i in range(8))
+    engine = "&engine name = 'e' stroke = 4 cylinders = 'crank' firing_deg = 0"
+    engine += f" crank_angles_deg = {points} torques = 0, 9, 3, 1, 0, 0, 0, 0 /"
+    assert len(set(final_torques(nocdyn, engine, "engine.e.torques(2)", 5, 13))) == 3
 
 
 def test_the_share_of_a_load_follows_it_in_sweeps(nocdyn):

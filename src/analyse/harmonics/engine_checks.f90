@@ -28,7 +28,7 @@ contains
     associate (group => input%groups(index))
       call check_cylinders(group, key, text)
       if (text == '') call check_cycle(group, key, text)   ! of a known stroke
-      if (text == '' .and. group%has_value('pressures')) call check_crank_angles(group, key, text)
+      if (text == '' .and. group%has_value('crank_angles')) call check_crank_angles(group, key, text)
       call note()
       if (group%has_value('orders')) call find_table_obstacle(group, key, text)
       call note()
@@ -79,9 +79,10 @@ contains
       end if
     end associate
     key = 'name'
-    if (group%has_value('orders') .or. group%has_value('pressures') .or. group%has_value('reciprocating_mass')) return
+    if (group%has_value('orders') .or. group%has_value('crank_angles') .or. group%has_value('reciprocating_mass')) return
     if (abs(group%number('mean_torque', absent=0.0_wp)) > 0) return
-    text = 'it has no torque; needed: orders, table_file, pressures, pressure_file, reciprocating_mass or mean_torque'
+    text = 'it has no torque; needed: orders, table_file, pressures, pressure_file, torques, torque_file, ' // &
+           'reciprocating_mass or mean_torque'
   end subroutine check_cylinders
 
   !> The rod reaches the piston at all angles of the crank.

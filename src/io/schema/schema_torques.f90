@@ -262,9 +262,16 @@ module nocdyn_schema_torques
       'pressure in a cylinder that does not fire', fewest=8), &
     key_rule_t('engine', 'pressure_file', a_file, 1, '', unset, anything, &
       'file with the columns crank_angle_deg, pressure, perhaps misfire_pressure'), &
+    key_rule_t('engine', 'torques', a_number, any_number, 'N m', unset, anything, &
+      'in place of pressures: torque of a cylinder on its crank at these angles (crank effort)', fewest=8), &
+    key_rule_t('engine', 'misfire_torques', a_number, any_number, 'N m', unset, anything, &
+      'torque of a cylinder that does not fire', fewest=8), &
+    key_rule_t('engine', 'torque_file', a_file, 1, '', unset, anything, &
+      'file with the columns crank_angle_deg, torque, perhaps misfire_torque'), &
     key_rule_t('engine', 'crankcase_pressure', a_number, 1, 'Pa', '0', not_negative, &
       'pressure below the pistons; 0 if pressures are above that of the atmosphere'), &
-    key_rule_t('engine', 'harmonics_up_to', a_number, 1, '', '24', up_to_64, 'highest order that is taken from the pressure'), &
+    key_rule_t('engine', 'harmonics_up_to', a_number, 1, '', '24', up_to_64, &
+      'highest order that is taken from pressures or torques'), &
     key_rule_t('engine', 'bore', a_number, 1, 'm', unset, positive, 'diameter of the pistons'), &
     key_rule_t('engine', 'crank_radius', a_number, 1, 'm', unset, positive, 'half the travel of the pistons'), &
     key_rule_t('engine', 'rod_length', a_number, 1, 'm', unset, positive, 'length of the connecting rods'), &
@@ -332,18 +339,23 @@ module nocdyn_schema_torques
                     'orders amplitudes phases speeds loads misfire_amplitudes misfire_phases'), &
     relation_rule_t('engine', at_most_one, 'pressure_file', 'crank_angles pressures misfire_pressures'), &
     relation_rule_t('engine', at_most_one, 'orders amplitudes phases table_file mean_torque', &
-                    'crank_angles pressures pressure_file'), &
+                    'crank_angles pressures pressure_file torques torque_file'), &
+    relation_rule_t('engine', at_most_one, 'torque_file', 'crank_angles torques misfire_torques'), &
+    relation_rule_t('engine', at_most_one, 'pressures pressure_file misfire_pressures', 'torques torque_file misfire_torques'), &
     relation_rule_t('engine', requires, 'load_share', 'loads table_file'), &
     relation_rule_t('engine', requires, 'misfire_phases', 'misfire_amplitudes'), &
+    relation_rule_t('engine', requires, 'crank_angles', 'pressures torques'), &
     relation_rule_t('engine', requires, 'pressures pressure_file', 'bore'), &
     relation_rule_t('engine', requires, 'pressures pressure_file reciprocating_mass', 'crank_radius'), &
     relation_rule_t('engine', requires, 'pressures pressure_file reciprocating_mass', 'rod_length'), &
-    relation_rule_t('engine', requires, 'bore crankcase_pressure harmonics_up_to', 'pressures pressure_file'), &
+    relation_rule_t('engine', requires, 'bore crankcase_pressure', 'pressures pressure_file'), &
+    relation_rule_t('engine', requires, 'harmonics_up_to', 'pressures pressure_file torques torque_file'), &
     relation_rule_t('engine', requires, 'crank_radius rod_length offset', 'pressures pressure_file reciprocating_mass'), &
     relation_rule_t('engine', less_than, 'crank_radius', 'rod_length'), &
     relation_rule_t('engine', equal_lengths, 'cylinders firing', ''), &
     relation_rule_t('engine', columns, 'orders amplitudes phases', 'table_file speeds loads misfire_amplitudes misfire_phases'), &
-    relation_rule_t('engine', columns, 'crank_angles pressures', 'pressure_file misfire_pressures')]
+    relation_rule_t('engine', columns, 'crank_angles pressures', 'pressure_file misfire_pressures'), &
+    relation_rule_t('engine', columns, 'crank_angles torques', 'torque_file misfire_torques')]
 
   type(example_t), parameter, public :: torque_examples(*) = [ &
     example_t('motor',      "name = 'drive'    body = 'motor'    a = 200.0  b = 10.0  c = 1.0"), &

@@ -170,7 +170,7 @@ contains
     type(group_t), intent(in) :: group
 
     order = max(largest(group, 'orders'), merge(inertia_orders, 0.0_wp, group%has_value('reciprocating_mass')))
-    if (group%has_value('pressures')) order = max(order, group%number('harmonics_up_to'))
+    if (group%has_value('crank_angles')) order = max(order, group%number('harmonics_up_to'))
   end function order_of_engine
 
   !> The highest order of a slider-crank.
