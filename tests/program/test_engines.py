@@ -24,6 +24,10 @@ PRESSURES = (
 LABEL = "nocdyn: machine.nml:2: &engine 'e': "
 
 
+def pressure_rows(low, high, step=2):
+    return "".join(f"{angle}, {1e5 + 1e4 * cos(radians(angle))}\n" for angle in range(low, high + 1, step))
+
+
 def run(nocdyn, engine, *words):
     nocdyn.done(MACHINE.format(engine), *words)
     return nocdyn.values()
@@ -83,10 +87,6 @@ def test_blades_have_a_share_of_the_load(nocdyn):
         nocdyn, load + other + blades.format("")
     )
     assert "load = 'watr' is no &load on 'crank'; there: 'water'\n" in refusal(nocdyn, load + blades.format("load = 'watr'"))
-
-
-def pressure_rows(low, high, step=2):
-    return "".join(f"{angle}, {1e5 + 1e4 * cos(radians(angle))}\n" for angle in range(low, high + 1, step))
 
 
 def test_pressure_turns_the_crank(nocdyn):
@@ -213,6 +213,75 @@ def test_a_cylinder_that_does_not_fire_has_its_own_crank_effort(nocdyn):
     assert run(nocdyn, text.format(""))["torque_e_1"] == pytest.approx(50)
     assert run(nocdyn, text.format("misfire = 1"))["torque_e_1"] == pytest.approx(0)
     assert run(nocdyn, text.format("misfire = 1 misfire_torques = 8*-4"))["torque_e_1"] == pytest.approx(-4)
+
+
+RESISTING = (
+    "mean_torque = 50 orders = 1, 2 amplitudes = 80, 30 phases_deg = 10, 20",
+    "crank_angles_deg = 0, 45, 90, 135, 180, 225, 270, 315 torques = 0, 10, 40, 90, 60, 50, 40, 10",
+)
+
+
+@pytest.mark.parametrize("torque", RESISTING)
+def test_the_torques_of_a_compressor_resist_and_its_inertia_torque_stays(nocdyn, torque):
+    text = "&engine name = 'e' {} stroke = 2 cylinders = 'crank' firing_deg = 0 {} /"
+    mass = f"reciprocating_mass = 0.5 {SLIDER_CRANK}"
+    column = "torque_e_1 [N m]"
+    engine, compressor = (run(nocdyn, text.format(works, torque))[column] for works in ("", "works = 'compressor'"))
+    assert compressor == pytest.approx(-engine, abs=1e-6)  # the speed changes by 1e-9 of itself
+    heavy = run(nocdyn, text.format("works = 'compressor'", torque + " " + mass))[column]
+    assert heavy - compressor == pytest.approx(run(nocdyn, text.format("", mass))[column], abs=1e-5)
+
+
+def test_the_pressures_of_a_compressor_have_the_sign_of_pressures(nocdyn):
+    nocdyn.write("p.csv", "crank_angle_deg, pressure\n" + pressure_rows(-180, 180))
+    engine = run(nocdyn, PRESSURES.format("crankcase_pressure = 1e5"))
+    compressor = run(nocdyn, PRESSURES.format("crankcase_pressure = 1e5 works = 'compressor'"))
+    assert all((values == compressor[label]).all() for label, values in engine.items())
+
+
+TRAIN_OF_BOTH = """&body name = 'c' inertia = 3 speed = 100 /
+&body name = 'f' inertia = 2 /
+&coupling name = 'k' bodies = 'c', 'f' stiffness = 1e5 damping = 5 /
+&engine name = 'gas' stroke = 4 cylinders = 'c' firing = 0 mean_torque = {} orders = 0.5 amplitudes = 9 /
+&engine name = 'pump' works = 'compressor' stroke = 2 cylinders = 'f', 'f' firing_deg = 0, 180 mean_torque = {} /
+&load name = 'l' body = 'f' viscous = 0.2 /
+&run t_end = 0.1 /
+&response body = 'c' speed = 50, 150 count = 3 /
+"""
+
+
+def notes_on_signs(outcome):
+    return re.findall(r"note: (\w+ '\w+' (?:works|generates).*)", outcome.stdout)
+
+
+def test_engines_hold_the_speed_of_a_response_and_compressors_do_not(nocdyn):
+    outcome = nocdyn.done(TRAIN_OF_BOTH.format(100, 60), command="response")
+    assert notes_on_signs(outcome) == []
+    table = nocdyn.values(name="response.csv")
+    assert table["drive"] == pytest.approx((60 + 0.2 * table["omega_c"]) / 100, rel=1e-9)
+
+
+def test_power_of_the_other_sign_is_noted(nocdyn):
+    motor = "&motor name = 'alternator' body = 'f' kind = 'constant' torque = {} /\n"
+    assert notes_on_signs(nocdyn.done(TRAIN_OF_BOTH.format(100, 60), command="equilibrium")) == []
+    for command in ("equilibrium", "modes"):
+        text = motor.format(-20) + TRAIN_OF_BOTH.format(100, 60)
+        assert notes_on_signs(nocdyn.done(text, command=command)) == ["motor 'alternator' generates: it takes 2000 W"]
+    backwards = motor.format(90) + TRAIN_OF_BOTH.format(-10, -60)
+    assert notes_on_signs(nocdyn.done(backwards, command="equilibrium")) == [
+        "engine 'gas' works as a compressor: it takes 7000 W",
+        "compressor 'pump' works as a motor: it gives 42000 W",
+    ]
+    for command in ("response", "campbell"):
+        notes = notes_on_signs(nocdyn.done(backwards, command=command))
+        assert [note.split(" up to")[0] for note in notes] == [
+            "engine 'gas' works as a compressor: it takes",
+            "compressor 'pump' works as a motor: it gives",
+        ]
+        assert re.search(r"gives up to 9000 W at (\d+) of \1 speeds", notes[1])
+    in_run = notes_on_signs(nocdyn.done(backwards))
+    assert re.match(r"engine 'gas' works as a compressor: it takes [0-9.]+ J in this run", in_run[0])
+    assert notes_on_signs(nocdyn.done(TRAIN_OF_BOTH.format(100, 60))) == []
 
 
 @pytest.mark.parametrize(

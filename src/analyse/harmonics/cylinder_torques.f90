@@ -35,6 +35,10 @@ contains
       missed = table_torque(group, 'misfire_amplitudes', 'misfire_phases')
       fired%mean = fired%mean + group%number('mean_torque', absent=0.0_wp) / size(firing)
     end if
+    if (group%text('works') == 'compressor' .and. .not. group%has_value('pressures')) then
+      fired = turned(fired, -1.0_wp, 0.0_wp)   ! given as torques that resist
+      missed = turned(missed, -1.0_wp, 0.0_wp)
+    end if
     call add_inertia(group, fired)
     call add_inertia(group, missed)
     allocate (torque(size(firing)))

@@ -10,14 +10,16 @@ module nocdyn_schema_torques
 
   type(allowed_t), parameter :: faults = allowed_t(words='three_phase two_phase resynchronisation')
   character(len=*), parameter :: governed = 'quadratic constant table induction dc inverter'   ! kinds with a governor
+
   type(allowed_t), parameter :: above_minus_1 = allowed_t(low=-1.0_wp)
+  type(allowed_t), parameter :: works = allowed_t(words='engine compressor')
 
   type(group_rule_t), parameter, public :: torque_groups(*) = [ &
     group_rule_t('motor', in_torques, any_times, 'torque', 'A driving torque on a body, by a law of its speed.'), &
     group_rule_t('load', in_torques, any_times, 'torque', 'A resisting torque on a body: the sum of the terms that are given.'), &
     group_rule_t('excitation', in_torques, any_times, 'torque', 'A torque on a body, by a law of time or of its angle.'), &
     group_rule_t('engine', in_torques, any_times, 'torque', &
-                 'The gas and inertia torques of the cylinders of an engine, on its cranks.')]
+                 'The torques of the cylinders of an engine or a compressor, on its cranks.')]
 
   type(kind_rule_t), parameter, public :: torque_kinds(*) = [ &
     kind_rule_t('motor',      'quadratic', 'a - b omega - c omega^2'), &
@@ -226,11 +228,16 @@ module nocdyn_schema_torques
       'the torque is 0 before; time, or t_start of &run, if not given'), &
     key_rule_t('excitation', 'end', a_number, 1, 's', unset, anything, 'the torque is 0 from then on'), &
     key_rule_t('excitation', 'decay', a_number, 1, 's', unset, positive, &
-      'time constant: the torque is multiplied by exp(-(t - start) / decay)'), &
+      'time constant: the torque is multiplied by exp(-(t - start) / decay)')]
+
+  ! A statement has at most 255 continued lines.
+  type(key_rule_t), parameter, public :: engine_keys(*) = [ &
     key_rule_t('engine', 'name', a_name, 1, '', required, anything, &
       'name in results and messages; its cylinders are NAME_1, NAME_2, ...'), &
     key_rule_t('engine', 'cylinders', a_body, any_number, '', required, anything, &
       'the crank of each cylinder; two cylinders of a V engine may share one', fewest=1, may_repeat=.true.), &
+    key_rule_t('engine', 'works', a_word, 1, '', "'engine'", works, &
+      'torques of an engine drive, of a compressor resist; pressures have one sign'), &
     key_rule_t('engine', 'stroke', an_integer, 1, '', required, strokes, &
       '4: each cylinder fires every other turn; 2: every turn'), &
     key_rule_t('engine', 'firing', a_number, any_number, 'rad', required, not_negative, &
@@ -334,7 +341,9 @@ module nocdyn_schema_torques
     relation_rule_t('excitation', requires, 'term_multiples term_times term_phases', 'term_amplitudes'), &
     relation_rule_t('excitation', equal_lengths, 'term_amplitudes term_multiples', ''), &
     relation_rule_t('excitation', less_than, 'start', 'end'), &
-    relation_rule_t('excitation', less_than, 'time', 'end'), &
+    relation_rule_t('excitation', less_than, 'time', 'end')]
+
+  type(relation_rule_t), parameter, public :: engine_relations(*) = [ &
     relation_rule_t('engine', at_most_one, 'table_file', &
                     'orders amplitudes phases speeds loads misfire_amplitudes misfire_phases'), &
     relation_rule_t('engine', at_most_one, 'pressure_file', 'crank_angles pressures misfire_pressures'), &
@@ -380,7 +389,7 @@ module nocdyn_schema_torques
                             'orders = 2, 4, 6  amplitudes = 90.0, 40.0, 15.0', .false.), &
     example_t('excitation', "name = 'blow'     body = 'machine'  kind = 'pulse'|" // &
                             'amplitude = -500.0  time = 2.0  duration = 0.05', .false.), &
-    example_t('engine',      "name = 'diesel'   cylinders = 'motor'  stroke = 4  firing_deg = 0|" // &
+    example_t('engine',     "name = 'diesel'   cylinders = 'motor'  stroke = 4  firing_deg = 0|" // &
                              'orders = 0.5, 1, 1.5, 2  amplitudes = 90, 80, 60, 40  mean_torque = 30', .false.)]
 
 end module nocdyn_schema_torques

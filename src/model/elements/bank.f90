@@ -58,6 +58,7 @@ module nocdyn_bank
     logical :: has_polynomial_potential = .true.  !! whether `polynomials` gives its whole restoring moment
     logical :: has_paper_law = .true.             !! whether its law is the one of eqs. (3), (5), (17) or (20)
     logical :: is_engine = .false.                !! whether its elements are excitations whose means drive
+    character(len=10) :: works = ''               !! of the cylinders of one machine: as an 'engine' or a 'compressor'
     logical :: follows_mean_speed = .false.       !! whether its torque changes with the speed from cycle to cycle, not within one
     logical :: is_mesh = .false.                  !! whether its rows are radii: angles are deformations [m], moments forces [N]
     logical :: has_parts = .false.                !! whether consecutive elements of one name are parts of one element

@@ -265,10 +265,11 @@ contains
   subroutine read_engines()
     character(len=64) :: name, cylinders(most_numbers)
     real(wp), dimension(most_numbers) :: amplitudes, firing, firing_deg, orders, phases
-    real(wp) :: crank_radius, mean_torque, reciprocating_mass, rod_length
+    real(wp) :: crank_radius, mean_torque, offset, reciprocating_mass, rod_length
+    character(len=64) :: works
     integer :: i, misfire, status, stroke
     namelist /engine/ name, cylinders, stroke, firing, firing_deg, orders, amplitudes, phases, mean_torque, misfire, &
-      crank_radius, reciprocating_mass, rod_length
+      crank_radius, reciprocating_mass, rod_length, offset, works
 
     rewind (unit)
     do
@@ -281,6 +282,8 @@ contains
       mean_torque = 0.0_wp
       misfire = 0
       crank_radius = not_given
+      offset = 0.0_wp
+      works = 'engine'
       reciprocating_mass = not_given
       rod_length = not_given
       read (unit, nml=engine, iostat=status)
@@ -288,7 +291,7 @@ contains
       if (status /= 0) error stop 'engine'
       where (firing_deg > not_given) firing = firing_deg * degree
       print '(*(g0, 1x))', 'engine', trim(name), (trim(cylinders(i)), i=1, most_numbers), stroke, firing, orders, amplitudes, &
-        phases, mean_torque, misfire, crank_radius, reciprocating_mass, rod_length
+        phases, mean_torque, misfire, crank_radius, reciprocating_mass, rod_length, offset, trim(works)
     end do
   end subroutine read_engines
 

@@ -211,7 +211,8 @@ contains
         names(c)%text = groups%names(i)%text // '_' // to_text(c)
       end do
       bank = new_order_excitations(names, groups%listed_bodies('cylinders', i), in_lanes(torque, groups%lanes))
-      bank%is_engine = .true.
+      bank%works = groups%input%groups(groups%indices(i))%text('works')
+      bank%is_engine = bank%works == 'engine'
       call append_bank(banks, bank)
       deallocate (names)
     end do
