@@ -198,7 +198,8 @@ contains
         if (all(other%kind /= [character(len=10) :: 'motor', 'load', 'excitation', 'engine'])) cycle
         if (index(other%name, group%name // '_') /= 1) cycle
         do c = 1, size(group%texts('cylinders'))
-          if (other%name == group%name // '_' // to_text(c)) text = 'the name ' // quoted(other%name) // &
+          if (other%name == group%name // '_' // to_text(c) .or. &
+              other%name == group%name // '_damping_' // to_text(c)) text = 'the name ' // quoted(other%name) // &
             ' of its cylinder ' // to_text(c) // ' is taken by &' // other%kind
         end do
       end associate

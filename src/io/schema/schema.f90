@@ -50,6 +50,8 @@ module nocdyn_schema
     key_rule_t('body', 'name', a_name, 1, '', required, anything, 'name in couplings, gears, torques and results'), &
     key_rule_t('body', 'inertia', a_number, 1, 'kg m2', required, not_negative, &
       'moment of inertia about the axis; 0 where a body with an inertia is geared to it'), &
+    key_rule_t('body', 'entrained', a_number, 1, '', unset, not_negative, &
+      'inertia of the water that moves with it, as a share of inertia, e.g. of a propeller'), &
     key_rule_t('body', 'bearing_friction', a_number, 1, 'N m', '0', not_negative, &
       'dry friction of its bearings: against the motion, and up to as much at rest'), &
     key_rule_t('body', 'angle', a_number, 1, 'rad', '0', anything, 'angle at the start'), &

@@ -156,6 +156,12 @@ module nocdyn_schema_torques
       'torque against the motion: constant tanh(omega / constant_speed)'), &
     key_rule_t('load', 'constant_speed', a_number, 1, 'rad/s', '0.01', positive, &
       'speed at which the constant torque has 76 % of its full value'), &
+    key_rule_t('load', 'vibration_damping', a_number, 1, 'N m s/rad', unset, not_negative, &
+      'of vibrations about the mean rotation, in place of the slope of the torque over the speed'), &
+    key_rule_t('load', 'vibration_factor', a_number, 1, '', unset, not_negative, &
+      'the same as a multiple of mean torque over mean speed; the slope of a quadratic torque is 2'), &
+    key_rule_t('load', 'mean_time', a_number, 1, 's', '1', positive, &
+      'time over which a run finds the mean rotation; much longer than a vibration'), &
     key_rule_t('load', 'table_speed', a_number, any_number, 'rad/s', unset, anything, &
       'speeds of the points of a table, ascending', fewest=2, ascends=.true.), &
     key_rule_t('load', 'table_torque', a_number, any_number, 'N m', unset, anything, &
@@ -286,6 +292,14 @@ module nocdyn_schema_torques
       'distance of the line of the pistons from the axis of the crank, as in &crank'), &
     key_rule_t('engine', 'reciprocating_mass', a_number, 1, 'kg', unset, not_negative, &
       'mass that moves with one piston; its inertia torque has all orders of the slider-crank'), &
+    key_rule_t('engine', 'vibration_damping', a_number, 1, 'N m s/rad', unset, not_negative, &
+      'of the vibration about the mean rotation, at each cylinder'), &
+    key_rule_t('engine', 'magnifier', a_number, 1, '', unset, positive, &
+      'the same: inertia of a crank times damping_frequency over it'), &
+    key_rule_t('engine', 'damping_frequency', a_number, 1, 'rad/s', unset, positive, &
+      'frequency at which the damping has this magnifier'), &
+    key_rule_t('engine', 'mean_time', a_number, 1, 's', '1', positive, &
+      'time over which a run finds the mean rotation; much longer than a vibration'), &
     key_rule_t('engine', 'misfire', an_integer, 1, '', '0', not_negative, &
       'number of a cylinder that does not fire, 0: all fire'), &
     key_rule_t('engine', 'cylinder_scatter', a_number, any_number, '', unset, above_minus_1, &
@@ -319,6 +333,9 @@ module nocdyn_schema_torques
     relation_rule_t('motor', requires, 'governor_speed set_times', 'governor_time'), &
     relation_rule_t('motor', requires, 'governor_gain governor_time governor_start', 'governor_speed set_times'), &
     relation_rule_t('motor', requires, 'set_speeds', 'set_times'), &
+    relation_rule_t('load', at_most_one, 'vibration_damping', 'vibration_factor'), &
+    relation_rule_t('load', at_most_one, 'vibration_damping vibration_factor', 'constant'), &
+    relation_rule_t('load', requires, 'mean_time', 'vibration_damping vibration_factor'), &
     relation_rule_t('load', requires, 'constant_speed', 'constant'), &
     relation_rule_t('load', requires, 'interpolation extrapolation', 'table_speed table_file'), &
     relation_rule_t('motor', equal_lengths, 'table_speed table_torque', 'table_file'), &
@@ -344,6 +361,10 @@ module nocdyn_schema_torques
     relation_rule_t('excitation', less_than, 'time', 'end')]
 
   type(relation_rule_t), parameter, public :: engine_relations(*) = [ &
+    relation_rule_t('engine', at_most_one, 'vibration_damping', 'magnifier damping_frequency'), &
+    relation_rule_t('engine', requires, 'magnifier', 'damping_frequency'), &
+    relation_rule_t('engine', requires, 'damping_frequency', 'magnifier'), &
+    relation_rule_t('engine', requires, 'mean_time', 'vibration_damping magnifier'), &
     relation_rule_t('engine', at_most_one, 'table_file', &
                     'orders amplitudes phases speeds loads misfire_amplitudes misfire_phases'), &
     relation_rule_t('engine', at_most_one, 'pressure_file', 'crank_angles pressures misfire_pressures'), &

@@ -66,6 +66,10 @@ module nocdyn_bank
     integer :: first_internal = 1                 !! number of the first internal state of `first` in the machine
     real(wp), allocatable :: loss_factor(:)       !! k (1 + i loss_factor) is the stiffness at a frequency; not allocated: 0
     real(wp), allocatable :: loss_damping(:)      !! part of the damping that replaces it over the time [N m s/rad]; with it
+    real(wp), allocatable :: vibration_damping(:) !! of oscillations in place of the slope over the speed, which is then the one
+                                                  !! of the mean rotation [N m s/rad], [elements]; not allocated: the slope
+    real(wp), allocatable :: vibration_factor(:)  !! more of it, over the moment over the speed, [elements]; with it
+    logical :: follows_inertias = .false.         !! whether parameters follow from the inertias of bodies
   contains
     procedure, non_overridable :: to_mean_torque
     procedure, non_overridable :: list_harmonics
