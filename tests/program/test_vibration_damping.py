@@ -98,6 +98,14 @@ def test_modes_and_campbell_have_the_damping_and_rigid_motions_the_slope_of_the_
     assert steady["growth_rate_1_s"] == pytest.approx(-SLOPE / (CRANK + PROPELLER), rel=1e-3)
 
 
+def test_a_mean_time_below_a_turn_is_noted(nocdyn):
+    short = nocdyn.done(
+        TRAIN.replace("vibration_factor = 4 mean_time = 0.5", "vibration_factor = 4 mean_time = 0.03") + RUN.format(0.1)
+    )
+    assert "note: mean_time of 'w' is 0.48 turns at the start speed: a run takes vibrations of so low orders" in short.stdout
+    assert "note: mean_time" not in nocdyn.done(TRAIN + RUN.format(0.1)).stdout
+
+
 def test_the_factor_two_is_the_slope_of_a_quadratic_torque(nocdyn):
     texts = (
         SHAKEN.replace("vibration_factor = 4", "vibration_factor = 2"),
