@@ -17,6 +17,7 @@ from scipy.optimize import brentq
 
 # the case that is computed
 CASES = {"reciprocating_compressor": "reconnection", "generator_set": "two_phase", "ice_propeller": "case_2"}
+INERTIA_ORDERS = 17  # of pistons: the ones from here on are below rounding errors
 ARC = 1e-3  # time constant of the currents in opening contacts [s]
 
 
@@ -150,8 +151,13 @@ def gas_harmonics(m, engine):
 
 
 def inertia_amplitudes(engine):
+    """Of the sines of the orders 1, 2, ... of -x' x'', x the exact position of a piston over the radius of its crank."""
     ratio = engine["crank_radius"] / engine["rod_length"]
-    shares = np.array([ratio / 4, -1 / 2, -3 * ratio / 4, -(ratio**2) / 4])
+    sine, cosine = np.sin(2 * np.pi * np.arange(512) / 512), np.cos(2 * np.pi * np.arange(512) / 512)
+    reach = np.sqrt(1 / ratio**2 - sine**2)
+    first = -sine - sine * cosine / reach
+    second = -cosine - (cosine**2 - sine**2) / reach - (sine * cosine) ** 2 / reach**3
+    shares = -np.fft.rfft(-first * second)[1:INERTIA_ORDERS].imag / 256
     return engine["reciprocating_mass"] * engine["crank_radius"] ** 2 * shares
 
 
@@ -234,7 +240,7 @@ def compressor_parts(m):
         torque = np.zeros(len(train.names))
         for body, dead_centre, harmonics in gas:
             torque[body] += np.real(harmonics @ np.exp(1j * k * (angle[body] - dead_centre)))
-        waves = np.sin(np.outer(np.arange(1, 5), angle[cranks] - angles))
+        waves = np.sin(np.outer(np.arange(1, INERTIA_ORDERS), angle[cranks] - angles))
         np.add.at(torque, cranks, speed[cranks] ** 2 * (inertia @ waves))
         torque[bearing_at] -= bearing["constant"] * np.tanh(speed[bearing_at] / bearing["constant_speed"])
         return torque
@@ -614,7 +620,7 @@ def compressor_response(m, order, speed):
     force = np.zeros(len(train.names), complex)
     for body, dead_centre, harmonics in gas:
         force[body] += harmonics[order] * np.exp(1j * order * (angle[body] - dead_centre))
-    if order <= 4:
+    if order < INERTIA_ORDERS:
         for body, dead_centre in zip(train.index(*masses["cylinders"]), masses["firing"]):
             amplitude = -1j * inertia_amplitudes(masses)[order - 1] * speed**2
             force[body] += amplitude * np.exp(1j * order * (angle[body] - dead_centre))

@@ -261,6 +261,8 @@ contains
 
     call append_bank(machine%banks, new_loads(lane_keys('fan', [1, bodies], variants, &
                                     'viscous quadratic constant constant_speed', [1.0_wp, 0.5_wp, 5.0_wp, 0.7_wp])))
+    call append_bank(machine%banks, new_loads(lane_keys('screw', [2, bodies], variants, &
+                                    'viscous quadratic vibration_factor mean_time', [1.0_wp, 0.5_wp, 4.0_wp, 0.2_wp])))
     given = lane_keys('mill', [2, 2], variants, 'viscous quadratic constant_speed', [1.0_wp, 0.5_wp, 1.0_wp])
     call given%add_table('table_speed', curves([-2.0_wp, 0.0_wp, 2.5_wp], [-10.0_wp, 0.0_wp, 30.0_wp], interpolation_cubic, &
                                                extrapolation_constant, variants, 2))

@@ -14,6 +14,7 @@ module nocdyn_assembly
   use nocdyn_motion_notes, only: note_motions
   use nocdyn_multiplier, only: multiplier_t
   use nocdyn_paper, only: paper_t
+  use nocdyn_mean_time_notes, only: note_mean_times
   use nocdyn_pressure_notes, only: note_pressures
   use nocdyn_reduced, only: reduced_t
   use nocdyn_steady_joints, only: choose_overruns
@@ -44,6 +45,7 @@ contains
     call note_motions(input, machine%start_notes)
     call note_left_out_harmonics(input, machine%start_notes)
     call note_pressures(input, machine%start_notes)
+    call note_mean_times(machine, machine%start_notes)
   end subroutine assemble_machine
 
   !> Builds the machine as it is in a steady state: with means over a turn, and, if it is asked for, with clutches and freewheels

@@ -29,7 +29,8 @@ module nocdyn_machine_parts
   use nocdyn_start_speeds, only: fit_start_speeds
   use nocdyn_steady_views, only: steady_view_t
   use nocdyn_text, only: append, joined, rounded_text, selected, to_text
-  use nocdyn_torque_assembly, only: add_engines, add_excitation_form, add_load_form, excitation_form, load_form
+  use nocdyn_torque_assembly, only: add_engines, add_excitation_form, add_load_form, add_steady_load_form, &
+    excitation_form, load_form
   use nocdyn_units, only: from_si, unit_rpm
   use nocdyn_written_values, only: shared_unit, unit_of, written_key, written_number
   implicit none (type, external)
@@ -183,9 +184,13 @@ contains
         call add_banks(new_element_groups(input, 'drive', n, body_index), drive_form, add_drive_form, machine%banks)
       end if
       call add_banks(new_element_groups(input, 'motor', n, body_index), motor_form, add_motor_form, machine%banks)
-      call add_banks(new_element_groups(input, 'load', n, body_index), load_form, add_load_form, machine%banks)
+      if (view%is_steady) then
+        call add_banks(new_element_groups(input, 'load', n, body_index), load_form, add_steady_load_form, machine%banks)
+      else
+        call add_banks(new_element_groups(input, 'load', n, body_index), load_form, add_load_form, machine%banks)
+      end if
       call add_banks(new_element_groups(input, 'excitation', n, body_index), excitation_form, add_excitation_form, machine%banks)
-      call add_engines(new_element_groups(input, 'engine', n, body_index), machine%banks)
+      call add_engines(new_element_groups(input, 'engine', n, body_index), machine%inertia, view%is_steady, machine%banks)
     end associate
   end subroutine add_elements
 
@@ -198,7 +203,7 @@ contains
     bodies = new_element_groups(input, 'body', machine%lanes)
     machine%bodies = size(bodies%names)
     machine%names = bodies%names
-    machine%inertia = bodies%values('inertia')
+    machine%inertia = bodies%values('inertia') * (1.0_wp + bodies%values('entrained'))
     machine%start_angle = bodies%values('angle')
     machine%start_speed = bodies%values('speed')
     allocate (machine%start_notes(0))

@@ -1,5 +1,6 @@
 !> The torques of the cylinders of an engine, from the keys of its group.
 module nocdyn_cylinder_torques
+  use nocdyn_crank_efforts, only: effort_harmonics, known_harmonics, sampled_effort
   use nocdyn_harmonic_tables, only: table_torque
   use nocdyn_input, only: group_t
   use nocdyn_kinds, only: wp
@@ -26,12 +27,17 @@ contains
     allocate (firing, source=group%numbers('firing'))
     allocate (factor, source=factors(group))
     if (group%has_value('pressures')) then
-      fired = gas_torque(group, 'pressures')
-      missed = gas_torque(group, 'misfire_pressures')
+      call find_cycles('pressures', 'misfire_pressures')
+    else if (group%has_value('torques')) then
+      call find_cycles('torques', 'misfire_torques')
     else
       fired = table_torque(group, 'amplitudes', 'phases')
       missed = table_torque(group, 'misfire_amplitudes', 'misfire_phases')
       fired%mean = fired%mean + group%number('mean_torque', absent=0.0_wp) / size(firing)
+    end if
+    if (group%text('works') == 'compressor' .and. .not. group%has_value('pressures')) then
+      fired = turned(fired, -1.0_wp, 0.0_wp)   ! given as torques that resist
+      missed = turned(missed, -1.0_wp, 0.0_wp)
     end if
     call add_inertia(group, fired)
     call add_inertia(group, missed)
@@ -40,6 +46,14 @@ contains
       torque(c) = turned(fired, factor(c), firing(c))
       if (c == group%whole_number('misfire')) torque(c) = turned(missed, 1.0_wp, firing(c))
     end do
+  contains
+    subroutine find_cycles(values, misfire_values)
+      character(len=*), intent(in) :: values, misfire_values   ! keys
+
+      fired = gas_torque(group, values)
+      missed = turned(fired, 0.0_wp, 0.0_wp)
+      if (size(group%numbers(misfire_values)) > 0) missed = gas_torque(group, misfire_values)
+    end subroutine find_cycles
   end function cylinder_torques
 
   !> Angle of the crank in a cycle [rad].
@@ -74,54 +88,62 @@ contains
     end function fired_before
   end function factors
 
-  !> The torque of a cylinder by its pressure; 0 if there are no values.
-  function gas_torque(group, pressures) result(torque)
+  !> The torque of a cylinder by its pressure or its torque over the angle of the crank.
+  function gas_torque(group, values) result(torque)
     type(group_t), intent(in) :: group
-    character(len=*), intent(in) :: pressures   !! key of the pressures
+    character(len=*), intent(in) :: values   !! key of the pressures or torques, which are given
     type(order_torque_t) :: torque
-    real(wp), allocatable :: angle(:), pressure(:)
+    real(wp), allocatable :: angle(:), value(:)
     real(wp) :: cycle
-    integer :: k
+    integer :: k, n
 
     cycle = cycle_of(group)
-    associate (n => int(group%number('harmonics_up_to') * cycle / (2.0_wp * pi) + 1.0e-9_wp))
-      allocate (torque%order(n))
-      torque%order(:) = [(k * 2.0_wp * pi / cycle, k=1, n)]
-      allocate (torque%speed(1), torque%mean(1), torque%sine(n, 1), torque%cosine(n, 1), source=0.0_wp)
-    end associate
+    call take_points(group, values, angle, value)
+    n = int(group%number('harmonics_up_to') * cycle / (2.0_wp * pi) + 1.0e-9_wp)
+    if (group%has_value('torques')) n = min(n, known_harmonics(cycle, angle))
+    allocate (torque%order(n))
+    torque%order(:) = [(k * 2.0_wp * pi / cycle, k=1, n)]
+    allocate (torque%speed(1), torque%mean(1), torque%sine(n, 1), torque%cosine(n, 1), source=0.0_wp)
     allocate (torque%square_order(0), torque%square_sine(0), torque%square_cosine(0))
-    if (size(group%numbers(pressures)) == 0) return
-    call take_pressures(group, pressures, angle, pressure)
-    call gas_harmonics(cylinder(group), cycle, angle, pressure, torque%mean(1), torque%sine(:, 1), torque%cosine(:, 1))
+    if (group%has_value('torques')) then
+      call effort_harmonics(cycle, angle, value, torque%mean(1), torque%sine(:, 1), torque%cosine(:, 1))
+    else
+      call gas_harmonics(cylinder(group), cycle, angle, value, torque%mean(1), torque%sine(:, 1), torque%cosine(:, 1))
+    end if
   end function gas_torque
 
-  !> The torque of a cylinder by its pressure at equal distances over a cycle, with all its harmonics [N m].
-  function sampled_torque(group, pressures) result(torque)
-    type(group_t), intent(in) :: group
-    character(len=*), intent(in) :: pressures   !! key of the pressures, which are given
+  !> The torque of a cylinder that fires at equal distances over a cycle, with all its harmonics [N m].
+  function sampled_torque(group) result(torque)
+    type(group_t), intent(in) :: group   !! with pressures or torques
     real(wp) :: torque(samples)
-    real(wp), allocatable :: angle(:), pressure(:)
+    real(wp), allocatable :: angle(:), value(:)
 
-    call take_pressures(group, pressures, angle, pressure)
-    torque = sampled_gas_torque(cylinder(group), cycle_of(group), angle, pressure)
+    if (group%has_value('torques')) then
+      call take_points(group, 'torques', angle, value)
+      torque = sampled_effort(cycle_of(group), angle, value)
+    else
+      call take_points(group, 'pressures', angle, value)
+      torque = sampled_gas_torque(cylinder(group), cycle_of(group), angle, value)
+    end if
   end function sampled_torque
 
-  !> The points of one cycle, with the pressure above the one of the crankcase.
-  pure subroutine take_pressures(group, pressures, angle, pressure)
+  !> The points of one cycle with their values; a pressure is the one above the crankcase's.
+  pure subroutine take_points(group, values, angle, value)
     type(group_t), intent(in) :: group
-    character(len=*), intent(in) :: pressures   !! key of the pressures
-    real(wp), allocatable, intent(out) :: angle(:), pressure(:)   !! [rad], [Pa]
+    character(len=*), intent(in) :: values                     !! key of the pressures or torques
+    real(wp), allocatable, intent(out) :: angle(:), value(:)   !! [rad], [Pa] or [N m]
 
-    allocate (pressure, source=group%numbers(pressures))
     allocate (angle, source=group%numbers('crank_angles'))
-    call close_cycle(cycle_of(group), angle, pressure)
-    pressure = pressure - group%number('crankcase_pressure')
-  end subroutine take_pressures
+    allocate (value, source=group%numbers(values))
+    call close_cycle(cycle_of(group), angle, value)
+    if (.not. group%has_value('torques')) value = value - group%number('crankcase_pressure')
+  end subroutine take_points
 
   type(cylinder_t) function cylinder(group)
     type(group_t), intent(in) :: group
 
-    cylinder = cylinder_t(group%number('bore', absent=0.0_wp), group%number('crank_radius'), group%number('rod_length'))
+    cylinder = cylinder_t(group%number('bore', absent=0.0_wp), group%number('crank_radius'), group%number('rod_length'), &
+                          group%number('offset', absent=0.0_wp))
   end function cylinder
 
   !> Sets the harmonics of the inertia torque, if the engine has a reciprocating mass.
@@ -129,10 +151,11 @@ contains
     type(group_t), intent(in) :: group
     type(order_torque_t), intent(inout) :: torque
 
+    integer :: k
+
     if (.not. group%has_value('reciprocating_mass')) return
-    torque%square_order = [1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp]
-    torque%square_sine = inertia_harmonics(cylinder(group), group%number('reciprocating_mass'))
-    torque%square_cosine = 0.0_wp * torque%square_sine
+    call inertia_harmonics(cylinder(group), group%number('reciprocating_mass'), torque%square_sine, torque%square_cosine)
+    torque%square_order = [(real(k, wp), k=1, size(torque%square_sine))]
   end subroutine add_inertia
 
   !> The torque of a cylinder that fires at another angle, its gas torque times a factor.

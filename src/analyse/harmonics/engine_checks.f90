@@ -10,7 +10,7 @@ module nocdyn_engine_checks
   implicit none (type, external)
   private
 
-  public :: check_engine, check_order_torques, check_stroke, check_crank_angles
+  public :: check_engine, check_order_torques, check_reach, check_stroke, check_crank_angles
 
   real(wp), parameter :: pi = acos(-1.0_wp)
   real(wp), parameter :: rounding = 1.0e-9_wp   ! relative, of angles and orders
@@ -28,9 +28,11 @@ contains
     associate (group => input%groups(index))
       call check_cylinders(group, key, text)
       if (text == '') call check_cycle(group, key, text)   ! of a known stroke
-      if (text == '' .and. group%has_value('pressures')) call check_crank_angles(group, key, text)
+      if (text == '' .and. group%has_value('crank_angles')) call check_crank_angles(group, key, text)
       call note()
       if (group%has_value('orders')) call find_table_obstacle(group, key, text)
+      call note()
+      if (group%has_value('crank_radius')) call check_reach(group, key, text)
       call note()
       call check_loads(group, key, text)
       call note()
@@ -77,10 +79,24 @@ contains
       end if
     end associate
     key = 'name'
-    if (group%has_value('orders') .or. group%has_value('pressures') .or. group%has_value('reciprocating_mass')) return
+    if (group%has_value('orders') .or. group%has_value('crank_angles') .or. group%has_value('reciprocating_mass')) return
     if (abs(group%number('mean_torque', absent=0.0_wp)) > 0) return
-    text = 'it has no torque; needed: orders, table_file, pressures, pressure_file, reciprocating_mass or mean_torque'
+    text = 'it has no torque; needed: orders, table_file, pressures, pressure_file, torques, torque_file, ' // &
+           'reciprocating_mass or mean_torque'
   end subroutine check_cylinders
+
+  !> The rod reaches the piston at all angles of the crank.
+  subroutine check_reach(group, key, text)
+    type(group_t), intent(in) :: group                        !! &engine or &crank
+    character(len=:), allocatable, intent(out) :: key, text   !! which key is wrong, and what about it, '' if nothing
+
+    text = ''
+    key = 'offset'
+    if (group%number('crank_radius') >= group%number('rod_length')) return   ! the schema refuses it
+    if (group%number('crank_radius') + abs(group%number('offset')) < group%number('rod_length')) return
+    text = 'offset = ' // to_text(group%number('offset')) // ' m: the rod of ' // to_text(group%number('rod_length')) // &
+           ' m does not reach the piston at all angles; allowed: crank_radius + |offset| below rod_length'
+  end subroutine check_reach
 
   !> The stroke is one of those that there are.
   subroutine check_stroke(group, key, text)
@@ -182,7 +198,8 @@ contains
         if (all(other%kind /= [character(len=10) :: 'motor', 'load', 'excitation', 'engine'])) cycle
         if (index(other%name, group%name // '_') /= 1) cycle
         do c = 1, size(group%texts('cylinders'))
-          if (other%name == group%name // '_' // to_text(c)) text = 'the name ' // quoted(other%name) // &
+          if (other%name == group%name // '_' // to_text(c) .or. &
+              other%name == group%name // '_damping_' // to_text(c)) text = 'the name ' // quoted(other%name) // &
             ' of its cylinder ' // to_text(c) // ' is taken by &' // other%kind
         end do
       end associate

@@ -6,27 +6,31 @@ module nocdyn_slider_cranks
   implicit none (type, external)
   private
 
-  public :: lever, gas_harmonics, sampled_gas_torque, inertia_harmonics, close_cycle, sample_cycle
+  public :: lever, gas_harmonics, sampled_gas_torque, inertia_harmonics, turn_angles, inertia_orders, close_cycle, sample_cycle
 
   type, public :: cylinder_t
     real(wp) :: bore = 0.0_wp           !! diameter of the piston [m]
     real(wp) :: crank_radius = 0.0_wp   !! r [m]
-    real(wp) :: rod_length = 0.0_wp     !! l > r [m]
+    real(wp) :: rod_length = 0.0_wp     !! l [m], more than r + |e|
+    real(wp) :: offset = 0.0_wp         !! e, of the piston's line beside the axis of the crank [m]
   end type cylinder_t
 
   real(wp), parameter :: pi = acos(-1.0_wp)
   integer, parameter, public :: samples = 4096   !! of a cycle: the pressure between them follows from points that are less dense
+  integer, parameter :: turn_samples = 1024      ! of the inertia, whose harmonics fall faster than those of a pressure
+  integer, parameter, public :: highest_order = 64   !! of an inertia torque; for r / l <= 0.9 it has no more above rounding
 
 contains
 
-  !> Torque per force on the piston, r sin(theta) (1 + lambda cos(theta) / sqrt(1 - lambda^2 sin(theta)^2)) with lambda = r / l.
+  !> Torque per force on the piston, -x' of its position x = r cos(theta) + sqrt(l^2 - p^2), p = r sin(theta) - e, which are the
+  !> rows of nocdyn_crank_rows: r sin(theta) + p r cos(theta) / sqrt(l^2 - p^2).
   elemental real(wp) function lever(crank, theta)
     type(cylinder_t), intent(in) :: crank
-    real(wp), intent(in) :: theta   !! angle of the crank after top dead centre [rad]
-    real(wp) :: ratio
+    real(wp), intent(in) :: theta   !! angle of the crank from where it points along the line of the piston, to it [rad]
+    real(wp) :: across
 
-    ratio = crank%crank_radius / crank%rod_length
-    lever = crank%crank_radius * sin(theta) * (1.0_wp + ratio * cos(theta) / sqrt(1.0_wp - (ratio * sin(theta))**2))
+    across = crank%crank_radius * sin(theta) - crank%offset
+    lever = crank%crank_radius * (sin(theta) + across * cos(theta) / sqrt(crank%rod_length**2 - across**2))
   end function lever
 
   !> Takes the last point of a cycle away if it is the first one again, which then has the mean of both values.
@@ -84,18 +88,39 @@ contains
     end do
   end function sampled_gas_torque
 
-  !> Amplitudes of sin(k theta), k = 1 to 4, of the torque of a reciprocating mass m over omega^2:
-  !> m r^2 (lambda / 4, -1/2, -3 lambda / 4, -lambda^2 / 4), lambda = r / l. The terms that are left out are smaller by
-  !> lambda^2. The first three are in J. P. Den Hartog, Mechanical Vibrations, 4th edition, 1956, chapter 5; the fourth follows
-  !> likewise from the piston's travel r (cos theta + lambda / 4 cos 2 theta).
-  pure function inertia_harmonics(crank, mass) result(amplitude)
+  !> The torque of a reciprocating mass m over omega^2, as of `inertia_orders`: the one of the inertia m x'^2. For small
+  !> lambda = r / l and no offset it is m r^2 (lambda / 4, -1/2, -3 lambda / 4, -lambda^2 / 4) sin(k theta), k = 1 to 4, the first
+  !> three in J. P. Den Hartog, Mechanical Vibrations, 4th edition, 1956, chapter 5.
+  pure subroutine inertia_harmonics(crank, mass, sine, cosine)
     type(cylinder_t), intent(in) :: crank
-    real(wp), intent(in) :: mass    !! [kg]
-    real(wp) :: amplitude(4)        !! [kg m2]
+    real(wp), intent(in) :: mass                                   !! [kg]
+    real(wp), allocatable, intent(out) :: sine(:), cosine(:)       !! [kg m2], of the orders 1, 2, ...
 
-    associate (ratio => crank%crank_radius / crank%rod_length)
-      amplitude = mass * crank%crank_radius**2 * [0.25_wp * ratio, -0.5_wp, -0.75_wp * ratio, -0.25_wp * ratio**2]
-    end associate
-  end function inertia_harmonics
+    call inertia_orders(mass * lever(crank, turn_angles())**2, sine, cosine)
+  end subroutine inertia_harmonics
+
+  !> The angles of a turn at which `inertia_orders` wants an inertia [rad].
+  pure function turn_angles()
+    real(wp) :: turn_angles(turn_samples)
+    integer :: i
+
+    turn_angles = [(2.0_wp * pi * (i - 1) / turn_samples, i=1, turn_samples)]
+  end function turn_angles
+
+  !> The torque -J'(theta) / 2 over omega^2 of an inertia J(theta) that repeats every turn: the sum of sine_k sin(k theta) +
+  !> cosine_k cos(k theta), with all orders up to `highest_order` that are more than rounding errors.
+  pure subroutine inertia_orders(inertia, sine, cosine)
+    real(wp), intent(in) :: inertia(:)                         !! at `turn_angles` [kg m2]
+    real(wp), allocatable, intent(out) :: sine(:), cosine(:)   !! [kg m2], of the orders 1, 2, ...
+    real(wp), parameter :: rounding = 2 * epsilon(1.0_wp)      ! of the coefficients of J, relative to its largest value
+    real(wp), dimension(highest_order) :: by_cosine, by_sine
+    real(wp) :: mean
+    integer :: k, last
+
+    call fourier_coefficients(inertia, mean, by_sine, by_cosine)
+    last = findloc(hypot(by_sine, by_cosine) > rounding * maxval(abs(inertia)), .true., dim=1, back=.true.)
+    sine = [(0.5_wp * k * by_cosine(k), k=1, last)]
+    cosine = [(-0.5_wp * k * by_sine(k), k=1, last)]
+  end subroutine inertia_orders
 
 end module nocdyn_slider_cranks

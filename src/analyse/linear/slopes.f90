@@ -21,7 +21,7 @@ module nocdyn_slopes
     real(wp), allocatable :: damping(:)            !! minus the derivatives by the rates of twist, without the two below
                                                    !! [N m s/rad], [elements]
     real(wp), allocatable :: stand_in(:)           !! viscous damping in place of `loss` over the time, the same
-    real(wp), allocatable :: mean_damping(:)       !! of torques that follow the mean speed of a cycle: of rigid motions only
+    real(wp), allocatable :: mean_damping(:)       !! of torques that follow the mean rotation: of rigid motions only
     real(wp), allocatable :: by_internal(:)        !! derivatives of the moments by internal states, [internal states]
     real(wp), allocatable :: rate_speed(:)         !! derivatives of their rates by the speed of the element, the same
     real(wp), allocatable :: rate_internal(:, :)   !! derivatives of the rates by the states of the element, [members, the same]
@@ -57,6 +57,7 @@ contains
       self%damping = self%damping - self%stand_in
       self%mean_damping = merge(self%damping, 0.0_wp, follows)
       where (follows) self%damping = 0.0_wp
+      call split_damping(machine, elements, self)
       self%by_internal = factor(machine%elements%internal%element) * internal%applied(1, :)
       self%rate_speed = internal%rate_speed(1, :)
       self%rate_internal = internal%rate_internal(1, :, :)
@@ -69,6 +70,29 @@ contains
       end do
     end associate
   end subroutine new_slopes
+
+  !> Gives elements that damp vibrations otherwise than the mean rotation both of their slopes.
+  pure subroutine split_damping(machine, elements, self)
+    type(machine_t), intent(in) :: machine
+    type(element_values_t), intent(in) :: elements   !! of the machine
+    type(slopes_t), intent(inout) :: self
+    real(wp) :: damping
+    integer :: b, e, i
+
+    do b = 1, size(machine%banks)
+      associate (bank => machine%banks(b)%bank)
+        if (.not. allocated(bank%vibration_damping)) cycle
+        do i = 1, bank%count
+          e = bank%first + i - 1
+          damping = bank%vibration_damping(i)
+          if (abs(elements%speed(1, e)) > 0) damping = damping - bank%vibration_factor(i) * elements%applied(1, e) &
+                                                                / elements%speed(1, e)
+          self%mean_damping(e) = self%damping(e) - damping
+          self%damping(e) = damping
+        end do
+      end associate
+    end do
+  end subroutine split_damping
 
   !> The complex stiffnesses D_e of motions exp(lambda t), and their derivatives by lambda, in which the relative damping stays as
   !> it is: k + lambda c + i loss at a frequency, less the moments of the internal states.

@@ -13,6 +13,7 @@ module nocdyn_equilibrium_report
   use nocdyn_kinds, only: wp
   use nocdyn_machine_report, only: named_coordinates
   use nocdyn_machine, only: machine_t
+  use nocdyn_power_notes, only: note_power_signs
   use nocdyn_quantities, only: form_angle
   use nocdyn_reduced, only: new_reduced, reduced_t
   use nocdyn_signals, only: signal_angle, signal_element, signal_residual, signal_t, signal_time, signal_work_in, &
@@ -53,6 +54,7 @@ contains
     real(wp), allocatable :: row(:), watts(:, :), y(:)
     integer, allocatable :: reported(:)                 !! columns
     type(string_t), allocatable :: parts(:)             !! of the elements with power
+    real(wp), allocatable :: power(:, :)                !! of these [W], [parts, equilibria]
     integer :: i, k
 
     allocate (self%equilibria, source=equilibria)
@@ -72,12 +74,13 @@ contains
     allocate (parts, source=work_element_names(formulation%machine))
     allocate (self%work_elements, source=whole_names(parts))
     allocate (self%values(size(self%labels), size(equilibria)), self%power(size(self%work_elements), size(equilibria)))
-    allocate (row(size(table%labels)), watts(1, size(parts)))
+    allocate (row(size(table%labels)), watts(1, size(parts)), power(size(parts), size(equilibria)))
     do k = 1, size(equilibria)
       y = [equilibria(k)%y(1, :), (0.0_wp, i=1, size(parts))]
       call table%fill(t_infinity, y, row)
       call with_works%state%power(with_works%machine, watts)
       self%values(:, k) = row(reported)
+      power(:, k) = watts(1, :)
       self%power(:, k) = whole_sums(parts, watts(1, :))
       i = findloc(is_finite([self%values(:, k), self%power(:, k)]), .false., dim=1)
       if (i == 0) cycle
@@ -85,6 +88,7 @@ contains
                  label_of(self, i) // ' is not a finite number')
       return
     end do
+    call note_power_signs(formulation%machine, power, 'W', 'steady states', self%notes)
   end subroutine new_equilibrium_report
 
   !> What the number `i` of the values and then the powers is.

@@ -12,6 +12,7 @@ module nocdyn_modes_report
   use nocdyn_shaft_errors, only: describe_error, has_shaft_nodes, noted_error, shaft_error
   use nocdyn_operating_point, only: operating_point_t
   use nocdyn_damping_notes, only: note_mean_slopes, note_stand_ins
+  use nocdyn_power_notes, only: note_power_signs
   use nocdyn_table_text, only: cell, cell_width, padded, text_width
   use nocdyn_text, only: append, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
@@ -62,6 +63,10 @@ contains
     if (allocated(error)) return
     self%machine = point%formulation%machine
     call note_mean_slopes(self%machine, point%formulation%state%elements%applied_speed(1, :), point%notes)
+    associate (elements => point%formulation%state%elements, e => self%machine%with_work)
+      call note_power_signs(self%machine, spread((elements%restoring(1, e) + elements%applied(1, e)) * elements%speed(1, e), &
+                                                 2, 1), 'W', '', point%notes)
+    end associate
     do i = 1, size(self%modes)
       associate (mode => self%modes(i))
         if (all(is_finite([real(mode%eigenvalue, wp), aimag(mode%eigenvalue), mode%undamped, mode%kinetic, mode%potential, &

@@ -12,6 +12,7 @@ module nocdyn_response_notes
   use nocdyn_linearisation, only: linearisation_t, undamped_modes
   use nocdyn_machine, only: machine_t
   use nocdyn_moment_forms, only: kind_reaction, moment_form_t
+  use nocdyn_power_notes, only: note_power_signs
   use nocdyn_response_choice, only: has_gap, lose_of
   use nocdyn_response_settings, only: response_settings_t
   use nocdyn_shaft_errors, only: describe_error, has_shaft_nodes, noted_error, shaft_error
@@ -84,6 +85,7 @@ contains
     real(wp), parameter :: rounding = 1.0e-9_wp
     integer :: e, held, i, open
     real(wp) :: factor(size(response%points)), supply(size(response%points))
+    real(wp), allocatable :: power(:, :)
     integer, allocatable :: elastic(:)
     type(string_t), allocatable :: names(:)
 
@@ -102,6 +104,13 @@ contains
                          'or its law is level there')
     end do
     call note_mean_slopes(response%machine, steepest_slopes(response), notes)
+    allocate (power(size(response%machine%with_work), size(response%points)))
+    do i = 1, size(response%points)
+      associate (state => response%points(i)%state, e => response%machine%with_work)
+        power(:, i) = state%mean(e) * state%rate(e)
+      end associate
+    end do
+    call note_power_signs(response%machine, power, 'W', 'speeds', notes)
     held = 0
     do i = 1, size(response%points)
       if (abs(response%points(i)%state%torque) > 0) held = held + 1

@@ -18,6 +18,7 @@ module nocdyn_transient
   use nocdyn_missed_states, only: note_missed_state
   use nocdyn_output_times, only: check_output_times, output_note, output_times
   use nocdyn_output_units, only: output_units
+  use nocdyn_power_notes, only: note_power_signs
   use nocdyn_row_intervals, only: choose_row_count, note_sparse_rows
   use nocdyn_run_verdict, only: add_damage, add_end, add_run_limits, column_extreme_t
   use nocdyn_run_settings, only: check_size, choose_settings
@@ -256,6 +257,9 @@ contains
     if (summary%extremes%rows > 0) then
       allocate (summary%energy_balance)
       call observer%table%find_energy_balance(summary%energy_balance)
+      associate (work => summary%energy_balance%work)
+        call note_power_signs(observer%table%columns%formulation%machine, reshape(work, [size(work), 1]), 'J', '', summary%notes)
+      end associate
     end if
     if (.not. allocated(error)) then
       associate (extremes => summary%extremes)

@@ -12,7 +12,8 @@ module nocdyn_schema
     from_2, group_alias_t, group_rule_t, in_machine, in_simulation, key_rule_t, kind_rule_t, less_than, not_negative, positive, &
     relation_rule_t, required, unset
   use nocdyn_schema_sweep, only: sweep_aliases, sweep_examples, sweep_groups, sweep_keys, sweep_kinds, sweep_relations
-  use nocdyn_schema_torques, only: torque_examples, torque_groups, torque_keys, torque_kinds, torque_relations
+  use nocdyn_schema_torques, only: engine_keys, engine_relations, torque_examples, torque_groups, torque_keys, torque_kinds, &
+    torque_relations
   use nocdyn_text, only: append, string_t
   implicit none (type, external)
   private
@@ -50,6 +51,8 @@ module nocdyn_schema
     key_rule_t('body', 'name', a_name, 1, '', required, anything, 'name in couplings, gears, torques and results'), &
     key_rule_t('body', 'inertia', a_number, 1, 'kg m2', required, not_negative, &
       'moment of inertia about the axis; 0 where a body with an inertia is geared to it'), &
+    key_rule_t('body', 'entrained', a_number, 1, '', unset, not_negative, &
+      'inertia of the water that moves with it, as a share of inertia, e.g. of a propeller'), &
     key_rule_t('body', 'bearing_friction', a_number, 1, 'N m', '0', not_negative, &
       'dry friction of its bearings: against the motion, and up to as much at rest'), &
     key_rule_t('body', 'angle', a_number, 1, 'rad', '0', anything, 'angle at the start'), &
@@ -103,12 +106,12 @@ module nocdyn_schema
   type(kind_rule_t), parameter, public :: kind_rules(*) = [joint_kinds, torque_kinds, sweep_kinds]
 
   type(key_rule_t), parameter, public :: key_rules(*) = &
-    [frame_keys, coupling_keys, joint_keys, torque_keys, response_keys, sweep_keys]
+    [frame_keys, coupling_keys, joint_keys, torque_keys, engine_keys, response_keys, sweep_keys]
 
   type(relation_rule_t), parameter, public :: relation_rules(*) = [ &
     relation_rule_t('run', less_than, 't_start', 't_end'), &
     relation_rule_t('output', at_most_one, 'interval', 'points'), &
-    coupling_relations, joint_relations, torque_relations, response_relations, sweep_relations]
+    coupling_relations, joint_relations, torque_relations, engine_relations, response_relations, sweep_relations]
 
   type(alias_t), parameter, public :: aliases(*) = sweep_aliases
 

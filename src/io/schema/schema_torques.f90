@@ -10,14 +10,16 @@ module nocdyn_schema_torques
 
   type(allowed_t), parameter :: faults = allowed_t(words='three_phase two_phase resynchronisation')
   character(len=*), parameter :: governed = 'quadratic constant table induction dc inverter'   ! kinds with a governor
+
   type(allowed_t), parameter :: above_minus_1 = allowed_t(low=-1.0_wp)
+  type(allowed_t), parameter :: works = allowed_t(words='engine compressor')
 
   type(group_rule_t), parameter, public :: torque_groups(*) = [ &
     group_rule_t('motor', in_torques, any_times, 'torque', 'A driving torque on a body, by a law of its speed.'), &
     group_rule_t('load', in_torques, any_times, 'torque', 'A resisting torque on a body: the sum of the terms that are given.'), &
     group_rule_t('excitation', in_torques, any_times, 'torque', 'A torque on a body, by a law of time or of its angle.'), &
     group_rule_t('engine', in_torques, any_times, 'torque', &
-                 'The gas and inertia torques of the cylinders of an engine, on its cranks.')]
+                 'The torques of the cylinders of an engine or a compressor, on its cranks.')]
 
   type(kind_rule_t), parameter, public :: torque_kinds(*) = [ &
     kind_rule_t('motor',      'quadratic', 'a - b omega - c omega^2'), &
@@ -154,6 +156,12 @@ module nocdyn_schema_torques
       'torque against the motion: constant tanh(omega / constant_speed)'), &
     key_rule_t('load', 'constant_speed', a_number, 1, 'rad/s', '0.01', positive, &
       'speed at which the constant torque has 76 % of its full value'), &
+    key_rule_t('load', 'vibration_damping', a_number, 1, 'N m s/rad', unset, not_negative, &
+      'of vibrations about the mean rotation, in place of the slope of the torque over the speed'), &
+    key_rule_t('load', 'vibration_factor', a_number, 1, '', unset, not_negative, &
+      'the same as a multiple of mean torque over mean speed; the slope of a quadratic torque is 2'), &
+    key_rule_t('load', 'mean_time', a_number, 1, 's', '1', positive, &
+      'time over which a run finds the mean rotation; much longer than a vibration'), &
     key_rule_t('load', 'table_speed', a_number, any_number, 'rad/s', unset, anything, &
       'speeds of the points of a table, ascending', fewest=2, ascends=.true.), &
     key_rule_t('load', 'table_torque', a_number, any_number, 'N m', unset, anything, &
@@ -226,11 +234,16 @@ module nocdyn_schema_torques
       'the torque is 0 before; time, or t_start of &run, if not given'), &
     key_rule_t('excitation', 'end', a_number, 1, 's', unset, anything, 'the torque is 0 from then on'), &
     key_rule_t('excitation', 'decay', a_number, 1, 's', unset, positive, &
-      'time constant: the torque is multiplied by exp(-(t - start) / decay)'), &
+      'time constant: the torque is multiplied by exp(-(t - start) / decay)')]
+
+  ! A statement has at most 255 continued lines.
+  type(key_rule_t), parameter, public :: engine_keys(*) = [ &
     key_rule_t('engine', 'name', a_name, 1, '', required, anything, &
       'name in results and messages; its cylinders are NAME_1, NAME_2, ...'), &
     key_rule_t('engine', 'cylinders', a_body, any_number, '', required, anything, &
       'the crank of each cylinder; two cylinders of a V engine may share one', fewest=1, may_repeat=.true.), &
+    key_rule_t('engine', 'works', a_word, 1, '', "'engine'", works, &
+      'torques of an engine drive, of a compressor resist; pressures have one sign'), &
     key_rule_t('engine', 'stroke', an_integer, 1, '', required, strokes, &
       '4: each cylinder fires every other turn; 2: every turn'), &
     key_rule_t('engine', 'firing', a_number, any_number, 'rad', required, not_negative, &
@@ -262,14 +275,31 @@ module nocdyn_schema_torques
       'pressure in a cylinder that does not fire', fewest=8), &
     key_rule_t('engine', 'pressure_file', a_file, 1, '', unset, anything, &
       'file with the columns crank_angle_deg, pressure, perhaps misfire_pressure'), &
+    key_rule_t('engine', 'torques', a_number, any_number, 'N m', unset, anything, &
+      'in place of pressures: torque of a cylinder on its crank at these angles (crank effort)', fewest=8), &
+    key_rule_t('engine', 'misfire_torques', a_number, any_number, 'N m', unset, anything, &
+      'torque of a cylinder that does not fire', fewest=8), &
+    key_rule_t('engine', 'torque_file', a_file, 1, '', unset, anything, &
+      'file with the columns crank_angle_deg, torque, perhaps misfire_torque'), &
     key_rule_t('engine', 'crankcase_pressure', a_number, 1, 'Pa', '0', not_negative, &
       'pressure below the pistons; 0 if pressures are above that of the atmosphere'), &
-    key_rule_t('engine', 'harmonics_up_to', a_number, 1, '', '24', up_to_64, 'highest order that is taken from the pressure'), &
+    key_rule_t('engine', 'harmonics_up_to', a_number, 1, '', '24', up_to_64, &
+      'highest order that is taken from pressures or torques'), &
     key_rule_t('engine', 'bore', a_number, 1, 'm', unset, positive, 'diameter of the pistons'), &
     key_rule_t('engine', 'crank_radius', a_number, 1, 'm', unset, positive, 'half the travel of the pistons'), &
     key_rule_t('engine', 'rod_length', a_number, 1, 'm', unset, positive, 'length of the connecting rods'), &
+    key_rule_t('engine', 'offset', a_number, 1, 'm', '0', anything, &
+      'distance of the line of the pistons from the axis of the crank, as in &crank'), &
     key_rule_t('engine', 'reciprocating_mass', a_number, 1, 'kg', unset, not_negative, &
-      'mass that moves with one piston; its inertia torque has the orders 1 to 4'), &
+      'mass that moves with one piston; its inertia torque has all orders of the slider-crank'), &
+    key_rule_t('engine', 'vibration_damping', a_number, 1, 'N m s/rad', unset, not_negative, &
+      'of the vibration about the mean rotation, at each cylinder'), &
+    key_rule_t('engine', 'magnifier', a_number, 1, '', unset, positive, &
+      'the same: inertia of a crank times damping_frequency over it'), &
+    key_rule_t('engine', 'damping_frequency', a_number, 1, 'rad/s', unset, positive, &
+      'frequency at which the damping has this magnifier'), &
+    key_rule_t('engine', 'mean_time', a_number, 1, 's', '1', positive, &
+      'time over which a run finds the mean rotation; much longer than a vibration'), &
     key_rule_t('engine', 'misfire', an_integer, 1, '', '0', not_negative, &
       'number of a cylinder that does not fire, 0: all fire'), &
     key_rule_t('engine', 'cylinder_scatter', a_number, any_number, '', unset, above_minus_1, &
@@ -303,6 +333,9 @@ module nocdyn_schema_torques
     relation_rule_t('motor', requires, 'governor_speed set_times', 'governor_time'), &
     relation_rule_t('motor', requires, 'governor_gain governor_time governor_start', 'governor_speed set_times'), &
     relation_rule_t('motor', requires, 'set_speeds', 'set_times'), &
+    relation_rule_t('load', at_most_one, 'vibration_damping', 'vibration_factor'), &
+    relation_rule_t('load', at_most_one, 'vibration_damping vibration_factor', 'constant'), &
+    relation_rule_t('load', requires, 'mean_time', 'vibration_damping vibration_factor'), &
     relation_rule_t('load', requires, 'constant_speed', 'constant'), &
     relation_rule_t('load', requires, 'interpolation extrapolation', 'table_speed table_file'), &
     relation_rule_t('motor', equal_lengths, 'table_speed table_torque', 'table_file'), &
@@ -325,23 +358,34 @@ module nocdyn_schema_torques
     relation_rule_t('excitation', requires, 'term_multiples term_times term_phases', 'term_amplitudes'), &
     relation_rule_t('excitation', equal_lengths, 'term_amplitudes term_multiples', ''), &
     relation_rule_t('excitation', less_than, 'start', 'end'), &
-    relation_rule_t('excitation', less_than, 'time', 'end'), &
+    relation_rule_t('excitation', less_than, 'time', 'end')]
+
+  type(relation_rule_t), parameter, public :: engine_relations(*) = [ &
+    relation_rule_t('engine', at_most_one, 'vibration_damping', 'magnifier damping_frequency'), &
+    relation_rule_t('engine', requires, 'magnifier', 'damping_frequency'), &
+    relation_rule_t('engine', requires, 'damping_frequency', 'magnifier'), &
+    relation_rule_t('engine', requires, 'mean_time', 'vibration_damping magnifier'), &
     relation_rule_t('engine', at_most_one, 'table_file', &
                     'orders amplitudes phases speeds loads misfire_amplitudes misfire_phases'), &
     relation_rule_t('engine', at_most_one, 'pressure_file', 'crank_angles pressures misfire_pressures'), &
     relation_rule_t('engine', at_most_one, 'orders amplitudes phases table_file mean_torque', &
-                    'crank_angles pressures pressure_file'), &
+                    'crank_angles pressures pressure_file torques torque_file'), &
+    relation_rule_t('engine', at_most_one, 'torque_file', 'crank_angles torques misfire_torques'), &
+    relation_rule_t('engine', at_most_one, 'pressures pressure_file misfire_pressures', 'torques torque_file misfire_torques'), &
     relation_rule_t('engine', requires, 'load_share', 'loads table_file'), &
     relation_rule_t('engine', requires, 'misfire_phases', 'misfire_amplitudes'), &
+    relation_rule_t('engine', requires, 'crank_angles', 'pressures torques'), &
     relation_rule_t('engine', requires, 'pressures pressure_file', 'bore'), &
     relation_rule_t('engine', requires, 'pressures pressure_file reciprocating_mass', 'crank_radius'), &
     relation_rule_t('engine', requires, 'pressures pressure_file reciprocating_mass', 'rod_length'), &
-    relation_rule_t('engine', requires, 'bore crankcase_pressure harmonics_up_to', 'pressures pressure_file'), &
-    relation_rule_t('engine', requires, 'crank_radius rod_length', 'pressures pressure_file reciprocating_mass'), &
+    relation_rule_t('engine', requires, 'bore crankcase_pressure', 'pressures pressure_file'), &
+    relation_rule_t('engine', requires, 'harmonics_up_to', 'pressures pressure_file torques torque_file'), &
+    relation_rule_t('engine', requires, 'crank_radius rod_length offset', 'pressures pressure_file reciprocating_mass'), &
     relation_rule_t('engine', less_than, 'crank_radius', 'rod_length'), &
     relation_rule_t('engine', equal_lengths, 'cylinders firing', ''), &
     relation_rule_t('engine', columns, 'orders amplitudes phases', 'table_file speeds loads misfire_amplitudes misfire_phases'), &
-    relation_rule_t('engine', columns, 'crank_angles pressures', 'pressure_file misfire_pressures')]
+    relation_rule_t('engine', columns, 'crank_angles pressures', 'pressure_file misfire_pressures'), &
+    relation_rule_t('engine', columns, 'crank_angles torques', 'torque_file misfire_torques')]
 
   type(example_t), parameter, public :: torque_examples(*) = [ &
     example_t('motor',      "name = 'drive'    body = 'motor'    a = 200.0  b = 10.0  c = 1.0"), &
@@ -366,7 +410,7 @@ module nocdyn_schema_torques
                             'orders = 2, 4, 6  amplitudes = 90.0, 40.0, 15.0', .false.), &
     example_t('excitation', "name = 'blow'     body = 'machine'  kind = 'pulse'|" // &
                             'amplitude = -500.0  time = 2.0  duration = 0.05', .false.), &
-    example_t('engine',      "name = 'diesel'   cylinders = 'motor'  stroke = 4  firing_deg = 0|" // &
+    example_t('engine',     "name = 'diesel'   cylinders = 'motor'  stroke = 4  firing_deg = 0|" // &
                              'orders = 0.5, 1, 1.5, 2  amplitudes = 90, 80, 60, 40  mean_torque = 30', .false.)]
 
 end module nocdyn_schema_torques

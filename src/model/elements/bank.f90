@@ -58,6 +58,7 @@ module nocdyn_bank
     logical :: has_polynomial_potential = .true.  !! whether `polynomials` gives its whole restoring moment
     logical :: has_paper_law = .true.             !! whether its law is the one of eqs. (3), (5), (17) or (20)
     logical :: is_engine = .false.                !! whether its elements are excitations whose means drive
+    character(len=10) :: works = ''               !! of the cylinders of one machine: as an 'engine' or a 'compressor'
     logical :: follows_mean_speed = .false.       !! whether its torque changes with the speed from cycle to cycle, not within one
     logical :: is_mesh = .false.                  !! whether its rows are radii: angles are deformations [m], moments forces [N]
     logical :: has_parts = .false.                !! whether consecutive elements of one name are parts of one element
@@ -65,6 +66,10 @@ module nocdyn_bank
     integer :: first_internal = 1                 !! number of the first internal state of `first` in the machine
     real(wp), allocatable :: loss_factor(:)       !! k (1 + i loss_factor) is the stiffness at a frequency; not allocated: 0
     real(wp), allocatable :: loss_damping(:)      !! part of the damping that replaces it over the time [N m s/rad]; with it
+    real(wp), allocatable :: vibration_damping(:) !! of oscillations in place of the slope over the speed, which is then the one
+                                                  !! of the mean rotation [N m s/rad], [elements]; not allocated: the slope
+    real(wp), allocatable :: vibration_factor(:)  !! more of it, over the moment over the speed, [elements]; with it
+    logical :: follows_inertias = .false.         !! whether parameters follow from the inertias of bodies
   contains
     procedure, non_overridable :: to_mean_torque
     procedure, non_overridable :: list_harmonics

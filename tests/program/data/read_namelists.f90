@@ -203,11 +203,11 @@ contains
 
   subroutine read_loads()
     character(len=64) :: name, body, interpolation, extrapolation
-    real(wp) :: viscous, quadratic, constant, constant_speed
+    real(wp) :: viscous, quadratic, constant, constant_speed, mean_time, vibration_factor
     real(wp), dimension(most_numbers) :: table_speed, table_torque
     integer :: status
     namelist /load/ name, body, viscous, quadratic, constant, constant_speed, table_speed, table_torque, interpolation, &
-      extrapolation
+      extrapolation, mean_time, vibration_factor
 
     rewind (unit)
     do
@@ -215,6 +215,8 @@ contains
       quadratic = 0.0_wp
       constant = 0.0_wp
       constant_speed = 0.01_wp
+      mean_time = not_given
+      vibration_factor = not_given
       table_speed = not_given
       table_torque = not_given
       interpolation = 'linear'
@@ -223,7 +225,7 @@ contains
       if (is_iostat_end(status)) exit
       if (status /= 0) error stop 'load'
       print '(*(g0, 1x))', 'load', trim(name), trim(body), viscous, quadratic, constant, constant_speed, table_speed, &
-        table_torque, trim(interpolation), trim(extrapolation)
+        table_torque, trim(interpolation), trim(extrapolation), mean_time, vibration_factor
     end do
   end subroutine read_loads
 
@@ -265,10 +267,11 @@ contains
   subroutine read_engines()
     character(len=64) :: name, cylinders(most_numbers)
     real(wp), dimension(most_numbers) :: amplitudes, firing, firing_deg, orders, phases
-    real(wp) :: crank_radius, mean_torque, reciprocating_mass, rod_length
+    real(wp) :: crank_radius, mean_time, mean_torque, offset, reciprocating_mass, rod_length, vibration_damping
+    character(len=64) :: works
     integer :: i, misfire, status, stroke
     namelist /engine/ name, cylinders, stroke, firing, firing_deg, orders, amplitudes, phases, mean_torque, misfire, &
-      crank_radius, reciprocating_mass, rod_length
+      crank_radius, reciprocating_mass, rod_length, offset, works, vibration_damping, mean_time
 
     rewind (unit)
     do
@@ -281,6 +284,10 @@ contains
       mean_torque = 0.0_wp
       misfire = 0
       crank_radius = not_given
+      offset = 0.0_wp
+      works = 'engine'
+      vibration_damping = not_given
+      mean_time = not_given
       reciprocating_mass = not_given
       rod_length = not_given
       read (unit, nml=engine, iostat=status)
@@ -288,7 +295,8 @@ contains
       if (status /= 0) error stop 'engine'
       where (firing_deg > not_given) firing = firing_deg * degree
       print '(*(g0, 1x))', 'engine', trim(name), (trim(cylinders(i)), i=1, most_numbers), stroke, firing, orders, amplitudes, &
-        phases, mean_torque, misfire, crank_radius, reciprocating_mass, rod_length
+        phases, mean_torque, misfire, crank_radius, reciprocating_mass, rod_length, offset, trim(works), &
+        vibration_damping, mean_time
     end do
   end subroutine read_engines
 

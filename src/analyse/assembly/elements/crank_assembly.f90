@@ -6,7 +6,7 @@ module nocdyn_crank_assembly
   use nocdyn_crank_rows, only: crank_rows_t, new_crank_rows, slider_crank_t
   use nocdyn_cylinder_torques, only: cycle_of
   use nocdyn_element_groups, only: element_groups_t
-  use nocdyn_engine_checks, only: check_crank_angles, check_stroke
+  use nocdyn_engine_checks, only: check_crank_angles, check_reach, check_stroke
   use nocdyn_fourier, only: fourier_coefficients
   use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
@@ -14,7 +14,7 @@ module nocdyn_crank_assembly
   use nocdyn_order_excitations, only: new_order_excitations, order_excitations_t, order_torque_t
   use nocdyn_phases, only: new_phases
   use nocdyn_piston_forces, only: new_piston_force, periodic_force_t
-  use nocdyn_slider_cranks, only: close_cycle, sample_cycle, samples
+  use nocdyn_slider_cranks, only: close_cycle, inertia_orders, sample_cycle, samples, turn_angles
   use nocdyn_text, only: append, string_t, to_text
   use nocdyn_torque_assembly, only: in_lanes
   implicit none (type, external)
@@ -34,11 +34,8 @@ contains
     character(len=:), allocatable :: key, text
 
     associate (group => input%groups(index))
-      if (group%number('crank_radius') + abs(group%number('offset')) >= group%number('rod_length')) then
-        call input%report(index, 'offset', 'offset = ' // to_text(group%number('offset')) // ' m: the rod of ' // &
-                   to_text(group%number('rod_length')) // ' m ' // &
-                   'does not reach the piston at all angles; allowed: crank_radius + |offset| below rod_length', diagnostics)
-      end if
+      call check_reach(group, key, text)
+      if (text /= '') call input%report(index, key, text, diagnostics)
       if (group%number('rod_mass') > 0 .and. .not. group%has_value('rod_center')) then
         call input%report(index, 'rod_mass', 'rod_mass = ' // to_text(group%number('rod_mass')) // &
                    ' kg, but rod_center is missing', diagnostics)
@@ -127,16 +124,14 @@ contains
     type(string_t), intent(in) :: name
     integer, intent(in) :: body
     type(machine_t), intent(inout) :: machine
-    integer, parameter :: most_orders = 12   ! of the inertia
     type(order_torque_t) :: torque
     type(order_excitations_t) :: bank
     type(periodic_force_t) :: force
     type(crank_rows_t) :: rows
     type(bank_state_t) :: state
     real(wp), allocatable :: masses(:)
-    real(wp), dimension(samples) :: change, gas, inertia
-    real(wp), allocatable :: g(:, :)
-    real(wp) :: mean, mean_inertia, angle
+    real(wp), allocatable :: angle(:), g(:, :), inertia(:)
+    real(wp) :: gas(samples)
     integer :: i, k
 
     call find_masses(group, body, machine, masses)
@@ -146,25 +141,20 @@ contains
     force%base = 1.0_wp
     allocate (force%sine(0), force%cosine(0))
     if (group%has_value('crank_angles')) force = force_of(group)
-    ! inertia, its torque over the square of the speed, and torque of the force of a crank over one cycle of the force
-    inertia = 0.0_wp
-    change = 0.0_wp
-    do i = 1, samples
-      angle = 2.0_wp * pi / force%base * (i - 1) / samples
-      call rows%motions(state, spread(angle, 1, size(masses)), g)
-      do k = size(masses), 1, -1
-        inertia(i) = inertia(i) + masses(k) * g(1, k)**2
-        change(i) = change(i) - masses(k) * g(1, k) * g(2, k)
-      end do
-      gas(i) = g(1, 1) * force%value(angle + group%number('phase'))
+    allocate (angle, source=turn_angles())
+    allocate (inertia(size(angle)))
+    do i = 1, size(angle)
+      call rows%motions(state, spread(angle(i), 1, size(masses)), g)
+      inertia(i) = sum(masses * g(1, :)**2)
     end do
-    associate (n => nint(most_orders / force%base))
-      torque%square_order = [(k * force%base, k=1, n)]
-      allocate (torque%square_sine(n), torque%square_cosine(n))
-    end associate
-    call fourier_coefficients(inertia, mean_inertia, torque%square_sine, torque%square_cosine)
-    machine%inertia(:, body) = machine%inertia(:, body) + mean_inertia
-    call fourier_coefficients(change, mean, torque%square_sine, torque%square_cosine)
+    do i = 1, samples
+      angle(1) = 2.0_wp * pi / force%base * (i - 1) / samples
+      call rows%motions(state, spread(angle(1), 1, size(masses)), g)
+      gas(i) = g(1, 1) * force%value(angle(1) + group%number('phase'))
+    end do
+    machine%inertia(:, body) = machine%inertia(:, body) + sum(inertia) / size(inertia)
+    call inertia_orders(inertia, torque%square_sine, torque%square_cosine)
+    torque%square_order = [(real(k, wp), k=1, size(torque%square_sine))]
     torque%order = [(k * force%base, k=1, size(force%sine))]
     torque%speed = [0.0_wp]
     allocate (torque%mean(1), torque%sine(size(torque%order), 1), torque%cosine(size(torque%order), 1))

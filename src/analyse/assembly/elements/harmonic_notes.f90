@@ -27,9 +27,9 @@ contains
     do i = 1, size(input%groups)
       associate (group => input%groups(i))
         if (group%kind == 'engine') then
-          if (.not. group%has_value('pressures')) cycle
-          torque = gas_torque(group, 'pressures')
-          call add_note(group, 'N m of the gas torque of a cylinder', sampled_torque(group, 'pressures'), torque%mean(1), &
+          if (.not. group%has_value('crank_angles')) cycle
+          torque = gas_torque(group, trim(merge('torques  ', 'pressures', group%has_value('torques'))))
+          call add_note(group, 'N m of the gas torque of a cylinder', sampled_torque(group), torque%mean(1), &
                         torque%sine(:, 1), torque%cosine(:, 1), notes)
         else if (group%kind == 'crank') then
           if (.not. group%has_value('crank_angles')) cycle

@@ -11,7 +11,7 @@ module nocdyn_torque_assembly
   use nocdyn_input, only: group_t
   use nocdyn_kinds, only: wp
   use nocdyn_load_shares, only: new_load_shares
-  use nocdyn_loads, only: new_loads
+  use nocdyn_loads, only: loads_t, new_loads, new_vibration_dampers
   use nocdyn_order_excitations, only: new_order_excitations, order_excitations_t, order_torque_t
   use nocdyn_shared_loads, only: find_shared_load
   use nocdyn_table_excitations, only: new_table_excitations
@@ -21,9 +21,9 @@ module nocdyn_torque_assembly
   implicit none (type, external)
   private
 
-  public :: load_form, add_load_form, excitation_form, add_excitation_form, add_engines, in_lanes
+  public :: load_form, add_load_form, add_steady_load_form, excitation_form, add_excitation_form, add_engines, in_lanes
 
-  integer, parameter :: viscous = 1, nonlinear = 2, table = 3     ! forms of loads
+  integer, parameter :: viscous = 1, nonlinear = 2, table = 3     ! forms of loads; those that damp vibrations have the ones after
   ! Forms of excitations, in the order of their columns; one with a start, an end or a decay has the form after its own.
   integer, parameter :: harmonic = 1, waves = 3, tables = 5, timed = 7, orders = 9, shares = 11, faults = 13
 
@@ -36,6 +36,7 @@ contains
     load_form = viscous
     if (group%number('quadratic', absent=0.0_wp) > 0 .or. group%number('constant', absent=0.0_wp) > 0) load_form = nonlinear
     if (group%has_value('table_speed')) load_form = table
+    if (group%has_value('vibration_damping') .or. group%has_value('vibration_factor')) load_form = load_form + table
   end function load_form
 
   !> Adds the bank of the loads of one form.
@@ -46,6 +47,15 @@ contains
 
     call append_bank(banks, new_loads(groups))
   end subroutine add_load_form
+
+  !> Adds the bank of the loads of one form to the machine of a steady state.
+  subroutine add_steady_load_form(groups, form, banks)
+    type(element_groups_t), intent(in) :: groups
+    integer, intent(in) :: form
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+
+    call append_bank(banks, new_loads(groups, is_steady=.true.))
+  end subroutine add_steady_load_form
 
   !> Form of the law of a group &excitation.
   pure integer function excitation_form(group)
@@ -195,9 +205,11 @@ contains
     end do
   end subroutine add_shares
 
-  !> Adds the banks of engines: their cylinders are the elements.
-  subroutine add_engines(groups, banks)
+  !> Adds the banks of engines: their cylinders are the elements, and the dampers of their vibrations.
+  subroutine add_engines(groups, inertia, is_steady, banks)
     type(element_groups_t), intent(in) :: groups
+    real(wp), intent(in) :: inertia(:, :)   !! of the bodies [kg m2], [lanes, bodies]
+    logical, intent(in) :: is_steady        !! whether it is the machine of a steady state
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(order_torque_t), allocatable :: torque(:)
     type(string_t), allocatable :: names(:)
@@ -211,10 +223,44 @@ contains
         names(c)%text = groups%names(i)%text // '_' // to_text(c)
       end do
       bank = new_order_excitations(names, groups%listed_bodies('cylinders', i), in_lanes(torque, groups%lanes))
-      bank%is_engine = .true.
+      bank%works = groups%input%groups(groups%indices(i))%text('works')
+      bank%is_engine = bank%works == 'engine'
       call append_bank(banks, bank)
       deallocate (names)
+      associate (group => groups%input%groups(groups%indices(i)))
+        if (group%has_value('vibration_damping') .or. group%has_value('magnifier')) then
+          call add_cylinder_dampers(group, groups%listed_bodies('cylinders', i), inertia, is_steady, banks)
+        end if
+      end associate
     end do
   end subroutine add_engines
+
+  !> Adds the damping of the vibration at each cylinder of an engine: given, or the inertia of its crank times the frequency over
+  !> the magnifier, which is the ratio of the torque of that inertia to the one of the damping. Cylinders share the inertia of a
+  !> crank that they have in common.
+  subroutine add_cylinder_dampers(group, body, inertia, is_steady, banks)
+    type(group_t), intent(in) :: group
+    integer, intent(in) :: body(:)          !! of each cylinder
+    real(wp), intent(in) :: inertia(:, :)   !! of the bodies [kg m2], [lanes, bodies]
+    logical, intent(in) :: is_steady
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    type(loads_t) :: bank
+    type(string_t) :: names(size(body))
+    real(wp) :: damping(size(inertia, 1), size(body))
+    integer :: c
+
+    do c = 1, size(body)
+      names(c)%text = group%name // '_damping_' // to_text(c)
+      if (group%has_value('magnifier')) then
+        damping(:, c) = inertia(:, body(c)) / count(body == body(c)) * group%number('damping_frequency') &
+                        / group%number('magnifier')
+      else
+        damping(:, c) = group%number('vibration_damping')
+      end if
+    end do
+    bank = new_vibration_dampers(names, body, damping, group%number('mean_time'), is_steady)
+    bank%follows_inertias = group%has_value('magnifier')
+    call append_bank(banks, bank)
+  end subroutine add_cylinder_dampers
 
 end module nocdyn_torque_assembly

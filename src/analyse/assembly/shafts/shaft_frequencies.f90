@@ -16,7 +16,7 @@ module nocdyn_shaft_frequencies
   real(wp), parameter :: pi = acos(-1.0_wp)
   integer, parameter :: least_modes = 4   ! that are exact where nothing faster is excited
   real(wp), parameter :: reserve = 1.2_wp
-  real(wp), parameter :: inertia_orders = 4.0_wp   ! of slider-cranks; the following ones are small
+  real(wp), parameter :: inertia_orders = 6.0_wp   ! of slider-cranks; the following ones are small
   real(wp), parameter :: cardan_orders = 4.0_wp
   real(wp), parameter :: least_rise = 0.05_wp      ! of the range of a table: less is no oscillation
 
@@ -170,7 +170,7 @@ contains
     type(group_t), intent(in) :: group
 
     order = max(largest(group, 'orders'), merge(inertia_orders, 0.0_wp, group%has_value('reciprocating_mass')))
-    if (group%has_value('pressures')) order = max(order, group%number('harmonics_up_to'))
+    if (group%has_value('crank_angles')) order = max(order, group%number('harmonics_up_to'))
   end function order_of_engine
 
   !> The highest order of a slider-crank.

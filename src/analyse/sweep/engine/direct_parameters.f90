@@ -65,12 +65,13 @@ contains
     holds_inertia = allocated(machine%start_impulse)
     do b = 1, size(machine%banks)
       associate (bank => machine%banks(b)%bank)
-        holds_inertia = holds_inertia .or. bank%has_parts .or. bank%moving_rows > 0
+        holds_inertia = holds_inertia .or. bank%has_parts .or. bank%moving_rows > 0 .or. bank%follows_inertias
       end associate
     end do
     do i = 1, size(targets)
       if (input%groups(targets(i)%group)%kind == 'body') then
-        self%are_direct = key_of(input, targets(i)) == 'inertia' .and. .not. holds_inertia
+        self%are_direct = key_of(input, targets(i)) == 'inertia' .and. .not. holds_inertia .and. &
+                          .not. input%groups(targets(i)%group)%number('entrained', absent=0.0_wp) > 0
         self%inertia_target = [self%inertia_target, i]
         self%body = [self%body, findloc(input%groups_named('body'), targets(i)%group, dim=1)]
       else

@@ -44,7 +44,7 @@ contains
     type(law_tape_t), target, intent(inout) :: tape
     type(expression_t) :: torque
 
-    torque = (self%parameter(tape, 'viscous') * speed_of(tape) - resistance(self, self%quadratic_switch, tape)) &
+    torque = (self%parameter(tape, 'viscous') * speed_of(tape) - resistance(self, self%quadratic_switch, tape, speed_of(tape))) &
              * self%sum_of_waves(tape)
   end function torque
 
