@@ -243,7 +243,7 @@ contains
     character(len=:), allocatable, intent(out) :: obstacle   !! why there is none, ''
 
     obstacle = code_obstacle(self%series_kernel)
-    if (obstacle == '') call write_series_code(self%series_kernel, self%state, code)
+    if (obstacle == '') call write_series_code(self%series_kernel, self%state, self%switching, code)
   end subroutine write_code
 
   !> Writes a program of its own for a block of equal lanes, after `prepare_series`, with the branches of the start.
@@ -278,7 +278,7 @@ contains
     class(reduced_t), intent(inout) :: self
     type(loaded_code_t), intent(in) :: loaded
 
-    call self%compiled%attach(self%series_kernel, loaded)
+    call self%compiled%attach(self%series_kernel, self%state, loaded)
   end subroutine attach_code
 
   !> Whether series are computed by a program, as long as no joint holds.
@@ -292,7 +292,8 @@ contains
   pure logical function takes_plain_steps(self)
     class(reduced_t), intent(in) :: self
 
-    takes_plain_steps = self%joints%count == 0 .and. self%compiled%fits(self%series_kernel)
+    takes_plain_steps = self%joints%count == 0 .and. self%compiled%fits(self%series_kernel) .and. &
+                        (self%switches == 0 .or. self%compiled%follows_switches)
   end function takes_plain_steps
 
   subroutine take_plain_steps(self, steps)
@@ -300,7 +301,7 @@ contains
     type(plain_steps_t), intent(inout) :: steps
 
     call self%norm%describe_map(steps)
-    call self%compiled%take_steps(self%series_kernel, self%state, self%twist_at_origin, steps)
+    call self%compiled%take_steps(self%series_kernel, self%state, self%twist_at_origin, self%switching, steps)
   end subroutine take_plain_steps
 
   !> Finds the joints that hold in each lane, and lanes without a motion that fits them.

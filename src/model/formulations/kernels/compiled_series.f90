@@ -3,10 +3,12 @@ module nocdyn_compiled_series
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_procpointer, c_funloc, c_funptr, c_int, &
     c_loc, c_long, c_ptr
   use nocdyn_compiled_code, only: loaded_code_t
+  use nocdyn_element_coordinates, only: element_coordinates_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine_state, only: machine_state_t
   use nocdyn_plain_steps, only: plain_steps_t
   use nocdyn_reduced_series, only: reduced_series_t
+  use nocdyn_switch_code, only: followed_switches, switching_banks
   use nocdyn_vector_functions, only: cosines, log_cosh_of, sines
   implicit none (type, external)
   private
@@ -47,6 +49,8 @@ module nocdyn_compiled_series
     procedure(steps_procedure), pointer, nopass, private :: run_steps => null()
     integer, private :: order = 0                                  !! P
     integer, allocatable, private :: terms(:)                      !! of the elements, as in `reduced_series_t`
+    logical :: follows_switches = .false.                          !! whether plain steps end where branches do
+    integer, allocatable, private :: switching(:)                  !! banks with switches
     type(function_table_t), private :: functions
     character(kind=c_char), allocatable, private :: space(:)
     type(c_ptr), allocatable, private :: numbers(:)
@@ -58,9 +62,10 @@ module nocdyn_compiled_series
 contains
 
   !> Takes the procedures of a program that was written for a machine with the structure of `series`.
-  subroutine attach(self, series, loaded)
+  subroutine attach(self, series, state, loaded)
     class(compiled_series_t), intent(inout) :: self
     type(reduced_series_t), intent(in) :: series
+    type(machine_state_t), intent(in) :: state
     type(loaded_code_t), intent(in) :: loaded
     procedure(length_procedure), pointer :: length_of_work
     integer :: banks
@@ -71,7 +76,9 @@ contains
     if (allocated(self%space)) deallocate (self%space, self%numbers)
     banks = size(series%banks%moved) + size(series%banks%timed)
     allocate (self%space(length_of_work()), source=char(0, c_char))
-    allocate (self%numbers(4 + 2 * banks))
+    self%switching = switching_banks(state)
+    self%follows_switches = followed_switches(series, state) > 0
+    allocate (self%numbers(5 + 2 * banks + size(self%switching)))
     self%order = series%order
     self%terms = series%terms
     self%functions = function_table_t(c_funloc(call_sines), c_funloc(call_cosines), c_funloc(call_log_cosh), &
@@ -102,16 +109,34 @@ contains
   end subroutine expand
 
   !> Takes plain steps.
-  subroutine take_steps(self, series, state, twist_at_origin, steps)
+  subroutine take_steps(self, series, state, twist_at_origin, switching, steps)
     class(compiled_series_t), intent(inout) :: self
     type(reduced_series_t), target, intent(in) :: series
     type(machine_state_t), target, intent(in) :: state
     real(wp), contiguous, target, intent(in) :: twist_at_origin(:, :)   !! [rad], [lanes, elements]
+    type(element_coordinates_t), target, intent(in) :: switching        !! of the elements that switches look at
     type(plain_steps_t), intent(in) :: steps
+    integer :: i
 
     call self%list_numbers(series, state, twist_at_origin)
+    if (self%follows_switches) then
+      associate (at => size(self%numbers) - size(self%switching))
+        self%numbers(at) = c_loc(switching%ratio)
+        do i = 1, size(self%switching)
+          call list_branches(state%banks(self%switching(i))%branch, self%numbers(at + i))
+        end do
+      end associate
+    end if
     call self%run_steps(steps, self%numbers, self%space, self%functions)
   end subroutine take_steps
+
+  !> Where branches stand.
+  subroutine list_branches(branch, address)
+    integer, contiguous, target, intent(in) :: branch(:, :)   !! [lanes, switches]
+    type(c_ptr), intent(inout) :: address
+
+    address = c_loc(branch)
+  end subroutine list_branches
 
   !> Where the numbers of the machine stand.
   subroutine list_numbers(self, series, state, twist_at_origin)
