@@ -63,7 +63,13 @@ module nocdyn_plain_steps
     type(c_funptr) :: look = c_null_funptr              !! called where a range may be exceeded inside a step
     type(c_ptr) :: indicator = c_null_ptr               !! of the switches, where the lanes are, [lanes, switches]
     type(c_ptr) :: side = c_null_ptr                    !! their signs, integers [lanes, switches]
-    type(c_ptr) :: crossed = c_null_ptr                 !! switch that has ended the last step of a lane, or 0; integers [lanes]
+    type(c_ptr) :: crossed = c_null_ptr                 !! switch that has ended the last step of a lane, or 0; less than 0 after
+                                                        !! `change_plain_branches`; integers [lanes]
+    real(c_double) :: stretch = 0.0_c_double            !! a step is stretched so much to end on the end
+    real(c_double) :: memory = 0.0_c_double             !! of the sizes of measured quantities
+    real(c_double) :: rounding = 0.0_c_double           !! of large angles, relative to them
+    real(c_double) :: largest_exponent = 0.0_c_double   !! of 2, in estimates of eigenvalues
+    integer(c_long) :: stiff_signs = 0                  !! consecutive signs of stiffness that are decided about
     real(c_double) :: promising = 0.0_c_double, least_distance = 0.0_c_double   !! as in `find_grazing` of root functions ...
     integer(c_long) :: grazing_steps = 0                !! ... and how often it guesses
   end type plain_steps_t

@@ -36,7 +36,8 @@ module nocdyn_switching
   end type block_scan_t
 
   type, public :: switching_t
-    integer(c_int), allocatable :: pending(:)              !! indicator that ended the last step of each lane, 0 if none did
+    integer(c_int), allocatable :: pending(:)              !! indicator that ended the last step of each lane, 0 if none did; less
+                                                           !! than 0 where its branch has changed already
     real(wp), private :: least_progress
     real(wp), allocatable, private :: last_time(:)         !! of the last crossing of each lane [s]
     integer, allocatable, private :: repeats(:, :)         !! crossings since the lane made progress, [lanes, functions]
@@ -332,6 +333,15 @@ contains
     integer :: function
 
     if (attempt%t(lane) - switching%last_time(lane) > switching%least_progress) switching%repeats(lane, :) = 0
+    if (switching%pending(lane) < 0) then
+      function = -switching%pending(lane)
+      call count_crossing(solver_status, lane, function)
+      switching%repeats(lane, function) = switching%repeats(lane, function) + 1
+      switching%last_time(lane) = attempt%t(lane)
+      if (switching%repeats(lane, function) >= max_repeats) solver_status%code(lane) = integration_chattering
+      switching%pending(lane) = 0
+      return
+    end if
     switching%y(:) = attempt%y(lane, :attempt%components)
     call system%indicator_values(lane, attempt%t(lane), switching%y, switching%g)
     limit = -tiny(limit)

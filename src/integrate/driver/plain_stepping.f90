@@ -3,11 +3,13 @@
 module nocdyn_plain_stepping
   use, intrinsic :: iso_c_binding, only: c_int, c_loc, c_long
   use nocdyn_after_step, only: change_branches
+  use nocdyn_error_norm, only: memory
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: any_true
   use nocdyn_observer, only: observer_t
   use nocdyn_plain_steps, only: last_step, no_step, plain_steps_t
   use nocdyn_solver_status, only: integration_done, integration_running, solver_status_t
+  use nocdyn_step_control, only: final_stretch
   use nocdyn_stepper, only: stepper_t
   use nocdyn_switching, only: describe_plain_crossings, may_be_plain
   use nocdyn_system, only: system_t
@@ -85,7 +87,10 @@ contains
       end if
       if (integrator%may_shift .and. any_true(attempt%lanes, integrator%accepted)) call shift_states(integrator, system, observer)
       call stepper%accept_plain_steps(integrator%accepted)
-      if (integrator%has_switches) call change_branches(integrator, stepper, system, times, observer, solver_status)
+      if (.not. integrator%has_switches) return
+      if (maxval(integrator%switching%pending) == 0) return
+      call system%change_plain_branches(integrator%plain)
+      call change_branches(integrator, stepper, system, times, observer, solver_status)
     end associate
   end subroutine take_plain_steps
 
@@ -99,6 +104,8 @@ contains
       plain%atol = control%atol
       plain%t_end = control%t_end
       plain%longest = control%longest_step
+      plain%stretch = final_stretch
+      plain%memory = memory
       plain%t = c_loc(attempt%t)
       plain%y = c_loc(attempt%y)
       plain%size = c_loc(control%size)

@@ -39,6 +39,13 @@ module nocdyn_compiled_series
       type(function_table_t), intent(in) :: functions
     end subroutine steps_procedure
 
+    !> Changes branches after plain steps.
+    subroutine branches_procedure(steps, numbers) bind(c)
+      import :: c_ptr, plain_steps_t
+      type(plain_steps_t), intent(in) :: steps
+      type(c_ptr), intent(in) :: numbers(*)
+    end subroutine branches_procedure
+
     integer(c_long) function length_procedure() bind(c)
       import :: c_long
     end function length_procedure
@@ -47,6 +54,7 @@ module nocdyn_compiled_series
   type, public :: compiled_series_t
     procedure(series_procedure), pointer, nopass, private :: run => null()
     procedure(steps_procedure), pointer, nopass, private :: run_steps => null()
+    procedure(branches_procedure), pointer, nopass, private :: run_branches => null()
     integer, private :: order = 0                                  !! P
     integer, allocatable, private :: terms(:)                      !! of the elements, as in `reduced_series_t`
     logical :: follows_switches = .false.                          !! whether plain steps end where branches do
@@ -55,8 +63,8 @@ module nocdyn_compiled_series
     character(kind=c_char), allocatable, private :: space(:)
     type(c_ptr), allocatable, private :: numbers(:)
   contains
-    procedure :: attach, fits, expand, take_steps
-    procedure, private :: list_numbers
+    procedure :: attach, fits, expand, take_steps, change_branches
+    procedure, private :: list_numbers, list_switches
   end type compiled_series_t
 
 contains
@@ -72,6 +80,7 @@ contains
 
     call c_f_procpointer(loaded%series, self%run)
     call c_f_procpointer(loaded%steps, self%run_steps)
+    call c_f_procpointer(loaded%branches, self%run_branches)
     call c_f_procpointer(loaded%work, length_of_work)
     if (allocated(self%space)) deallocate (self%space, self%numbers)
     banks = size(series%banks%moved) + size(series%banks%timed)
@@ -116,19 +125,35 @@ contains
     real(wp), contiguous, target, intent(in) :: twist_at_origin(:, :)   !! [rad], [lanes, elements]
     type(element_coordinates_t), target, intent(in) :: switching        !! of the elements that switches look at
     type(plain_steps_t), intent(in) :: steps
-    integer :: i
 
     call self%list_numbers(series, state, twist_at_origin)
-    if (self%follows_switches) then
-      associate (at => size(self%numbers) - size(self%switching))
-        self%numbers(at) = c_loc(switching%ratio)
-        do i = 1, size(self%switching)
-          call list_branches(state%banks(self%switching(i))%branch, self%numbers(at + i))
-        end do
-      end associate
-    end if
+    if (self%follows_switches) call self%list_switches(state, switching)
     call self%run_steps(steps, self%numbers, self%space, self%functions)
   end subroutine take_steps
+
+  !> Puts lanes on their next branches, after `take_steps`.
+  subroutine change_branches(self, state, steps)
+    class(compiled_series_t), intent(in) :: self
+    type(machine_state_t), intent(inout) :: state   !! whose branches and constants change
+    type(plain_steps_t), intent(in) :: steps
+
+    call self%run_branches(steps, self%numbers)
+  end subroutine change_branches
+
+  !> Where the numbers of the switches stand.
+  subroutine list_switches(self, state, switching)
+    class(compiled_series_t), intent(inout) :: self
+    type(machine_state_t), target, intent(in) :: state
+    type(element_coordinates_t), target, intent(in) :: switching
+    integer :: i
+
+    associate (at => size(self%numbers) - size(self%switching))
+      self%numbers(at) = c_loc(switching%ratio)
+      do i = 1, size(self%switching)
+        call list_branches(state%banks(self%switching(i))%branch, self%numbers(at + i))
+      end do
+    end associate
+  end subroutine list_switches
 
   !> Where branches stand.
   subroutine list_branches(branch, address)

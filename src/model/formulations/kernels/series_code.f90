@@ -10,6 +10,7 @@ module nocdyn_series_code
   use nocdyn_element_laws, only: element_law_t
   use nocdyn_law_code, only: law_code_t
   use nocdyn_laws, only: narrow
+  use nocdyn_machine, only: machine_t
   use nocdyn_machine_state, only: machine_state_t
   use nocdyn_reduced_series, only: reduced_series_t
   use nocdyn_series_terms, only: has_forcing
@@ -35,9 +36,10 @@ contains
   end function code_obstacle
 
   !> Writes the program for blocks of lanes. Its procedures are described in `nocdyn_compiled_series`.
-  subroutine write_series_code(series, state, switching, code)
+  subroutine write_series_code(series, state, machine, switching, code)
     type(reduced_series_t), intent(in) :: series
     type(machine_state_t), intent(in) :: state
+    type(machine_t), intent(in) :: machine
     type(element_coordinates_t), intent(in) :: switching   !! of the elements that switches look at
     type(code_text_t), intent(inout) :: code
     type(law_code_t), allocatable :: laws(:)
@@ -51,7 +53,7 @@ contains
     call code%line('#define SWITCHES $   /* whose crossings are found */', [switches])
     call write_recurrence(series, state, laws, layout, narrow, series%w, code)
     if (switches > 0) then
-      call write_switch_code(series, state, switching, code)
+      call write_switch_code(series, state, machine, switching, code)
       call write_passes(series, state, 4 + 2 * size(laws), code)
     end if
     call write_entries(series, laws, code)
@@ -452,6 +454,16 @@ contains
     call code%line('      take_steps(s, p, first + LANES * e, z + at_c + WORK * e);')
     call code%line('    }')
     call code%line('  }')
+    call code%line('}')
+    call code%line('void nocdyn_branches(const steps *s, const double *const *numbers) {')
+    call code%line('#if SWITCHES > 0')
+    call code%line('  for (long first = 0; first < s->lanes; first += LANES) {')
+    call code%line('    const strip own = strip_from(first, s->lanes, numbers, s->t, s->y);')
+    call code%line('    pass p = {.s = s, .numbers = &own, .first = first};')
+    call code%line('    begin_pass(&p, numbers);')
+    call code%line('    change_branches(&p);')
+    call code%line('  }')
+    call code%line('#endif')
     call code%line('}')
   end subroutine write_entries
 
