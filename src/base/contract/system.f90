@@ -246,7 +246,7 @@ contains
     error stop 'nocdyn_system: a system that takes plain steps overrides take_plain_steps'
   end subroutine take_plain_steps
 
-  !> After `take_plain_steps`, and after a shift of the states: puts lanes whose step has ended at a boundary on their next branches
+  !> After `take_plain_steps` and a shift of the states: puts lanes whose steps have ended at boundaries on their next branches
   !> where that is simple, and changes the sign of `crossed` there.
   subroutine change_plain_branches(self, steps)
     class(system_t), intent(inout) :: self

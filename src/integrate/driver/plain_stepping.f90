@@ -34,7 +34,8 @@ contains
                               size(times) == 2 .and. .not. integrator%first_step > 0 .and. &
                               .not. (integrator%has_events .or. integrator%has_extremes .or. system%limits_steps .or. &
                                      system%projects .or. system%hides_bends)
-    if (integrator%has_switches) integrator%may_be_plain = integrator%may_be_plain .and. may_be_plain(integrator%switching, system)
+    if (.not. integrator%may_be_plain) return
+    if (integrator%has_switches) integrator%may_be_plain = may_be_plain(integrator%switching, system)
     if (.not. integrator%may_be_plain) return
     call observer%list_ranges(stepper%series_order, integrator%plain, integrator%may_be_plain)
     if (.not. integrator%may_be_plain) return

@@ -57,6 +57,7 @@ contains
       call write_passes(series, state, 4 + 2 * size(laws), code)
     end if
     call write_entries(series, laws, code)
+    call write_steps(code)
   end subroutine write_series_code
 
   !> Writes what computes the series, `expand`.
@@ -439,6 +440,12 @@ contains
     call code%line('                      lanes - first - LANES * e);')
     call code%line('  }')
     call code%line('}')
+  end subroutine write_entries
+
+  !> Writes the procedures of plain steps.
+  subroutine write_steps(code)
+    type(code_text_t), intent(inout) :: code
+
     call code%line('void nocdyn_steps(const steps *s, const double *const *numbers, char *space, const functions *f) {')
     call code%line('  vd *z = aligned(space);')
     call code%line('  for (long first = 0, g; first < s->lanes; first += LANES * g) {')
@@ -465,6 +472,6 @@ contains
     call code%line('  }')
     call code%line('#endif')
     call code%line('}')
-  end subroutine write_entries
+  end subroutine write_steps
 
 end module nocdyn_series_code
