@@ -309,7 +309,7 @@ contains
     class(reduced_t), intent(inout) :: self
     type(plain_steps_t), intent(in) :: steps
 
-    call self%compiled%change_branches(self%state, steps)
+    call self%compiled%change_branches(self%machine, self%state, steps)
   end subroutine change_plain_branches
 
   !> Finds the joints that hold in each lane, and lanes without a motion that fits them.

@@ -1,10 +1,12 @@
 !> The Taylor recurrence of a machine by a program that was written for its structure (`nocdyn_series_code`) and compiled.
 module nocdyn_compiled_series
-  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_procpointer, c_funloc, c_funptr, c_int, &
-    c_loc, c_long, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_pointer, c_f_procpointer, c_funloc, c_funptr, c_int, &
+    c_loc, c_long, c_null_ptr, c_ptr
   use nocdyn_compiled_code, only: loaded_code_t
+  use nocdyn_curves, only: plain_curve_t
   use nocdyn_element_coordinates, only: element_coordinates_t
   use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
   use nocdyn_machine_state, only: machine_state_t
   use nocdyn_plain_steps, only: plain_steps_t
   use nocdyn_reduced_series, only: reduced_series_t
@@ -51,6 +53,11 @@ module nocdyn_compiled_series
     end function length_procedure
   end interface
 
+  !> Where the curves of a bank stand.
+  type :: switch_curves_t
+    type(plain_curve_t), allocatable :: curve(:, :)   !! [lanes, elements]
+  end type switch_curves_t
+
   type, public :: compiled_series_t
     procedure(series_procedure), pointer, nopass, private :: run => null()
     procedure(steps_procedure), pointer, nopass, private :: run_steps => null()
@@ -59,12 +66,13 @@ module nocdyn_compiled_series
     integer, allocatable, private :: terms(:)                      !! of the elements, as in `reduced_series_t`
     logical :: follows_switches = .false.                          !! whether plain steps end where branches do
     integer, allocatable, private :: switching(:)                  !! banks with switches
+    type(switch_curves_t), allocatable, private :: curves(:)       !! of these banks
     type(function_table_t), private :: functions
     character(kind=c_char), allocatable, private :: space(:)
     type(c_ptr), allocatable, private :: numbers(:)
   contains
     procedure :: attach, fits, expand, take_steps, change_branches
-    procedure, private :: list_numbers, list_switches
+    procedure, private :: list_numbers, list_switches, list_curves
   end type compiled_series_t
 
 contains
@@ -87,7 +95,10 @@ contains
     allocate (self%space(length_of_work()), source=char(0, c_char))
     self%switching = switching_banks(state)
     self%follows_switches = followed_switches(series, state) > 0
-    allocate (self%numbers(5 + 2 * banks + size(self%switching)))
+    if (allocated(self%curves)) deallocate (self%curves)
+    allocate (self%curves(size(self%switching)))
+    allocate (self%numbers(5 + 2 * banks + 2 * size(self%switching)))
+    self%numbers(:) = c_null_ptr
     self%order = series%order
     self%terms = series%terms
     self%functions = function_table_t(c_funloc(call_sines), c_funloc(call_cosines), c_funloc(call_log_cosh), &
@@ -132,13 +143,44 @@ contains
   end subroutine take_steps
 
   !> Puts lanes on their next branches, after `take_steps`.
-  subroutine change_branches(self, state, steps)
-    class(compiled_series_t), intent(in) :: self
+  subroutine change_branches(self, machine, state, steps)
+    class(compiled_series_t), target, intent(inout) :: self
+    type(machine_t), intent(in) :: machine
     type(machine_state_t), intent(inout) :: state   !! whose branches and constants change
     type(plain_steps_t), intent(in) :: steps
+    integer(c_int), pointer, contiguous :: crossed(:)
+    integer :: lane
 
+    call c_f_pointer(steps%crossed, crossed, [steps%lanes])
+    call self%list_curves(machine, crossed)
     call self%run_branches(steps, self%numbers)
+    do lane = 1, size(crossed)
+      if (crossed(lane) < 0) call state%take_constants(machine, int(-crossed(lane)), lane)
+    end do
   end subroutine change_branches
+
+  !> Where the curves of banks with switches stand, in the lanes where branches may change.
+  subroutine list_curves(self, machine, crossed)
+    class(compiled_series_t), target, intent(inout) :: self
+    type(machine_t), intent(in) :: machine
+    integer(c_int), intent(in) :: crossed(:)
+    integer :: e, i, lane
+
+    do i = 1, size(self%switching)
+      associate (bank => machine%banks(self%switching(i))%bank, at => size(self%numbers) - size(self%switching) + i)
+        if (.not. allocated(bank%curve)) cycle
+        if (.not. allocated(self%curves(i)%curve)) then
+          allocate (self%curves(i)%curve(size(bank%curve, 1), size(bank%curve, 2)))
+        end if
+        do e = 1, size(bank%curve, 2)
+          do lane = 1, size(crossed)
+            if (crossed(lane) > 0) call bank%curve(lane, e)%describe(self%curves(i)%curve(lane, e))
+          end do
+        end do
+        self%numbers(at) = c_loc(self%curves(i)%curve)
+      end associate
+    end do
+  end subroutine list_curves
 
   !> Where the numbers of the switches stand.
   subroutine list_switches(self, state, switching)
@@ -147,7 +189,7 @@ contains
     type(element_coordinates_t), target, intent(in) :: switching
     integer :: i
 
-    associate (at => size(self%numbers) - size(self%switching))
+    associate (at => size(self%numbers) - 2 * size(self%switching))
       self%numbers(at) = c_loc(switching%ratio)
       do i = 1, size(self%switching)
         call list_branches(state%banks(self%switching(i))%branch, self%numbers(at + i))

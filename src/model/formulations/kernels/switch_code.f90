@@ -7,8 +7,8 @@ module nocdyn_switch_code
   use nocdyn_element_coordinates, only: element_coordinates_t
   use nocdyn_element_laws, only: element_law_t
   use nocdyn_law_code, only: law_code_t, new_law_code
-  use nocdyn_law_tape, only: law_tape_t, op_add, op_fixed, op_larger, op_multiply, op_pick, op_reciprocal, op_scale, op_shift, &
-    op_size, op_square_root, op_subtract
+  use nocdyn_law_tape, only: law_tape_t, op_add, op_fixed, op_larger, op_multiply, op_pick, op_reciprocal, op_scale, &
+    op_segment, op_shift, op_size, op_square_root, op_subtract
   use nocdyn_law_work, only: new_law_work
   use nocdyn_laws, only: law_t
   use nocdyn_machine, only: machine_t
@@ -22,7 +22,8 @@ module nocdyn_switch_code
   integer, parameter :: most_switches = 64   ! more would end nearly every step of some lane
   integer, parameter :: known(9) = [op_fixed, op_add, op_subtract, op_multiply, op_shift, op_scale, op_reciprocal, &
                                     op_square_root, op_larger]   ! operations of guards that have code
-  integer, parameter :: arithmetic(7) = [op_pick, op_add, op_subtract, op_multiply, op_shift, op_scale, op_size]   ! of constants
+  integer, parameter :: arithmetic(8) = [op_pick, op_segment, op_add, op_subtract, op_multiply, op_shift, op_scale, &
+                                         op_size]   ! of constants
   character(len=*), parameter :: far = '1.7976931348623157e308'   ! huge
 
   !> The switches of a bank.
@@ -151,12 +152,12 @@ contains
       integer :: port
 
       allocate (found(0))
-      associate (law => state%banks(bank%number)%law)
+      associate (law => state%banks(bank%number)%law, tape => state%banks(bank%number)%law%law%tape)
         do port = 1, law%ports
           associate (place => bank%place + (port - 1) * bank%elements + e)
             associate (own => switching%coordinate(switching%first(place):switching%first(place + 1) - 1))
-              if (reads(law%law%tape, merge(law%speed, law%phase_speed, port == 1))) found = [found, own - 1]
-              if (reads(law%law%tape, merge(law%angle, law%phase, port == 1))) found = [found, series%freedoms + own - 1]
+              if (reads(tape, tape%guard, merge(law%speed, law%phase_speed, port == 1))) found = [found, own - 1]
+              if (reads(tape, tape%guard, merge(law%angle, law%phase, port == 1))) found = [found, series%freedoms + own - 1]
             end associate
           end associate
         end do
@@ -168,13 +169,14 @@ contains
 
   end subroutine write_switch_tables
 
-  !> Whether guards read an input of the law.
-  pure logical function reads(tape, input)
+  !> Whether nodes read an input of the law.
+  pure logical function reads(tape, results, input)
     type(law_tape_t), intent(in) :: tape
-    integer, intent(in) :: input   !! node, 0 if the law has none
+    integer, intent(in) :: results(:)   !! nodes
+    integer, intent(in) :: input        !! node, 0 if the law has none
 
     reads = input > 0
-    if (reads) reads = any(tape%needed(tape%guard, .false.) == input)
+    if (reads) reads = any(tape%needed(results, .false.) == input)
   end function reads
 
   !> Writes the procedures that find crossings and change branches.
@@ -193,7 +195,7 @@ contains
     do i = 1, size(banks)
       associate (law => state%banks(banks(i)%number)%law, choices => machine%banks(banks(i)%number)%bank%choices)
         call write_guards(series, law, banks(i), code)
-        banks(i)%changes = can_change(law%law) .and. all(choices > 0)
+        banks(i)%changes = can_change(law%law) .and. all(choices >= 0)
         if (.not. banks(i)%changes) cycle
         call write_choice(series, law, banks(i), choices, code)
         call write_constants(law, banks(i), code)
@@ -210,9 +212,9 @@ contains
     call write_cases('{ guards$(p, (which - $) % $, y, t, g, 1); return g[(which - $) / $]; }', .true.)
     call code%line('  return t;')
     call code%line('}')
-    call code%line('static vl next_branch(const pass *p, int which, const vd *y, vd t) {')
-    call write_cases('return choice$(p, (which - $) % $, (which - $) / $, y, t);', .false.)
-    call code%line('  return (vl){};')
+    call code%line('static vl next_branch(const pass *p, int which, const vl lanes, const vd *y, vd t) {')
+    call write_cases('return choice$(p, (which - $) % $, (which - $) / $, lanes, y, t);', .false.)
+    call code%line('  return (vl){} - 1;')
     call code%line('}')
     call code%line('static void refresh_constants(const pass *p, int which, const vl lanes) {')
     call write_cases('constants$(p, (which - $) % $, lanes);', .false.)
@@ -247,18 +249,19 @@ contains
     end associate
   end function can_change
 
-  !> Writes the values of all guards of element i of a bank.
-  subroutine write_values(series, law, bank, guards, code)
+  !> Writes the values of some nodes of the law of element i of a bank.
+  subroutine write_values(series, law, bank, results, guards, code)
     type(reduced_series_t), intent(in) :: series
     type(element_law_t), intent(in) :: law
     type(switch_bank_t), intent(in) :: bank
+    integer, intent(in) :: results(:)   !! nodes
     type(law_code_t), intent(out) :: guards
     type(code_text_t), intent(inout) :: code
     integer :: i
 
     associate (tape => law%law%tape)
       guards = new_law_code(bank%in_code - 1, law%law, &
-                            new_law_work(tape, tape%needed(tape%guard, .false.), 0, law%law%w, law%law%groups), law)
+                            new_law_work(tape, tape%needed(results, .false.), 0, law%law%w, law%law%groups), law)
     end associate
     guards%is_local = .true.
     call code%line('  enum { k = 0, g = 1 };')
@@ -280,7 +283,7 @@ contains
       integer, intent(in) :: node
       character(len=*), intent(in) :: value
 
-      if (reads(law%law%tape, node)) call code%line('  vd n$[] = {@}; enum { d$ = 0 };', [node, node], value)
+      if (reads(law%law%tape, results, node)) call code%line('  vd n$[] = {@}; enum { d$ = 0 };', [node, node], value)
     end subroutine declare_input
 
   end subroutine write_values
@@ -296,7 +299,7 @@ contains
 
     call code%line('INLINE void guards$(const pass *p, const int i, const vd *y, const vd t, vd *lowest, const long step) {', &
                    [bank%in_code])
-    call write_values(series, law, bank, guards, code)
+    call write_values(series, law, bank, law%law%tape%guard, guards, code)
     call code%line('  vd inside, all;')
     associate (tape => law%law%tape)
       do q = 1, bank%switches
@@ -343,13 +346,18 @@ contains
     type(law_code_t) :: guards
     integer :: branch, i, q
 
-    call code%line('static vl choice$(const pass *p, const int i, const int which, const vd *y, const vd t) {', [bank%in_code])
-    call write_values(series, law, bank, guards, code)
+    call code%line('static vl choice$(const pass *p, const int i, const int which, const vl lanes, const vd *y, const vd t) {', &
+                   [bank%in_code])
+    call write_values(series, law, bank, [law%law%tape%guard, law%law%tape%argument], guards, code)
     call code%line('  vd best = -@ + (vd){}, inside;', a=far)
-    call code%line('  vl chosen = {}, is_better;')
+    call code%line('  vl chosen = (vl){} - 1, is_better;')
     associate (tape => law%law%tape)
       do q = 1, bank%switches
         call code%line('  if (which == $) {', [q - 1])
+        if (choices(1 + (q - 1) * bank%elements) == 0) then
+          call code%line('    const int e = 0;')
+          call code%line('    return segments_at(p, $ + i, lanes, @);', [bank%first], guards%operand(tape%argument))
+        end if
         do branch = 1, choices(1 + (q - 1) * bank%elements)
           call code%line('    inside = @ + (vd){};', a=far)
           do i = 1, size(tape%guard)
@@ -387,6 +395,8 @@ contains
               call code%line('  x = choose(p->branch[$ + i] == $, @, x);', &
                              [bank%first + bank%elements * (node%a - 1), c - node%first + 1], value(tape%list(c)))
             end do
+          else if (node%operation == op_segment) then
+            call code%line('  x = segment_numbers(p, $ + i, lanes, $);', [bank%first, node%a])
           else if (node%b > 0) then
             call code%line('  x = @ @ @;', a=value(node%a), b=sign_of(node%operation), c=value(node%b))
           else
@@ -437,6 +447,9 @@ contains
     do i = 1, size(banks)
       call code%line('  for (int i = 0; i < $; i++)', [banks(i)%elements * banks(i)%switches])
       call code%line('    p->present[$ + i] = (int *)numbers[$] + p->numbers->lanes * i;', [banks(i)%first, at + i])
+      call code%line('  for (int i = 0; numbers[$] && i < $; i++)', [at + size(banks) + i, banks(i)%elements])
+      call code%line('    p->curve[$ + i] = (const curve *)numbers[$] + p->numbers->lanes * i + p->first;', &
+                     [banks(i)%first, at + size(banks) + i])
     end do
     call code%line('  for (int i = 0; i < SWITCHES; i++)')
     call code%line('    p->branch[i] = load_integers(p->present[i] + p->first, p->numbers->left);')
