@@ -32,6 +32,28 @@ ENGINE = """\
 &record quantity = 'moment_rubber' statistic = 'max_abs', 'min', 'mean' /
 """
 
+# A mill, whose steps end at the edges of a gap and at the points of a table.
+MILL = """\
+&body name = 'motor' inertia = 60.0 speed = 6.3 /
+&body name = 'stand' inertia = 2.5 speed = 6.3 /
+&body name = 'roll' inertia = 1.8 speed = 6.3 /
+&coupling name = 'shaft' bodies = 'motor', 'stand' stiffness = 6e4 damping = 50.0 /
+&coupling name = 'spindle' bodies = 'stand', 'roll' stiffness = 4.5e4 damping = 40.0 gap = 0.02 /
+&motor name = 'drive' body = 'motor' a = 1.2e4 b = 1.9e3 c = 0.0 /
+&load name = 'fan' body = 'roll' viscous = 0.8 quadratic = 0.3 /
+&excitation name = 'billet' body = 'roll' kind = 'table' table_time = 0.0, 0.05, 0.07, 0.3, 0.31
+  table_torque = 0.0, 0.0, -600.0, -560.0, 0.0 /
+&run t_end = 0.4 method = 'METHOD' rtol = 1e-7 atol = 1e-7 /
+&output points = 11 /
+&sweep design = 'random' samples = 61 seed = 2 /
+&vary target = 'coupling.spindle.stiffness' low = 3.6e4 high = 5.4e4 /
+&vary target = 'coupling.spindle.gap' low = 0.016 high = 0.024 /
+&vary target = 'body.roll.inertia' low = 1.5 high = 2.0 /
+&record quantity = 'omega_roll' statistic = 'final', 'max', 'time_of_max' /
+&record quantity = 'moment_shaft' statistic = 'max_abs', 'rms' /
+&record quantity = 'twist_spindle' statistic = 'max', 'min' /
+"""
+
 
 class Compiler:
     """A compiler that counts what it compiles, and a cache folder of its own."""
@@ -71,9 +93,10 @@ def results(nocdyn, out):
     return (nocdyn.folder / out / "sweep.nc").read_bytes()
 
 
+@pytest.mark.parametrize("machine", [ENGINE, MILL], ids=["engine", "mill"])
 @pytest.mark.parametrize("method", ["taylor", "auto"])
-def test_results_have_the_bits_of_the_recurrence(nocdyn, compiler, method):
-    text = ENGINE.replace("METHOD", method)
+def test_results_have_the_bits_of_the_recurrence(nocdyn, compiler, method, machine):
+    text = machine.replace("METHOD", method)
     sweep(nocdyn, "without", compiler, "--compile", "never", text=text)
     assert compiler.count == 0
     sweep(nocdyn, "with", compiler, "--compile", "always", "--threads", "2", text=text)

@@ -26,7 +26,7 @@ VALUES_OF_A_VARIANT = {
     "input",
 }
 NAMES_IN_FAILURES = {"solver_status", "formulation", "system"}
-PROGRAMS = {"code_text", "law_code", "machine_code", "reduced", "series_code"}  # in the critical section
+PROGRAMS = {"code_text", "law_code", "machine_code", "reduced", "series_code", "switch_code"}  # in the critical section
 ANALYSES = {"limit_groups", "solve", "margins"}  # wrong limits, which the base machine has too; modes at a time; reports
 REPORTS = {  # of recorded paths, in the critical section
     *("csv", "energy_balance", "hidden_file", "holzer", "holzer_report", "machine_report", "output_file", "table_text"),

@@ -180,7 +180,7 @@ contains
 
     self%strip%before = 0
     self%strip%t_end(:) = steps%t_new(1)
-    self%strip%scale(:) = steps%scale(1)
+    self%strip%scale(:) = steps%scale(1) * steps%theta_end(1)
     if (.not. self%is_filter_current) then
       call self%filter%refresh(self%columns, self%accumulators)
       self%is_filter_current = .true.
@@ -250,7 +250,7 @@ contains
     end if
     do i = 1, size(chosen)
       associate (acc => self%accumulators(chosen(i)))
-        if (steps%theta_end(1) < 1 .or. acc%bound(1) > 0) then   ! the bounds are not valid
+        if (acc%bound(1) > 0) then   ! it has not begun: the bounds are not valid
           rise(i) = 1.0_wp
           fall(i) = 1.0_wp
         end if
@@ -293,12 +293,14 @@ contains
       strip%is_complete = strip%lanes == width .and. steps%are_all_taken
       if (strip%is_complete) then
         strip%t_end = steps%t_new(strip%before + 1:strip%before + width)
-        strip%scale = steps%scale(strip%before + 1:strip%before + width)
+        strip%scale = steps%scale(strip%before + 1:strip%before + width) &
+                      * steps%theta_end(strip%before + 1:strip%before + width)
         return
       end if
       do i = 1, strip%lanes
         strip%t_end(i) = steps%t_new(strip%before + i)
-        strip%scale(i) = merge(steps%scale(strip%before + i), 0.0_wp, steps%taken(strip%before + i))
+        strip%scale(i) = merge(steps%scale(strip%before + i) * steps%theta_end(strip%before + i), 0.0_wp, &
+                               steps%taken(strip%before + i))
       end do
       if (strip%lanes == width) return
       self%y_last(:strip%lanes, :) = y(strip%before + 1:, :)
@@ -348,12 +350,12 @@ contains
       call bound_excess(acc%has_max_abs, strip, acc%bound(at), acc%highest(at), acc%lowest(at), acc%no_highest(at), &
                         acc%no_lowest(at), rise, fall)
       if (any_positive(rise, fall)) call exclude_monotonic(degree, self%chord_gap, strip%scale, strip%c, rise, fall)
-      if (.not. (steps%may_be_cut .or. acc%from > self%t_start)) then
+      if (.not. acc%from > self%t_start) then
         if (.not. any_positive(rise, fall)) return
       end if
       do i = 1, strip%lanes
         associate (lane => strip%before + i)
-          if (steps%theta_end(lane) < 1 .or. acc%bound(lane) > 0) then   ! the bounds are not valid
+          if (acc%bound(lane) > 0) then   ! it has not begun: the bounds are not valid
             rise(i) = 1.0_wp
             fall(i) = 1.0_wp
           end if

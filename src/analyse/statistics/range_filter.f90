@@ -171,11 +171,10 @@ contains
     real(wp), dimension(width) :: fall, outside, rise
     real(wp) :: x(4, width)
     integer :: before, i, strip
-    logical :: is_cut
 
     self%found = 0
-    is_cut = steps%theta_end(1) < 1   ! the bounds are not valid
-    call bound_components(size(c, 2), size(c, 3), chord_gap, steps%scale(1), y, y_new, c, self%ends, self%slopes)
+    call bound_components(size(c, 2), size(c, 3), chord_gap, steps%scale(1) * steps%theta_end(1), y, y_new, c, self%ends, &
+                          self%slopes)
     do strip = 1, self%strips
       before = width * (strip - 1)
       do i = 1, width
@@ -192,14 +191,14 @@ contains
         end do
       end if
       call bound_rises(x, self%highest(before + 1), self%lowest(before + 1), rise, fall)
-      if (.not. (any_positive(rise) .or. any_positive(fall) .or. is_cut .or. &
+      if (.not. (any_positive(rise) .or. any_positive(fall) .or. &
                  .not. all(self%has_begun(before + 1:before + width)))) cycle
       do i = 1, width
         associate (number => self%number(before + i))
           if (number == 0) cycle
           if (self%has_begun(before + i)) then
-            if (.not. (max(rise(i), fall(i)) > 0 .or. is_cut)) cycle
-            if (is_monotonic(self, before + i, size(c, 2)) .and. .not. is_cut) cycle
+            if (.not. max(rise(i), fall(i)) > 0) cycle
+            if (is_monotonic(self, before + i, size(c, 2))) cycle
           else if (steps%t_new(1) <= accumulators(number)%from) then
             cycle
           end if

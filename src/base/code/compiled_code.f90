@@ -12,13 +12,15 @@ module nocdyn_compiled_code
 
   integer, parameter, public :: series_part = 1    !! Taylor arithmetic
   integer, parameter, public :: steps_part = 2     !! plain steps of a block of lanes
-  integer, parameter, public :: machine_part = 3   !! derivative and steps of one machine
+  integer, parameter, public :: crossings_part = 3 !! changes of branches in these steps
+  integer, parameter, public :: machine_part = 4   !! derivative and steps of one machine
 
   !> Procedures of a loaded program; it stays loaded.
   type, public :: loaded_code_t
     type(c_funptr) :: series = c_null_funptr   !! `nocdyn_series`
     type(c_funptr) :: steps = c_null_funptr    !! `nocdyn_steps`
     type(c_funptr) :: work = c_null_funptr     !! `nocdyn_work`
+    type(c_funptr) :: branches = c_null_funptr !! `nocdyn_branches`
   end type loaded_code_t
 
   integer, parameter :: longest_message = 400
@@ -67,13 +69,13 @@ contains
     type(loaded_code_t), intent(out) :: loaded
     character(len=:), allocatable, intent(out) :: failure   !! why it is not loaded, ''
     character(len=longest_message, kind=c_char) :: message
-    type(c_funptr) :: procedures(3)
+    type(c_funptr) :: procedures(4)
     integer(c_int) :: status
 
     status = c_load_code(text, len(text, c_size_t), 'nocdyn_series' // c_null_char // 'nocdyn_steps' // c_null_char // &
-                         'nocdyn_work' // c_null_char, size(procedures, kind=c_int), procedures, message, &
-                         int(longest_message, c_size_t))
-    loaded = loaded_code_t(procedures(1), procedures(2), procedures(3))
+                         'nocdyn_work' // c_null_char // 'nocdyn_branches' // c_null_char, size(procedures, kind=c_int), &
+                         procedures, message, int(longest_message, c_size_t))
+    loaded = loaded_code_t(procedures(1), procedures(2), procedures(3), procedures(4))
     failure = ''
     if (status /= 0) failure = message(:index(message, c_null_char) - 1)
   end subroutine load_code

@@ -4,8 +4,8 @@
 module nocdyn_law_code
   use nocdyn_code_text, only: code_text_t, filled, list_of
   use nocdyn_law_tape, only: law_inputs_t, law_node_t, law_tape_t, op_add, op_arctangent, op_cosine, op_exponential, op_fixed, &
-    op_harmonics, op_log_cosh, op_logarithm, op_multiply, op_power, op_reciprocal, op_scale, op_sech_squared, op_shift, op_sine, &
-    op_square_root, op_subtract, op_tanh, op_wave, unlimited
+    op_harmonics, op_larger, op_log_cosh, op_logarithm, op_multiply, op_power, op_reciprocal, op_scale, op_sech_squared, &
+    op_shift, op_sine, op_square_root, op_subtract, op_tanh, op_wave, unlimited
   use nocdyn_law_work, only: law_work_t
   use nocdyn_laws, only: law_t, terms_of
   use nocdyn_text, only: to_text
@@ -19,9 +19,10 @@ module nocdyn_law_code
     integer :: bank = 0                            !! number of the bank in the code, from 0
     type(law_t) :: law
     type(law_work_t) :: work
+    logical :: is_local = .false.                  !! whether the code has no work space: of values alone
     logical, allocatable, private :: is_kept(:)    !! whether the work space has all coefficients of a node
   contains
-    procedure :: declare_work, declare_tables, write_nodes, operand, kept
+    procedure :: declare_work, declare_tables, write_nodes, operand, constant, kept
   end type law_code_t
 
 contains
@@ -151,6 +152,10 @@ contains
     do i = 1, size(self%work%nodes)
       associate (number => self%work%nodes(i))
         if (.not. self%kept(number)) cycle
+        if (self%is_local) then
+          call code%line('  vd n$[1]; enum { d$ = 0 };', [number, number])
+          cycle
+        end if
         call code%line('  vd *n$ = z + at_@ + (P + 1) * i;', [number], member(self, number))
         call code%line('  enum { d$ = ACROSS ? WORK : P + 1 };', [number])
       end associate
@@ -226,6 +231,8 @@ contains
       text = filled('quotient(g, f->arctangents, k, @, n$, d$, @)', [node%b, node%b], x, a)
     case (op_power)
       text = filled('{ vd c[MOST]; EACH c[e] = @; power(g, f, k, @, c, @); }', [integer ::], constant(self, node%b), x, a)
+    case (op_larger)
+      text = filled('EACH v$[e] = larger(@, @)', [number], self%operand(node%a), self%operand(node%b))
     case default   ! op_harmonics
       terms = terms_of(node)
       before = (self%law%stack(number) - 1) / size(self%law%constant, 1)   ! coefficients of each slot in `stacked`
@@ -239,7 +246,7 @@ contains
 
   !> A constant of element i + e, or of element i in lanes e.
   function constant(self, node) result(text)
-    type(law_code_t), intent(in) :: self
+    class(law_code_t), intent(in) :: self
     integer, intent(in) :: node
     character(len=:), allocatable :: text
 

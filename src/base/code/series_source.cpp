@@ -7,11 +7,16 @@ static const char series[] =
 static const char steps[] =
 #include "steps.inc"
   ;
+static const char crossings[] =
+#include "crossings.inc"
+  ;
 static const char machine[] =
 #include "machine.inc"
   ;
 
 extern "C" const char *nocdyn_code_part(int part, std::size_t *length) {
-  *length = (part == 1 ? sizeof(series) : part == 2 ? sizeof(steps) : sizeof(machine)) - 1;
-  return part == 1 ? series : part == 2 ? steps : machine;
+  static const char *const parts[] = {series, steps, crossings, machine};
+  static const std::size_t lengths[] = {sizeof(series), sizeof(steps), sizeof(crossings), sizeof(machine)};
+  *length = lengths[part - 1] - 1;
+  return parts[part - 1];
 }

@@ -36,7 +36,6 @@ module nocdyn_observer
   !> The steps that the lanes of a block have taken together; [lanes].
   type, public :: step_block_t
     logical :: are_all_taken = .false.      !! whether all lanes have taken a step
-    logical :: may_be_cut = .false.         !! whether `theta_end` may be less than 1
     logical, allocatable :: taken(:)        !! whether the lane has taken a step; only then it has dense output
     logical, allocatable :: crosses(:)      !! whether the step ends where the system changes its branch
     integer, allocatable :: degree(:)       !! of the dense output, the largest one of the block at most

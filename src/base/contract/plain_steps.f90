@@ -1,8 +1,8 @@
 !> Plain steps: what an integrator, a system and an observer share where a system takes whole steps by itself, by a program that
 !> was compiled for it. They are the steps of the method `taylor` in which nothing has to be decided: the series is finite, its
-!> step not too small, and no switch, event, output time or sampled function lies in it.
+!> step not too small, and no event, output time or sampled function lies in it. Where a switch does, they end there.
 !>
-!> The types are laid out as `steps` and `range` of base/code/series.inc.
+!> The types are laid out as `steps` and `range` of base/code/steps.inc.
 module nocdyn_plain_steps
   use, intrinsic :: iso_c_binding, only: c_double, c_funptr, c_int, c_long, c_null_funptr, c_null_ptr, c_ptr
   implicit none (type, external)
@@ -61,6 +61,17 @@ module nocdyn_plain_steps
     type(c_ptr) :: node = c_null_ptr, weight = c_null_ptr   !! of Gauss's rule with a point more than the order, -1 to 1
     type(c_ptr) :: observer = c_null_ptr                !! argument of `look`
     type(c_funptr) :: look = c_null_funptr              !! called where a range may be exceeded inside a step
+    type(c_ptr) :: indicator = c_null_ptr               !! of the switches, where the lanes are, [lanes, switches]
+    type(c_ptr) :: side = c_null_ptr                    !! their signs, integers [lanes, switches]
+    type(c_ptr) :: crossed = c_null_ptr                 !! switch that has ended the last step of a lane, or 0; less than 0 after
+                                                        !! `change_plain_branches`; integers [lanes]
+    real(c_double) :: stretch = 0.0_c_double            !! a step is stretched so much to end on the end
+    real(c_double) :: memory = 0.0_c_double             !! of the sizes of measured quantities
+    real(c_double) :: rounding = 0.0_c_double           !! of large angles, relative to them
+    real(c_double) :: largest_exponent = 0.0_c_double   !! of 2, in estimates of eigenvalues
+    integer(c_long) :: stiff_signs = 0                  !! consecutive signs of stiffness that are decided about
+    real(c_double) :: promising = 0.0_c_double, least_distance = 0.0_c_double   !! as in `find_grazing` of root functions ...
+    integer(c_long) :: grazing_steps = 0                !! ... and how often it guesses
   end type plain_steps_t
 
 end module nocdyn_plain_steps

@@ -55,7 +55,7 @@ module nocdyn_system
     procedure :: jacobian_pattern, component_name, prepare_integration, measure, measure_name, find_far
     procedure :: project_state, evaluation_obstacle, limit_steps, shift_state, restore_state, series_obstacle
     procedure :: prepare_series, series, evaluation_cost, series_cost, start_lane, indicator_values
-    procedure :: takes_plain_steps, take_plain_steps
+    procedure :: takes_plain_steps, take_plain_steps, change_plain_branches
     procedure :: set_indicator, block_indicators, find_fastest_wave, find_fastest_waves, change_branch, switch_name
   end type system_t
 
@@ -245,6 +245,13 @@ contains
 
     error stop 'nocdyn_system: a system that takes plain steps overrides take_plain_steps'
   end subroutine take_plain_steps
+
+  !> After `take_plain_steps` and a shift of the states: puts lanes whose steps have ended at boundaries on their next branches
+  !> where that is simple, and changes the sign of `crossed` there.
+  subroutine change_plain_branches(self, steps)
+    class(system_t), intent(inout) :: self
+    type(plain_steps_t), intent(in) :: steps
+  end subroutine change_plain_branches
 
   !> Called where a lane starts, at (t, y): a system with switches chooses its branches here.
   subroutine start_lane(self, lane, t, y)

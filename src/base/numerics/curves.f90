@@ -1,6 +1,7 @@
 !> Interpolation of points: by straight lines, or by cubics with the slopes of a monotone cubic, of a spline, or of splines
 !> between dwells.
 module nocdyn_curves
+  use, intrinsic :: iso_c_binding, only: c_loc, c_long, c_null_ptr, c_ptr
   use nocdyn_curve_slopes, only: dwell_slopes, monotone_slopes, spline_slopes
   use nocdyn_kinds, only: wp
   implicit none (type, external)
@@ -29,8 +30,14 @@ module nocdyn_curves
     real(wp), allocatable, private :: coefficient(:, :)  !! of the powers of x - origin, [0:3, 0:points]
     real(wp), allocatable, private :: area(:)            !! integral from the first point to the origin, [0:points]
   contains
-    procedure :: points, knots, is_same, segment, segment_number, value, derivatives, integral_to
+    procedure :: points, knots, is_same, segment, segment_number, value, derivatives, integral_to, describe
   end type curve_t
+
+  !> Where the numbers of a curve stand, for programs in C: as `curve` of base/code/steps.inc.
+  type, bind(c), public :: plain_curve_t
+    integer(c_long) :: points = 0
+    type(c_ptr) :: knot = c_null_ptr, origin = c_null_ptr, coefficient = c_null_ptr, area = c_null_ptr
+  end type plain_curve_t
 
 contains
 
@@ -75,6 +82,15 @@ contains
       self%area(i + 1) = integral_to(self, i, x(i + 1))
     end do
   end function new_curve
+
+  !> Where the numbers stand, as long as the curve is not changed.
+  subroutine describe(self, plain)
+    class(curve_t), target, intent(in) :: self
+    type(plain_curve_t), intent(out) :: plain
+
+    plain = plain_curve_t(size(self%knot, kind=c_long), c_loc(self%knot), c_loc(self%origin), c_loc(self%coefficient), &
+                          c_loc(self%area))
+  end subroutine describe
 
   !> The value of each point until the next one; 0 before the first.
   function new_steps(x, y) result(self)

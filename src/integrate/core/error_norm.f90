@@ -15,7 +15,7 @@ module nocdyn_error_norm
 
   real(wp), parameter :: low_order_share = 0.01_wp  !! weight of the second estimate in the error norm of Hairer's DOP853
   real(wp), parameter :: quadrature_leniency = 100.0_wp    !! ratio of the errors allowed in quadratures to those in states
-  real(wp), parameter :: memory = 0.95_wp                  !! of the sizes of measured quantities, from step to step
+  real(wp), parameter, public :: memory = 0.95_wp          !! of the sizes of measured quantities, from step to step
   real(wp), parameter :: usual_rtol = 1.0e-6_wp            !! the quadratures are not less accurate than with this rtol
 
   real(wp), parameter :: largest_ratio = 1.0e100_wp    !! keeps the square of an error ratio finite

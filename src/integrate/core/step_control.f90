@@ -13,7 +13,7 @@ module nocdyn_step_control
   real(wp), parameter :: pi_correction = 0.75_wp    !! times beta: reduction of the exponent of the present error
   real(wp), parameter :: safety = 0.9_wp
   real(wp), parameter :: min_factor = 0.2_wp        !! smallest ratio of a step size to the last one
-  real(wp), parameter :: final_stretch = 1.01_wp    !! a step is stretched by up to 1 % to end on the final time
+  real(wp), parameter, public :: final_stretch = 1.01_wp   !! a step is stretched by up to 1 % to end on the final time
   real(wp), parameter :: min_log_error = -13.287712379549449_wp   !! log2 of 1e-4
 
   real(wp), parameter :: no_error = 1.0e-30_wp         !! replaces an error of zero, whose logarithm is infinite

@@ -3,6 +3,7 @@
 !> The functions are evaluated at the ends of a few equal parts of every step. A change of sign between two of them is a bracket,
 !> in which the root is found to the last bits of the time.
 module nocdyn_root_functions
+  use, intrinsic :: iso_c_binding, only: c_int
   use nocdyn_dense_output, only: batch, dense_output_t, sample, sample_batch
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
@@ -17,14 +18,14 @@ module nocdyn_root_functions
 
   integer, parameter, public :: most_halvings = 14   !! of a part of a wave
   integer, parameter :: least_parts = 4   !! of a step; more for dense output of higher degree, whose steps are longer
-  integer, parameter :: max_grazing_steps = 10
-  real(wp), parameter :: promising = 0.5_wp             ! of the least value: a parabola with a higher minimum predicts no root
-  real(wp), parameter :: least_distance = 1.0e-8_wp     ! in theta, of points on a parabola: rounding spoils closer ones
+  integer, parameter, public :: max_grazing_steps = 10
+  real(wp), parameter, public :: promising = 0.5_wp   !! of the least value: a parabola with a higher minimum predicts no root
+  real(wp), parameter, public :: least_distance = 1.0e-8_wp   !! in theta, of points on a parabola: rounding spoils closer ones
 
   type, public :: root_functions_t
     logical :: of_system = .false.                      !! indicator functions of the system, else events of the observer
     integer :: parts = least_parts                      !! number of parts of the last step
-    integer, allocatable :: side(:, :)                  !! sign of the last value, 0 after a zero; [lanes, functions]
+    integer(c_int), allocatable :: side(:, :)           !! sign of the last value, 0 after a zero; [lanes, functions]
     real(wp), allocatable :: values(:, :)               !! at their ends; [functions, 0:most parts]
     real(wp), allocatable :: last(:, :)                 !! values at the end of the last step; [functions, lanes]
     real(wp), allocatable :: g(:)                       !! values at one theta

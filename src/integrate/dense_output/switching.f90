@@ -1,19 +1,22 @@
 !> Switching of branches. Steps end where an indicator function falls through zero; there the system changes its branch.
 module nocdyn_switching
+  use, intrinsic :: iso_c_binding, only: c_int, c_loc
   use nocdyn_dense_output, only: batch, dense_output_t, sample, sample_lanes, strip
   use nocdyn_finite, only: is_finite
   use nocdyn_followed_crossings, only: find_followed_crossing, find_unsettled_lanes, followed_lanes_t, new_followed_lanes
   use nocdyn_kinds, only: wp
   use nocdyn_observer, only: observer_t
-  use nocdyn_root_functions, only: allocate_root_functions, sign_change_t, find_grazing, find_root, part_bracket, &
-    part_end, parts_of, root_functions_t, scan_step, set_start, sign_of
+  use nocdyn_plain_steps, only: plain_steps_t
+  use nocdyn_root_functions, only: allocate_root_functions, sign_change_t, find_grazing, find_root, least_distance, &
+    max_grazing_steps, part_bracket, part_end, parts_of, promising, root_functions_t, scan_step, set_start, sign_of
   use nocdyn_solver_status, only: count_crossing, integration_chattering, solver_status_t
   use nocdyn_step_attempt, only: step_attempt_t
   use nocdyn_system, only: system_t
   implicit none (type, external)
   private
 
-  public :: allocate_switching, start_switching, scan_for_crossings, may_cross, find_crossing, cross_boundaries
+  public :: allocate_switching, start_switching, scan_for_crossings, may_cross, find_crossing, cross_boundaries, &
+    may_be_plain, describe_plain_crossings
 
   integer, parameter :: max_repeats = 100   ! crossings of one boundary without progress in time; more are chattering
   real(wp), parameter :: negligible = 1.0e-10_wp          ! of the duration: a shorter time between crossings is no progress
@@ -33,7 +36,8 @@ module nocdyn_switching
   end type block_scan_t
 
   type, public :: switching_t
-    integer, allocatable :: pending(:)                     !! indicator that ended the last step of each lane, 0 if none did
+    integer(c_int), allocatable :: pending(:)              !! indicator that ended the last step of each lane, 0 if none did; less
+                                                           !! than 0 where its branch has changed already
     real(wp), private :: least_progress
     real(wp), allocatable, private :: last_time(:)         !! of the last crossing of each lane [s]
     integer, allocatable, private :: repeats(:, :)         !! crossings since the lane made progress, [lanes, functions]
@@ -70,6 +74,27 @@ contains
                 scan%y(lanes, size(attempt%y, 2), batch), source=0.0_wp)
     end associate
   end subroutine allocate_switching
+
+  !> Whether a system may find crossings in plain steps: the way of `scan_for_crossings` and `find_crossing` without waves.
+  pure logical function may_be_plain(switching, system)
+    type(switching_t), intent(in) :: switching
+    class(system_t), intent(in) :: system
+
+    may_be_plain = switching%scan%is_used .and. .not. system%follows_waves
+  end function may_be_plain
+
+  !> Where plain steps find the indicators, and put the ones that have ended steps.
+  subroutine describe_plain_crossings(switching, steps)
+    type(switching_t), target, intent(inout) :: switching
+    type(plain_steps_t), intent(inout) :: steps
+
+    steps%indicator = c_loc(switching%scan%g)
+    steps%side = c_loc(switching%roots%side)
+    steps%crossed = c_loc(switching%pending)
+    steps%promising = promising
+    steps%least_distance = least_distance
+    steps%grazing_steps = max_grazing_steps
+  end subroutine describe_plain_crossings
 
   !> Starts a lane on the branches that the system has chosen; branches that do not hold there change at once.
   subroutine start_switching(switching, system, attempt, lane, solver_status)
@@ -308,6 +333,15 @@ contains
     integer :: function
 
     if (attempt%t(lane) - switching%last_time(lane) > switching%least_progress) switching%repeats(lane, :) = 0
+    if (switching%pending(lane) < 0) then
+      function = -switching%pending(lane)
+      call count_crossing(solver_status, lane, function)
+      switching%repeats(lane, function) = switching%repeats(lane, function) + 1
+      switching%last_time(lane) = attempt%t(lane)
+      if (switching%repeats(lane, function) >= max_repeats) solver_status%code(lane) = integration_chattering
+      switching%pending(lane) = 0
+      return
+    end if
     switching%y(:) = attempt%y(lane, :attempt%components)
     call system%indicator_values(lane, attempt%t(lane), switching%y, switching%g)
     limit = -tiny(limit)

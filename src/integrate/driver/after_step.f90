@@ -91,7 +91,6 @@ contains
     associate (steps => integrator%steps, attempt => integrator%attempt)
       steps%taken(:) = integrator%accepted
       steps%are_all_taken = all_true(size(integrator%accepted), integrator%accepted)
-      steps%may_be_cut = integrator%has_switches .or. integrator%has_events
       steps%degree(:) = attempt%degree
       steps%t(:) = attempt%t
       steps%h(:) = attempt%h

@@ -86,7 +86,7 @@ contains
     do
       call fill_lanes(integrator, stepper, system, ensemble, times, observer, solver_status)
       if (integrator%free == system%lanes) exit
-      call take_plain_steps(integrator, stepper, system, observer, solver_status, are_taken)
+      call take_plain_steps(integrator, stepper, system, times, observer, solver_status, are_taken)
       if (.not. are_taken) call attempt_steps(integrator, stepper, system, times, observer, solver_status)
       call interrupt_if_asked(integrator, observer, solver_status, is_interrupted)
       call release_lanes(integrator, system, ensemble, observer, solver_status)

@@ -2,12 +2,16 @@
 !> `nocdyn_integration`.
 module nocdyn_plain_stepping
   use, intrinsic :: iso_c_binding, only: c_int, c_loc, c_long
+  use nocdyn_after_step, only: change_branches
+  use nocdyn_error_norm, only: memory
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: any_true
   use nocdyn_observer, only: observer_t
   use nocdyn_plain_steps, only: last_step, no_step, plain_steps_t
   use nocdyn_solver_status, only: integration_done, integration_running, solver_status_t
+  use nocdyn_step_control, only: final_stretch
   use nocdyn_stepper, only: stepper_t
+  use nocdyn_switching, only: describe_plain_crossings, may_be_plain
   use nocdyn_system, only: system_t
   use nocdyn_time_stepping, only: integrator_t, shift_states
   implicit none (type, external)
@@ -28,8 +32,10 @@ contains
     integrator%may_be_plain = stepper%series_order > 0 .and. system%lanes > 1 .and. system%measures > 0 .and. &
                               system%quadratures == 0 .and. &
                               size(times) == 2 .and. .not. integrator%first_step > 0 .and. &
-                              .not. (integrator%has_switches .or. integrator%has_events .or. integrator%has_extremes .or. &
-                                     system%limits_steps .or. system%projects .or. system%hides_bends)
+                              .not. (integrator%has_events .or. integrator%has_extremes .or. system%limits_steps .or. &
+                                     system%projects .or. system%hides_bends)
+    if (.not. integrator%may_be_plain) return
+    if (integrator%has_switches) integrator%may_be_plain = may_be_plain(integrator%switching, system)
     if (.not. integrator%may_be_plain) return
     call observer%list_ranges(stepper%series_order, integrator%plain, integrator%may_be_plain)
     if (.not. integrator%may_be_plain) return
@@ -39,10 +45,11 @@ contains
   end subroutine prepare_plain_steps
 
   !> Lets the system take plain steps; the lanes that have come to their ends are done.
-  subroutine take_plain_steps(integrator, stepper, system, observer, solver_status, are_taken)
+  subroutine take_plain_steps(integrator, stepper, system, times, observer, solver_status, are_taken)
     type(integrator_t), target, intent(inout) :: integrator
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(inout) :: system
+    real(wp), contiguous, intent(in) :: times(:)   !! output times [s]
     class(observer_t), intent(inout) :: observer
     type(solver_status_t), target, intent(inout) :: solver_status
     logical, intent(out) :: are_taken   !! whether all running lanes have taken a step
@@ -59,6 +66,7 @@ contains
       call describe_state(integrator)
       integrator%is_running(:) = merge(1_c_int, 0_c_int, integrator%occupied .and. solver_status%code == integration_running)
       integrator%outcome(:) = no_step
+      if (integrator%has_switches) integrator%switching%pending(:) = 0
       call system%take_plain_steps(integrator%plain)
       integrator%accepted(:) = integrator%outcome > no_step
       left = 0
@@ -80,6 +88,10 @@ contains
       end if
       if (integrator%may_shift .and. any_true(attempt%lanes, integrator%accepted)) call shift_states(integrator, system, observer)
       call stepper%accept_plain_steps(integrator%accepted)
+      if (.not. integrator%has_switches) return
+      if (maxval(integrator%switching%pending) == 0) return
+      call system%change_plain_branches(integrator%plain)
+      call change_branches(integrator, stepper, system, times, observer, solver_status)
     end associate
   end subroutine take_plain_steps
 
@@ -93,6 +105,8 @@ contains
       plain%atol = control%atol
       plain%t_end = control%t_end
       plain%longest = control%longest_step
+      plain%stretch = final_stretch
+      plain%memory = memory
       plain%t = c_loc(attempt%t)
       plain%y = c_loc(attempt%y)
       plain%size = c_loc(control%size)
@@ -101,6 +115,7 @@ contains
       plain%running = c_loc(integrator%is_running)
       plain%outcome = c_loc(integrator%outcome)
     end associate
+    if (integrator%has_switches) call describe_plain_crossings(integrator%switching, integrator%plain)
   end subroutine describe_state
 
 end module nocdyn_plain_stepping

@@ -18,7 +18,7 @@ module nocdyn_auto_stepper
   use nocdyn_stepper, only: stepper_t
   use nocdyn_stepper_kinds, only: stepper_kinds_t
   use nocdyn_system, only: system_t
-  use nocdyn_taylor_stepper, only: taylor_stepper_t
+  use nocdyn_taylor_stepper, only: largest_exponent, taylor_stepper_t
   implicit none (type, external)
   private
 
@@ -382,6 +382,8 @@ contains
     steps%calm = c_loc(self%calm)
     steps%near = near_limit * self%data%limit(by_series)
     steps%weak = weak_sign * self%data%limit(by_series)
+    steps%stiff_signs = stiff_signs
+    steps%largest_exponent = largest_exponent
   end subroutine describe_plain_steps
 
   subroutine accept_plain_steps(self, accepted)

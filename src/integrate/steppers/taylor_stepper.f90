@@ -34,6 +34,8 @@ module nocdyn_taylor_stepper
 
   real(wp), parameter :: order_offset = 3.0_wp, order_slope = 0.7_wp   !! order as a function of -ln(rtol), measured
 
+  real(wp), parameter, public :: largest_exponent = 300.0_wp   !! of 2, in estimates of eigenvalues: keeps them finite
+
   real(wp), parameter :: quadrature_share = 0.2_wp   !! of the error allowed to a quadrature, for its last term
 
   real(wp), parameter :: times(4) = [0.3_wp, 0.6_wp, 0.9_wp, 1.0_wp]   ! of a step, where the defect of a series is computed
@@ -432,7 +434,6 @@ contains
   pure subroutine find_eigenvalues(self, sizes)
     class(taylor_stepper_t), intent(in) :: self
     real(wp), contiguous, intent(inout) :: sizes(:)   !! [1/s], [lanes]
-    real(wp), parameter :: largest_exponent = 300.0_wp   ! keeps it finite
 
     sizes(:) = min(self%log_growth, largest_exponent)
     call exp2s(size(sizes), sizes)

@@ -31,7 +31,7 @@ module nocdyn_element_laws
     logical :: has_waves = .false.              !! whether there are sines of variables
     type(law_numbers_t) :: numbers              !! the guards, and all values if there are few elements
   contains
-    procedure :: refresh
+    procedure :: refresh, take_constants
     procedure :: evaluate
     procedure :: differentiate
     procedure :: evaluate_energies
@@ -97,6 +97,14 @@ contains
     call self%law%refresh(lane, element, parameters, branch, is_branch_only, curve)
     if (self%is_ready) call self%numbers%set_constants(self%law, self%law%slot(lane, element), is_branch_only)
   end subroutine refresh
+
+  !> Takes the constants of an element in one lane that depend on branches, after a program has computed them.
+  subroutine take_constants(self, lane, element)
+    class(element_law_t), intent(inout) :: self
+    integer, intent(in) :: lane, element
+
+    if (self%is_ready) call self%numbers%set_constants(self%law, self%law%slot(lane, element), .true.)
+  end subroutine take_constants
 
   !> Adds the moments, and sets the rates of the internal states. Phases follow all elements.
   subroutine evaluate(self, time, angle, speed, internal, restoring, applied, rate)

@@ -21,6 +21,7 @@ module nocdyn_switches
     integer, allocatable, private :: bank(:)     !! [switches]
     integer, allocatable, private :: number(:)   !! of the switch in its bank, [switches]
   contains
+    procedure :: bank_of
     procedure :: choose
     procedure :: indicator
     procedure :: block_indicators
@@ -58,6 +59,14 @@ contains
       end associate
     end do
   end function new_switches
+
+  !> The bank of a switch.
+  pure integer function bank_of(self, switch)
+    class(switches_t), intent(in) :: self
+    integer, intent(in) :: switch   !! numbered in the machine
+
+    bank_of = self%bank(switch)
+  end function bank_of
 
   !> Sets the branch of a switch in one lane to the one that contains the state.
   subroutine choose(self, banks, states, switch, lane, t, motion, internal)

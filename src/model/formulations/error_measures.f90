@@ -86,6 +86,7 @@ contains
     type(plain_steps_t), intent(inout) :: steps
 
     steps%phases = self%count - size(self%free)
+    steps%rounding = rounding
     steps%first = c_loc(self%map%first)
     steps%column = c_loc(self%map%column)
     steps%coefficient = c_loc(self%map%coefficient)

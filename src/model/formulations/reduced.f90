@@ -42,6 +42,7 @@ module nocdyn_reduced
     procedure :: evaluate_at, hold_jacobian, spread_jacobian
     procedure :: jacobian_pattern, series_obstacle, prepare_series, series, find_sets
     procedure :: write_code, write_program, attach_code, runs_code, takes_plain_steps, take_plain_steps
+    procedure :: change_plain_branches
   end type reduced_t
 
 contains
@@ -243,7 +244,7 @@ contains
     character(len=:), allocatable, intent(out) :: obstacle   !! why there is none, ''
 
     obstacle = code_obstacle(self%series_kernel)
-    if (obstacle == '') call write_series_code(self%series_kernel, self%state, code)
+    if (obstacle == '') call write_series_code(self%series_kernel, self%state, self%machine, self%switching, code)
   end subroutine write_code
 
   !> Writes a program of its own for a block of equal lanes, after `prepare_series`, with the branches of the start.
@@ -278,7 +279,7 @@ contains
     class(reduced_t), intent(inout) :: self
     type(loaded_code_t), intent(in) :: loaded
 
-    call self%compiled%attach(self%series_kernel, loaded)
+    call self%compiled%attach(self%series_kernel, self%state, loaded)
   end subroutine attach_code
 
   !> Whether series are computed by a program, as long as no joint holds.
@@ -292,7 +293,8 @@ contains
   pure logical function takes_plain_steps(self)
     class(reduced_t), intent(in) :: self
 
-    takes_plain_steps = self%joints%count == 0 .and. self%compiled%fits(self%series_kernel)
+    takes_plain_steps = self%joints%count == 0 .and. self%compiled%fits(self%series_kernel) .and. &
+                        (self%switches == 0 .or. self%compiled%follows_switches)
   end function takes_plain_steps
 
   subroutine take_plain_steps(self, steps)
@@ -300,8 +302,15 @@ contains
     type(plain_steps_t), intent(inout) :: steps
 
     call self%norm%describe_map(steps)
-    call self%compiled%take_steps(self%series_kernel, self%state, self%twist_at_origin, steps)
+    call self%compiled%take_steps(self%series_kernel, self%state, self%twist_at_origin, self%switching, steps)
   end subroutine take_plain_steps
+
+  subroutine change_plain_branches(self, steps)
+    class(reduced_t), intent(inout) :: self
+    type(plain_steps_t), intent(in) :: steps
+
+    call self%compiled%change_branches(self%machine, self%state, steps)
+  end subroutine change_plain_branches
 
   !> Finds the joints that hold in each lane, and lanes without a motion that fits them.
   subroutine find_sets(self, status)

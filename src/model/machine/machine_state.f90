@@ -22,7 +22,7 @@ module nocdyn_machine_state
     procedure :: differentiate_elements
     procedure :: evaluate_energies
     procedure :: fastest_wave
-    procedure :: refresh_lane
+    procedure :: refresh_lane, take_constants
     procedure :: power
   end type machine_state_t
 
@@ -226,6 +226,17 @@ contains
       call self%banks(i)%refresh_lane(machine%banks(i)%bank, lane)
     end do
   end subroutine refresh_lane
+
+  !> Takes the constants of a switch's element in one lane, after a program has put them on another branch.
+  subroutine take_constants(self, machine, switch, lane)
+    class(machine_state_t), intent(inout) :: self
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: switch, lane
+
+    associate (bank => machine%switches%bank_of(switch))
+      call self%banks(bank)%law%take_constants(lane, machine%switches%element(switch) - machine%banks(bank)%bank%first + 1)
+    end associate
+  end subroutine take_constants
 
   !> Powers of the elements `with_work` after `evaluate`, positive into the machine.
   subroutine power(self, machine, watts)

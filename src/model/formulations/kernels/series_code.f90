@@ -6,12 +6,15 @@ module nocdyn_series_code
   use nocdyn_code_layout, only: find_laws, first_of, is_forcing, lay_out, layout_t, number_of
   use nocdyn_code_text, only: code_text_t, filled, list_of
   use nocdyn_compiled_code, only: code_part, series_part, steps_part
+  use nocdyn_element_coordinates, only: element_coordinates_t
   use nocdyn_element_laws, only: element_law_t
   use nocdyn_law_code, only: law_code_t
   use nocdyn_laws, only: narrow
+  use nocdyn_machine, only: machine_t
   use nocdyn_machine_state, only: machine_state_t
   use nocdyn_reduced_series, only: reduced_series_t
   use nocdyn_series_terms, only: has_forcing
+  use nocdyn_switch_code, only: followed_switches, write_passes, write_switch_code
   implicit none (type, external)
   private
 
@@ -33,18 +36,28 @@ contains
   end function code_obstacle
 
   !> Writes the program for blocks of lanes. Its procedures are described in `nocdyn_compiled_series`.
-  subroutine write_series_code(series, state, code)
+  subroutine write_series_code(series, state, machine, switching, code)
     type(reduced_series_t), intent(in) :: series
     type(machine_state_t), intent(in) :: state
+    type(machine_t), intent(in) :: machine
+    type(element_coordinates_t), intent(in) :: switching   !! of the elements that switches look at
     type(code_text_t), intent(inout) :: code
     type(law_code_t), allocatable :: laws(:)
     type(layout_t) :: layout
+    integer :: switches
 
     call find_laws(series, state, laws)
     call lay_out(series, state, laws, layout)
     layout%is_across = series%elements <= few_elements .and. series%strip >= most_across * narrow
+    switches = followed_switches(series, state)
+    call code%line('#define SWITCHES $   /* whose crossings are found */', [switches])
     call write_recurrence(series, state, laws, layout, narrow, series%w, code)
+    if (switches > 0) then
+      call write_switch_code(series, state, machine, switching, code)
+      call write_passes(series, state, 4 + 2 * size(laws), code)
+    end if
     call write_entries(series, laws, code)
+    call write_steps(code)
   end subroutine write_series_code
 
   !> Writes what computes the series, `expand`.
@@ -67,8 +80,8 @@ contains
                    [merge(1, 0, layout%is_across)])
     call code%line('#define MOST $   /* of them */', [merge(most_across, most_elements, layout%is_across)])
     call code%line(code_part(series_part))
-    if (lanes > 1) call code%line(code_part(steps_part))
     call write_data(series, state, laws, layout, code)
+    if (lanes > 1) call code%line(code_part(steps_part))
     do b = 1, size(laws)
       call write_bank(series, state%banks(number_of(series, b))%law, laws(b), code)
     end do
@@ -388,11 +401,11 @@ contains
     type(code_text_t), intent(inout) :: code
     integer :: b
 
-    call code%line('/* The series from lane `first` on; returns how many times eight lanes they are of. */')
-    call code%line('static long expand_from(const long first, const long lanes, const double *const *numbers, vd *z,')
-    call code%line('                        const functions *f, const double *t, const double *y) {')
+    call code%line('/* The numbers from lane `first` on */')
+    call code%line('static strip strip_from(const long first, const long lanes, const double *const *numbers, const double *t,')
+    call code%line('                        const double *y) {')
     call code%line('  const long strips = (lanes + W - 1) / W, number = first / W, within = first % W;')
-    call code%line('  const strip s = {lanes, lanes - first, number,')
+    call code%line('  return (strip){lanes, lanes - first, number,')
     call code%line('    numbers[0] + W * ELEMENTS * $ * number + within, numbers[1] + W * $ * number + within,', &
                    [size(series%law, 3), size(series%twists%column)])
     call code%line('    numbers[2] + W * $ * number + within, numbers[3] + first, t + first, y + first, {', &
@@ -409,6 +422,11 @@ contains
       call code%line('      W * $ * strips,', [laws(b)%law%elements])
     end do
     call code%line('    }};')
+    call code%line('}')
+    call code%line('/* The series from lane `first` on; returns how many times eight lanes they are of. */')
+    call code%line('static long expand_from(const long first, const long lanes, const double *const *numbers, vd *z,')
+    call code%line('                        const functions *f, const double *t, const double *y) {')
+    call code%line('  const strip s = strip_from(first, lanes, numbers, t, y);')
     call code%line('  if (ACROSS && s.left > LANES) {')
     call code%line('    expand(MOST, f, &s, z);')
     call code%line('    return MOST;')
@@ -432,13 +450,38 @@ contains
     call code%line('                      lanes - first - LANES * e);')
     call code%line('  }')
     call code%line('}')
+  end subroutine write_entries
+
+  !> Writes the procedures of plain steps.
+  subroutine write_steps(code)
+    type(code_text_t), intent(inout) :: code
+
     call code%line('void nocdyn_steps(const steps *s, const double *const *numbers, char *space, const functions *f) {')
     call code%line('  vd *z = aligned(space);')
     call code%line('  for (long first = 0, g; first < s->lanes; first += LANES * g) {')
     call code%line('    g = expand_from(first, s->lanes, numbers, z, f, s->t, s->y);')
-    call code%line('    for (int e = 0; e < g; e++) take_steps(s, first + LANES * e, z + at_c + WORK * e);')
+    call code%line('    for (int e = 0; e < g && first + LANES * e < s->lanes; e++) {')
+    call code%line('#if SWITCHES > 0')
+    call code%line('      const strip own = strip_from(first + LANES * e, s->lanes, numbers, s->t, s->y);')
+    call code%line('      pass own_pass = {.s = s, .numbers = &own, .first = first + LANES * e}, *p = &own_pass;')
+    call code%line('      begin_pass(p, numbers);')
+    call code%line('#else')
+    call code%line('      pass *p = 0;')
+    call code%line('#endif')
+    call code%line('      take_steps(s, p, first + LANES * e, z + at_c + WORK * e);')
+    call code%line('    }')
     call code%line('  }')
     call code%line('}')
-  end subroutine write_entries
+    call code%line('void nocdyn_branches(const steps *s, const double *const *numbers) {')
+    call code%line('#if SWITCHES > 0')
+    call code%line('  for (long first = 0; first < s->lanes; first += LANES) {')
+    call code%line('    const strip own = strip_from(first, s->lanes, numbers, s->t, s->y);')
+    call code%line('    pass p = {.s = s, .numbers = &own, .first = first};')
+    call code%line('    begin_pass(&p, numbers);')
+    call code%line('    change_branches(&p);')
+    call code%line('  }')
+    call code%line('#endif')
+    call code%line('}')
+  end subroutine write_steps
 
 end module nocdyn_series_code
