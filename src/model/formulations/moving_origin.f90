@@ -5,9 +5,11 @@
 !> The rounding of an angle disturbs the acceleration of a twist in proportion to the square of its natural frequency: the
 !> stiffer a machine, the smaller its angles are kept. An origin is a whole multiple of a power of two, added up exactly.
 module nocdyn_moving_origin
+  use, intrinsic :: iso_c_binding, only: c_loc
   use nocdyn_element_coordinates, only: element_coordinates_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
+  use nocdyn_plain_steps, only: plain_steps_t
   use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
   implicit none (type, external)
   private
@@ -30,7 +32,7 @@ module nocdyn_moving_origin
     integer, allocatable, private :: elastic(:)           !! elements that must not be twisted
     logical, private :: has_springs_only = .true.         !! whether the laws of these are polynomials
   contains
-    procedure :: find_shift, move, start_lane, move_twists, pass_parameters
+    procedure :: find_shift, move, start_lane, move_twists, pass_parameters, describe_limits
   end type moving_origin_t
 
 contains
@@ -122,6 +124,16 @@ contains
       end do
     end do
   end subroutine move_twists
+
+  !> Tells plain steps where a rigid motion is put back.
+  subroutine describe_limits(self, steps)
+    class(moving_origin_t), target, intent(in) :: self
+    type(plain_steps_t), intent(inout) :: steps
+
+    steps%turning = size(self%motions%free)
+    steps%turn = c_loc(self%motions%free)
+    steps%far = c_loc(self%unit)
+  end subroutine describe_limits
 
   !> Passes the arrays that may differ from variant to variant.
   subroutine pass_parameters(self, parameters)
