@@ -19,6 +19,7 @@ module nocdyn_series_code
 
   integer, parameter :: most_elements = 6, most_across = 2   ! numbers side by side: of elements, of lanes
   integer, parameter :: few_elements = 12                    ! of a machine whose lanes are computed side by side
+  integer, parameter :: most_unrolled = 1000   ! elements times the square of the order: code of up to about 20 kB without loops
 
 contains
 
@@ -40,6 +41,9 @@ contains
     type(law_code_t), allocatable :: laws(:)
     type(layout_t) :: layout
 
+    call code%line('#if defined __AVX512F__ && defined __znver3__   /* so GCC 12 calls a Zen 4; a Zen 3 has no such vectors */')
+    call code%line('#pragma GCC target("tune=skylake-avx512")')
+    call code%line('#endif')
     call find_laws(series, state, laws)
     call lay_out(series, state, laws, layout)
     layout%is_across = series%elements <= few_elements .and. series%strip >= most_across * narrow
@@ -66,6 +70,11 @@ contains
     call code%line('#define ACROSS $   /* whether numbers side by side are of lanes, not of elements */', &
                    [merge(1, 0, layout%is_across)])
     call code%line('#define MOST $   /* of them */', [merge(most_across, most_elements, layout%is_across)])
+    if (layout%is_across .and. series%elements * series%order**2 <= most_unrolled) then
+      call code%line('#define UNROLL _Pragma("GCC unroll 64")   /* of loops over coefficients */')
+    else
+      call code%line('#define UNROLL')
+    end if
     call code%line(code_part(series_part))
     if (lanes > 1) call code%line(code_part(steps_part))
     call write_data(series, state, laws, layout, code)
@@ -373,7 +382,7 @@ contains
       end associate
     end do
     call code%line('  coefficient(g, 0, f, s, z);')
-    call code%line('  for (int k = 1; k < P; k++) coefficient(g, k, f, s, z);')
+    call code%line('  UNROLL for (int k = 1; k < P; k++) coefficient(g, k, f, s, z);')
     call code%line('}')
   end subroutine write_strip
 
