@@ -15,7 +15,7 @@ module nocdyn_plain_stepping
 
   public :: prepare_plain_steps, take_plain_steps
 
-  integer, parameter :: most_steps = 8   ! at once: then lanes that have ended take variants, and interruptions are asked for
+  integer, parameter :: most_steps = 4   ! at once: then lanes that have ended take variants, and interruptions are asked for
 
 contains
 
