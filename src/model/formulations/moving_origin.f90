@@ -93,20 +93,21 @@ contains
     integer, intent(in) :: lane
     type(element_coordinates_t), intent(in) :: incidence
     real(wp), intent(in) :: stiffness(:)   !! linear stiffness of the elements [N m/rad], [elements]
-    real(wp) :: square   ! of the highest natural frequency of one element with the bodies that it joins
-    integer :: i
+    real(wp) :: response, square   ! of the highest natural frequency of one element with the bodies that it joins
+    integer :: i, k
 
     self%angle(lane, :) = 0.0_wp
     self%q(lane, :) = 0.0_wp
     square = noise * epsilon(square)
     do i = 1, size(self%elastic)
-      associate (first => incidence%first(self%elastic(i)), last => incidence%first(self%elastic(i) + 1) - 1)
-        square = max(square, abs(stiffness(self%elastic(i))) &
-                     * sum(incidence%ratio(lane, first:last) * incidence%response(lane, first:last)))
-      end associate
+      response = 0.0_wp
+      do k = incidence%first(self%elastic(i)), incidence%first(self%elastic(i) + 1) - 1
+        response = response + incidence%ratio(lane, k) * incidence%response(lane, k)
+      end do
+      square = max(square, abs(stiffness(self%elastic(i))) * response)
     end do
-    self%unit(lane) = 2.0_wp**max(smallest_exponent, min(exponent(noise / square), &
-                                                         merge(largest_exponent, usual_exponent, self%has_springs_only)))
+    self%unit(lane) = scale(1.0_wp, max(smallest_exponent, min(exponent(noise / square), &
+                                                               merge(largest_exponent, usual_exponent, self%has_springs_only))))
   end subroutine start_lane
 
   !> Adds the angle of the origin to the angles of the elements that turn with it. Elastic elements do not feel it.
