@@ -286,11 +286,14 @@ contains
     integer, intent(in) :: number, lane
     real(wp), contiguous, intent(in) :: y(:)
 
+    if (self%element(number) == 0 .and. .not. self%is_speed(number)) then
+      select type (block)
+      class is (reduced_t)
+        x = block%body_angle(lane, self%body(number), y)
+        return
+      end select
+    end if
     x = self%argument(number, lane, y)
-    select type (block)
-    class is (reduced_t)
-      if (self%element(number) == 0 .and. .not. self%is_speed(number)) x = block%body_angle(lane, self%body(number), y)
-    end select
   end function value_at_end
 
 end module nocdyn_linear_columns

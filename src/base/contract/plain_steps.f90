@@ -10,7 +10,7 @@ module nocdyn_plain_steps
 
   ! What has become of a lane.
   integer, parameter, public :: no_step = 0      !! something has to be decided for a lane nearby
-  integer, parameter, public :: plain_step = 1   !! it has taken a step
+  integer, parameter, public :: plain_step = 1   !! it has taken steps
   integer, parameter, public :: last_step = 2    !! it has taken a step to its end
 
   !> A function of the state, x = offset + sum of factor * y, whose range over time the steps widen.
@@ -44,6 +44,8 @@ module nocdyn_plain_steps
     integer(c_long) :: lanes = 0, columns = 0           !! columns of the state, with padding
     integer(c_long) :: measures = 0, phases = 0         !! measured quantities, and those before the phases, whose size is about 1
     integer(c_long) :: ranges = 0
+    integer(c_long) :: most = 1                         !! steps of a lane at once
+    integer(c_long) :: turning = 0                      !! states that are shifted where they have gone far
     real(c_double) :: rtol = 0.0_c_double, atol = 0.0_c_double
     real(c_double) :: t_end = 0.0_c_double, longest = 0.0_c_double   !! end, longest step [s]
     type(c_ptr) :: t = c_null_ptr, y = c_null_ptr       !! [lanes], [lanes, columns]
@@ -51,6 +53,9 @@ module nocdyn_plain_steps
     type(c_ptr) :: h = c_null_ptr                       !! steps that were taken [s], [lanes]
     type(c_ptr) :: running = c_null_ptr                 !! whether a lane has a variant, integers [lanes]
     type(c_ptr) :: outcome = c_null_ptr                 !! no_step and so on, [lanes]
+    type(c_ptr) :: taken = c_null_ptr                   !! number of steps, integers [lanes]
+    type(c_ptr) :: turn = c_null_ptr                    !! freedoms whose angles are shifted, [turning]
+    type(c_ptr) :: far = c_null_ptr                     !! angles beyond which they are [rad], [lanes]
     type(c_ptr) :: first = c_null_ptr, column = c_null_ptr           !! of the map from the state to the measures
     type(c_ptr) :: coefficient = c_null_ptr, offset = c_null_ptr     !! [lanes, entries], [lanes, measures]
     type(c_ptr) :: wanted = c_null_ptr                  !! steps that the series allow [s], [lanes]

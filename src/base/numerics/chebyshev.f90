@@ -28,7 +28,7 @@ module nocdyn_chebyshev
 
   !> Parts of [-1, 1] that are left to be searched; the last one is next.
   type :: series_parts_t
-    integer :: count = 0
+    integer :: count
     real(wp) :: middle(max_halvings + 2), half(max_halvings + 2)   !! middles and half lengths
   end type series_parts_t
 
@@ -83,6 +83,7 @@ contains
     if (found) highest = values(top)
     if (0.5_wp * ((1 - lebesgue_constant) * values(bottom) + (1 + lebesgue_constant) * values(top)) <= highest) return
     call find_series(rule, values, whole)
+    parts%count = 0
     call add_part(parts, 0.0_wp, 1.0_wp)
     do part = 1, max_parts
       if (parts%count == 0) exit
@@ -123,6 +124,7 @@ contains
     position = -1.0_wp
     if (lebesgue_constant * maxval(abs(values)) <= tolerance) return
     call find_series(rule, values, whole)
+    parts%count = 0
     call add_part(parts, 0.0_wp, 1.0_wp)
     do while (parts%count > 0)
       call take_part(rule, values, whole, parts, middle, half, part, c)
@@ -151,6 +153,7 @@ contains
 
     count = 0
     call find_series(rule, values, whole)
+    parts%count = 0
     call add_part(parts, 0.0_wp, 1.0_wp)
     do part = 1, max_parts
       if (parts%count == 0 .or. count == max_degree) exit

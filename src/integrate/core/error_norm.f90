@@ -43,8 +43,8 @@ contains
     logical, intent(in) :: starting(:)   !! [lanes]
     integer :: i
 
-    do i = 1, size(control%size, 2)
-      control%size(:, i) = merge(0.0_wp, control%size(:, i), starting)
+    do i = 1, size(starting)
+      if (starting(i)) control%size(i, :) = 0.0_wp
     end do
   end subroutine forget_sizes
 

@@ -72,8 +72,8 @@ contains
     solver_status%accepted(lane) = 0
     solver_status%rejected(lane) = 0
     solver_status%implicit_steps(lane) = 0
+    solver_status%switch_times(:min(solver_status%switches(lane), max_switch_times), lane) = 0.0_wp
     solver_status%switches(lane) = 0
-    solver_status%switch_times(:, lane) = 0.0_wp
     solver_status%implicit(lane) = .false.
     solver_status%crossings(lane) = 0
     solver_status%last_crossing(lane) = 0

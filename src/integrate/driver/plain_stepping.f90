@@ -19,6 +19,8 @@ module nocdyn_plain_stepping
 
   public :: prepare_plain_steps, take_plain_steps
 
+  integer, parameter :: most_steps = 4   ! at once: then lanes that have ended take variants, and interruptions are asked for
+
 contains
 
   !> Finds whether steps may be plain at all.
@@ -39,12 +41,13 @@ contains
     if (.not. integrator%may_be_plain) return
     call observer%list_ranges(stepper%series_order, integrator%plain, integrator%may_be_plain)
     if (.not. integrator%may_be_plain) return
-    allocate (integrator%outcome(system%lanes), integrator%is_running(system%lanes), source=0_c_int)
+    allocate (integrator%outcome(system%lanes), integrator%is_running(system%lanes), integrator%taken(system%lanes), &
+              source=0_c_int)
     integrator%plain%lanes = system%lanes
     integrator%plain%measures = system%measures
   end subroutine prepare_plain_steps
 
-  !> Lets the system take plain steps; the lanes that have come to their ends are done.
+  !> Lets the system take some plain steps; the lanes that have come to their ends are done.
   subroutine take_plain_steps(integrator, stepper, system, times, observer, solver_status, are_taken)
     type(integrator_t), target, intent(inout) :: integrator
     class(stepper_t), intent(inout) :: stepper
@@ -52,14 +55,15 @@ contains
     real(wp), contiguous, intent(in) :: times(:)   !! output times [s]
     class(observer_t), intent(inout) :: observer
     type(solver_status_t), target, intent(inout) :: solver_status
-    logical, intent(out) :: are_taken   !! whether all running lanes have taken a step
+    logical, intent(out) :: are_taken   !! whether all running lanes have taken steps
     integer :: lane, left
     logical :: is_able
 
     are_taken = .false.
     if (.not. integrator%may_be_plain) return
     if (.not. system%takes_plain_steps()) return
-    if (maxval(solver_status%steps) + 1 >= integrator%max_steps) return
+    integrator%plain%most = min(most_steps, integrator%max_steps - 1 - maxval(solver_status%steps))
+    if (integrator%plain%most < 1) return
     call stepper%describe_plain_steps(integrator%plain, is_able)
     if (.not. is_able) return
     associate (attempt => integrator%attempt)
@@ -67,14 +71,15 @@ contains
       integrator%is_running(:) = merge(1_c_int, 0_c_int, integrator%occupied .and. solver_status%code == integration_running)
       integrator%outcome(:) = no_step
       if (integrator%has_switches) integrator%switching%pending(:) = 0
+      integrator%taken(:) = 0
       call system%take_plain_steps(integrator%plain)
       integrator%accepted(:) = integrator%outcome > no_step
       left = 0
       do lane = 1, attempt%lanes
         solver_status%h(lane) = merge(attempt%h(lane), solver_status%h(lane), integrator%accepted(lane))
-        solver_status%steps(lane) = solver_status%steps(lane) + merge(1, 0, integrator%accepted(lane))
-        solver_status%accepted(lane) = solver_status%accepted(lane) + merge(1, 0, integrator%accepted(lane))
-        attempt%evaluations(lane) = attempt%evaluations(lane) + merge(1, 0, integrator%accepted(lane))
+        solver_status%steps(lane) = solver_status%steps(lane) + integrator%taken(lane)
+        solver_status%accepted(lane) = solver_status%accepted(lane) + integrator%taken(lane)
+        attempt%evaluations(lane) = attempt%evaluations(lane) + integrator%taken(lane)
         solver_status%code(lane) = merge(integration_done, solver_status%code(lane), integrator%outcome(lane) == last_step)
         left = left + integrator%is_running(lane) - merge(1, 0, integrator%accepted(lane))
       end do
@@ -114,6 +119,7 @@ contains
       plain%wanted = c_loc(control%h)
       plain%running = c_loc(integrator%is_running)
       plain%outcome = c_loc(integrator%outcome)
+      plain%taken = c_loc(integrator%taken)
     end associate
     if (integrator%has_switches) call describe_plain_crossings(integrator%switching, integrator%plain)
   end subroutine describe_state

@@ -62,7 +62,7 @@ module nocdyn_time_stepping
     integer, allocatable :: next(:)                  !! index of the next output time of each lane
     real(wp), allocatable :: sample(:)               !! state of one lane, [components]
     type(plain_steps_t) :: plain
-    integer(c_int), allocatable :: is_running(:), outcome(:)   !! of plain steps, [lanes]
+    integer(c_int), allocatable :: is_running(:), outcome(:), taken(:)   !! of plain steps, [lanes]
     real(wp), allocatable :: coefficients(:, :, :)   !! of the dense output of the last step, [lanes, padded columns, degree]
   end type integrator_t
 

@@ -67,7 +67,7 @@ module nocdyn_described_elements
     type(curve_t), allocatable :: curve(:, :)     !! of the first switch of each element, [lanes, elements]
     type(law_tape_t), allocatable :: tape         !! the part of the law that is not polynomial
   contains
-    procedure :: polynomials
+    procedure :: polynomials, set_terms
     procedure :: describe
     procedure :: set_size
     procedure :: add_key
@@ -276,15 +276,38 @@ contains
     integer :: e, i, l
 
     do i = 1, size(self%terms)
-      associate (term => self%terms(i))
-        do e = 1, self%count
-          do l = first_lane, last_lane
-            call laws%set(term%coefficient, l, self%first - 1 + e, term%factor * self%parameters(term%parameter)%value(l, e))
-          end do
+      do e = 1, self%count
+        do l = first_lane, last_lane
+          call set_term(self, i, e, l, laws)
         end do
-      end associate
+      end do
     end do
   end subroutine polynomials
+
+  !> Sets the coefficients that follow from one parameter of an element, in a lane.
+  pure subroutine set_terms(self, parameter, element, lane, laws)
+    class(described_elements_t), intent(in) :: self
+    integer, intent(in) :: parameter, element, lane
+    type(polynomial_laws_t), intent(inout) :: laws   !! of the machine
+    integer :: i
+
+    do i = 1, size(self%terms)
+      if (self%terms(i)%parameter == parameter) call set_term(self, i, element, lane, laws)
+    end do
+  end subroutine set_terms
+
+  !> Sets one coefficient of an element in a lane.
+  pure subroutine set_term(self, number, element, lane, laws)
+    class(described_elements_t), intent(in) :: self
+    integer, intent(in) :: number   !! of the term
+    integer, intent(in) :: element, lane
+    type(polynomial_laws_t), intent(inout) :: laws
+
+    associate (term => self%terms(number))
+      call laws%set(term%coefficient, lane, self%first - 1 + element, &
+                    term%factor * self%parameters(term%parameter)%value(lane, element))
+    end associate
+  end subroutine set_term
 
   !> Writes the part of the law that is not polynomial as formulas: sets `restoring`, `applied`, `stored`, `rate`, `row` of the
   !> list and the guards of its branches. By default there is none.

@@ -10,6 +10,7 @@ module nocdyn_coordinate_formulation
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_moving_origin, only: moving_origin_t, new_moving_origin
+  use nocdyn_plain_steps, only: plain_steps_t
   use nocdyn_sparse_map, only: sparse_map_t
   implicit none (type, external)
   private
@@ -25,7 +26,7 @@ module nocdyn_coordinate_formulation
   contains
     procedure :: set_coordinates, list_coordinates, start, project_start_speeds, set_state, gather, find_far
     procedure :: shift_state, restore_state, reset_origin, angle_at_zero, body_angle, twist_at_zero, switch_motion
-    procedure :: accelerate, element_rate, push_element, block_indicators, reactions
+    procedure :: accelerate, element_rate, push_element, block_indicators, reactions, describe_steps
   end type coordinate_formulation_t
 
 contains
@@ -176,6 +177,15 @@ contains
       end do
     end associate
   end subroutine find_far
+
+  !> Describes the measured quantities of several lanes, and where their states are shifted.
+  subroutine describe_steps(self, steps)
+    class(coordinate_formulation_t), intent(in) :: self
+    type(plain_steps_t), intent(inout) :: steps
+
+    call self%norm%describe_map(steps)
+    call self%origin%describe_limits(steps)
+  end subroutine describe_steps
 
   !> Puts the coordinates of a lane back near the origin, and moves the origin instead.
   subroutine shift_state(self, lane, y, shift)

@@ -5,9 +5,11 @@
 !> The rounding of an angle disturbs the acceleration of a twist in proportion to the square of its natural frequency: the
 !> stiffer a machine, the smaller its angles are kept. An origin is a whole multiple of a power of two, added up exactly.
 module nocdyn_moving_origin
+  use, intrinsic :: iso_c_binding, only: c_loc
   use nocdyn_element_coordinates, only: element_coordinates_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
+  use nocdyn_plain_steps, only: plain_steps_t
   use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
   implicit none (type, external)
   private
@@ -30,7 +32,7 @@ module nocdyn_moving_origin
     integer, allocatable, private :: elastic(:)           !! elements that must not be twisted
     logical, private :: has_springs_only = .true.         !! whether the laws of these are polynomials
   contains
-    procedure :: find_shift, move, start_lane, move_twists, pass_parameters
+    procedure :: find_shift, move, start_lane, move_twists, pass_parameters, describe_limits
   end type moving_origin_t
 
 contains
@@ -91,20 +93,21 @@ contains
     integer, intent(in) :: lane
     type(element_coordinates_t), intent(in) :: incidence
     real(wp), intent(in) :: stiffness(:)   !! linear stiffness of the elements [N m/rad], [elements]
-    real(wp) :: square   ! of the highest natural frequency of one element with the bodies that it joins
-    integer :: i
+    real(wp) :: response, square   ! of the highest natural frequency of one element with the bodies that it joins
+    integer :: i, k
 
     self%angle(lane, :) = 0.0_wp
     self%q(lane, :) = 0.0_wp
     square = noise * epsilon(square)
     do i = 1, size(self%elastic)
-      associate (first => incidence%first(self%elastic(i)), last => incidence%first(self%elastic(i) + 1) - 1)
-        square = max(square, abs(stiffness(self%elastic(i))) &
-                     * sum(incidence%ratio(lane, first:last) * incidence%response(lane, first:last)))
-      end associate
+      response = 0.0_wp
+      do k = incidence%first(self%elastic(i)), incidence%first(self%elastic(i) + 1) - 1
+        response = response + incidence%ratio(lane, k) * incidence%response(lane, k)
+      end do
+      square = max(square, abs(stiffness(self%elastic(i))) * response)
     end do
-    self%unit(lane) = 2.0_wp**max(smallest_exponent, min(exponent(noise / square), &
-                                                         merge(largest_exponent, usual_exponent, self%has_springs_only)))
+    self%unit(lane) = scale(1.0_wp, max(smallest_exponent, min(exponent(noise / square), &
+                                                               merge(largest_exponent, usual_exponent, self%has_springs_only))))
   end subroutine start_lane
 
   !> Adds the angle of the origin to the angles of the elements that turn with it. Elastic elements do not feel it.
@@ -122,6 +125,16 @@ contains
       end do
     end do
   end subroutine move_twists
+
+  !> Tells plain steps where a rigid motion is put back.
+  subroutine describe_limits(self, steps)
+    class(moving_origin_t), target, intent(in) :: self
+    type(plain_steps_t), intent(inout) :: steps
+
+    steps%turning = size(self%motions%free)
+    steps%turn = c_loc(self%motions%free)
+    steps%far = c_loc(self%unit)
+  end subroutine describe_limits
 
   !> Passes the arrays that may differ from variant to variant.
   subroutine pass_parameters(self, parameters)

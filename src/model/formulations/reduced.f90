@@ -301,7 +301,7 @@ contains
     class(reduced_t), intent(inout) :: self
     type(plain_steps_t), intent(inout) :: steps
 
-    call self%norm%describe_map(steps)
+    call self%describe_steps(steps)
     call self%compiled%take_steps(self%series_kernel, self%state, self%twist_at_origin, self%switching, steps)
   end subroutine take_plain_steps
 

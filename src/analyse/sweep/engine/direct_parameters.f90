@@ -34,7 +34,6 @@ module nocdyn_direct_parameters
     integer, allocatable, private :: unit(:)                      !! of the values of each target: index of `units`
     integer, allocatable, private :: target(:)                    !! targets whose values are in arrays of banks ...
     type(place_t), allocatable, private :: place(:)               !! ... and where each of them is
-    integer, allocatable, private :: banks(:)                     !! with such arrays
     integer, allocatable, private :: inertia_target(:)            !! targets that are inertias ...
     integer, allocatable, private :: body(:)                      !! ... and the body of each
     integer, allocatable, private :: groups(:)                    !! of geared bodies, in which these are
@@ -54,7 +53,7 @@ contains
     logical :: holds_inertia   ! whether the machine has what follows from inertias: sums of them, or projected start speeds
     integer :: b, g, i
 
-    allocate (self%target(0), self%place(0), self%banks(0), self%inertia_target(0), self%body(0))
+    allocate (self%target(0), self%place(0), self%inertia_target(0), self%body(0))
     allocate (self%signs(size(targets), 0))
     allocate (self%unit(size(targets)))
     self%unit(:) = targets%in_unit
@@ -107,7 +106,6 @@ contains
             self%are_direct = .true.
             self%target = [self%target, number]
             self%place = [self%place, place]
-            if (all(self%banks /= b)) self%banks = [self%banks, b]
           end do
         end associate
       end do
@@ -245,13 +243,12 @@ contains
     logical :: is_indefinite
 
     do i = 1, size(self%target)
-      associate (place => self%place(i))
-        block%machine%banks(place%bank)%bank%parameters(place%parameter)%value(lane, place%column) = &
-          in_si(values(self%target(i)), self%unit(self%target(i)))
+      associate (place => self%place(i), target => self%target(i))
+        associate (bank => block%machine%banks(place%bank)%bank)
+          bank%parameters(place%parameter)%value(lane, place%column) = in_si(values(target), self%unit(target))
+          call bank%set_terms(place%parameter, place%column, lane, block%machine%laws)
+        end associate
       end associate
-    end do
-    do i = 1, size(self%banks)
-      call block%machine%banks(self%banks(i))%bank%polynomials(lane, lane, block%machine%laws)
     end do
     is_set = .true.
     if (size(self%inertia_target) == 0) return

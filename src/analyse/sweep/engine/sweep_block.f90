@@ -42,6 +42,7 @@ module nocdyn_sweep_block
   type, extends(statistics_observer_t) :: block_observer_t
     class(scheduler_t), pointer :: scheduler => null()
     integer :: steps = 0
+    real(wp), allocatable :: values(:)   !! of the statistics of the last variant
   contains
     procedure :: wants_stop
   end type block_observer_t
@@ -61,6 +62,7 @@ module nocdyn_sweep_block
     type(open_chunk_t), allocatable :: chunks(:)   !! each has a variant in a lane, or variants for lanes, [lanes + 1]
     integer :: newest = 0                          !! chunk that has variants for lanes; 0: none
     integer, allocatable :: slot(:), index(:)      !! chunk of the variant in each lane, and its number there
+    real(wp), allocatable :: values(:)             !! of the targets, of the last variant
     logical :: is_last = .false.                   !! no chunk is taken after the newest one in this integration
     logical :: none_left = .false.                 !! the scheduler has no more variants
     real(wp) :: submitted = 0.0_wp                 !! when the last chunk was submitted, or the integration began [s]
@@ -158,6 +160,7 @@ contains
       allocate (ensemble%slot(lanes), ensemble%index(lanes), source=0)
       allocate (ensemble%chunks(lanes + 1))
     end associate
+    allocate (ensemble%values(size(self%plan%numbers%targets)))
     do
       ensemble%is_last = size(self%plan%statistics) == 0 .or. size(self%plan%analyses) > 0
       ensemble%submitted = time_now()
@@ -175,7 +178,7 @@ contains
   subroutine take_chunk(self, found)
     type(chunk_ensemble_t), intent(inout) :: self
     logical, intent(out) :: found
-    integer :: count, first
+    integer :: count, first, i
 
     self%newest = 0
     found = .false.
@@ -194,6 +197,9 @@ contains
       call allocate_chunk(open%chunk, first, count, self%block%plan%design%varied, self%block%plan%results())
       open%chunk%results(:, :) = ieee_value(0.0_wp, ieee_quiet_nan)
       open%chunk%status(:) = not_computed
+      do i = 1, count
+        call self%block%plan%values(first + i - 1, open%chunk%parameters(:, i))
+      end do
       open%is_open = .true.
       open%next_index = 1
       open%left = count
@@ -209,17 +215,13 @@ contains
     type(solver_status_t) :: solver_status
     real(wp), allocatable :: y(:)
     real(wp) :: t
-    integer :: i
     logical :: found
 
     t = 0.0_wp
     if (size(self%plan%statistics) == 0) then
       associate (chunk => ensemble%chunks(ensemble%newest)%chunk)
-        do i = 1, chunk%count
-          call self%plan%values(chunk%first + i - 1, chunk%parameters(:, i))
-          chunk%status(i) = status_done
-          chunk%steps(i) = 0
-        end do
+        chunk%status(:) = status_done
+        chunk%steps(:) = 0
       end associate
     else if (self%message == '') then
       allocate (stepper, source=self%stepper)
@@ -288,7 +290,6 @@ contains
     real(wp), contiguous, intent(inout) :: y(:)
     logical, intent(out) :: found
     character(len=:), allocatable :: reason
-    real(wp) :: values(size(self%block%plan%numbers%targets))
     integer :: i, status
 
     do
@@ -299,9 +300,8 @@ contains
       associate (open => self%chunks(self%slot(lane)))
         i = open%next_index
         open%next_index = i + 1
-        call self%block%plan%values(open%chunk%first + i - 1, open%chunk%parameters(:, i))
-        call self%block%plan%numbers%target_values(open%chunk%parameters(:, i), values)
-        call self%block%machines%set_variant(values, lane, y, status, reason)
+        call self%block%plan%numbers%target_values(open%chunk%parameters(:, i), self%values)
+        call self%block%machines%set_variant(self%values, lane, y, status, reason)
         if (status == variant_needs_own_block) open%own_blocks = open%own_blocks + 1
         if (i == open%chunk%count) then
           self%newest = 0
@@ -361,23 +361,25 @@ contains
     class(formulation_t), intent(in) :: formulation
     type(integration_settings_t), intent(in) :: settings
     type(statistic_t), intent(in) :: statistics(:)
-    class(statistics_observer_t), intent(inout) :: observer
-    real(wp) :: values(size(statistics))
-    integer :: i
+    type(block_observer_t), intent(inout) :: observer
+    integer :: i, wrong
 
     if (solver_status%code(lane) == integration_interrupted) return
     chunk%steps(index) = solver_status%accepted(lane)
     if (solver_status%code(lane) == integration_done) then
       chunk%status(index) = status_done
-      call observer%results(lane, values)
-      do i = 1, size(statistics)
-        values(i) = from_si(values(i), statistics(i)%in_unit)
-        chunk%results(statistics(i)%result, index) = values(i)
+      if (.not. allocated(observer%values)) allocate (observer%values(size(statistics)))
+      call observer%results(lane, observer%values)
+      wrong = 0
+      do i = size(statistics), 1, -1
+        associate (result => chunk%results(statistics(i)%result, index))
+          result = from_si(observer%values(i), statistics(i)%in_unit)
+          if (.not. is_finite(result)) wrong = i
+        end associate
       end do
-      i = findloc(is_finite(values), .false., dim=1)
-      if (i == 0) return
+      if (wrong == 0) return
       chunk%status(index) = status_failed
-      chunk%reasons(index)%text = 'the result ' // statistics(i)%label // ' is not a finite number'
+      chunk%reasons(index)%text = 'the result ' // statistics(wrong)%label // ' is not a finite number'
       chunk%results(:, index) = ieee_value(0.0_wp, ieee_quiet_nan)
     else
       chunk%status(index) = status_failed

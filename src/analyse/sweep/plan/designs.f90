@@ -17,6 +17,9 @@ module nocdyn_designs
 
   integer, parameter, public :: max_variants = 2000000000
 
+  character(len=6), parameter :: words(5) = ['grid  ', 'random', 'latin ', 'sobol ', 'list  ']
+  integer, parameter :: by_grid = 1, at_random = 2, latin = 3, sobol = 4, by_list = 5   ! indices of `words`
+
   real(wp), parameter :: last_offset = 1.0_wp - 2.0_wp**(-20)   ! in a stratum: rounding must not leave it
 
   !> A factor: a number that varies, and its distribution.
@@ -31,7 +34,7 @@ module nocdyn_designs
   type, public :: design_t
     integer :: variants = 0   !! numbered from 1
     integer :: varied = 0     !! number of factors
-    character(len=6), private :: word = 'list'                       !! 'grid', 'random', 'latin', 'sobol', 'list'
+    integer, private :: kind = by_list                               !! of `words`
     integer, private :: seed = 0
     type(factor_t), allocatable, private :: factors(:)               !! of a grid
     type(distribution_t), allocatable, private :: distributions(:)   !! of random values, [varied]
@@ -50,7 +53,7 @@ contains
     type(factor_t), intent(in) :: factors(:)   !! with `grid_size` at most `max_variants`
 
     if (grid_size(factors) > max_variants) error stop 'nocdyn_designs: the grid has too many variants'
-    design%word = 'grid'
+    design%kind = by_grid
     design%variants = int(grid_size(factors))
     design%varied = size(factors)
     allocate (design%factors, source=factors)
@@ -75,21 +78,21 @@ contains
     integer :: i
     real(wp) :: probability
 
-    select case (self%word)
-    case ('grid')
+    select case (self%kind)
+    case (by_grid)
       call grid_values(self%factors, variant, x)
-    case ('list')
+    case (by_list)
       x = self%list(:, variant)
     case default
       do i = 1, self%varied
         ! the probability of values below the one of a factor in a variant
-        select case (self%word)
-        case ('random')
+        select case (self%kind)
+        case (at_random)
           probability = random_number_at(self%seed, stream_values, i, variant)
-        case ('latin')
+        case (latin)
           probability = (self%strata(i)%image(variant - 1) + &
                          min(random_number_at(self%seed, stream_offsets, i, variant), last_offset)) / self%variants
-        case ('sobol')
+        case (sobol)
           probability = self%points%coordinate(variant - 1, i)
         case default
           error stop 'nocdyn_designs: there is no such design'
@@ -136,7 +139,7 @@ contains
 
     design%variants = samples
     design%varied = size(factors)
-    design%word = word
+    design%kind = findloc(words, word, dim=1)
     design%seed = seed
     allocate (design%distributions(size(factors)), design%strata(merge(size(factors), 0, word == 'latin')))
     do i = 1, size(factors)

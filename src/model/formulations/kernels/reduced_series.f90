@@ -120,28 +120,28 @@ contains
     type(reduced_series_t), intent(inout) :: self
     integer, intent(in) :: lane
     type(polynomial_laws_t), intent(in) :: laws
-    integer :: e, first, g, last, slot, terms
+    integer :: at, e, first, g, last, slot, strip, terms
 
     first = modulo(lane - 1, self%strip) + 1
     last = first
     if (lane == self%lanes) last = self%strip
+    strip = (lane - 1) / self%strip + 1
     do e = 1, self%elements
+      ! the terms that the law of an element has in one lane
+      terms = 0
+      if (abs(laws%linear(lane, e)) > 0) terms = has_angle
+      if (abs(laws%cubic(lane, e)) > 0) terms = has_angle + has_cubic + has_history
+      if (abs(laws%constant(lane, e)) > 0 .or. abs(laws%by_speed(lane, e)) > 0) terms = terms + has_applied
+      if (abs(laws%by_speed_squared(lane, e)) > 0) terms = ior(terms, has_square + has_history)
       do slot = self%strip * (e - 1) + first, self%strip * (e - 1) + last
         g = (slot - 1) / self%w + 1
-        associate (law => self%law(modulo(slot - 1, self%w) + 1, g, :, (lane - 1) / self%strip + 1))
-          law(linear) = laws%linear(lane, e)
-          law(constant) = laws%constant(lane, e)
-          law(by_speed) = laws%by_speed(lane, e)
-          law(cubic) = laws%cubic(lane, e)
-          law(by_speed_squared) = laws%by_speed_squared(lane, e)
-          law(rest) = laws%rest(lane, e)
-        end associate
-        ! the terms that the law of an element has in one lane
-        terms = 0
-        if (abs(laws%linear(lane, e)) > 0) terms = has_angle
-        if (abs(laws%cubic(lane, e)) > 0) terms = has_angle + has_cubic + has_history
-        if (abs(laws%constant(lane, e)) > 0 .or. abs(laws%by_speed(lane, e)) > 0) terms = terms + has_applied
-        if (abs(laws%by_speed_squared(lane, e)) > 0) terms = ior(terms, has_square + has_history)
+        at = slot - self%w * (g - 1)
+        self%law(at, g, linear, strip) = laws%linear(lane, e)
+        self%law(at, g, constant, strip) = laws%constant(lane, e)
+        self%law(at, g, by_speed, strip) = laws%by_speed(lane, e)
+        self%law(at, g, cubic, strip) = laws%cubic(lane, e)
+        self%law(at, g, by_speed_squared, strip) = laws%by_speed_squared(lane, e)
+        self%law(at, g, rest, strip) = laws%rest(lane, e)
         self%terms(g) = ior(self%terms(g), terms)
       end do
     end do

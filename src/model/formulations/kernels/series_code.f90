@@ -22,6 +22,7 @@ module nocdyn_series_code
 
   integer, parameter :: most_elements = 6, most_across = 2   ! numbers side by side: of elements, of lanes
   integer, parameter :: few_elements = 12                    ! of a machine whose lanes are computed side by side
+  integer, parameter :: most_unrolled = 1000   ! elements times the square of the order: code of up to about 20 kB without loops
 
 contains
 
@@ -46,6 +47,9 @@ contains
     type(layout_t) :: layout
     integer :: switches
 
+    call code%line('#if defined __AVX512F__ && defined __znver3__   /* so GCC 12 calls a Zen 4; a Zen 3 has no such vectors */')
+    call code%line('#pragma GCC target("tune=skylake-avx512")')
+    call code%line('#endif')
     call find_laws(series, state, laws)
     call lay_out(series, state, laws, layout)
     layout%is_across = series%elements <= few_elements .and. series%strip >= most_across * narrow
@@ -79,6 +83,11 @@ contains
     call code%line('#define ACROSS $   /* whether numbers side by side are of lanes, not of elements */', &
                    [merge(1, 0, layout%is_across)])
     call code%line('#define MOST $   /* of them */', [merge(most_across, most_elements, layout%is_across)])
+    if (layout%is_across .and. series%elements * series%order**2 <= most_unrolled) then
+      call code%line('#define UNROLL _Pragma("GCC unroll 64")   /* of loops over coefficients */')
+    else
+      call code%line('#define UNROLL')
+    end if
     call code%line(code_part(series_part))
     call write_data(series, state, laws, layout, code)
     if (lanes > 1) call code%line(code_part(steps_part))
@@ -353,20 +362,26 @@ contains
     integer :: b, i, run
 
     call write_coefficient(series, layout, code)
-    call code%line('/* The series of a strip, in z */')
-    call code%line('INLINE void expand(const int g, const functions *f, const strip *s, vd *z) {')
+    call code%line('/* The numbers of a strip that its steps do not change, in z */')
+    call code%line('INLINE void load_numbers(const int g, const strip *s, vd *z) {')
     call code%line('  EACH {')
-    call code%line('    const long left = s->left - LANES * e;')
     call code%line('    vd *w = z + WORK * e;')
-    call code%line('    w[at_time] = load_lanes(s->t + LANES * e, left);')
-    call code%line('    w[at_time + 1] = 1.0 + (vd){};')
-    call code%line('    for (int i = 0; i < COMPONENTS; i++) w[at_c + i] = load_lanes(s->y + s->lanes * i + LANES * e, left);')
     call code%line('    for (int i = 0; i < $; i++) w[at_ratio + i] = load(s->ratio + W * i + LANES * e);', &
                    [size(series%twists%column)])
     call code%line('    for (int i = 0; i < $; i++) w[at_response + i] = load(s->response + W * i + LANES * e);', &
                    [size(series%accelerations%column)])
     call code%line('    for (int i = 0; i < $ * ELEMENTS; i++) w[at_law + i] = load(s->law + W * i + LANES * e);', &
                    [size(series%law, 3)])
+    call code%line('    w[at_time + 1] = 1.0 + (vd){};')
+    call code%line('  }')
+    call code%line('}')
+    call code%line('/* The series of a strip, in z */')
+    call code%line('INLINE void expand(const int g, const functions *f, const strip *s, vd *z) {')
+    call code%line('  EACH {')
+    call code%line('    const long left = s->left - LANES * e;')
+    call code%line('    vd *w = z + WORK * e;')
+    call code%line('    w[at_time] = load_lanes(s->t + LANES * e, left);')
+    call code%line('    for (int i = 0; i < COMPONENTS; i++) w[at_c + i] = load_lanes(s->y + s->lanes * i + LANES * e, left);')
     do b = 1, size(series%banks%moved)
       associate (inputs => state%banks(series%banks%moved(b))%law)
         do i = 1, inputs%states
@@ -390,7 +405,7 @@ contains
       end associate
     end do
     call code%line('  coefficient(g, 0, f, s, z);')
-    call code%line('  for (int k = 1; k < P; k++) coefficient(g, k, f, s, z);')
+    call code%line('  UNROLL for (int k = 1; k < P; k++) coefficient(g, k, f, s, z);')
     call code%line('}')
   end subroutine write_strip
 
@@ -401,7 +416,7 @@ contains
     type(code_text_t), intent(inout) :: code
     integer :: b
 
-    call code%line('/* The numbers from lane `first` on */')
+    call code%line('/* The strip that begins with lane `first` */')
     call code%line('static strip strip_from(const long first, const long lanes, const double *const *numbers, const double *t,')
     call code%line('                        const double *y) {')
     call code%line('  const long strips = (lanes + W - 1) / W, number = first / W, within = first % W;')
@@ -423,16 +438,19 @@ contains
     end do
     call code%line('    }};')
     call code%line('}')
-    call code%line('/* The series from lane `first` on; returns how many times eight lanes they are of. */')
-    call code%line('static long expand_from(const long first, const long lanes, const double *const *numbers, vd *z,')
-    call code%line('                        const functions *f, const double *t, const double *y) {')
-    call code%line('  const strip s = strip_from(first, lanes, numbers, t, y);')
-    call code%line('  if (ACROSS && s.left > LANES) {')
-    call code%line('    expand(MOST, f, &s, z);')
-    call code%line('    return MOST;')
-    call code%line('  }')
-    call code%line('  expand(1, f, &s, z);')
-    call code%line('  return 1;')
+    call code%line('/* How many times eight lanes of a strip are computed at once */')
+    call code%line('static long groups_of(const strip *s) { return ACROSS && s->left > LANES ? MOST : 1; }')
+    call code%line('static void load_strip(const long g, const strip *s, vd *z) {')
+    call code%line('  if (ACROSS && g > 1)')
+    call code%line('    load_numbers(MOST, s, z);')
+    call code%line('  else')
+    call code%line('    load_numbers(1, s, z);')
+    call code%line('}')
+    call code%line('static void expand_strip(const long g, const functions *f, const strip *s, vd *z) {')
+    call code%line('  if (ACROSS && g > 1)')
+    call code%line('    expand(MOST, f, s, z);')
+    call code%line('  else')
+    call code%line('    expand(1, f, s, z);')
     call code%line('}')
     call code%line('long nocdyn_work(void) { return sizeof(vd) * (WORK * (ACROSS ? MOST : 1) + 1); }')
     call code%line('static vd *aligned(char *space) { ' // &
@@ -441,7 +459,10 @@ contains
     call code%line('                   const double *t, double *y) {')
     call code%line('  vd *z = aligned(space);')
     call code%line('  for (long first = 0, g; first < lanes; first += LANES * g) {')
-    call code%line('    g = expand_from(first, lanes, numbers, z, f, t, y);')
+    call code%line('    const strip part = strip_from(first, lanes, numbers, t, y);')
+    call code%line('    g = groups_of(&part);')
+    call code%line('    load_strip(g, &part, z);')
+    call code%line('    expand_strip(g, f, &part, z);')
     call code%line('    for (int e = 0; e < g; e++)')
     call code%line('      for (int k = 1; k <= P; k++)')
     call code%line('        for (int i = 0; i < COMPONENTS; i++)')
@@ -459,16 +480,21 @@ contains
     call code%line('void nocdyn_steps(const steps *s, const double *const *numbers, char *space, const functions *f) {')
     call code%line('  vd *z = aligned(space);')
     call code%line('  for (long first = 0, g; first < s->lanes; first += LANES * g) {')
-    call code%line('    g = expand_from(first, s->lanes, numbers, z, f, s->t, s->y);')
-    call code%line('    for (int e = 0; e < g && first + LANES * e < s->lanes; e++) {')
+    call code%line('    const strip part = strip_from(first, s->lanes, numbers, s->t, s->y);')
+    call code%line('    g = groups_of(&part);')
+    call code%line('    load_strip(g, &part, z);')
+    call code%line('    for (long turns = 0; go_on(s, first, LANES * g, turns); turns++) {')
+    call code%line('      expand_strip(g, f, &part, z);')
+    call code%line('      for (int e = 0; e < g && first + LANES * e < s->lanes; e++) {')
     call code%line('#if SWITCHES > 0')
-    call code%line('      const strip own = strip_from(first + LANES * e, s->lanes, numbers, s->t, s->y);')
-    call code%line('      pass own_pass = {.s = s, .numbers = &own, .first = first + LANES * e}, *p = &own_pass;')
-    call code%line('      begin_pass(p, numbers);')
+    call code%line('        const strip own = strip_from(first + LANES * e, s->lanes, numbers, s->t, s->y);')
+    call code%line('        pass own_pass = {.s = s, .numbers = &own, .first = first + LANES * e}, *p = &own_pass;')
+    call code%line('        begin_pass(p, numbers);')
     call code%line('#else')
-    call code%line('      pass *p = 0;')
+    call code%line('        pass *p = 0;')
     call code%line('#endif')
-    call code%line('      take_steps(s, p, first + LANES * e, z + at_c + WORK * e);')
+    call code%line('        take_steps(s, p, first + LANES * e, z + at_c + WORK * e);')
+    call code%line('      }')
     call code%line('    }')
     call code%line('  }')
     call code%line('}')
