@@ -38,7 +38,7 @@ def one_line(text):
             "allowed: '--out', '--set', '--case', '--threads', '--compile', '--shard', '--resume', '--csv', '--quiet', "
             "'--help'\n",
         ),
-        (["new", "a.nml", "--force"], "'--force' is not an option of nocdyn new; allowed: '--help'\n"),
+        (["new", "a.nml", "--force"], "'--force' is not an option of nocdyn new; allowed: '--kind', '--help'\n"),
         (["run", CASE_1, "--out"], "--out needs a value: --out DIR\n"),
         (["run", CASE_1, "--out="], "--out needs a value: --out DIR\n"),
         (["run", CASE_1, "--set"], "--set needs a value: --set PATH=VALUE\n"),
@@ -108,6 +108,7 @@ OPTIONS = {
     "--modes": "1",
     "--range_hz": "1,2",
     "--holzer": None,
+    "--kind": "ship",
     "--threads": "1",
     "--shard": "1/2",
     "--compile": "never",

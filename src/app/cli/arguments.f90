@@ -23,6 +23,7 @@ module nocdyn_arguments
     option_t('--at', value='equilibrium|rest|TIME'), &
     option_t('--modes', value='NUMBER'), &
     option_t('--range_hz', value='LOW,HIGH'), &
+    option_t('--kind', value='KIND'), &
     option_t('--holzer', may_repeat=.true.), &
     option_t('--code', may_repeat=.true.), &
     option_t('--threads', value='NUMBER'), &

@@ -202,7 +202,7 @@ contains
       if (allocated(error)) call report_error(error, code)
     end if
     if (.not. arguments%is_given('--quiet')) then
-      call verdict%write_table(report)
+      if (size(results) > 1) call verdict%write_table(report)
       if (reading%folder /= '' .and. .not. allocated(error)) then
         call report%append_line(reading%machine%shown_file() // ': ' // counted(size(results), 'load case', 'load cases') // &
                                 '; ' // name // ' is in ' // shown_path(reading%folder))

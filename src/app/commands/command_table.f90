@@ -1,15 +1,10 @@
 !> The table of commands. A new command is a row here and a module with its procedure.
 module nocdyn_command_table
   use nocdyn_analysis_command, only: analysis_command
-  use nocdyn_arguments, only: arguments_t
   use nocdyn_commands, only: add_command, command_t
   use nocdyn_companion_command, only: companion_command
-  use nocdyn_console, only: print_text, report_error
-  use nocdyn_errors, only: error_t, exit_done, exit_file, raise
-  use nocdyn_output_file, only: write_file
+  use nocdyn_new_command, only: new_command
   use nocdyn_run_command, only: run_command
-  use nocdyn_schema_help, only: input_template
-  use nocdyn_text, only: quoted, shown_path
   implicit none (type, external)
   private
 
@@ -32,8 +27,10 @@ contains
       '  --code             print the equations of motion as a program in C instead, to be built into others' // nl // &
       '  --case NAME        look at the machine of this &load_case', analysis_command)
     call list_sweeps(commands)
-    call add_command(commands, 'new', 'FILE', '', 'write a commented input to start from', &
-                     'Writes a commented input file. A file that exists is not overwritten.', new_command)
+    call add_command(commands, 'new', 'FILE', '--kind', 'write a commented input to start from', &
+      'Writes a commented input file that runs. A file that exists is not overwritten.' // nl // nl // &
+      '  --kind KIND        of a machine: car, compressor, genset, mill, motor_fan, ship, wind; default: two bodies' // nl // &
+      '                     with the groups that most inputs have', new_command)
     call add_command(commands, 'help', '[COMMAND]', '', 'help on a command', &
       'Without a COMMAND, all commands with one line each.' // nl // nl // &
       '  nocdyn help input          the groups of an input file by topics, one line each' // nl // &
@@ -142,32 +139,5 @@ contains
       '  --quiet            print nothing but errors' // nl // nl // &
       'Exit code 2: the journals are not of one sweep, or variants are missing.', companion_command)
   end subroutine list_sweeps
-
-  !> Writes the template of the input; refuses to overwrite a file.
-  subroutine new_command(arguments, code)
-    type(arguments_t), intent(in) :: arguments
-    integer, intent(out) :: code
-    type(error_t), allocatable :: error
-    integer :: slash
-    logical :: exists
-
-    code = exit_done
-    associate (path => arguments%operands(1)%text)
-      inquire (file=path, exist=exists)
-      slash = index(path, '/', back=.true.)
-      if (exists) then
-        call raise(error, exit_file, quoted(shown_path(path)) // ' exists and was not changed')
-      else if (slash == 0) then
-        call write_file('.', path, input_template(), error)
-      else
-        call write_file(path(:max(1, slash - 1)), path(slash + 1:), input_template(), error)
-      end if
-      if (allocated(error)) then
-        call report_error(error, code)
-      else
-        call print_text(shown_path(path) // ': a commented input; try: nocdyn run ' // shown_path(path))
-      end if
-    end associate
-  end subroutine new_command
 
 end module nocdyn_command_table
