@@ -13,7 +13,8 @@ module nocdyn_compiled_code
   integer, parameter, public :: series_part = 1    !! Taylor arithmetic
   integer, parameter, public :: steps_part = 2     !! plain steps of a block of lanes
   integer, parameter, public :: crossings_part = 3 !! changes of branches in these steps
-  integer, parameter, public :: machine_part = 4   !! derivative and steps of one machine
+  integer, parameter, public :: turns_part = 4     !! the steps that are taken at once
+  integer, parameter, public :: machine_part = 5   !! derivative and steps of one machine
 
   !> Procedures of a loaded program; it stays loaded.
   type, public :: loaded_code_t

@@ -5,7 +5,7 @@
 module nocdyn_series_code
   use nocdyn_code_layout, only: find_laws, first_of, is_forcing, lay_out, layout_t, number_of
   use nocdyn_code_text, only: code_text_t, filled, list_of
-  use nocdyn_compiled_code, only: code_part, series_part, steps_part
+  use nocdyn_compiled_code, only: code_part, series_part, steps_part, turns_part
   use nocdyn_element_coordinates, only: element_coordinates_t
   use nocdyn_element_laws, only: element_law_t
   use nocdyn_law_code, only: law_code_t
@@ -61,7 +61,7 @@ contains
       call write_passes(series, state, 4 + 2 * size(laws), code)
     end if
     call write_entries(series, laws, code)
-    call write_steps(code)
+    call code%line(code_part(turns_part))
   end subroutine write_series_code
 
   !> Writes what computes the series, `expand`.
@@ -472,42 +472,5 @@ contains
     call code%line('  }')
     call code%line('}')
   end subroutine write_entries
-
-  !> Writes the procedures of plain steps.
-  subroutine write_steps(code)
-    type(code_text_t), intent(inout) :: code
-
-    call code%line('void nocdyn_steps(const steps *s, const double *const *numbers, char *space, const functions *f) {')
-    call code%line('  vd *z = aligned(space);')
-    call code%line('  for (long first = 0, g; first < s->lanes; first += LANES * g) {')
-    call code%line('    const strip part = strip_from(first, s->lanes, numbers, s->t, s->y);')
-    call code%line('    g = groups_of(&part);')
-    call code%line('    load_strip(g, &part, z);')
-    call code%line('    for (long turns = 0; go_on(s, first, LANES * g, turns); turns++) {')
-    call code%line('      expand_strip(g, f, &part, z);')
-    call code%line('      for (int e = 0; e < g && first + LANES * e < s->lanes; e++) {')
-    call code%line('#if SWITCHES > 0')
-    call code%line('        const strip own = strip_from(first + LANES * e, s->lanes, numbers, s->t, s->y);')
-    call code%line('        pass own_pass = {.s = s, .numbers = &own, .first = first + LANES * e}, *p = &own_pass;')
-    call code%line('        begin_pass(p, numbers);')
-    call code%line('#else')
-    call code%line('        pass *p = 0;')
-    call code%line('#endif')
-    call code%line('        take_steps(s, p, first + LANES * e, z + at_c + WORK * e);')
-    call code%line('      }')
-    call code%line('    }')
-    call code%line('  }')
-    call code%line('}')
-    call code%line('void nocdyn_branches(const steps *s, const double *const *numbers) {')
-    call code%line('#if SWITCHES > 0')
-    call code%line('  for (long first = 0; first < s->lanes; first += LANES) {')
-    call code%line('    const strip own = strip_from(first, s->lanes, numbers, s->t, s->y);')
-    call code%line('    pass p = {.s = s, .numbers = &own, .first = first};')
-    call code%line('    begin_pass(&p, numbers);')
-    call code%line('    change_branches(&p);')
-    call code%line('  }')
-    call code%line('#endif')
-    call code%line('}')
-  end subroutine write_steps
 
 end module nocdyn_series_code
