@@ -207,7 +207,7 @@ BARE = RELEASED.replace(" section_modulus=1e-5", "").format(t_end=1)
         ),
         (
             "coupling='c' reference_moment=1 reference_cycles=1 slope=3 yield_stress=1e8",
-            ":5: &fatigue 'f': yield_stress has no effect with mean_stress = 'none'; allowed: goodman with "
+            ":5: &fatigue 'f': yield_stress has no effect with mean_stress = 'none'; allowed: goodman and gerber with "
             "ultimate_stress, soderberg with yield_stress",
         ),
     ],

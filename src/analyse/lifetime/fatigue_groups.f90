@@ -3,7 +3,7 @@ module nocdyn_fatigue_groups
   use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_schema_text, only: suggest
-  use nocdyn_sn_curves, only: mean_strength, new_sn_curve, sn_curve_t
+  use nocdyn_sn_curves, only: mean_none, mean_parabola, mean_strength, new_sn_curve, sn_curve_t
   use nocdyn_text, only: counted, quoted, string_t, to_text
   use nocdyn_written_values, only: written_element, written_number, written_unit
   implicit none (type, external)
@@ -152,7 +152,7 @@ contains
 
     associate (group => input%groups(index))
       select case (group%text('mean_stress'))
-      case ('goodman')
+      case ('goodman', 'gerber')
         key = 'ultimate_stress'
       case ('soderberg')
         key = 'yield_stress'
@@ -161,7 +161,7 @@ contains
         if (group%has_value('ultimate_stress')) key = 'ultimate_stress'
         if (group%has_value('yield_stress')) key = 'yield_stress'
         if (key /= '') call input%report(index, trim(key), trim(key) // &
-                   " has no effect with mean_stress = 'none'; allowed: goodman with ultimate_stress, " // &
+                   " has no effect with mean_stress = 'none'; allowed: goodman and gerber with ultimate_stress, " // &
                    'soderberg with yield_stress', diagnostics)
         return
       end select
@@ -222,9 +222,16 @@ contains
     end if
     curve%endurance = group%number('endurance_limit')
     curve%notch_factor = group%number('notch_factor')
-    if (group%text('mean_stress') == 'none') return
-    curve%mean_kind = mean_strength
-    curve%strength = group%number('ultimate_stress', absent=group%number('yield_stress', absent=1.0_wp))
+    select case (group%text('mean_stress'))
+    case ('goodman', 'gerber')
+      curve%mean_kind = merge(mean_parabola, mean_strength, group%text('mean_stress') == 'gerber')
+      curve%strength = group%number('ultimate_stress')
+    case ('soderberg')
+      curve%mean_kind = mean_strength
+      curve%strength = group%number('yield_stress')
+    case default
+      curve%mean_kind = mean_none
+    end select
   end function read_curve
 
 end module nocdyn_fatigue_groups

@@ -9,6 +9,8 @@ module nocdyn_sn_curves
   integer, parameter, public :: mean_none = 1         !! the mean does not count
   integer, parameter, public :: mean_strength = 2     !! amplitude / (1 - |mean| / strength): with the tensile strength Goodman's
                                                       !! line, with the yield strength Soderberg's
+  integer, parameter, public :: mean_parabola = 3     !! amplitude / (1 - (mean / tensile strength)^2): Gerber's parabola
+                                                      !! (S. Suresh, Fatigue of Materials, Cambridge 1998)
 
   real(wp), parameter :: longest = 600.0_wp   !! logarithm of the most cycles, and of the fewest
 
@@ -56,7 +58,7 @@ contains
     class(sn_curve_t), intent(in) :: self
     real(wp), intent(in) :: mean
 
-    fails_at_once = self%mean_kind == mean_strength .and. abs(mean) >= self%strength
+    fails_at_once = self%mean_kind /= mean_none .and. abs(mean) >= self%strength
   end function fails_at_once
 
   !> The part of the life that one cycle takes, by Miner's rule; 1 if the part fails at once.
@@ -71,6 +73,7 @@ contains
     if (self%fails_at_once(mean)) return
     amplitude = 0.5_wp * self%notch_factor * range
     if (self%mean_kind == mean_strength) amplitude = amplitude / (1.0_wp - abs(mean) / self%strength)
+    if (self%mean_kind == mean_parabola) amplitude = amplitude / (1.0_wp - (mean / self%strength)**2)
     damage = 0.0_wp
     if (amplitude <= self%endurance .or. amplitude <= tiny(amplitude)) return
     level = log(amplitude)

@@ -13,7 +13,7 @@ module nocdyn_schema_response
   type(allowed_t), parameter :: strengths = allowed_t(low=4.0e8_wp, high=8.0e8_wp)
   type(allowed_t), parameter :: factors = allowed_t(low=0.1_wp, high=1.5_wp)
   type(allowed_t), parameter :: margins = allowed_t(low=0.0_wp, high=0.9_wp)
-  type(allowed_t), parameter :: mean_stresses = allowed_t(words='none goodman soderberg')
+  type(allowed_t), parameter :: mean_stresses = allowed_t(words='none goodman gerber soderberg')
 
   type(group_rule_t), parameter, public :: response_groups(*) = [ &
     group_rule_t('response', in_torsional, at_most_once, '', "Speeds and orders of 'nocdyn response' and 'nocdyn campbell'."), &
@@ -90,9 +90,9 @@ module nocdyn_schema_response
       'half range up to which no damage is done, in the unit of the reference'), &
     key_rule_t('fatigue', 'notch_factor', a_number, 1, '', '1', from_1, 'fatigue notch factor on the half range'), &
     key_rule_t('fatigue', 'mean_stress', a_word, 1, '', "'none'", mean_stresses, &
-      'half range / (1 - mean / strength): ultimate_stress of goodman, yield_stress of soderberg'), &
+      'half range / (1 - mean / strength), of gerber its square; soderberg by yield_stress'), &
     key_rule_t('fatigue', 'ultimate_stress', a_number, 1, 'Pa', unset, positive, &
-      'shear stress that breaks the part at once, for goodman'), &
+      'shear stress that breaks the part at once, for goodman and gerber'), &
     key_rule_t('fatigue', 'yield_stress', a_number, 1, 'Pa', unset, positive, 'shear stress at which it yields, for soderberg'), &
     key_rule_t('fatigue', 'repeats', a_number, 1, '', '1', positive, &
       'how often the motion of the run occurs in the life of the machine'), &
