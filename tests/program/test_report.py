@@ -154,7 +154,7 @@ def test_every_number_of_the_bodies_is_that_of_check(reports, opened):
 
 
 def test_findings_are_those_of_the_files(reports, opened):
-    report, cases = results(reports, "response.json"), results(reports, "cases.json")
+    report, cases = results(reports, "calm/response.json"), results(reports, "cases.json")
     ratio = next(one["ratio_to_limit"] for one in report["largest"] if "ratio_to_limit" in one)
     assert f"{100 * ratio:.3g}" in opened.find("#summary").text
     shown = zip(column(opened, "Barred ranges", "from"), column(opened, "Barred ranges", "to"))
@@ -317,12 +317,24 @@ def test_only_what_does_not_belong_to_the_input_is_computed_again(fresh):
     fresh.write("m.nml", PLANT.replace("revision = 'B'", "revision = 'C'"))
     assert states() == dict.fromkeys(commands, "reused")
     assert "<dd>C</dd>" in fresh.page().read_text(encoding="utf-8")
-    fresh.write("results/m/response.json", fresh.page().with_name("response.json").read_text().replace("tyre", "tire"))
+    fresh.write("results/m/blow/response.json", (fresh.folder / "results/m/blow/response.json").read_text().replace("tyre", "tire"))
     assert states() == dict.fromkeys(commands, "reused") | {"response": "computed"}
     fresh.write("m.nml", PLANT.replace("inertia = 90.0", "inertia = 91.0"))
     assert states() == dict.fromkeys(commands, "computed")
     (fresh.folder / "results/m/blow/trajectory.csv").unlink()
     assert states() == dict.fromkeys(commands, "reused") | {"run": "computed"}
+
+
+def test_a_load_case_without_a_steady_state_leaves_the_sections_to_the_next(fresh, browser):
+    case = "&load_case name = 'start' analyses = 'run' /\n&load_case name = 'calm'"
+    fresh.write("m.nml", without_notes(PLANT).replace("&load_case name = 'calm'", case))
+    outcome = fresh("m.nml", "--no-pdf")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert not (fresh.folder / "results/m/start/modes.json").exists()
+    browser.open(fresh.page())
+    assert faults(browser) == []
+    found = browser.ask("return [...document.querySelectorAll('main > section')].map((one) => one.id)")
+    assert {"steady", "modes", "campbell", "response", "motion"} <= set(found)
 
 
 def test_set_reaches_every_calculation(fresh):
@@ -332,7 +344,7 @@ def test_set_reaches_every_calculation(fresh):
     assert (outcome.returncode, outcome.stdout, outcome.stderr) == (0, "", "")
     page = (fresh.folder / "there/report.html").read_text(encoding="utf-8")
     assert "--set body.engine.inertia=70" in page
-    assert json.loads((fresh.folder / "there/modes.json").read_text())["inertia_kg_m2"][0] == 70
+    assert json.loads((fresh.folder / "there/calm/modes.json").read_text())["inertia_kg_m2"][0] == 70
     assert not (fresh.folder / "there/report.pdf").exists()
 
 
@@ -552,7 +564,7 @@ def test_a_peak_beyond_its_limit_is_told_beside_a_larger_share_of_another(fresh,
     assert limit in PLANT
     fresh.write("m.nml", without_notes(PLANT).replace(limit, "vibratory_moment = 100.0 moment = 1000.0"))
     assert fresh("m.nml", "--no-pdf", "--quiet").returncode == 0
-    report = json.loads((fresh.folder / "results/m/response.json").read_text())
+    report = json.loads((fresh.folder / "results/m/calm/response.json").read_text())
     (one,) = [one for one in report["largest"] if "ratio_to_limit" in one]
     assert one["peak_ratio_to_limit"] == pytest.approx(one["peak"] / 1000.0, rel=1e-12)
     assert 1 < one["peak_ratio_to_limit"] < one["ratio_to_limit"]

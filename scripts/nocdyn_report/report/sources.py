@@ -17,11 +17,14 @@ from ..trajectory_files import ResultsError, labels_of, read_columns
 from .calculations import Calculations
 from .curves import Arrays
 from .failure import FILES, ReportError
+from .result_files import CaseResult
 from .numbers import number_text
 
 NOTES_FILE = re.compile(
     r"""^[^!\n]*\bnotes_file\s*=\s*(?:'(?P<one>(?:[^'\n]|'')*)'|"(?P<other>[^"\n]*)")""", re.MULTILINE | re.IGNORECASE
 )
+
+READERS = {"campbell": read_campbell, "response": read_response}
 
 
 class Sources:
@@ -32,7 +35,7 @@ class Sources:
         self.text = text  # of the input file
         self.overrides = overrides  # PATH=VALUE of --set
         self.arrays = Arrays()
-        self._read: dict[str, Campbell | Response | str] = {}
+        self._read: dict[tuple[str, str], Campbell | Response | str] = {}
 
     @property
     def check(self) -> dict:
@@ -49,16 +52,36 @@ class Sources:
 
     def missing(self, command: str) -> str:
         """Why results that are there have nothing to show."""
-        read = {"campbell": read_campbell, "response": read_response}.get(command)
-        if read is None or not self.results.has(command):
+        if command not in READERS or not self.results.has(command):
             return ""
-        if command not in self._read:
-            try:
-                self._read[command] = read(self.results.folder)
-            except ResultsError as error:
-                self._read[command] = str(error)
-        found = self._read[command]
+        found = self._try(command, self.cases_of(command)[0])
         return found if isinstance(found, str) else ""
+
+    def _try(self, command: str, case: CaseResult) -> Campbell | Response | str:
+        """The results of a load case, or why they cannot be shown."""
+        if (command, case.name) not in self._read:
+            try:
+                self._read[command, case.name] = READERS[command](case.folder)
+            except ResultsError as error:
+                self._read[command, case.name] = str(error)
+        return self._read[command, case.name]
+
+    def cases_of(self, command: str) -> list[CaseResult]:
+        """The load cases for which a command has results, '' without load cases; sections show the first one."""
+        return self.results.files.there(command)
+
+    def main(self, command: str) -> str:
+        """As ' of load case full': whose results the section of a command shows; '' without load cases."""
+        name = self.cases_of(command)[0].name
+        return f" of load case {name}" if name else ""
+
+    def folder(self, command: str) -> Path:
+        return self.cases_of(command)[0].folder
+
+    def responses(self) -> list[tuple[str, Response]]:
+        """Of all load cases, that of the section first."""
+        found = [(case.name, self._try("response", case)) for case in self.cases_of("response")]
+        return [(name, one) for name, one in found if not isinstance(one, str)]
 
     def groups(self, kind: str) -> list[f90nml.Namelist]:
         return groups_of(self.machine, kind)
@@ -79,7 +102,7 @@ class Sources:
 
     @cached_property
     def equilibrium(self) -> dict:
-        return self.read_json("equilibrium.json")
+        return self.read_json(self.folder("equilibrium") / "equilibrium.json")
 
     @cached_property
     def steady_columns(self) -> dict[str, Column]:
@@ -88,11 +111,11 @@ class Sources:
 
     @cached_property
     def modes(self) -> Modes:
-        return _told(read_modes, self.results.folder)
+        return _told(read_modes, self.folder("modes"))
 
     @cached_property
     def response_report(self) -> dict:
-        return self.read_json("response.json")
+        return self.read_json(self.folder("response") / "response.json")
 
     @property
     def response(self) -> Response:
@@ -100,7 +123,7 @@ class Sources:
 
     @cached_property
     def campbell_report(self) -> dict:
-        return self.read_json("campbell.json")
+        return self.read_json(self.folder("campbell") / "campbell.json")
 
     @property
     def campbell(self) -> Campbell:
@@ -113,14 +136,9 @@ class Sources:
     @cached_property
     def runs(self) -> list["Run"]:
         """The run, or that of each load case; also those that ended early."""
-        folder = self.results.folder
-        if not self.results.cases:
-            folders = [("", folder)] if (folder / "summary.json").is_file() and self.results.of["run"].state != "refused" else []
-        elif (folder / "cases.json").is_file() and self.results.of["run"].state != "refused":
-            folders = [(case["name"], folder / case["folder"]) for case in self.cases["load_cases"]]
-        else:
-            folders = []
-        return [Run(name, one, self.read_json(one / "summary.json")) for name, one in folders if (one / "summary.json").is_file()]
+        if self.results.of["run"].state == "refused":
+            return []
+        return [Run(one.name, one.folder, self.read_json(one.folder / "summary.json"), one.title) for one in self.cases_of("run")]
 
     def read_json(self, name: str | Path) -> dict:
         file = self.results.folder / name if isinstance(name, str) else name
@@ -129,16 +147,17 @@ class Sources:
         except (OSError, ValueError) as error:
             raise ReportError(f"{file}: cannot be read: {error}", FILES) from None
 
-    def table(self, name: str) -> pd.DataFrame:
+    def table(self, command: str, name: str) -> pd.DataFrame:
+        file = self.folder(command) / name
         try:
-            return pd.read_csv(self.results.folder / name)
+            return pd.read_csv(file)
         except (OSError, ValueError) as error:
-            raise ReportError(f"{self.results.folder / name}: cannot be read: {error}", FILES) from None
+            raise ReportError(f"{file}: cannot be read: {error}", FILES) from None
 
     def _shown(self, command: str) -> Campbell | Response:
         if reason := self.missing(command):
             raise ReportError(reason, FILES)
-        return self._read[command]
+        return self._try(command, self.cases_of(command)[0])
 
     @cached_property
     def speed_unit(self) -> str:
@@ -165,8 +184,8 @@ class Sources:
 class Run:
     """A run over the time."""
 
-    def __init__(self, name: str, folder: Path, summary: dict) -> None:
-        self.name, self.folder, self.summary = name, folder, summary
+    def __init__(self, name: str, folder: Path, summary: dict, title: str = "") -> None:
+        self.name, self.folder, self.summary, self.title = name, folder, summary, title
 
     @property
     def columns(self) -> dict[str, dict]:

@@ -104,7 +104,7 @@ def _crossings(sources: Sources) -> Table:
 
 
 def _modes(sources: Sources) -> Table:
-    table = sources.table("campbell.csv")
+    table = sources.table("campbell", "campbell.csv")
     rows = []
     for mode, frequency in sources.campbell.modes.items():
         damping = table[f"damping_ratio_{mode} [1]"]

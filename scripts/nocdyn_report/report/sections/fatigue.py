@@ -97,7 +97,7 @@ def _hourly(sources: Sources) -> Figure | None:
     columns = [column for column in sources.response.columns if column.kind == "damage_per_hour"]
     if not columns:
         return None
-    response, table = sources.response, sources.table("response.csv")
+    response, table = sources.response, sources.table("response", "response.csv")
     speed = [sources.of_rpm(one) for one in response.speed]
     order = table.iloc[:, 0].argsort(kind="stable")
     names, labels = [column.title for column in columns], [column.label for column in columns]

@@ -127,7 +127,7 @@ def _abscissas(train: Train) -> tuple[list[float], list[int | None]]:
 def _holzer(sources: Sources) -> list[Paragraph | Table]:
     if not sources.has("holzer"):
         return [Paragraph(sources.results.of["holzer"].message)]
-    table = sources.table("holzer.csv")
+    table = sources.table("holzer", "holzer.csv")
     if not len(table):
         return [Paragraph("No mode oscillates: there is no table.")]
     blocks: list[Paragraph | Table] = []
