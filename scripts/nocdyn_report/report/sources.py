@@ -17,8 +17,10 @@ from ..trajectory_files import ResultsError, labels_of, read_columns
 from .calculations import Calculations
 from .curves import Arrays
 from .failure import FILES, ReportError
-from .result_files import CaseResult
 from .numbers import number_text
+from .readable import Units
+from .result_files import CaseResult
+from .verdict import ANALYSES, Line, failure_line, verdict_lines, worst_first
 
 NOTES_FILE = re.compile(
     r"""^[^!\n]*\bnotes_file\s*=\s*(?:'(?P<one>(?:[^'\n]|'')*)'|"(?P<other>[^"\n]*)")""", re.MULTILINE | re.IGNORECASE
@@ -168,6 +170,27 @@ class Sources:
         given = {"_rpm": "rpm", "_hz": "Hz"} if re.search(r"speed\w*_(rpm|hz)\b", self.text, re.IGNORECASE) else {}
         found = re.search(r"speed\w*(_rpm|_hz)\b", self.text, re.IGNORECASE)
         return named or (given[found[1].lower()] if found else "rad/s")
+
+    @cached_property
+    def units(self) -> Units:
+        return Units(self.speed_unit)
+
+    @cached_property
+    def verdict(self) -> list[Line]:
+        """The lines of all analyses and load cases; one that was asked for and gave nothing has a line too."""
+        asked = [name for name in ANALYSES if name in self.results.of]
+        there = [name for name in asked if self.results.has(name)]
+        lines = verdict_lines(self.results.files, there)
+        failed = [self.results.of[name] for name in asked if self.results.of[name].state in ("failed", "refused")]
+        told = [failure_line(one.command, one.message.splitlines()[0]) for one in failed if one.command not in there]
+        return worst_first([*lines, *told])
+
+    def given_unit(self, key: str, unit: str) -> str:
+        """The unit in which the input gives a key that has another one in the complete input: its own words."""
+        for ending, other in (("_hz", "Hz"), ("_rpm", "rpm"), ("_deg", "deg")):
+            if re.search(rf"\b{key}{ending}\b", self.text, re.IGNORECASE):
+                return other
+        return unit
 
     def speed(self, value: float) -> float:
         """A speed [rad/s] in that unit."""
