@@ -707,6 +707,25 @@ def test_other_load_cases_beyond_a_limit_have_their_curves(fresh, browser):
     assert "blow, tyre: elastic and damping moment" in browser.find("#response").text
 
 
+def test_changes_since_another_revision_are_told(fresh, browser):
+    fresh.write("m.nml", without_notes(PLANT))
+    assert fresh("m.nml", "--no-pdf", "--quiet", "--out", "old").returncode == 0
+    fresh.write("m.nml", without_notes(PLANT).replace("stiffness = 4.0e5", "stiffness = 5.0e5"))
+    assert fresh("m.nml", "--no-pdf", "--quiet", "--against", "old").returncode == 0
+    browser.open(fresh.page())
+    assert faults(browser) == []
+    modes = [json.loads((fresh.folder / name / "calm/modes.json").read_text())["modes"] for name in ("old", "results/m")]
+    first = [next(one["frequency_Hz"] for one in those if one["kind"] == "oscillating") for those in modes]
+    caption = "Numbers that are not the same [Hz]"
+    assert column(browser, caption, "of")[0] == "mode I"
+    assert [plain(column(browser, caption, head)[0]) for head in ("old", "new")] == pytest.approx(first, rel=1e-4)
+    assert "of the verdict that are not the same" in browser.find("#changes").text
+    assert "-  stiffness = 4" in browser.find("#details").text and "+  stiffness = 5" in browser.find("#details").text
+    assert fresh("m.nml", "--no-pdf", "--quiet", "--against", "results/m").returncode == 2
+    outcome = fresh("m.nml", "--no-pdf", "--quiet", "--against", "none")
+    assert (outcome.returncode, outcome.stderr) == (2, "scripts/report: --against none: has no results of nocdyn\n")
+
+
 def test_lines_that_fill_a_panel_are_bands():
     curves = importlib.import_module("nocdyn_report.report.curves")
     time = np.linspace(0, 1, 5000)
