@@ -163,7 +163,10 @@ def test_findings_are_those_of_the_files(reports, opened):
     findings = column(opened, "Verdict on all limits", "finding")
     assert exceeded and findings[: len(exceeded)] == [line for line in findings if line.startswith("exceeded")]
     assert set(findings[: len(exceeded)]) == exceeded
-    ratios = [plain(one.split()[0]) for one in column(opened, "Verdict on all limits", "of limit")[: len(exceeded)]]
+    ratios = [
+        plain(one.rstrip("% \N{NARROW NO-BREAK SPACE}"))
+        for one in column(opened, "Verdict on all limits", "of limit")[: len(exceeded)]
+    ]
     assert ratios == sorted(ratios, reverse=True) and ratios[-1] > 100
     assert opened.find("#summary p").text.startswith("exceeded: coupling 'tyre', ")
     shown = zip(column(opened, "Barred ranges", "from"), column(opened, "Barred ranges", "to"))
