@@ -3,15 +3,14 @@
 import base64
 import hashlib
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
 from ..thinning import thin
 
 MOST_TURNS = 4  # pixels for each turn of a line: with fewer it fills its panel
-STEP = 1e-3  # of the range of a curve: smaller steps are no turns
-LEAST_PARTS, MOST_PARTS = 25, 125  # of an envelope
+TURN = 0.1  # of the range of a curve: smaller swings do not fill a panel
+PLACES = 125  # of an envelope
 PIXELS = 500  # that a curve is wide: at most twice as many points
 COLOURS = 8  # of assets/report.css, before strokes change
 
@@ -49,18 +48,28 @@ class Arrays:
 
 
 def _turns(y: np.ndarray) -> int:
-    """How often a curve turns; many turns in few pixels would be a solid block."""
+    """How often a curve turns by more than a share of its range; many turns in few pixels would be a solid block."""
     y = y[np.isfinite(y)]
-    steps = np.diff(y)
-    return int(np.count_nonzero(np.diff(np.sign(steps[np.abs(steps) > STEP * np.ptp(y)])))) if len(y) > 1 else 0
+    if len(y) < 3:
+        return 0
+    inner = y[1:-1]
+    turning = y[1:-1][(inner - y[:-2]) * (y[2:] - inner) < 0]
+    least = TURN * np.ptp(y)
+    turns, rises, last = 0, True, float(y[0])
+    for value in turning.tolist():
+        if (value > last) == rises:
+            last = value
+        elif abs(value - last) > least:
+            turns, rises, last = turns + 1, not rises, value
+    return turns
 
 
 def _envelope(x: np.ndarray, y: np.ndarray, turns: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The smallest and the largest value of each part, which has one oscillation or more."""
-    ends = np.linspace(0, len(y), min(MOST_PARTS, max(LEAST_PARTS, turns // 2)) + 1).astype(int)
-    parts = [slice(start, max(start + 1, end)) for start, end in pairwise(ends)]
-    middles = np.array([x[part].mean() for part in parts])
-    return middles, np.array([y[part].min() for part in parts]), np.array([y[part].max() for part in parts])
+    """Places, and about each the smallest and the largest value within half an oscillation to both sides."""
+    places = np.linspace(0, len(y) - 1, min(PLACES, len(y))).astype(int)
+    half = max(1, round(max(len(y) / turns, 0.5 * len(y) / len(places))))
+    parts = [slice(max(0, place - half), place + half + 1) for place in places]
+    return x[places], np.array([y[part].min() for part in parts]), np.array([y[part].max() for part in parts])
 
 
 def band(start: float, end: float, kind: str, label: str) -> dict:

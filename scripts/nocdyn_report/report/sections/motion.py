@@ -1,5 +1,7 @@
 """Runs over the time: peaks with their times, the load cases, curves."""
 
+import re
+
 from ...columns import DETAIL, LOADS, LOSS, MOMENT, SLIP, SPEED, TORQUE, TWIST, Column, by_sort
 from ...results import TIME
 from ...selection import widest
@@ -9,6 +11,7 @@ from ..numbers import number_text
 from ..readable import texts
 from ..sources import Run, Sources
 
+CYLINDER = re.compile(r"_\d+(_\d+)?$")  # that a torque of an engine ends with
 MOST_CURVES = 3  # of a panel of speeds or torques
 MOST_PANELS = 6  # of loads, of one of several load cases
 MOST_OF_ONE = 15  # likewise, of a single run
@@ -159,7 +162,7 @@ def _figures(sources: Sources, run: Run) -> list[Figure]:
     chosen = [[one] for one in _of_interest(sources, run, moments)[:most]]
     for rank in (TORQUE, SPEED):
         for sort in by_sort(one for one in drawn if one.rank == rank and one.unit != "W"):
-            labels = widest([one.label for one in sort], run.ranges, MOST_CURVES)
+            labels = widest([one.label for one in _of_each_engine(sources, run, sort)], run.ranges, MOST_CURVES)
             chosen.append(sorted((run.column_list[label] for label in labels), key=lambda one: -run.ranges.get(one.label, 0.0)))
     labels = [one.label for part in chosen for one in part]
     table = run.values([TIME, *labels]) if labels else ()
@@ -170,6 +173,16 @@ def _figures(sources: Sources, run: Run) -> list[Figure]:
     has_bands = any("low" in curve for panel in panels for curve in panel.spec["curves"])
     bands = "; filled: between the smallest and the largest value" if has_bands else ""
     return [Figure(f"Motion{_of(run)} over the time{some}{bands}", panels, min(PANELS_BESIDE, len(panels)))]
+
+
+def _of_each_engine(sources: Sources, run: Run, columns: list[Column]) -> list[Column]:
+    """Of the torques of the cylinders of an engine, which are alike, the one that varies most."""
+    engines = {str(group.get("name", "")).lower() for group in sources.groups("engine")}
+    chosen: dict[str, Column] = {}
+    for one in sorted(columns, key=lambda one: -run.ranges.get(one.label, 0.0)):
+        engine = CYLINDER.sub("", one.element.lower())
+        chosen.setdefault(engine if engine in engines else one.label, one)
+    return list(chosen.values())
 
 
 def _of_interest(sources: Sources, run: Run, moments: list[Column]) -> list[Column]:
