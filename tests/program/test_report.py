@@ -5,10 +5,12 @@ import html
 import importlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 
+import jinja2
 import numpy as np
 import pandas as pd
 import pytest
@@ -748,3 +750,29 @@ def test_units_are_those_of_engineers():
     assert head == "twist [deg]" and [cell.text for cell in cells] == ["5.7296", "0", "\N{EN DASH}"]
     life = importlib.import_module("nocdyn_report.report.readable").life
     assert life(1e-28).text == "< 10⁻¹²" and plain(life(7.4123e15).text) == 7.4e15
+
+
+def test_the_state_that_a_machine_can_stay_in_is_its_operating_point():
+    ordered = importlib.import_module("nocdyn_report.report.sections.steady").ordered_states
+    states = [
+        {"stability": "unstable", "values": {}},
+        {"stability": "stable", "is_at_rest": True, "values": {}},
+        {"stability": "stable", "is_at_rest": False, "values": {}},
+    ]
+    assert ordered({"steady_states": states}) == [states[2], states[1], states[0]]
+
+
+def test_paper_says_that_a_table_has_more_columns():
+    content = importlib.import_module("nocdyn_report.report.content")
+    tables = [content.Table("", ["a_long_name_of_a_column"] * count, [[content.number(1.5)] * count]) for count in (20, 3)]
+    assets = jinja2.FileSystemLoader(SOURCE / "scripts/nocdyn_report/report/assets")
+    module = jinja2.Environment(loader=assets, autoescape=True).get_template("blocks.html.jinja").module
+    assert ["wider than the page" in module.block_of(table) for table in tables] == [True, False]
+
+
+def test_the_report_of_a_plant_has_few_pages(fresh):
+    for name in ("ship_plant.nml", "diesel.csv"):
+        fresh.write(name, (SOURCE / "docs/tutorial" / name).read_text(encoding="utf-8"))
+    assert fresh("ship_plant.nml", "--quiet").returncode == 0
+    content = (fresh.folder / "results/ship_plant/report.pdf").read_bytes()
+    assert 5 < len(re.findall(rb"/Type */Page\b", content)) <= 15

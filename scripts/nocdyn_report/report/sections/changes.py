@@ -39,9 +39,8 @@ def _verdict(sources: Sources, lines: list[Line]) -> list[Block]:
         values = [sources.units.amount(one.value, one.unit, like=one.limit) if one else "" for one in mine]
         limits = [sources.units.amount(one.limit, one.unit) if one else "" for one in mine]
         columns.append((f"{head} value, limit", texts([f"{a}, {b}" if a else "" for a, b in zip(values, limits)])))
-        columns.append(
-            (f"{head} finding", [text(one.finding, TONES[one.finding]) if one else text("no such line") for one in mine])
-        )
+        told = [(one.assessment if place else one.finding) if one else "no such line" for one in mine]
+        columns.append((f"{head} finding", [text(word, TONES[one.finding] if one else "") for word, one in zip(told, mine)]))
     table = by_columns("Lines of the verdict that are not the same", columns)
     table.rows = list({tuple(cell.text for cell in row): row for row in table.rows}.values())  # load cases with equal lines
     return [cut(table, MOST_ROWS, "the files of the results")]
