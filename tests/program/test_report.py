@@ -738,7 +738,7 @@ def test_lines_that_fill_a_panel_are_bands():
     slow, fast = (arrays.curve("a", time, np.sin(2 * np.pi * count * time)) for count in (20, 400))
     assert "low" not in slow and "low" in fast
     low, high = (np.frombuffer(base64.b64decode(arrays.texts[fast[key]]), "<f4") for key in ("low", "y"))
-    assert low == pytest.approx(-1, abs=0.01) and high == pytest.approx(1, abs=0.01)
+    assert low == pytest.approx(-1, abs=0.05) and high == pytest.approx(1, abs=0.05)  # of 12 points in an oscillation
 
 
 def test_units_are_those_of_engineers():

@@ -6,7 +6,7 @@ from ...columns import DETAIL, LOADS, LOSS, MOMENT, SLIP, SPEED, TORQUE, TWIST, 
 from ...results import TIME
 from ...selection import widest
 from ..content import Block, Cell, Figure, Heading, Panel, Paragraph, Section, Table, by_columns, cut, first, number, text
-from ..naming import WHOLE, name_of
+from ..naming import WHOLE, is_end, name_of
 from ..numbers import number_text
 from ..readable import texts
 from ..sources import Run, Sources
@@ -66,7 +66,7 @@ def _peaks(sources: Sources) -> list[Table]:
     """The largest magnitude of each load in each case: a table for each sort."""
     tables = []
     columns = {column.label: column for run in reversed(sources.runs) for column in run.column_list.values()}
-    for sort in by_sort(one for one in columns.values() if _is_told(one) and one.rank in (*LOADS, SPEED)):
+    for sort in by_sort(one for one in columns.values() if _is_told(one) and not is_end(one) and one.rank in (*LOADS, SPEED)):
         chosen = [one for one in sort if any("max" in run.columns.get(one.label, {}) for run in sources.runs)]
         magnitudes = [[_magnitude(run, one) for one in chosen] for run in sources.runs]
         head, cells = sources.units.column("", sort[0].unit, [value for values in magnitudes for value in values])
@@ -172,7 +172,12 @@ def _figures(sources: Sources, run: Run) -> list[Figure]:
     some = f": {most} of {len(moments)} moments, those with limits first" if len(moments) > most else ""
     has_bands = any("low" in curve for panel in panels for curve in panel.spec["curves"])
     bands = "; filled: between the smallest and the largest value" if has_bands else ""
-    return [Figure(f"Motion{_of(run)} over the time{some}{bands}", panels, min(PANELS_BESIDE, len(panels)))]
+    return [Figure(f"Motion{_of(run)} over the time{some}{bands}", panels, _beside(len(panels)))]
+
+
+def _beside(count: int) -> int:
+    """Panels beside one another: four in one row, else three."""
+    return count if count <= PANELS_BESIDE + 1 else PANELS_BESIDE
 
 
 def _of_each_engine(sources: Sources, run: Run, columns: list[Column]) -> list[Column]:

@@ -157,7 +157,9 @@ def _small(sources: Sources, quantities: list[Quantity]) -> list[Figure | Paragr
         colours = _colours(part, sources.response)
         panels = [_panel(sources, sources.response, one.in_short(largest), colours, is_small=True) for one in part]
         caption = part[0].column.caption if len({one.column.caption for one in part}) == 1 else kind.replace("_", " ")
-        blocks.append(Figure(f"{caption[0].upper()}{caption[1:]}: half ranges over the speed", panels, min(SMALL, len(panels))))
+        blocks.append(
+            Figure(f"{caption[0].upper()}{caption[1:]}: half ranges over the speed", panels, min(SMALL, max(BIG, len(panels))))
+        )
     if len(chosen) < len(quantities):
         blocks.append(Paragraph(f"Drawn are the {len(chosen)} largest of {len(quantities)} quantities; response.csv has all."))
     return blocks
