@@ -66,6 +66,7 @@ def _diagram(sources: Sources) -> Figure:
     for mode, frequency in list(campbell.modes.items())[:MOST_MODES]:
         curves.append(arrays.curve(f"mode {roman(mode)}", speed, frequency, role="mode", end=roman(mode)))
     for place, (name, role) in POINTS.items():
+        name = "electrical mode" if not place and campbell.operation else name  # nothing else has no distance to operation
         if chosen := [one for one in campbell.crossings if one.place == place]:
             places = [sources.of_rpm(one.speed) for one in chosen], [one.frequency for one in chosen]
             labels = [sources.named(one) for one in chosen]

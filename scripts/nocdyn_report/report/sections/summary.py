@@ -12,7 +12,7 @@ from .steady import ordered_states, stability_text
 MOST_NAMED = 6  # of one sort
 MOST_PEAKS = 2  # of a kind
 MOST_LINES = 40
-MOST_CASES = 3  # that are named in a line of the verdict
+MOST_CASES = 2  # that are named in a line of the verdict
 TONES = {"exceeded": "bad", "not assessed": "warn", "restricted": "warn", "kept": "good"}
 
 
