@@ -131,9 +131,10 @@ class Quantity:
         return float(np.nanmax(self.half_range, initial=0.0))
 
     def in_short(self, largest: float | None = None) -> "Quantity":
-        """In kN m or MN m, if the numbers, or the largest of a figure, are large."""
+        """In kN m, MN m or MPa, if the numbers, or the largest of a figure, are large."""
         largest = self.largest if largest is None else largest
-        factor, prefix = next(((f, p) for f, p in ((1e6, "M"), (1e3, "k")) if 1e1 * f <= largest < np.inf), (1.0, ""))
+        steps = ((1e6, "M", 1e4),) if self.unit == "Pa" else ((1e6, "M", 1e7), (1e3, "k", 1e4))
+        factor, prefix = next(((f, p) for f, p, least in steps if least <= largest < np.inf), (1.0, ""))
         scaled = {name: values / factor for name, values in self._values().items()}
         return replace(self, unit=prefix + self.unit, stress=self.stress and self.stress * factor, **scaled)
 

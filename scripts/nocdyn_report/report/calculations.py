@@ -10,6 +10,7 @@ import f90nml
 
 from .failure import ReportError
 from .program import Answer, Program, option_words
+from .result_files import ResultFiles
 from .stamps import Stamps, is_run_of, without_case
 
 FAILED = 1  # exit code of a computation that failed
@@ -20,7 +21,7 @@ FILES = {
     "response": ["response.json", "response.csv", "response_orders.csv"],
     "campbell": ["campbell.json", "campbell.csv"],
 }
-HOLZER = "holzer.csv"
+HOLZER = ["holzer.csv"]
 SWEEP = "sweep.nc"
 
 
@@ -52,8 +53,15 @@ class Calculations:
     def cases(self) -> list[dict]:
         return self.check.get("load_cases", [])
 
+    @property
+    def files(self) -> ResultFiles:
+        return ResultFiles(self.folder, bool(self.cases))
+
     def has(self, command: str) -> bool:
-        return command in self.of and self.of[command].is_there
+        """Whether a command has results, at least of one load case."""
+        if command not in self.of or self.of[command].state in ("refused", "left out"):
+            return False
+        return bool(self.files.there(command)) and (self.of[command].is_there or bool(self.cases))
 
 
 def calculate(
@@ -127,12 +135,12 @@ def _refusal(command: str, answer: Answer) -> Calculation:
 
 def _modes(program: Program, words: Sequence[str], stamps: Stamps) -> tuple[Calculation, Calculation]:
     """With the tables of Holzer; not every machine that has modes has these."""
-    if stamps.holds("modes", FILES["modes"]) and stamps.holds("holzer", [HOLZER]):
+    if stamps.holds("modes", FILES["modes"]) and stamps.holds("holzer", HOLZER):
         return Calculation("modes", "reused"), Calculation("holzer", "reused")
     answer = program("modes", "--holzer", *words)
     if answer.code == 0:
         stamps.put("modes", FILES["modes"])
-        stamps.put("holzer", [HOLZER])
+        stamps.put("holzer", HOLZER)
         return Calculation("modes", "computed", seconds=answer.seconds), Calculation("holzer", "computed", seconds=answer.seconds)
     modes = _analyse(program, "modes", words, stamps)
     return modes, _refusal("holzer", answer) if modes.is_there else Calculation("holzer", "left out", "there are no modes")

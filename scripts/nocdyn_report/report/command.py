@@ -14,11 +14,13 @@ from .notes_text import read_notes
 from .page import render
 from .pdf import print_pdf
 from .program import find_program
-from .sections.appendix import input_section
+from .revisions import former
+from .sections.appendix import details_section, input_section
 from .sections.campbell import campbell_section
+from .sections.changes import changes_section
 from .sections.energy import energy_section
 from .sections.fatigue import fatigue_section
-from .sections.machine import machine_section
+from .sections.machine import data_section, machine_section
 from .sections.modes import modes_section
 from .sections.motion import motion_section
 from .sections.remarks import notes_section, remarks_section
@@ -69,6 +71,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--allow-outside", action="store_true", help="take notes, pictures and tables from other folders than that of FILE"
     )
+    parser.add_argument("--against", type=Path, metavar="DIR", help="tell the changes since the revision whose results are there")
     parser.add_argument("--quiet", "-q", action="store_true", help="print nothing but errors")
     return parser
 
@@ -93,13 +96,16 @@ def _text(file: str) -> str:
 
 
 def _sections(sources: Sources, arguments: argparse.Namespace) -> list[Section]:
-    made = [make(sources) for make in (machine_section, steady_section, modes_section, campbell_section, response_section)]
-    made += [make(sources) for make in (motion_section, energy_section, fatigue_section)]
-    body = [section for section in made if section is not None]
+    made = [make(sources) for make in (machine_section, steady_section, data_section, modes_section, campbell_section)]
+    made += [make(sources) for make in (response_section, motion_section, energy_section, fatigue_section)]
+    there = [section for section in made if section is not None]
     folder = Folder(Path(arguments.file).parent, arguments.allow_outside)
     remarks = remarks_section(_notes(sources, arguments.file, folder))
-    first = [summary_section(sources), *([remarks] if remarks else []), scope_section(sources, body)]
-    return [*first, *body, notes_section(sources), input_section(sources, arguments.set, folder)]
+    body = [section for section in there if section.blocks]
+    changed = [changes_section(sources, former(arguments.against, sources.results.folder))] if arguments.against else []
+    body = [summary_section(sources), *changed, *([remarks] if remarks else []), *body]
+    appendices = [notes_section(sources), scope_section(sources, there), input_section(sources, arguments.set, folder)]
+    return [*body, *details_section([*changed, *there]), *appendices]
 
 
 def _notes(sources: Sources, file: str, folder: Folder) -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from .numbers import name_and_unit, number_text, unit_text
+from .numbers import NONE, name_and_unit, number_text, unit_text
 
 
 @dataclass(frozen=True)
@@ -17,6 +17,9 @@ class Cell:
     is_number: bool = False
 
 
+PAPER = 150  # characters that a line of a table has on paper, in the smallest print
+
+
 @dataclass
 class Table:
     caption: str
@@ -24,6 +27,7 @@ class Table:
     rows: list[list[Cell]]
     note: str = ""
     is_sorted: bool = True  # whether the reader may sort it
+    is_beside: bool = False  # on paper, of another table
     kind: str = "table"
     number: int = 0  # in the report, as the id
     id: str = ""
@@ -35,14 +39,39 @@ class Table:
         numbers = [any(row[i].is_number for row in self.rows) for i in range(len(self.columns))]
         return [(name, unit_text(unit), is_number) for (name, unit), is_number in zip(named, numbers)]
 
+    @property
+    def width(self) -> int:
+        """Characters of a row without line breaks."""
+        heads = [max(map(len, head.split()), default=0) + 1 for head in self.columns]
+        return sum(max([head, *(len(row[i].text) + 2 for row in self.rows)]) for i, head in enumerate(heads))
+
+    @property
+    def is_wider_than_paper(self) -> bool:
+        """Whether there is no room for its words on a page."""
+        words = [
+            [word for text in (head, *(row[i].text for row in self.rows)) for word in text.split()]
+            for i, head in enumerate(self.columns)
+        ]
+        return sum(max(map(len, column), default=0) + 2 for column in words) > PAPER
+
+
+@dataclass
+class Panel:
+    """Curves; `spec` is what assets/figures.js draws."""
+
+    title: str  # '' of a figure that has no other
+    text: str  # alternative to the picture
+    spec: dict
+    id: str = ""
+
 
 @dataclass
 class Figure:
-    """Curves; `spec` is what assets/figures.js draws."""
+    """Panels with one legend: curves of one name look alike in all of them."""
 
     caption: str
-    text: str  # alternative to the picture
-    spec: dict
+    panels: list[Panel]
+    columns: int = 1  # panels beside one another
     kind: str = "figure"
     number: int = 0
     id: str = ""
@@ -104,16 +133,37 @@ class Heading:
 Block = Table | Figure | Drawing | Paragraph | Markup | Listing | Items | Heading
 
 
+NARROW = 62, 84  # characters in a row of a table that has room beside another one; in small print
+FEW = 45  # rows of such a table
+
+
+def set_beside(blocks: Sequence[Block], is_small: bool) -> None:
+    """Marks pairs of narrow tables that follow one another."""
+    free = None
+    for block in blocks:
+        is_narrow = isinstance(block, Table) and block.width <= NARROW[is_small] and len(block.rows) <= FEW
+        if is_narrow and free:
+            free.is_beside = block.is_beside = True
+            free = None
+        else:
+            free = block if is_narrow else None
+
+
 @dataclass
 class Section:
     id: str
     title: str
     blocks: list[Block] = field(default_factory=list)
+    details: list[Block] = field(default_factory=list)  # what stands in an appendix
     is_appendix: bool = False
     number: str = ""
 
     def add(self, *blocks: Block) -> "Section":
         self.blocks.extend(blocks)
+        return self
+
+    def add_details(self, *blocks: Block) -> "Section":
+        self.details.extend(blocks)
         return self
 
 
@@ -127,15 +177,18 @@ def number(value: object, digits: int = 5, tone: str = "") -> Cell:
     return Cell(number_text(value, digits), key, "", tone, True)
 
 
-NOISE = 1e-9  # of the largest number of a sort: what rounding leaves of a zero, as the program prints it too
+def by_columns(caption: str, columns: Sequence[tuple[str, list[Cell]]], note: str = "", is_sorted: bool = True) -> Table:
+    """A table of its columns; one without any content is left out."""
+    shown = [(head, cells) for head, cells in columns if any(cell.text not in ("", NONE) for cell in cells)]
+    rows = [list(row) for row in zip(*(cells for _, cells in shown))]
+    return Table(caption, [head for head, _ in shown], rows, note, is_sorted)
 
 
-def rounded(values: dict[str, float], sorts: dict[str, str]) -> dict[str, float]:
-    """Numbers by names; what is rounding beside the largest one of its sort (unit) is 0."""
-    largest: dict[str, float] = {}
-    for name, value in values.items():
-        largest[sorts[name]] = max(largest.get(sorts[name], 0.0), abs(value))
-    return {name: value if abs(value) > NOISE * largest[sorts[name]] else 0 for name, value in values.items()}
+def cut(table: Table, most: int, where: str) -> Table:
+    """Its first rows."""
+    table.rows, more = first(table.rows, most, where)
+    table.note = f"{table.note} {more}".strip()
+    return table
 
 
 def share(value: float | None, digits: int = 3, tone: str = "") -> Cell:

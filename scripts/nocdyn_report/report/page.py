@@ -10,7 +10,7 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup
 
-from .content import Section
+from .content import Section, set_beside
 from .sources import Sources
 
 ASSETS = Path(__file__).parent / "assets"
@@ -29,7 +29,8 @@ def render(sources: Sources, sections: Sequence[Section]) -> str:
     )
     environment.filters["css"] = _css_text
     scripts = [LIBRARY.read_text(encoding="utf-8"), *((ASSETS / name).read_text(encoding="utf-8") for name in SCRIPTS)]
-    figures = {block.id: block.spec for section in sections for block in section.blocks if block.kind == "figure"}
+    blocks = [block for section in sections for block in section.blocks if block.kind == "figure"]
+    figures = {panel.id: panel.spec for block in blocks for panel in block.panels}
     case = sources.case
     return environment.get_template("report.html.jinja").render(
         title=case.get("title") or Path(sources.check["input"]).stem,
@@ -50,12 +51,15 @@ def number_all(sections: Sequence[Section]) -> None:
     numbers = iter(range(1, len(sections) + 1))
     letters = iter("ABCDEFGH")
     for section in sections:
+        set_beside(section.blocks, section.is_appendix)
         section.number = next(letters) if section.is_appendix else str(next(numbers))
         for block in section.blocks:
             kind = {"drawing": "figure", "figure": "figure", "table": "table"}.get(block.kind)
             if kind:
                 count[kind] += 1
                 block.number, block.id = count[kind], f"{kind}-{count[kind]}"
+            for i, panel in enumerate(getattr(block, "panels", []), start=1):
+                panel.id = f"{block.id}-{i}"
 
 
 def _facts(sources: Sources) -> list[tuple[str, str]]:
@@ -77,4 +81,4 @@ def _digest(script: str) -> str:
 
 def _css_text(text: str) -> Markup:
     """What stands between quotes in CSS: every character that could mean something there as its number."""
-    return Markup("".join(c if c.isalnum() or c in " .,-" else f"\\{ord(c):06x}" for c in text))
+    return Markup("".join(c if c.isalnum() or c in " .,-" else f"\\{ord(c):06x} " for c in text))

@@ -18,10 +18,15 @@ from .calculations import Calculations
 from .curves import Arrays
 from .failure import FILES, ReportError
 from .numbers import number_text
+from .readable import Units
+from .result_files import CaseResult
+from .verdict import ANALYSES, Line, failure_line, verdict_lines, worst_first
 
 NOTES_FILE = re.compile(
     r"""^[^!\n]*\bnotes_file\s*=\s*(?:'(?P<one>(?:[^'\n]|'')*)'|"(?P<other>[^"\n]*)")""", re.MULTILINE | re.IGNORECASE
 )
+
+READERS = {"campbell": read_campbell, "response": read_response}
 
 
 class Sources:
@@ -32,7 +37,7 @@ class Sources:
         self.text = text  # of the input file
         self.overrides = overrides  # PATH=VALUE of --set
         self.arrays = Arrays()
-        self._read: dict[str, Campbell | Response | str] = {}
+        self._read: dict[tuple[str, str], Campbell | Response | str] = {}
 
     @property
     def check(self) -> dict:
@@ -49,16 +54,36 @@ class Sources:
 
     def missing(self, command: str) -> str:
         """Why results that are there have nothing to show."""
-        read = {"campbell": read_campbell, "response": read_response}.get(command)
-        if read is None or not self.results.has(command):
+        if command not in READERS or not self.results.has(command):
             return ""
-        if command not in self._read:
-            try:
-                self._read[command] = read(self.results.folder)
-            except ResultsError as error:
-                self._read[command] = str(error)
-        found = self._read[command]
+        found = self._try(command, self.cases_of(command)[0])
         return found if isinstance(found, str) else ""
+
+    def _try(self, command: str, case: CaseResult) -> Campbell | Response | str:
+        """The results of a load case, or why they cannot be shown."""
+        if (command, case.name) not in self._read:
+            try:
+                self._read[command, case.name] = READERS[command](case.folder)
+            except ResultsError as error:
+                self._read[command, case.name] = str(error)
+        return self._read[command, case.name]
+
+    def cases_of(self, command: str) -> list[CaseResult]:
+        """The load cases for which a command has results, '' without load cases; sections show the first one."""
+        return self.results.files.there(command)
+
+    def main(self, command: str) -> str:
+        """As ' of load case full': whose results the section of a command shows; '' without load cases."""
+        name = self.cases_of(command)[0].name
+        return f" of load case {name}" if name else ""
+
+    def folder(self, command: str) -> Path:
+        return self.cases_of(command)[0].folder
+
+    def responses(self) -> list[tuple[str, Response]]:
+        """Of all load cases, that of the section first."""
+        found = [(case.name, self._try("response", case)) for case in self.cases_of("response")]
+        return [(name, one) for name, one in found if not isinstance(one, str)]
 
     def groups(self, kind: str) -> list[f90nml.Namelist]:
         return groups_of(self.machine, kind)
@@ -79,7 +104,7 @@ class Sources:
 
     @cached_property
     def equilibrium(self) -> dict:
-        return self.read_json("equilibrium.json")
+        return self.read_json(self.folder("equilibrium") / "equilibrium.json")
 
     @cached_property
     def steady_columns(self) -> dict[str, Column]:
@@ -88,11 +113,11 @@ class Sources:
 
     @cached_property
     def modes(self) -> Modes:
-        return _told(read_modes, self.results.folder)
+        return _told(read_modes, self.folder("modes"))
 
     @cached_property
     def response_report(self) -> dict:
-        return self.read_json("response.json")
+        return self.read_json(self.folder("response") / "response.json")
 
     @property
     def response(self) -> Response:
@@ -100,7 +125,7 @@ class Sources:
 
     @cached_property
     def campbell_report(self) -> dict:
-        return self.read_json("campbell.json")
+        return self.read_json(self.folder("campbell") / "campbell.json")
 
     @property
     def campbell(self) -> Campbell:
@@ -113,14 +138,9 @@ class Sources:
     @cached_property
     def runs(self) -> list["Run"]:
         """The run, or that of each load case; also those that ended early."""
-        folder = self.results.folder
-        if not self.results.cases:
-            folders = [("", folder)] if (folder / "summary.json").is_file() and self.results.of["run"].state != "refused" else []
-        elif (folder / "cases.json").is_file() and self.results.of["run"].state != "refused":
-            folders = [(case["name"], folder / case["folder"]) for case in self.cases["load_cases"]]
-        else:
-            folders = []
-        return [Run(name, one, self.read_json(one / "summary.json")) for name, one in folders if (one / "summary.json").is_file()]
+        if self.results.of["run"].state == "refused":
+            return []
+        return [Run(one.name, one.folder, self.read_json(one.folder / "summary.json"), one.title) for one in self.cases_of("run")]
 
     def read_json(self, name: str | Path) -> dict:
         file = self.results.folder / name if isinstance(name, str) else name
@@ -129,16 +149,17 @@ class Sources:
         except (OSError, ValueError) as error:
             raise ReportError(f"{file}: cannot be read: {error}", FILES) from None
 
-    def table(self, name: str) -> pd.DataFrame:
+    def table(self, command: str, name: str) -> pd.DataFrame:
+        file = self.folder(command) / name
         try:
-            return pd.read_csv(self.results.folder / name)
+            return pd.read_csv(file)
         except (OSError, ValueError) as error:
-            raise ReportError(f"{self.results.folder / name}: cannot be read: {error}", FILES) from None
+            raise ReportError(f"{file}: cannot be read: {error}", FILES) from None
 
     def _shown(self, command: str) -> Campbell | Response:
         if reason := self.missing(command):
             raise ReportError(reason, FILES)
-        return self._read[command]
+        return self._try(command, self.cases_of(command)[0])
 
     @cached_property
     def speed_unit(self) -> str:
@@ -149,6 +170,27 @@ class Sources:
         given = {"_rpm": "rpm", "_hz": "Hz"} if re.search(r"speed\w*_(rpm|hz)\b", self.text, re.IGNORECASE) else {}
         found = re.search(r"speed\w*(_rpm|_hz)\b", self.text, re.IGNORECASE)
         return named or (given[found[1].lower()] if found else "rad/s")
+
+    @cached_property
+    def units(self) -> Units:
+        return Units(self.speed_unit)
+
+    @cached_property
+    def verdict(self) -> list[Line]:
+        """The lines of all analyses and load cases; one that was asked for and gave nothing has a line too."""
+        asked = [name for name in ANALYSES if name in self.results.of]
+        there = [name for name in asked if self.results.has(name)]
+        lines = verdict_lines(self.results.files, there)
+        failed = [self.results.of[name] for name in asked if self.results.of[name].state in ("failed", "refused")]
+        told = [failure_line(one.command, one.message.splitlines()[0]) for one in failed if one.command not in there]
+        return worst_first([*lines, *told])
+
+    def given_unit(self, key: str, unit: str) -> str:
+        """The unit in which the input gives a key that has another one in the complete input: its own words."""
+        for ending, other in (("_hz", "Hz"), ("_rpm", "rpm"), ("_deg", "deg")):
+            if re.search(rf"\b{key}{ending}\b", self.text, re.IGNORECASE):
+                return other
+        return unit
 
     def speed(self, value: float) -> float:
         """A speed [rad/s] in that unit."""
@@ -165,8 +207,8 @@ class Sources:
 class Run:
     """A run over the time."""
 
-    def __init__(self, name: str, folder: Path, summary: dict) -> None:
-        self.name, self.folder, self.summary = name, folder, summary
+    def __init__(self, name: str, folder: Path, summary: dict, title: str = "") -> None:
+        self.name, self.folder, self.summary, self.title = name, folder, summary, title
 
     @property
     def columns(self) -> dict[str, dict]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .program import Program
+from .result_files import CASES, ResultFiles
 from .writing import write_whole
 
 NAME = "report.json"
@@ -37,6 +38,7 @@ class Stamps:
     """What this script computed before, in a file beside the results: the input, the program, and the files as they were."""
 
     def __init__(self, folder: Path, program: Program, check: dict) -> None:
+        self.results = ResultFiles(folder, bool(check.get("load_cases")))
         self.folder = folder
         text = without_case(check["complete_input"]) + "\n".join(str(check[key]) for key in ("version", "compiler", "input"))
         self.key = hashlib.sha256((text + program.identity).encode()).hexdigest()
@@ -49,19 +51,25 @@ class Stamps:
     def holds(self, command: str, names: Sequence[str]) -> bool:
         """Whether the files of a command are those that were written for this input."""
         known = self.files.get(command)
-        return isinstance(known, dict) and known == self._digests(names)
+        return isinstance(known, dict) and bool(known) and known == self._digests(command, names)
 
     def put(self, command: str, names: Sequence[str]) -> None:
-        self.files[command] = self._digests(names)
+        self.files[command] = self._digests(command, names)
 
     def write(self) -> None:
         write_whole(self.folder / NAME, json.dumps({"key": self.key, "files": self.files}, indent=2) + "\n")
 
-    def _digests(self, names: Sequence[str]) -> dict[str, str | None]:
-        digests: dict[str, str | None] = {}
-        for name in names:
-            try:
-                digests[name] = hashlib.sha256((self.folder / name).read_bytes()).hexdigest()
-            except OSError:
-                digests[name] = None
-        return digests
+    def _digests(self, command: str, names: Sequence[str]) -> dict[str, str | None]:
+        """Of the files of the machine, or of all load cases and of the report on them."""
+        cases = self.results.cases(command)
+        files = [one.folder / name for one in cases for name in names]
+        if any(one.name for one in cases):
+            files.append(self.folder / CASES.get(command, CASES["modes"]))
+        return {str(file.relative_to(self.folder)): _digest(file) for file in files}
+
+
+def _digest(file: Path) -> str | None:
+    try:
+        return hashlib.sha256(file.read_bytes()).hexdigest()
+    except OSError:
+        return None

@@ -3,15 +3,17 @@
 const report = (() => {
   const GROUPS = { order: "orders", mode: "modes" };
 
+  // Of an envelope both ends.
+  const valueText = (curve, i) => (curve.low ? `${numberText(curve.low[i])} to ` : "") + numberText(curve.y[i]);
+
   class Chart extends Picture {
-    constructor(figure, spec, index) {
-      super(figure, spec, index);
-      this.status = figure.querySelector(".values");
+    constructor(panel, spec, index) {
+      super(panel, spec, index);
+      this.status = panel.querySelector(".values");
       this.tip = document.createElement("div");
       this.tip.className = "tip";
       this.tip.hidden = true;
       this.at = null;
-      this.makeLegend();
       this.listen();
       this.draw();
     }
@@ -36,48 +38,6 @@ const report = (() => {
         this.draw();
       });
       this.svg.append("g").attr("class", "brush").call(brush);
-    }
-
-    makeLegend() {
-      const legend = this.figure.querySelector(".legend"), groups = new Map();
-      for (const curve of this.curves) {
-        const name = GROUPS[curve.role] || curve.name;
-        groups.set(name, [...(groups.get(name) || []), curve]);
-      }
-      for (const [name, curves] of groups) {
-        const button = document.createElement("button");
-        button.type = "button";
-        const swatch = curves[0].points ? `<circle class="point ${curves[0].look}" cx="10" cy="5" r="4"/>` : `<path class="curve ${curves[0].look}" d="M0 5h20"/>`;
-        button.innerHTML = `<svg width="20" height="10" aria-hidden="true">${swatch}</svg>`;
-        button.append(name);
-        const tell = () => button.setAttribute("aria-pressed", String(curves[0].shown));
-        button.addEventListener("click", () => {
-          const shown = !curves[0].shown;
-          curves.forEach((curve) => { curve.shown = shown; });
-          tell();
-          tellLeftOut();
-          this.draw();
-        });
-        tell();
-        legend.append(button);
-      }
-      const leftOut = document.createElement("span"); // on paper, which has no buttons to press
-      leftOut.className = "left-out";
-      const tellLeftOut = () => {
-        const names = [...groups].filter(([, curves]) => !curves[0].shown).map(([name]) => name);
-        leftOut.textContent = names.length ? `not drawn: ${names.join(", ")}` : "";
-      };
-      tellLeftOut();
-      legend.append(leftOut);
-      const told = new Set();
-      for (const band of this.spec.bands || []) {
-        if (told.has(band.label)) continue;
-        told.add(band.label);
-        const entry = document.createElement("span");
-        entry.innerHTML = `<svg width="20" height="10" aria-hidden="true"><rect class="band ${band.kind}" width="20" height="10"/></svg>`;
-        entry.append(band.label);
-        legend.append(entry);
-      }
     }
 
     listen() {
@@ -136,10 +96,10 @@ const report = (() => {
       for (const { one, k } of rows) {
         const line = document.createElement("span");
         line.innerHTML = `<svg width="16" height="8" aria-hidden="true"><path class="curve ${one.look}" d="M0 4h16"/></svg>`;
-        line.append(`${one.name}: ${numberText(one.y[k])}${yUnit}`);
+        line.append(`${one.name}: ${valueText(one, k)}${yUnit}`);
         this.tip.append(line);
       }
-      this.status.textContent = [head, ...rows.map(({ one, k }) => `${one.name} ${numberText(one.y[k])}${yUnit}`)].join("; ");
+      this.status.textContent = [head, ...rows.map(({ one, k }) => `${one.name} ${valueText(one, k)}${yUnit}`)].join("; ");
       this.tip.hidden = false;
       this.drawCursor(x, rows);
     }
@@ -234,7 +194,60 @@ const report = (() => {
     }
   }
 
-  const charts = [...document.querySelectorAll("[data-figure]")].map((figure, i) => new Chart(figure, content.figures[figure.id], i));
+  // One legend for all panels of a figure: what is of one name looks alike in them.
+  function makeLegend(figure, charts) {
+    const legend = figure.querySelector(".legend"), groups = new Map();
+    for (const chart of charts) {
+      for (const curve of chart.curves) {
+        const name = GROUPS[curve.role] || curve.name;
+        groups.set(name, [...(groups.get(name) || []), curve]);
+      }
+    }
+    if (figure.querySelectorAll(".panel").length > 1) groups.delete("load"); // a panel of one curve has its name
+    const isShown = (curves) => curves.some((curve) => curve.shown);
+    const leftOut = document.createElement("span"); // on paper, which has no buttons to press
+    leftOut.className = "left-out";
+    const tellLeftOut = () => {
+      const names = [...groups].filter(([, curves]) => !isShown(curves)).map(([name]) => name);
+      leftOut.textContent = names.length ? `not drawn: ${names.join(", ")}` : "";
+    };
+    for (const [name, curves] of groups) {
+      const button = document.createElement("button");
+      button.type = "button";
+      const swatch = curves[0].points ? `<circle class="point ${curves[0].look}" cx="10" cy="5" r="4"/>` : `<path class="curve ${curves[0].look}" d="M0 5h20"/>`;
+      button.innerHTML = `<svg width="20" height="10" aria-hidden="true">${swatch}</svg>`;
+      button.append(name);
+      const tell = () => button.setAttribute("aria-pressed", String(isShown(curves)));
+      button.addEventListener("click", () => {
+        const shown = !isShown(curves);
+        curves.forEach((curve) => { curve.shown = shown; });
+        tell();
+        tellLeftOut();
+        charts.forEach((chart) => chart.draw());
+      });
+      tell();
+      legend.append(button);
+    }
+    tellLeftOut();
+    legend.append(leftOut);
+    const bands = charts.flatMap((chart) => chart.spec.bands || []);
+    for (const label of new Set(bands.map((band) => band.label))) {
+      const entry = document.createElement("span");
+      const { kind } = bands.find((band) => band.label === label);
+      entry.innerHTML = `<svg width="20" height="10" aria-hidden="true"><rect class="band ${kind}" width="20" height="10"/></svg>`;
+      entry.append(label);
+      legend.append(entry);
+    }
+    if (charts.some((chart) => (chart.spec.marks || []).length)) {
+      const entry = document.createElement("span");
+      entry.innerHTML = '<svg width="20" height="10" aria-hidden="true"><path class="mark" d="M10 9l-4 -7h8z"/></svg>';
+      entry.append("critical speed, mode/order");
+      legend.append(entry);
+    }
+  }
+
+  const charts = [...document.querySelectorAll("[data-figure]")].map((panel, i) => new Chart(panel, content.figures[panel.id], i));
+  for (const figure of new Set(charts.map((chart) => chart.figure))) makeLegend(figure, charts.filter((chart) => chart.figure === figure));
   const redraw = () => charts.forEach((chart) => chart.draw());
   const print = (printing) => {
     if (printing) document.documentElement.dataset.printing = "yes";

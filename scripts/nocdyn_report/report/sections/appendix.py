@@ -1,10 +1,10 @@
-"""The input as text, with the tables that it reads."""
+"""Further results, and the input as text, with the tables that it reads."""
 
 import re
 from statistics import median
 
 from ..confined import Folder
-from ..content import Items, Listing, Paragraph, Section
+from ..content import Heading, Items, Listing, Paragraph, Section
 from ..failure import ReportError
 from ..sources import Sources
 
@@ -13,6 +13,16 @@ MOST_OF_INPUT = 500  # lines
 MOST_LINES = 300  # of a table
 MOST_BYTES = 1_000_000  # likewise
 NARROW = 40  # characters in a line of a table that has room beside others
+
+
+def details_section(sections: list[Section]) -> list[Section]:
+    """What is too long for the sections; none if there is nothing."""
+    section = Section("details", "Further results", is_appendix=True)
+    for one in sections:
+        if one.details:
+            first = one.details[0]
+            section.add(*([] if isinstance(first, Heading) else [Heading(one.title, f"more-{one.id}")]), *one.details)
+    return [section] if section.blocks else []
 
 
 def input_section(sources: Sources, overrides: list[str], folder: Folder) -> Section:

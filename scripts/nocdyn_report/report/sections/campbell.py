@@ -1,10 +1,15 @@
 """Natural frequencies over the speed, and where the orders meet them."""
 
+import math
+
 import numpy as np
 
+from ...columns import FORCE, MOMENT
 from ...speed_results import Critical, roman
-from ..content import Figure, Heading, Paragraph, Section, Table, first, number, share, text
+from ..content import Figure, Heading, Panel, Paragraph, Section, Table, by_columns, cut, first, number, share, text
 from ..curves import band
+from ..numbers import unit_text
+from ..readable import texts
 from ..sources import Sources
 
 MOST_MODES = 24
@@ -24,15 +29,14 @@ def campbell_section(sources: Sources) -> Section | None:
     if not sources.has("campbell"):
         return None
     campbell = sources.campbell
-    section = Section("campbell", "Campbell diagram and interference")
+    section = Section("campbell", f"Campbell diagram and critical speeds{sources.main('campbell')}")
     section.add(_diagram(sources))
-    section.add(Heading("Interference: critical speeds", "critical"))
+    section.add(Heading("Critical speeds", "critical"))
     if campbell.crossings:
         section.add(_crossings(sources))
     else:
         section.add(Paragraph("No order meets a natural frequency in this range of speeds."))
-    section.add(_modes(sources))
-    return section
+    return section.add_details(_modes(sources))
 
 
 def operation_bands(sources: Sources, report: object) -> list[dict]:
@@ -62,6 +66,7 @@ def _diagram(sources: Sources) -> Figure:
     for mode, frequency in list(campbell.modes.items())[:MOST_MODES]:
         curves.append(arrays.curve(f"mode {roman(mode)}", speed, frequency, role="mode", end=roman(mode)))
     for place, (name, role) in POINTS.items():
+        name = "electrical mode" if not place and campbell.operation else name  # nothing else has no distance to operation
         if chosen := [one for one in campbell.crossings if one.place == place]:
             places = [sources.of_rpm(one.speed) for one in chosen], [one.frequency for one in chosen]
             labels = [sources.named(one) for one in chosen]
@@ -75,36 +80,60 @@ def _diagram(sources: Sources) -> Figure:
         "name": "line",
     }
     told = "; ".join(map(sources.named, campbell.crossings[:20]))
+    caption = (
+        f"Campbell diagram over the speed of {campbell.body}. Points: mode and order meet, as II/6 where order 6 meets mode 2"
+    )
     return Figure(
-        f"Campbell diagram over the speed of {campbell.body}. Points: mode and order meet, as II/6 where order 6 meets mode 2",
-        f"Natural frequencies and orders over the speed. Critical speeds: {told or 'none'}.",
-        spec,
+        caption, [Panel("", f"Natural frequencies and orders over the speed. Critical speeds: {told or 'none'}.", spec)]
     )
 
 
 def _crossings(sources: Sources) -> Table:
-    rows = []
-    for one in sources.campbell.crossings:
-        words, tone = verdict(one)
-        distance = None if one.distance != one.distance else max(0.0, one.distance)
-        rows.append(
-            [
-                text(one.name),
-                number(one.mode),
-                text(one.line.name),
-                number(sources.of_rpm(one.speed)),
-                number(one.frequency),
-                share(distance),
-                text(words, tone),
-            ]
-        )
-    rows, more = first(rows, MOST_ROWS, "campbell.json")
-    columns = ["mode/order", "mode", "order", f"critical speed [{sources.speed_unit}]", "frequency [Hz]"]
-    return Table("Critical speeds", [*columns, "distance to operation [%]", "assessment"], rows, more)
+    found = sources.campbell.crossings
+    reached = _reached(sources)
+    verdicts = [verdict(one) for one in found]
+    distances = [None if math.isnan(one.distance) else max(0.0, one.distance) for one in found]
+    columns = [
+        ("mode/order", texts([one.name for one in found])),
+        (f"critical speed [{sources.speed_unit}]", [number(sources.of_rpm(one.speed)) for one in found]),
+        ("frequency [Hz]", [number(one.frequency) for one in found]),
+        ("distance to operation [%]", [share(one) for one in distances]),
+        ("operation", [text(words, tone) for words, tone in verdicts]),
+    ]
+    entries = [reached.get((one.name, round(one.speed, 3)), {}) for one in found]
+    columns.append(("most in", texts([one.get("coupling", "") for one in entries])))
+    units = _units(sources) if reached else {}
+    unit = "N m" if FORCE not in units.values() else ""  # moments and forces share a column where there are both
+    if not unit:
+        names = {FORCE: "N", MOMENT: unit_text("N m")}
+        columns.append(("unit", texts([names.get(units.get(one.get("coupling", "")), "") for one in entries])))
+    columns.append(sources.units.column("of the order", unit, [one.get("moment_N_m") for one in entries], 4))
+    columns.append(sources.units.column("all orders", unit, [one.get("half_range_N_m") for one in entries], 4))
+    columns.append(sources.units.column("stress", "Pa", [one.get("stress_Pa") for one in entries], 4))
+    shares = [one.get("ratio_to_limit") for one in entries]
+    columns.append(
+        ("all orders, of the limit [%]", [share(one, 3, "bad" if one is not None and one > 1 else "") for one in shares])
+    )
+    note = "Half ranges, the largest near the critical speed; of all orders together, the order of the line may be a small part."
+    table = by_columns("Critical speeds and what they reach", columns, note if reached else "")
+    return cut(table, MOST_ROWS, "campbell.json")
+
+
+def _reached(sources: Sources) -> dict[tuple[str, float], dict]:
+    """What the forced response says of critical speeds, by name and speed."""
+    if not sources.has("response"):
+        return {}
+    entries = zip(sources.response.criticals, sources.response_report["critical_speeds"])
+    return {(one.name, round(one.speed, 3)): entry for one, entry in entries}
+
+
+def _units(sources: Sources) -> dict[str, int]:
+    """Whether an element has moments or forces, by the ranks of its columns."""
+    return {one.column.element: one.column.rank for one in sources.response.quantities if one.column.rank in (MOMENT, FORCE)}
 
 
 def _modes(sources: Sources) -> Table:
-    table = sources.table("campbell.csv")
+    table = sources.table("campbell", "campbell.csv")
     rows = []
     for mode, frequency in sources.campbell.modes.items():
         damping = table[f"damping_ratio_{mode} [1]"]

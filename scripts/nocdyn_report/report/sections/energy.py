@@ -1,11 +1,10 @@
 """The energy account of runs."""
 
-from ..content import Heading, Section, Table, first, number, rounded, text
-from ..numbers import number_text
+from ..content import Heading, Section, Table, by_columns, cut
+from ..readable import texts
 from ..sources import Run, Sources
-from .motion import anchor
 
-MOST_ROWS = 120
+MOST_ROWS = 60
 
 
 def energy_section(sources: Sources) -> Section | None:
@@ -13,31 +12,29 @@ def energy_section(sources: Sources) -> Section | None:
     if not runs:
         return None
     section = Section("energy", "Energy account")
-    for run in runs:
-        if run.name:
-            section.add(Heading(f"Load case {run.name}", f"energy-{anchor(run.name)}"))
-        section.add(_work(run), _stored(run))
-    return section
+    return section.add_details(
+        Heading("Energy account", "energy"), *(_work(sources, run) for run in runs[:1]), _stored(sources, runs[0])
+    )
 
 
 def _which(run: Run) -> str:
     return f" of load case {run.name}" if run.name else ""
 
 
-def _work(run: Run) -> Table:
+def _work(sources: Sources, run: Run) -> Table:
     account = run.summary["energy_account"]
-    work = rounded(account["work_in_J"], dict.fromkeys(account["work_in_J"], "J"))
-    rows = [[text(name), number(amount)] for name, amount in sorted(work.items(), key=lambda item: -item[1])]
-    rows, more = first(rows, MOST_ROWS, "summary.json")
-    note = (
-        f"The balance error is {number_text(account['residual_J'])} J. Negative work was taken out of the machine. {more}".strip()
-    )
-    return Table(f"Work into the machine{_which(run)}", ["element", "work [J]"], rows, note)
+    work = sorted(account["work_in_J"].items(), key=lambda item: -item[1])
+    columns = [("element", texts([name for name, _ in work])), sources.units.column("work", "J", [amount for _, amount in work])]
+    largest = max((abs(amount) for _, amount in work), default=0.0)
+    note = f"The balance error is {sources.units.amount(account['residual_J'], 'J', 3)}"
+    note += f", {account['residual_J'] / largest:.0e} of the largest work. Negative work was taken out." if largest else "."
+    return cut(by_columns(f"Work into the machine{_which(run)}", columns, note), MOST_ROWS, "summary.json")
 
 
-def _stored(run: Run) -> Table:
+def _stored(sources: Sources, run: Run) -> Table:
     account = run.summary["energy_account"]
-    rows = [[text(name), number(start), number(end)] for name, (start, end) in account["stored_J"].items()]
-    rows, more = first(rows, MOST_ROWS, "summary.json")
-    rows.insert(0, [text("all bodies, kinetic energy"), *map(number, account["kinetic_J"])])
-    return Table(f"Stored energy{_which(run)}", ["where", "at the start [J]", "at the end [J]"], rows, more)
+    stored = {"all bodies, kinetic energy": account["kinetic_J"], **account["stored_J"]}
+    both = [value for values in stored.values() for value in values]
+    head, cells = sources.units.column("", "J", both)
+    columns = [("where", texts(stored)), (f"at the start{head}", cells[::2]), (f"at the end{head}", cells[1::2])]
+    return cut(by_columns(f"Stored energy{_which(run)}", columns), MOST_ROWS, "summary.json")

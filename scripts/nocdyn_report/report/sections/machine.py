@@ -1,7 +1,10 @@
 """The machine: its drawing and the mass-elastic table."""
 
-from ..content import Cell, Heading, Section, Table, first, number, text
+import math
+
+from ..content import Cell, Section, Table, by_columns, cut, number, text
 from ..numbers import number_text, unit_text
+from ..readable import texts
 from ..sources import Sources
 from ..train_svg import train_drawing
 
@@ -10,29 +13,20 @@ ACTING = ("motor", "load", "excitation", "drive", "engine")
 
 
 def machine_section(sources: Sources) -> Section:
-    section = Section("machine", "Machine")
-    section.add(train_drawing(sources.check, sources.groups))
-    section.add(Heading("Bodies", "bodies"), _cut(_bodies(sources)))
-    if sources.check["couplings"]:
-        section.add(Heading("Couplings and shafts", "couplings"), _cut(_couplings(sources)))
-    if sources.check["shafts"]:
-        section.add(_cut(_segments(sources)))
-    if sources.check["constraints"]:
-        section.add(Heading("Gears and other rigid relations", "gears"), _cut(_constraints(sources)))
-    joints = _joints(sources)
-    if joints.rows:
-        section.add(_cut(joints))
-    torques = _torques(sources)
-    if torques.rows:
-        section.add(Heading("Torques", "torques"), _cut(torques))
-    return section
+    return Section("machine", "Machine", [train_drawing(sources.check, sources.groups)])
 
 
-def _cut(table: Table) -> Table:
-    """Its first rows."""
-    table.rows, more = first(table.rows, MOST_ROWS, "the input")
-    table.note = f"{table.note} {more}".strip()
-    return table
+def data_section(sources: Sources) -> Section:
+    section = Section("mass-elastic", "Mass-elastic data")
+    tables = [
+        _bodies(sources),
+        _couplings(sources),
+        _segments(sources),
+        _constraints(sources),
+        _joints(sources),
+        _torques(sources),
+    ]
+    return section.add(*(cut(table, MOST_ROWS, "the input") for table in tables if table.rows))
 
 
 def _bodies(sources: Sources) -> Table:
@@ -42,13 +36,15 @@ def _bodies(sources: Sources) -> Table:
     columns = ["body", "inertia [kg m2]"]
     columns += ["with ends of shafts [kg m2]"] if has_shafts else []
     columns += ["speed as", "referred inertia [kg m2]"] if has_ratios else []
-    columns += [f"speed at the start [{sources.speed_unit}]"]
     rows = []
+    starts = {body["start_speed_rad_s"] for body in bodies}
+    columns += [f"speed at the start [{sources.speed_unit}]"] if len(starts) > 1 else []
     for body in bodies:
         row = [text(body["name"]), number(body["inertia_kg_m2"])]
         row += [number(body["inertia_with_shafts_kg_m2"])] if has_shafts else []
         row += [text(_relation(body)), number(body.get("referred_inertia_kg_m2"))] if has_ratios else []
-        rows.append([*row, number(sources.speed(body["start_speed_rad_s"]))])
+        row += [number(sources.speed(body["start_speed_rad_s"]))] if len(starts) > 1 else []
+        rows.append(row)
     notes = []
     if has_shafts:
         notes.append("The ends of a shaft have a part of its inertia; the rest is in its inner nodes.")
@@ -68,29 +64,28 @@ def _relation(body: dict) -> str:
 
 def _couplings(sources: Sources) -> Table:
     given = {group["name"].lower(): group for kind in ("coupling", "shaft", "mesh") for group in sources.groups(kind)}
-    rows = []
-    for one in sources.check["couplings"]:
-        is_mesh = one["kind"] == "mesh"
-        stiffness = one["stiffness_N_m" if is_mesh else "stiffness_N_m_rad"]
-        damping = one["damping_N_s_m" if is_mesh else "damping_N_m_s_rad"]
+    found = sources.check["couplings"]
+    laws = []
+    for one in found:
         group = given.get(one["name"].lower(), {})
-        given_damping = {key: value for key, value in group.items() if key != "damping"}  # in a column of its own
-        rows.append(
-            [
-                text(one["name"]),
-                text(one["kind"]),
-                text(" \N{EN DASH} ".join(one["bodies"])),
-                number(stiffness),
-                number(damping),
-                text("N/m, N s/m" if is_mesh else "N m/rad, N m s/rad"),
-                text(_law(given_damping)),
-            ]
-        )
-    columns = ["name", "kind", "between", "stiffness", "damping", "units", "law and damping as given"]
+        laws.append(_law({key: value for key, value in group.items() if key != "damping"}, sources))  # in a column of its own
+    columns = [
+        ("name", texts([one["name"] for one in found])),
+        ("kind", texts([one["kind"] for one in found])),
+        ("between", texts([" \N{EN DASH} ".join(one["bodies"]) for one in found])),
+    ]
+    for key, head, unit in TANGENTS:
+        columns.append(sources.units.column(head, unit, [one.get(key) for one in found]))
     note = "Stiffness and damping are the tangents at the start of a run."
-    return Table("Couplings, shafts and meshes", columns, rows, note)
+    return by_columns("Couplings, shafts and meshes", [*columns, ("law and damping as given", texts(laws))], note)
 
 
+TANGENTS = (
+    ("stiffness_N_m_rad", "stiffness", "N m/rad"),
+    ("damping_N_m_s_rad", "damping", "N m s/rad"),
+    ("stiffness_N_m", "stiffness of teeth", "N/m"),
+    ("damping_N_s_m", "damping of teeth", "N s/m"),
+)
 LAW_KEYS = {  # of the input, as the table calls them, with their units
     "cubic_stiffness": ("cubic", "N m/rad3"),
     "polynomial": ("polynomial", ""),
@@ -117,35 +112,52 @@ JOINT_KEYS = {  # likewise, of joints
 }
 
 
-def _given(group: dict) -> str:
+def _given(group: dict, sources: Sources) -> str:
     """What tells a joint."""
     parts = [str(group[key]) for key in ("kind", "direction") if key in group]
-    for key, (word, unit) in JOINT_KEYS.items():
-        value = group.get(key)
-        if isinstance(value, (int, float)) and not isinstance(value, bool) and value != 0:
-            parts.append(f"{word} {number_text(value)} {unit_text(unit)}".rstrip())
-    return ", ".join(parts) or NO_KIND
+    return (
+        ", ".join(parts + [_value(key, group[key], JOINT_KEYS[key], sources) for key in JOINT_KEYS if _is_told(group.get(key))])
+        or NO_KIND
+    )
 
 
-def _law(group: dict) -> str:
+def _law(group: dict, sources: Sources) -> str:
     parts = []
     for key, (word, unit) in LAW_KEYS.items():
         value = group.get(key)
-        if isinstance(value, (int, float)) and not isinstance(value, bool) and value != 0:
-            parts.append(f"{word} {number_text(value)} {unit_text(unit)}".rstrip())
+        if _is_told(value):
+            parts.append(_value(key, value, (word, unit), sources))
         elif isinstance(value, list):
             parts.append(f"{word} by table")
     return ", ".join(parts) or "linear"
 
 
+def _is_told(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and value != 0
+
+
+FROM_SI = {"Hz": 0.5 / math.pi, "rpm": 30.0 / math.pi, "deg": 180.0 / math.pi}
+
+
+def _value(key: str, value: float, told: tuple[str, str], sources: Sources) -> str:
+    """A number in the unit in which the input gives it."""
+    word, unit = told
+    given = sources.given_unit(key, unit)
+    value = float(f"{value * FROM_SI[given]:.10g}") if given != unit else value
+    return f"{word} {number_text(value)} {unit_text(given)}".rstrip()
+
+
 def _segments(sources: Sources) -> Table:
-    rows = []
+    names, values = [], []
+    keys = ("length_m", "diameter_m", "bore_m", "stiffness_N_m_rad", "inertia_kg_m2")
     for shaft in sources.check["shafts"]:
-        keys = ("length_m", "diameter_m", "bore_m", "stiffness_N_m_rad", "inertia_kg_m2")
-        for i, values in enumerate(zip(*(shaft[key] for key in keys)), start=1):
-            rows.append([text(shaft["name"]), number(i), *map(number, values)])
-    columns = ["shaft", "segment", "length [m]", "diameter [m]", "bore [m]", "stiffness [N m/rad]", "inertia [kg m2]"]
-    return Table("Segments of the shafts", columns, rows)
+        parts = list(zip(*(shaft[key] for key in keys)))
+        names += [(shaft["name"], i) for i in range(1, len(parts) + 1)]
+        values += parts
+    columns = [("shaft", texts([name for name, _ in names])), ("segment", [number(i) for _, i in names])]
+    heads = (("length", "m"), ("diameter", "m"), ("bore", "m"), ("stiffness", "N m/rad"), ("inertia", "kg m2"))
+    columns += [sources.units.column(head, unit, [row[i] for row in values]) for i, (head, unit) in enumerate(heads)]
+    return by_columns("Segments of the shafts", columns)
 
 
 def _constraints(sources: Sources) -> Table:
@@ -176,7 +188,7 @@ def _joints(sources: Sources) -> Table:
             if kind == "coupling" and group["name"].lower() in elastic:
                 continue
             bodies = group.get("bodies", group.get("body", []))
-            law = _law(group) if kind == "coupling" else _given(group)
+            law = _law(group, sources) if kind == "coupling" else _given(group, sources)
             rows.append(
                 [text(group.get("name", "")), text(kind), text(" \N{EN DASH} ".join(map(str, _listed(bodies)))), text(law)]
             )

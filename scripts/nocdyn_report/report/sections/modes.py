@@ -6,8 +6,9 @@ from ...modes_results import Modes, marks_of, motion_of
 from ...results import RPM
 from ...speed_results import roman
 from ...train_layout import Train
-from ..content import Figure, Heading, Paragraph, Section, Table, first, number, text
-from ..numbers import number_text, percent
+from ..content import Figure, Heading, Panel, Paragraph, Section, Table, by_columns, cut, first, number, text
+from ..numbers import name_and_unit, number_text, percent
+from ..readable import texts
 from ..sources import Sources
 
 MOST_ROWS = 60
@@ -15,25 +16,38 @@ MOST_SHAPES = 8  # that are drawn
 SHOWN_SHAPES = 3  # at first
 MOST_TABLES = 4  # of Holzer
 MOST_BODIES = 60  # of such a table
+LEAST_MODES = 6  # that the section has
+BEYOND = 1.5  # times the highest frequency of an order: modes above are no part of the section
 SHARES, SMALLEST_SHARE = 3, 0.02  # of energies that are named
 
 
 def modes_section(sources: Sources) -> Section | None:
     if not sources.has("modes"):
         return None
-    section = Section("modes", "Natural frequencies and modes")
+    section = Section("modes", f"Natural frequencies and modes{sources.main('modes')}")
     modes = sources.modes
     section.add(Paragraph(f"The machine is linearised about {modes.content['about']}."))
     if modes.oscillating:
-        section.add(_frequencies(modes))
+        count = max(LEAST_MODES, sum(mode["frequency_Hz"] <= _of_interest(sources) for mode in modes.oscillating))
+        section.add(_frequencies(modes, modes.oscillating[:count], "Natural frequencies"))
+        if further := modes.oscillating[count:]:
+            told = f"Modes above {number_text(_of_interest(sources), 3)} Hz: {len(further)}, in the appendix."
+            section.add(Paragraph(told))
+            section.add_details(_frequencies(modes, further, "Further natural frequencies"))
         if modes.shaped and len(modes.bodies) > 1:
             section.add(_shapes(sources, modes.shaped[:MOST_SHAPES]))
     else:
         section.add(Paragraph("Nothing oscillates: there is no mode with a frequency."))
     if others := [mode for mode in modes.content["modes"] if mode["kind"] != "oscillating"]:
-        section.add(_others(others, modes))
-    section.add(Heading("Holzer tables", "holzer"), *_holzer(sources))
-    return section
+        section.add_details(_others(others, modes))
+    return section.add_details(Heading("Holzer tables", "holzer"), *_holzer(sources))
+
+
+def _of_interest(sources: Sources) -> float:
+    """A frequency [Hz] above all that excite the machine; without a Campbell diagram all modes are of interest."""
+    if not sources.has("campbell") or not sources.campbell.lines:
+        return math.inf
+    return BEYOND * max(float(frequency.max()) for _, frequency in sources.campbell.lines)
 
 
 def _shares(values: list[float], names: list[str]) -> str:
@@ -42,29 +56,20 @@ def _shares(values: list[float], names: list[str]) -> str:
     return ", ".join(f"{name} {percent(value, 2)}" for value, name in ranked if value >= SMALLEST_SHARE)
 
 
-def _frequencies(modes: Modes) -> Table:
-    marks = [", ".join(marks_of(mode)) for mode in modes.oscillating]
-    rows = []
-    for mode, mark in zip(modes.oscillating, marks):
-        damping = mode["damping_ratio"]
-        rows.append(
-            [
-                number(mode["mode"]),
-                number(mode["frequency_Hz"]),
-                number(RPM["Hz"] * mode["frequency_Hz"]),
-                number(mode.get("undamped_frequency_Hz")),
-                number(damping, 3, "bad" if damping < 0 else ""),
-                number(mode.get("time_constant_s"), 3),
-                text(_shares(mode.get("kinetic_share", []), modes.kinetic_names)),
-                text(_shares(mode.get("potential_share", []), modes.couplings)),
-                *([text(mark, "warn" if mark else "")] if any(marks) else []),
-            ]
-        )
-    rows, more = first(rows, MOST_ROWS, "modes.csv")
-    columns = ["mode", "frequency [Hz]", "frequency [1/min]", "undamped [Hz]", "damping ratio", "decay time [s]"]
-    note = f"Negative damping: the mode grows. {more}" if any(mode["damping_ratio"] < 0 for mode in modes.oscillating) else more
-    columns += ["kinetic energy in", "potential energy in", *(["remark"] if any(marks) else [])]
-    return Table("Natural frequencies", columns, rows, note)
+def _frequencies(modes: Modes, shown: list[dict], caption: str) -> Table:
+    damping = [number(mode["damping_ratio"], 3, "bad" if mode["damping_ratio"] < 0 else "") for mode in shown]
+    marks = [", ".join(marks_of(mode)) for mode in shown]
+    columns = [
+        ("mode", [number(mode["mode"]) for mode in shown]),
+        ("frequency [Hz]", [number(mode["frequency_Hz"]) for mode in shown]),
+        ("frequency [1/min]", [number(RPM["Hz"] * mode["frequency_Hz"]) for mode in shown]),
+        ("damping ratio", damping),
+        ("kinetic energy in", texts([_shares(mode.get("kinetic_share", []), modes.kinetic_names) for mode in shown])),
+        ("potential energy in", texts([_shares(mode.get("potential_share", []), modes.couplings) for mode in shown])),
+        ("remark", [text(mark, "warn" if mark else "") for mark in marks]),
+    ]
+    grows = any(mode["damping_ratio"] < 0 for mode in shown)
+    return cut(by_columns(caption, columns, "Negative damping: the mode grows." if grows else ""), MOST_ROWS, "modes.csv")
 
 
 def _others(others: list[dict], modes: Modes) -> Table:
@@ -102,9 +107,8 @@ def _shapes(sources: Sources, shaped: list[dict]) -> Figure:
     }
     told = "; ".join(f"mode {mode['mode']} at {number_text(mode['frequency_Hz'])} Hz" for mode in shaped)
     lines = " Shaft lines stand one beside the other." if modes.train.lines > 1 else ""
-    return Figure(
-        f"Shapes of the modes along the train.{lines}", f"Curves of the relative amplitudes of the bodies: {told}.", spec
-    )
+    panel = Panel("", f"Curves of the relative amplitudes of the bodies: {told}.", spec)
+    return Figure(f"Shapes of the modes along the train.{lines}", [panel])
 
 
 def _abscissas(train: Train) -> tuple[list[float], list[int | None]]:
@@ -127,7 +131,7 @@ def _abscissas(train: Train) -> tuple[list[float], list[int | None]]:
 def _holzer(sources: Sources) -> list[Paragraph | Table]:
     if not sources.has("holzer"):
         return [Paragraph(sources.results.of["holzer"].message)]
-    table = sources.table("holzer.csv")
+    table = sources.table("holzer", "holzer.csv")
     if not len(table):
         return [Paragraph("No mode oscillates: there is no table.")]
     blocks: list[Paragraph | Table] = []
@@ -135,20 +139,22 @@ def _holzer(sources: Sources) -> list[Paragraph | Table]:
     columns = [name for name in table.columns if name not in ("mode", "frequency [Hz]")]
     for mode in shown[:MOST_TABLES]:
         part = table[table["mode"] == mode]
-        rows = []
-        for values in part[columns].itertuples(index=False):
-            rows.append(
-                [
-                    text("" if value != value else value) if _is_text(name) else number(value)
-                    for name, value in zip(columns, values)
-                ]
-            )
-        rows, more = first(rows, MOST_BODIES, "holzer.csv")
         caption = f"Holzer table of undamped mode {mode}, {number_text(float(part['frequency [Hz]'].iloc[0]))} Hz"
-        blocks.append(Table(caption, columns, rows, more, is_sorted=False))
+        content = []
+        for name in columns:
+            head, unit = name_and_unit(name.replace("omega^2", "ω²").replace("theta", "θ"))
+            if _is_text(name):
+                content.append((name, texts(["" if value != value else value for value in part[name]])))
+            else:
+                content.append(sources.units.column(head, unit if unit != "rad" else "1", list(map(_finite, part[name])), 4))
+        blocks.append(cut(by_columns(caption, content, is_sorted=False), MOST_BODIES, "holzer.csv"))
     if len(shown) > MOST_TABLES:
         blocks.append(Paragraph(f"holzer.csv has the tables of all {len(shown)} modes."))
     return blocks
+
+
+def _finite(value: float) -> float | None:
+    return None if math.isnan(value) else float(value)
 
 
 def _is_text(column: str) -> bool:

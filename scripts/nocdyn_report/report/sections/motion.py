@@ -1,44 +1,49 @@
 """Runs over the time: peaks with their times, the load cases, curves."""
 
-from ...columns import DETAIL, LOSS, TWIST, Column, by_sort
+import re
+
+from ...columns import DETAIL, LOADS, LOSS, MOMENT, SLIP, SPEED, TORQUE, TWIST, Column, by_sort
 from ...results import TIME
 from ...selection import widest
-from ..content import Cell, Figure, Heading, Paragraph, Section, Table, first, number, rounded, share, text
-from ..numbers import number_text, unit_text
+from ..content import Block, Cell, Figure, Heading, Panel, Paragraph, Section, Table, by_columns, cut, first, number, text
+from ..naming import WHOLE, is_end, name_of
+from ..numbers import number_text
+from ..readable import texts
 from ..sources import Run, Sources
-from .response import ratio_tone
 
-NO_FIGURE = (LOSS, TWIST)  # only their extremes are told
-MOST_CURVES = 10  # of a figure
-SHOWN_CURVES = 5  # at first
-MOST_ROWS = 120
+CYLINDER = re.compile(r"_\d+(_\d+)?$")  # that a torque of an engine ends with
+MOST_CURVES = 3  # of a panel of speeds or torques
+MOST_PANELS = 6  # of loads, of one of several load cases
+MOST_OF_ONE = 15  # likewise, of a single run
+PANELS_BESIDE = 3
+PANEL = 180  # width of a panel on paper [pixels]
+MOST_ROWS = 60
 
 
 def motion_section(sources: Sources) -> Section | None:
     if not sources.runs:
         return None
-    section = Section("motion", "Load cases" if sources.results.cases else "Motion over the time")
+    section = Section("motion", "Load cases over the time" if sources.results.cases else "Motion over the time")
     if sources.results.cases:
-        section.add(_cases(sources), _peaks(sources))
+        section.add(_cases(sources), *_peaks(sources))
     for run in sources.runs:
         if run.name:
             section.add(Heading(f"Load case {run.name}", anchor(run.name)))
-        if run.summary["status"] != "done":
-            message = run.summary.get("message", "")
-            section.add(Paragraph(f"The run {run.summary['status']}: {message}", "bad"))
         section.add(*_of_run(sources, run))
+        section.add_details(*_extremes(sources, run, is_main=False))
     return section
 
 
-def _of_run(sources: Sources, run: Run) -> list[Paragraph | Table | Figure]:
+def _of_run(sources: Sources, run: Run) -> list[Block]:
     settings, counts = run.summary["settings"], run.summary.get("counts", {})
     end = run.summary.get("time_reached", settings["t_end"])
-    told = f"From {number_text(settings['t_start'])} to {number_text(end)} s by the method {settings['method']}, "
-    told += f"rtol = {settings['rtol']:g}, atol = {settings['atol']:g}; {counts.get('accepted_steps', 0)} steps."
-    blocks: list[Paragraph | Table | Figure] = [Paragraph(told)]
-    if run.summary.get("limits"):
-        blocks.append(_limits(run))
-    blocks.append(_extremes(run))
+    told = f"{number_text(settings['t_start'])} to {number_text(end)} s by {settings['method']}, "
+    told += f"rtol {settings['rtol']:g}, atol {settings['atol']:g}; {counts.get('accepted_steps', 0)} steps."
+    blocks: list[Block] = [Paragraph(f"{run.title}: {told}" if run.title else told)]
+    if run.summary["status"] != "done":
+        blocks.append(Paragraph(f"The run {run.summary['status']}: {run.summary.get('message', '')}", "bad"))
+    if not run.name:
+        blocks += _extremes(sources, run, is_main=True)
     if run.summary.get("joint_events"):
         blocks.append(_events(run))
     if run.file:
@@ -50,27 +55,45 @@ def _cases(sources: Sources) -> Table:
     rows = []
     for case in sources.cases["load_cases"]:
         tone = "good" if case["status"] == "done" else "bad"
+        link = f"#{anchor(case['name'])}"
         rows.append(
-            [
-                text(case["name"], "", f"#{anchor(case['name'])}"),
-                text(case["title"]),
-                number(case["repeats"]),
-                text(case["status"], tone),
-            ]
+            [text(case["name"], "", link), text(case["title"]), number(float(case["repeats"]), 3), text(case["status"], tone)]
         )
     return Table("Load cases", ["name", "title", "repeats in the life", "run"], rows)
 
 
-def _peaks(sources: Sources) -> Table:
-    rows = []
-    columns = {column.name: column for run in sources.runs for column in run.column_list.values()}
-    peaks = [peak for peak in sources.cases["peaks"] if _is_shown(columns[peak["column"]])]
-    for peak in sorted(peaks, key=lambda one: columns[one["column"]].rank):
-        values = [text(peak["column"]), number(peak["largest"]), text(unit_text(peak["unit"])), number(peak["time"])]
-        rows.append([*values, text(peak["load_case"], "", f"#{anchor(peak['load_case'])}")])
-    rows, more = first(rows, MOST_ROWS, "cases.csv")
-    columns = ["quantity", "value of largest magnitude", "unit", "at t [s]", "load case"]
-    return Table("Peaks of all load cases", columns, rows, more)
+def _peaks(sources: Sources) -> list[Table]:
+    """The largest magnitude of each load in each case: a table for each sort."""
+    tables = []
+    columns = {column.label: column for run in reversed(sources.runs) for column in run.column_list.values()}
+    for sort in by_sort(one for one in columns.values() if _is_told(one) and not is_end(one) and one.rank in (*LOADS, SPEED)):
+        chosen = [one for one in sort if any("max" in run.columns.get(one.label, {}) for run in sources.runs)]
+        magnitudes = [[_magnitude(run, one) for one in chosen] for run in sources.runs]
+        head, cells = sources.units.column("", sort[0].unit, [value for values in magnitudes for value in values])
+        content = [("of", texts([name_of(one) for one in chosen]))]
+        for i, run in enumerate(sources.runs):
+            content.append((run.name, _marked(sources, run, chosen, cells[i * len(chosen) : (i + 1) * len(chosen)])))
+        if chosen:
+            unit = head.strip()
+            tables.append(
+                cut(by_columns(f"Largest magnitudes: {sort[0].caption} {unit}".rstrip(), content), MOST_ROWS, "cases.csv")
+            )
+    return tables
+
+
+def _magnitude(run: Run, column: Column) -> float | None:
+    found = run.columns.get(column.label, {})
+    return max(abs(found["min"]), abs(found["max"])) if "max" in found else None
+
+
+def _marked(sources: Sources, run: Run, columns: list[Column], cells: list[Cell]) -> list[Cell]:
+    """In the case in which a load is largest, its number stands out."""
+    marked = []
+    for column, cell in zip(columns, cells):
+        mine = _magnitude(run, column)
+        is_largest = len(sources.runs) > 1 and mine and mine >= max(_magnitude(other, column) or 0.0 for other in sources.runs)
+        marked.append(Cell(cell.text, cell.key, "", "most" if is_largest else "", True))
+    return marked
 
 
 def anchor(case: str) -> str:
@@ -78,50 +101,42 @@ def anchor(case: str) -> str:
     return "case-" + "-".join(case.split())
 
 
-def _is_shown(column: Column) -> bool:
+def _is_told(column: Column) -> bool:
     """Whether a table of peaks has it."""
     return column.rank < DETAIL and not column.is_inner
 
 
-def _limits(run: Run) -> Table:
-    rows = []
-    for one in run.summary["limits"]:
-        words, tone = ratio_tone(one["ratio"])
-        rows.append([text(one["column"]), number(one["limit"]), number(one["largest"]), share(one["ratio"]), text(words, tone)])
-    return Table("Limits over the time", ["quantity", "limit", "largest", "share of the limit [%]", "assessment"], rows)
+def _is_main(column: Column) -> bool:
+    """Whether the section has it: loads and speeds; the rest is in the appendix."""
+    return column.rank in (*LOADS, SPEED) and (column.rank != MOMENT or column.point in WHOLE)
 
 
-def _extremes(run: Run) -> Table:
+def _extremes(sources: Sources, run: Run, is_main: bool) -> list[Table]:
     transient = run.summary.get("start_transient", {})
     starred = {*transient.get("has_min_of", []), *transient.get("has_max_of", [])}
-    rows: list[list[Cell]] = []
-    shown_labels: list[str] = []
-    for label, signal in run.column_list.items():
-        column = run.columns.get(label, {})
-        name, unit = signal.name, signal.unit
-        if "min" not in column or not _is_shown(signal):
-            continue
-        star = "*" if label in starred else ""
-        shown_labels.append(label)
-        shown = rounded({key: column[key] for key in ("min", "max", "last")}, dict.fromkeys(("min", "max", "last"), unit))
-        row = [
-            text(name + star),
-            text(unit_text(unit)),
-            number(shown["min"]),
-            number(column["time_of_min"]),
-            number(shown["max"]),
-        ]
-        rows.append([*row, number(column["time_of_max"]), number(shown["last"])])
-    rows, more = first(rows, MOST_ROWS, "summary.json")
-    shown_labels = shown_labels[: len(rows)]
-    notes = [f"The extremes are those {run.summary.get('extremes', 'of the motion')}."]
-    if "extremes_from" in run.summary:
-        notes.append(f"They are taken from {number_text(run.summary['extremes_from'])} s on.")
-    notes.append("Angles, parts of moments, energies and inner nodes of shafts are in summary.json.")
-    if any(label in starred for label in shown_labels):
-        notes.append(f"* In the first fast transient of a start out of balance, up to {number_text(transient['until'])} s.")
-    columns = ["quantity", "unit", "smallest", "at t [s]", "largest", "largest at t [s]", "last"]
-    return Table(f"Peaks{_of(run)} and their times", columns, rows, " ".join([*notes, more]).strip())
+    chosen = [
+        one
+        for label, one in run.column_list.items()
+        if _is_told(one) and "max" in run.columns.get(label, {}) and (_is_main(one) and not run.name) == is_main
+        if not run.name or one.rank in (*LOADS, TORQUE)
+    ]
+    tables = []
+    for sort in by_sort(chosen):
+        found = [run.columns[one.label] for one in sort]
+        names = [name_of(one) + ("*" if one.label in starred else "") for one in sort]
+        head, cells = sources.units.column("", sort[0].unit, [entry[key] for key in ("min", "max", "last") for entry in found])
+        content = [("of", texts(names)), (f"smallest{head}", cells[: len(sort)])]
+        content.append(("at t [s]", [number(entry["time_of_min"], 4) for entry in found]))
+        content.append((f"largest{head}", cells[len(sort) : 2 * len(sort)]))
+        content.append(("largest at t [s]", [number(entry["time_of_max"], 4) for entry in found]))
+        content.append((f"last{head}", cells[2 * len(sort) :]))
+        note = ""
+        if any(one.label in starred for one in sort):
+            note = f"* In the first fast transient of a start out of balance, up to {number_text(transient['until'], 4)} s."
+        tables.append(cut(by_columns(f"Peaks{_of(run)}: {sort[0].caption}", content, note), MOST_ROWS, "summary.json"))
+    if tables and "extremes_from" in run.summary:
+        tables[-1].note = f"{tables[-1].note} Extremes are taken from {number_text(run.summary['extremes_from'])} s on.".strip()
+    return tables
 
 
 def _of(run: Run) -> str:
@@ -139,36 +154,65 @@ def _events(run: Run) -> Table:
 
 
 def _figures(sources: Sources, run: Run) -> list[Figure]:
-    """A figure for each sort of columns, with those that vary most."""
-    sorts = by_sort(column for column in run.drawn() if column.rank not in NO_FIGURE)
-    chosen = [widest([column.label for column in columns], run.ranges, MOST_CURVES) for columns in sorts]
-    needed = [label for labels in chosen for label in labels]
-    if not needed:
-        return []
-    table = run.values([TIME, *needed])
+    """Panels: the loads that vary most, one each; then speeds and torques."""
+    drawn = [one for one in run.drawn() if one.rank not in (LOSS, TWIST, SLIP)]
+    most = MOST_PANELS - 2 if run.name else MOST_OF_ONE
+    loads = [one for one in drawn if one.rank in LOADS and (one.rank != MOMENT or one.point in WHOLE)]
+    moments = [one for one in loads if one.rank == MOMENT] or loads
+    chosen = [[one] for one in _of_interest(sources, run, moments)[:most]]
+    for rank in (TORQUE, SPEED):
+        for sort in by_sort(one for one in drawn if one.rank == rank and one.unit != "W"):
+            labels = widest([one.label for one in _of_each_engine(sources, run, sort)], run.ranges, MOST_CURVES)
+            chosen.append(sorted((run.column_list[label] for label in labels), key=lambda one: -run.ranges.get(one.label, 0.0)))
+    labels = [one.label for part in chosen for one in part]
+    table = run.values([TIME, *labels]) if labels else ()
     if len(table) < 2:
         return []
-    return [_figure(sources, run, table, labels, len(all_of)) for labels, all_of in zip(chosen, sorts)]
+    panels = [_panel(sources, run, table, part) for part in chosen]
+    some = f": {most} of {len(moments)} moments, those with limits first" if len(moments) > most else ""
+    has_bands = any("low" in curve for panel in panels for curve in panel.spec["curves"])
+    bands = "; filled: between the smallest and the largest value" if has_bands else ""
+    return [Figure(f"Motion{_of(run)} over the time{some}{bands}", panels, _beside(len(panels)))]
 
 
-def _figure(sources: Sources, run: Run, table: object, labels: list[str], count: int) -> Figure:
-    columns = [run.column_list[label] for label in labels]
+def _beside(count: int) -> int:
+    """Panels beside one another: four in one row, else three."""
+    return count if count <= PANELS_BESIDE + 1 else PANELS_BESIDE
+
+
+def _of_each_engine(sources: Sources, run: Run, columns: list[Column]) -> list[Column]:
+    """Of the torques of the cylinders of an engine, which are alike, the one that varies most."""
+    engines = {str(group.get("name", "")).lower() for group in sources.groups("engine")}
+    chosen: dict[str, Column] = {}
+    for one in sorted(columns, key=lambda one: -run.ranges.get(one.label, 0.0)):
+        engine = CYLINDER.sub("", one.element.lower())
+        chosen.setdefault(engine if engine in engines else one.label, one)
+    return list(chosen.values())
+
+
+def _of_interest(sources: Sources, run: Run, moments: list[Column]) -> list[Column]:
+    """Those of elements with a limit or a fatigue strength, then those that vary most."""
+    groups = [group for kind in ("limit", "fatigue") for group in sources.groups(kind)]
+    judged = {str(group[kind]).lower() for group in groups for kind in ("coupling", "shaft", "mesh", "gear") if kind in group}
+    return sorted(moments, key=lambda one: (one.element.lower() not in judged, -run.ranges.get(one.label, 0.0)))
+
+
+def _panel(sources: Sources, run: Run, table: object, columns: list[Column]) -> Panel:
     time, one = table[TIME].to_numpy(), columns[0]
-    shown = widest(labels, run.ranges, SHOWN_CURVES)
-    curves = [
-        sources.arrays.curve(column.title, time, table[column.label].to_numpy(), shown=column.label in shown)
-        for column in columns
-    ]
-    spec = {
-        "x": {"label": "time", "unit": "s"},
-        "y": {"label": one.caption, "unit": one.unit},
-        "curves": curves,
-        "name": one.kind,
-    }
-    some = f", the {len(columns)} of {count} that vary most" if len(columns) < count else ""
+    largest = max(_magnitude(run, column) or 0.0 for column in columns)
+    factor, unit = sources.units.shown(one.unit, largest)
+    is_one = len(columns) == 1
+    curves = []
+    for column in columns:
+        style = {"role": "load"} if is_one and column.rank in LOADS else {}
+        name = "load" if style else f"{one.caption}: {column.title}"
+        curve = sources.arrays.curve(name, time, factor * table[column.label].to_numpy(), pixels=PANEL, **style)
+        if "low" not in curve or not any("low" in other for other in curves):  # envelopes would cover one another
+            curves.append(curve)
+    spec = {"x": {"label": "time", "unit": "s"}, "y": {"label": "", "unit": unit}, "curves": curves, "name": one.kind}
     told = "; ".join(_range(column, run.columns[column.label]) for column in columns if column.label in run.ranges)
-    caption = one.caption[0].upper() + one.caption[1:]
-    return Figure(f"{caption}{_of(run)} over the time{some}", f"Curves over the time: {told}.", spec)
+    title = f"{name_of(one)}: {one.caption}" if is_one and one.element else one.caption
+    return Panel(title, f"Curves over the time{_of(run)}: {told}.", spec)
 
 
 def _range(column: Column, found: dict) -> str:

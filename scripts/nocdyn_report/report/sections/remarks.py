@@ -25,7 +25,7 @@ def remarks_section(html: str) -> Section | None:
 
 
 def notes_section(sources: Sources) -> Section:
-    section = Section("notes", "Assumptions and notes")
+    section = Section("notes", "Assumptions and notes", is_appendix=True)
     assumed = list(ASSUMED["all"])
     for command in ("equilibrium", "modes", "campbell", "response", "run"):
         assumed += ASSUMED[command] if sources.has(command) else []

@@ -1,54 +1,52 @@
 """The forced response with its limits and barred ranges."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from ...columns import FORCE, MOMENT
-from ...speed_results import NEAR, Quantity
-from ..content import Figure, Heading, Paragraph, Section, Table, first, number, share, text
+from ...columns import LOADS, MOMENT, Column
+from ...speed_results import NEAR, Quantity, Response
+from ..content import Figure, Heading, Panel, Paragraph, Section, Table, by_columns, cut, number, share, text
 from ..curves import band
-from ..numbers import number_text, unit_text
+from ..naming import WHOLE, name_of
+from ..numbers import number_text
+from ..readable import texts
 from ..sources import Sources
-from .campbell import operation_bands, verdict
+from .campbell import operation_bands
 
-MOST_FIGURES = 24
-MOST_ROWS = 120
+MOST_PANELS = 24
+MOST_ROWS = 60
+BIG, SMALL = 2, 3  # panels beside one another
 
 
 def response_section(sources: Sources) -> Section | None:
     if not sources.has("response"):
         return None
-    section = Section("response", "Forced response")
+    section = Section("response", f"Forced response{sources.main('response')}")
     report = sources.response_report
-    span = (
-        f"from {_speed(sources, report['speed_rad_s'][0])} to {_speed(sources, report['speed_rad_s'][-1])} {sources.speed_unit}"
-    )
-    section.add(Paragraph(f"{len(report['lines'])} orders are computed at the speeds of {report['body']} {span}."))
+    ends = [number_text(sources.speed(speed)) for speed in (report["speed_rad_s"][0], report["speed_rad_s"][-1])]
+    span = f"speeds of {report['body']} from {ends[0]} to {ends[1]} {sources.speed_unit}"
+    told = f"{len(report['lines'])} orders are computed at {span}. Half range: of the oscillation of all orders together."
+    section.add(Paragraph(told))
     section.add(Heading("Limits and barred ranges of speed", "limits"), *_limits(sources))
-    section.add(Heading("Resonances", "resonances"))
-    section.add(_resonances(sources) if report["critical_speeds"] else Paragraph("No order meets a natural frequency."))
-    section.add(Heading("Largest values", "largest"), _largest(sources))
-    section.add(Heading("Curves over the speed", "curves"), *_curves(sources))
+    section.add(Heading("Largest values", "largest"), *_largest(sources, whole=True))
+    section.add_details(*_largest(sources, whole=False))
+    if others := [one for one in told_quantities(sources.response) if not has_limit(one)]:
+        section.add(*_small(sources, others))
     return section
 
 
-def _speed(sources: Sources, value: float) -> str:
-    return number_text(sources.speed(value))
+def told_quantities(response: Response) -> list[Quantity]:
+    """Loads, of an element the one that tells all of it: not the moments at the ends of a shaft."""
+    loads = [one for one in response.quantities if one.column.rank in LOADS]
+    whole = {(one.column.kind, one.column.element_kind, one.column.element) for one in loads if one.column.point in WHOLE}
+    of = [(one.column.kind, one.column.element_kind, one.column.element) for one in loads]
+    return [one for one, key in zip(loads, of) if one.column.point in WHOLE or key not in whole]
 
 
-def limited(report: dict) -> list[dict]:
-    """The quantities that have a limit."""
-    return [one for one in report["largest"] if "ratio_to_limit" in one]
-
-
-def shares_of_limits(report: dict) -> list[tuple[str, float, float]]:
-    """Of each quantity with a limit the largest share, then that of its peak: what is shared, the share, the speed in rad/s."""
-    found = []
-    for one in limited(report):
-        found.append((one["quantity"], one["ratio_to_limit"], one["ratio_speed_rad_s"]))
-        peak = one.get("peak_ratio_to_limit", one["ratio_to_limit"])
-        if peak != one["ratio_to_limit"]:
-            found.append((f"{one['quantity']}, its peak,", peak, one["peak_speed_rad_s"]))
-    return found
+def has_limit(quantity: Quantity) -> bool:
+    limits = (quantity.limit, quantity.transient_limit, quantity.peak_limit)
+    return any(values is not None and np.isfinite(values).any() for values in limits)
 
 
 def passage(barred: dict) -> tuple[str, str]:
@@ -57,147 +55,157 @@ def passage(barred: dict) -> tuple[str, str]:
         return "not allowed from 0.8 of the rated speed on", "bad"
     if barred["can_be_passed"]:
         return "may be passed quickly", "warn"
-    return "limit for passing through exceeded too", "bad"
+    return "limit for passing through exceeded, or none given", "bad"
 
 
 def ratio_tone(ratio: float) -> tuple[str, str]:
     return ("limit exceeded", "bad") if ratio > 1 else ("within the limit", "good")
 
 
-def _limits(sources: Sources) -> list[Paragraph | Table]:
-    report, unit = sources.response_report, sources.speed_unit
-    if not limited(report):
+def _limits(sources: Sources) -> list[Paragraph | Table | Figure]:
+    limited = [one for one in told_quantities(sources.response) if has_limit(one)]
+    if not limited:
         return [Paragraph("The input sets no limit for a quantity of the response.")]
-    rows = []
-    for name, ratio, speed in shares_of_limits(report):
-        words, tone = ratio_tone(ratio)
-        rows.append([text(name.rstrip(",")), share(ratio), number(sources.speed(speed)), text(words, tone)])
-    columns = ["quantity", "largest share of its limit [%]", f"at [{unit}]", "assessment"]
-    blocks: list[Paragraph | Table] = [Table("Limits", columns, rows)]
-    barred = report["barred_speed_ranges"]
-    if not barred:
-        return [*blocks, Paragraph("No range of speeds is barred.", "good")]
-    rows = []
-    for one in barred:
-        ends = sorted((sources.speed(one["from_rad_s"]), sources.speed(one["to_rad_s"])))
-        passing = text(*passage(one))
-        rows.append([text(one["quantity"]), *map(number, ends), passing, text(one["limit_at"])])
-    columns = ["limit of", f"from [{unit}]", f"to [{unit}]", "passage", "set at"]
-    return [*blocks, Table("Barred ranges of speed", columns, rows, "No continuous operation within these speeds.")]
-
-
-def _resonances(sources: Sources) -> Table:
-    units = {one.column.element: one.column.unit for one in sources.response.quantities if one.column.rank in (MOMENT, FORCE)}
-    rows = []
-    for one, critical in zip(sources.response_report["critical_speeds"], sources.response.criticals):
-        words, tone = verdict(critical)
-        ratio = one.get("ratio_to_limit")
-        rows.append(
-            [
-                text(critical.name),
-                number(sources.speed(one["speed_rad_s"])),
-                number(one["frequency_Hz"]),
-                number(one["damping_ratio"], 3),
-                text(one.get("coupling", "")),
-                text(unit_text(units.get(one.get("coupling", ""), ""))),
-                number(one.get("moment_N_m")),
-                number(one.get("half_range_N_m")),
-                number(sources.speed(one["peak_speed_rad_s"]) if "peak_speed_rad_s" in one else None),
-                number(one.get("stress_Pa")),
-                share(ratio, 3, "bad" if ratio is not None and ratio > 1 else ""),
-                text(words, tone),
-            ]
-        )
-    rows, more = first(rows, MOST_ROWS, "response.json")
-    unit = sources.speed_unit
-    columns = [
-        "mode/order",
-        f"critical speed [{unit}]",
-        "frequency [Hz]",
-        "damping ratio",
-        "largest in",
-        "unit",
-        "of the order",
-    ]
-    columns += ["half range of all orders", f"at [{unit}]", "stress [Pa]", "all orders, of the limit [%]", "operation"]
-    note = "Half range and share of the limit are those of all orders together, there; the order may have a small part in them."
-    return Table("Resonances and what they reach", columns, rows, f"{note} {more}".strip())
-
-
-def _largest(sources: Sources) -> Table:
-    rows = []
-    for one in sources.response_report["largest"]:
-        ratio = one.get("ratio_to_limit")
-        strongest = sorted(zip(one["half_range_by_order"], sources.response.lines), key=lambda pair: -pair[0])[:3]
-        orders = ", ".join(f"{line.name} ({number_text(value, 4)})" for value, line in strongest if value > 0)
-        rows.append(
-            [
-                text(one["quantity"]),
-                text(unit_text(one["unit"])),
-                number(one["half_range"]),
-                number(sources.speed(one["half_range_speed_rad_s"])),
-                number(one["peak"]),
-                number(sources.speed(one["peak_speed_rad_s"])),
-                share(ratio, 3, "bad" if ratio is not None and ratio > 1 else ""),
-                text(orders),
-            ]
-        )
-    rows, more = first(rows, MOST_ROWS, "response.json")
-    unit = sources.speed_unit
-    columns = ["quantity", "unit", "half range", f"at [{unit}]", "peak", f"peak at [{unit}]", "of its limit [%]"]
-    note = "Half range: of the oscillation of all orders together. Peak: the largest magnitude, with the mean."
-    return Table("Largest values over the speeds", [*columns, "orders in the half range"], rows, f"{note} {more}".strip())
-
-
-def _curves(sources: Sources) -> list[Paragraph | Figure]:
-    response = sources.response
-    ranked = sorted(response.quantities, key=lambda one: -np.nanmax(one.half_range, initial=0.0))[:MOST_FIGURES]
-    chosen = [one for one in response.quantities if any(one is other for other in ranked)]
-    blocks: list[Paragraph | Figure] = [_figure(sources, one) for one in chosen]
-    if len(chosen) < len(response.quantities):
-        blocks.append(
-            Paragraph(f"Drawn are the {len(chosen)} largest of {len(response.quantities)} quantities; response.csv has all.")
-        )
+    blocks: list[Paragraph | Table | Figure] = _barred_ranges(sources)
+    colours = _colours(limited, sources.response)
+    panels = [_panel(sources, sources.response, one.in_short(), colours) for one in limited]
+    blocks.append(Figure("Half ranges with limits over the speed; triangles: critical speeds", panels, min(BIG, len(panels))))
+    if others := _other_cases(sources):
+        blocks.append(Figure("Other load cases: half ranges beyond their limits", others, min(BIG, len(others))))
     return blocks
 
 
-def _figure(sources: Sources, quantity: Quantity) -> Figure:
-    response, arrays = sources.response, sources.arrays
+def _other_cases(sources: Sources) -> list[Panel]:
+    """Curves of the load cases that the section does not show, where a limit is not kept."""
+    panels = []
+    for case, response in sources.responses()[1:]:
+        broken = {
+            one.element
+            for one in sources.verdict
+            if one.finding in ("exceeded", "restricted") and case in one.cases and one.limit_at
+        }
+        chosen = [
+            one
+            for one in told_quantities(response)
+            if has_limit(one) and f"{one.column.element_kind} '{one.column.element}'" in broken
+        ]
+        panels += [_panel(sources, response, one.in_short(), _colours(chosen, response), f"{case}, ") for one in chosen]
+    return panels
+
+
+def _barred_ranges(sources: Sources) -> list[Paragraph | Table | Figure]:
+    barred = sources.response_report["barred_speed_ranges"]
+    if not barred:
+        return [Paragraph("No range of speeds is barred.", "good")]
+    columns = {one.name: one for one in sources.response.columns}
+    rows = []
+    for one in barred:
+        ends = sorted((sources.speed(one["from_rad_s"]), sources.speed(one["to_rad_s"])))
+        column = columns.get(one["quantity"])
+        named = f"{name_of(column)}: {column.caption}" if column else one["quantity"]
+        rows.append([text(named), *map(number, ends), text(*passage(one)), text(one["limit_at"])])
+    columns = ["limit of", f"from [{sources.speed_unit}]", f"to [{sources.speed_unit}]", "passage", "set at"]
+    return [Table("Barred ranges of speed", columns, rows, "No continuous operation within these speeds.")]
+
+
+def _largest(sources: Sources, whole: bool) -> list[Table]:
+    """A table for each unit; `whole`: of what the section shows, else of the rest."""
+    columns = {one.name: one for one in sources.response.columns if one.statistic == "half_range"}
+    told = {one.label for one in told_quantities(sources.response)}
+    told |= {one.name for one in columns.values() if one.rank in LOADS and one.rank != MOMENT}
+    entries = [
+        one for one in sources.response_report["largest"] if one["quantity"] in columns and (one["quantity"] in told) == whole
+    ]
+    sorts = dict.fromkeys((columns[one["quantity"]].kind, one["unit"]) for one in entries)
+    chosen = [[one for one in entries if (columns[one["quantity"]].kind, one["unit"]) == sort] for sort in sorts]
+    return [_largest_of(sources, part, columns) for part in chosen]
+
+
+def _largest_of(sources: Sources, entries: Sequence[dict], columns: dict[str, Column]) -> Table:
+    unit, speed = entries[0]["unit"], sources.speed_unit
+    factor, _ = sources.units.shown(unit, max(max(one["half_range"], one["peak"]) for one in entries))
+    like = max(max(one["half_range"], one["peak"]) for one in entries)
+    orders = []
+    for one in entries:
+        strongest = sorted(zip(one["half_range_by_order"], sources.response.lines), key=lambda pair: -pair[0])[:3]
+        orders.append(
+            ", ".join(f"{line.name} ({number_text(factor * value, 3)})" for value, line in strongest if value > 1e-6 * like)
+        )
+    head, values = sources.units.column("", unit, [one["half_range"] for one in entries] + [one["peak"] for one in entries])
+    shares = [one.get("ratio_to_limit") for one in entries]
+    content = [
+        ("of", texts([name_of(columns[one["quantity"]]) for one in entries])),
+        (f"half range{head}", values[: len(entries)]),
+        (f"at [{speed}]", [number(sources.speed(one["half_range_speed_rad_s"])) for one in entries]),
+        (f"largest magnitude{head}", values[len(entries) :]),
+        (f"largest at [{speed}]", [number(sources.speed(one["peak_speed_rad_s"])) for one in entries]),
+        ("of its limit [%]", [share(one, 3, "bad" if one is not None and one > 1 else "") for one in shares]),
+        (f"largest orders{head}", texts(orders)),
+    ]
+    caption = columns[entries[0]["quantity"]].caption
+    return cut(by_columns(f"Largest over the speeds: {caption}", content), MOST_ROWS, "response.json")
+
+
+def _small(sources: Sources, quantities: list[Quantity]) -> list[Figure | Paragraph]:
+    """A figure for each sort, of one scale for all of its panels."""
+    blocks: list[Figure | Paragraph] = []
+    ranked = sorted(quantities, key=lambda one: -one.largest)[:MOST_PANELS]
+    chosen = [one for one in quantities if any(one is other for other in ranked)]
+    for kind, unit in dict.fromkeys((one.column.kind, one.unit) for one in chosen):
+        part = [one for one in chosen if (one.column.kind, one.unit) == (kind, unit)]
+        largest = max(one.largest for one in part)
+        colours = _colours(part, sources.response)
+        panels = [_panel(sources, sources.response, one.in_short(largest), colours, is_small=True) for one in part]
+        caption = part[0].column.caption if len({one.column.caption for one in part}) == 1 else kind.replace("_", " ")
+        blocks.append(
+            Figure(f"{caption[0].upper()}{caption[1:]}: half ranges over the speed", panels, min(SMALL, max(BIG, len(panels))))
+        )
+    if len(chosen) < len(quantities):
+        blocks.append(Paragraph(f"Drawn are the {len(chosen)} largest of {len(quantities)} quantities; response.csv has all."))
+    return blocks
+
+
+def _colours(quantities: list[Quantity], response: Response) -> dict[int, int]:
+    """An order has one colour in all panels of a figure."""
+    lines = sorted({line for one in quantities for line in response.largest_lines(one)})
+    return {line: place for place, line in enumerate(lines)}
+
+
+def _panel(
+    sources: Sources, response: Response, quantity: Quantity, colours: dict[int, int], before: str = "", is_small: bool = False
+) -> Panel:
+    arrays, column = sources.arrays, quantity.column
     speed = np.array([sources.of_rpm(one) for one in response.speed])
     curves = [arrays.curve("all orders", speed, quantity.half_range, role="total")]
-    curves += _orders(sources, quantity, speed)
-    top = float(np.nanmax(quantity.half_range, initial=0.0))
+    for line in sorted(response.largest_lines(quantity)):
+        curves.append(arrays.curve(response.lines[line].title, speed, quantity.orders[:, line], colour=colours[line]))
+    top = quantity.largest
     for name, values, role in (("limit", quantity.limit, "limit"), ("limit for passing", quantity.transient_limit, "passing")):
         if values is not None and np.isfinite(values).any():
             is_near = np.nanmin(values) <= NEAR * top
-            curves.append(arrays.curve(name, speed, values, role=role, shown=bool(is_near)))
+            told = (
+                name
+                if is_near
+                else f"{name} of {before}{name_of(column)}: {number_text(float(np.nanmin(values)), 4)} {quantity.unit} and more"
+            )
+            curves.append(arrays.curve(told, speed, values, role=role, shown=bool(is_near)))
     spec = {
         "x": {"label": f"speed of {response.body}", "unit": sources.speed_unit},
-        "y": {"label": f"half range of {quantity.label}", "unit": quantity.unit, "zero": True},
+        "y": {"label": "" if is_small else "half range", "unit": quantity.unit, "zero": True},
         "curves": curves,
-        "bands": [*operation_bands(sources, response), *_barred(sources, quantity)],
-        "marks": [[sources.of_rpm(one.speed), one.name] for one in response.criticals],
+        "bands": [*operation_bands(sources, response), *_barred(sources, response, quantity)],
+        "marks": [] if is_small else [[sources.of_rpm(one.speed), one.name] for one in response.criticals],
         "name": "order",
     }
     at = number_text(float(speed[np.nanargmax(quantity.half_range)]))
-    return Figure(
-        f"{quantity.label}, {quantity.column.caption}: half range over the speed, largest orders. Triangles: critical speeds",
-        f"Half range of {quantity.label} over the speed of {response.body}; the largest is {number_text(top)} {quantity.unit} "
-        f"at {at} {sources.speed_unit}.",
-        spec,
-    )
+    title = name_of(column) if is_small else f"{before}{name_of(column)}: {column.caption}"
+    largest = f"the largest is {number_text(top)} {quantity.unit} at {at} {sources.speed_unit}"
+    return Panel(title, f"Half range of {quantity.label} over the speed of {response.body}; {largest}.", spec)
 
 
-def _orders(sources: Sources, quantity: Quantity, speed: np.ndarray) -> list[dict]:
-    """The largest, in the order of the file."""
-    response = sources.response
-    chosen = sorted(response.largest_lines(quantity))
-    return [sources.arrays.curve(response.lines[i].title, speed, quantity.orders[:, i]) for i in chosen]
-
-
-def _barred(sources: Sources, quantity: Quantity) -> list[dict]:
+def _barred(sources: Sources, response: Response, quantity: Quantity) -> list[dict]:
     bands = []
-    for one in sources.response.barred_by(quantity):
+    for one in response.barred_by(quantity):
         kind, label = ("passable", "barred") if one.can_be_passed else ("barred", "barred, also for passing")
         bands.append(band(sources.of_rpm(one.start), sources.of_rpm(one.end), kind, label))
     return bands

@@ -15,7 +15,7 @@ TITLES = {
 
 
 def scope_section(sources: Sources, sections: list[Section]) -> Section:
-    section = Section("scope", "Scope")
+    section = Section("scope", "Scope", is_appendix=True)
     there = {one.id for one in sections}
     rows: list[list[Cell]] = []
     for command, (title, target, files) in TITLES.items():
