@@ -303,7 +303,8 @@ def test_a_circuit_from_rated_values_is_noted(nocdyn):
         "motor 'mains' has from its rated values, with 40 % of the losses outside of the rotor in the stator winding and equal "
         "leakages: stator_resistance = 0.643653, rotor_resistance = 0.414587, stator_reactance = rotor_reactance = 5.97825, "
         "mutual_reactance = 129.174 Ohm; its starting torque is 0.189 of the rated one, its starting current 4.69",
-        "motor 'mains': starting_torque = 1.22, but 0.189 with the circuit, which knows no skin effect in the bars",
+        "motor 'mains': starting_torque = 1.22, but 0.189 with the circuit, which knows no skin effect in the bars; "
+        "cages = 2 fits a second cage",
     ]
     text = run(nocdyn, RATED.format(keys=""), command="check").stdout
     assert text.count("note: ") == 1 and f"  note: {notes[0]}\n" in text
