@@ -113,6 +113,14 @@ def test_steady_states_stand_on_both_sides_of_both_maxima_of_the_torque(nocdyn):
     assert sorted(speed for speed in speeds if speed > 0) == pytest.approx(expected, abs=0.02)
 
 
+@pytest.mark.parametrize("resistance, kind", [("0", "neutral"), ("1e-9", "stable")])
+def test_steady_states_are_found_without_losses_in_the_stator(nocdyn, resistance, kind):
+    nocdyn.write("machine.nml", machine().replace("stator_resistance = 0.644", f"stator_resistance = {resistance}"))
+    outcome = nocdyn("equilibrium", "machine.nml")
+    assert outcome.returncode == 0, outcome.stderr
+    assert f"steady state, {kind}" in outcome.stdout
+
+
 TRAIN = """&body name = 'load' inertia = 30 /
 &coupling name = 'shaft' bodies = 'rotor', 'load' stiffness = 2e5 damping = 100 /
 """

@@ -131,6 +131,15 @@ def test_steady_states_are_on_both_sides_of_the_breakdown_torque(nocdyn):
     assert "steady state 1 of 2, unstable" in text and "steady state 2 of 2, stable" in text
 
 
+@pytest.mark.parametrize("resistance", ["0", "1e-9", "1e-4"])
+def test_steady_states_are_found_without_losses_in_the_stator(nocdyn, resistance):
+    load = "&load name = 'fan' body = 'rotor' quadratic = 4e-4 /"
+    text = machine("3 hp", rest=load).replace("stator_resistance = 0.435", f"stator_resistance = {resistance}")
+    text = run(nocdyn, text, command="equilibrium").stdout
+    speed = next(float(line.split()[-1]) for line in text.splitlines() if "omega_rotor" in line)
+    assert speed == pytest.approx(180.20595, rel=1e-6)
+
+
 def test_a_sweep_computes_what_single_runs_compute(nocdyn):
     variants = """
 &sweep design = 'grid' /

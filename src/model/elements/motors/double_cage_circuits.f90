@@ -38,14 +38,16 @@ contains
     complex(wp) :: flux(3)
     complex(wp) :: admittance   ! current over magnetising flux [1/H]
     complex(wp) :: cage(2)      ! impedance times slip [Ohm]
+    complex(wp) :: magnetising  ! flux [V s]
 
     associate (frequency => self%frequency)
       cage = cmplx(self%resistance, slip * frequency * self%leakage, wp)
       admittance = 1.0_wp / self%mutual + sum(cmplx(0.0_wp, slip * frequency, wp) / cage)
-      flux(1) = 1.0_wp + self%stator_leakage * admittance
-      flux(2:3) = self%resistance / cage
-      flux = flux * self%voltage / (cmplx(0.0_wp, frequency, wp) &
+      magnetising = self%voltage / (cmplx(0.0_wp, frequency, wp) &
                                     + cmplx(self%stator_resistance, frequency * self%stator_leakage, wp) * admittance)
+      ! the part of the first by the resistance is exact, however small it is beside the flux
+      flux = [(self%voltage - self%stator_resistance * admittance * magnetising) / cmplx(0.0_wp, frequency, wp), &
+              magnetising * self%resistance / cage]
     end associate
   end function steady_flux
 
