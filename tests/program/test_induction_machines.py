@@ -131,6 +131,15 @@ def test_steady_states_are_on_both_sides_of_the_breakdown_torque(nocdyn):
     assert "steady state 1 of 2, unstable" in text and "steady state 2 of 2, stable" in text
 
 
+@pytest.mark.parametrize("resistance", ["0", "1e-9", "1e-4"])
+def test_steady_states_are_found_without_losses_in_the_stator(nocdyn, resistance):
+    load = "&load name = 'fan' body = 'rotor' quadratic = 4e-4 /"
+    text = machine("3 hp", rest=load).replace("stator_resistance = 0.435", f"stator_resistance = {resistance}")
+    text = run(nocdyn, text, command="equilibrium").stdout
+    speed = next(float(line.split()[-1]) for line in text.splitlines() if "omega_rotor" in line)
+    assert speed == pytest.approx(180.20595, rel=1e-6)
+
+
 def test_a_sweep_computes_what_single_runs_compute(nocdyn):
     variants = """
 &sweep design = 'grid' /
@@ -303,7 +312,8 @@ def test_a_circuit_from_rated_values_is_noted(nocdyn):
         "motor 'mains' has from its rated values, with 40 % of the losses outside of the rotor in the stator winding and equal "
         "leakages: stator_resistance = 0.643653, rotor_resistance = 0.414587, stator_reactance = rotor_reactance = 5.97825, "
         "mutual_reactance = 129.174 Ohm; its starting torque is 0.189 of the rated one, its starting current 4.69",
-        "motor 'mains': starting_torque = 1.22, but 0.189 with the circuit, which knows no skin effect in the bars",
+        "motor 'mains': starting_torque = 1.22, but 0.189 with the circuit, which knows no skin effect in the bars; "
+        "cages = 2 fits a second cage",
     ]
     text = run(nocdyn, RATED.format(keys=""), command="check").stdout
     assert text.count("note: ") == 1 and f"  note: {notes[0]}\n" in text

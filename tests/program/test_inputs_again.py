@@ -105,7 +105,8 @@ ELEMENTS = {
     f"&sweep design = 'grid' /\n{VARY} count = 3 /\n"
     "&excitation name = 'x' body = 'a' kind = 'orders' orders = 1 amplitudes = 2 /\n"
     "&response body = 'a' speed = 10, 20 operating = 12, 18 /\n&limit coupling = 'k' moment = 100 /\n"
-    "&record response = 'moment_k' statistic = 'peak', 'peak_speed', 'margin', 'ratio' /",
+    "&record response = 'moment_k' statistic = 'peak', 'peak_speed', 'margin', 'ratio' /\n"
+    "&record mode = 1 order = 1 statistic = 'crossing', 'crossing_margin' /",
     "lives": f"&coupling name = 'k' bodies = 'a', 'b' stiffness = 100 /\n&sweep design = 'grid' /\n{VARY} count = 3 /\n"
     "&fatigue name = 'f' coupling = 'k' reference_moment = 1e6 reference_cycles = 1e6 slope = 5 /\n"
     "&record fatigue = 'f' statistic = 'damage', 'cycles' /",

@@ -5,6 +5,7 @@ module nocdyn_test_full_machines
   use nocdyn_curves, only: curve_t, extrapolation_constant, extrapolation_linear, interpolation_cubic, interpolation_linear, &
                            new_curve
   use nocdyn_dc_motors, only: new_dc_motors
+  use nocdyn_double_cage_motors, only: new_double_cage_motors
   use nocdyn_element_rows, only: element_rows_t, new_element_rows
   use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_fault_excitations, only: fault_terms_t, new_fault_excitations
@@ -224,6 +225,7 @@ contains
     type(machine_t), intent(inout) :: machine
     character(len=*), parameter :: circuit = &   ! inductances are given partly as reactances
       'voltage frequency stator_resistance rotor_resistance stator_leakage rotor_reactance mutual_inductance'
+    character(len=*), parameter :: outer = ' outer_resistance outer_reactance'
     real(wp), parameter :: of_circuit(7) = [30.0_wp, 12.0_wp, 0.4_wp, 0.5_wp, 0.05_wp, 0.6_wp, 0.8_wp]
     type(given_keys_t) :: given
 
@@ -252,6 +254,15 @@ contains
     call given%add_list('supply_factors', all_lanes([0.6_wp, 0.0_wp, 1.7_wp], variants))
     call given%add_list('supply_ramps', all_lanes([0.2_wp, 0.0_wp, 3.0_wp], variants))
     call append_bank(machine%banks, new_flux_motors(given))
+    given = lane_keys('cages', [bodies], variants, circuit // outer, [of_circuit, 1.5_wp, 0.4_wp])
+    call given%add_list('poles', [4.0_wp])
+    call append_bank(machine%banks, new_double_cage_motors(given))
+    given = lane_keys('supplied cages', [1], variants, circuit // outer, [of_circuit, 1.5_wp, 0.4_wp])
+    call given%add_list('poles', [2.0_wp])
+    call given%add_list('supply_times', all_lanes([0.05_wp, 0.4_wp, 0.5_wp], variants))
+    call given%add_list('supply_factors', all_lanes([0.6_wp, 0.0_wp, 1.7_wp], variants))
+    call given%add_list('supply_ramps', all_lanes([0.2_wp, 0.0_wp, 3.0_wp], variants))
+    call append_bank(machine%banks, new_double_cage_motors(given))
   end subroutine add_three_phase_motors
 
   subroutine add_loads(bodies, variants, machine)

@@ -10,7 +10,7 @@ module nocdyn_schema_torques
 
   type(allowed_t), parameter :: faults = allowed_t(words='three_phase two_phase resynchronisation')
   character(len=*), parameter :: governed = 'quadratic constant table induction dc inverter'   ! kinds with a governor
-
+  type(allowed_t), parameter :: one_or_two = allowed_t(low=1.0_wp, high=2.0_wp)
   type(allowed_t), parameter :: above_minus_1 = allowed_t(low=-1.0_wp)
   type(allowed_t), parameter :: works = allowed_t(words='engine compressor')
 
@@ -88,6 +88,12 @@ module nocdyn_schema_torques
       'leakage reactance of a phase of the rotor at the frequency, referred to the stator', 'induction_dq'), &
     key_rule_t('motor', 'mutual_reactance', a_number, 1, 'Ohm', required, positive, &
       'magnetising reactance at the frequency', 'induction_dq'), &
+    key_rule_t('motor', 'outer_resistance', a_number, 1, 'Ohm', unset, positive, &
+      'of the outer cage beside the inner one, whose are the values of the rotor; deep bars', 'induction_dq'), &
+    key_rule_t('motor', 'outer_leakage', a_number, 1, 'H', unset, positive, &
+      'leakage inductance of the outer cage, referred to the stator', 'induction_dq'), &
+    key_rule_t('motor', 'outer_reactance', a_number, 1, 'Ohm', unset, positive, &
+      'leakage reactance of the outer cage at the frequency, referred to the stator', 'induction_dq'), &
     key_rule_t('motor', 'rated_power', a_number, 1, 'W', required, positive, &
       'power at the shaft on the name plate, from which the circuit follows with the values below', 'induction_dq'), &
     key_rule_t('motor', 'rated_speed', a_number, 1, 'rad/s', required, positive, &
@@ -98,9 +104,11 @@ module nocdyn_schema_torques
     key_rule_t('motor', 'breakdown_ratio', a_number, 1, '', required, above_1, &
       'breakdown torque over the rated torque, of the data sheet', 'induction_dq'), &
     key_rule_t('motor', 'starting_torque', a_number, 1, '', unset, positive, &
-      'starting torque over the rated torque, to compare with that of the circuit', 'induction_dq'), &
+      'starting torque over the rated torque: compared with one cage, fitted with two', 'induction_dq'), &
     key_rule_t('motor', 'starting_current', a_number, 1, '', unset, positive, &
-      'starting current over the rated current, to compare with that of the circuit', 'induction_dq'), &
+      'starting current over the rated current: compared with one cage, fitted with two', 'induction_dq'), &
+    key_rule_t('motor', 'cages', an_integer, 1, '', '1', one_or_two, &
+      'of the circuit from the name plate; 2: its outer cage gives starting torque and current', 'induction_dq'), &
     key_rule_t('motor', 'supply_times', a_number, any_number, 's', unset, anything, &
       'times at which the supply changes; before the first one the motor is disconnected', 'induction_dq', 1, ascends=.true.), &
     key_rule_t('motor', 'supply_factors', a_number, any_number, '', unset, not_negative, &
@@ -317,9 +325,13 @@ module nocdyn_schema_torques
     relation_rule_t('motor', exactly_one, 'stator_resistance rotor_resistance stator_leakage rotor_leakage ' // &
                     'mutual_inductance stator_reactance rotor_reactance mutual_reactance', &
                     'rated_power rated_speed efficiency power_factor breakdown_ratio'), &
-    relation_rule_t('motor', requires, 'starting_torque starting_current', 'rated_power'), &
+    relation_rule_t('motor', requires, 'starting_torque starting_current cages', 'rated_power'), &
     relation_rule_t('motor', exactly_one, 'stator_leakage rotor_leakage mutual_inductance', &
                     'stator_reactance rotor_reactance mutual_reactance'), &
+    relation_rule_t('motor', requires, 'outer_resistance outer_leakage outer_reactance', 'rotor_resistance'), &
+    relation_rule_t('motor', requires, 'outer_resistance', 'outer_leakage outer_reactance'), &
+    relation_rule_t('motor', requires, 'outer_leakage outer_reactance', 'outer_resistance'), &
+    relation_rule_t('motor', at_most_one, 'outer_leakage', 'outer_reactance'), &
     relation_rule_t('motor', requires, 'supply_factors supply_ramps', 'supply_times'), &
     relation_rule_t('motor', exactly_one, 'slips d_torques q_torques mean_torques pulsations', 'table_file'), &
     relation_rule_t('motor', at_most_one, 'd_torques q_torques', 'mean_torques pulsations'), &

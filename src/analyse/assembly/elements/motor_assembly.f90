@@ -2,9 +2,10 @@
 module nocdyn_motor_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
   use nocdyn_dc_motors, only: new_dc_motors
+  use nocdyn_double_cage_motors, only: new_double_cage_motors
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_flux_motors, only: new_flux_motors
-  use nocdyn_induction_assembly, only: add_rated_motors, check_flux_motor, check_poles
+  use nocdyn_induction_assembly, only: add_rated_double_cages, add_rated_motors, check_flux_motor, check_poles
   use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_inverter_motors, only: new_inverter_motors
   use nocdyn_motors, only: new_induction_motors, new_motors, new_table_motors
@@ -15,10 +16,10 @@ module nocdyn_motor_assembly
 
   public :: motor_form, add_motor_form, check_motor
 
-  ! forms; a motor with a governor has the next one, and so has one of `fluxes` or `rated` with a supply over the time; one whose
-  ! set speed follows the time has the one after that
+  ! forms; a motor with a governor has the next one, and so has one of `fluxes`, `rated` or with two cages and a supply over the
+  ! time; one whose set speed follows the time has the one after that
   integer, parameter :: quadratic = 1, induction = 4, table = 7, inductive = 10, fluxes = 13, rated = 16, inverter = 19, &
-                        synchronous = 22
+                        synchronous = 22, double_cage = 25, rated_double_cage = 27
 
 contains
 
@@ -89,7 +90,11 @@ contains
     case ('induction')
       motor_form = induction
     case ('induction_dq')
-      motor_form = merge(rated, fluxes, group%has_value('rated_power'))
+      if (group%has_value('rated_power')) then
+        motor_form = merge(rated_double_cage, rated, group%whole_number('cages') == 2)
+      else
+        motor_form = merge(double_cage, fluxes, group%has_value('outer_resistance'))
+      end if
     case ('inverter')
       motor_form = inverter
     case ('synchronous')
@@ -126,6 +131,10 @@ contains
       call add_rated_motors(groups, banks)
     case (inverter:inverter + 2)
       call append_bank(banks, new_inverter_motors(groups))
+    case (double_cage:double_cage + 1)
+      call append_bank(banks, new_double_cage_motors(groups))
+    case (rated_double_cage:rated_double_cage + 1)
+      call add_rated_double_cages(groups, banks)
     case default
       call append_bank(banks, new_synchronous_motors(groups))
     end select

@@ -23,7 +23,7 @@ module nocdyn_flux_motors
   implicit none (type, external)
   private
 
-  public :: new_flux_motors
+  public :: new_flux_motors, connect_motors
 
   !> Keys of the circuit. Each inductance is given as such or as a reactance at the frequency; the other one is 0.
   character(len=*), parameter, public :: circuit_keys(*) = [character(len=17) :: &
@@ -31,17 +31,19 @@ module nocdyn_flux_motors
     'stator_reactance', 'rotor_reactance', 'mutual_reactance']
 
   character(len=*), parameter :: share_name = 'share of frequency'   ! of the supply, where a speed is held
-  character(len=*), parameter :: supply = 'supply'   ! the scheduled share of the voltage; its flag: the motor is disconnected
+  character(len=*), parameter, public :: supply = 'supply'   !! the scheduled share of the voltage; its flag: disconnected
   real(wp), parameter, public :: arc_time = 1.0e-3_wp   !! time constant of the currents in opening contacts [s]
-  real(wp), parameter :: amplitude = sqrt(2.0_wp / 3.0_wp)   ! of a phase of the star, per rms voltage between lines
+  real(wp), parameter, public :: amplitude = sqrt(2.0_wp / 3.0_wp)   !! of a phase of the star, per rms voltage between lines
 
   !> The internal states of a motor are the flux linkages d and q of its stator, then the ones of its rotor [V s].
   type, extends(bank_t), public :: flux_motors_t
-    logical, private :: has_schedule = .false.   !! whether the supply follows the time
+    logical :: has_schedule = .false.            !! whether the supply follows the time
     logical, private :: is_held = .false.        !! whether the supply may have another frequency, after `hold_speed`
   contains
     procedure :: describe
     procedure :: circuit
+    procedure :: inductance, field_turn, slip_frequency, direction_of
+    procedure :: working_point
     procedure :: decide_internal
     procedure :: transient_frequency
     procedure :: hold_speed, follows_supply, set_supply, idle_supply
@@ -57,19 +59,29 @@ contains
     class(element_keys_t), intent(in) :: keys
     real(wp), intent(in), optional :: rated(:, :, :)   !! circuits in place of the ones of the keys, in SI, [lanes, motors, keys]
     type(flux_motors_t) :: bank
+
+    allocate (bank%internal_names, source=[character(len=24) :: 'stator flux d', 'stator flux q', 'rotor flux d', 'rotor flux q'])
+    call connect_motors(bank, keys, circuit_keys, rated)
+  end function new_flux_motors
+
+  !> Makes a bank of motors on mains, whose `internal_names` are set, from its keys.
+  subroutine connect_motors(bank, keys, names, rated)
+    class(flux_motors_t), intent(inout) :: bank
+    class(element_keys_t), intent(in) :: keys
+    character(len=*), intent(in) :: names(:)             !! of the keys of the circuit
+    real(wp), intent(in), optional :: rated(:, :, :)     !! as in `new_flux_motors`
     type(schedule_t), allocatable :: schedule(:, :)
     integer :: e, k, lane
 
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
-    bank%states = 4
-    allocate (bank%internal_names, source=[character(len=24) :: 'stator flux d', 'stator flux q', 'rotor flux d', 'rotor flux q'])
+    bank%states = size(bank%internal_names)
     call bank%connect(role_motor, keys)
-    do k = 1, size(circuit_keys)
+    do k = 1, size(names)
       if (present(rated)) then
-        call bank%add_parameter(circuit_keys(k), rated(:, :, k), is_key=.false.)
+        call bank%add_parameter(names(k), rated(:, :, k), is_key=.false.)
       else
-        call bank%add_key(keys, circuit_keys(k))
+        call bank%add_key(keys, names(k))
       end if
     end do
     call bank%add_parameter('pole pairs', 0.5_wp * keys%values('poles'), is_key=.false.)
@@ -86,7 +98,7 @@ contains
       call add_schedule(bank, supply, schedule, 'change of the supply')
     end if
     call bank%prepare_law()
-  end function new_flux_motors
+  end subroutine connect_motors
 
   !> The share of the voltage of one motor: at each time a change to the next factor, within a ramp. Before the first one, and
   !> with the factor 0, the motor is disconnected.
@@ -108,43 +120,64 @@ contains
   subroutine describe(self, tape)
     class(flux_motors_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape
-    type(expression_t) :: circuit(3), determinant, drive, ds, dr, frequency, mutual, own, pole_pairs, qs, qr, rotor, rotor_rate, &
+    type(expression_t) :: circuit(3), determinant, drive, ds, dr, mutual, own, pole_pairs, qs, qr, rotor, rotor_rate, &
                           slip_frequency, stator, turn
 
     ds = state_of(tape, 1)
     qs = state_of(tape, 2)
     dr = state_of(tape, 3)
     qr = state_of(tape, 4)
-    frequency = self%parameter(tape, 'frequency')
-    mutual = inductance('mutual_inductance', 'mutual_reactance')
-    stator = mutual + inductance('stator_leakage', 'stator_reactance')
-    rotor = mutual + inductance('rotor_leakage', 'rotor_reactance')
+    mutual = self%inductance(tape, 'mutual_inductance', 'mutual_reactance')
+    stator = mutual + self%inductance(tape, 'stator_leakage', 'stator_reactance')
+    rotor = mutual + self%inductance(tape, 'rotor_leakage', 'rotor_reactance')
     determinant = stator * rotor - mutual * mutual
     rotor_rate = self%parameter(tape, 'rotor_resistance') / determinant   ! of the flux, times an inductance [1/(H s)]
     pole_pairs = self%parameter(tape, 'direction') * self%parameter(tape, 'pole pairs')
-    slip_frequency = frequency - pole_pairs * speed_of(tape)
-    if (self%is_held) slip_frequency = self%parameter(tape, share_name) * frequency - pole_pairs * speed_of(tape)
+    slip_frequency = self%slip_frequency(tape)
     circuit = stator_circuit(self, tape, [stator, rotor, mutual, determinant])
     own = circuit(1)
     drive = circuit(2)
-    turn = frequency
-    if (self%has_schedule) turn = frequency - scheduled_flag(self, tape, supply, 1) * pole_pairs * speed_of(tape)
+    turn = self%field_turn(tape)
     tape%applied = node_of(1.5_wp * pole_pairs * (mutual / determinant) * (qs * dr - ds * qr))
     tape%rate(1) = node_of(circuit(3) - own * ds + drive * dr + turn * qs)
     tape%rate(2) = node_of(drive * qr - own * qs - turn * ds)
     tape%rate(3) = node_of(rotor_rate * mutual * ds - rotor_rate * stator * dr + slip_frequency * qr)
     tape%rate(4) = node_of(rotor_rate * mutual * qs - rotor_rate * stator * qr - slip_frequency * dr)
-
-  contains
-
-    !> One inductance, from the key that is given.
-    type(expression_t) function inductance(key, reactance)
-      character(len=*), intent(in) :: key, reactance
-
-      inductance = self%parameter(tape, key) + self%parameter(tape, reactance) / frequency
-    end function inductance
-
   end subroutine describe
+
+  !> One inductance [H], from the key that is given.
+  type(expression_t) function inductance(self, tape, key, reactance)
+    class(flux_motors_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    character(len=*), intent(in) :: key, reactance
+
+    inductance = self%parameter(tape, key) + self%parameter(tape, reactance) / self%parameter(tape, 'frequency')
+  end function inductance
+
+  !> The angular frequency of the fields against the rotor [rad/s].
+  type(expression_t) function slip_frequency(self, tape)
+    class(flux_motors_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: frequency, pole_pairs
+
+    frequency = self%parameter(tape, 'frequency')
+    pole_pairs = self%parameter(tape, 'direction') * self%parameter(tape, 'pole pairs')
+    slip_frequency = frequency - pole_pairs * speed_of(tape)
+    if (self%is_held) slip_frequency = self%parameter(tape, share_name) * frequency - pole_pairs * speed_of(tape)
+  end function slip_frequency
+
+  !> The angular frequency of the frame against what carries the flux of the stator [rad/s]: the stator itself, or the rotor while
+  !> the motor is disconnected.
+  type(expression_t) function field_turn(self, tape)
+    class(flux_motors_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: pole_pairs
+
+    field_turn = self%parameter(tape, 'frequency')
+    if (.not. self%has_schedule) return
+    pole_pairs = self%parameter(tape, 'direction') * self%parameter(tape, 'pole pairs')
+    field_turn = field_turn - scheduled_flag(self, tape, supply, 1) * pole_pairs * speed_of(tape)
+  end function field_turn
 
   !> What the stator flux follows: its own rate and that by the rotor flux [1/s], and the voltage [V].
   function stator_circuit(self, tape, inductances) result(circuit)
@@ -206,20 +239,42 @@ contains
     type(induction_circuit_t) :: circuit
     complex(wp) :: flux(2)
     integer :: e
-    real(wp) :: slip
+    real(wp) :: share, slip
 
     is_decided = .true.
-    associate (direction => self%parameters(self%number_of('direction'))%value)
-      do e = 1, self%count
-        circuit = self%circuit(1, e)
-        if (self%has_schedule) circuit%voltage = circuit%voltage * value_at(self, supply, e, t)
-        slip = circuit%slip(direction(1, e) * speed(e))
-        if (self%is_held) slip = self%parameters(self%number_of(share_name))%value(1, e) - self%idle_supply(e, speed(e))
-        flux = circuit%steady_flux(slip)
-        internal(4 * e - 3:4 * e) = [real(flux(1), wp), aimag(flux(1)), real(flux(2), wp), aimag(flux(2))]
-      end do
-    end associate
+    do e = 1, self%count
+      circuit = self%circuit(1, e)
+      call self%working_point(e, t, speed(e), slip, share)
+      circuit%voltage = circuit%voltage * share
+      flux = circuit%steady_flux(slip)
+      internal(4 * e - 3:4 * e) = [real(flux(1), wp), aimag(flux(1)), real(flux(2), wp), aimag(flux(2))]
+    end do
   end subroutine decide_internal
+
+  !> The slip and the share of the voltage of a motor of the first lane.
+  subroutine working_point(self, element, t, speed, slip, share)
+    class(flux_motors_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: t        !! [s]
+    real(wp), intent(in) :: speed    !! u' [rad/s]
+    real(wp), intent(out) :: slip    !! 1 at standstill
+    real(wp), intent(out) :: share   !! of the voltage of the mains
+    type(induction_circuit_t) :: circuit
+
+    circuit = self%circuit(1, element)
+    slip = circuit%slip(self%direction_of(element) * speed)
+    if (self%is_held) slip = self%parameters(self%number_of(share_name))%value(1, element) - self%idle_supply(element, speed)
+    share = 1.0_wp
+    if (self%has_schedule) share = value_at(self, supply, element, t)
+  end subroutine working_point
+
+  !> 1, or -1 with a reversed field, of a motor of the first lane.
+  pure real(wp) function direction_of(self, element)
+    class(flux_motors_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+
+    direction_of = self%parameters(self%number_of('direction'))%value(1, element)
+  end function direction_of
 
   !> The torque swings with the mains after a change of the supply, which at the start is the one of switching on.
   pure real(wp) function transient_frequency(self, element, is_steady)
@@ -261,7 +316,7 @@ contains
     real(wp), intent(in) :: speed    !! u' [rad/s]
 
     associate (circuit => self%circuit(1, element))
-      idle_supply = 1.0_wp - circuit%slip(self%parameters(self%number_of('direction'))%value(1, element) * speed)
+      idle_supply = 1.0_wp - circuit%slip(self%direction_of(element) * speed)
     end associate
   end function idle_supply
 
@@ -274,8 +329,7 @@ contains
     type(induction_circuit_t) :: circuit
 
     circuit = self%circuit(1, element)
-    associate (synchronous => self%parameters(self%number_of('direction'))%value(1, element) * circuit%frequency &
-               / circuit%pole_pairs)
+    associate (synchronous => self%direction_of(element) * circuit%frequency / circuit%pole_pairs)
       speeds = synchronous * (1.0_wp + circuit%breakdown_slip() * [-1.0_wp, 0.0_wp, 1.0_wp])
     end associate
   end function extremes

@@ -55,8 +55,9 @@ contains
       rotor = cmplx(self%rotor_resistance, slip * frequency * self%rotor, wp)
       current = self%voltage / (cmplx(self%stator_resistance, frequency * self%stator, wp) &
                                 + slip * (frequency * mutual)**2 / rotor)
-      flux = current * [self%stator - mutual * cmplx(0.0_wp, slip * frequency * mutual, wp) / rotor, &
-                        mutual * self%rotor_resistance / rotor]
+      ! the part of the first by the resistance is exact, however small it is beside the flux
+      flux = [(self%voltage - self%stator_resistance * current) / cmplx(0.0_wp, frequency, wp), &
+              current * mutual * self%rotor_resistance / rotor]
     end associate
   end function steady_flux
 

@@ -16,7 +16,7 @@ module nocdyn_rated_circuits
   implicit none (type, external)
   private
 
-  public :: fit_circuit
+  public :: fit_circuit, rated_phase
 
   integer, parameter, public :: rating_fits = 0
   integer, parameter, public :: rating_too_efficient = 1   !! the slip alone takes more than the losses
@@ -41,12 +41,12 @@ module nocdyn_rated_circuits
   end type rating_t
 
   !> What does not depend on the reactances, of one phase.
-  type :: phase_t
-    real(wp) :: voltage = 0.0_wp         ! rms [V]
-    real(wp) :: power = 0.0_wp           ! of the air gap [W]
+  type, public :: phase_t
+    real(wp) :: voltage = 0.0_wp         !! rms [V]
+    real(wp) :: power = 0.0_wp           !! of the air gap [W]
     real(wp) :: slip = 0.0_wp
-    real(wp) :: resistance = 0.0_wp      ! of the stator [Ohm]
-    complex(wp) :: current = 0.0_wp      ! of the stator without the one of the terminal resistance, rms [A]
+    real(wp) :: resistance = 0.0_wp      !! of the stator [Ohm]
+    complex(wp) :: current = 0.0_wp      !! of the stator without the one of the terminal resistance, rms [A]
   end type phase_t
 
   real(wp), parameter :: growth = 1.02_wp      ! of the reactance in a step of the search
@@ -77,21 +77,11 @@ contains
     type(phase_t) :: phase
     real(wp) :: excess, lowest, highest, ratio, x
     logical :: is_possible, starts_above
-    real(wp) :: losses   ! without the ones of the rotor [W]
 
     limit = 1.0_wp - rating%slip()
     status = rating_too_efficient
     if (.not. rating%efficiency < limit) return
-    ! what does not depend on the reactances
-    phase%slip = rating%slip()
-    phase%power = rating%power / (1.0_wp - phase%slip) / 3.0_wp
-    phase%voltage = rating%voltage / sqrt(3.0_wp)
-    losses = rating%power / rating%efficiency - 3.0_wp * phase%power
-    associate (share => rating%stator_share, factor => rating%power_factor)
-      phase%current = rating%current() * cmplx(factor, -sqrt(1.0_wp - factor**2), wp) &
-                      - (1.0_wp - share) * losses / (3.0_wp * phase%voltage)
-      phase%resistance = share * losses / (3.0_wp * abs(phase%current)**2)
-    end associate
+    phase = rated_phase(rating)
     x = least * phase%voltage / abs(phase%current)
     call set_leakage(rating, phase, x, circuit, excess, is_possible)
     status = rating_impossible
@@ -117,6 +107,22 @@ contains
     status = merge(rating_too_weak, rating_too_strong, starts_above)
     limit = ratio + merge(lowest, highest, starts_above)
   end subroutine fit_circuit
+
+  !> What does not depend on the reactances.
+  pure type(phase_t) function rated_phase(rating) result(phase)
+    type(rating_t), intent(in) :: rating   !! whose efficiency fits its slip
+    real(wp) :: losses   ! without the ones of the rotor [W]
+
+    phase%voltage = rating%voltage / sqrt(3.0_wp)
+    phase%slip = rating%slip()
+    phase%power = rating%power / (1.0_wp - phase%slip) / 3.0_wp
+    losses = rating%power / rating%efficiency - 3.0_wp * phase%power
+    associate (share => rating%stator_share, factor => rating%power_factor)
+      phase%current = rating%current() * cmplx(factor, -sqrt(1.0_wp - factor**2), wp) &
+                      - (1.0_wp - share) * losses / (3.0_wp * phase%voltage)
+      phase%resistance = share * losses / (3.0_wp * abs(phase%current)**2)
+    end associate
+  end function rated_phase
 
   !> Closes in on the leakage reactance between x and the next one.
   pure subroutine bisect(rating, phase, x, starts_above, circuit)
