@@ -102,12 +102,14 @@ def test_the_columns_of_a_response_are_those_of_its_tables(nocdyn, name):
         added = f"&response body = '{body}' speed = 5, 9 count = 3 /\n"
         added += f"&excitation name = 'shaker' body = '{body}' kind = 'orders' orders = 2 amplitudes = 1.0 /\n"
         nocdyn.write("m.nml", path.read_text() + added)
-    outcome = nocdyn("response", "m.nml", "--out", "out", "-q")
+    case = first_case(path)
+    outcome = nocdyn("response", "m.nml", "--out", "out", "-q", *case)
     assert outcome.returncode == 0, outcome.stderr
-    columns = nocdyn.columns("out", "response_columns.json")
+    folder = "/".join(("out", *case[1:]))
+    columns = nocdyn.columns(folder, "response_columns.json")
     check(columns, path.read_text() + "&body &excitation")
     for table in ("response.csv", "response_orders.csv"):
-        assert labels(columns, table) == header(nocdyn, f"out/{table}")
+        assert labels(columns, table) == header(nocdyn, f"{folder}/{table}")
 
 
 def test_the_columns_of_steady_states_are_those_of_their_values(nocdyn):

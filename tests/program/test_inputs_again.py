@@ -82,7 +82,12 @@ ELEMENTS = {
         f"mean stress {word}": "&coupling name = 'k' bodies = 'a', 'b' stiffness = 100 diameter = 0.1 /\n"
         f"&fatigue name = 'f' coupling = 'k' reference_stress = 1e6 reference_cycles = 1e6 slope = 5 "
         f"mean_stress = '{word}' {more} /"
-        for word, more in (("none", ""), ("goodman", "ultimate_stress = 1e9"), ("gerber", "ultimate_stress = 1e9"), ("soderberg", "yield_stress = 1e9"))
+        for word, more in (
+            ("none", ""),
+            ("goodman", "ultimate_stress = 1e9"),
+            ("gerber", "ultimate_stress = 1e9"),
+            ("soderberg", "yield_stress = 1e9"),
+        )
     },
     **{
         f"design {word}": f"&sweep design = '{word}' {more} /\n{VARY} {'count = 3' if word == 'grid' else ''} /\n{RECORD} /"
