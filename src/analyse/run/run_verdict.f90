@@ -15,8 +15,8 @@ module nocdyn_run_verdict
   public :: add_damage, add_end, add_run_limits
 
   character(len=*), parameter :: peak_keys(*) = [character(len=7) :: 'moment', 'force', 'largest']   ! of the largest magnitude
-  character(len=*), parameter :: steady_keys(*) = [character(len=16) :: 'vibratory_moment', 'vibratory_force', 'vibratory', &
-                                                                        'stress', 'stress_transient', 'rule']
+  character(len=*), parameter :: steady_keys(*) = [character(len=19) :: 'vibratory_moment', 'vibratory_frequency', &
+    'vibratory_force', 'vibratory', 'stress', 'stress_transient', 'rule', 'rule_file', 'heat']
 
   !> An extreme of a column.
   type, public :: column_extreme_t
@@ -101,7 +101,7 @@ contains
     associate (group => input%groups(index))
       criterion = in_words(key)
       if (any(key == ['largest  ', 'vibratory'])) criterion = in_words(group%text('quantity'))
-      if (key == 'rule') criterion = 'stress'
+      if (any(key == ['rule     ', 'rule_file'])) criterion = 'stress'
       line = new_verdict_line('run', kind // ' ' // quoted(group%text(kind)), '', &
                               criterion // trim(merge(', steady ', ', largest', any(key == steady_keys))), input%place(index, ''))
     end associate
