@@ -416,3 +416,27 @@ def test_the_moment_of_an_order_has_a_curve_over_the_frequency(nocdyn, form):
     assert line["ratio"] == pytest.approx(worst[0], rel=1e-4)
     assert worst[1] in line["assessment"] and "Hz" in line["assessment"]
     assert line["criterion"].endswith("moment, of one order over the frequency")
+
+
+@pytest.mark.parametrize(("temperature", "factor"), [(10, 1.0), (30, 1.0), (45, 0.85), (60, 0.7), (80, 0.5)])
+def test_a_warm_coupling_carries_less(nocdyn, temperature, factor):
+    warm = f"temperature = {temperature} derating_temperatures = 30, 60, 80 derating_factors = 1, 0.7, 0.5 "
+    keys = "vibratory_moment = 4000 moment = 6000 vibratory_frequency_hz = 10, 20 vibratory_moments = 4000, 4000"
+    for command, name in (("response", "response"), ("run", "summary")):
+        found = []
+        for more in ("", warm):
+            nocdyn.write("machine.nml", HEATED.format(keys + "\n" + more))
+            outcome = nocdyn(command, "machine.nml", "--out", "out")
+            assert outcome.returncode == 0, outcome.stderr
+            report = json.loads((nocdyn.folder / f"out/{name}.json").read_text())
+            found.append({line["criterion"]: line["limit"] for line in report["verdict"]["lines"] if "limit" in line})
+        assert len(found[0]) == (3 if command == "response" else 1)
+        assert found[1] == pytest.approx({criterion: factor * limit for criterion, limit in found[0].items()}, rel=EXACT)
+
+
+def test_a_temperature_without_a_factor_is_refused(nocdyn):
+    keys = "moment = 6000 temperature = 81 derating_temperatures = 30, 80 derating_factors = 1, 0.5"
+    nocdyn.write("machine.nml", HEATED.format(keys))
+    outcome = nocdyn("check", "machine.nml")
+    assert outcome.returncode == 2
+    assert "temperature: there is no factor of it; allowed: up to 80 degC" in outcome.stderr

@@ -3,7 +3,7 @@ module nocdyn_response_limits
   use nocdyn_errors, only: add_error, error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_limit_groups, only: limited_kind, limited_signal
+  use nocdyn_limit_groups, only: derating, limited_kind, limited_signal
   use nocdyn_limit_rules, only: bind_rule, limit_rule_t, load_rule
   use nocdyn_moment_forms, only: moment_form_t
   use nocdyn_signals, only: find_signal, signal_t
@@ -83,15 +83,19 @@ contains
     character(len=*), parameter :: peak(*) = [character(len=7) :: 'moment', 'force', 'largest']
     type(response_limit_t) :: limit
     integer :: k
+    real(wp) :: factor
 
     limit%group = index
     do k = 1, size(peak)
       limit%vibratory = min(limit%vibratory, group%number(trim(vibratory(k)), absent=no_limit))
       limit%peak = min(limit%peak, group%number(trim(peak(k)), absent=no_limit))
     end do
+    factor = derating(group)
+    if (limit%vibratory < no_limit) limit%vibratory = factor * limit%vibratory
+    if (limit%peak < no_limit) limit%peak = factor * limit%peak
     limit%heat = group%number('heat', absent=no_limit)
     limit%frequency = group%numbers('vibratory_frequency')
-    limit%amplitude = group%numbers('vibratory_moments')
+    limit%amplitude = factor * group%numbers('vibratory_moments')
     if (min(limit%vibratory, limit%peak, limit%heat) >= no_limit .and. size(limit%frequency) == 0) return
     limit%quantity = limited_signal(group, signals)
     if (limit%quantity > 0) call add_one(limit, limits)

@@ -4,7 +4,7 @@
 module nocdyn_run_verdict
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_limit_groups, only: limited_kind, limited_signal
+  use nocdyn_limit_groups, only: derating, limited_kind, limited_signal
   use nocdyn_run_fatigue, only: run_fatigue_t
   use nocdyn_signals, only: signal_t
   use nocdyn_text, only: quoted, rounded_text, string_t
@@ -67,7 +67,8 @@ contains
       line%reason = 'the run has no such quantity'
     else
       line%quantity = signals(column)%name
-      call line%compare(extremes(column)%size, input%groups(index)%number(key), signals(column)%unit)
+      call line%compare(extremes(column)%size, derating(input%groups(index)) * input%groups(index)%number(key), &
+                        signals(column)%unit)
       line%has_time = .true.
       line%time = extremes(column)%time
       if (extremes(column)%is_of_start) line%detail = 'in the first transient of the start'

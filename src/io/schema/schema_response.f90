@@ -55,6 +55,11 @@ module nocdyn_schema_response
       'amplitude that each order may have at these frequencies; straight between them', fewest=2), &
     key_rule_t('limit', 'table_file', a_file, 1, '', unset, anything, &
       'two columns in place of both, frequency [rad/s] and moment [N m]'), &
+    key_rule_t('limit', 'temperature', a_number, 1, 'degC', unset, anything, 'of the coupling, which lowers its moments'), &
+    key_rule_t('limit', 'derating_temperatures', a_number, any_number, 'degC', unset, anything, &
+      'temperatures of the factors of its moments, ascending', fewest=2, ascends=.true.), &
+    key_rule_t('limit', 'derating_factors', a_number, any_number, '', unset, positive, &
+      'factors of the limits of moments at these temperatures; straight between them', fewest=2), &
     key_rule_t('limit', 'heat', a_number, 1, 'W', unset, positive, &
       'mean power that the coupling or shaft loses by its oscillation'), &
     key_rule_t('limit', 'vibratory_force', a_number, 1, 'N', unset, positive, &
@@ -132,6 +137,10 @@ module nocdyn_schema_response
     relation_rule_t('limit', requires, 'vibratory_force force', 'mesh'), &
     relation_rule_t('limit', requires, 'vibratory_moment vibratory_frequency vibratory_moments table_file ' // &
                                        'heat moment stress stress_transient rule rule_file', 'coupling shaft'), &
+    relation_rule_t('limit', equal_lengths, 'derating_temperatures derating_factors', ''), &
+    relation_rule_t('limit', requires, 'temperature', 'derating_temperatures'), &
+    relation_rule_t('limit', requires, 'derating_temperatures', 'temperature'), &
+    relation_rule_t('limit', requires, 'temperature', 'vibratory_moment moment vibratory_frequency table_file'), &
     relation_rule_t('limit', equal_lengths, 'vibratory_frequency vibratory_moments', 'table_file'), &
     relation_rule_t('limit', at_most_one, 'vibratory_frequency vibratory_moments', 'table_file'), &
     relation_rule_t('limit', at_most_one, 'quantity', 'vibratory_force force vibratory_moment moment stress ' // &
