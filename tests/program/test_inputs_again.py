@@ -79,6 +79,20 @@ ELEMENTS = {
     "&response body = 'a' speed = 10, 20 /\n"
     "&limit coupling = 'k' rule = 'iacs_m68' tensile_strength = 6e8 rated_speed = 18 /",
     **{
+        f"rule {word}": "&coupling name = 'k' bodies = 'a', 'b' stiffness = 100 diameter = 0.1 /\n"
+        "&response body = 'a' speed = 10, 20 operating = 12, 18 margin_rule = 'api_617' /\n"
+        f"&limit coupling = 'k' rule = '{word}' rated_speed = 18 {more} /"
+        for word, more in (
+            ("kr_generator", ""),
+            ("kr_crankshaft", "choices = 'other' rule_symbols = 'yield_stress' rule_values = 300"),
+            (
+                "iacs_m53",
+                "tensile_strength = 6e8 choices = 'free_form' rule_symbols = 'E', 'R_H', 'W', 'B', 'bending_stress' "
+                "rule_values = 90, 8, 40, 150, 50",
+            ),
+        )
+    },
+    **{
         f"mean stress {word}": "&coupling name = 'k' bodies = 'a', 'b' stiffness = 100 diameter = 0.1 /\n"
         f"&fatigue name = 'f' coupling = 'k' reference_stress = 1e6 reference_cycles = 1e6 slope = 5 "
         f"mean_stress = '{word}' {more} /"

@@ -28,6 +28,20 @@ def test_the_installed_program_runs(prefix):
     assert run(prefix / "bin/nocdyn", "--version").startswith("nocdyn ")
 
 
+def test_the_installed_program_has_the_rules_and_shows_their_files(prefix, tmp_path):
+    files = sorted((SOURCE / "src/analyse/rules").glob("*.rule"))
+    installed = sorted((prefix / "share/nocdyn/rules").iterdir())
+    assert [path.name for path in installed] == [path.name for path in files] != []
+    assert [path.read_bytes() for path in installed] == [path.read_bytes() for path in files]
+    (tmp_path / "machine.nml").write_text(
+        "&body name = 'a' inertia = 1 /\n&body name = 'b' inertia = 2 /\n&run t_end = 1 /\n"
+        "&coupling name = 'k' bodies = 'a', 'b' stiffness = 100 damping = 1 diameter = 0.1 /\n"
+        "&response body = 'a' speed = 10, 20 orders = 1 /\n&excitation name = 'x' body = 'a' kind = 'orders' orders = 1 "
+        "amplitudes = 1 /\n&limit coupling = 'k' rule = 'kr_generator' rated_speed = 18 /\n"
+    )
+    assert "KR generator shaft" in run(prefix / "bin/nocdyn", "response", tmp_path / "machine.nml", "--out", tmp_path / "out")
+
+
 @pytest.fixture(scope="module")
 def consumer(prefix, tmp_path_factory):
     """The folder of the programs of another project."""

@@ -27,7 +27,9 @@ VALUES_OF_A_VARIANT = {
 }
 NAMES_IN_FAILURES = {"solver_status", "formulation", "system"}
 PROGRAMS = {"code_text", "law_code", "machine_code", "reduced", "series_code", "switch_code"}  # in the critical section
-ANALYSES = {"limit_groups", "solve", "margins"}  # wrong limits, which the base machine has too; modes at a time; reports
+ANALYSES = {  # wrong limits and rules, which the base machine has too; modes at a time; reports
+    *("limit_groups", "response_limits", "limit_rules", "rule_files", "rule_expressions", "solve", "margins"),
+}
 REPORTS = {  # of recorded paths, in the critical section
     *("csv", "energy_balance", "hidden_file", "holzer", "holzer_report", "machine_report", "output_file", "table_text"),
     *(f"{command}_{part}" for command in ("campbell", "response", "modes") for part in ("files", "report", "results")),

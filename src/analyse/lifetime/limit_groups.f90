@@ -1,13 +1,14 @@
 !> The elements and the signals that groups &limit are of.
 module nocdyn_limit_groups
   use nocdyn_input, only: diagnostics_t, group_t, input_t
+  use nocdyn_kinds, only: wp
   use nocdyn_schema_text, only: suggestion
   use nocdyn_signals, only: find_signal, signal_t
-  use nocdyn_text, only: quoted, string_t
+  use nocdyn_text, only: quoted, rounded_text, string_t
   implicit none (type, external)
   private
 
-  public :: check_limit, limited_kind, limited_signal
+  public :: check_limit, derating, limited_kind, limited_signal
 
 contains
 
@@ -40,7 +41,35 @@ contains
     end if
   end function limited_signal
 
-  !> Refuses limits of elements that there are not.
+  !> The factor of the limits of moments at the temperature of a coupling; below the lowest temperature the one there.
+  pure real(wp) function derating(group) result(factor)
+    type(group_t), intent(in) :: group   !! &limit
+    integer :: i
+
+    factor = 1.0_wp
+    if (.not. group%has_value('temperature')) return
+    associate (x => group%numbers('derating_temperatures'), y => group%numbers('derating_factors'), &
+               temperature => group%number('temperature'))
+      i = min(max(count(x <= temperature), 1), size(x) - 1)
+      factor = y(i) + (y(i + 1) - y(i)) * min(max((temperature - x(i)) / (x(i + 1) - x(i)), 0.0_wp), 1.0_wp)
+    end associate
+  end function derating
+
+  !> Refuses temperatures above the ones whose factors are known.
+  subroutine check_temperature(input, index, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    type(diagnostics_t), intent(inout) :: diagnostics
+    real(wp) :: highest
+
+    if (.not. input%groups(index)%has_value('temperature')) return
+    highest = maxval(input%groups(index)%numbers('derating_temperatures'))
+    if (input%groups(index)%number('temperature') <= highest) return
+    call input%report(index, 'temperature', 'temperature: there is no factor of it; allowed: up to ' // &
+                      rounded_text(highest, 6) // ' degC, the highest one of derating_temperatures', diagnostics)
+  end subroutine check_temperature
+
+  !> Refuses limits of elements that there are not, and at temperatures that are too high.
   subroutine check_limit(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
@@ -52,6 +81,7 @@ contains
     integer, allocatable :: groups(:)
     integer :: i
 
+    call check_temperature(input, index, diagnostics)
     kind = limited_kind(input%groups(index))
     allocate (groups, source=input%groups_named(trim(kind)))
     allocate (names(size(groups)))

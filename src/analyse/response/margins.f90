@@ -4,13 +4,14 @@ module nocdyn_margins
   use nocdyn_critical_speeds, only: crossing_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
+  use nocdyn_limit_rules, only: margin_of
   use nocdyn_machine, only: machine_t
   use nocdyn_response_settings, only: response_settings_t
   use nocdyn_mode_branches, only: speed_modes_t
   use nocdyn_text, only: quoted, rounded_text, to_text
   use nocdyn_units, only: from_si, unit_rpm
   use nocdyn_unstable_speeds, only: unstable_speed_t
-  use nocdyn_verdicts, only: is_kept, is_not_assessed, is_restricted, new_verdict_line, verdict_line_t, verdict_t
+  use nocdyn_verdicts, only: is_exceeded, is_kept, is_not_assessed, is_restricted, new_verdict_line, verdict_line_t, verdict_t
   implicit none (type, external)
   private
 
@@ -98,7 +99,9 @@ contains
     type(verdict_t), intent(inout) :: verdict
     type(verdict_line_t) :: line
 
-    if (size(settings%operating) == 0 .or. .not. is_too_near(settings, distance)) return
+    if (size(settings%operating) == 0) return
+    if (settings%has_margin_rule) call add_margin(analysis, settings, crossing, order, distance, ratio, element, verdict)
+    if (settings%has_margin_rule .or. .not. is_too_near(settings, distance)) return
     call start_critical(analysis, settings, crossing, distance, line)
     line%detail = 'order ' // order
     line%finding = is_not_assessed
@@ -116,7 +119,33 @@ contains
     call verdict%add(line)
   end subroutine add_critical
 
-  !> If all critical speeds are far enough from operation, the nearest one.
+  !> A critical speed against the margin that a rule asks for; the arguments are those of `add_critical`.
+  subroutine add_margin(analysis, settings, crossing, order, distance, ratio, element, verdict)
+    character(len=*), intent(in) :: analysis, order, element
+    type(response_settings_t), intent(in) :: settings
+    type(crossing_t), intent(in) :: crossing
+    real(wp), intent(in) :: distance, ratio
+    type(verdict_t), intent(inout) :: verdict
+    type(verdict_line_t) :: line
+    real(wp) :: margin
+
+    margin = margin_of(settings%margin_rule, crossing%frequency / abs(crossing%speed))
+    call start_critical(analysis, settings, crossing, distance, line)
+    line%rule = settings%margin_rule%label
+    line%limit = percent * margin
+    line%detail = 'order ' // order
+    line%finding = is_kept
+    if (distance < margin) then
+      line%finding = is_exceeded
+      line%reason = 'too near to operation'
+      if (distance <= 0) line%reason = 'in operation'
+      if (ratio > 0) line%reason = line%reason // '; the response of ' // quoted(element) // ' has ' // &
+                                   rounded_text(percent * ratio, 3) // ' % of its limit'
+    end if
+    call verdict%add(line)
+  end subroutine add_margin
+
+  !> If all critical speeds are far enough from operation, the nearest one; a rule has a line for each.
   subroutine add_nearest(analysis, settings, modes, crossings, verdict)
     character(len=*), intent(in) :: analysis   !! 'response', 'campbell'
     type(response_settings_t), intent(in) :: settings
@@ -127,7 +156,7 @@ contains
     real(wp) :: distance(size(crossings))
     integer :: i, nearest
 
-    if (size(settings%operating) == 0) return
+    if (size(settings%operating) == 0 .or. settings%has_margin_rule) return
     distance = [(operating_distance(settings, crossings(i)%speed), i=1, size(crossings))]
     nearest = minloc(distance, dim=1, mask=[(.not. modes%is_electrical(crossings(i)%mode), i=1, size(crossings))])
     if (nearest == 0) return

@@ -16,8 +16,8 @@ module nocdyn_response_analysis
   use nocdyn_response_choice, only: choose_quantities, choose_shown, find_couplings
   use nocdyn_response_fatigue, only: find_response_fatigue, response_fatigue_t
   use nocdyn_response_limits, only: read_limits, response_limit_t
-  use nocdyn_response_notes, only: note_linear_ranges, note_overloads, note_rated_speeds, note_shaft_modes, note_separation, &
-    note_simplifications, note_steady_states
+  use nocdyn_response_notes, only: note_linear_ranges, note_overloads, note_rated_speeds, note_rules, note_shaft_modes, &
+    note_separation, note_simplifications, note_steady_states
   use nocdyn_response_points, only: keep_points
   use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
   use nocdyn_state_modes, only: most_coordinates
@@ -98,6 +98,7 @@ contains
       call note_linear_ranges(self%response, self%notes)
       call note_overloads(self%response, self%notes)
       call note_rated_speeds(input, self%settings, self%notes)
+      call note_rules(self%limits, self%notes)
     end if
     call system_clock(ended)
     self%wall_time = real(ended - began, wp) / real(rate, wp)

@@ -429,6 +429,7 @@ contains
         call json%put('limit_at', input%place(limit%group, ''))
         call json%put('from_rad_s', range%from)
         call json%put('to_rad_s', range%to)
+        if (range%has_tolerance) call json%put('with_tolerance_rad_s', range%barred)
         call json%put('can_be_passed', range%can_be_passed)
         call json%put('is_allowed', range%is_allowed)
         call json%close()

@@ -1,24 +1,18 @@
-!> Limits of moments and stresses, by &limit: curves over the speed, and the ratio of a response to them.
-!>
-!> The rule 'iacs_m68' is IACS Unified Requirement M68, Dimensions of propulsion shafts and their permissible torsional vibration
-!> stresses: with lambda = speed / rated speed, the shear stress amplitude for continuous operation [N/mm2] is
-!>   tau_C = (sigma_B + 160) / 18 c_K c_D (3 - 2 lambda^2) for lambda < 0.9, ... 1.38 for 0.9 <= lambda < 1.05,
-!> with c_D = 0.35 + 0.93 d^(-0.2), d in mm; for passing through quickly it is tau_T = 1.7 tau_C / sqrt(c_K), for lambda < 0.8:
-!> from there on the rule accepts no restricted range of speeds in normal operation.
+!> Limits of moments and stresses, by &limit and its rules: curves over the speed, and the ratio of a response to them.
 module nocdyn_response_limits
   use nocdyn_errors, only: add_error, error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_limit_groups, only: limited_kind, limited_signal
+  use nocdyn_limit_groups, only: derating, limited_kind, limited_signal
+  use nocdyn_limit_rules, only: bind_rule, limit_rule_t, load_rule
   use nocdyn_moment_forms, only: moment_form_t
   use nocdyn_signals, only: find_signal, signal_t
-  use nocdyn_text, only: quoted, rounded_text
+  use nocdyn_text, only: quoted, string_t
   implicit none (type, external)
   private
 
   public :: read_limits
 
-  real(wp), parameter :: mega = 1.0e6_wp, milli = 1.0e-3_wp
   real(wp), parameter, public :: no_limit = huge(1.0_wp)
 
   !> The limits of one quantity, in its unit.
@@ -28,12 +22,14 @@ module nocdyn_response_limits
     real(wp), private :: vibratory = no_limit         !! of the half range
     real(wp), private :: peak = no_limit              !! of the largest magnitude, with the mean
     real(wp), private :: transient = no_limit         !! of the half range while a speed is passed
+    real(wp) :: heat = no_limit                       !! of the element [W]
+    real(wp), allocatable :: frequency(:)             !! of a curve of amplitudes, ascending [rad/s]
+    real(wp), allocatable :: amplitude(:)             !! that each line may have there
     logical, private :: has_rule = .false.
-    real(wp), private :: tensile_strength = 0.0_wp    !! sigma_B [Pa]
-    real(wp), private :: c_k = 1.0_wp, diameter = 0.0_wp, rated = 0.0_wp   !! [1], [m], [rad/s]
+    type(limit_rule_t), private :: rule
   contains
     procedure :: continuous_limit, transient_limit, peak_limit, ratio, allows_passing, has_continuous, has_transient
-    procedure :: write_rule, write_place
+    procedure :: amplitude_limit, has_tolerance, find_barred, list_notes, write_rule, write_place, write_unbarred
   end type response_limit_t
 
 contains
@@ -62,12 +58,20 @@ contains
       call add_stress_limits(input, groups(i), trim(kind), signals, limits, own)
       if (size(limits) == before .and. .not. (allocated(own) .or. input%groups(groups(i))%has_value('quantity'))) then
         call raise(own, exit_input, input%location(groups(i)) // ': nothing is limited; needed: ' // &
-                   trim(merge('vibratory_force or force                                  ', &
-                              'vibratory_moment, moment, stress, stress_transient or rule', kind == 'mesh')))
+                   needed_keys(trim(kind)))
       end if
       call add_error(error, own)
     end do
   end subroutine read_limits
+
+  !> The keys of which &limit needs one.
+  pure function needed_keys(kind) result(keys)
+    character(len=*), intent(in) :: kind   !! of the element
+    character(len=:), allocatable :: keys
+
+    keys = 'vibratory_moment, moment, stress, stress_transient, rule, rule_file, heat or vibratory_frequency'
+    if (kind == 'mesh') keys = 'vibratory_force or force'
+  end function needed_keys
 
   !> A limit of the moment of a coupling or shaft, the force of a mesh or a named quantity, if it is linear in the motion.
   subroutine add_limit(group, index, signals, limits)
@@ -79,18 +83,25 @@ contains
     character(len=*), parameter :: peak(*) = [character(len=7) :: 'moment', 'force', 'largest']
     type(response_limit_t) :: limit
     integer :: k
+    real(wp) :: factor
 
     limit%group = index
     do k = 1, size(peak)
       limit%vibratory = min(limit%vibratory, group%number(trim(vibratory(k)), absent=no_limit))
       limit%peak = min(limit%peak, group%number(trim(peak(k)), absent=no_limit))
     end do
-    if (min(limit%vibratory, limit%peak) >= no_limit) return
+    factor = derating(group)
+    if (limit%vibratory < no_limit) limit%vibratory = factor * limit%vibratory
+    if (limit%peak < no_limit) limit%peak = factor * limit%peak
+    limit%heat = group%number('heat', absent=no_limit)
+    limit%frequency = group%numbers('vibratory_frequency')
+    limit%amplitude = factor * group%numbers('vibratory_moments')
+    if (min(limit%vibratory, limit%peak, limit%heat) >= no_limit .and. size(limit%frequency) == 0) return
     limit%quantity = limited_signal(group, signals)
-    if (limit%quantity > 0) limits = [limits, limit]
+    if (limit%quantity > 0) call add_one(limit, limits)
   end subroutine add_limit
 
-  !> Limits of its stress.
+  !> Limits of its stress, or of what its rule limits.
   subroutine add_stress_limits(input, index, kind, signals, limits, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
@@ -98,59 +109,85 @@ contains
     type(signal_t), intent(in) :: signals(:)   !! of the quantities
     type(response_limit_t), allocatable, intent(inout) :: limits(:)
     type(error_t), allocatable, intent(out) :: error
+    character(len=*), parameter :: keys(*) = [character(len=16) :: 'rule', 'rule_file', 'stress', 'stress_transient']
     type(response_limit_t) :: limit
-    character(len=:), allocatable :: key
+    character(len=:), allocatable :: quantity
+    integer :: k
 
     associate (group => input%groups(index))
-      key = ''
-      if (group%has_value('stress_transient')) key = 'stress_transient'
-      if (group%has_value('stress')) key = 'stress'
-      if (group%has_value('rule')) key = 'rule'
-      if (key == '') return
-      limit%quantity = find_signal(signals, kind, group%text(kind), 'stress')
+      do k = 1, size(keys)
+        if (group%has_value(trim(keys(k)))) exit
+      end do
+      if (k > size(keys)) return
+      quantity = 'stress'
+      limit%has_rule = k <= 2
+      if (limit%has_rule) then
+        call load_rule(input, index, '', limit%rule%rule, error)
+        if (allocated(error)) return
+        quantity = limit%rule%rule%quantity
+      end if
+      limit%quantity = find_signal(signals, kind, group%text(kind), quantity)
+      if (limit%quantity == 0) limit%quantity = find_signal(signals, kind, group%text(kind), quantity, 'max')
       if (limit%quantity == 0) then
-        call raise(error, exit_input, input%location(index, key) // ': ' // key // ' limits a stress, but ' // &
-                   quoted(group%text(kind)) // ' has none; required: section_modulus [m3] or diameter [m] of &coupling')
+        call refuse_quantity(input, index, trim(keys(k)), kind, quantity, error)
         return
       end if
       limit%group = index
       limit%vibratory = group%number('stress', absent=no_limit)
       limit%transient = group%number('stress_transient', absent=no_limit)
-      if (key == 'rule') call set_rule(input, index, kind, limit, error)
+      if (limit%has_rule) call bind_rule(input, index, diameter_of(input, index, kind), limit%rule, error)
     end associate
-    limits = [limits, limit]
+    if (.not. allocated(error)) call add_one(limit, limits)
   end subroutine add_stress_limits
 
-  !> The numbers of the rule iacs_m68.
-  subroutine set_rule(input, index, kind, limit, error)
+  !> A limit of a quantity that the element does not have.
+  subroutine refuse_quantity(input, index, key, kind, quantity, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
-    character(len=*), intent(in) :: kind
-    type(response_limit_t), intent(inout) :: limit
+    character(len=*), intent(in) :: key, kind, quantity
     type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: name
+
+    name = quoted(input%groups(index)%text(kind))
+    if (quantity == 'stress') then
+      call raise(error, exit_input, input%location(index, key) // ': ' // key // ' limits a stress, but ' // name // &
+                 ' has none; required: section_modulus [m3] or diameter [m] of &coupling')
+    else
+      call raise(error, exit_input, input%location(index, key) // ': the rule limits ' // quoted(quantity) // ', but ' // &
+                 kind // ' ' // name // ' has no such quantity in a response; allowed: a kind in columns.json')
+    end if
+  end subroutine refuse_quantity
+
+  !> The diameter of a coupling, or the smallest one of a shaft [m]; 0 if it is not given.
+  real(wp) function diameter_of(input, index, kind) result(diameter)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group &limit
+    character(len=*), intent(in) :: kind
     integer, allocatable :: groups(:)
     integer :: i
-    real(wp) :: diameter
 
-    associate (group => input%groups(index))
-      limit%has_rule = .true.
-      limit%tensile_strength = group%number('tensile_strength')
-      limit%c_k = group%number('c_k')
-      ! the diameter of a coupling, or the smallest one of a shaft [m]; 0 if it is not given
-      diameter = 0.0_wp
-      allocate (groups, source=input%groups_named(kind))
-      do i = 1, size(groups)
-        if (input%groups(groups(i))%name /= group%text(kind)) cycle
-        if (kind == 'coupling') diameter = input%groups(groups(i))%number('diameter', absent=0.0_wp)
-        if (kind == 'shaft') diameter = minval(input%groups(groups(i))%numbers('diameters'))
-      end do
-      limit%diameter = group%number('diameter', absent=diameter)
-      limit%rated = abs(group%number('rated_speed'))
-      if (limit%diameter > 0) return
-      call raise(error, exit_input, input%location(index, 'rule') // ': the rule iacs_m68 needs a diameter [m], of &limit ' // &
-                 'or of &' // kind // ' ' // quoted(group%text(kind)))
-    end associate
-  end subroutine set_rule
+    diameter = 0.0_wp
+    allocate (groups, source=input%groups_named(kind))
+    do i = 1, size(groups)
+      if (input%groups(groups(i))%name /= input%groups(index)%text(kind)) cycle
+      if (kind == 'coupling') diameter = input%groups(groups(i))%number('diameter', absent=0.0_wp)
+      if (kind == 'shaft') diameter = minval(input%groups(groups(i))%numbers('diameters'))
+    end do
+  end function diameter_of
+
+  subroutine add_one(limit, limits)
+    type(response_limit_t), intent(in) :: limit
+    type(response_limit_t), allocatable, intent(inout) :: limits(:)
+    type(response_limit_t), allocatable :: longer(:)
+    integer :: i
+
+    allocate (longer(size(limits) + 1))
+    do i = 1, size(limits)
+      longer(i) = limits(i)
+    end do
+    longer(size(longer)) = limit
+    call move_alloc(longer, limits)
+  end subroutine add_one
 
   !> The limit of the half range in continuous operation at a speed, in the unit of the quantity.
   elemental real(wp) function continuous_limit(self, speed) result(limit)
@@ -158,7 +195,7 @@ contains
     real(wp), intent(in) :: speed   !! of the reference body [rad/s]
 
     limit = self%vibratory
-    if (self%has_rule) limit = min(limit, m68_stress(self, speed))
+    if (self%has_rule) limit = min(limit, self%rule%continuous_at(speed))
   end function continuous_limit
 
   !> The limit of the half range while a speed is passed; without one, `no_limit`.
@@ -168,10 +205,10 @@ contains
 
     limit = self%transient
     if (.not. self%has_rule) return
-    if (self%allows_passing(speed)) then
-      limit = min(limit, 1.7_wp * m68_stress(self, speed) / sqrt(self%c_k))
-    else
-      limit = min(limit, m68_stress(self, speed))
+    if (.not. self%rule%bars_at(speed)) then
+      limit = min(limit, self%rule%continuous_at(speed))
+    else if (self%rule%rule%transient%is_given()) then
+      limit = min(limit, self%rule%transient_at(speed))
     end if
   end function transient_limit
 
@@ -179,11 +216,22 @@ contains
   elemental logical function allows_passing(self, speed)
     class(response_limit_t), intent(in) :: self
     real(wp), intent(in) :: speed   !! [rad/s]
-    real(wp), parameter :: share = 0.8_wp   ! of the rated speed
 
     allows_passing = .true.
-    if (self%has_rule) allows_passing = abs(speed) < share * self%rated
+    if (self%has_rule) allows_passing = self%rule%bars_at(speed)
   end function allows_passing
+
+  !> The amplitude that one line may have at a frequency; beyond the ends of the curve it is that of the end.
+  elemental real(wp) function amplitude_limit(self, frequency) result(limit)
+    class(response_limit_t), intent(in) :: self   !! with a curve
+    real(wp), intent(in) :: frequency             !! [rad/s]
+    integer :: i
+
+    associate (x => self%frequency, y => self%amplitude)
+      i = min(max(count(x <= frequency), 1), size(x) - 1)
+      limit = y(i) + (y(i + 1) - y(i)) * min(max((frequency - x(i)) / (x(i + 1) - x(i)), 0.0_wp), 1.0_wp)
+    end associate
+  end function amplitude_limit
 
   !> The limit of the largest magnitude, with the mean.
   elemental real(wp) function peak_limit(self) result(limit)
@@ -203,7 +251,8 @@ contains
   elemental logical function has_transient(self)
     class(response_limit_t), intent(in) :: self
 
-    has_transient = self%has_rule .or. self%transient < no_limit
+    has_transient = self%transient < no_limit
+    if (self%has_rule) has_transient = has_transient .or. self%rule%rule%transient%is_given()
   end function has_transient
 
   !> The rule that the limit for continuous operation comes from, '' if it is the user's own.
@@ -212,7 +261,7 @@ contains
     character(len=:), allocatable, intent(out) :: text
 
     text = ''
-    if (self%has_rule) text = 'IACS UR M68'
+    if (self%has_rule) text = self%rule%rule%label
   end subroutine write_rule
 
   !> A speed in the terms of the rule, "lambda 0.84"; '' without a rule.
@@ -222,20 +271,42 @@ contains
     character(len=:), allocatable, intent(out) :: text
 
     text = ''
-    if (self%has_rule) text = 'lambda ' // rounded_text(abs(speed) / self%rated, 2)
+    if (self%has_rule) call self%rule%write_place(speed, text)
   end subroutine write_place
 
-  !> tau_C [Pa].
-  elemental real(wp) function m68_stress(self, speed) result(stress)
-    type(response_limit_t), intent(in) :: self
-    real(wp), intent(in) :: speed
-    real(wp) :: lambda
+  !> Whether a rule says which speeds about a critical one are to be barred.
+  elemental logical function has_tolerance(self)
+    class(response_limit_t), intent(in) :: self
 
-    lambda = abs(speed) / self%rated
-    stress = mega * (self%tensile_strength / mega + 160.0_wp) / 18.0_wp * self%c_k &
-             * (0.35_wp + 0.93_wp * (self%diameter / milli)**(-0.2_wp)) &
-             * merge(3.0_wp - 2.0_wp * lambda**2, 1.38_wp, lambda < 0.9_wp)
-  end function m68_stress
+    has_tolerance = .false.
+    if (self%has_rule) has_tolerance = self%rule%has_tolerance()
+  end function has_tolerance
+
+  !> Widens a range of speeds that exceeds the limit to the one that the rule bars.
+  pure subroutine find_barred(self, critical, from, to)
+    class(response_limit_t), intent(in) :: self   !! which has a tolerance
+    real(wp), intent(in) :: critical              !! speed of the largest ratio in the range [rad/s]
+    real(wp), intent(inout) :: from, to           !! [rad/s]
+
+    call self%rule%find_barred(critical, from, to)
+  end subroutine find_barred
+
+  !> "0.8", the speed ratio from which the rule accepts no barred range.
+  pure subroutine write_unbarred(self, text)
+    class(response_limit_t), intent(in) :: self
+    character(len=:), allocatable, intent(out) :: text
+
+    call self%rule%write_unbarred(text)
+  end subroutine write_unbarred
+
+  !> What is said of numbers outside of the ranges of the rule.
+  pure subroutine list_notes(self, notes)
+    class(response_limit_t), intent(in) :: self
+    type(string_t), allocatable, intent(out) :: notes(:)
+
+    allocate (notes(0))
+    if (self%has_rule) notes = self%rule%notes
+  end subroutine list_notes
 
   !> The largest ratio of a response to its limits for continuous operation.
   elemental real(wp) function ratio(self, speed, half_range, peak)

@@ -14,6 +14,7 @@ module nocdyn_response_notes
   use nocdyn_moment_forms, only: kind_reaction, moment_form_t
   use nocdyn_power_notes, only: note_power_signs
   use nocdyn_response_choice, only: has_gap, lose_of
+  use nocdyn_response_limits, only: response_limit_t
   use nocdyn_response_settings, only: response_settings_t
   use nocdyn_shaft_errors, only: describe_error, has_shaft_nodes, noted_error, shaft_error
   use nocdyn_mode_branches, only: speed_modes_t
@@ -25,7 +26,8 @@ module nocdyn_response_notes
   implicit none (type, external)
   private
 
-  public :: note_simplifications, note_steady_states, note_separation, note_linear_ranges, note_overloads, note_rated_speeds
+  public :: note_simplifications, note_steady_states, note_separation, note_linear_ranges, note_overloads, note_rated_speeds, &
+    note_rules
   public :: note_shaft_modes
 
 contains
@@ -323,5 +325,20 @@ contains
                          rounded_text(highest, 5) // ' rpm')
     end do
   end subroutine note_rated_speeds
+
+  !> Numbers outside of the ranges of rules.
+  subroutine note_rules(limits, notes)
+    type(response_limit_t), intent(in) :: limits(:)
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    type(string_t), allocatable :: own(:)
+    integer :: i, k
+
+    do i = 1, size(limits)
+      call limits(i)%list_notes(own)
+      do k = 1, size(own)
+        call append(notes, own(k)%text)
+      end do
+    end do
+  end subroutine note_rules
 
 end module nocdyn_response_notes

@@ -4,9 +4,11 @@ module nocdyn_response_settings
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
+  use nocdyn_limit_rules, only: load_rule
   use nocdyn_machine, only: machine_t
   use nocdyn_response_limits, only: read_limits, response_limit_t
   use nocdyn_moment_forms, only: list_moment_forms, moment_form_t
+  use nocdyn_rule_files, only: rule_t
   use nocdyn_text, only: counted, rounded_text
   use nocdyn_units, only: from_si, unit_rpm
   implicit none (type, external)
@@ -21,6 +23,8 @@ module nocdyn_response_settings
     real(wp), allocatable :: orders(:)          !! oscillations per turn of the body; empty: the ones of the excitations
     real(wp), allocatable :: operating(:)       !! lowest and highest speed in operation [rad/s]; empty: unknown
     real(wp) :: margin = 0.0_wp                 !! as a share of the speed
+    logical :: has_margin_rule = .false.
+    type(rule_t) :: margin_rule                 !! with the margin of each critical speed
   end type response_settings_t
 
 contains
@@ -48,6 +52,7 @@ contains
       settings%orders = group%numbers('orders')
       settings%operating = group%numbers('operating')
       settings%margin = group%number('margin', absent=0.0_wp)
+      settings%has_margin_rule = group%has_value('margin_rule') .or. group%has_value('margin_rule_file')
       count = group%whole_number('count')
       range = group%numbers('speed')
     end associate
@@ -56,6 +61,7 @@ contains
       settings%speeds = [(range(1) + (last - range(1)) * (real(i, wp) / max(1, count - 1)), i=0, count - 1)]
       settings%speeds(count) = last
     end associate
+    if (settings%has_margin_rule) call load_rule(input, groups(1), 'margin_', settings%margin_rule, error)
   end subroutine read_response_settings
 
   !> Checks &response and &limit, if there are any.

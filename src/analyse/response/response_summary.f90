@@ -44,6 +44,8 @@ module nocdyn_response_summary
     logical :: can_be_passed = .true.           !! whether the limit for passing them quickly is kept
     logical :: is_allowed = .true.              !! whether the rule of the limit accepts a barred range there
     integer :: worst = 0                        !! point with the largest ratio to the limit
+    logical :: has_tolerance = .false.          !! whether the rule widens the range
+    real(wp) :: barred(2) = 0.0_wp              !! the widened range [rad/s]
   end type barred_range_t
 
   type, public :: response_summary_t
@@ -190,6 +192,9 @@ contains
           if (i > size(points)) exit
           if (excess(i) <= 0) exit
         end do
+        range%barred = [range%from, range%to]
+        range%has_tolerance = limit%has_tolerance()
+        if (range%has_tolerance) call limit%find_barred(speed(range%worst), range%barred(1), range%barred(2))
         barred = [barred, range]
       end if
       i = i + 1

@@ -13,6 +13,7 @@ module nocdyn_response_verdict
   use nocdyn_response_points, only: response_point_t
   use nocdyn_response_summary, only: barred_range_t, response_summary_t
   use nocdyn_text, only: quoted, rounded_text
+  use nocdyn_units, only: from_si, unit_hz, unit_rpm
   use nocdyn_verdicts, only: in_words, is_exceeded, is_not_assessed, is_restricted, new_verdict_line, verdict_line_t, verdict_t
   implicit none (type, external)
   private
@@ -33,6 +34,8 @@ contains
       call add_continuous(input, analysis, summary, i, verdict)
       call add_transient(input, analysis, i, verdict)
       call add_peak(input, analysis, i, verdict)
+      call add_heat(input, analysis, i, verdict)
+      call add_curve(input, analysis, i, verdict)
     end do
     call add_other_limits(input, analysis, verdict)
     call add_fatigue(analysis, verdict)
@@ -75,6 +78,7 @@ contains
     type(barred_range_t), intent(in) :: range
     real(wp), intent(in) :: operating(:)   !! speeds in operation [rad/s]; empty: unknown
     type(verdict_line_t), intent(inout) :: line
+    character(len=:), allocatable :: share
     logical :: is_outside
 
     is_outside = .false.
@@ -85,7 +89,8 @@ contains
     line%speeds = 2
     line%speed = [range%from, range%to]
     if (.not. range%is_allowed) then
-      line%reason = 'not allowed by ' // line%rule // ' from lambda 0.8 on'
+      call limit%write_unbarred(share)
+      line%reason = 'not allowed by ' // line%rule // ' from lambda ' // share // ' on'
     else if (.not. limit%has_transient() .and. .not. is_outside) then
       line%reason = 'no limit for passing the range is given'
     else if (.not. limit%has_transient() .and. limit%peak_limit() < no_limit) then
@@ -99,8 +104,17 @@ contains
     else
       line%finding = is_restricted
       line%reason = 'barred, to be passed quickly'
+      if (range%has_tolerance) line%reason = line%reason // '; with the tolerance of the tachometer ' // range_text(range%barred)
     end if
   end subroutine judge_range
+
+  !> "50.3 to 56.6 rpm"
+  function range_text(speeds) result(text)
+    real(wp), intent(in) :: speeds(2)   !! [rad/s]
+    character(len=:), allocatable :: text
+
+    text = rounded_text(from_si(speeds(1), unit_rpm), 4) // ' to ' // rounded_text(from_si(speeds(2), unit_rpm), 4) // ' rpm'
+  end function range_text
 
   !> The limit for passing speeds quickly, where that is accepted.
   subroutine add_transient(input, analysis, number, verdict)
@@ -144,6 +158,66 @@ contains
       call verdict%add(line)
     end associate
   end subroutine add_peak
+
+  !> The mean power that the element loses by its oscillation.
+  subroutine add_heat(input, analysis, number, verdict)
+    type(input_t), intent(in) :: input
+    type(response_analysis_t), intent(in) :: analysis
+    integer, intent(in) :: number   !! of the limit
+    type(verdict_t), intent(inout) :: verdict
+    type(verdict_line_t) :: line
+    real(wp) :: heat(size(analysis%response%points))
+    integer :: i, worst
+
+    associate (limit => analysis%limits(number), points => analysis%response%points)
+      if (limit%heat >= no_limit) return
+      heat = [(sum(points(i)%heat(analysis%response%quantities(limit%quantity)%elements)), i=1, size(points))]
+      worst = maxloc(heat, dim=1)
+      call start_line(input, analysis, number, '', line)
+      line%quantity = 'heat'
+      line%criterion = 'heat'
+      call line%compare(heat(worst), limit%heat, 'W')
+      line%speeds = 1
+      line%speed(1) = points(worst)%state%speed
+      call verdict%add(line)
+    end associate
+  end subroutine add_heat
+
+  !> The amplitude of the order that comes nearest to a curve over the frequency.
+  subroutine add_curve(input, analysis, number, verdict)
+    type(input_t), intent(in) :: input
+    type(response_analysis_t), intent(in) :: analysis
+    integer, intent(in) :: number   !! of the limit
+    type(verdict_t), intent(inout) :: verdict
+    type(verdict_line_t) :: line
+    real(wp) :: largest, ratio
+    integer :: i, k, worst(2)
+
+    associate (limit => analysis%limits(number), points => analysis%response%points)
+      if (.not. allocated(limit%frequency)) return
+      if (size(limit%frequency) == 0) return
+      largest = -1.0_wp
+      do i = 1, size(points)
+        do k = 1, size(points(i)%frequency)
+          ratio = abs(points(i)%quantity(k, limit%quantity)) / limit%amplitude_limit(points(i)%frequency(k))
+          if (ratio <= largest) cycle
+          largest = ratio
+          worst = [i, k]
+        end do
+      end do
+      if (largest < 0) return
+      call start_line(input, analysis, number, 'of one order over the frequency', line)
+      associate (point => points(worst(1)), frequency => points(worst(1))%frequency(worst(2)))
+        call line%compare(abs(point%quantity(worst(2), limit%quantity)), limit%amplitude_limit(frequency), line%unit)
+        line%speeds = 1
+        line%speed(1) = point%state%speed
+        line%detail = 'order ' // analysis%response%lines(worst(2))%word() // ', ' // &
+                      rounded_text(from_si(frequency, unit_hz), 4) // ' Hz'
+      end associate
+      line%rule = ''
+      call verdict%add(line)
+    end associate
+  end subroutine add_curve
 
   !> The limits of quantities that no response has.
   subroutine add_other_limits(input, analysis, verdict)

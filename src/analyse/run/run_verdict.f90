@@ -4,7 +4,7 @@
 module nocdyn_run_verdict
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_limit_groups, only: limited_kind, limited_signal
+  use nocdyn_limit_groups, only: derating, limited_kind, limited_signal
   use nocdyn_run_fatigue, only: run_fatigue_t
   use nocdyn_signals, only: signal_t
   use nocdyn_text, only: quoted, rounded_text, string_t
@@ -15,8 +15,8 @@ module nocdyn_run_verdict
   public :: add_damage, add_end, add_run_limits
 
   character(len=*), parameter :: peak_keys(*) = [character(len=7) :: 'moment', 'force', 'largest']   ! of the largest magnitude
-  character(len=*), parameter :: steady_keys(*) = [character(len=16) :: 'vibratory_moment', 'vibratory_force', 'vibratory', &
-                                                                        'stress', 'stress_transient', 'rule']
+  character(len=*), parameter :: steady_keys(*) = [character(len=19) :: 'vibratory_moment', 'vibratory_frequency', &
+    'vibratory_force', 'vibratory', 'stress', 'stress_transient', 'rule', 'rule_file', 'heat']
 
   !> An extreme of a column.
   type, public :: column_extreme_t
@@ -67,7 +67,8 @@ contains
       line%reason = 'the run has no such quantity'
     else
       line%quantity = signals(column)%name
-      call line%compare(extremes(column)%size, input%groups(index)%number(key), signals(column)%unit)
+      call line%compare(extremes(column)%size, derating(input%groups(index)) * input%groups(index)%number(key), &
+                        signals(column)%unit)
       line%has_time = .true.
       line%time = extremes(column)%time
       if (extremes(column)%is_of_start) line%detail = 'in the first transient of the start'
@@ -101,7 +102,7 @@ contains
     associate (group => input%groups(index))
       criterion = in_words(key)
       if (any(key == ['largest  ', 'vibratory'])) criterion = in_words(group%text('quantity'))
-      if (key == 'rule') criterion = 'stress'
+      if (any(key == ['rule     ', 'rule_file'])) criterion = 'stress'
       line = new_verdict_line('run', kind // ' ' // quoted(group%text(kind)), '', &
                               criterion // trim(merge(', steady ', ', largest', any(key == steady_keys))), input%place(index, ''))
     end associate

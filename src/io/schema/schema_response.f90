@@ -1,16 +1,16 @@
 !> Rows of the schema: the forced response and what is judged by it, &response, &limit and &fatigue.
 module nocdyn_schema_response
   use nocdyn_kinds, only: wp
-  use nocdyn_schema_rules, only: a_body, a_name, a_number, a_text, a_word, allowed_t, an_integer, any_number, any_times, &
-    anything, at_most_once, at_most_one, equal_lengths, exactly_one, example_t, from_1, group_rule_t, in_torsional, key_rule_t, &
-    not_negative, not_zero, positive, relation_rule_t, required, requires, unset
+  use nocdyn_schema_rules, only: a_body, a_file, a_line_file, a_name, a_number, a_text, a_word, allowed_t, an_integer, &
+    any_number, any_times, anything, at_most_once, at_most_one, equal_lengths, exactly_one, example_t, from_1, group_rule_t, &
+    in_torsional, key_rule_t, not_negative, not_zero, positive, relation_rule_t, required, requires, unset
   implicit none (type, external)
   private
 
   type(allowed_t), parameter :: speed_counts = allowed_t(low=2.0_wp, high=1.0e6_wp)
-  type(allowed_t), parameter :: rules = allowed_t(words='iacs_m68')
+  type(allowed_t), parameter :: rules = allowed_t(words='iacs_m68 iacs_m53 kr_crankshaft kr_generator')
+  type(allowed_t), parameter :: margin_rules = allowed_t(words='api_617')
   type(allowed_t), parameter :: formats = allowed_t(words='csv netcdf')
-  type(allowed_t), parameter :: strengths = allowed_t(low=4.0e8_wp, high=8.0e8_wp)
   type(allowed_t), parameter :: factors = allowed_t(low=0.1_wp, high=1.5_wp)
   type(allowed_t), parameter :: margins = allowed_t(low=0.0_wp, high=0.9_wp)
   type(allowed_t), parameter :: mean_stresses = allowed_t(words='none goodman gerber soderberg')
@@ -38,12 +38,30 @@ module nocdyn_schema_response
     key_rule_t('response', 'operating', a_number, 2, 'rad/s', unset, not_zero, 'lowest and highest speed in operation'), &
     key_rule_t('response', 'margin', a_number, 1, '', '0.1', margins, &
       'a critical speed so near to the speeds in operation, as a share of it, is reported'), &
+    key_rule_t('response', 'margin_rule', a_word, 1, '', unset, margin_rules, &
+      'rule with the margin of each critical speed to the speeds in operation: api_617 asks for 10 %'), &
+    key_rule_t('response', 'margin_rule_file', a_line_file, 1, '', unset, anything, 'file of a rule of your own with a margin'), &
+    key_rule_t('response', 'margin_rule_lines', a_text, any_number, '', unset, anything, &
+      'the lines of margin_rule_file, as an input that was written has them'), &
     key_rule_t('limit', 'coupling', a_text, 1, '', unset, anything, 'name of the coupling'), &
     key_rule_t('limit', 'shaft', a_text, 1, '', unset, anything, 'name of the shaft'), &
     key_rule_t('limit', 'mesh', a_text, 1, '', unset, anything, 'name of the mesh'), &
     key_rule_t('limit', 'vibratory_moment', a_number, 1, 'N m', unset, positive, &
       'half range of the moment in continuous operation'), &
     key_rule_t('limit', 'moment', a_number, 1, 'N m', unset, positive, 'largest magnitude of the moment, its mean included'), &
+    key_rule_t('limit', 'vibratory_frequency', a_number, any_number, 'rad/s', unset, positive, &
+      'frequencies of a curve of the moment, ascending', fewest=2, ascends=.true.), &
+    key_rule_t('limit', 'vibratory_moments', a_number, any_number, 'N m', unset, positive, &
+      'amplitude that each order may have at these frequencies; straight between them', fewest=2), &
+    key_rule_t('limit', 'table_file', a_file, 1, '', unset, anything, &
+      'two columns in place of both, frequency [rad/s] and moment [N m]'), &
+    key_rule_t('limit', 'temperature', a_number, 1, 'degC', unset, anything, 'of the coupling, which lowers its moments'), &
+    key_rule_t('limit', 'derating_temperatures', a_number, any_number, 'degC', unset, anything, &
+      'temperatures of the factors of its moments, ascending', fewest=2, ascends=.true.), &
+    key_rule_t('limit', 'derating_factors', a_number, any_number, '', unset, positive, &
+      'factors of the limits of moments at these temperatures; straight between them', fewest=2), &
+    key_rule_t('limit', 'heat', a_number, 1, 'W', unset, positive, &
+      'mean power that the coupling or shaft loses by its oscillation'), &
     key_rule_t('limit', 'vibratory_force', a_number, 1, 'N', unset, positive, &
       'half range of the force of the mesh in continuous operation'), &
     key_rule_t('limit', 'force', a_number, 1, 'N', unset, positive, 'largest magnitude of this force, its mean included'), &
@@ -56,15 +74,24 @@ module nocdyn_schema_response
     key_rule_t('limit', 'vibratory', a_number, 1, '', unset, positive, &
       'half range of the quantity in continuous operation, in its SI unit'), &
     key_rule_t('limit', 'rule', a_word, 1, '', unset, rules, &
-      'stresses by a rule: iacs_m68 is IACS Unified Requirement M68 for propulsion shafts'), &
-    key_rule_t('limit', 'tensile_strength', a_number, 1, 'Pa', unset, strengths, &
+      'limits by a rule: iacs_m68 is IACS Unified Requirement M68 for propulsion shafts'), &
+    key_rule_t('limit', 'rule_file', a_line_file, 1, '', unset, anything, 'file of a rule of your own'), &
+    key_rule_t('limit', 'rule_lines', a_text, any_number, '', unset, anything, &
+      'the lines of rule_file, as an input that was written has them'), &
+    key_rule_t('limit', 'choices', a_text, any_number, '', unset, anything, &
+      "words of the rule, such as 'propeller' for the kind of shaft", fewest=1), &
+    key_rule_t('limit', 'tensile_strength', a_number, 1, 'Pa', unset, positive, &
       'specified minimum tensile strength sigma_B, for the rule'), &
-    key_rule_t('limit', 'c_k', a_number, 1, '', '1', factors, &
+    key_rule_t('limit', 'c_k', a_number, 1, '', unset, factors, &
       'factor of the shape of the shaft in the rule: 1 with integral flanges, 0.6 with keyways, ...'), &
     key_rule_t('limit', 'diameter', a_number, 1, 'm', unset, positive, &
       'outer diameter in the rule; that of the coupling if not given'), &
     key_rule_t('limit', 'rated_speed', a_number, 1, 'rad/s', unset, not_zero, &
       'rated speed of the body of &response, for the rule'), &
+    key_rule_t('limit', 'rule_symbols', a_text, any_number, '', unset, anything, &
+      'further symbols of the rule, as it calls them', fewest=1), &
+    key_rule_t('limit', 'rule_values', a_number, any_number, '', unset, anything, &
+      'their numbers, in the units of the rule', fewest=1), &
     key_rule_t('fatigue', 'name', a_name, 1, '', required, anything, 'name in results and messages'), &
     key_rule_t('fatigue', 'coupling', a_text, 1, '', unset, anything, 'name of the coupling'), &
     key_rule_t('fatigue', 'shaft', a_text, 1, '', unset, anything, 'name of the shaft; its worst section counts'), &
@@ -102,18 +129,30 @@ module nocdyn_schema_response
       'how long the machine runs at each of these speeds', fewest=1)]
 
   type(relation_rule_t), parameter, public :: response_relations(*) = [ &
-    relation_rule_t('response', requires, 'margin', 'operating'), &
+    relation_rule_t('response', requires, 'margin margin_rule margin_rule_file', 'operating'), &
+    relation_rule_t('response', at_most_one, 'margin_rule', 'margin_rule_file'), &
+    relation_rule_t('response', requires, 'margin_rule_lines', 'margin_rule_file'), &
     relation_rule_t('limit', exactly_one, 'coupling shaft', 'mesh'), &
     relation_rule_t('limit', at_most_one, 'coupling', 'shaft'), &
     relation_rule_t('limit', requires, 'vibratory_force force', 'mesh'), &
-    relation_rule_t('limit', requires, 'vibratory_moment moment stress stress_transient rule', 'coupling shaft'), &
+    relation_rule_t('limit', requires, 'vibratory_moment vibratory_frequency vibratory_moments table_file ' // &
+                                       'heat moment stress stress_transient rule rule_file', 'coupling shaft'), &
+    relation_rule_t('limit', equal_lengths, 'derating_temperatures derating_factors', ''), &
+    relation_rule_t('limit', requires, 'temperature', 'derating_temperatures'), &
+    relation_rule_t('limit', requires, 'derating_temperatures', 'temperature'), &
+    relation_rule_t('limit', requires, 'temperature', 'vibratory_moment moment vibratory_frequency table_file'), &
+    relation_rule_t('limit', equal_lengths, 'vibratory_frequency vibratory_moments', 'table_file'), &
+    relation_rule_t('limit', at_most_one, 'vibratory_frequency vibratory_moments', 'table_file'), &
     relation_rule_t('limit', at_most_one, 'quantity', 'vibratory_force force vibratory_moment moment stress ' // &
-                                                      'stress_transient rule'), &
+                                                      'stress_transient rule rule_file heat vibratory_frequency ' // &
+                                                      'table_file'), &
     relation_rule_t('limit', requires, 'largest vibratory', 'quantity'), &
     relation_rule_t('limit', requires, 'quantity', 'largest vibratory'), &
-    relation_rule_t('limit', requires, 'rule', 'tensile_strength'), &
-    relation_rule_t('limit', requires, 'rule', 'rated_speed'), &
-    relation_rule_t('limit', requires, 'tensile_strength rated_speed c_k diameter', 'rule'), &
+    relation_rule_t('limit', at_most_one, 'rule', 'rule_file'), &
+    relation_rule_t('limit', requires, 'rule_lines', 'rule_file'), &
+    relation_rule_t('limit', requires, 'tensile_strength rated_speed c_k diameter choices rule_symbols rule_values', &
+                                       'rule rule_file'), &
+    relation_rule_t('limit', equal_lengths, 'rule_symbols rule_values', ''), &
     relation_rule_t('fatigue', exactly_one, 'coupling shaft', 'mesh gear'), &
     relation_rule_t('fatigue', at_most_one, 'coupling', 'shaft'), &
     relation_rule_t('fatigue', at_most_one, 'mesh', 'gear'), &

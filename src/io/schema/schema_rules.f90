@@ -38,8 +38,9 @@ module nocdyn_schema_rules
   integer, parameter, public :: a_file = 10      !! path of a table file, relative to the folder of the input
   integer, parameter, public :: a_folder = 11    !! path of a folder
   integer, parameter, public :: a_document = 12  !! path of a file that other programs read, relative to the folder of the input
-  character(len=12), parameter, public :: type_nouns(12) = [character(len=12) :: &   !! of `a_text` ... `a_document`
-    'text', 'name', 'body', 'body', 'word', 'number', 'whole number', 'logical', 'word', 'file', 'folder', 'file']
+  integer, parameter, public :: a_line_file = 13 !! path of a text file whose lines are the next key, relative to that folder
+  character(len=12), parameter, public :: type_nouns(13) = [character(len=12) :: &   !! of `a_text` ... `a_line_file`
+    'text', 'name', 'body', 'body', 'word', 'number', 'whole number', 'logical', 'word', 'file', 'folder', 'file', 'file']
 
   ! Relations between two sets of keys, `first` and `second`.
   integer, parameter, public :: exactly_one = 1    !! keys of one set are given; the ones of the other lose their defaults
@@ -83,7 +84,7 @@ module nocdyn_schema_rules
   type, public :: key_rule_t
     character(len=12) :: group
     character(len=22) :: name
-    integer :: value_type          !! `a_text` ... `a_document`
+    integer :: value_type          !! `a_text` ... `a_line_file`
     integer :: count               !! how many values, or `any_number`
     character(len=12) :: unit
     character(len=12) :: default   !! of each value, as written in a file, or `required`, or `unset`

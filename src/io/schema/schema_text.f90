@@ -3,8 +3,8 @@ module nocdyn_schema_text
   use nocdyn_kinds, only: wp
   use nocdyn_schema, only: aliases, first_key, group_aliases, group_rules, has_word, key_rule_index, key_rules, last_key, &
     words_in, words_of
-  use nocdyn_schema_rules, only: a_body, a_document, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_word, allowed_t, &
-    an_integer, any_number, body_or_ground, key_rule_t, type_nouns
+  use nocdyn_schema_rules, only: a_body, a_document, a_file, a_flag, a_folder, a_line_file, a_name, a_number, a_selector, &
+    a_word, allowed_t, an_integer, any_number, body_or_ground, key_rule_t, type_nouns
   use nocdyn_schema_units, only: name_in_unit, other_unit, unit_name
   use nocdyn_near_words, only: nearest_word
   use nocdyn_text, only: append, joined, listed, quoted, rounded_text, selected, string_t, strings, to_text
@@ -42,7 +42,7 @@ contains
       text = 'name of a &body'
     case (body_or_ground)
       text = "name of a &body, or 'ground'"
-    case (a_file, a_document)
+    case (a_file, a_document, a_line_file)
       text = 'path of a file'
     case (a_folder)
       text = 'path of a folder'

@@ -10,13 +10,13 @@ module nocdyn_group_reader
   use nocdyn_raw_group, only: new_raw_group, raw_group_t
   use nocdyn_schema, only: first_key, group_rules, has_word, is_single, key_rules
   use nocdyn_schema_relations, only: relations_t
-  use nocdyn_schema_rules, only: a_document, a_name, columns, equal_lengths
+  use nocdyn_schema_rules, only: a_document, a_line_file, a_name, columns, equal_lengths
   use nocdyn_schema_text, only: similar_keys, suggest_key
   use nocdyn_schema_units, only: find_key, name_in_unit
   use nocdyn_table_columns, only: read_table_columns
   use nocdyn_table_file, only: read_table_file
-  use nocdyn_text, only: lower_case, shortened, string_t
-  use nocdyn_text_file, only: largest_input, path_in, read_text_file
+  use nocdyn_text, only: append, lower_case, shortened, string_t
+  use nocdyn_text_file, only: first_position, largest_input, path_in, read_text_file
   use nocdyn_value_conversion, only: convert_key
   implicit none (type, external)
   private
@@ -86,6 +86,7 @@ contains
       end associate
     end do
     call check_documents(folder, raw, group, diagnostics)
+    call read_line_files(folder, raw, group, diagnostics)
     call check_group(raw, relations, group, diagnostics)
   end subroutine read_group
 
@@ -208,5 +209,45 @@ contains
       end associate
     end do
   end subroutine check_documents
+
+  !> Takes over the lines of text files into the keys behind theirs, unless these are given. The paths stay, for messages.
+  subroutine read_line_files(folder, raw, group, diagnostics)
+    character(len=*), intent(in) :: folder
+    type(raw_group_t), intent(in) :: raw
+    type(group_t), intent(inout) :: group
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: text
+    integer :: i
+
+    do i = 1, size(group%values)
+      if (key_rules(raw%keys(i)%rule)%value_type /= a_line_file .or. .not. allocated(group%values(i)%texts)) cycle
+      associate (file => group%values(i), lines => group%values(i + 1))
+        if (lines%count() > 0) cycle
+        call read_text_file(path_in(folder, file%texts(1)%text), text, error, largest_input)
+        if (allocated(error)) then
+          call diagnostics%add(file%line, raw%index, raw%keys(i)%name() // ': ' // error%message, file%override, error%code)
+          cycle
+        end if
+        lines = value_t(file%is_given, file%line, file%override)
+        call split_lines(text(first_position(text):), lines%texts)
+      end associate
+    end do
+  end subroutine read_line_files
+
+  !> The lines of a text, without blanks at their ends.
+  pure subroutine split_lines(text, lines)
+    character(len=*), intent(in) :: text
+    type(string_t), allocatable, intent(out) :: lines(:)
+    integer :: first, last
+
+    allocate (lines(0))
+    first = 1
+    do while (first <= len(text))
+      last = index(text(first:) // new_line('a'), new_line('a')) + first - 2
+      call append(lines, trim(text(first:last)))
+      first = last + 2
+    end do
+  end subroutine split_lines
 
 end module nocdyn_group_reader

@@ -6,8 +6,8 @@ module nocdyn_value_conversion
   use nocdyn_literals, only: literal_ok, literal_too_large, number_problem, read_integer, read_logical, read_real
   use nocdyn_raw_group, only: new_raw_key, raw_group_t, raw_key_t, raw_value_t
   use nocdyn_schema, only: holds_texts, key_rules, words_of
-  use nocdyn_schema_rules, only: a_body, a_document, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_word, &
-    an_integer, ground, is_out_of_range, key_rule_t, longest_name, size_limit, unset
+  use nocdyn_schema_rules, only: a_body, a_document, a_file, a_flag, a_folder, a_line_file, a_name, a_number, a_selector, &
+    a_word, an_integer, ground, is_out_of_range, key_rule_t, longest_name, size_limit, unset
   use nocdyn_schema_text, only: allowed_text
   use nocdyn_schema_units, only: name_in_unit
   use nocdyn_near_words, only: nearest_word
@@ -197,7 +197,7 @@ contains
       message = ' is not known; allowed: ' // joined(words, ', ')
       i = nearest_word(value%text, words)
       if (i > 0) message = message // "; did you mean '" // words(i)%text // "'?"
-    case (a_file, a_document)
+    case (a_file, a_document, a_line_file)
       if (value%text == '') message = ' is not the name of a file'
     case (a_folder)
       if (is_too_long(value%text)) message = ' is too long for a folder; allowed: ' // to_text(longest_path) // &
