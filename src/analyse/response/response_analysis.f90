@@ -222,7 +222,7 @@ contains
     real(wp), intent(inout) :: failed_speed
     character(len=:), allocatable :: text
     integer :: i
-    logical :: is_unstable(size(self%response%points))
+    logical, dimension(size(self%response%points)) :: is_of_grid, is_unstable
 
     call find_unstable(self%response%speeds(), self%modes, self%unstable, is_unstable)
     if (all(is_unstable)) then
@@ -232,7 +232,10 @@ contains
       return
     end if
     if (size(self%unstable) == 0) return
-    self%unstable = pack(self%unstable, pack(self%response%points%is_of_grid, is_unstable))
+    do i = 1, size(is_of_grid)
+      is_of_grid(i) = self%response%points(i)%is_of_grid
+    end do
+    self%unstable = pack(self%unstable, pack(is_of_grid, is_unstable))
     self%crossings = pack(self%crossings, [(.not. is_between(self%crossings(i)%speed), i=1, size(self%crossings))])
     call keep_points(self%response%points, .not. is_unstable)
 

@@ -1,6 +1,6 @@
 !> The table over load cases: as printed, for cases.json and for cases.csv.
 module nocdyn_load_case_report
-  use nocdyn_case_results, only: combine_verdicts, is_complete, put_cases, status_done
+  use nocdyn_case_results, only: case_result_t, combine_verdicts, is_complete, put_cases, status_done
   use nocdyn_csv, only: text_cell, write_header
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
@@ -36,7 +36,7 @@ contains
     call json%open_report(input%file, input%title())
     call find_verdict(runs, verdict)
     call verdict%put(json)
-    call put_cases(json, runs%case_result_t)
+    call put_cases(json, results_of(runs))
     call find_peaks(runs, peaks)
     call json%open_list('peaks')
     do i = 1, size(peaks)
@@ -54,6 +54,17 @@ contains
     text = json%text()
   end function load_cases_json
 
+  !> How the runs ended. A section `runs%case_result_t` would be copied with a warning in a debug build.
+  pure function results_of(runs) result(results)
+    type(case_run_t), intent(in) :: runs(:)
+    type(case_result_t) :: results(size(runs))
+    integer :: c
+
+    do c = 1, size(runs)
+      results(c) = runs(c)%case_result_t
+    end do
+  end function results_of
+
   !> What all runs say of limits, and their damage together.
   subroutine find_verdict(runs, verdict)
     type(case_run_t), intent(in) :: runs(:)
@@ -62,7 +73,7 @@ contains
     type(verdict_line_t) :: line
     integer :: i
 
-    call combine_verdicts('run', runs%case_result_t, verdict)
+    call combine_verdicts('run', results_of(runs), verdict)
     call sum_damage(runs, lives)
     do i = 1, size(lives)
       line = new_verdict_line('run', lives(i)%kind // ' ' // quoted(lives(i)%element), '', 'damage ' // quoted(lives(i)%name), '')
@@ -71,7 +82,7 @@ contains
       if (lives(i)%exceeds_strength) then
         line%finding = is_exceeded
         line%reason = 'the mean of a cycle exceeds the strength'
-      else if (line%finding == is_kept .and. .not. is_complete(runs%case_result_t)) then
+      else if (line%finding == is_kept .and. .not. is_complete(results_of(runs))) then
         line%finding = is_not_assessed
         line%reason = 'load cases are missing'
       end if
@@ -95,7 +106,7 @@ contains
       call json%put('unit', lives(i)%unit)
       if (lives(i)%is_shaft) call json%put('position', lives(i)%position)
       call json%put('damage', lives(i)%damage)
-      if (lives(i)%damage > 0 .and. is_complete(runs%case_result_t)) call json%put('repeats_to_failure', 1 / lives(i)%damage)
+      if (lives(i)%damage > 0 .and. is_complete(results_of(runs))) call json%put('repeats_to_failure', 1 / lives(i)%damage)
       call json%put('mean_exceeds_strength', lives(i)%exceeds_strength)
       call json%open('damage_of_load_cases')
       do c = 1, size(runs)
@@ -174,14 +185,14 @@ contains
       line = 'fatigue ' // quoted(lives(i)%name) // ': damage of all load cases ' // rounded_text(lives(i)%damage, digits)
       if (lives(i)%is_shaft) line = line // ' at ' // rounded_text(lives(i)%position, digits) // ' m'
       if (lives(i)%damage > 1) line = line // ', above 1: the part does not last'
-      if (is_complete(runs%case_result_t) .and. lives(i)%damage > 0 .and. lives(i)%damage <= 1) then
+      if (is_complete(results_of(runs)) .and. lives(i)%damage > 0 .and. lives(i)%damage <= 1) then
         line = line // ', all of them may occur ' // rounded_text(1 / lives(i)%damage, digits) // ' times'
       end if
       line = line // parts_text(runs, lives(i)%of_case)
       if (lives(i)%exceeds_strength) line = line // '; the mean of a cycle exceeds the strength'
       call report%append_line(line)
     end do
-    if (is_complete(runs%case_result_t)) return
+    if (is_complete(results_of(runs))) return
     line = ''
     do c = 1, size(runs)
       if (runs(c)%status == status_done) cycle

@@ -29,7 +29,7 @@ module nocdyn_trajectory_table
     real(wp), allocatable, private :: stored(:, :) !! in the elastic elements, [elements, 2]
     real(wp), allocatable, private :: work(:, :)   !! of the elements with work, and kept in them, [elements, 2]
   contains
-    procedure :: fill, keep_energies, find_energy_balance
+    procedure :: fill, keep_energies, find_energy_balance, works
   end type trajectory_table_t
 
 contains
@@ -99,7 +99,7 @@ contains
 
     allocate (names, source=work_element_names(self%columns%formulation%machine))
     allocate (balance%work_elements, source=whole_names(names))
-    allocate (balance%work, source=whole_sums(names, self%work(:, at_last_row) - self%work(:, at_start)))
+    allocate (balance%work, source=whole_sums(names, self%works()))
     deallocate (names)
     allocate (names, source=element_names(self%columns%formulation%machine, self%elastic))
     allocate (balance%elastic_elements, source=whole_names(names))
@@ -108,5 +108,13 @@ contains
     balance%kinetic_start = self%kinetic(at_start)
     balance%kinetic_end = self%kinetic(at_last_row)
   end subroutine find_energy_balance
+
+  !> The work of each element into the machine from the start to the last row [J], [`machine%with_work`].
+  pure function works(self)
+    class(trajectory_table_t), intent(in) :: self
+    real(wp) :: works(size(self%work, 1))
+
+    works = self%work(:, at_last_row) - self%work(:, at_start)
+  end function works
 
 end module nocdyn_trajectory_table

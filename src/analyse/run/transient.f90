@@ -246,6 +246,7 @@ contains
     type(run_observer_t), intent(inout) :: observer
     type(error_t), allocatable, intent(inout) :: error   !! of the integration, or that a number of the summary is not finite
     type(run_summary_t), intent(inout) :: summary
+    real(wp), allocatable :: works(:, :)   ! [elements, 1]
 
     associate (table => observer%table)
       call find_extremes(observer, input, table%unit, observer%row, observer%rows, summary%extremes)
@@ -257,9 +258,8 @@ contains
     if (summary%extremes%rows > 0) then
       allocate (summary%energy_balance)
       call observer%table%find_energy_balance(summary%energy_balance)
-      associate (work => summary%energy_balance%work)
-        call note_power_signs(observer%table%columns%formulation%machine, reshape(work, [size(work), 1]), 'J', '', summary%notes)
-      end associate
+      works = reshape(observer%table%works(), [size(observer%table%columns%formulation%machine%with_work), 1])
+      call note_power_signs(observer%table%columns%formulation%machine, works, 'J', '', summary%notes)
     end if
     if (.not. allocated(error)) then
       associate (extremes => summary%extremes)
