@@ -77,7 +77,7 @@ def test_energy_of_every_kind_of_element_adds_up(nocdyn, kinds, formulation, met
 
 def test_check_counts_elements_of_one_role_together(nocdyn):
     outcome = nocdyn("check", EVERY_KIND)
-    assert "0 gears, 4 couplings, 1 shaft, 1 mesh, 5 motors, 2 loads, 11 excitations" in outcome.stdout
+    assert "0 gears, 4 couplings, 1 shaft, 1 mesh, 5 motors, 3 loads, 12 excitations" in outcome.stdout
 
 
 def test_check_counts_electrical_machines_and_faults(nocdyn):

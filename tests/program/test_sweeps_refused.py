@@ -129,7 +129,7 @@ def test_a_list_is_refused_with_its_own_file_and_line(nocdyn):
     assert message == (
         "nocdyn: m.nml:5: &sweep: file: list.csv:3: 1 column in '0.5'; needed: 2, separated by blanks or a comma\n"
         "nocdyn: m.nml:5: &sweep: file: list.csv:1: column 2, 'body.disc.name': name is not a number (name); "
-        "allowed: inertia, bearing_friction, angle, speed\n"
+        "allowed: inertia, entrained, bearing_friction, angle, speed\n"
     )
 
 

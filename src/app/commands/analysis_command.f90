@@ -33,7 +33,7 @@ module nocdyn_analysis_command
 
   !> A machine to analyse.
   type :: job_t
-    type(input_t) :: input
+    integer :: load_case = 0                  !! which one of the file, 0: the machine itself
     character(len=:), allocatable :: folder   !! of its results, '': nothing is written
     logical :: is_alone = .false.             !! whether it is the only one of its file
   end type job_t
@@ -41,7 +41,7 @@ module nocdyn_analysis_command
   !> An input file that has been read.
   type :: reading_t
     type(input_t) :: machine                      !! with the load cases of the file
-    type(input_t), allocatable :: load_cases(:)   !! of `check`
+    type(input_t), allocatable :: load_cases(:)
     type(job_t), allocatable :: jobs(:)           !! the machine itself, or load cases
     character(len=:), allocatable :: folder       !! of the file
     type(error_t), allocatable :: error
@@ -138,13 +138,21 @@ contains
     end if
     allocate (results(size(reading%jobs)))
     do k = 1, size(results)
-      if (allocated(reading%jobs(k)%input%load_case)) results(k)%load_case = reading%jobs(k)%input%load_case
+      associate (c => reading%jobs(k)%load_case)
+        if (c > 0) results(k)%load_case = reading%load_cases(c)%load_case
+      end associate
       if (is_interrupted()) then
         results(k)%status = 'not run'
         cycle
       end if
-      call analyse_job(arguments, kind, reading%jobs(k), results(k), reading%error, netcdf)
-      if (arguments%command == 'check') call check_load_cases(kind, reading)
+      associate (job => reading%jobs(k))
+        if (job%load_case == 0) then
+          call analyse_job(arguments, kind, job, reading%machine, results(k), reading%error, netcdf)
+          if (arguments%command == 'check') call check_load_cases(kind, reading)
+        else
+          call analyse_job(arguments, kind, job, reading%load_cases(job%load_case), results(k), reading%error, netcdf)
+        end if
+      end associate
       if (is_interrupted() .and. allocated(reading%error)) reading%error%message = words
       if (.not. allocated(reading%error)) cycle
       call report_error(reading%error, code)
@@ -154,18 +162,19 @@ contains
   end subroutine analyse_file
 
   !> Analyses one machine.
-  subroutine analyse_job(arguments, kind, job, result, error, netcdf)
+  subroutine analyse_job(arguments, kind, job, input, result, error, netcdf)
     type(arguments_t), intent(in) :: arguments
     class(analysis_t), intent(in) :: kind
     type(job_t), intent(in) :: job
+    type(input_t), intent(in) :: input   !! of the job
     type(case_result_t), intent(inout) :: result
     type(error_t), allocatable, intent(out) :: error
     class(grid_file_t), intent(in), optional :: netcdf     !! as in `analyse`
     type(machine_t) :: machine
 
-    call assemble_analysed(arguments%command, kind, job%input, machine, error)
-    if (.not. allocated(error)) call check_signals(job%input, machine, error)
-    if (.not. allocated(error)) call analyse_one(arguments, kind, job, machine, result%verdict, error, netcdf)
+    call assemble_analysed(arguments%command, kind, input, machine, error)
+    if (.not. allocated(error)) call check_signals(input, machine, error)
+    if (.not. allocated(error)) call analyse_one(arguments, kind, job, input, machine, result%verdict, error, netcdf)
     if (.not. allocated(error)) return
     result%status = status_refused
     if (error%code == exit_failed) result%status = status_failed
@@ -186,8 +195,8 @@ contains
     character(len=:), allocatable :: name
 
     if (size(results) == 1) then
-      call be_strict(arguments, reading%jobs(1)%input%shown_case(), results(1)%verdict, code)
-      if (.not. allocated(reading%jobs(1)%input%load_case) .or. arguments%is_given('--case')) return
+      call be_strict(arguments, reading%machine%shown_file(), results(1)%verdict, code)
+      if (reading%jobs(1)%load_case == 0 .or. arguments%is_given('--case')) return
     end if
     call combine_verdicts(arguments%command, results, verdict)
     name = arguments%command // '_cases.json'
@@ -218,8 +227,15 @@ contains
     type(reading_t), intent(in) :: reading
     integer :: k
 
-    needs_companion = .not. allocated(reading%error)
-    if (needs_companion) needs_companion = any([(kind%grid_name(reading%jobs(k)%input) /= '', k=1, size(reading%jobs))])
+    needs_companion = .false.
+    if (allocated(reading%error)) return
+    do k = 1, size(reading%jobs)
+      associate (c => reading%jobs(k)%load_case)
+        if (c == 0) needs_companion = kind%grid_name(reading%machine) /= ''
+        if (c > 0) needs_companion = kind%grid_name(reading%load_cases(c)) /= ''
+      end associate
+      if (needs_companion) return
+    end do
   end function needs_companion
 
   !> Refuses inputs that another program would have to read again and cannot.
@@ -238,10 +254,11 @@ contains
   end subroutine refuse_pipes
 
   !> Analyses one machine, prints the report, and writes the files.
-  subroutine analyse_one(arguments, kind, job, machine, verdict, error, netcdf)
+  subroutine analyse_one(arguments, kind, job, input, machine, verdict, error, netcdf)
     type(arguments_t), intent(in) :: arguments
     class(analysis_t), intent(in) :: kind
     type(job_t), intent(in) :: job
+    type(input_t), intent(in) :: input   !! of the job
     type(machine_t), intent(in) :: machine
     type(verdict_t), intent(inout) :: verdict
     type(error_t), allocatable, intent(out) :: error
@@ -260,28 +277,28 @@ contains
     options%has_code = arguments%is_given('--code')
     options%has_holzer = arguments%is_given('--holzer')
     options%writes_files = job%folder /= ''
-    options%folder = result_folder(arguments, job%input)
+    options%folder = result_folder(arguments, input)
     allocate (analysis, source=kind)
-    call analysis%solve(job%input, machine, options, error)
+    call analysis%solve(input, machine, options, error)
     if (allocated(error)) return
     if (allocated(analysis%refusal)) then
-      call analysis%text(job%input, text)
+      call analysis%text(input, text)
       call print_text(text)
       error = analysis%refusal
       return
     end if
     if (job%folder /= '' .and. analysis%has_report) then
-      call write_files(arguments%command, analysis, job%input, job%folder, names, error, netcdf)
+      call write_files(arguments%command, analysis, input, job%folder, names, error, netcdf)
       if (allocated(error)) return
     end if
-    call analysis%find_verdict(job%input, verdict)
+    call analysis%find_verdict(input, verdict)
     if (arguments%is_given('--quiet')) return
     if (job%is_alone .or. .not. analysis%always_writes) then   ! tables of one machine, or that are written nowhere
       call verdict%write_table(report)
-      call analysis%text(job%input, text)
+      call analysis%text(input, text)
       call print_text(report%text() // text)
     end if
-    if (analysis%always_writes) call print_text(job%input%shown_case() // ': ' // shown_path(job%folder) // ' has ' // &
+    if (analysis%always_writes) call print_text(input%shown_case() // ': ' // shown_path(job%folder) // ' has ' // &
                                                 listed(names, ' and '))
   end subroutine analyse_one
 
@@ -397,17 +414,17 @@ contains
     if (always_writes) reading%folder = result_folder(arguments, reading%machine)
     allocate (reading%jobs(max(1, size(wanted))))
     reading%jobs%is_alone = size(reading%jobs) == 1
+    call move_alloc(load_cases, reading%load_cases)
     if (size(wanted) == 0) then
-      reading%jobs(1)%input = reading%machine
       reading%jobs(1)%folder = reading%folder
-      if (arguments%command == 'check') call move_alloc(load_cases, reading%load_cases)
+      call refuse_mistakes(reading%machine, reading%error)
     end if
     do k = 1, size(wanted)
-      reading%jobs(k)%input = load_cases(wanted(k))
-      reading%jobs(k)%folder = case_folder(reading%folder, load_cases(wanted(k)))
-    end do
-    do k = 1, size(reading%jobs)
-      call refuse_mistakes(reading%jobs(k)%input, own)
+      reading%jobs(k)%load_case = wanted(k)
+      associate (input => reading%load_cases(wanted(k)))
+        reading%jobs(k)%folder = case_folder(reading%folder, input)
+        call refuse_mistakes(input, own)
+      end associate
       call add_error(reading%error, own)
     end do
   end subroutine read_one

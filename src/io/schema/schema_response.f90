@@ -39,7 +39,7 @@ module nocdyn_schema_response
     key_rule_t('response', 'margin', a_number, 1, '', '0.1', margins, &
       'a critical speed so near to the speeds in operation, as a share of it, is reported'), &
     key_rule_t('response', 'margin_rule', a_word, 1, '', unset, margin_rules, &
-      'rule with the margin of each critical speed to the speeds in operation: api_617 asks for 10 %'), &
+      'rule with the margin of critical speeds to the speeds in operation: api_617 asks for 10 %'), &
     key_rule_t('response', 'margin_rule_file', a_line_file, 1, '', unset, anything, 'file of a rule of your own with a margin'), &
     key_rule_t('response', 'margin_rule_lines', a_text, any_number, '', unset, anything, &
       'the lines of margin_rule_file, as an input that was written has them'), &

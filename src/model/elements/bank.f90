@@ -61,6 +61,7 @@ module nocdyn_bank
     character(len=10) :: works = ''               !! of the cylinders of one machine: as an 'engine' or a 'compressor'
     logical :: follows_mean_speed = .false.       !! whether its torque changes with the speed from cycle to cycle, not within one
     logical :: is_mesh = .false.                  !! whether its rows are radii: angles are deformations [m], moments forces [N]
+    logical :: is_damper = .false.                 !! whether they damp the vibration of cylinders, and are no loads
     logical :: has_parts = .false.                !! whether consecutive elements of one name are parts of one element
     character(len=24), allocatable :: internal_names(:)   !! e.g. 'armature current', [states]
     integer :: first_internal = 1                 !! number of the first internal state of `first` in the machine
@@ -164,12 +165,13 @@ contains
     last = self%first + self%count - 1
   end function last
 
-  !> The kind of its elements as the input calls it: the one of the role, 'shaft' or 'mesh'.
+  !> The kind of its elements as the input calls it: the one of the role, 'shaft', 'mesh' or 'damper'.
   pure character(len=10) function kind_name(self)
     class(bank_t), intent(in) :: self
 
     kind_name = role_names(self%role)
     if (self%is_mesh) kind_name = 'mesh'
+    if (self%is_damper) kind_name = 'damper'
     if (self%has_parts) kind_name = 'shaft'
   end function kind_name
 

@@ -70,6 +70,7 @@ contains
     type(loads_t) :: bank
 
     call prepare_damping(bank, is_steady)
+    bank%is_damper = .true.
     call bank%connect(role_load, size(damping, 1), names, rows_between(0 * body, body))
     call bank%add_parameter('viscous', 0.0_wp * damping, is_key=.false.)
     bank%is_polynomial = .not. bank%follows_mean
