@@ -203,6 +203,15 @@ def test_a_limit_that_an_analysis_does_not_compare_with_is_not_assessed(nocdyn):
     assert line["assessment"].endswith("a response has no such quantity: nocdyn run has")
 
 
+def test_limits_of_steady_oscillations_do_not_concern_a_load_case_that_only_runs(nocdyn):
+    limit = "&limit coupling = 'shaft' vibratory_moment = 1e4 moment = 1e5 /\n"
+    nocdyn.write("machine.nml", TRAIN + limit + CASES.replace("'fault'", "'fault' analyses = 'run'"))
+    assert nocdyn("run", "machine.nml", "--out", "out").returncode == 0
+    lines = {case: nocdyn.summary(f"out/{case}")["verdict"]["lines"] for case in ("full", "fault")}
+    criteria = {case: [line["criterion"] for line in lines[case]] for case in lines}
+    assert criteria == {"full": ["vibratory moment, steady", "moment, largest"], "fault": ["moment, largest"]}
+
+
 def test_the_largest_magnitude_of_a_run_is_compared_at_its_time(nocdyn):
     first, _ = answer(nocdyn, "run", TRAIN)
     assert "verdict" not in first

@@ -35,7 +35,10 @@ contains
     type(verdict_t), intent(inout) :: verdict
     integer, allocatable :: groups(:)
     integer :: i, k
+    logical :: is_steady   ! whether the machine oscillates steadily too: not a load case that only runs
 
+    is_steady = .true.
+    if (allocated(input%load_case)) is_steady = input%load_case%is_for('response')
     allocate (groups, source=input%groups_named('limit'))
     do i = 1, size(groups)
       associate (group => input%groups(groups(i)))
@@ -43,6 +46,7 @@ contains
           if (.not. group%has_value(trim(peak_keys(k)))) cycle
           call add_peak(input, groups(i), trim(peak_keys(k)), signals, extremes, verdict)
         end do
+        if (.not. is_steady) cycle
         do k = 1, size(steady_keys)
           if (group%has_value(trim(steady_keys(k)))) call add_steady(input, groups(i), trim(steady_keys(k)), verdict)
         end do
