@@ -178,8 +178,7 @@ contains
     line%value = percent * distance
     line%limit = percent * settings%margin
     line%unit = '%'
-    line%speeds = 1
-    line%speed(1) = crossing%speed
+    call line%stand_at(crossing%speed)
   end subroutine start_critical
 
   !> Speeds in operation, or within the margin of it, at which nothing is computed.

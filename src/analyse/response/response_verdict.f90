@@ -153,8 +153,7 @@ contains
       call start_line(input, analysis, number, 'largest', line)
       line%rule = ''
       call line%compare(points(worst)%peak(limit%quantity), limit%peak_limit(), line%unit)
-      line%speeds = 1
-      line%speed(1) = points(worst)%state%speed
+      call line%stand_at(points(worst)%state%speed)
       call verdict%add(line)
     end associate
   end subroutine add_peak
@@ -177,8 +176,7 @@ contains
       line%quantity = 'heat'
       line%criterion = 'heat'
       call line%compare(heat(worst), limit%heat, 'W')
-      line%speeds = 1
-      line%speed(1) = points(worst)%state%speed
+      call line%stand_at(points(worst)%state%speed)
       call verdict%add(line)
     end associate
   end subroutine add_heat
@@ -209,8 +207,7 @@ contains
       call start_line(input, analysis, number, 'of one order over the frequency', line)
       associate (point => points(worst(1)), frequency => points(worst(1))%frequency(worst(2)))
         call line%compare(abs(point%quantity(worst(2), limit%quantity)), limit%amplitude_limit(frequency), line%unit)
-        line%speeds = 1
-        line%speed(1) = point%state%speed
+        call line%stand_at(point%state%speed)
         line%detail = 'order ' // analysis%response%lines(worst(2))%word() // ', ' // &
                       rounded_text(from_si(frequency, unit_hz), 4) // ' Hz'
       end associate
@@ -315,8 +312,7 @@ contains
 
     associate (one => analysis%response%points(point))
       call line%compare(one%half_range(limit%quantity), allowed, line%unit)
-      line%speeds = 1
-      line%speed(1) = one%state%speed
+      call line%stand_at(one%state%speed)
       call limit%write_place(one%state%speed, line%detail)
     end associate
   end subroutine compare_at

@@ -40,7 +40,7 @@ module nocdyn_verdicts
     logical :: has_time = .false.
     real(wp) :: time = 0.0_wp                       !! [s]
   contains
-    procedure :: compare
+    procedure :: compare, stand_at
     procedure, private :: write_assessment, write_place
   end type verdict_line_t
 
@@ -105,6 +105,15 @@ contains
     self%ratio = value / limit
     if (value > limit) self%finding = is_exceeded
   end subroutine compare
+
+  !> Says at which speed the value is.
+  pure subroutine stand_at(self, speed)
+    class(verdict_line_t), intent(inout) :: self
+    real(wp), intent(in) :: speed   !! [rad/s]
+
+    self%speeds = 1
+    self%speed(1) = speed
+  end subroutine stand_at
 
   !> Adds a line.
   subroutine add(self, line)

@@ -1,7 +1,8 @@
 !> The rules that come with the program: the texts of the files beside this one, which the build puts into the program.
 module nocdyn_rule_texts
-  use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_ptr, c_size_t
-  use nocdyn_text, only: string_t
+  use, intrinsic :: iso_c_binding, only: c_int, c_ptr, c_size_t
+  use nocdyn_c_texts, only: copy_text
+  use nocdyn_text, only: split_lines, string_t
   implicit none (type, external)
   private
 
@@ -48,20 +49,6 @@ contains
     call split_lines(text, lines)
   end subroutine find_rule_text
 
-  pure subroutine split_lines(text, lines)
-    character(len=*), intent(in) :: text
-    type(string_t), allocatable, intent(out) :: lines(:)
-    integer :: first, i, last
-
-    allocate (lines(count([(text(i:i) == new_line('a'), i=1, len(text))])))
-    first = 1
-    do i = 1, size(lines)
-      last = index(text(first:), new_line('a')) + first - 2
-      lines(i)%text = text(first:last)
-      first = last + 2
-    end do
-  end subroutine split_lines
-
   integer function part_count()
     type(c_ptr) :: place
     integer(c_size_t) :: length
@@ -72,17 +59,12 @@ contains
   subroutine read_part(number, is_text, text)
     integer, intent(in) :: number, is_text
     character(len=:), allocatable, intent(out) :: text
-    character(kind=c_char), pointer :: characters(:)
     type(c_ptr) :: place
     integer(c_size_t) :: length
-    integer :: i, ignored
+    integer :: ignored
 
     ignored = int(rule_part(int(number, c_int), int(is_text, c_int), place, length))
-    call c_f_pointer(place, characters, [length])
-    allocate (character(len=int(length)) :: text)
-    do i = 1, len(text)
-      text(i:i) = characters(i)
-    end do
+    call copy_text(place, length, text)
   end subroutine read_part
 
 end module nocdyn_rule_texts

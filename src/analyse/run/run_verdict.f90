@@ -2,12 +2,12 @@
 !>
 !> Limits of half ranges and rules are the ones of a steady oscillation; `nocdyn response` compares with them.
 module nocdyn_run_verdict
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_limit_groups, only: derating, limited_kind, limited_signal
   use nocdyn_run_fatigue, only: run_fatigue_t
   use nocdyn_signals, only: signal_t
-  use nocdyn_text, only: quoted, rounded_text, string_t
+  use nocdyn_text, only: quoted, rounded_text
   use nocdyn_verdicts, only: in_words, is_exceeded, is_not_assessed, new_verdict_line, verdict_line_t, verdict_t
   implicit none (type, external)
   private

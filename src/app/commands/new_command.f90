@@ -1,7 +1,8 @@
 !> nocdyn new: a commented input to start from, of all groups or of a kind of machine.
 module nocdyn_new_command
-  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_int, c_ptr, c_size_t
+  use, intrinsic :: iso_c_binding, only: c_associated, c_int, c_ptr, c_size_t
   use nocdyn_arguments, only: arguments_t
+  use nocdyn_c_texts, only: copy_text
   use nocdyn_console, only: print_text, report_error
   use nocdyn_errors, only: error_t, exit_done, exit_file, exit_input, raise
   use nocdyn_output_file, only: write_file
@@ -61,6 +62,7 @@ contains
     type(arguments_t), intent(in) :: arguments
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(out) :: error   !! there is no such kind
+    character(len=:), allocatable :: name
     type(string_t), allocatable :: kinds(:)
     type(c_ptr) :: kind, content
     integer(c_size_t) :: kind_length, length
@@ -75,28 +77,14 @@ contains
     do
       call c_template(number, kind, kind_length, content, length)
       if (.not. c_associated(kind)) exit
-      call append(kinds, text_at(kind, kind_length))
-      if (kinds(number)%text == arguments%value('--kind')) text = text_at(content, length)
+      call copy_text(kind, kind_length, name)
+      call append(kinds, name)
+      if (name == arguments%value('--kind')) call copy_text(content, length, text)
       number = number + 1
     end do
     if (allocated(text)) return
     call raise(error, exit_input, '--kind: ' // quoted(shortened(arguments%value('--kind'))) // ' is no kind of machine' // &
                suggestion(arguments%value('--kind'), kinds) // '; allowed: ' // joined(kinds, ', '))
   end subroutine find_text
-
-  !> A copy of a text in C.
-  function text_at(address, length) result(text)
-    type(c_ptr), intent(in) :: address
-    integer(c_size_t), intent(in) :: length
-    character(len=:), allocatable :: text
-    character(kind=c_char), pointer :: characters(:)
-    integer :: i
-
-    call c_f_pointer(address, characters, [length])
-    allocate (character(len=length) :: text)
-    do i = 1, int(length)
-      text(i:i) = characters(i)
-    end do
-  end function text_at
 
 end module nocdyn_new_command

@@ -1,6 +1,7 @@
 !> Programs in C that nocdyn writes: what they begin with, compiled by the compiler of the system and loaded.
 module nocdyn_compiled_code
-  use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_funptr, c_int, c_null_char, c_null_funptr, c_ptr, c_size_t
+  use, intrinsic :: iso_c_binding, only: c_char, c_funptr, c_int, c_null_char, c_null_funptr, c_ptr, c_size_t
+  use nocdyn_c_texts, only: copy_text
   implicit none (type, external)
   private
 
@@ -52,16 +53,11 @@ contains
   function code_part(part) result(text)
     integer, intent(in) :: part   !! series_part and so on
     character(len=:), allocatable :: text
-    character(kind=c_char), pointer :: characters(:)
-    integer(c_size_t) :: i, length
+    integer(c_size_t) :: length
     type(c_ptr) :: address
 
     address = c_code_part(int(part, c_int), length)
-    call c_f_pointer(address, characters, [length])
-    allocate (character(len=length) :: text)
-    do i = 1, length
-      text(i:i) = characters(i)
-    end do
+    call copy_text(address, length, text)
   end function code_part
 
   !> Compiles and loads a program, or loads it from the user's cache folder. Threads may call it.

@@ -7,7 +7,7 @@ module nocdyn_text
   private
 
   public :: to_text, rounded_text, write_number, lower_case, quoted, joined, listed, counted, shortened, &
-    shown_path, strings, append, selected, is_too_long
+    shown_path, split_lines, strings, append, selected, is_too_long
 
   integer, parameter :: most_characters = 80   ! of a text in a message
   integer, parameter :: head = 30, tail = 46   ! characters of a path that is cut
@@ -385,5 +385,25 @@ contains
       is_too_long = is_too_long .or. length > longest_file_name
     end do
   end function is_too_long
+
+  !> The lines of a text, without blanks at their ends. A line feed at the end of the text begins no line.
+  pure subroutine split_lines(text, lines)
+    character(len=*), intent(in) :: text
+    type(string_t), allocatable, intent(out) :: lines(:)
+    integer :: count, first, i, last
+
+    count = 0
+    do i = 1, len(text)
+      if (text(i:i) == new_line('a') .or. i == len(text)) count = count + 1
+    end do
+    allocate (lines(count))
+    first = 1
+    do i = 1, count
+      last = index(text(first:), new_line('a')) + first - 2
+      if (last < first - 1) last = len(text)
+      lines(i)%text = trim(text(first:last))
+      first = last + 2
+    end do
+  end subroutine split_lines
 
 end module nocdyn_text

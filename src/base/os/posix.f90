@@ -1,8 +1,9 @@
 !> Services of the operating system that Fortran lacks: folders, renaming, terminals, signals; and writing, because gfortran's
 !> `write`, `flush` and `close` report no error when a disk is full.
 module nocdyn_posix
-  use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_intptr_t, c_long, c_null_char, &
+  use, intrinsic :: iso_c_binding, only: c_char, c_funloc, c_funptr, c_int, c_intptr_t, c_long, c_null_char, &
     c_null_funptr, c_null_ptr, c_ptr, c_size_t
+  use nocdyn_c_texts, only: copy_text
   implicit none (type, external)
   private
 
@@ -173,16 +174,10 @@ contains
   !> The reason why the last call of the operating system failed, e.g. "No space left on device".
   function last_failure() result(reason)
     character(len=:), allocatable :: reason
-    character(kind=c_char), pointer :: characters(:)
     type(c_ptr) :: text
-    integer :: i
 
     text = c_strerror(c_errno())
-    call c_f_pointer(text, characters, [c_strlen(text)])
-    allocate (character(len=size(characters)) :: reason)
-    do i = 1, size(characters)
-      reason(i:i) = characters(i)
-    end do
+    call copy_text(text, c_strlen(text), reason)
   end function last_failure
 
   !> Number of the last failure, `errno`.

@@ -15,7 +15,7 @@ module nocdyn_group_reader
   use nocdyn_schema_units, only: find_key, name_in_unit
   use nocdyn_table_columns, only: read_table_columns
   use nocdyn_table_file, only: read_table_file
-  use nocdyn_text, only: append, lower_case, shortened, string_t
+  use nocdyn_text, only: lower_case, shortened, split_lines, string_t
   use nocdyn_text_file, only: first_position, largest_input, path_in, read_text_file
   use nocdyn_value_conversion, only: convert_key
   implicit none (type, external)
@@ -234,20 +234,5 @@ contains
       end associate
     end do
   end subroutine read_line_files
-
-  !> The lines of a text, without blanks at their ends.
-  pure subroutine split_lines(text, lines)
-    character(len=*), intent(in) :: text
-    type(string_t), allocatable, intent(out) :: lines(:)
-    integer :: first, last
-
-    allocate (lines(0))
-    first = 1
-    do while (first <= len(text))
-      last = index(text(first:) // new_line('a'), new_line('a')) + first - 2
-      call append(lines, trim(text(first:last)))
-      first = last + 2
-    end do
-  end subroutine split_lines
 
 end module nocdyn_group_reader
