@@ -162,6 +162,21 @@ def test_branches_do_not_depend_on_the_grid(nocdyn, seed):
             assert one == pytest.approx(same, rel=1e-6, abs=1e-9)
 
 
+@pytest.mark.parametrize("seed", range(MACHINES))
+def test_peaks_do_not_depend_on_the_grid_where_modes_move(nocdyn, seed):
+    text = random_machine(seed).replace("orders=1", "")
+    text = re.sub(r"(&coupling (?:(?!damping).)*?) /\n", r"\1 damping=3 /\n", text)
+    text += "&excitation name='gas' body='b1' kind='orders' orders=1 amplitudes=1 /\n"
+    peaks = []
+    for count in (20, 1901):
+        nocdyn.write("machine.nml", text.format(count))
+        outcome = nocdyn("response", "machine.nml", "--out", "out")
+        assert outcome.returncode == 0, outcome.stderr
+        largest = json.loads((nocdyn.folder / "out/response.json").read_text())["largest"]
+        peaks.append([one["half_range"] for one in largest])
+    assert peaks[0] == pytest.approx(peaks[1], rel=1e-4)  # refinement ends at 1e-5 of the square
+
+
 def test_an_unstable_speed_does_not_stop_the_others(nocdyn):
     """Beyond 125 rad/s the torque of the load falls, and the oscillation of a light damping grows."""
     text = """\

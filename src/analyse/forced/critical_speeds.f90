@@ -90,9 +90,9 @@ contains
     speeds = pack([(crossings(i)%speed, i=1, size(crossings))], [(crossings(i)%damping_ratio > undamped, i=1, size(crossings))])
     call keep_new(response, speeds)
     do round = 1, most_rounds
-      if (size(speeds) == 0) return
+      if (size(speeds) == 0 .and. round > 1) return
       room = room - size(speeds)
-      call response%add_points(speeds, .false., error, failed_speed)
+      if (size(speeds) > 0) call response%add_points(speeds, .false., error, failed_speed)
       if (allocated(error)) return
       ! a third of the room: the next rounds know better which ones matter
       call find_vertices(response, crossings, max(0, room / 3), speeds, unrefined)
@@ -128,9 +128,11 @@ contains
     real(wp), parameter :: counts = 1.0e-2_wp   ! of the largest amplitude of all lines: smaller ones are left as they are
     real(wp) :: largest, square(size(response%points), size(response%lines))   ! of the amplitudes
     type(vertices_t) :: vertices
-    integer :: i, l, q
+    integer :: first, i, l, q
 
-    allocate (vertices%speed(64), vertices%gain(64))
+    allocate (vertices%speed(64), vertices%gain(64), speeds(0))
+    unrefined = 0.0_wp
+    if (size(response%points) < 3) return
     associate (points => response%points)
       do q = 1, size(response%quantities)
         do i = 1, size(points)
@@ -138,12 +140,15 @@ contains
         end do
         largest = maxval(square)
         do l = 1, size(response%lines)
-          do i = 2, size(points) - 1
-            if (square(i, l) < max(square(i - 1, l), square(i + 1, l)) .or. .not. square(i, l) > counts**2 * largest) cycle
+          do i = 1, size(points)
+            if (square(i, l) < maxval(square(max(1, i - 1):min(size(points), i + 1), l)) .or. &
+                .not. square(i, l) > counts**2 * largest) cycle
+            first = max(1, min(i - 1, size(points) - 2))   ! of three points; the maximum may be at the end of all
             if (any(crossings%line == l .and. crossings%damping_ratio <= undamped .and. &
-                crossings%speed >= min(points(i - 1)%state%speed, points(i + 1)%state%speed) .and. &
-                crossings%speed <= max(points(i - 1)%state%speed, points(i + 1)%state%speed))) cycle
-            call add_vertex(points(i - 1:i + 1), square(i - 1:i + 1, l), sqrt(square(i, l) / largest), vertices)
+                crossings%speed >= min(points(first)%state%speed, points(first + 2)%state%speed) .and. &
+                crossings%speed <= max(points(first)%state%speed, points(first + 2)%state%speed))) cycle
+            call add_vertex(points(first:first + 2), i - first + 1, square(first:first + 2, l), sqrt(square(i, l) / largest), &
+                            vertices)
           end do
         end do
       end do
@@ -172,29 +177,34 @@ contains
   end subroutine keep_highest
 
   !> Adds the vertex of a maximum, unless it is so near that the peak grows by rounding only, or another speed is there.
-  subroutine add_vertex(points, amplitude, share, vertices)
+  subroutine add_vertex(points, top, amplitude, share, vertices)
     type(response_point_t), intent(in) :: points(3)
-    real(wp), intent(in) :: amplitude(3)   !! squares of the amplitudes, the second one is the largest
-    real(wp), intent(in) :: share          !! the second one, as a share of the largest one of the quantity
+    integer, intent(in) :: top             !! the maximum, of the three
+    real(wp), intent(in) :: amplitude(3)   !! squares of the amplitudes
+    real(wp), intent(in) :: share          !! the maximum, as a share of the largest one of the quantity
     type(vertices_t), intent(inout) :: vertices
     real(wp), parameter :: accuracy = 1.0e-5_wp   ! relative, of the square of a peak
     real(wp), parameter :: narrow = 1.0e-12_wp    ! relative distance of speeds
     real(wp), parameter :: believed = 0.5_wp      ! a parabola beside an antiresonance falls below zero
     real(wp) :: bend, distance, gain, promised, slope, vertex, x(3), y(3)
-    integer :: k
+    integer :: k, others(2)
 
+    others = pack([1, 2, 3], [1, 2, 3] /= top)
     x = [points(1)%state%speed, points(2)%state%speed, points(3)%state%speed]
-    x = x - points(2)%state%speed
-    y = min(amplitude(2) / max(amplitude, tiny(1.0_wp)), 1.0e12_wp)   ! 1 at the maximum
-    bend = ((y(3) - 1.0_wp) / x(3) - (y(1) - 1.0_wp) / x(1)) / (x(3) - x(1))
-    slope = (y(3) - 1.0_wp) / x(3) - bend * x(3)
+    x = x - points(top)%state%speed
+    y = min(amplitude(top) / max(amplitude, tiny(1.0_wp)), 1.0e12_wp)   ! 1 at the maximum
+    associate (a => others(1), b => others(2))
+      bend = ((y(b) - 1.0_wp) / x(b) - (y(a) - 1.0_wp) / x(a)) / (x(b) - x(a))
+      slope = (y(b) - 1.0_wp) / x(b) - bend * x(b)
+    end associate
     if (.not. bend > 0) return
     vertex = -0.5_wp * slope / bend
+    if (top /= 2 .and. vertex * x(2) < 0) return   ! beyond the end
     gain = 0.25_wp * slope**2 / bend   ! y falls by so much
-    if (gain <= accuracy .or. abs(vertex) <= narrow * abs(points(2)%state%speed)) return
+    if (gain <= accuracy .or. abs(vertex) <= narrow * abs(points(top)%state%speed)) return
     distance = sqrt(accuracy / bend)
     promised = share * (1.0_wp / sqrt(1.0_wp - min(gain, believed)) - 1.0_wp)
-    associate (n => vertices%count, speed => points(2)%state%speed + vertex)
+    associate (n => vertices%count, speed => points(top)%state%speed + vertex)
       do k = 1, n
         if (abs(vertices%speed(k) - speed) > distance) cycle
         vertices%gain(k) = max(vertices%gain(k), promised)
