@@ -5,12 +5,13 @@
 module nocdyn_steady_joints
   use nocdyn_constraint_assembly, only: constraint_groups
   use nocdyn_element_groups, only: bodies_of, body_index_t, new_body_index
-  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability, nearest_equilibrium
+  use nocdyn_equilibrium, only: equilibrium_t
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_operating_states, only: find_operating_state
   use nocdyn_steady_views, only: steady_view_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -32,14 +33,13 @@ contains
     type(equilibrium_t), allocatable :: equilibria(:)
     type(error_t), allocatable :: error
     type(string_t), allocatable :: notes(:)
-    integer :: freewheel
+    integer :: freewheel, nearest
 
     is_changed = .false.
     if (size(input%groups_named('freewheel')) == 0) return
-    call find_equilibria(machine, view%at, formulation, equilibria, notes, error)
+    call find_operating_state(machine, view%at, formulation, equilibria, nearest, notes, error)
     if (allocated(error)) return
-    if (size(equilibria) > 1) call find_stability(formulation, view%at, equilibria)
-    call formulation%observe([view%at], equilibria(nearest_equilibrium(formulation, equilibria))%y)
+    call formulation%observe([view%at], equilibria(nearest)%y)
     freewheel = pulling_freewheel(input, view, formulation)
     if (freewheel == 0) freewheel = overtaken_freewheel(input, view, formulation)
     is_changed = freewheel > 0

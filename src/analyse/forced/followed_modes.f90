@@ -1,11 +1,16 @@
 !> The modes at all speeds of a response, and the critical speeds, at which its lines meet them.
 module nocdyn_followed_modes
   use nocdyn_critical_speeds, only: crossing_t, find_crossings
+  use nocdyn_equilibrium, only: equilibrium_t, t_infinity
   use nocdyn_errors, only: error_t
   use nocdyn_forced_response, only: forced_response_t
+  use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: sort_ascending
+  use nocdyn_machine, only: machine_t
   use nocdyn_mode_branches, only: new_speed_modes, speed_modes_t
+  use nocdyn_operating_states, only: find_operating_state
+  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -14,8 +19,10 @@ module nocdyn_followed_modes
 contains
 
   !> Finds the modes at all speeds and the crossings. Where modes move with the speed, the crossings become speeds of their own,
-  !> until they stay.
-  subroutine follow_modes(response, orders, modes, crossings, error, failed_speed)
+  !> until they stay. Where modes change their order over the speeds, they have the numbers that they have in the steady state,
+  !> as `nocdyn modes` numbers them; without one those of the first speed.
+  subroutine follow_modes(machine, response, orders, modes, crossings, error, failed_speed)
+    type(machine_t), intent(in) :: machine     !! of the response, at no held speed
     type(forced_response_t), intent(inout) :: response
     real(wp), intent(in) :: orders(:)          !! that are sought; none: the lines of the response
     type(speed_modes_t), intent(out) :: modes
@@ -25,9 +32,15 @@ contains
     integer, parameter :: rounds = 3
     real(wp), allocatable :: more(:), speed(:)
     integer :: round
+    logical :: has_state
+    real(wp) :: steady_speed
 
+    call new_speed_modes(response, 1, modes, error)
+    if (allocated(error)) return
+    has_state = .false.
+    if (modes%change_places) call find_steady_speed(machine, response, has_state, steady_speed)
     do round = 1, rounds
-      call new_speed_modes(response, modes, error)
+      if (has_state .or. round > 1) call new_speed_modes(response, nearest_point(response), modes, error)
       if (allocated(error)) return
       speed = response%speeds()
       call find_crossings(speed, frequencies_of(response, orders), modes, crossings)
@@ -38,7 +51,43 @@ contains
       call response%add_points(more, .false., error, failed_speed, only_states=.true.)
       if (allocated(error)) return
     end do
+
+  contains
+
+    !> The point nearest to the steady state, or the first one.
+    integer function nearest_point(response)
+      type(forced_response_t), intent(in) :: response
+
+      nearest_point = 1
+      if (has_state) nearest_point = minloc(abs(response%speeds() - steady_speed), dim=1)
+    end function nearest_point
+
   end subroutine follow_modes
+
+  !> The speed of the body of the response in the steady state of the machine, which becomes a point if it is among the speeds.
+  subroutine find_steady_speed(machine, response, has_state, steady_speed)
+    type(machine_t), intent(in) :: machine
+    type(forced_response_t), intent(inout) :: response
+    logical, intent(out) :: has_state
+    real(wp), intent(out) :: steady_speed   !! [rad/s]
+    class(formulation_t), allocatable :: formulation
+    type(equilibrium_t), allocatable :: equilibria(:)
+    type(error_t), allocatable :: error
+    type(string_t), allocatable :: notes(:)
+    integer :: nearest
+    real(wp) :: failed_speed
+    real(wp), allocatable :: speed(:)
+
+    steady_speed = 0.0_wp
+    call find_operating_state(machine, t_infinity, formulation, equilibria, nearest, notes, error)
+    has_state = .not. allocated(error)
+    if (.not. has_state) return
+    call formulation%set_state(equilibria(nearest)%y)
+    steady_speed = formulation%omega(1, response%held%reference)
+    speed = response%speeds()
+    if (steady_speed < minval(speed) .or. steady_speed > maxval(speed)) return
+    call response%add_points([steady_speed], .false., error, failed_speed, only_states=.true.)
+  end subroutine find_steady_speed
 
   !> The frequencies of orders, or of the lines of a response, at its speeds [rad/s], [lines, points].
   function frequencies_of(response, orders) result(frequency)

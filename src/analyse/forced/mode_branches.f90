@@ -17,9 +17,11 @@ module nocdyn_mode_branches
 
   public :: new_speed_modes
 
-  !> The oscillating modes, in the order of their frequencies at the first speed; then those that begin at other speeds.
+  !> The oscillating modes, in the order of their frequencies at one speed; then those that begin at other speeds.
   type, public :: speed_modes_t
     integer :: modes = 0
+    real(wp) :: numbered_at = 0.0_wp               !! the speed at whose frequencies they are numbered [rad/s]
+    logical :: change_places = .false.             !! whether their order is not the same at all points, or some begin or end
     logical, allocatable :: exists(:, :)           !! whether a mode oscillates, [modes, points]
     real(wp), allocatable :: frequency(:, :)       !! of the damped oscillations, 0 where there is none [rad/s], [modes, points]
     real(wp), allocatable :: damping_ratio(:, :)   !! negative where they grow, [modes, points]
@@ -59,8 +61,9 @@ module nocdyn_mode_branches
 contains
 
   !> Finds the modes at every point.
-  subroutine new_speed_modes(response, self, error)
+  subroutine new_speed_modes(response, numbered_at, self, error)
     type(forced_response_t), intent(in) :: response
+    integer, intent(in) :: numbered_at   !! point
     type(speed_modes_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
     type(branches_t) :: tracks
@@ -86,7 +89,8 @@ contains
       if (.not. allocated(error)) call connect(response, tracks, first, last, error)
       if (allocated(error)) return
     end if
-    call set_modes(tracks, self)
+    call set_modes(tracks, numbered_at, self)
+    self%numbered_at = response%points(numbered_at)%state%speed
     self%is_electrical = [(response%machine%is_electrical(self%internal(m)), m=1, self%modes)]
   end subroutine new_speed_modes
 
@@ -254,24 +258,30 @@ contains
     tracks%divergence(stop%point) = stop%pairs%divergence
   end subroutine record
 
-  !> The result, with the branches in the order of their begin and of their frequencies there. Branches that are only between the
-  !> points are left out.
-  subroutine set_modes(tracks, self)
+  !> The result, with the branches in the order of their frequencies where they are numbered; then those that are not there, in the
+  !> order of their begin and of their frequencies there. Branches that are only between the points are left out.
+  subroutine set_modes(tracks, numbered_at, self)
     type(branches_t), intent(in) :: tracks
+    integer, intent(in) :: numbered_at   !! point
     type(speed_modes_t), intent(inout) :: self
-    integer :: begin(tracks%branches), m, rank
+    integer, parameter :: before_all = -1
+    integer :: begin(tracks%branches), m, rank   ! begin 0: at no point
     integer, allocatable :: order(:)
     real(wp) :: first(tracks%branches)
 
     do m = 1, tracks%branches
       begin(m) = findloc(aimag(tracks%value(m, :)) > 0, .true., dim=1)
-      if (begin(m) > 0) first(m) = aimag(tracks%value(m, begin(m)))
+      if (begin(m) == 0) cycle
+      first(m) = aimag(tracks%value(m, begin(m)))
+      if (.not. aimag(tracks%value(m, numbered_at)) > 0) cycle
+      begin(m) = before_all
+      first(m) = aimag(tracks%value(m, numbered_at))
     end do
-    self%modes = count(begin > 0)
+    self%modes = count(begin /= 0)
     allocate (order(self%modes))
     do m = 1, tracks%branches
       if (begin(m) == 0) cycle
-      rank = 1 + count(begin > 0 .and. begin < begin(m)) + count(begin == begin(m) .and. first < first(m)) &
+      rank = 1 + count(begin /= 0 .and. begin < begin(m)) + count(begin == begin(m) .and. first < first(m)) &
              + count(begin(:m - 1) == begin(m) .and. abs(first(:m - 1) - first(m)) <= 0)
       order(rank) = m
     end do
@@ -288,6 +298,7 @@ contains
       call set_shape(tracks%shape(:, order(m)), self%shape(:, m))
     end do
     self%is_constant = is_constant(self)
+    self%change_places = change_places(self)
   end subroutine set_modes
 
   !> The motion in phase with the largest one.
@@ -300,6 +311,18 @@ contains
       if (abs(largest) > 0) shape = real(angle / largest, wp)
     end associate
   end subroutine set_shape
+
+  !> Whether the order of the frequencies is not the same at all points, or modes begin or end.
+  pure logical function change_places(self)
+    type(speed_modes_t), intent(in) :: self
+    real(wp), parameter :: same = 1.0e-9_wp   ! relative
+    integer :: m
+
+    change_places = .not. all(self%exists)
+    do m = 2, self%modes
+      change_places = change_places .or. any(self%frequency(m, :) < (1.0_wp - same) * self%frequency(m - 1, :))
+    end do
+  end function change_places
 
   !> Whether straight lines between the points are good enough.
   pure logical function is_constant(self)

@@ -5,7 +5,7 @@ module nocdyn_damping_notes
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: linearisation_t
   use nocdyn_machine, only: machine_t
-  use nocdyn_text, only: append, joined, quoted, rounded_text, string_t
+  use nocdyn_text, only: append, joined, quoted, rounded_text, string_t, to_text
   use nocdyn_units, only: from_si, unit_hz
   implicit none (type, external)
   private
@@ -45,13 +45,17 @@ contains
     end do
   end function has_stand_ins
 
-  !> Adds a note for each coupling or shaft: of the lowest of the modes that twist it most.
+  !> Adds a note on the couplings and shafts whose damping has another frequency than the lowest of the modes that twist them most.
   subroutine note_stand_ins(machine, linear, notes)
     type(machine_t), intent(in) :: machine         !! one lane
     type(linearisation_t), intent(in) :: linear    !! all but `matrix` and `held`
     type(string_t), allocatable, intent(inout) :: notes(:)
+    integer, parameter :: most_names = 4
     integer :: b, e, last
+    character(len=:), allocatable :: list
+    type(string_t), allocatable :: cases(:)   ! "coupling 'rubber' at 5 Hz, the mode at 12 Hz: 0.02 in place of 0.008"
 
+    allocate (cases(0))
     do b = 1, size(machine%banks)
       associate (bank => machine%banks(b)%bank)
         if (.not. allocated(bank%loss_damping)) cycle
@@ -62,21 +66,30 @@ contains
             if (bank%names(last + 1)%text /= bank%names(e)%text) exit
             last = last + 1
           end do
-          call note_one(trim(bank%kind_name()) // ' ' // quoted(bank%names(e)%text), bank%first - 1 + e, bank%first - 1 + last, &
-                        bank%loss_factor(e), bank%loss_damping(e), linear, notes)
+          call add_case(trim(bank%kind_name()) // ' ' // quoted(bank%names(e)%text), bank%first - 1 + e, bank%first - 1 + last, &
+                        bank%loss_factor(e), bank%loss_damping(e), linear, cases)
           e = last + 1
         end do
       end associate
     end do
+    if (size(cases) == 0) return
+    list = cases(1)%text
+    do e = 2, min(size(cases), most_names)
+      list = list // '; ' // cases(e)%text
+    end do
+    if (size(cases) > most_names) list = list // '; and ' // to_text(size(cases) - most_names) // ' more'
+    call append(notes, 'over the time (run, sweep) the viscous damping that stands for the relative one has another ' // &
+                       'frequency than the mode, and another damping ratio than in response and campbell: ' // list // &
+                       '; equal with damping_frequency_hz of the mode')
   end subroutine note_stand_ins
 
-  !> Adds the note of one of them, if the frequencies differ and the damping counts.
-  subroutine note_one(name, first, last, loss_factor, damping, linear, notes)
+  !> Adds one of them, if the frequencies differ and the damping counts.
+  subroutine add_case(name, first, last, loss_factor, damping, linear, cases)
     character(len=*), intent(in) :: name
     integer, intent(in) :: first, last          !! its elements
     real(wp), intent(in) :: loss_factor, damping   !! of the first one; viscous, in place of it [N m s/rad]
     type(linearisation_t), intent(in) :: linear
-    type(string_t), allocatable, intent(inout) :: notes(:)
+    type(string_t), allocatable, intent(inout) :: cases(:)
     real(wp), parameter :: far = 1.5_wp         ! ratio of the frequencies
     real(wp), parameter :: twisted = 0.5_wp     ! of the largest share of the energy
     real(wp), parameter :: counts = 0.005_wp    ! damping ratio
@@ -96,12 +109,9 @@ contains
     lossy = 0.5_wp * loss_factor * share(m)
     viscous = lossy * linear%natural(m) / chosen
     if (max(chosen / linear%natural(m), linear%natural(m) / chosen) <= far .or. max(lossy, viscous) < counts) return
-    call append(notes, 'the viscous damping that stands for the relative damping of ' // name // ' over the time (run, ' // &
-                       'sweep) has its frequency at ' // hertz(chosen) // ' Hz: to the mode at ' // hertz(linear%natural(m)) // &
-                       ' Hz it gives a damping ratio of ' // rounded_text(viscous, 2) // ', the relative damping (response, ' // &
-                       'campbell) ' // rounded_text(lossy, 2) // '; equal with damping_frequency_hz = ' // &
-                       hertz(linear%natural(m)))
-  end subroutine note_one
+    call append(cases, name // ' at ' // hertz(chosen) // ' Hz, the mode at ' // hertz(linear%natural(m)) // ' Hz: ' // &
+                       rounded_text(viscous, 2) // ' in place of ' // rounded_text(lossy, 2))
+  end subroutine add_case
 
   pure function hertz(omega) result(text)
     real(wp), intent(in) :: omega   !! [rad/s]

@@ -14,7 +14,7 @@ module nocdyn_campbell
   use nocdyn_machine, only: machine_t
   use nocdyn_margins, only: operating_distance
   use nocdyn_dense_pairs, only: most_modes
-  use nocdyn_response_notes, only: note_shaft_modes, note_simplifications, note_steady_states
+  use nocdyn_response_notes, only: note_numbers, note_shaft_modes, note_simplifications, note_steady_states
   use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
   use nocdyn_mode_branches, only: speed_modes_t
   use nocdyn_state_modes, only: has_choice, most_coordinates
@@ -72,13 +72,14 @@ contains
     call place_error(input, self%settings, failed_speed, error)
     if (.not. allocated(error)) call refuse_backward_speeds(input, self%settings, machine, self%response, error)
     if (allocated(error)) return
-    call follow_modes(self%response, self%settings%orders, self%modes, self%crossings, error, failed_speed)
+    call follow_modes(machine, self%response, self%settings%orders, self%modes, self%crossings, error, failed_speed)
     call place_error(input, self%settings, failed_speed, error)
     if (allocated(error)) return
     self%speed = self%response%speeds()
     self%is_of_grid = self%response%points%is_of_grid
     self%frequency = frequencies_of(self%response, self%settings%orders)
     call note_simplifications(machine, self%notes)
+    call note_numbers(self%modes, self%notes)
     call note_left_out(self%response%choice, self%modes%modes, self%response%matrix%coordinates, self%notes)
     allocate (is_unstable(size(self%speed)))
     call find_unstable(self%speed, self%modes, self%unstable, is_unstable)

@@ -175,6 +175,7 @@ contains
     associate (machine => self%response%machine)
       call json%put('bodies', machine%names(:machine%bodies - machine%nodes))
     end associate
+    call json%put('modes_numbered_at_rad_s', self%modes%numbered_at)
     call json%open_list('modes')
     do i = 1, self%modes%modes
       ! frequencies at both ends of the range, and the shape at the lowest speed

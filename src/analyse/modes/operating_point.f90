@@ -1,6 +1,6 @@
 !> The state at which a machine is linearised.
 module nocdyn_operating_point
-  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability, mean_formulation, nearest_equilibrium, t_infinity
+  use nocdyn_equilibrium, only: equilibrium_t, mean_formulation, t_infinity
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
@@ -9,6 +9,7 @@ module nocdyn_operating_point
   use nocdyn_kinds, only: wp
   use nocdyn_literals, only: literal_ok, read_real
   use nocdyn_machine, only: machine_t
+  use nocdyn_operating_states, only: find_operating_state
   use nocdyn_reduced, only: new_reduced
   use nocdyn_run_settings, only: choose_settings
   use nocdyn_solve, only: solve
@@ -87,13 +88,11 @@ contains
     type(equilibrium_t), allocatable :: equilibria(:)
     integer :: nearest
 
-    call find_equilibria(machine, t_infinity, point%formulation, equilibria, point%notes, error)
+    call find_operating_state(machine, t_infinity, point%formulation, equilibria, nearest, point%notes, error)
     if (allocated(error)) then
       error%message = error%message // '; --at rest linearises at the start angles without speeds'
       return
     end if
-    if (size(equilibria) > 1) call find_stability(point%formulation, t_infinity, equilibria)
-    nearest = nearest_equilibrium(point%formulation, equilibria)
     point%t = t_infinity
     point%y = equilibria(nearest)%y
     point%text = 'the steady state'

@@ -16,8 +16,8 @@ module nocdyn_response_analysis
   use nocdyn_response_choice, only: choose_quantities, choose_shown, find_couplings
   use nocdyn_response_fatigue, only: find_response_fatigue, response_fatigue_t
   use nocdyn_response_limits, only: read_limits, response_limit_t
-  use nocdyn_response_notes, only: note_linear_ranges, note_overloads, note_rated_speeds, note_rules, note_shaft_modes, &
-    note_separation, note_simplifications, note_steady_states
+  use nocdyn_response_notes, only: note_linear_ranges, note_numbers, note_overloads, note_rated_speeds, note_rules, &
+    note_separation, note_shaft_modes, note_simplifications, note_steady_states
   use nocdyn_response_points, only: keep_points
   use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
   use nocdyn_state_modes, only: most_coordinates
@@ -87,12 +87,13 @@ contains
     end associate
     if (.not. allocated(error)) call refuse_backward_speeds(input, self%settings, machine, self%response, error)
     if (allocated(error)) return
-    call find_peaks(self, forms, error, failed_speed)
+    call find_peaks(machine, self, forms, error, failed_speed)
     if (allocated(error)) then
       call place_error(input, self%settings, failed_speed, error)
     else
       call note_speeds(self%response, self%unstable, 'they are left out', self%notes)
       call note_steady_states(self%response, self%notes)
+      call note_numbers(self%modes, self%notes)
       if (self%modes%modes > 0) call note_shaft_modes(machine, self%modes, self%crossings, .false., self%notes)
       call note_separation(self%response, self%notes)
       call note_linear_ranges(self%response, self%notes)
@@ -183,7 +184,8 @@ contains
   end subroutine list_orders
 
   !> Finds modes, critical speeds, oscillations and their peaks between the speeds of the grid.
-  subroutine find_peaks(self, forms, error, failed_speed)
+  subroutine find_peaks(machine, self, forms, error, failed_speed)
+    type(machine_t), intent(in) :: machine
     type(response_analysis_t), intent(inout) :: self
     type(moment_form_t), intent(in) :: forms(:)   !! all quantities of the machine
     type(error_t), allocatable, intent(out) :: error
@@ -196,7 +198,7 @@ contains
                               'neither critical speeds nor peaks between the speeds of the grid are found for more than ' // &
                               to_text(most_coordinates) // '; nocdyn campbell has natural frequencies')
     else
-      call follow_modes(self%response, no_orders, self%modes, self%crossings, error, failed_speed)
+      call follow_modes(machine, self%response, no_orders, self%modes, self%crossings, error, failed_speed)
       if (.not. allocated(error)) call leave_out_unstable(self, error, failed_speed)
       if (allocated(error)) return
     end if

@@ -341,6 +341,7 @@ contains
       call json%close()
     end do
     call json%close_list()
+    if (analysis%modes%modes > 0) call json%put('modes_numbered_at_rad_s', analysis%modes%numbered_at)
     call json%open_list('critical_speeds')
     do i = 1, size(summary%criticals)
       call json%open()

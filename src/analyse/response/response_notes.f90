@@ -28,7 +28,7 @@ module nocdyn_response_notes
 
   public :: note_simplifications, note_steady_states, note_separation, note_linear_ranges, note_overloads, note_rated_speeds, &
     note_rules
-  public :: note_shaft_modes
+  public :: note_numbers, note_shaft_modes
 
 contains
 
@@ -49,6 +49,15 @@ contains
       end associate
     end do
   end subroutine note_simplifications
+
+  !> Modes whose numbers are not in the order of their frequencies at all speeds.
+  subroutine note_numbers(modes, notes)
+    type(speed_modes_t), intent(in) :: modes
+    type(string_t), allocatable, intent(inout) :: notes(:)
+
+    if (modes%change_places) call append(notes, 'modes change places over the speeds: their numbers are in the order of the ' // &
+      'frequencies at ' // rounded_text(from_si(modes%numbered_at, unit_rpm), 6) // ' rpm')
+  end subroutine note_numbers
 
   !> Modes that the nodes of shafts do not resolve, and critical speeds of these.
   subroutine note_shaft_modes(machine, modes, crossings, lists_modes, notes)
