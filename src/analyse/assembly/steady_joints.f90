@@ -11,7 +11,7 @@ module nocdyn_steady_joints
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_operating_states, only: find_operating_state
+  use nocdyn_steady_start, only: find_operating_state
   use nocdyn_steady_views, only: steady_view_t
   use nocdyn_text, only: string_t
   implicit none (type, external)

@@ -1,16 +1,13 @@
 !> The modes at all speeds of a response, and the critical speeds, at which its lines meet them.
 module nocdyn_followed_modes
   use nocdyn_critical_speeds, only: crossing_t, find_crossings
-  use nocdyn_equilibrium, only: equilibrium_t, t_infinity
   use nocdyn_errors, only: error_t
   use nocdyn_forced_response, only: forced_response_t
-  use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: sort_ascending
   use nocdyn_machine, only: machine_t
   use nocdyn_mode_branches, only: new_speed_modes, speed_modes_t
-  use nocdyn_operating_states, only: find_operating_state
-  use nocdyn_text, only: string_t
+  use nocdyn_steady_start, only: find_steady_speed
   implicit none (type, external)
   private
 
@@ -38,7 +35,7 @@ contains
     call new_speed_modes(response, 1, modes, error)
     if (allocated(error)) return
     has_state = .false.
-    if (modes%change_places) call find_steady_speed(machine, response, has_state, steady_speed)
+    if (modes%change_places) call add_steady_speed(machine, response, has_state, steady_speed)
     do round = 1, rounds
       if (has_state .or. round > 1) call new_speed_modes(response, nearest_point(response), modes, error)
       if (allocated(error)) return
@@ -64,30 +61,22 @@ contains
 
   end subroutine follow_modes
 
-  !> The speed of the body of the response in the steady state of the machine, which becomes a point if it is among the speeds.
-  subroutine find_steady_speed(machine, response, has_state, steady_speed)
+  !> Makes the speed in the steady state of the machine a point, if it is among the speeds.
+  subroutine add_steady_speed(machine, response, has_state, steady_speed)
     type(machine_t), intent(in) :: machine
     type(forced_response_t), intent(inout) :: response
-    logical, intent(out) :: has_state
+    logical, intent(out) :: has_state       !! whether there is one
     real(wp), intent(out) :: steady_speed   !! [rad/s]
-    class(formulation_t), allocatable :: formulation
-    type(equilibrium_t), allocatable :: equilibria(:)
     type(error_t), allocatable :: error
-    type(string_t), allocatable :: notes(:)
-    integer :: nearest
     real(wp) :: failed_speed
     real(wp), allocatable :: speed(:)
 
-    steady_speed = 0.0_wp
-    call find_operating_state(machine, t_infinity, formulation, equilibria, nearest, notes, error)
-    has_state = .not. allocated(error)
+    call find_steady_speed(machine, response%held%reference, has_state, steady_speed)
     if (.not. has_state) return
-    call formulation%set_state(equilibria(nearest)%y)
-    steady_speed = formulation%omega(1, response%held%reference)
     speed = response%speeds()
     if (steady_speed < minval(speed) .or. steady_speed > maxval(speed)) return
     call response%add_points([steady_speed], .false., error, failed_speed, only_states=.true.)
-  end subroutine find_steady_speed
+  end subroutine add_steady_speed
 
   !> The frequencies of orders, or of the lines of a response, at its speeds [rad/s], [lines, points].
   function frequencies_of(response, orders) result(frequency)

@@ -258,8 +258,8 @@ contains
     tracks%divergence(stop%point) = stop%pairs%divergence
   end subroutine record
 
-  !> The result, with the branches in the order of their frequencies where they are numbered; then those that are not there, in the
-  !> order of their begin and of their frequencies there. Branches that are only between the points are left out.
+  !> The result, with the branches in the order of their frequencies where they are numbered; then those that are not there,
+  !> in the order of their begin and of their frequencies there. Branches that are only between the points are left out.
   subroutine set_modes(tracks, numbered_at, self)
     type(branches_t), intent(in) :: tracks
     integer, intent(in) :: numbered_at   !! point

@@ -45,7 +45,7 @@ contains
     end do
   end function has_stand_ins
 
-  !> Adds a note on the couplings and shafts whose damping has another frequency than the lowest of the modes that twist them most.
+  !> Adds a note on the couplings and shafts whose damping has another frequency than the lowest mode that twists them most.
   subroutine note_stand_ins(machine, linear, notes)
     type(machine_t), intent(in) :: machine         !! one lane
     type(linearisation_t), intent(in) :: linear    !! all but `matrix` and `held`

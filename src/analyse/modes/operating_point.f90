@@ -9,10 +9,10 @@ module nocdyn_operating_point
   use nocdyn_kinds, only: wp
   use nocdyn_literals, only: literal_ok, read_real
   use nocdyn_machine, only: machine_t
-  use nocdyn_operating_states, only: find_operating_state
   use nocdyn_reduced, only: new_reduced
   use nocdyn_run_settings, only: choose_settings
   use nocdyn_solve, only: solve
+  use nocdyn_steady_start, only: find_operating_state
   use nocdyn_text, only: append, string_t, to_text
   implicit none (type, external)
   private
