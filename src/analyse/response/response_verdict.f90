@@ -14,7 +14,8 @@ module nocdyn_response_verdict
   use nocdyn_response_summary, only: barred_range_t, response_summary_t
   use nocdyn_text, only: quoted, rounded_text
   use nocdyn_units, only: from_si, unit_hz, unit_rpm
-  use nocdyn_verdicts, only: in_words, is_exceeded, is_not_assessed, is_restricted, new_verdict_line, verdict_line_t, verdict_t
+  use nocdyn_verdicts, only: in_words, is_not_assessed, is_restricted, new_damage_line, new_verdict_line, verdict_line_t, &
+    verdict_t
   implicit none (type, external)
   private
 
@@ -250,14 +251,13 @@ contains
     do i = 1, size(analysis%fatigue)
       associate (item => analysis%fatigue(i))
         if (size(item%hours) == 0 .and. .not. item%exceeds_strength) cycle
-        line = new_verdict_line('response', item%kind // ' ' // quoted(item%element), item%quantity, &
-                                'damage ' // quoted(item%name), '')
-        if (size(item%hours) > 0) call line%compare(item%damage(), 1.0_wp, '1')
-        if (size(item%hours) > 0) line%detail = rounded_text(sum(item%hours), 6) // ' h'
-        if (item%exceeds_strength) then
-          line%finding = is_exceeded
-          line%reason = 'the mean exceeds the strength'
+        if (size(item%hours) == 0) then
+          line = new_damage_line('response', item%kind, item%element, item%name, item%exceeds_strength)
+        else
+          line = new_damage_line('response', item%kind, item%element, item%name, item%exceeds_strength, item%damage())
+          line%detail = rounded_text(sum(item%hours), 6) // ' h'
         end if
+        line%quantity = item%quantity
         call verdict%add(line)
       end associate
     end do

@@ -11,7 +11,7 @@ module nocdyn_load_case_report
   use nocdyn_table_text, only: cell, padded, text_width
   use nocdyn_text, only: counted, quoted, rounded_text, string_t, strings
   use nocdyn_text_buffer, only: text_buffer_t
-  use nocdyn_verdicts, only: is_exceeded, is_kept, is_not_assessed, new_verdict_line, verdict_line_t, verdict_t
+  use nocdyn_verdicts, only: is_kept, is_not_assessed, new_damage_line, verdict_line_t, verdict_t
   implicit none (type, external)
   private
 
@@ -76,13 +76,11 @@ contains
     call combine_verdicts('run', results_of(runs), verdict)
     call sum_damage(runs, lives)
     do i = 1, size(lives)
-      line = new_verdict_line('run', lives(i)%kind // ' ' // quoted(lives(i)%element), '', 'damage ' // quoted(lives(i)%name), '')
-      call line%compare(lives(i)%damage, 1.0_wp, '1')
+      associate (life => lives(i))
+        line = new_damage_line('run', life%kind, life%element, life%name, life%exceeds_strength, life%damage)
+      end associate
       line%detail = 'all load cases'
-      if (lives(i)%exceeds_strength) then
-        line%finding = is_exceeded
-        line%reason = 'the mean of a cycle exceeds the strength'
-      else if (line%finding == is_kept .and. .not. is_complete(results_of(runs))) then
+      if (line%finding == is_kept .and. .not. is_complete(results_of(runs))) then
         line%finding = is_not_assessed
         line%reason = 'load cases are missing'
       end if
