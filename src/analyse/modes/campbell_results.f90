@@ -25,7 +25,7 @@ module nocdyn_campbell_results
     type(campbell_t), private :: campbell
     character(len=:), allocatable, private :: body   !! whose speed is held
   contains
-    procedure :: solve, list_tables, put_table, find_verdict, put_report, text => printed
+    procedure :: solve, list_tables, put_table, judge, put_report, text => printed
   end type campbell_results_t
 
   integer, parameter :: most_modes = 20, most_crossings = 60   ! that are printed; all are in campbell.json
@@ -91,31 +91,28 @@ contains
   end subroutine put_table
 
   !> Critical speeds in operation or near it: a diagram does not know what responds there.
-  subroutine find_verdict(self, input, verdict)
-    class(campbell_results_t), intent(in) :: self
+  subroutine judge(self, input)
+    class(campbell_results_t), intent(inout) :: self
     type(input_t), intent(in) :: input
-    type(verdict_t), intent(out) :: verdict
     integer :: i
 
     associate (campbell => self%campbell)
       do i = 1, size(campbell%crossings)
         if (campbell%modes%is_electrical(campbell%crossings(i)%mode)) cycle
         call add_critical('campbell', campbell%settings, campbell%crossings(i), line_word(campbell, campbell%crossings(i)%line), &
-                          campbell%distance(i), unknown_ratio, '', verdict)
+                          campbell%distance(i), unknown_ratio, '', self%verdict)
       end do
-      call add_nearest('campbell', campbell%settings, campbell%modes, campbell%crossings, verdict)
-      call add_coverage('campbell', campbell%settings, campbell%unstable, verdict)
+      call add_nearest('campbell', campbell%settings, campbell%modes, campbell%crossings, self%verdict)
+      call add_coverage('campbell', campbell%settings, campbell%unstable, self%verdict)
     end associate
-  end subroutine find_verdict
+  end subroutine judge
 
   subroutine put_report(self, input, json)
     class(campbell_results_t), intent(in) :: self
     type(input_t), intent(in) :: input
     type(json_t), intent(inout) :: json
-    type(verdict_t) :: verdict
 
-    call self%find_verdict(input, verdict)
-    call put_campbell(json, input, self%body, self%campbell, verdict)
+    call put_campbell(json, input, self%body, self%campbell, self%verdict)
   end subroutine put_report
 
   subroutine printed(self, input, text)

@@ -15,7 +15,7 @@ module nocdyn_load_case_report
   implicit none (type, external)
   private
 
-  public :: find_verdict, load_cases_json, load_cases_text, put_load_cases_csv
+  public :: find_cases_verdict, load_cases_json, load_cases_text, put_load_cases_csv
 
   integer, parameter :: most_lines = 25   ! printed
   integer, parameter :: digits = 4        ! of printed damages
@@ -24,17 +24,16 @@ module nocdyn_load_case_report
 contains
 
   !> The text of cases.json.
-  function load_cases_json(input, runs) result(text)
+  function load_cases_json(input, runs, verdict) result(text)
     type(input_t), intent(in) :: input   !! of one of the cases
     type(case_run_t), intent(in) :: runs(:)
+    type(verdict_t), intent(in) :: verdict   !! of all runs
     character(len=:), allocatable :: text
     type(json_t) :: json
-    type(verdict_t) :: verdict
     integer :: i
     type(peak_t), allocatable :: peaks(:)
 
     call json%open_report(input%file, input%title())
-    call find_verdict(runs, verdict)
     call verdict%put(json)
     call put_cases(json, results_of(runs))
     call find_peaks(runs, peaks)
@@ -66,7 +65,7 @@ contains
   end function results_of
 
   !> What all runs say of limits, and their damage together.
-  subroutine find_verdict(runs, verdict)
+  subroutine find_cases_verdict(runs, verdict)
     type(case_run_t), intent(in) :: runs(:)
     type(verdict_t), intent(out) :: verdict
     type(life_t), allocatable :: lives(:)
@@ -86,7 +85,7 @@ contains
       end if
       call verdict%add(line)
     end do
-  end subroutine find_verdict
+  end subroutine find_cases_verdict
 
   subroutine put_lives(json, runs)
     type(json_t), intent(inout) :: json
@@ -138,17 +137,16 @@ contains
   end subroutine put_load_cases_csv
 
   !> The printed table: the largest magnitudes of the columns that one looks for, with their times and cases; the damage.
-  function load_cases_text(runs) result(text)
+  function load_cases_text(runs, verdict) result(text)
     type(case_run_t), intent(in) :: runs(:)
+    type(verdict_t), intent(in) :: verdict   !! of all runs
     character(len=:), allocatable :: text
     type(text_buffer_t) :: report
-    type(verdict_t) :: verdict
     type(peak_t), allocatable :: peaks(:)
     type(string_t), allocatable :: labels(:)
     integer, allocatable :: ranks(:), shown(:)
     integer :: i, width
 
-    call find_verdict(runs, verdict)
     call verdict%write_table(report)
     call find_peaks(runs, peaks)
     allocate (labels(size(peaks)))
