@@ -4,6 +4,7 @@
 !> barred range there and a limit for passing it is kept: one of half ranges or, outside of operation, that of the largest
 !> magnitude. In operation the limit is exceeded if there is none; outside of it the range is 'not assessed' then.
 module nocdyn_response_verdict
+  use nocdyn_excitation_lines, only: line_t
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_limit_groups, only: limited_kind
@@ -209,7 +210,7 @@ contains
       associate (point => points(worst(1)), frequency => points(worst(1))%frequency(worst(2)))
         call line%compare(abs(point%quantity(worst(2), limit%quantity)), limit%amplitude_limit(frequency), line%unit)
         call line%stand_at(point%state%speed)
-        line%detail = 'order ' // analysis%response%lines(worst(2))%word() // ', ' // &
+        line%detail = title_of(analysis%response%lines(worst(2))) // ', ' // &
                       rounded_text(from_si(frequency, unit_hz), 4) // ' Hz'
       end associate
       line%rule = ''
@@ -277,12 +278,21 @@ contains
         element = ''
         if (critical%quantity > 0) element = analysis%response%quantities(critical%quantity)%element
         call add_critical('response', analysis%settings, critical%crossing, &
-                          analysis%response%lines(critical%crossing%line)%word(), critical%margin, critical%ratio, element, &
+                          title_of(analysis%response%lines(critical%crossing%line)), critical%margin, critical%ratio, element, &
                           verdict)
       end associate
     end do
     call add_nearest('response', analysis%settings, analysis%modes, analysis%crossings, verdict)
   end subroutine add_criticals
+
+  !> "order 6", "twice-slip".
+  function title_of(line) result(title)
+    type(line_t), intent(in) :: line
+    character(len=:), allocatable :: title
+
+    title = line%word()
+    if (line%is_order) title = 'order ' // title
+  end function title_of
 
   !> A line on a limit.
   subroutine start_line(input, analysis, number, what, line)
