@@ -15,11 +15,10 @@ from .trajectory_files import ResultsError, labels_of, read_columns
 
 SPEED = re.compile(r"omega_(?P<body>.+) \[(?P<unit>rad/s|rpm|Hz)\]")
 FREQUENCY = re.compile(r"frequency_(?P<mode>\d+) \[Hz\]")
-LINE = re.compile(r"(?P<kind>order|line)_(?P<name>.+) \[Hz\]")
+LINE = re.compile(r"(order|line)_.+ \[Hz\]")
 TABLE, ORDERS = "response.csv", "response_orders.csv"
 LIMITS = ("limit", "transient_limit", "peak_limit")
 STATISTICS = ("half_range", "mean", "peak", *LIMITS)
-FIXED = 1e-9  # relative range of a frequency that does not change with the speed
 NAMED = 4  # orders that are named beside the curve of all
 NEAR = 2.5  # times what is drawn: limits above are not in the picture
 
@@ -31,14 +30,17 @@ def rpm(speed: float) -> float:
 
 @dataclass(frozen=True)
 class Line:
-    """An excitation: oscillations per turn of the body, or a frequency [Hz] that is the same at all speeds."""
+    """An excitation: oscillations per turn of the body, or a frequency [Hz] at the first speed, with the name of the program."""
 
     value: float
     is_order: bool
+    word: str = "fixed"
 
     @property
     def name(self) -> str:
-        return f"{self.value:.6g}" if self.is_order else f"{self.value:.5g} Hz"
+        if self.is_order:
+            return f"{self.value:.6g}"
+        return f"{self.value:.5g} Hz" if self.word == "fixed" else self.word
 
     @property
     def title(self) -> str:
@@ -189,7 +191,7 @@ def roman(number: int) -> str:
 
 
 def read_response(folder: Path) -> Response:
-    report = _read_report(folder, "response", (TABLE, ORDERS), ("body", "critical_speeds"))
+    report = _read_report(folder, "response", (TABLE, ORDERS), ("body", "lines", "critical_speeds"))
     columns = read_column_list(folder, RESPONSE_COLUMNS)
     table, speed, rising = _read_table(folder / TABLE)
     order_table, order_speed, _ = _read_table(folder / ORDERS, rises=False)
@@ -202,11 +204,11 @@ def read_response(folder: Path) -> Response:
         raise ResultsError(f"{folder / ORDERS}: its speeds are not those of response.csv; both must be of the same run")
     shape = (len(table), count)
     by_kind = {column.kind: column.label for column in columns if column.file == ORDERS and not column.element}
-    orders, frequencies = (order_table[by_kind[kind]].to_numpy().reshape(shape) for kind in ("order", "frequency"))
+    frequencies = order_table[by_kind["frequency"]].to_numpy().reshape(shape)
     quantities = [one.sorted_by(rising) for one in _quantities(table, order_table, columns, shape)]
     if not quantities:
         raise ResultsError(f"{folder / TABLE}: nothing to draw: there is no half range")
-    lines = [_line(*line) for line in zip(orders.T, frequencies.T)]
+    lines = [_line(entry, frequency) for entry, frequency in zip(report["lines"], frequencies[0])]
     return Response(
         folder,
         _title(report, folder),
@@ -215,24 +217,22 @@ def read_response(folder: Path) -> Response:
         columns,
         lines,
         quantities,
-        [_critical(entry) for entry in report["critical_speeds"]],
+        [read_critical(entry) for entry in report["critical_speeds"]],
         [_barred(entry) for entry in report.get("barred_speed_ranges", [])],
         _operation(report),
     )
 
 
 def read_campbell(folder: Path) -> Campbell:
-    report = _read_report(folder, "campbell", ("campbell.csv",), ("body", "crossings"))
+    report = _read_report(folder, "campbell", ("campbell.csv",), ("body", "lines", "crossings"))
     table, speed, rising = _read_table(folder / "campbell.csv")
     modes = {int(match["mode"]): label for label in table if (match := FREQUENCY.fullmatch(label))}
     if not modes:
         raise ResultsError(f"{folder / 'campbell.csv'}: nothing to draw: there is no column 'frequency_1 [Hz]'")
     lines = []
-    for label in table:
-        if match := LINE.fullmatch(label):
-            frequency = table[label].to_numpy()
-            is_order = match["kind"] == "order"
-            lines.append((Line(float(match["name"]) if is_order else frequency[0], is_order), frequency[rising]))
+    for entry, label in zip(report["lines"], filter(LINE.fullmatch, table)):
+        frequency = table[label].to_numpy()
+        lines.append((_line(entry, frequency[0]), frequency[rising]))
     return Campbell(
         folder,
         _title(report, folder),
@@ -240,7 +240,7 @@ def read_campbell(folder: Path) -> Campbell:
         speed[rising],
         {mode: table[label].to_numpy()[rising] for mode, label in modes.items()},
         lines,
-        [_critical(entry) for entry in report["crossings"]],
+        [read_critical(entry) for entry in report["crossings"]],
         _operation(report),
     )
 
@@ -310,14 +310,14 @@ def _lower(limit: np.ndarray | None, of_stress: np.ndarray | None, ratio: float)
     return of_stress / ratio if limit is None else np.fmin(limit, of_stress / ratio)
 
 
-def _line(orders: np.ndarray, frequencies: np.ndarray) -> Line:
-    is_fixed = np.ptp(frequencies) <= FIXED * frequencies.max() and np.ptp(orders) > FIXED * orders.max()
-    return Line(frequencies[0], False) if is_fixed else Line(orders[0], True)
+def _line(entry: dict, frequency: float) -> Line:
+    return Line(entry["order"], True) if "order" in entry else Line(frequency, False, entry["line_name"])
 
 
-def _critical(entry: dict) -> Critical:
+def read_critical(entry: dict) -> Critical:
+    """One of the crossings of campbell.json or of the critical speeds of response.json."""
     distance = entry.get("distance_to_operation", math.nan)
-    line = Line(entry["order"], True) if "order" in entry else Line(entry["frequency_Hz"], False)
+    line = _line(entry, entry["frequency_Hz"])
     speed = rpm(entry["speed_rad_s"])
     judged = entry.get("is_too_near", False), entry.get("is_electrical", False)
     return Critical(entry["mode"], line, speed, entry["frequency_Hz"], distance, *judged)

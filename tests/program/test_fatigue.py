@@ -97,6 +97,45 @@ def test_the_damage_is_that_of_the_sampled_stress_with_goodman_and_notch(nocdyn)
     assert life["damage"] == pytest.approx(damage, rel=1e-5)
 
 
+SN_CYCLES, SN_STRESS = (2e3, 1e5, 3e6), (9e6, 4e6, 2.5e6)
+SN_TABLE = "# cycles to failure, half range of the stress [Pa]\n" + "".join(f"{n}, {s}\n" for n, s in zip(SN_CYCLES, SN_STRESS))
+
+
+def table_life(half_range, constant=False):
+    """Cycles to failure, straight in logarithmic scales; below the last point none fail it if the curve is constant there."""
+    cycles, stress = np.log(SN_CYCLES), np.log(SN_STRESS)
+    if constant and half_range <= SN_STRESS[-1]:
+        return math.inf
+    i = 0 if half_range > SN_STRESS[1] else 1
+    return math.exp(cycles[i] + (cycles[i + 1] - cycles[i]) / (stress[i + 1] - stress[i]) * (math.log(half_range) - stress[i]))
+
+
+@pytest.mark.parametrize("constant", [False, True])
+@pytest.mark.parametrize(
+    ("mean", "level"),
+    [
+        ("", lambda mean: 1),
+        ("mean_stress='goodman' ultimate_stress=8e7", lambda mean: 1 / (1 - abs(mean) / 8e7)),
+        ("mean_stress='soderberg' yield_stress=5e7", lambda mean: 1 / (1 - abs(mean) / 5e7)),
+        ("mean_stress='gerber' ultimate_stress=6e7", lambda mean: 1 / (1 - (mean / 6e7) ** 2)),
+    ],
+)
+def test_the_table_of_a_file_counts_as_the_sampled_stress(nocdyn, constant, mean, level):
+    nocdyn.write("curve.csv", SN_TABLE)
+    keys = mean + (" extrapolation='constant'" if constant else "")
+    lists = f"table_cycles={str(SN_CYCLES)[1:-1]} table_stress={str(SN_STRESS)[1:-1]}"
+    text = STARTED + f"&fatigue name='life' coupling='c' stress_file='curve.csv' {keys} /\n"
+    life, same = fatigue_of(nocdyn, text + f"&fatigue name='lists' coupling='c' {lists} {keys} /\n")
+    assert same["damage"] == life["damage"]
+    header, rows = nocdyn.table("results/machine")
+    stress = [float(row[header.index("stress_c [Pa]")]) for row in rows]
+    least = 1e-5 * max(map(abs, stress))
+    cycles = [(r, m, c) for r, m, c, _, _ in rainflow.extract_cycles(stress) if r > least]
+    levels = [r / 2 * level(m) for r, m, _ in cycles]
+    assert any(one > SN_STRESS[0] for one in levels) and any(one < SN_STRESS[-1] for one in levels)
+    assert life["damage"] == pytest.approx(sum(c / table_life(one, constant) for one, (_, _, c) in zip(levels, cycles)), rel=1e-5)
+
+
 def test_the_thin_part_of_a_shaft_takes_the_damage(nocdyn):
     (life,) = fatigue_of(
         nocdyn,
@@ -203,7 +242,8 @@ BARE = RELEASED.replace(" section_modulus=1e-5", "").format(t_end=1)
         ),
         (
             "coupling='c' reference_moment=1 reference_cycles=1 slope=3 mean_stress='goodman'",
-            ":5: &fatigue 'f': mean_stress = 'goodman' needs an S-N curve of stresses, reference_stress or table_stress",
+            ":5: &fatigue 'f': mean_stress = 'goodman' needs an S-N curve of stresses, reference_stress, table_stress or "
+            "stress_file",
         ),
         (
             "coupling='c' reference_moment=1 reference_cycles=1 slope=3 yield_stress=1e8",
@@ -219,6 +259,43 @@ def test_groups_that_do_not_fit_are_refused(nocdyn, group, message):
         assert done.returncode == 2
         assert message in done.stderr
         assert done.stderr.count("\n") <= 2
+
+
+@pytest.mark.parametrize(
+    ("keys", "rows", "message"),
+    [
+        ("", ["1e3 9e6"], "moment_file: curve.csv: 1 row; needed: at least 2\n"),
+        ("", ["1e3 5", "1e2 4"], "moment_file: curve.csv:2: column 1, 100, must be greater than 1000 on line 1"),
+        ("", ["1e3 5", "1e6 5"], "table_moment(2) = 5 is not less than the value before, 5; needed: half ranges that descend\n"),
+        ("", ["1e3 5", "1e6 0"], "moment_file: curve.csv: table_moment = 0 in row 2 is out of range; allowed: > 0 [N m]\n"),
+        (
+            "slope=3 reference_moment=1 reference_cycles=1",
+            ["1 2", "2 1"],
+            "slope and moment_file are both given; allowed: one of them",
+        ),
+        ("table_cycles=1, 2", ["1 2", "2 1"], "table_cycles and moment_file are both given; allowed: one of them\n"),
+        ("table_moment=2, 1", ["1 2", "2 1"], "table_moment and moment_file are both given; allowed: one of them\n"),
+        ("stress_file='curve.csv'", ["1 2", "2 1"], "stress_file and moment_file are both given; allowed: one of them\n"),
+        ("force_file='curve.csv'", ["1 2", "2 1"], "moment_file and force_file are both given; allowed: one of them\n"),
+    ],
+)
+def test_tables_of_files_that_do_not_fit_are_refused(nocdyn, keys, rows, message):
+    nocdyn.write("curve.csv", "\n".join(rows) + "\n")
+    nocdyn.write("bad.nml", BARE + f"&fatigue name='f' coupling='c' moment_file='curve.csv' {keys} /\n")
+    done = nocdyn("check", "bad.nml")
+    assert done.returncode == 2
+    assert f"bad.nml:5: &fatigue 'f': {message}" in done.stderr
+
+
+def test_an_extrapolation_needs_a_table_and_a_table_its_half_ranges(nocdyn):
+    for keys, message in (
+        (f"{CURVE} extrapolation='constant'", "extrapolation needs table_cycles, stress_file, moment_file or force_file\n"),
+        ("table_cycles=1, 2", "table_cycles needs table_stress, table_moment or table_force\n"),
+    ):
+        nocdyn.write("bad.nml", RELEASED.format(t_end=1) + f"&fatigue name='f' coupling='c' {keys} /\n")
+        done = nocdyn("check", "bad.nml")
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+        assert message in done.stderr
 
 
 def test_a_mean_needs_its_strength_and_a_force_its_radii(nocdyn):

@@ -43,6 +43,7 @@ def report(**changes):
         "body": "prop $",
         "operating_rad_s": [350.0 / RPM, 450.0 / RPM],
         "margin": 0.1,
+        "lines": [{"order": order} for order in ORDERS],
         "critical_speeds": [
             {"mode": 2, "order": 2.5, "speed_rad_s": CRITICAL / RPM, "frequency_Hz": 12.5, "distance_to_operation": 0.143},
             {"mode": 4, "order": 9.0, "speed_rad_s": 330.0 / RPM, "frequency_Hz": 49.5, "distance_to_operation": 0.057},
@@ -308,7 +309,8 @@ def campbell(folder, modes=3, orders=(1.0, 2.5, 12.0), **changes):
         if 100.0 <= 600.0 * mode / order <= 500.0
         for distance in [max((350.0 - 600.0 * mode / order) / 350.0, (600.0 * mode / order - 450.0) / 450.0)]
     ]
-    content = {"title": "", "input": "in/train.nml", "body": "motor", "crossings": crossings}
+    lines = [{"order": order} for order in orders] + [{"line": 4, "line_name": "fixed"}]
+    content = {"title": "", "input": "in/train.nml", "body": "motor", "lines": lines, "crossings": crossings}
     return write(folder, "campbell.json", content | {"operating_rad_s": [350.0 / RPM, 450.0 / RPM], "margin": 0.1} | changes)
 
 
@@ -391,6 +393,48 @@ MACHINE = """\
 &run t_end = 1 /
 &response body = 'motor' speed_rpm = -20, -900 count = 81 operating_rpm = -300, -400 /
 """
+
+
+START = """
+&body name = 'motor' inertia = 3 /
+&body name = 'fan' inertia = 2 /
+&coupling name = 'c' bodies = 'motor', 'fan' stiffness = 6.0e4 damping = 5.0 /
+&motor name = 'start' body = 'motor' kind = 'synchronous' frequency_hz = 50 poles = 4
+       slips = 0, 1 mean_torques = 0, 50 pulsations = 10, 10 /
+&load name = 'air' body = 'fan' quadratic = 5e-4 /
+&run t_end = 1 /
+&response body = 'motor' speed_rpm = 200, 1400 operating_rpm = 300, 1200 /
+"""
+
+
+def test_the_line_at_twice_the_slip_frequency_has_one_name(tmp_path):
+    write(tmp_path, "machine.nml", START)
+    for command, read, key in (("response", read_response, "critical_speeds"), ("campbell", read_campbell, "crossings")):
+        words = [NOCDYN, command, tmp_path / "machine.nml"]
+        printed = subprocess.run(words, check=True, capture_output=True, text=True, cwd=tmp_path).stdout
+        assert printed.count("twice-slip") >= 2 and "order twice-slip" not in printed  # in the table, in the verdict
+        subprocess.run([*words, "--out", tmp_path], check=True, capture_output=True)
+        content = json.loads((tmp_path / f"{command}.json").read_text())
+        assert [one["line_name"] for one in content["lines"]] == [one["line_name"] for one in content[key]] == ["twice-slip"]
+        found = read(tmp_path)
+        assert [one.name for one in getattr(found, "criticals", None) or found.crossings] == ["I/twice-slip"]
+        (line,) = found.lines
+        assert (line if command == "response" else line[0]).title == "twice-slip"
+
+
+def test_a_line_of_a_body_of_another_speed_varies(tmp_path):
+    fluid = START.replace("stiffness = 6.0e4", "friction = 800 friction_speed = 20").split("&motor")[0]
+    fluid += """
+&motor name = 'drive' body = 'motor' kind = 'constant' torque = 20 /
+&load name = 'air' body = 'fan' quadratic = 5e-3 /
+&excitation name = 'blades' body = 'fan' kind = 'orders' orders = 3 amplitudes = 5 /
+&run t_end = 1 /
+&response body = 'motor' speed_rpm = 200, 1400 /
+"""
+    write(tmp_path, "machine.nml", fluid)
+    subprocess.run([NOCDYN, "response", tmp_path / "machine.nml", "--out", tmp_path], check=True, capture_output=True)
+    content = json.loads((tmp_path / "response.json").read_text())
+    assert [one["line_name"] for one in content["lines"]] == ["varying"]
 
 
 def test_what_the_program_writes_is_drawn(tmp_path, monkeypatch):

@@ -87,6 +87,23 @@ def test_several_orders_have_the_cycles_of_their_synthesis(nocdyn, mean_stress):
         assert row["damage_per_hour_life [1/h]"] == pytest.approx(expected, rel=1e-5)
 
 
+def test_the_table_of_a_file_counts_in_a_response(nocdyn):
+    nocdyn.write("curve.txt", "1e4 400\n1e6 120\n1e8 60\n")
+    fatigue = "&fatigue name = 'life' coupling = 'c' moment_file = 'curve.txt' extrapolation = 'constant' /\n"
+    rows, _, _, _ = respond(nocdyn, MACHINE + ORDER + fatigue)
+    cycles, half_ranges = [1e4, 1e6, 1e8], [400, 120, 60]
+    found = set()
+    for row in rows:
+        level = row["half_range_total_moment_c [N m]"]
+        i = 0 if level > 120 else 1
+        slope = math.log(cycles[i] / cycles[i + 1]) / math.log(half_ranges[i] / half_ranges[i + 1])
+        life = cycles[i] * (level / half_ranges[i]) ** slope if level > 60 else math.inf
+        per_hour = 3600 * 2 * row["omega_engine [rad/s]"] / (2 * math.pi)
+        assert row["damage_per_hour_life [1/h]"] == pytest.approx(per_hour / life, rel=1e-9)
+        found.add("above" if level > 400 else "below" if level <= 60 else "between")
+    assert found == {"above", "below", "between"}
+
+
 def test_lines_without_a_common_period(nocdyn):
     """The mean over many periods: 1000 of the slower line here, as many in the reference."""
     mains = "&excitation name = 'mains' body = 'fan' amplitude = 400 frequency_hz = 23.4567 /\n"

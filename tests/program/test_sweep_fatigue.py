@@ -21,6 +21,7 @@ MACHINE = BODIES + TORQUES + RUN
 COUPLING = "&coupling name = 'c' bodies = 'motor', 'fan' stiffness = 6.0e3 damping = 6.0 diameter = 0.06 /\n"
 STRESS = "&fatigue name = 'life' coupling = 'c' reference_stress = 4.0e7 reference_cycles = 1.0e6 slope = 5 /\n"
 MOMENT = "&fatigue name = 'life' coupling = 'c' reference_moment = 800 reference_cycles = 1.0e6 slope = 5 /\n"
+FROM_FILE = "&fatigue name = 'life' coupling = 'c' stress_file = 'curve.csv' mean_stress = 'gerber' ultimate_stress = 2.0e8 /\n"
 VARIED = "&vary target = 'coupling.c.stiffness' low = 4.0e3 high = 9.0e3 count = 4 /\n"
 RECORD = "&sweep design = 'grid' /\n&record fatigue = 'life' statistic = 'damage', 'cycles' /\n"
 SWEEP = RECORD + "&record trajectories = 1, 2, 3, 4 /\n"
@@ -31,6 +32,7 @@ ELEMENTS = {
     "moment with damping": COUPLING + MOMENT,
     "cubic": COUPLING.replace("damping", "cubic_stiffness = 4.0e5 damping") + MOMENT,
     "goodman": COUPLING + STRESS.replace("slope", "mean_stress = 'goodman' ultimate_stress = 2.0e8 slope"),
+    "table of a file": COUPLING + FROM_FILE,
     "gap": COUPLING.replace("damping", "gap = 0.002 damping") + MOMENT,
 }
 
@@ -59,6 +61,7 @@ def compare_with_runs(nocdyn, text, number=0):
 
 @pytest.mark.parametrize("element", ELEMENTS)
 def test_each_variant_has_the_damage_of_its_run(nocdyn, element):
+    nocdyn.write("curve.csv", "1e4, 8e7\n1e6, 3e7\n1e8, 1e7\n")
     compare_with_runs(nocdyn, MACHINE + ELEMENTS[element] + SWEEP + VARIED)
 
 

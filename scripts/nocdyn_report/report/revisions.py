@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..columns import LOADS, RESPONSE_COLUMNS, read_column_list
-from ..speed_results import roman
+from ..speed_results import read_critical, roman
 from ..trajectory_files import ResultsError
 from .failure import USAGE, ReportError
 from .naming import is_end, name_of
@@ -107,8 +107,7 @@ def _frequencies(files: ResultFiles) -> Iterable[tuple]:
 def _criticals(files: ResultFiles) -> Iterable[tuple]:
     if folder := _main(files, "campbell"):
         for one in _read(folder / "campbell.json")["crossings"]:
-            line = f"{one['order']:.6g}" if "order" in one else f"{one['frequency_Hz']:.5g} Hz"
-            yield ("critical speed", f"{roman(one['mode'])}/{line}"), (one["speed_rad_s"], "rad/s")
+            yield ("critical speed", read_critical(one).name), (one["speed_rad_s"], "rad/s")
 
 
 def _response(files: ResultFiles) -> Iterable[tuple]:

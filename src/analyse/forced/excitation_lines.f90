@@ -18,6 +18,7 @@ module nocdyn_excitation_lines
     real(wp) :: order = 0.0_wp       !! oscillations per turn of the reference body, at the first speed
     logical :: is_order = .true.     !! whether its frequency is proportional to the speed; else a fixed frequency is in it
     logical :: is_fixed = .false.    !! whether its frequency is the same at all speeds
+    logical :: is_slip = .false.     !! whether it is twice the slip frequency of a motor that starts asynchronously
     integer :: family = 0            !! frequencies of one family keep their ratios at all speeds
     integer, allocatable :: source(:)     !! harmonics, numbered over all elements
   contains
@@ -31,6 +32,7 @@ module nocdyn_excitation_lines
     real(wp) :: order = 0.0_wp          !! oscillations per turn of the reference body
     complex(wp) :: moment = 0.0_wp      !! moment exp(i Omega t) on `to` [N m], or a twist in series with the element [rad]
     logical :: is_twist = .false.       !! the latter
+    logical :: is_slip = .false.        !! as of a line
   end type source_t
 
   real(wp), parameter :: same = 1.0e-9_wp   ! relative difference of equal frequencies
@@ -39,12 +41,14 @@ module nocdyn_excitation_lines
 
 contains
 
-  !> What a table calls a line: its order, 'fixed', or 'slip' if its frequency is the one of the slip.
+  !> What tables, reports and figures call a line: its order, 'fixed', 'twice-slip', or 'varying' if its frequency follows the
+  !> speed of a body that has no constant ratio to the reference body.
   function word(self) result(text)
     class(line_t), intent(in) :: self
     character(len=:), allocatable :: text
 
-    text = 'slip'
+    text = 'varying'
+    if (self%is_slip) text = 'twice-slip'
     if (self%is_fixed) text = 'fixed'
     if (self%is_order) text = rounded_text(self%order, 6)
   end function word
@@ -96,6 +100,7 @@ contains
 
     source%element = harmonic%element
     source%is_twist = harmonic%is_twist
+    source%is_slip = abs(harmonic%frequency) > 0 .and. abs(harmonic%order) > 0   ! of motors that start asynchronously
     source%frequency = harmonic%frequency + harmonic%order * state%omega(harmonic%body)
     source%order = abs(source%frequency / state%speed)
     if (.not. abs(harmonic%frequency) > 0) source%order = abs(harmonic%order * (state%omega(harmonic%body) / state%speed))
@@ -138,6 +143,7 @@ contains
         if (lines(k)%is_order) lines(k)%family = -1
         lines(k)%is_fixed = is_same(low(source)%frequency, high(source)%frequency)
         if (lines(k)%is_fixed) lines(k)%family = -2
+        lines(k)%is_slip = low(source)%is_slip
       end associate
     end do
   end subroutine new_lines

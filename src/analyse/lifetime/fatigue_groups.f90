@@ -4,7 +4,7 @@ module nocdyn_fatigue_groups
   use nocdyn_kinds, only: wp
   use nocdyn_schema_text, only: suggest
   use nocdyn_sn_curves, only: mean_none, mean_parabola, mean_strength, new_sn_curve, sn_curve_t
-  use nocdyn_text, only: counted, quoted, string_t, to_text
+  use nocdyn_text, only: quoted, string_t, to_text
   use nocdyn_written_values, only: written_element, written_number, written_unit
   implicit none (type, external)
   private
@@ -113,27 +113,20 @@ contains
     end if
   end subroutine check_quantity
 
-  !> The lists of a table have the same length, and its half ranges descend.
+  !> The half ranges of a table descend.
   subroutine check_curve(input, index, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: index   !! of the group
     type(diagnostics_t), intent(inout) :: diagnostics
-    real(wp), allocatable :: cycles(:), half_range(:)
+    real(wp), allocatable :: half_range(:)
     character(len=18) :: key
     integer :: i
 
     associate (group => input%groups(index))
       if (group%has_value('slope')) return
       key = 'table_' // quantities(quantity_of(group))
-      allocate (cycles, source=group%numbers('table_cycles'))
       allocate (half_range, source=group%numbers(trim(key)))
-      if (size(half_range) /= size(cycles)) then
-        call input%report(index, trim(key), trim(key) // ' has ' // counted(size(half_range), 'value', 'values') // &
-                   ' and table_cycles has ' // counted(size(cycles), 'value', 'values') // '; needed: as many of each', &
-                   diagnostics)
-        return
-      end if
-      do i = 2, size(cycles)
+      do i = 2, size(half_range)
         if (half_range(i) < half_range(i - 1)) cycle
         call input%report(index, trim(key), trim(key) // '(' // to_text(i) // ') = ' // to_text(half_range(i)) // &
                    ' is not less than the value before, ' // to_text(half_range(i - 1)) // &
@@ -167,7 +160,8 @@ contains
       end select
       if (quantity_of(group) /= quantity_stress) then
         call input%report(index, 'mean_stress', 'mean_stress = ' // quoted(group%text('mean_stress')) // &
-                   ' needs an S-N curve of stresses, reference_stress or table_stress', diagnostics)
+                   ' needs an S-N curve of stresses, reference_stress, table_stress or stress_file', &
+                   diagnostics)
       else if (.not. group%has_value(trim(key))) then
         call input%report(index, 'mean_stress', 'mean_stress = ' // quoted(group%text('mean_stress')) // ' needs ' // &
                    trim(key) // ' [Pa]', diagnostics)
@@ -219,8 +213,9 @@ contains
       allocate (cycles, source=group%numbers('table_cycles'))
       allocate (half_range, source=group%numbers('table_' // trim(name)))
       curve = new_sn_curve(cycles, half_range)
+      if (group%text('extrapolation') == 'constant') curve%endurance = half_range(size(half_range))
     end if
-    curve%endurance = group%number('endurance_limit')
+    curve%endurance = max(curve%endurance, group%number('endurance_limit'))
     curve%notch_factor = group%number('notch_factor')
     select case (group%text('mean_stress'))
     case ('goodman', 'gerber')

@@ -25,7 +25,7 @@ module nocdyn_campbell_results
     type(campbell_t), private :: campbell
     character(len=:), allocatable, private :: body   !! whose speed is held
   contains
-    procedure :: solve, list_tables, put_table, find_verdict, put_report, text => printed
+    procedure :: solve, list_tables, put_table, judge, put_report, text => printed
   end type campbell_results_t
 
   integer, parameter :: most_modes = 20, most_crossings = 60   ! that are printed; all are in campbell.json
@@ -91,31 +91,30 @@ contains
   end subroutine put_table
 
   !> Critical speeds in operation or near it: a diagram does not know what responds there.
-  subroutine find_verdict(self, input, verdict)
-    class(campbell_results_t), intent(in) :: self
+  subroutine judge(self, input)
+    class(campbell_results_t), intent(inout) :: self
     type(input_t), intent(in) :: input
-    type(verdict_t), intent(out) :: verdict
     integer :: i
 
     associate (campbell => self%campbell)
       do i = 1, size(campbell%crossings)
-        if (campbell%modes%is_electrical(campbell%crossings(i)%mode)) cycle
-        call add_critical('campbell', campbell%settings, campbell%crossings(i), line_word(campbell, campbell%crossings(i)%line), &
-                          campbell%distance(i), unknown_ratio, '', verdict)
+        associate (crossing => campbell%crossings(i))
+          if (campbell%modes%is_electrical(crossing%mode)) cycle
+          call add_critical('campbell', campbell%settings, crossing, line_title(campbell, crossing%line), campbell%distance(i), &
+                            unknown_ratio, '', self%verdict)
+        end associate
       end do
-      call add_nearest('campbell', campbell%settings, campbell%modes, campbell%crossings, verdict)
-      call add_coverage('campbell', campbell%settings, campbell%unstable, verdict)
+      call add_nearest('campbell', campbell%settings, campbell%modes, campbell%crossings, self%verdict)
+      call add_coverage('campbell', campbell%settings, campbell%unstable, self%verdict)
     end associate
-  end subroutine find_verdict
+  end subroutine judge
 
   subroutine put_report(self, input, json)
     class(campbell_results_t), intent(in) :: self
     type(input_t), intent(in) :: input
     type(json_t), intent(inout) :: json
-    type(verdict_t) :: verdict
 
-    call self%find_verdict(input, verdict)
-    call put_campbell(json, input, self%body, self%campbell, verdict)
+    call put_campbell(json, input, self%body, self%campbell, self%verdict)
   end subroutine put_report
 
   subroutine printed(self, input, text)
@@ -136,7 +135,7 @@ contains
     if (self%is_order(line)) name = 'order_' // rounded_text(self%order(line), 8)
   end function line_name
 
-  !> What tables call a line: its order, or 'fixed' or 'slip'.
+  !> What tables and reports call a line.
   function line_word(self, line) result(word)
     type(campbell_t), intent(in) :: self
     integer, intent(in) :: line
@@ -148,6 +147,16 @@ contains
       word = self%response%lines(line)%word()
     end if
   end function line_word
+
+  !> The same in a sentence.
+  function line_title(self, line) result(title)
+    type(campbell_t), intent(in) :: self
+    integer, intent(in) :: line
+    character(len=:), allocatable :: title
+
+    title = line_word(self, line)
+    if (self%is_order(line)) title = 'order ' // title
+  end function line_title
 
   !> The members of campbell.json.
   subroutine put_campbell(json, input, body, self, verdict)
@@ -175,6 +184,13 @@ contains
     associate (machine => self%response%machine)
       call json%put('bodies', machine%names(:machine%bodies - machine%nodes))
     end associate
+    call json%open_list('lines')
+    do i = 1, size(self%order)
+      call json%open()
+      call put_line(json, self, i)
+      call json%close()
+    end do
+    call json%close_list()
     call json%put('modes_numbered_at_rad_s', self%modes%numbered_at)
     call json%open_list('modes')
     do i = 1, self%modes%modes
@@ -196,11 +212,7 @@ contains
       associate (crossing => self%crossings(i))
         call json%open()
         call put_mode(json, self%response%machine, self%modes, crossing%mode)
-        if (self%is_order(crossing%line)) then
-          call json%put('order', self%order(crossing%line))
-        else
-          call json%put('line', crossing%line)
-        end if
+        call put_line(json, self, crossing%line)
         call json%put('speed_rad_s', crossing%speed)
         call json%put('frequency_Hz', from_si(crossing%frequency, unit_hz))
         call json%put('damping_ratio', crossing%damping_ratio)
@@ -211,6 +223,20 @@ contains
     call json%close_list()
     call json%close()
   end subroutine put_campbell
+
+  !> The order of a line, or its number and name if its frequency does not grow with the speed.
+  subroutine put_line(json, self, line)
+    type(json_t), intent(inout) :: json
+    type(campbell_t), intent(in) :: self
+    integer, intent(in) :: line
+
+    if (self%is_order(line)) then
+      call json%put('order', self%order(line))
+    else
+      call json%put('line', line)
+      call json%put('line_name', line_word(self, line))
+    end if
+  end subroutine put_line
 
   !> All tables.
   function campbell_text(file, body, self) result(text)

@@ -88,11 +88,11 @@ contains
   end subroutine put_margin
 
   !> A critical speed in operation, or too near to it: whether the limits of its response judge it.
-  subroutine add_critical(analysis, settings, crossing, order, distance, ratio, element, verdict)
+  subroutine add_critical(analysis, settings, crossing, title, distance, ratio, element, verdict)
     character(len=*), intent(in) :: analysis   !! 'response', 'campbell'
     type(response_settings_t), intent(in) :: settings
     type(crossing_t), intent(in) :: crossing   !! its mode is not electrical
-    character(len=*), intent(in) :: order      !! a word for the line
+    character(len=*), intent(in) :: title      !! of the line
     real(wp), intent(in) :: distance           !! as of `operating_distance`
     real(wp), intent(in) :: ratio              !! of the response there to its limits; 0: there are none; `unknown_ratio`
     character(len=*), intent(in) :: element    !! whose response it is
@@ -100,10 +100,10 @@ contains
     type(verdict_line_t) :: line
 
     if (size(settings%operating) == 0) return
-    if (settings%has_margin_rule) call add_margin(analysis, settings, crossing, order, distance, ratio, element, verdict)
+    if (settings%has_margin_rule) call add_margin(analysis, settings, crossing, title, distance, ratio, element, verdict)
     if (settings%has_margin_rule .or. .not. is_too_near(settings, distance)) return
     call start_critical(analysis, settings, crossing, distance, line)
-    line%detail = 'order ' // order
+    line%detail = title
     line%finding = is_not_assessed
     line%reason = 'too near to operation'
     if (distance <= 0) line%reason = 'in operation'
@@ -120,8 +120,8 @@ contains
   end subroutine add_critical
 
   !> A critical speed against the margin that a rule asks for; the arguments are those of `add_critical`.
-  subroutine add_margin(analysis, settings, crossing, order, distance, ratio, element, verdict)
-    character(len=*), intent(in) :: analysis, order, element
+  subroutine add_margin(analysis, settings, crossing, title, distance, ratio, element, verdict)
+    character(len=*), intent(in) :: analysis, title, element
     type(response_settings_t), intent(in) :: settings
     type(crossing_t), intent(in) :: crossing
     real(wp), intent(in) :: distance, ratio
@@ -133,7 +133,7 @@ contains
     call start_critical(analysis, settings, crossing, distance, line)
     line%rule = settings%margin_rule%label
     line%limit = percent * margin
-    line%detail = 'order ' // order
+    line%detail = title
     line%finding = is_kept
     if (distance < margin) then
       line%finding = is_exceeded

@@ -370,7 +370,7 @@ contains
     call json%close()
   end subroutine put_response
 
-  !> The order of a line, or its fixed frequency, or its number if its frequency is neither.
+  !> The order of a line, or its number, its name and its frequencies at both ends if these do not grow with the speed.
   subroutine put_line(json, analysis, l)
     type(json_t), intent(inout) :: json
     type(response_analysis_t), intent(in) :: analysis
@@ -381,6 +381,7 @@ contains
         call json%put('order', line%order)
       else
         call json%put('line', l)
+        call json%put('line_name', line%word())
         call json%put('line_frequency_Hz', [points(1)%frequency(l), points(size(points))%frequency(l)] / turn)
       end if
     end associate

@@ -92,7 +92,7 @@ contains
     if (critical%quantity > 0) name = analysis%response%quantities(critical%quantity)%element
   end function coupling_name
 
-  !> "0.5", "fixed".
+  !> "0.5", "fixed", "twice-slip".
   function order_word(analysis, critical) result(word)
     type(response_analysis_t), intent(in) :: analysis
     type(critical_t), intent(in) :: critical
@@ -223,7 +223,14 @@ contains
       l = maxloc(left, dim=1)
       if (left(l) <= smallest * maxval(abs(point%quantity(:, quantity)))) exit
       if (k > 1) text = text // ', '
-      text = text // rounded_text(point%frequency(l) / abs(point%state%speed), 5) // ' (' // rounded_text(left(l), 4) // ')'
+      associate (line => analysis%response%lines(l))
+        if (line%is_order .or. line%is_fixed) then
+          text = text // rounded_text(point%frequency(l) / abs(point%state%speed), 5)
+        else
+          text = text // line%word()
+        end if
+      end associate
+      text = text // ' (' // rounded_text(left(l), 4) // ')'
       left(l) = -1.0_wp
     end do
   end function orders_text

@@ -15,7 +15,6 @@ module nocdyn_response_results
   use nocdyn_response_summary, only: response_summary_t, summarise_response
   use nocdyn_response_verdict, only: find_response_verdict
   use nocdyn_text, only: string_t
-  use nocdyn_verdicts, only: verdict_t
   implicit none (type, external)
   private
 
@@ -25,7 +24,7 @@ module nocdyn_response_results
     type(response_analysis_t), private :: analysis
     type(response_summary_t), private :: summary
   contains
-    procedure :: solve, list_tables, put_table, grid_name, other_names, put_grid, find_verdict, put_report, text => printed
+    procedure :: solve, list_tables, put_table, grid_name, other_names, put_grid, judge, put_report, text => printed
   end type response_results_t
 
 contains
@@ -93,22 +92,19 @@ contains
     end select
   end subroutine put_table
 
-  subroutine find_verdict(self, input, verdict)
-    class(response_results_t), intent(in) :: self
+  subroutine judge(self, input)
+    class(response_results_t), intent(inout) :: self
     type(input_t), intent(in) :: input
-    type(verdict_t), intent(out) :: verdict
 
-    call find_response_verdict(input, self%analysis, self%summary, verdict)
-  end subroutine find_verdict
+    call find_response_verdict(input, self%analysis, self%summary, self%verdict)
+  end subroutine judge
 
   subroutine put_report(self, input, json)
     class(response_results_t), intent(in) :: self
     type(input_t), intent(in) :: input
     type(json_t), intent(inout) :: json
-    type(verdict_t) :: verdict
 
-    call self%find_verdict(input, verdict)
-    call put_response(json, input, self%analysis, self%summary, verdict)
+    call put_response(json, input, self%analysis, self%summary, self%verdict)
   end subroutine put_report
 
   subroutine printed(self, input, text)

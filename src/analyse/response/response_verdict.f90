@@ -4,6 +4,7 @@
 !> barred range there and a limit for passing it is kept: one of half ranges or, outside of operation, that of the largest
 !> magnitude. In operation the limit is exceeded if there is none; outside of it the range is 'not assessed' then.
 module nocdyn_response_verdict
+  use nocdyn_excitation_lines, only: line_t
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_limit_groups, only: limited_kind
@@ -14,7 +15,8 @@ module nocdyn_response_verdict
   use nocdyn_response_summary, only: barred_range_t, response_summary_t
   use nocdyn_text, only: quoted, rounded_text
   use nocdyn_units, only: from_si, unit_hz, unit_rpm
-  use nocdyn_verdicts, only: in_words, is_exceeded, is_not_assessed, is_restricted, new_verdict_line, verdict_line_t, verdict_t
+  use nocdyn_verdicts, only: in_words, is_not_assessed, is_restricted, new_damage_line, new_verdict_line, verdict_line_t, &
+    verdict_t
   implicit none (type, external)
   private
 
@@ -208,7 +210,7 @@ contains
       associate (point => points(worst(1)), frequency => points(worst(1))%frequency(worst(2)))
         call line%compare(abs(point%quantity(worst(2), limit%quantity)), limit%amplitude_limit(frequency), line%unit)
         call line%stand_at(point%state%speed)
-        line%detail = 'order ' // analysis%response%lines(worst(2))%word() // ', ' // &
+        line%detail = title_of(analysis%response%lines(worst(2))) // ', ' // &
                       rounded_text(from_si(frequency, unit_hz), 4) // ' Hz'
       end associate
       line%rule = ''
@@ -250,14 +252,13 @@ contains
     do i = 1, size(analysis%fatigue)
       associate (item => analysis%fatigue(i))
         if (size(item%hours) == 0 .and. .not. item%exceeds_strength) cycle
-        line = new_verdict_line('response', item%kind // ' ' // quoted(item%element), item%quantity, &
-                                'damage ' // quoted(item%name), '')
-        if (size(item%hours) > 0) call line%compare(item%damage(), 1.0_wp, '1')
-        if (size(item%hours) > 0) line%detail = rounded_text(sum(item%hours), 6) // ' h'
-        if (item%exceeds_strength) then
-          line%finding = is_exceeded
-          line%reason = 'the mean exceeds the strength'
+        if (size(item%hours) == 0) then
+          line = new_damage_line('response', item%kind, item%element, item%name, item%exceeds_strength)
+        else
+          line = new_damage_line('response', item%kind, item%element, item%name, item%exceeds_strength, item%damage())
+          line%detail = rounded_text(sum(item%hours), 6) // ' h'
         end if
+        line%quantity = item%quantity
         call verdict%add(line)
       end associate
     end do
@@ -277,12 +278,21 @@ contains
         element = ''
         if (critical%quantity > 0) element = analysis%response%quantities(critical%quantity)%element
         call add_critical('response', analysis%settings, critical%crossing, &
-                          analysis%response%lines(critical%crossing%line)%word(), critical%margin, critical%ratio, element, &
+                          title_of(analysis%response%lines(critical%crossing%line)), critical%margin, critical%ratio, element, &
                           verdict)
       end associate
     end do
     call add_nearest('response', analysis%settings, analysis%modes, analysis%crossings, verdict)
   end subroutine add_criticals
+
+  !> "order 6", "twice-slip".
+  function title_of(line) result(title)
+    type(line_t), intent(in) :: line
+    character(len=:), allocatable :: title
+
+    title = line%word()
+    if (line%is_order) title = 'order ' // title
+  end function title_of
 
   !> A line on a limit.
   subroutine start_line(input, analysis, number, what, line)

@@ -31,6 +31,7 @@ module nocdyn_analyses
     logical :: always_writes = .false.  !! whether it writes files without --out too
     logical :: has_report = .true.      !! whether it has a report in JSON
     logical :: is_for_threads = .false. !! whether threads may call `solve` at the same time
+    type(verdict_t) :: verdict          !! after `judge`: what it says of limits
     type(error_t), allocatable :: refusal   !! after `solve`: an error beside a report that can be printed, without files
   contains
     procedure(solve_interface), deferred :: solve
@@ -39,7 +40,7 @@ module nocdyn_analyses
     procedure :: grid_name, other_names
     procedure :: put_grid
     procedure :: put_report
-    procedure :: find_verdict
+    procedure :: judge
     procedure(text_interface), deferred :: text
   end type analysis_t
 
@@ -113,12 +114,11 @@ contains
     error stop 'nocdyn_analyses: an analysis with a grid overrides put_grid'
   end subroutine put_grid
 
-  !> What the analysis says of limits. By default nothing.
-  subroutine find_verdict(self, input, verdict)
-    class(analysis_t), intent(in) :: self
+  !> Finds the verdict of a solved analysis, which the report has. By default there is none. Only one thread at a time.
+  subroutine judge(self, input)
+    class(analysis_t), intent(inout) :: self
     type(input_t), intent(in) :: input
-    type(verdict_t), intent(out) :: verdict
-  end subroutine find_verdict
+  end subroutine judge
 
   !> Fills the report: the file COMMAND.json, and what sweeps record by paths.
   subroutine put_report(self, input, json)

@@ -3,13 +3,13 @@ module nocdyn_verdicts
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_table_text, only: padded, text_width
-  use nocdyn_text, only: rounded_text, string_t, to_text
+  use nocdyn_text, only: quoted, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_units, only: from_si, unit_rpm
   implicit none (type, external)
   private
 
-  public :: in_words, new_verdict_line
+  public :: in_words, new_damage_line, new_verdict_line
 
   !> Findings, from the best to the worst.
   integer, parameter, public :: is_kept = 1
@@ -78,6 +78,21 @@ contains
     self%detail = ''
     self%reason = ''
   end function new_verdict_line
+
+  !> A line on the damage of a &fatigue, of which 1 is allowed.
+  pure type(verdict_line_t) function new_damage_line(analysis, kind, element, fatigue, exceeds_strength, damage) result(self)
+    character(len=*), intent(in) :: analysis         !! as in `verdict_line_t`
+    character(len=*), intent(in) :: kind, element    !! "shaft" and its name
+    character(len=*), intent(in) :: fatigue          !! name of the group
+    logical, intent(in) :: exceeds_strength          !! whether a mean leaves no strength for an amplitude
+    real(wp), intent(in), optional :: damage         !! if cycles are counted
+
+    self = new_verdict_line(analysis, trim(kind) // ' ' // quoted(element), '', 'damage ' // quoted(fatigue), '')
+    if (present(damage)) call self%compare(damage, 1.0_wp, '1')
+    if (.not. exceeds_strength) return
+    self%finding = is_exceeded
+    self%reason = 'the mean of a cycle exceeds the strength'
+  end function new_damage_line
 
   !> "total moment" of the symbol total_moment.
   pure function in_words(symbol) result(words)

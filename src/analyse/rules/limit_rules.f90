@@ -1,13 +1,13 @@
 !> A rule with the numbers of one &limit: its limits over the speed, the ranges of speeds that it bars.
 module nocdyn_limit_rules
+  use nocdyn_built_in_texts, only: find_built_in
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_rule_expressions, only: formula_t
   use nocdyn_rule_files, only: continuous, hold, is_choice, is_range, is_symbol, is_value, lambda, n_c, order, read_rule, &
     refuse, rule_item_t, rule_t
-  use nocdyn_rule_texts, only: find_rule_text
-  use nocdyn_text, only: append, joined, quoted, rounded_text, string_t
+  use nocdyn_text, only: append, joined, quoted, rounded_text, split_lines, string_t
   use nocdyn_units, only: from_si, in_si, unit_rpm
   implicit none (type, external)
   private
@@ -38,14 +38,17 @@ contains
     character(len=*), intent(in) :: prefix   !! of its keys: '' or 'margin_'
     type(rule_t), intent(out) :: rule
     type(error_t), allocatable, intent(out) :: error
-    type(string_t), allocatable :: lines(:)
+    character(len=:), allocatable :: text
+    type(string_t), allocatable :: lines(:), names(:)
 
     associate (group => input%groups(index))
       if (group%has_value(prefix // 'rule_file')) then
         allocate (lines, source=group%texts(prefix // 'rule_lines'))
         call read_rule(group%text(prefix // 'rule_file'), lines, rule, error)
       else
-        call find_rule_text(group%text(prefix // 'rule'), lines)
+        call find_built_in('rule', group%text(prefix // 'rule'), text, names)
+        if (.not. allocated(text)) error stop 'nocdyn_limit_rules: the schema allows a rule that there is not'
+        call split_lines(text, lines)
         call read_rule('rule ' // group%text(prefix // 'rule'), lines, rule, error)
       end if
       if (allocated(error)) return

@@ -155,7 +155,9 @@ contains
     integer, intent(in) :: number   !! of the line
     type(rule_t), intent(inout) :: rule
     character(len=:), allocatable, intent(inout) :: problem
+    type(rule_item_t) :: item
 
+    item%line = number
     select case (key)
     case ('name')
       rule%name = text
@@ -175,13 +177,17 @@ contains
       rule%unit = text
       call find_unit(text, rule%factor, problem)
     case ('symbol')
-      call read_symbol(text, number, rule, problem)
+      item%kind = is_symbol
+      call read_symbol(text, rule, item, problem)
     case ('choice')
-      call read_choice(text, number, rule, problem)
+      item%kind = is_choice
+      call read_choice(text, rule, item, problem)
     case ('value')
-      call read_named(text, number, rule, problem)
+      item%kind = is_value
+      call read_named(text, rule, item, problem)
     case ('range')
-      call read_range(text, number, rule, problem)
+      item%kind = is_range
+      call read_range(text, rule, item, problem)
     case ('continuous')
       call read_formula(text, rule, [lambda], rule%continuous, problem)
     case ('transient')
@@ -195,20 +201,21 @@ contains
     case default   ! margin
       call read_formula(text, rule, [order], rule%margin, problem)
     end select
-    if (problem /= '') problem = key // ': ' // problem
+    if (problem /= '') then
+      problem = key // ': ' // problem
+    else if (item%kind > 0) then
+      call add_item(item, rule)
+    end if
   end subroutine take_value
 
   !> "NAME from KEY in UNIT default FORMULA"
-  subroutine read_symbol(text, number, rule, problem)
+  subroutine read_symbol(text, rule, item, problem)
     character(len=*), intent(in) :: text
-    integer, intent(in) :: number
     type(rule_t), intent(inout) :: rule
+    type(rule_item_t), intent(inout) :: item
     character(len=:), allocatable, intent(inout) :: problem
-    type(rule_item_t) :: item
     character(len=:), allocatable :: rest, value, word
 
-    item%kind = is_symbol
-    item%line = number
     rest = text
     call take_word(rest, word)
     call add_name(word, rule, item%symbol, problem)
@@ -230,22 +237,18 @@ contains
         problem = quoted(word) // ' is not expected; allowed: NAME from KEY in UNIT default FORMULA'
       end if
     end do
-    if (problem == '') call add_item(item, rule)
   end subroutine read_symbol
 
   !> "NAME default FORMULA: WORD NUMBER, WORD NUMBER"
-  subroutine read_choice(text, number, rule, problem)
+  subroutine read_choice(text, rule, item, problem)
     character(len=*), intent(in) :: text
-    integer, intent(in) :: number
     type(rule_t), intent(inout) :: rule
+    type(rule_item_t), intent(inout) :: item
     character(len=:), allocatable, intent(inout) :: problem
-    type(rule_item_t) :: item
     character(len=:), allocatable :: list, rest, word
     integer :: comma, status
     real(wp) :: value
 
-    item%kind = is_choice
-    item%line = number
     call split(text, ':', rest, list)
     call take_word(rest, word)
     call add_name(word, rule, item%symbol, problem)
@@ -269,38 +272,30 @@ contains
       end if
     end do
     if (problem == '' .and. size(item%words) == 0) problem = 'there are no words; required: NAME: WORD NUMBER, WORD NUMBER'
-    if (problem == '') call add_item(item, rule)
   end subroutine read_choice
 
   !> "NAME: FORMULA"
-  subroutine read_named(text, number, rule, problem)
+  subroutine read_named(text, rule, item, problem)
     character(len=*), intent(in) :: text
-    integer, intent(in) :: number
     type(rule_t), intent(inout) :: rule
+    type(rule_item_t), intent(inout) :: item
     character(len=:), allocatable, intent(inout) :: problem
-    type(rule_item_t) :: item
     character(len=:), allocatable :: formula, name
 
-    item%kind = is_value
-    item%line = number
     call split(text, ':', name, formula)
     if (formula == '') problem = 'there is no formula; required: NAME: FORMULA'
     if (problem == '') call read_formula(formula, rule, [lambda], item%formula, problem)
     if (problem == '') call add_name(name, rule, item%symbol, problem)
-    if (problem == '') call add_item(item, rule)
   end subroutine read_named
 
   !> "NAME <= FORMULA: ACTION"
-  subroutine read_range(text, number, rule, problem)
+  subroutine read_range(text, rule, item, problem)
     character(len=*), intent(in) :: text
-    integer, intent(in) :: number
     type(rule_t), intent(inout) :: rule
+    type(rule_item_t), intent(inout) :: item
     character(len=:), allocatable, intent(inout) :: problem
-    type(rule_item_t) :: item
     character(len=:), allocatable :: action, rest, word
 
-    item%kind = is_range
-    item%line = number
     call split(text, ':', rest, action)
     call take_word(rest, word)
     item%symbol = max(findloc(rule%names, word, dim=1), 0)
@@ -319,7 +314,6 @@ contains
       problem = 'a speed cannot be refused; allowed for lambda: hold, note'
     end if
     if (problem == '') call read_formula(rest(3:), rule, [integer ::], item%formula, problem)
-    if (problem == '') call add_item(item, rule)
   end subroutine read_range
 
   !> Reads a formula that may use some of the symbols of every rule, and all others.

@@ -11,11 +11,11 @@ module nocdyn_load_case_report
   use nocdyn_table_text, only: cell, padded, text_width
   use nocdyn_text, only: counted, quoted, rounded_text, string_t, strings
   use nocdyn_text_buffer, only: text_buffer_t
-  use nocdyn_verdicts, only: is_exceeded, is_kept, is_not_assessed, new_verdict_line, verdict_line_t, verdict_t
+  use nocdyn_verdicts, only: is_kept, is_not_assessed, new_damage_line, verdict_line_t, verdict_t
   implicit none (type, external)
   private
 
-  public :: find_verdict, load_cases_json, load_cases_text, put_load_cases_csv
+  public :: find_cases_verdict, load_cases_json, load_cases_text, put_load_cases_csv
 
   integer, parameter :: most_lines = 25   ! printed
   integer, parameter :: digits = 4        ! of printed damages
@@ -24,17 +24,16 @@ module nocdyn_load_case_report
 contains
 
   !> The text of cases.json.
-  function load_cases_json(input, runs) result(text)
+  function load_cases_json(input, runs, verdict) result(text)
     type(input_t), intent(in) :: input   !! of one of the cases
     type(case_run_t), intent(in) :: runs(:)
+    type(verdict_t), intent(in) :: verdict   !! of all runs
     character(len=:), allocatable :: text
     type(json_t) :: json
-    type(verdict_t) :: verdict
     integer :: i
     type(peak_t), allocatable :: peaks(:)
 
     call json%open_report(input%file, input%title())
-    call find_verdict(runs, verdict)
     call verdict%put(json)
     call put_cases(json, results_of(runs))
     call find_peaks(runs, peaks)
@@ -66,7 +65,7 @@ contains
   end function results_of
 
   !> What all runs say of limits, and their damage together.
-  subroutine find_verdict(runs, verdict)
+  subroutine find_cases_verdict(runs, verdict)
     type(case_run_t), intent(in) :: runs(:)
     type(verdict_t), intent(out) :: verdict
     type(life_t), allocatable :: lives(:)
@@ -76,19 +75,17 @@ contains
     call combine_verdicts('run', results_of(runs), verdict)
     call sum_damage(runs, lives)
     do i = 1, size(lives)
-      line = new_verdict_line('run', lives(i)%kind // ' ' // quoted(lives(i)%element), '', 'damage ' // quoted(lives(i)%name), '')
-      call line%compare(lives(i)%damage, 1.0_wp, '1')
+      associate (life => lives(i))
+        line = new_damage_line('run', life%kind, life%element, life%name, life%exceeds_strength, life%damage)
+      end associate
       line%detail = 'all load cases'
-      if (lives(i)%exceeds_strength) then
-        line%finding = is_exceeded
-        line%reason = 'the mean of a cycle exceeds the strength'
-      else if (line%finding == is_kept .and. .not. is_complete(results_of(runs))) then
+      if (line%finding == is_kept .and. .not. is_complete(results_of(runs))) then
         line%finding = is_not_assessed
         line%reason = 'load cases are missing'
       end if
       call verdict%add(line)
     end do
-  end subroutine find_verdict
+  end subroutine find_cases_verdict
 
   subroutine put_lives(json, runs)
     type(json_t), intent(inout) :: json
@@ -140,17 +137,16 @@ contains
   end subroutine put_load_cases_csv
 
   !> The printed table: the largest magnitudes of the columns that one looks for, with their times and cases; the damage.
-  function load_cases_text(runs) result(text)
+  function load_cases_text(runs, verdict) result(text)
     type(case_run_t), intent(in) :: runs(:)
+    type(verdict_t), intent(in) :: verdict   !! of all runs
     character(len=:), allocatable :: text
     type(text_buffer_t) :: report
-    type(verdict_t) :: verdict
     type(peak_t), allocatable :: peaks(:)
     type(string_t), allocatable :: labels(:)
     integer, allocatable :: ranks(:), shown(:)
     integer :: i, width
 
-    call find_verdict(runs, verdict)
     call verdict%write_table(report)
     call find_peaks(runs, peaks)
     allocate (labels(size(peaks)))

@@ -8,7 +8,7 @@ module nocdyn_run_verdict
   use nocdyn_run_fatigue, only: run_fatigue_t
   use nocdyn_signals, only: signal_t
   use nocdyn_text, only: quoted, rounded_text
-  use nocdyn_verdicts, only: in_words, is_exceeded, is_not_assessed, new_verdict_line, verdict_line_t, verdict_t
+  use nocdyn_verdicts, only: in_words, is_not_assessed, new_damage_line, new_verdict_line, verdict_line_t, verdict_t
   implicit none (type, external)
   private
 
@@ -123,13 +123,8 @@ contains
     do i = 1, size(fatigue%items)
       k = fatigue%worst(i)
       associate (item => fatigue%items(i), counter => fatigue%counters(k))
-        line = new_verdict_line('run', trim(item%kind) // ' ' // quoted(item%element), '', 'damage ' // quoted(item%name), '')
-        call line%compare(item%repeats * counter%damage, 1.0_wp, '1')
+        line = new_damage_line('run', item%kind, item%element, item%name, counter%has_failed, item%repeats * counter%damage)
         if (abs(item%repeats - 1.0_wp) > 0) line%detail = rounded_text(item%repeats, 6) // ' such runs'
-        if (counter%has_failed) then
-          line%finding = is_exceeded
-          line%reason = 'the mean of a cycle exceeds the strength'
-        end if
         call verdict%add(line)
       end associate
     end do

@@ -287,11 +287,12 @@ contains
       error = analysis%refusal
       return
     end if
+    call analysis%judge(input)
     if (job%folder /= '' .and. analysis%has_report) then
       call write_files(arguments%command, analysis, input, job%folder, names, error, netcdf)
       if (allocated(error)) return
     end if
-    call analysis%find_verdict(input, verdict)
+    verdict = analysis%verdict
     if (arguments%is_given('--quiet')) return
     if (job%is_alone .or. .not. analysis%always_writes) then   ! tables of one machine, or that are written nowhere
       call verdict%write_table(report)

@@ -9,7 +9,7 @@ module nocdyn_run_command
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_load_case_peaks, only: case_run_t
-  use nocdyn_load_case_report, only: find_verdict, load_cases_json, load_cases_text, put_load_cases_csv
+  use nocdyn_load_case_report, only: find_cases_verdict, load_cases_json, load_cases_text, put_load_cases_csv
   use nocdyn_machine_parts, only: refuse_mistakes
   use nocdyn_posix, only: catch_interrupts, is_interrupted, remove_file
   use nocdyn_result_files, only: result_files_t
@@ -147,16 +147,16 @@ contains
       call report_error(error, code)
       deallocate (error)
     end if
-    call write_cases_files(reading%inputs(1), runs, reading%folder, error)
+    call find_cases_verdict(runs, verdict)
+    call write_cases_files(reading%inputs(1), runs, verdict, reading%folder, error)
     if (allocated(error)) then
       call report_error(error, code)
     else if (.not. arguments%is_given('--quiet')) then
-      if (.not. arguments%is_given('--case')) call print_text(load_cases_text(runs))
+      if (.not. arguments%is_given('--case')) call print_text(load_cases_text(runs, verdict))
       call print_text(reading%inputs(1)%shown_file() // ': ' // &
                       counted(size(runs), 'load case', 'load cases') // '; cases.json and cases.csv are in ' // &
                       shown_path(reading%folder))
     end if
-    call find_verdict(runs, verdict)
     call be_strict(arguments, reading%inputs(1)%shown_file(), verdict, code)
   end subroutine run_load_cases
 
@@ -271,16 +271,17 @@ contains
   end function shows_table
 
   !> Writes both; cases.json comes last.
-  subroutine write_cases_files(input, runs, folder, error)
+  subroutine write_cases_files(input, runs, verdict, folder, error)
     type(input_t), intent(in) :: input   !! of one of the cases
     type(case_run_t), intent(in) :: runs(:)
+    type(verdict_t), intent(in) :: verdict   !! of all of them
     character(len=*), intent(in) :: folder
     type(error_t), allocatable, intent(out) :: error
     type(result_files_t) :: files
 
     call files%open(folder, [string_t(csv_file), string_t(json_file)])
     call put_load_cases_csv(runs, files%files(1))
-    call files%files(2)%put(load_cases_json(input, runs))
+    call files%files(2)%put(load_cases_json(input, runs, verdict))
     call files%finish(error)
   end subroutine write_cases_files
 

@@ -4,7 +4,7 @@ module nocdyn_quadrature
   implicit none (type, external)
   private
 
-  public :: gauss_legendre_rule
+  public :: gauss_legendre_rule, legendre_pair
 
   integer, parameter :: max_newton_steps = 20   ! four or five are needed
 
@@ -33,12 +33,23 @@ contains
     end do
   end subroutine gauss_legendre_rule
 
-  !> P_n and its derivative, by Bonnet's recurrence.
+  !> P_n and its derivative.
   pure subroutine legendre(n, x, value, slope)
     integer, intent(in) :: n
     real(wp), intent(in) :: x   !! between -1 and 1, not at the ends
     real(wp), intent(out) :: value, slope
-    real(wp) :: before, next
+    real(wp) :: before
+
+    call legendre_pair(n, x, value, before)
+    slope = n * (x * value - before) / (x**2 - 1)
+  end subroutine legendre
+
+  !> The Legendre polynomials of degree n and n - 1, by Bonnet's recurrence.
+  pure subroutine legendre_pair(n, x, value, before)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: x
+    real(wp), intent(out) :: value, before
+    real(wp) :: next
     integer :: k
 
     before = 1.0_wp
@@ -48,7 +59,6 @@ contains
       before = value
       value = next
     end do
-    slope = n * (x * value - before) / (x**2 - 1)
-  end subroutine legendre
+  end subroutine legendre_pair
 
 end module nocdyn_quadrature

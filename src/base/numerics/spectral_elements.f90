@@ -5,7 +5,7 @@
 !> weights of the Gauss-Lobatto quadrature, so that the mass matrix is diagonal; the error falls exponentially with n.
 module nocdyn_spectral_elements
   use nocdyn_kinds, only: wp
-  use nocdyn_quadrature, only: gauss_legendre_rule
+  use nocdyn_quadrature, only: gauss_legendre_rule, legendre_pair
   implicit none (type, external)
   private
 
@@ -69,23 +69,6 @@ contains
       weights(i) = 1.0_wp / (n * (n + 1) * value**2)
     end do
   end subroutine gauss_lobatto_rule
-
-  !> The Legendre polynomials of degree n and n - 1, by Bonnet's recurrence.
-  pure subroutine legendre_pair(n, x, value, before)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: x
-    real(wp), intent(out) :: value, before
-    real(wp) :: next
-    integer :: k
-
-    before = 1.0_wp
-    value = x
-    do k = 2, n
-      next = ((2 * k - 1) * x * value - (k - 1) * before) / k
-      before = value
-      value = next
-    end do
-  end subroutine legendre_pair
 
   !> The slope of a Lagrange polynomial at a point that is no node.
   pure real(wp) function slope_of(node, j, x) result(slope)

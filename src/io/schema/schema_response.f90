@@ -2,8 +2,8 @@
 module nocdyn_schema_response
   use nocdyn_kinds, only: wp
   use nocdyn_schema_rules, only: a_body, a_file, a_line_file, a_name, a_number, a_text, a_word, allowed_t, an_integer, &
-    any_number, any_times, anything, at_most_once, at_most_one, equal_lengths, exactly_one, example_t, from_1, group_rule_t, &
-    in_torsional, key_rule_t, not_negative, not_zero, positive, relation_rule_t, required, requires, unset
+    any_number, any_times, anything, at_most_once, at_most_one, equal_lengths, exactly_one, example_t, extrapolations, from_1, &
+    group_rule_t, in_torsional, key_rule_t, linear, not_negative, not_zero, positive, relation_rule_t, required, requires, unset
   implicit none (type, external)
   private
 
@@ -113,6 +113,12 @@ module nocdyn_schema_response
       'half ranges of the shear stress at these cycles, descending', fewest=2), &
     key_rule_t('fatigue', 'table_moment', a_number, any_number, 'N m', unset, positive, 'the same as moments', fewest=2), &
     key_rule_t('fatigue', 'table_force', a_number, any_number, 'N', unset, positive, 'the same as tooth forces', fewest=2), &
+    key_rule_t('fatigue', 'stress_file', a_file, 1, '', unset, anything, &
+      'two columns in place of both lists, cycles and half range of the shear stress [Pa]'), &
+    key_rule_t('fatigue', 'moment_file', a_file, 1, '', unset, anything, 'the same with moments [N m]'), &
+    key_rule_t('fatigue', 'force_file', a_file, 1, '', unset, anything, 'the same with tooth forces [N]'), &
+    key_rule_t('fatigue', 'extrapolation', a_word, 1, '', linear, extrapolations, &
+      'below the last point of a table: straight on in log scales, or constant: no damage'), &
     key_rule_t('fatigue', 'endurance_limit', a_number, 1, '', '0', not_negative, &
       'half range up to which no damage is done, in the unit of the reference'), &
     key_rule_t('fatigue', 'notch_factor', a_number, 1, '', '1', from_1, 'fatigue notch factor on the half range'), &
@@ -156,7 +162,15 @@ module nocdyn_schema_response
     relation_rule_t('fatigue', exactly_one, 'coupling shaft', 'mesh gear'), &
     relation_rule_t('fatigue', at_most_one, 'coupling', 'shaft'), &
     relation_rule_t('fatigue', at_most_one, 'mesh', 'gear'), &
-    relation_rule_t('fatigue', exactly_one, 'slope', 'table_cycles'), &
+    relation_rule_t('fatigue', exactly_one, 'slope', 'table_cycles stress_file moment_file force_file'), &
+    relation_rule_t('fatigue', at_most_one, 'table_cycles table_stress table_moment table_force', &
+                                            'stress_file moment_file force_file'), &
+    relation_rule_t('fatigue', at_most_one, 'stress_file', 'moment_file force_file'), &
+    relation_rule_t('fatigue', at_most_one, 'moment_file', 'force_file'), &
+    relation_rule_t('fatigue', equal_lengths, 'table_cycles table_stress', 'stress_file'), &
+    relation_rule_t('fatigue', equal_lengths, 'table_cycles table_moment', 'moment_file'), &
+    relation_rule_t('fatigue', equal_lengths, 'table_cycles table_force', 'force_file'), &
+    relation_rule_t('fatigue', requires, 'extrapolation', 'table_cycles stress_file moment_file force_file'), &
     relation_rule_t('fatigue', requires, 'slope', 'reference_cycles'), &
     relation_rule_t('fatigue', requires, 'slope', 'reference_stress reference_moment reference_force'), &
     relation_rule_t('fatigue', requires, 'reference_cycles second_slope', 'slope'), &
@@ -167,8 +181,9 @@ module nocdyn_schema_response
     relation_rule_t('fatigue', requires, 'table_stress table_moment table_force', 'table_cycles'), &
     relation_rule_t('fatigue', at_most_one, 'table_stress', 'table_moment table_force'), &
     relation_rule_t('fatigue', at_most_one, 'table_moment', 'table_force'), &
-    relation_rule_t('fatigue', requires, 'reference_stress table_stress reference_moment table_moment', 'coupling shaft'), &
-    relation_rule_t('fatigue', requires, 'reference_force table_force', 'mesh gear'), &
+    relation_rule_t('fatigue', requires, 'reference_stress table_stress stress_file reference_moment table_moment ' // &
+                                         'moment_file', 'coupling shaft'), &
+    relation_rule_t('fatigue', requires, 'reference_force table_force force_file', 'mesh gear'), &
     relation_rule_t('fatigue', at_most_one, 'ultimate_stress', 'yield_stress'), &
     relation_rule_t('fatigue', equal_lengths, 'profile_speeds profile_hours', '')]
 

@@ -82,7 +82,10 @@ contains
     if (.not. (allocated(error) .or. analysis%is_for_threads)) then
       call analysis%solve(input, machine, analysis_options_t(at=''), error)
     end if
-    if (.not. allocated(error)) call analysis%put_report(input, report)
+    if (.not. allocated(error)) then
+      call analysis%judge(input)
+      call analysis%put_report(input, report)
+    end if
     !$omp end critical (texts)
   end subroutine analyse_for_report
 

@@ -107,6 +107,7 @@ contains
       call solve_named(trim(analysis_words(k)), input, analysis, failure)
       if (allocated(failure)) cycle
       reports(k)%keeps_numbers = .true.
+      call analysis%judge(input)
       call analysis%put_report(input, reports(k))
     end do
   end subroutine read_reports

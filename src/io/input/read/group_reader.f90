@@ -13,9 +13,9 @@ module nocdyn_group_reader
   use nocdyn_schema_rules, only: a_document, a_line_file, a_name, columns, equal_lengths
   use nocdyn_schema_text, only: similar_keys, suggest_key
   use nocdyn_schema_units, only: find_key, name_in_unit
-  use nocdyn_table_columns, only: read_table_columns
+  use nocdyn_table_columns, only: convert_column, read_table_columns
   use nocdyn_table_file, only: read_table_file
-  use nocdyn_text, only: lower_case, shortened, split_lines, string_t
+  use nocdyn_text, only: lower_case, shortened, shown_path, split_lines, string_t
   use nocdyn_text_file, only: first_position, largest_input, path_in, read_text_file
   use nocdyn_value_conversion, only: convert_key
   implicit none (type, external)
@@ -184,6 +184,14 @@ contains
     end do
     call read_table_file(path_in(folder, source%texts(1)%text), group%values(lists(1))%numbers, &
                          group%values(lists(2))%numbers, messages, code)
+    if (size(messages) == 0) then
+      do i = 1, size(lists)
+        associate (rule => key_rules(raw%keys(lists(i))%rule))
+          call convert_column(shown_path(source%texts(1)%text) // ': ' // trim(rule%name), rule, 0, &
+                              group%values(lists(i))%numbers, messages)
+        end associate
+      end do
+    end if
     do i = 1, size(messages)
       call diagnostics%add(source%line, raw%index, raw%keys(file)%name() // ': ' // messages(i)%text, source%override, code)
     end do

@@ -205,10 +205,11 @@ contains
     type(diagnostics_t), intent(inout) :: diagnostics
     type(string_t), allocatable :: words(:)
     character(len=:), allocatable :: needed   ! "fault", "fault = 'resynchronisation'", "a or b"
-    logical :: has_needed, is_known
+    logical :: has_needed, is_known, is_reported
     integer :: i, j
 
     associate (keys => relation%first, others => relation%second)
+      is_reported = .false.
       is_known = .true.
       if (relation%word == '') then
         if (group%first_given(others) > 0) return
@@ -231,9 +232,11 @@ contains
             needed = listed_keys(group%rule, others, ' or ')
             if (relation%word /= '') needed = needed // ' = ' // quoted(trim(relation%word))
             call group%report(keys(i:i), key%name() // ' needs ' // needed, diagnostics)
+            is_reported = .true.
           end if
         end associate
       end do
+      if (is_reported) group%keys(others)%may_be_missing = .true.
     end associate
   end subroutine check_requirement
 

@@ -16,7 +16,7 @@ module nocdyn_table_columns
   implicit none (type, external)
   private
 
-  public :: read_table_columns
+  public :: convert_column, read_table_columns
 
   integer, parameter :: most_messages = 5   ! on numbers of a file
 
@@ -148,17 +148,18 @@ contains
     integer, intent(in) :: unit                 !! index of `units`, 0: the one of the schema
     real(wp), intent(inout) :: numbers(:)
     type(string_t), allocatable, intent(inout) :: messages(:)
-    character(len=:), allocatable :: message, written
+    character(len=:), allocatable :: message
+    real(wp) :: given
     integer :: r
 
     do r = 1, size(numbers)
       if (size(messages) >= most_messages) return
-      written = ' = ' // to_text(numbers(r)) // ' in row ' // to_text(r)
+      given = numbers(r)
       call convert_number(rule, unit, numbers(r), message)
       if (message == '' .and. rule%ascends .and. r > 1) then
         if (numbers(r) <= numbers(max(1, r - 1))) message = ' is not greater than that in the row before'
       end if
-      if (message /= '') call append(messages, label // written // message)
+      if (message /= '') call append(messages, label // ' = ' // to_text(given) // ' in row ' // to_text(r) // message)
     end do
     if (size(numbers) < rule%fewest) call append(messages, label // ' has ' // to_text(size(numbers)) // &
                                                  ' rows; needed: at least ' // to_text(rule%fewest))

@@ -14,7 +14,6 @@
 module nocdyn_double_cage_motors
   use nocdyn_double_cage_circuits, only: double_cage_circuit_t
   use nocdyn_element_keys, only: element_keys_t
-  use nocdyn_elements, only: element_values_t
   use nocdyn_flux_motors, only: amplitude, arc_time, circuit_keys, connect_motors, flux_motors_t, supply
   use nocdyn_induction_circuits, only: induction_circuit_t
   use nocdyn_kinds, only: wp
@@ -35,9 +34,8 @@ module nocdyn_double_cage_motors
   contains
     procedure :: describe
     procedure :: double_circuit
-    procedure :: decide_internal
     procedure :: extremes
-    procedure :: observe
+    procedure :: steady_flux, stator_current
   end type double_cage_motors_t
 
 contains
@@ -141,27 +139,17 @@ contains
 
   end function double_circuit
 
-  !> The fluxes of the steady state with the slip at a speed, by the circuit.
-  subroutine decide_internal(self, t, speed, internal, is_decided)
+  pure function steady_flux(self, element, slip, share) result(flux)
     class(double_cage_motors_t), intent(in) :: self
-    real(wp), intent(in) :: t                !! [s]
-    real(wp), intent(in) :: speed(:)         !! u' [rad/s], [motors]
-    real(wp), intent(inout) :: internal(:)   !! [states * motors]
-    logical, intent(out) :: is_decided(:)    !! [states]
+    integer, intent(in) :: element
+    real(wp), intent(in) :: slip, share
+    complex(wp) :: flux(self%states / 2)
     type(double_cage_circuit_t) :: circuit
-    complex(wp) :: flux(3)
-    integer :: e, k
-    real(wp) :: share, slip
 
-    is_decided = .true.
-    do e = 1, self%count
-      circuit = self%double_circuit(1, e)
-      call self%working_point(e, t, speed(e), slip, share)
-      circuit%voltage = circuit%voltage * share
-      flux = circuit%steady_flux(slip)
-      internal(6 * e - 5:6 * e) = [(real(flux(k), wp), aimag(flux(k)), k=1, 3)]
-    end do
-  end subroutine decide_internal
+    circuit = self%double_circuit(1, element)
+    circuit%voltage = circuit%voltage * share
+    flux = circuit%steady_flux(slip)
+  end function steady_flux
 
   !> The synchronous speed, and the ones of the extremes of the steady torque.
   function extremes(self, element, t) result(speeds)
@@ -175,22 +163,15 @@ contains
     speeds = self%direction_of(element) * circuit%frequency / circuit%pole_pairs * (1.0_wp - [0.0_wp, circuit%extreme_slips()])
   end function extremes
 
-  pure subroutine observe(self, elements, quantity, lane, values)
+  pure complex(wp) function stator_current(self, lane, element, flux)
     class(double_cage_motors_t), intent(in) :: self
-    type(element_values_t), intent(in) :: elements
-    integer, intent(in) :: quantity   !! index in `quantities`
     integer, intent(in) :: lane
-    real(wp), intent(out) :: values(:)   !! [elements of the bank]; the current is the one of a line, rms
-    real(wp) :: z(6)
+    integer, intent(in) :: element
+    complex(wp), intent(in) :: flux(:)   !! of the stator, the inner and the outer cage [V s]
     type(double_cage_circuit_t) :: circuit
-    integer :: e
 
-    if (quantity /= 2) error stop 'nocdyn_double_cage_motors: the current is the quantity without a form'
-    do e = 1, size(values)
-      z = elements%internal%value(lane, self%first_internal + 6 * (e - 1):self%first_internal + 6 * e - 1)
-      circuit = self%double_circuit(lane, e)
-      values(e) = sqrt(0.5_wp) * abs(circuit%stator_current(cmplx(z(1:5:2), z(2:6:2), wp)))
-    end do
-  end subroutine observe
+    circuit = self%double_circuit(lane, element)
+    stator_current = circuit%stator_current(flux)
+  end function stator_current
 
 end module nocdyn_double_cage_motors

@@ -49,6 +49,7 @@ module nocdyn_flux_motors
     procedure :: hold_speed, follows_supply, set_supply, idle_supply
     procedure :: extremes
     procedure :: quantities
+    procedure :: steady_flux, stator_current   !! which differ by the circuit of the rotor
     procedure :: observe
   end type flux_motors_t
 
@@ -236,20 +237,31 @@ contains
     real(wp), intent(in) :: speed(:)         !! u' [rad/s], [motors]
     real(wp), intent(inout) :: internal(:)   !! [states * motors]
     logical, intent(out) :: is_decided(:)    !! [states]
-    type(induction_circuit_t) :: circuit
-    complex(wp) :: flux(2)
-    integer :: e
+    complex(wp) :: flux(self%states / 2)
+    integer :: e, k
     real(wp) :: share, slip
 
     is_decided = .true.
     do e = 1, self%count
-      circuit = self%circuit(1, e)
       call self%working_point(e, t, speed(e), slip, share)
-      circuit%voltage = circuit%voltage * share
-      flux = circuit%steady_flux(slip)
-      internal(4 * e - 3:4 * e) = [real(flux(1), wp), aimag(flux(1)), real(flux(2), wp), aimag(flux(2))]
+      flux = self%steady_flux(e, slip, share)
+      internal((e - 1) * self%states + 1:e * self%states) = [(real(flux(k), wp), aimag(flux(k)), k=1, size(flux))]
     end do
   end subroutine decide_internal
+
+  !> The fluxes of the stator and of each cage that do not change at a slip, of a motor of the first lane [V s].
+  pure function steady_flux(self, element, slip, share) result(flux)
+    class(flux_motors_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: slip     !! 1 at standstill
+    real(wp), intent(in) :: share    !! of the voltage of the mains
+    complex(wp) :: flux(self%states / 2)
+    type(induction_circuit_t) :: circuit
+
+    circuit = self%circuit(1, element)
+    circuit%voltage = circuit%voltage * share
+    flux = circuit%steady_flux(slip)
+  end function steady_flux
 
   !> The slip and the share of the voltage of a motor of the first lane.
   subroutine working_point(self, element, t, speed, slip, share)
@@ -346,21 +358,32 @@ contains
     columns(2) = new_quantity('current', 'A', columns(1)%elements, 'line current (rms)', '', rank_current, form_observed, 1.0_wp)
   end subroutine quantities
 
+  !> The current of the stator of one motor in one lane [A].
+  pure complex(wp) function stator_current(self, lane, element, flux)
+    class(flux_motors_t), intent(in) :: self
+    integer, intent(in) :: lane
+    integer, intent(in) :: element       !! numbered within the bank
+    complex(wp), intent(in) :: flux(:)   !! of the stator and of each cage [V s]
+    type(induction_circuit_t) :: circuit
+
+    circuit = self%circuit(lane, element)
+    stator_current = circuit%stator_current(flux)
+  end function stator_current
+
   pure subroutine observe(self, elements, quantity, lane, values)
     class(flux_motors_t), intent(in) :: self
     type(element_values_t), intent(in) :: elements
     integer, intent(in) :: quantity   !! index in `quantities`
     integer, intent(in) :: lane
     real(wp), intent(out) :: values(:)   !! [elements of the bank]; the current is the one of a line, rms
-    real(wp) :: z(4)
-    type(induction_circuit_t) :: circuit
-    integer :: e
+    real(wp) :: z(self%states)
+    integer :: e, first
 
     if (quantity /= 2) error stop 'nocdyn_flux_motors: the current is the quantity without a form'
     do e = 1, size(values)
-      z = elements%internal%value(lane, self%first_internal + 4 * (e - 1):self%first_internal + 4 * e - 1)
-      circuit = self%circuit(lane, e)
-      values(e) = sqrt(0.5_wp) * abs(circuit%stator_current(cmplx(z(1:3:2), z(2:4:2), wp)))
+      first = self%first_internal + self%states * (e - 1)
+      z = elements%internal%value(lane, first:first + self%states - 1)
+      values(e) = sqrt(0.5_wp) * abs(self%stator_current(lane, e, cmplx(z(1::2), z(2::2), wp)))
     end do
   end subroutine observe
 
