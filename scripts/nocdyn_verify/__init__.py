@@ -1,0 +1,1 @@
+"""Verification: cases with known answers, computed again on this machine and compared."""

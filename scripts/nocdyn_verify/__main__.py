@@ -1,0 +1,91 @@
+"""Runs the verification cases with the installed program, and writes verification.html, .pdf and .json."""
+
+import argparse
+import os
+import shutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from .cases import chosen, read_cases, read_previous
+from .failure import FAILED, VerificationError
+from .outcomes import Outcome, installation, verify, write_json
+from .page import verdict, write_page
+from .paper import write_paper
+
+HERE = Path(__file__).resolve().parent
+PLACES = (HERE.parents[1] / "verification", HERE.parent / "verification", HERE / "verification")
+NAME = "verification"
+
+
+def read_arguments(words: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="nocdyn verify", description=__doc__)
+    parser.add_argument("chosen", nargs="*", metavar="CASE", help="only these cases, or those of these features")
+    parser.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help="write to DIR; default: results")
+    parser.add_argument("--cases", type=Path, metavar="DIR", help="cases of one's own: a folder like that of the program")
+    parser.add_argument("--threads", type=int, default=len(os.sched_getaffinity(0)), metavar="NUMBER")
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors and failed cases")
+    arguments = parser.parse_args(words)
+    if arguments.threads < 1:
+        parser.error(f"--threads {arguments.threads}: allowed: 1 or more")
+    return arguments
+
+
+def find_program() -> Path:
+    """The one of the environment variable NOCDYN, which `nocdyn verify` sets, else that in the PATH."""
+    for candidate in (os.environ.get("NOCDYN"), shutil.which("nocdyn"), HERE.parents[1] / "build/release/bin/nocdyn"):
+        if candidate and Path(candidate).is_file():
+            return Path(candidate).resolve()
+    raise VerificationError("there is no program nocdyn in the PATH")
+
+
+def find_cases(wanted: Path | None) -> Path:
+    places = PLACES if wanted is None else (wanted,)
+    for place in places:
+        if place.is_dir():
+            return place
+    raise VerificationError(f"{places[0]}: the folder of the verification cases does not exist")
+
+
+def write_results(folder: Path, program: Path, cases: Path, outcomes: Sequence[Outcome], version: str) -> None:
+    """All files, each whole or not at all."""
+    machine = installation(program, cases, [one.case for one in outcomes])
+    part = folder / f"{NAME}.part"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        part.write_text(write_page(machine, outcomes, version), encoding="utf-8")
+        part.replace(folder / f"{NAME}.html")
+        write_paper(part, machine, outcomes, version)
+        part.replace(folder / f"{NAME}.pdf")
+        write_json(part, machine, outcomes)
+        part.replace(folder / f"{NAME}.json")
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise VerificationError(f"{folder}: cannot be written: {error.strerror}") from None
+
+
+def main(words: Sequence[str]) -> int:
+    arguments = read_arguments(words)
+    try:
+        program, folder = find_program(), find_cases(arguments.cases)
+        version, previous = read_previous(folder)
+        cases = chosen(read_cases(folder), arguments.chosen)
+        outcomes = verify(program, folder, cases, previous, arguments.threads)
+        write_results(arguments.out, program, folder, outcomes, version)
+    except VerificationError as error:
+        print(f"nocdyn: verify: {error}", file=sys.stderr)
+        return error.code
+    for one in outcomes:
+        if not one.passes:
+            reason = one.problem or f"{one.computed:.10g}, expected {one.case.expected:.10g} {one.case.unit}"
+            print(f"{one.case.id}: {one.case.quantity}: {reason}", file=sys.stderr)
+    if not arguments.quiet:
+        print(f"{verdict(outcomes)} {arguments.out} has {NAME}.html, {NAME}.pdf and {NAME}.json")
+    return 0 if all(one.passes for one in outcomes) else FAILED
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(sys.argv[1:]))
+    except KeyboardInterrupt:
+        sys.exit(130)
