@@ -10,7 +10,8 @@ module nocdyn_assembly
   use nocdyn_joint_simplifications, only: has_joint_that_locks, has_joint_that_moves, refuse_joints
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_machine_parts, only: build_machine, given_speeds
+  use nocdyn_machine_parts, only: build_machine
+  use nocdyn_machine_start, only: given_speeds
   use nocdyn_motion_notes, only: note_motions
   use nocdyn_multiplier, only: multiplier_t
   use nocdyn_paper, only: paper_t

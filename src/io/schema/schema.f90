@@ -57,7 +57,7 @@ module nocdyn_schema
       'dry friction of its bearings: against the motion, and up to as much at rest'), &
     key_rule_t('body', 'angle', a_number, 1, 'rad', '0', anything, 'angle at the start'), &
     key_rule_t('body', 'speed', a_number, 1, 'rad/s', '0', anything, &
-      'speed at the start; if not given it follows through the gears from others, else it is 0', follows=.true.), &
+      'speed at the start; if not given it follows through gears and couplings from others, else 0', follows=.true.), &
     key_rule_t('run', 't_start', a_number, 1, 's', '0', anything, 'time of the start'), &
     key_rule_t('run', 't_end', a_number, 1, 's', required, anything, 'time of the end, after t_start'), &
     key_rule_t('run', 'method', a_word, 1, '', default_method, methods, &
