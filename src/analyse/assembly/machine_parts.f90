@@ -149,6 +149,10 @@ contains
       end associate
     case ('fatigue')
       call check_fatigue(input, g, diagnostics)
+    case ('run')
+      if (input%groups(g)%has_value('start_speed') .and. input%groups(g)%text('start') /= 'equilibrium') &
+        call input%report(g, 'start_speed', "start_speed is for start = 'equilibrium'; allowed: that, or the speeds of bodies", &
+                          diagnostics)
     case default
     end select
   end subroutine check_group

@@ -9,6 +9,7 @@ module nocdyn_neighbour_speeds
   use nocdyn_element_groups, only: bodies_of, body_index_t
   use nocdyn_element_rows, only: element_rows_t, joined_rows, new_element_rows, rows_between
   use nocdyn_followed_speeds, only: collect, known_t, rounding_of
+  use nocdyn_grouping, only: grouped, groups_t
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -32,14 +33,15 @@ module nocdyn_neighbour_speeds
     procedure :: take
   end type neighbours_t
 
-  !> What joins the bodies of a component, and what is found of them.
+  !> What joins the bodies of a component. Arrays over the bodies of the machine serve all components, one after the other.
   type :: component_t
     integer, allocatable :: rows(:)      !! that touch it
     integer, allocatable :: bodies(:)
     integer, allocatable :: beside(:)    !! bodies with known speeds, 0 = ground
-    integer, allocatable :: unknown(:)   !! each body turns in proportion to an unknown, [bodies of the machine]
-    real(wp), allocatable :: ratio(:)    !! speed of a body by its unknown, [bodies of the machine]
     integer :: unknowns = 0
+    integer, allocatable :: unknown(:)   !! each body turns in proportion to an unknown, [bodies of the machine]
+    integer, allocatable :: to(:)        !! a body in proportion to whose speed each body turns, [bodies of the machine]
+    real(wp), allocatable :: ratio(:)    !! speed of a body by that one [bodies of the machine]
   end type component_t
 
 contains
@@ -97,40 +99,43 @@ contains
     type(machine_t), intent(inout) :: machine
     logical, intent(inout) :: is_known(:)   !! [bodies]
     type(string_t), allocatable, intent(out) :: notes(:)
-    integer :: parent(size(is_known)), b, root
-    logical :: concerns(size(is_known))   ! whether the component of a root has elastic elements, and something beside it turns
+    logical :: concerns(size(is_known))   ! whether a component has elastic elements, and something beside it turns
+    type(groups_t) :: bodies, rows        ! of the components
     type(component_t) :: component
-    logical, allocatable :: is_found(:)   ! [bodies]
+    logical, allocatable :: is_found(:)   ! of the bodies of a component
+    integer, allocatable :: beside(:), taken(:)
+    integer :: root
 
-    allocate (notes(0))
+    allocate (notes(0), beside(0), taken(0))
     if (.not. any(is_known .and. abs(machine%start_speed(1, :)) > 0)) return
-    call find_components(self, machine%start_speed(1, :), is_known, parent, concerns)
-    do root = 1, size(parent)
-      if (parent(root) /= root .or. .not. concerns(root)) cycle
-      call describe_component(self, root, parent, is_known, component)
+    call find_components(self, machine%start_speed(1, :), is_known, bodies, rows, concerns)
+    allocate (component%unknown(size(is_known)), component%to(size(is_known)), component%ratio(size(is_known)))
+    do root = 1, size(is_known)
+      if (.not. concerns(root)) cycle
+      component%bodies = bodies%member(bodies%start(root):bodies%start(root + 1) - 1)
+      component%rows = rows%member(rows%start(root):rows%start(root + 1) - 1)
+      call list_beside(self, is_known, component)
       call solve(self, component, is_known, machine%start_speed, is_found)
       if (.not. allocated(is_found)) then
-        call note_contradiction(component, unit, machine, notes)
+        if (size(notes) < most_names) call note_contradiction(component, unit, machine, notes)
         cycle
       end if
-      component%bodies = pack(component%bodies, is_found(component%bodies))
-      if (size(component%bodies) == 0) cycle
-      call note_speeds(component, unit, machine, notes)
-      do b = 1, size(component%bodies)
-        is_known(component%bodies(b)) = .true.
-      end do
+      taken = [taken, pack(component%bodies, is_found)]
+      beside = [beside, component%beside]
     end do
+    is_known(taken) = .true.
+    call note_speeds(taken, beside, unit, machine, notes)
   end subroutine take
 
   !> Joins the bodies whose speeds are not known.
-  pure subroutine find_components(self, speed, is_known, parent, concerns)
+  pure subroutine find_components(self, speed, is_known, bodies, rows, concerns)
     type(neighbours_t), intent(in) :: self
     real(wp), intent(in) :: speed(:)        !! [rad/s], [bodies]
     logical, intent(in) :: is_known(:)
-    integer, intent(out) :: parent(:)
+    type(groups_t), intent(out) :: bodies, rows   !! by the component, which has the number of one of its bodies
     logical, intent(out) :: concerns(:)
-    logical, dimension(size(parent)) :: is_elastic, is_moving
-    integer :: i, r, root
+    logical, dimension(size(speed)) :: is_elastic, is_moving
+    integer :: i, parent(size(speed)), r, root, root_of_row(self%rows%count()), roots(size(speed))
 
     parent = [(i, i=1, size(parent))]
     is_elastic = .false.
@@ -152,6 +157,7 @@ contains
         do i = 1, size(body)
           if (is_open(body(i), is_known)) call find_root(parent, body(i), root)
         end do
+        root_of_row(r) = root
         if (root == 0) cycle
         is_elastic(root) = is_elastic(root) .or. r > self%gears
         do i = 1, size(body)
@@ -161,6 +167,11 @@ contains
       end associate
     end do
     concerns = is_elastic .and. is_moving
+    do i = 1, size(roots)
+      call find_root(parent, i, roots(i))
+    end do
+    bodies = grouped(size(roots), pack(roots, .not. is_known), pack([(i, i=1, size(roots))], .not. is_known))
+    rows = grouped(size(roots), pack(root_of_row, root_of_row > 0), pack([(r, r=1, size(root_of_row))], root_of_row > 0))
   end subroutine find_components
 
   !> Whether a body, not the ground, has no known speed.
@@ -172,37 +183,23 @@ contains
     if (is_open) is_open = .not. is_known(body)
   end function is_open
 
-  !> The rows and bodies of a component.
-  pure subroutine describe_component(self, root, parent, is_known, component)
+  !> The bodies with known speeds in the rows of a component.
+  pure subroutine list_beside(self, is_known, component)
     type(neighbours_t), intent(in) :: self
-    integer, intent(in) :: root
-    integer, intent(inout) :: parent(:)
     logical, intent(in) :: is_known(:)
-    type(component_t), intent(out) :: component
-    integer :: b, i, its_root, r
-    logical :: is_inside(size(parent)), touches
+    type(component_t), intent(inout) :: component
+    integer :: entry, i
 
-    do b = 1, size(parent)
-      call find_root(parent, b, its_root)
-      is_inside(b) = its_root == root .and. .not. is_known(b)
+    component%beside = [integer ::]
+    do i = 1, size(component%rows)
+      do entry = self%rows%first(component%rows(i)), self%rows%first(component%rows(i) + 1) - 1
+        associate (b => self%rows%body(entry))
+          if (is_open(b, is_known) .or. any(component%beside == b)) cycle
+          component%beside = [component%beside, b]
+        end associate
+      end do
     end do
-    component%bodies = pack([(b, b=1, size(parent))], is_inside)
-    allocate (component%rows(0), component%beside(0))
-    do r = 1, self%rows%count()
-      associate (body => self%rows%body(self%rows%first(r):self%rows%first(r + 1) - 1))
-        touches = .false.
-        do i = 1, size(body)
-          if (body(i) > 0) touches = touches .or. is_inside(max(1, body(i)))
-        end do
-        if (.not. touches) cycle
-        component%rows = [component%rows, r]
-        do i = 1, size(body)
-          if (is_open(body(i), is_known) .or. any(component%beside == body(i))) cycle
-          component%beside = [component%beside, body(i)]
-        end do
-      end associate
-    end do
-  end subroutine describe_component
+  end subroutine list_beside
 
   !> Finds the speeds that the rows of a component determine; `is_found` is not allocated if the rows contradict each other.
   subroutine solve(self, component, is_known, speed, is_found)
@@ -210,7 +207,7 @@ contains
     type(component_t), intent(inout) :: component
     logical, intent(in) :: is_known(:)
     real(wp), intent(inout) :: speed(:, :)   !! [lanes, bodies]
-    logical, allocatable, intent(out) :: is_found(:)
+    logical, allocatable, intent(out) :: is_found(:)   !! [bodies of the component]
     real(wp), allocatable :: equations(:, :), slack(:), unknown(:), value(:)
     integer, allocatable :: left(:)   ! rows that do not join two bodies of the component
     real(wp), allocatable :: rest(:)
@@ -225,7 +222,7 @@ contains
     end do
     call collect(equations, value, slack, [(i, i=1, size(left))], known, is_consistent)
     if (.not. is_consistent) return
-    allocate (is_found(size(is_known)), source=.false.)
+    allocate (is_found(size(component%bodies)))
     allocate (unknown(component%unknowns))
     unknown = matmul(known%orthonormal(:, :known%count), known%value(:known%count))
     do i = 1, size(component%bodies)
@@ -233,8 +230,8 @@ contains
       k = component%unknown(b)
       rest = -matmul(known%orthonormal(:, :known%count), known%orthonormal(k, :known%count))
       rest(k) = rest(k) + 1.0_wp
-      is_found(b) = norm2(rest) <= tolerance
-      if (is_found(b)) speed(:, b) = component%ratio(b) * unknown(k)
+      is_found(i) = norm2(rest) <= tolerance
+      if (is_found(i)) speed(:, b) = component%ratio(b) * unknown(k)
     end do
   end subroutine solve
 
@@ -244,12 +241,12 @@ contains
     logical, intent(in) :: is_known(:)
     type(component_t), intent(inout) :: component
     integer, allocatable, intent(out) :: left(:)   !! the other rows
-    integer :: b, body(2), i, k, root(2), to(size(is_known))
-    real(wp) :: c(2), factor(2), ratio(size(is_known))
+    integer :: body(2), i, k, root(2)
+    real(wp) :: c(2), factor(2)
 
     allocate (left(0))
-    to = [(b, b=1, size(to))]
-    ratio = 1.0_wp   ! speed of a body by that of the body `to` which it points
+    component%to(component%bodies) = component%bodies
+    component%ratio(component%bodies) = 1.0_wp
     do i = 1, size(component%rows)
       associate (first => self%rows%first(component%rows(i)), last => self%rows%first(component%rows(i) + 1) - 1)
         body = 0
@@ -261,17 +258,17 @@ contains
         c = self%rows%coefficient(first:last)
       end associate
       do k = 1, 2
-        call trace(body(k), to, ratio, root(k), factor(k))
+        call trace(body(k), component%to, component%ratio, root(k), factor(k))
       end do
       if (root(1) /= root(2)) then
-        to(maxval(root)) = minval(root)
-        if (root(2) > root(1)) ratio(root(2)) = -c(1) * factor(1) / (c(2) * factor(2))
-        if (root(1) > root(2)) ratio(root(1)) = -c(2) * factor(2) / (c(1) * factor(1))
+        component%to(maxval(root)) = minval(root)
+        if (root(2) > root(1)) component%ratio(root(2)) = -c(1) * factor(1) / (c(2) * factor(2))
+        if (root(1) > root(2)) component%ratio(root(1)) = -c(2) * factor(2) / (c(1) * factor(1))
       else if (abs(c(1) * factor(1) + c(2) * factor(2)) > tolerance * abs(c(1) * factor(1))) then
         left = [left, component%rows(i)]   ! a loop whose ratios let it stand still only
       end if
     end do
-    call number_unknowns(to, ratio, component)
+    call number_unknowns(component)
   end subroutine join_pairs
 
   !> The body at the end of a chain of ratios, to which the body then points itself.
@@ -292,24 +289,23 @@ contains
     ratio(body) = factor
   end subroutine trace
 
-  !> Numbers the unknowns of a component.
-  pure subroutine number_unknowns(to, ratio, component)
-    integer, intent(inout) :: to(:)
-    real(wp), intent(inout) :: ratio(:)
+  !> Numbers the unknowns of a component: the bodies to which others point.
+  pure subroutine number_unknowns(component)
     type(component_t), intent(inout) :: component
-    integer :: b, i, number(size(to)), root
+    real(wp) :: factor
+    integer :: b, i, root
 
-    allocate (component%unknown(size(to)), source=0)
-    allocate (component%ratio(size(to)), source=0.0_wp)
-    number = 0
+    component%unknowns = 0
     do i = 1, size(component%bodies)
       b = component%bodies(i)
-      call trace(b, to, ratio, root, component%ratio(b))
-      if (number(root) == 0) then
-        component%unknowns = component%unknowns + 1
-        number(root) = component%unknowns
-      end if
-      component%unknown(b) = number(root)
+      if (component%to(b) /= b) cycle
+      component%unknowns = component%unknowns + 1
+      component%unknown(b) = component%unknowns
+    end do
+    do i = 1, size(component%bodies)
+      b = component%bodies(i)
+      call trace(b, component%to, component%ratio, root, factor)
+      component%unknown(b) = component%unknown(root)
     end do
   end subroutine number_unknowns
 
@@ -342,32 +338,32 @@ contains
   end subroutine form_equation
 
   !> "'a', 'b' start at 10 rad/s as 'motor' does, 'c' at 3.333333 rad/s".
-  subroutine note_speeds(component, unit, machine, notes)
-    type(component_t), intent(in) :: component   !! its bodies are the ones with speeds
+  subroutine note_speeds(taken, beside, unit, machine, notes)
+    integer, intent(in) :: taken(:)    !! bodies
+    integer, intent(in) :: beside(:)   !! bodies whose speeds are known, 0 = ground
     integer, intent(in) :: unit
     type(machine_t), intent(in) :: machine
     type(string_t), allocatable, intent(inout) :: notes(:)
     character(len=:), allocatable :: text
-    logical :: is_told(size(component%bodies))
-    logical :: is_alike(size(component%bodies))
+    logical, dimension(size(taken)) :: is_alike, is_told
     integer :: i, sorts, source
 
     text = ''
-    is_told = abs(machine%start_speed(1, component%bodies)) <= 0
+    is_told = abs(machine%start_speed(1, taken)) <= 0
     if (all(is_told)) return
     sorts = 0
     do i = 1, size(is_told)
       if (is_told(i)) cycle
-      associate (speed => machine%start_speed(1, component%bodies(i)))
-        is_alike = .not. is_told .and. abs(machine%start_speed(1, component%bodies) - speed) <= tolerance * abs(speed)
+      associate (speed => machine%start_speed(1, taken(i)))
+        is_alike = .not. is_told .and. abs(machine%start_speed(1, taken) - speed) <= tolerance * abs(speed)
         is_told = is_told .or. is_alike
         sorts = sorts + 1
         if (sorts > most_names) cycle
         if (sorts > 1) text = text // ', '
-        call append_names(pack(component%bodies, is_alike), machine, text)
+        call append_names(pack(taken, is_alike), machine, text)
         if (sorts == 1) text = text // trim(merge(' starts', ' start ', count(is_alike) == 1))
         text = text // ' at ' // speed_text(speed, unit, digits)
-        source = source_of(component, speed, machine)
+        source = source_of(beside, speed, machine)
         if (source > 0) text = text // ' as ' // quoted(machine%names(source)%text) // ' does'
       end associate
     end do
@@ -375,15 +371,15 @@ contains
     call append(notes, 'speeds at the start that are not given follow through couplings: ' // text)
   end subroutine note_speeds
 
-  !> The first body beside a component that has a speed; 0 if there is none.
-  pure integer function source_of(component, speed, machine) result(source)
-    type(component_t), intent(in) :: component
+  !> The first body beside components that has a speed; 0 if there is none.
+  pure integer function source_of(beside, speed, machine) result(source)
+    integer, intent(in) :: beside(:)   !! bodies, 0 = ground
     real(wp), intent(in) :: speed   !! [rad/s]
     type(machine_t), intent(in) :: machine
     integer :: i
 
-    do i = 1, size(component%beside)
-      source = component%beside(i)
+    do i = 1, size(beside)
+      source = beside(i)
       if (source == 0) cycle
       if (abs(machine%start_speed(1, source) - speed) <= tolerance * abs(speed)) return
     end do
