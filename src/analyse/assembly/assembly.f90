@@ -106,8 +106,8 @@ contains
     end if
   end subroutine assemble_steady_machine
 
-  !> Starts a machine in its steady state, if the input wants it. Analyses about a steady state do not ask for the speed that a run
-  !> has there.
+  !> Starts a machine in its steady state, if the input wants it. Analyses about a steady state do not ask for the speed that a
+  !> run has there.
   recursive subroutine start_machine(input, is_steady, machine, error)
     type(input_t), intent(in) :: input
     logical, intent(in) :: is_steady   !! whether the machine is one in a steady state

@@ -61,9 +61,9 @@ contains
     where = input%location(input%position('run'), 'start_speed') // ': '
     start%input = input
     if (has_joint_that_locks(input) .or. has_joint_that_moves(input)) then
-      call raise(error, exit_input, where // 'start_speed is for machines without clutches, freewheels, friction of bearings, ' // &
-                 'losses of teeth, cardans, cranks, relations and drives; allowed: start = ' // quoted('equilibrium') // &
-                 ' without start_speed')
+      call raise(error, exit_input, where // 'start_speed is for machines without clutches, freewheels, friction of ' // &
+                 'bearings, losses of teeth, cardans, cranks, relations and drives; allowed: start = ' // &
+                 quoted('equilibrium') // ' without start_speed')
       return
     end if
     associate (run => input%groups(input%position('run')))
@@ -223,14 +223,15 @@ contains
 
     associate (run => start%input%groups(start%input%position('run')), &
                number => start%input%groups(start%group)%values(start%key)%numbers(1))
-      start%note = 'the start is in equilibrium at ' // speed_text(start%speed, unit_of(run, 'start_speed'), digits) // ' of ' // &
-                   quoted(run%text('start_body'))
+      start%note = 'the start is in equilibrium at ' // speed_text(start%speed, unit_of(run, 'start_speed'), digits) // &
+                   ' of ' // quoted(run%text('start_body'))
       if (run%has_value('free')) then
         start%note = start%note // ' with ' // path_of(start) // ' = ' // rounded_text(number, digits) // ', not ' // &
                      rounded_text(given, digits)
       else
-        start%note = start%note // ' by a constant torque of ' // rounded_text(number, digits) // ' N m on it, the excitation ' // &
-                     quoted(start%input%groups(start%group)%name) // '; free names a number that is found in place of it'
+        start%note = start%note // ' by a constant torque of ' // rounded_text(number, digits) // &
+                     ' N m on it, the excitation ' // quoted(start%input%groups(start%group)%name) // &
+                     '; free names a number that is found in place of it'
       end if
     end associate
   end subroutine write_note

@@ -150,9 +150,10 @@ contains
     case ('fatigue')
       call check_fatigue(input, g, diagnostics)
     case ('run')
-      if (input%groups(g)%has_value('start_speed') .and. input%groups(g)%text('start') /= 'equilibrium') &
+      if (input%groups(g)%has_value('start_speed') .and. input%groups(g)%text('start') /= 'equilibrium') then
         call input%report(g, 'start_speed', "start_speed is for start = 'equilibrium'; allowed: that, or the speeds of bodies", &
                           diagnostics)
+      end if
     case default
     end select
   end subroutine check_group
