@@ -104,6 +104,17 @@ def test_every_variant_of_a_sweep_finds_its_number(nocdyn):
             assert abs(float(row[f"moment_k_{statistic} [N m]"])) == pytest.approx(torque, rel=STEADY)
 
 
+def test_the_speed_of_a_start_varies_in_a_sweep(nocdyn):
+    sweep = "&sweep design = 'grid' /\n&vary target = 'run.start_speed_rpm' low = 900 high = 1500 count = 3 /\n"
+    sweep += "&record quantity = 'omega_motor' statistic = 'max', 'min' /\n"
+    nocdyn.write("m.nml", TRAIN + RUN.replace("KEYS", "") + sweep)
+    assert nocdyn("sweep", "m.nml", "--out", "all", "--csv").returncode == 0
+    with open(nocdyn.folder / "all/sweep.csv", newline="") as file:
+        for row, rpm in zip(csv.DictReader(file), (900, 1200, 1500), strict=True):
+            for statistic in ("min", "max"):
+                assert float(row[f"omega_motor_{statistic} [rad/s]"]) == pytest.approx(rpm * pi / 30, rel=STEADY)
+
+
 def test_the_input_that_a_run_leaves_starts_like_the_run(nocdyn):
     run(nocdyn, TRAIN, "free = 'load.air.quadratic'")
     assert nocdyn("run", "out/input.nml", "--out", "again").returncode == 0

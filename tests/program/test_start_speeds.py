@@ -203,7 +203,7 @@ def test_speeds_follow_through_couplings_and_gears_in_turn(nocdyn, given, speed)
     assert speeds == {name: pytest.approx(90 if name in "ab" else 30, rel=EXACT) for name in "abcd"}
     told = {
         "a": "'b' starts at 90 rad/s as 'a' does, 'c', 'd' at 30 rad/s",
-        "c": "'d' starts at 30 rad/s as 'c' does",
+        "c": "'a', 'b' start at 90 rad/s, 'd' at 30 rad/s as 'c' does",
         "d": "'a', 'b' start at 90 rad/s, 'c' at 30 rad/s as 'd' does",
     }
     assert TAKEN + told[given] in notes
