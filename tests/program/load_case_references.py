@@ -16,7 +16,12 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 # the case that is computed
-CASES = {"reciprocating_compressor": "reconnection", "generator_set": "two_phase", "ice_propeller": "case_2"}
+CASES = {
+    "reciprocating_compressor": "reconnection",
+    "generator_set": "two_phase",
+    "ice_propeller": "case_2",
+    "vfd_compressor": "full_load",
+}
 INERTIA_ORDERS = 17  # of pistons: the ones from here on are below rounding errors
 ARC = 1e-3  # time constant of the currents in opening contacts [s]
 
@@ -546,6 +551,66 @@ def ice_propeller(with_damage=True):
     return result
 
 
+def vfd_parts(m):
+    """Inertias of motor, wheel with pinion, and compressor; rows and groups of disc and quill with their stiffnesses."""
+    teeth, quill = m.gear["gearbox"]["teeth"], m.shaft["quill"]
+    ratio = teeth[0] / teeth[1]
+    motor, wheel, pinion, compressor = m.inertia("motor", "wheel", "pinion", "compressor")
+    sections = np.pi * np.array(quill["diameters"]) ** 4 / 32
+    stiffness = {"disc": m.coupling["disc"]["stiffness"], "quill": quill["shear_modulus"] / sum(quill["lengths"] / sections)}
+    losses = {"disc": m.coupling["disc"]["relative_damping"] / (2 * np.pi), "quill": 2 * quill["damping_ratio"]}
+    frequencies = {"disc": m.coupling["disc"]["damping_frequency"], "quill": quill["damping_frequency"]}
+    rows = {"disc": np.array([-1.0, 1.0, 0.0]), "quill": np.array([0.0, ratio, 1.0])}  # the pinion turns with -ratio
+    inertia = np.array([motor, wheel + ratio**2 * pinion, compressor])
+    return inertia, rows, stiffness, losses, frequencies, ratio
+
+
+def vfd_compressor():
+    """States: angles and speeds of motor, wheel and compressor, integrator of the governor, which is within its limits."""
+    m = LoadCase("vfd_compressor", CASES["vfd_compressor"])
+    inertia, rows, stiffness, losses, frequencies, ratio = vfd_parts(m)
+    drive, gas = m.motor["drive"], m.load["gas"]
+    pairs, multiples, shares = drive["poles"] / 2, np.array(drive["harmonics"]), np.array(drive["harmonic_shares"])
+    speed = drive["governor_speed"]
+
+    def throttle(y):
+        return y[6] + drive["governor_gain"] * (speed - y[3])
+
+    def driving(y):
+        return drive["torque_limit"] * throttle(y) * (1 + shares @ np.sin(multiples * pairs * y[0]))
+
+    def moment(name, y):
+        """On the first body."""
+        damping = stiffness[name] * losses[name] / frequencies[name]
+        return stiffness[name] * (rows[name] @ y[:3]) + damping * (rows[name] @ y[3:6])
+
+    def braking(omega):
+        return gas["quadratic"] * omega * abs(omega) + gas["constant"] * np.tanh(omega / 0.01)
+
+    def rate(t, y, mode, middle):
+        torque = -sum(rows[name] * moment(name, y) for name in rows)
+        torque += np.array([driving(y), 0.0, -braking(y[5])])
+        return np.concatenate([y[3:6], torque / inertia, [(throttle(y) - y[6]) / drive["governor_time"]]])
+
+    load = braking(-ratio * speed)  # negative
+    mean = -ratio * load
+    wheel = -mean / stiffness["disc"]
+    angles = [0.0, wheel, -ratio * wheel - load / stiffness["quill"]]
+    motion = motion_of(rate, [*angles, speed, speed, -ratio * speed, mean / drive["torque_limit"]], m.end())
+    end = motion.at(m.end())
+    return {
+        "phi_motor [rad]": end[0],
+        "omega_motor [rad/s]": end[3],
+        "omega_wheel [rad/s]": end[4],
+        "omega_compressor [rad/s]": end[5],
+        "total_moment_disc [N m]": moment("disc", end),
+        "total_moment_quill_1 [N m]": moment("quill", end),
+        "torque_drive [N m]": driving(end),
+        "min total_moment_disc [N m]": motion.largest(lambda t, y, mode: moment("disc", y), -1),
+        "max total_moment_quill_1 [N m]": motion.largest(lambda t, y, mode: moment("quill", y)),
+    }
+
+
 # --- natural frequencies, steady speeds, responses
 
 
@@ -559,6 +624,10 @@ def frequencies():
         result[name] = np.sqrt(squares[squares > 1e-6 * squares[-1]]) / (2 * np.pi)
     m = LoadCase("ice_propeller", CASES["ice_propeller"])
     result["ice_propeller"] = continuous_frequencies(m, 6)
+    inertia, rows, stiffness, *_ = vfd_parts(LoadCase("vfd_compressor", CASES["vfd_compressor"]))
+    root = 1 / np.sqrt(inertia)
+    squares = np.linalg.eigvalsh(sum(stiffness[name] * np.outer(rows[name], rows[name]) for name in rows) * np.outer(root, root))
+    result["vfd_compressor"] = np.sqrt(squares[1:]) / (2 * np.pi)
     return result
 
 
@@ -653,10 +722,26 @@ def propeller_response(m, order, speed):
     return result
 
 
+def vfd_response(m, order, speed):
+    """Amplitudes of the moments: dense complex matrices, with the governor, and harmonics of the mean torque."""
+    inertia, rows, stiffness, losses, _, ratio = vfd_parts(m)
+    frequency, drive, gas = order * speed, m.motor["drive"], m.load["gas"]
+    mean = ratio * (gas["quadratic"] * (ratio * speed) ** 2 + gas["constant"])
+    share = drive["harmonic_shares"][drive["harmonics"].index(order / (drive["poles"] / 2))]
+    complex_stiffness = {name: stiffness[name] * (1 + 1j * losses[name]) for name in rows}
+    matrix = sum(complex_stiffness[name] * np.outer(rows[name], rows[name]) for name in rows) - np.diag(inertia) * frequency**2
+    matrix[0, 0] += speed_control(drive, drive["torque_limit"], frequency)
+    matrix[2, 2] += 1j * frequency * 2 * gas["quadratic"] * ratio * speed
+    angle = np.linalg.solve(matrix, [share * mean, 0.0, 0.0])
+    columns = {"disc": "total_moment_disc", "quill": "total_moment_quill_1"}
+    return {columns[name]: abs(complex_stiffness[name] * (rows[name] @ angle)) for name in rows}
+
+
 RESPONSES = {
     "reciprocating_compressor": (compressor_response, [(1, 590), (2, 590), (4, 590), (8, 590), (3, 235), (2, 350), (9, 550)]),
     "generator_set": (generator_response, [(4.5, 840), (6, 630), (3, 150), (0.5, 545)]),
     "ice_propeller": (propeller_response, [(4, 64), (8, 32), (4, 150)]),
+    "vfd_compressor": (vfd_response, [(2, 1030), (4, 510), (12, 170), (12, 1150), (24, 570)]),
 }
 
 

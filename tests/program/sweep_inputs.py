@@ -11,7 +11,7 @@ import pytest
 TWO_DISCS = """\
 &case     title = 'Two discs' /
 &body     name = 'disc'  inertia = 2.0  speed = 1.0 /
-&body     name = 'wheel' inertia = 1.0 /
+&body     name = 'wheel' inertia = 1.0  speed = 0.0 /
 &coupling name = 'shaft' bodies = 'disc', 'wheel' stiffness = 40.0 damping = 0.2 /
 &load     name = 'drag'  body = 'wheel' viscous = 0.5 /
 &run      t_end = 2.0 rtol = 1e-8 atol = 1e-8 /

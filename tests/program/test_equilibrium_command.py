@@ -132,7 +132,7 @@ def test_a_spring_without_linear_part_is_twisted_from_rest(nocdyn):
 
 
 def test_what_nothing_drives_keeps_the_speed_of_its_start(nocdyn):
-    free = "&body name = 'idler' inertia = 2.0 speed = 3.0 /\n&body name = 'disc' inertia = 1.0 /\n"
+    free = "&body name = 'idler' inertia = 2.0 speed = 3.0 /\n&body name = 'disc' inertia = 1.0 speed = 0.0 /\n"
     joint = "&coupling name = 'joint' bodies = 'idler', 'disc' stiffness = 10.0 /\n"
     path = nocdyn.write("machine.nml", TRAIN + free + joint)
     outcome = nocdyn("equilibrium", path, "--out", "out")

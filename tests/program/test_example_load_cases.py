@@ -57,9 +57,25 @@ REFERENCE = {
         "damage life_of_intermediate": 6.196390365098e-10,
         "damage life_of_tail": 4.588526980259e-11,
     },
+    "vfd_compressor": {
+        "phi_motor [rad]": 376.9918015837,
+        "omega_motor [rad/s]": 188.4870445449,
+        "omega_wheel [rad/s]": 188.4958473579,
+        "omega_compressor [rad/s]": -991.124507721,
+        "total_moment_disc [N m]": -7545.809399958,
+        "total_moment_quill_1 [N m]": 1435.150185805,
+        "torque_drive [N m]": 7550.859710311,
+        "min total_moment_disc [N m]": -7589.517230771,
+        "max total_moment_quill_1 [N m]": 1442.296258656,
+    },
 }
-CASES = {"reciprocating_compressor": "reconnection", "generator_set": "two_phase", "ice_propeller": "case_2"}
-FIRST = {"reciprocating_compressor": "full_load", "generator_set": "full_load", "ice_propeller": "open_water"}  # of steady speeds
+CASES = {
+    "reciprocating_compressor": "reconnection",
+    "generator_set": "two_phase",
+    "ice_propeller": "case_2",
+    "vfd_compressor": "full_load",
+}
+FIRST = dict.fromkeys(CASES, "full_load") | {"ice_propeller": "open_water"}  # of steady speeds
 
 # By the same program: natural frequencies without damping and motors [Hz], the lowest first; of the propulsion line the first,
 FREQUENCIES = {
@@ -77,6 +93,7 @@ FREQUENCIES = {
         587.7185774592,
     ],
     "ice_propeller": [4.287384633366],
+    "vfd_compressor": [34.28781824307, 229.6461282824],
 }
 
 # speeds at which the torques balance,
@@ -210,6 +227,13 @@ RESPONSES = {
             "total_moment_tail_1": 3313.36996459,
             "total_moment_tail_2": 3028.962445857,
         },
+    },
+    "vfd_compressor": {
+        (2, 1030): {"total_moment_disc": 302.3712063691, "total_moment_quill_1": 46.63006479536},
+        (4, 510): {"total_moment_disc": 89.76781206968, "total_moment_quill_1": 13.83716160754},
+        (12, 170): {"total_moment_disc": 153.9590248115, "total_moment_quill_1": 23.73182948127},
+        (12, 1150): {"total_moment_disc": 3.370523356117, "total_moment_quill_1": 13.78778105943},
+        (24, 570): {"total_moment_disc": 0.181361269467, "total_moment_quill_1": 1.354619328441},
     },
 }
 

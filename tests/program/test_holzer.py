@@ -1,7 +1,8 @@
 """nocdyn modes --holzer: the tables by hand, what is left at their ends, and what is refused."""
 
 import csv
-from math import isclose, pi, sqrt
+import re
+from math import isclose, pi, sin, sqrt
 
 import pytest
 from conftest import SOURCE
@@ -109,6 +110,53 @@ def test_a_locked_clutch_joins_as_a_gear_of_ratio_one(nocdyn):
         assert (lines["pinion"]["to"], lines["pinion"]["by"], float(lines["pinion"]["ratio [1]"])) == ("wheel", "joint", 1.0)
         assert lines["drum"]["by"] == ""
         assert abs(float(lines["drum"]["sum [N m]"])) < 1e-9 * abs(float(lines["drum"]["J omega^2 theta [N m]"]))
+
+
+def test_the_inertia_of_a_shaft_is_lumped_and_the_difference_is_told(nocdyn):
+    length, diameter, density, modulus = 2.0, 0.1, 7850.0, 8e10
+    text = "&body name = 'a' inertia = 1e-9 /\n&body name = 'b' inertia = 1e-9 /\n"
+    text += f"&shaft name = 's' bodies = 'a', 'b' lengths = {length} diameters = {diameter} shear_modulus = {modulus}"
+    text += f" density = {density} nodes = 7 /\n&run t_end = 1 /\n"
+    printed, rows = tables(nocdyn, nocdyn.write("m.nml", text), "--at", "rest")
+    assert "the inertia of 's' is lumped in these tables" in printed
+    with open(nocdyn.folder / "out/modes.csv", newline="") as file:
+        modes = [
+            float(row["undamped_frequency [Hz]"])
+            for row in csv.DictReader(file)
+            if float(row["undamped_frequency [Hz]"] or 0) > 0
+        ]
+    stations, wave = 8, sqrt(modulus / density)
+    assert len(rows) == stations * (stations + 1)
+    for mode in range(1, stations + 1):
+        lines = rows[(stations + 1) * (mode - 1) : (stations + 1) * mode]
+        assert [line["body"] for line in lines] == ["a", *(f"s[{k}]" for k in range(1, stations)), "b"]
+        lumped = float(lines[0]["frequency [Hz]"])  # free ends, half of an inertia at each of them
+        assert lumped == pytest.approx(stations * wave / (pi * length) * abs(sin(mode * pi / (2 * stations))), rel=1e-6)
+        whole = float(lines[0]["frequency in modes.csv [Hz]"])
+        assert whole == pytest.approx(modes[mode - 1], rel=1e-9)
+        if mode == 1:
+            assert whole == pytest.approx(wave / (2 * length), rel=1e-6)
+            told = float(re.search(r"Hz where the shafts are not lumped, (\S+) % off", printed)[1])
+            assert told == pytest.approx(100 * (lumped / whole - 1), rel=0.05)
+        inertias = sum(float(line["inertia [kg m2]"]) for line in lines)
+        assert inertias == pytest.approx(density * length * pi * diameter**4 / 32, rel=1e-6)
+        largest = max(abs(float(line["J omega^2 theta [N m]"])) for line in lines)
+        assert abs(float(lines[-1]["sum [N m]"])) < 1e-7 * largest
+
+
+def test_segments_of_a_shaft_are_cut_into_parts_of_their_own(nocdyn):
+    text = (
+        "&body name = 'a' inertia = 1 /\n&body name = 'b' inertia = 2 /\n&shaft name = 's' bodies = 'a', 'b' lengths = 1.0, 0.5 "
+    )
+    text += (
+        "diameters = 0.1, 0.08 bores = 0.02, 0.03 shear_modulus = 8e10, 7e10 density = 7850, 7000 nodes = 5 /\n&run t_end = 1 /\n"
+    )
+    _, rows = tables(nocdyn, nocdyn.write("m.nml", text), "--at", "rest")
+    stiffness = [float(line["stiffness [N m/rad]"]) for line in rows[:6]]
+    moments = [pi / 32 * (0.1**4 - 0.02**4), pi / 32 * (0.08**4 - 0.03**4)]
+    expected = [8e10 * moments[0] / 0.25] * 4 + [7e10 * moments[1] / 0.25] * 2
+    assert stiffness == pytest.approx(expected) or stiffness == pytest.approx(expected[::-1])
+    assert float(rows[0]["frequency in modes.csv [Hz]"]) == pytest.approx(float(rows[0]["frequency [Hz]"]), rel=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -388,7 +388,7 @@ def test_a_load_case_alone_does_not_fail_by_the_mistake_of_another(nocdyn, comma
 
 
 def test_names_that_spreadsheets_would_compute_are_texts_in_tables(nocdyn):
-    text = "&body name='+1+1' inertia=1 speed=1 /\n&body name='@b' inertia=1 /\n&body name='plain' inertia=1 /\n"
+    text = "&body name='+1+1' inertia=1 speed=1 /\n&body name='@b' inertia=1 speed=0 /\n&body name='plain' inertia=1 /\n"
     text += "&coupling name='-k' bodies='+1+1','@b' stiffness=9 /\n&coupling name='+k' bodies='@b','plain' stiffness=9 /\n"
     text += "&fatigue name='-life' coupling='-k' reference_moment=10 reference_cycles=1e6 slope=5 /\n"
     nocdyn.write("m.nml", text + "&run t_end=9 /\n&load_case name='+case' /\n")

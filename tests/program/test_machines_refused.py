@@ -107,7 +107,7 @@ def test_dense_matrices_too_large_for_memory_are_refused(nocdyn, bodies, overrid
 def hub(shared_nocdyn):
     """A disc with so many branches that no order of the states makes the band of the Jacobian narrow."""
     branches = [
-        f"&body name = 'b{i}' inertia = 1.0 /\n&coupling name = 'c{i}' bodies = 'hub', 'b{i}' stiffness = 1.0 /"
+        f"&body name = 'b{i}' inertia = 1.0 speed = 0.0 /\n&coupling name = 'c{i}' bodies = 'hub', 'b{i}' stiffness = 1.0 /"
         for i in range(3000)
     ]
     lines = ["&body name = 'hub' inertia = 1.0 speed = 1.0 /", *branches, "&run t_end = 0.01 method = 'auto' /"]

@@ -14,7 +14,7 @@ TUTORIAL = SOURCE / "docs/tutorial/pump.nml"
 # Two discs on a shaft, 45 rad/s, damping ratio 0.01: a constant torque of 30 N m twists it by 15 N m in the mean.
 DISCS = """\
 &body name = 'driver' inertia = 1.0 {driver} /
-&body name = 'driven' inertia = 1.0 /
+&body name = 'driven' inertia = 1.0 speed = 0.0 /
 &coupling name = 'line' bodies = 'driver', 'driven' stiffness = 1012.5 damping = 0.45 /
 &motor name = 'drive' body = 'driver' kind = 'constant' torque = 30.0 /
 &run t_end = 5.0 rtol = 1e-10 atol = 1e-12 {run} /

@@ -138,3 +138,136 @@ def test_the_input_that_a_run_leaves_starts_like_the_run(nocdyn, method):
 def test_speeds_of_any_size_have_digits(nocdyn, speed):
     speeds, _ = start(nocdyn, (bodies(a=1.0, b=None) + GEAR).replace("speed = 1.0", f"speed = {speed}"))
     assert speeds["b"] == pytest.approx(float(speed) / 3, rel=EXACT, abs=0)
+
+
+TAKEN = "note: speeds at the start that are not given follow through couplings: "
+SHAFT = "&shaft name = 's' bodies = 'a', 'b' lengths = 1.0 diameters = 0.05 shear_modulus = 8e10 density = 7850 /\n"
+
+
+def coupling(name, first, second, keys="stiffness = 10.0"):
+    return f"&coupling name = '{name}' bodies = '{first}', '{second}' {keys} /\n"
+
+
+@pytest.mark.parametrize(
+    "joined",
+    [
+        coupling("k", "a", "b"),
+        coupling("k", "b", "a", "stiffness = 0 cubic_stiffness = 5.0"),
+        coupling("k", "a", "b", "stiffness = 10.0 gap = 0.1"),
+        coupling("k", "a", "b", "table_twist = -1, 1 table_moment = -3, 3 rest_twist = 0.1"),
+        SHAFT,
+        SHAFT.replace("density = 7850 ", ""),
+    ],
+)
+def test_a_speed_is_that_of_the_neighbour_through_an_elastic_element(nocdyn, joined):
+    speeds, notes = start(nocdyn, bodies(a=12.0, b=None) + joined)
+    assert speeds == {"a": 12, "b": pytest.approx(12, rel=EXACT)}
+    assert notes == [TAKEN + "'b' starts at 12 rad/s as 'a' does"]
+
+
+def test_nothing_jolts_a_train_that_turns_as_one_of_its_bodies(nocdyn):
+    train = bodies(a=12.0, b=None, c=None, d=None) + SHAFT + GEAR.replace("'a', 'b'", "'b', 'c'") + coupling("k", "c", "d")
+    outcome = nocdyn("run", nocdyn.write("m.nml", train + "&run t_end = 0.1 /\n"), "--out", "out")
+    assert outcome.returncode == 0
+    header, rows = nocdyn.table("out")
+    twists = [row[k] for row in rows for k, label in enumerate(header) if label.startswith("total_moment_")]
+    assert len(twists) > 0
+    assert max(map(abs, twists)) < 1e-6
+
+
+@pytest.mark.parametrize(
+    "joined",
+    [
+        coupling("k", "a", "b", "damping = 1.0"),
+        coupling("k", "a", "b", "friction = 1.0"),
+        "&clutch name = 'k' bodies = 'a', 'b' capacity = 1.0 /\n",
+        "&freewheel name = 'k' bodies = 'b', 'a' /\n",
+    ],
+)
+def test_speeds_do_not_follow_through_dampers_and_clutches(nocdyn, joined):
+    speeds, notes = start(nocdyn, bodies(a=12.0, b=None) + joined)
+    assert speeds == {"a": 12, "b": 0}
+    assert not any("follow" in note for note in notes)
+
+
+def test_a_given_speed_stays_also_if_it_is_zero(nocdyn):
+    speeds, notes = start(nocdyn, bodies(a=12.0, b=0.0) + coupling("k", "a", "b"))
+    assert speeds == {"a": 12, "b": 0}
+    assert notes == []
+
+
+@pytest.mark.parametrize(("given", "speed"), [("a", 90.0), ("c", 30.0), ("d", 30.0)])
+def test_speeds_follow_through_couplings_and_gears_in_turn(nocdyn, given, speed):
+    joined = coupling("k", "a", "b") + GEAR.replace("'a', 'b'", "'b', 'c'") + coupling("l", "c", "d")
+    speeds, notes = start(nocdyn, bodies(**{name: speed if name == given else None for name in "abcd"}) + joined)
+    assert speeds == {name: pytest.approx(90 if name in "ab" else 30, rel=EXACT) for name in "abcd"}
+    told = {
+        "a": "'b' starts at 90 rad/s as 'a' does, 'c', 'd' at 30 rad/s",
+        "c": "'a', 'b' start at 90 rad/s, 'd' at 30 rad/s as 'c' does",
+        "d": "'a', 'b' start at 90 rad/s, 'c' at 30 rad/s as 'd' does",
+    }
+    assert TAKEN + told[given] in notes
+
+
+def test_speeds_follow_through_the_teeth_of_a_mesh(nocdyn):
+    mesh = "&mesh name = 'z' bodies = 'a', 'b' radii = 0.1, 0.3 stiffness = 1e6 /\n"
+    assert start(nocdyn, bodies(a=90.0, b=None) + mesh)[0]["b"] == pytest.approx(-30, rel=EXACT)
+
+
+def test_a_speed_that_is_rounded_fits_and_the_gears_hold_exactly(nocdyn):
+    joined = coupling("k", "a", "b") + GEAR.replace("'a', 'b'", "'b', 'c'") + coupling("l", "c", "d")
+    speeds, _ = start(nocdyn, bodies(a=100.0, b=None, c=None, d=33.33) + joined)
+    assert speeds["b"] == pytest.approx(100)
+    assert speeds["c"] == pytest.approx(speeds["b"] / 3, rel=EXACT)
+
+
+def test_a_speed_that_gears_replace_is_taken_as_replaced(nocdyn):
+    speeds, _ = start(nocdyn, bodies(a=100.0, b=33.33, c=None) + GEAR + coupling("k", "b", "c"))
+    assert speeds["c"] == pytest.approx(100 / 3, rel=EXACT)
+
+
+@pytest.mark.parametrize(
+    ("joined", "told"),
+    [
+        (coupling("k", "a", "b") + coupling("l", "b", "c"), "'a' starts at 10 rad/s, 'c' starts at 20 rad/s"),
+        (coupling("k", "a", "b") + coupling("l", "b", "ground"), "'a' starts at 10 rad/s, 'ground' stands still"),
+    ],
+)
+def test_no_speed_is_taken_between_neighbours_that_differ(nocdyn, joined, told):
+    speeds, notes = start(nocdyn, bodies(a=10.0, b=None, c=20.0) + joined)
+    assert speeds["b"] == 0
+    assert f"note: start speeds of 'b' do not follow through couplings, for the bodies beside them differ: {told}" in notes
+
+
+def test_two_speeds_of_a_differential_may_come_through_couplings(nocdyn):
+    joined = AXLE + coupling("k", "left", "wheel") + coupling("l", "right", "other")
+    speeds, _ = start(nocdyn, bodies(case=100.0, left=None, right=None, wheel=120.0, other=None) + joined)
+    assert [speeds[name] for name in ("left", "right", "other")] == pytest.approx([120, 80, 80], rel=EXACT)
+
+
+def test_what_is_left_open_is_the_same_on_both_sides_of_a_coupling(nocdyn):
+    joined = AXLE + coupling("k", "left", "wheel") + coupling("l", "right", "other")
+    speeds, _ = start(nocdyn, bodies(case=100.0, left=None, right=None, wheel=None, other=None) + joined)
+    assert speeds == {name: pytest.approx(100, rel=EXACT) for name in speeds}
+
+
+def test_speeds_follow_through_couplings_between_cardans(nocdyn):
+    joined = "&cardan name = 'c' bodies = 'a', 'b' angle = 0.3 /\n&cardan name = 'd' bodies = 'c', 'd' angle = 0.3 /\n"
+    speeds, _ = start(
+        nocdyn, bodies(a=10.0, b=None, c=None, d=None, e=None) + joined + coupling("k", "b", "c") + coupling("l", "d", "e")
+    )
+    assert abs(speeds["b"]) > 1
+    assert speeds["b"] != pytest.approx(10, rel=1e-3)
+    assert speeds["c"] == pytest.approx(speeds["b"], rel=EXACT)
+    assert abs(speeds["d"]) > 1
+    assert speeds["e"] == pytest.approx(speeds["d"], rel=EXACT)
+
+
+def test_speeds_follow_a_drive_through_couplings(nocdyn):
+    joined = "&drive name = 'd' body = 'a' speed = 25.0 /\n" + coupling("k", "a", "b")
+    assert start(nocdyn, bodies(a=None, b=None) + joined)[0] == {"a": 25, "b": pytest.approx(25, rel=EXACT)}
+
+
+def test_bodies_beside_an_impact_do_not_follow_through_couplings(nocdyn):
+    speeds, _ = start(nocdyn, bodies(a=8.0, b=None) + coupling("k", "a", "b"), "--set", "run.start=projected")
+    assert speeds == {"a": 8, "b": 0}

@@ -268,3 +268,23 @@ def test_projected_start_speeds_follow_an_inertia_that_varies(nocdyn):
     for row, inertia in zip(sweep(nocdyn, "out", "--threads", 1), (1, 2.5, 4)):
         nocdyn("run", "sweep.nml", "--out", "run", "--set", f"body.b.inertia={inertia}", "--quiet")
         assert float(row["omega_a_final [rad/s]"]) == nocdyn.summary("run")["columns"]["omega_a [rad/s]"]["last"]
+
+
+def test_variants_start_with_speeds_that_follow_through_couplings(nocdyn):
+    text = "&body name = 'a' inertia = 1 speed = 10 /\n&body name = 'b' inertia = 1 /\n&body name = 'c' inertia = 1 /\n"
+    text += (
+        "&coupling name = 'k' bodies = 'a', 'b' stiffness = 5 damping = 1 /\n&gear name = 'g' bodies = 'b', 'c' radii = 1, 2 /\n"
+    )
+    text += "&load name = 'l' body = 'c' viscous = 0.1 /\n&run t_end = 0.5 /\n&sweep design = 'list' file = 'list.csv' /\n"
+    nocdyn.write("sweep.nml", text + "&record quantity = 'omega_c' statistic = 'max_abs', 'final' /\n")
+    paths = ["coupling.k.stiffness", "body.a.inertia", "gear.g.radii(2)", "body.a.speed"]
+    variants = [(5, 1, 2, 10), (0, 1, 2, 10), (5, 2, 4, 8), (7, 3, 2, 8)]
+    nocdyn.write("list.csv", ",".join(paths) + "\n" + "".join(",".join(map(str, values)) + "\n" for values in variants))
+    for row, values in zip(sweep(nocdyn, "out"), variants):
+        options = [f"--set={path}={value}" for path, value in zip(paths, values)]
+        nocdyn("run", "sweep.nml", "--out", "run", "--quiet", *options)
+        column = nocdyn.summary("run")["columns"]["omega_c [rad/s]"]
+        assert float(row["omega_c_final [rad/s]"]) == column["last"]
+        fastest = max(abs(column["min"]), abs(column["max"]))
+        assert float(row["omega_c_max_abs [rad/s]"]) == fastest
+        assert (fastest > 0.9 * values[3] / values[2]) == (values[0] > 0)  # a damper alone begins with a jolt

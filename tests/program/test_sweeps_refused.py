@@ -40,7 +40,7 @@ def refusal(nocdyn, **groups):
         (
             {"vary": "&vary target = 'run.method' low = 0 high = 1 /\n"},
             "m.nml:6: &vary: target = 'run.method': method is not a number (word); "
-            "allowed: t_start, t_end, rtol, atol, max_steps",
+            "allowed: t_start, t_end, rtol, atol, start_speed, max_steps",
         ),
         (
             {"vary": "&vary target = 'load.drag.constant_speed' low = 1 high = 2 /\n"},

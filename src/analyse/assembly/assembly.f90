@@ -1,5 +1,6 @@
 !> From an input to a machine at its start, and to its formulation.
 module nocdyn_assembly
+  use nocdyn_balanced_start, only: balanced_start_t, find_balanced_start, has_balanced_start
   use nocdyn_equilibrium, only: t_infinity
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
@@ -10,7 +11,8 @@ module nocdyn_assembly
   use nocdyn_joint_simplifications, only: has_joint_that_locks, has_joint_that_moves, refuse_joints
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_machine_parts, only: build_machine, given_speeds
+  use nocdyn_machine_parts, only: build_machine
+  use nocdyn_machine_start, only: given_speeds
   use nocdyn_motion_notes, only: note_motions
   use nocdyn_multiplier, only: multiplier_t
   use nocdyn_paper, only: paper_t
@@ -37,8 +39,12 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer, intent(in), optional :: lanes   !! 1 if absent
 
-    call build_machine(input, steady_view_t(), machine, error, lanes)
-    if (.not. allocated(error)) call start_machine(input, .false., machine, error)
+    if (has_balanced_start(input)) then
+      call assemble_balanced_machine(input, machine, error, lanes)
+    else
+      call build_machine(input, steady_view_t(), machine, error, lanes)
+      if (.not. allocated(error)) call start_machine(input, .false., machine, error)
+    end if
     if (allocated(error)) return
     call note_idle_elements(input, machine%start_notes)
     call note_rated_motors(input, machine%start_notes)
@@ -47,6 +53,22 @@ contains
     call note_pressures(input, machine%start_notes)
     call note_mean_times(machine, machine%start_notes)
   end subroutine assemble_machine
+
+  !> Builds a machine that starts in equilibrium at a given speed, with the number that is found for it.
+  subroutine assemble_balanced_machine(input, machine, error, lanes)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(out) :: machine
+    type(error_t), allocatable, intent(out) :: error
+    integer, intent(in), optional :: lanes   !! 1 if absent
+    type(balanced_start_t) :: start
+
+    call find_balanced_start(input, start, error)
+    if (allocated(error)) return
+    call build_machine(start%input, steady_view_t(), machine, error, lanes)
+    if (allocated(error)) return
+    call start%set(machine)
+    call append(machine%start_notes, start%note)
+  end subroutine assemble_balanced_machine
 
   !> Builds the machine as it is in a steady state: with means over a turn, and, if it is asked for, with clutches and freewheels
   !> that are locked as constraint rows.
@@ -84,7 +106,8 @@ contains
     end if
   end subroutine assemble_steady_machine
 
-  !> Starts a machine in its steady state, if the input wants it.
+  !> Starts a machine in its steady state, if the input wants it. Analyses about a steady state do not ask for the speed that a
+  !> run has there.
   recursive subroutine start_machine(input, is_steady, machine, error)
     type(input_t), intent(in) :: input
     logical, intent(in) :: is_steady   !! whether the machine is one in a steady state
@@ -94,7 +117,7 @@ contains
     integer :: i
 
     associate (run => input%groups(input%position('run')))
-      if (run%text('start') /= 'equilibrium') return
+      if (run%text('start') /= 'equilibrium' .or. has_balanced_start(input)) return
       if (machine%lanes == 1 .and. (is_steady .or. .not. (has_joint_that_locks(input) .or. &
                                                                   has_joint_that_moves(input)))) then
         call start_steadily(machine, given_speeds(input, machine%nodes), run%number('t_start'), error)

@@ -18,25 +18,24 @@ module nocdyn_machine_parts
   use nocdyn_limit_groups, only: check_limit
   use nocdyn_loss_assembly, only: add_losses, check_loss
   use nocdyn_machine, only: machine_t
+  use nocdyn_machine_start, only: start_bodies
   use nocdyn_massless_motion, only: massless_bodies
   use nocdyn_mesh_assembly, only: add_mesh_form, check_mesh, mesh_form
   use nocdyn_motion_assembly, only: add_cardans, add_drive_form, add_relations, check_drive, check_relation, drive_form
   use nocdyn_motor_assembly, only: add_motor_form, check_motor, motor_form
-  use nocdyn_moving_start, only: fit_moving_rows
   use nocdyn_output_times, only: check_output_times
   use nocdyn_shaft_assembly, only: add_shafts, new_shaft_set, shaft_set_t
   use nocdyn_shaft_segments, only: check_shaft
-  use nocdyn_start_speeds, only: fit_start_speeds
   use nocdyn_steady_views, only: steady_view_t
   use nocdyn_text, only: append, joined, rounded_text, selected, to_text
   use nocdyn_torque_assembly, only: add_engines, add_excitation_form, add_load_form, add_steady_load_form, &
     excitation_form, load_form
   use nocdyn_units, only: from_si, unit_rpm
-  use nocdyn_written_values, only: shared_unit, unit_of, written_key, written_number
+  use nocdyn_written_values, only: unit_of, written_key, written_number
   implicit none (type, external)
   private
 
-  public :: build_machine, check_input, given_speeds, refuse_mistakes
+  public :: build_machine, check_input, refuse_mistakes
 
   integer, parameter :: most_names = 12   ! in a message
 
@@ -71,8 +70,7 @@ contains
     call machine%number_elements()
     call analyse_machine_constraints(input, view, body_index, machine, error)
     if (allocated(error)) return
-    call shafts%place_nodes(machine)
-    call fit_moving_rows(input, machine, given_speeds(input, machine%nodes), error)
+    call start_bodies(input, constraint_groups(input, view), view%is_steady, body_index, shafts, machine, error)
   end subroutine build_machine
 
   !> Adds all mistakes of `check_input` to an error or to none.
@@ -151,6 +149,11 @@ contains
       end associate
     case ('fatigue')
       call check_fatigue(input, g, diagnostics)
+    case ('run')
+      if (input%groups(g)%has_value('start_speed') .and. input%groups(g)%text('start') /= 'equilibrium') then
+        call input%report(g, 'start_speed', "start_speed is for start = 'equilibrium'; allowed: that, or the speeds of bodies", &
+                          diagnostics)
+      end if
     case default
     end select
   end subroutine check_group
@@ -210,8 +213,8 @@ contains
     call list_simplifications(input, view, machine%simplifications)
   end subroutine set_bodies
 
-  !> Analyses the constraints, chooses the coordinates and makes the start speeds consistent. A message begins with file, line and
-  !> group: the ones of a constraint row, or of `independent`.
+  !> Analyses the constraints and chooses the coordinates. A message begins with file, line and group: the ones of a constraint
+  !> row, or of `independent`.
   subroutine analyse_machine_constraints(input, view, body_index, machine, error)
     type(input_t), intent(in) :: input
     type(steady_view_t), intent(in) :: view
@@ -229,14 +232,6 @@ contains
         if (allocated(error)) return
         call build_coordinates(machine%constraints, machine%names, machine%trains, machine%groups, machine%inertia, wanted, &
                                findloc(complement_names == run%text('complement'), .true., dim=1), machine%coordinates, error)
-      end if
-      if (.not. allocated(error)) then
-        call fit_start_speeds(machine, given_speeds(input, machine%nodes), run%text('start') == 'projected', &
-                              shared_unit(input, 'body', 'speed'), offending_row, error)
-        if (allocated(error) .and. view%is_steady) then   ! the speeds fit the ratios at the start, perhaps
-          deallocate (error)
-          call fit_start_speeds(machine, given_speeds(input, machine%nodes), .true., 0, offending_row, error)
-        end if
       end if
     end associate
     if (.not. allocated(error)) return
@@ -262,21 +257,6 @@ contains
                joined(selected(machine%names, bodies), ', ', most_names) // ' can turn while every body with an inertia ' // &
                'stands still; allowed: > 0 [kg m2], or 0 where a body with an inertia is geared to it')
   end subroutine refuse_massless_motion
-
-  !> Whether the input gives the start speed of a body, [bodies].
-  function given_speeds(input, nodes) result(is_given)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: nodes   !! bodies that the input does not name
-    logical, allocatable :: is_given(:)
-    integer, allocatable :: bodies(:)
-    integer :: b
-
-    allocate (bodies, source=input%groups_named('body'))
-    allocate (is_given(size(bodies) + nodes), source=.false.)
-    do b = 1, size(bodies)
-      is_given(b) = input%groups(bodies(b))%is_given('speed')
-    end do
-  end function given_speeds
 
   !> Two speeds are the lowest and the highest one, in the same direction. The ones of a response may be one.
   subroutine check_range(input, group, key, range, diagnostics)

@@ -6,7 +6,6 @@
 !> locked joint with the inverse ratio of the angles. What is left at the last body vanishes for a natural frequency, unless a
 !> locked joint holds it: then its angle does, and the sum is the moment of the joint.
 module nocdyn_holzer
-  use nocdyn_bank, only: bank_of
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: linearisation_t
@@ -80,9 +79,7 @@ contains
         associate (body => rows%body(first:rows%first(e + 1) - 1), c => rows%coefficient(first:rows%first(e + 1) - 1))
           if (size(body) /= 2 .or. any(abs(abs(c) - 1.0_wp) > 0) .or. abs(sum(c)) > 0) then
             call raise(error, exit_input, 'there is no table of Holzer: ' // quoted(machine%element_name(e)) // &
-                       trim(merge(' is no chain of springs and masses; needed: nodes of &shaft, one less than its segments', &
-                                  ' acts by radii, not between two angles; needed: &gear and &coupling                    ', &
-                                  machine%banks(bank_of(machine%banks, e))%bank%has_parts)))
+                       ' acts by radii, not between two angles; needed: &gear and &coupling')
             return
           end if
           if (minval(body) == 0) then

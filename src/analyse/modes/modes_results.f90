@@ -1,10 +1,12 @@
 !> Natural frequencies and mode shapes, as an analysis: modes.csv, modes.json and holzer.csv.
 module nocdyn_modes_results
   use nocdyn_analyses, only: analysis_options_t, analysis_t
+  use nocdyn_assembly, only: assemble_steady_machine
   use nocdyn_errors, only: error_t, exit_failed
   use nocdyn_holzer_report, only: holzer_tables
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
+  use nocdyn_lumped_shafts, only: lump_shafts
   use nocdyn_machine, only: machine_t
   use nocdyn_modes_files, only: put_modes, write_modes
   use nocdyn_modes_report, only: modes_report_t, modes_text, new_modes_report
@@ -27,25 +29,51 @@ module nocdyn_modes_results
 
 contains
 
-  subroutine solve(self, input, machine, options, error)
+  recursive subroutine solve(self, input, machine, options, error)
     class(modes_results_t), intent(inout) :: self
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
     type(analysis_options_t), intent(in) :: options
     type(error_t), allocatable, intent(out) :: error
     type(operating_point_t) :: point
-    logical :: is_of_holzer, is_of_point
+    logical :: is_of_point
 
     if (options%at /= '') call find_operating_point(input, machine, options%at, point, error)
     if (options%at == '') call find_operating_point(input, machine, 'equilibrium', point, error)
     is_of_point = allocated(error)
     if (.not. allocated(error)) call new_modes_report(point, modes_choice_t(options%modes, options%has_range, options%range_hz), &
                                                       self%report, error)
-    is_of_holzer = .not. allocated(error) .and. options%has_holzer
-    if (is_of_holzer) call holzer_tables(self%report, self%holzer_text, self%holzer_csv, error)
+    if (.not. allocated(error) .and. options%has_holzer) call make_tables(self, input, machine, options, error)
     if (.not. allocated(error)) return
     if (.not. is_of_point .or. error%code == exit_failed) error%message = input%shown_case() // ': ' // error%message
   end subroutine solve
+
+  !> Makes the tables of Holzer, of a machine with lumped shafts.
+  recursive subroutine make_tables(self, input, machine, options, error)
+    class(modes_results_t), intent(inout) :: self
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    type(analysis_options_t), intent(in) :: options
+    type(error_t), allocatable, intent(out) :: error
+    type(input_t) :: chains
+    type(machine_t) :: lumped
+    type(modes_results_t) :: of_lumped
+    type(analysis_options_t) :: without_tables
+    type(string_t), allocatable :: names(:)
+
+    chains = input
+    call lump_shafts(machine, chains, names)
+    if (size(names) == 0) then
+      call holzer_tables(self%report, self%report%linear%natural, names, self%holzer_text, self%holzer_csv, error)
+      return
+    end if
+    without_tables = options
+    without_tables%has_holzer = .false.
+    call assemble_steady_machine(chains, self%locks_joints, lumped, error)
+    if (.not. allocated(error)) call of_lumped%solve(chains, lumped, without_tables, error)
+    if (allocated(error)) return
+    call holzer_tables(of_lumped%report, self%report%linear%natural, names, self%holzer_text, self%holzer_csv, error)
+  end subroutine make_tables
 
   subroutine list_tables(self, names)
     class(modes_results_t), intent(in) :: self

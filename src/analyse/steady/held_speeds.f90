@@ -59,16 +59,22 @@ module nocdyn_held_speeds
 
 contains
 
-  !> Prepares the search. A reference body that cannot turn steadily is refused.
-  subroutine new_held_speeds(machine, reference, self, error)
+  !> Prepares the search. A reference body that cannot turn steadily is refused. At a time a torque holds the speed, beside motors
+  !> with their governors and supplies.
+  subroutine new_held_speeds(machine, reference, self, error, t)
     type(machine_t), intent(in) :: machine   !! one lane
     integer, intent(in) :: reference         !! body
     type(held_speeds_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
+    real(wp), intent(in), optional :: t   !! the time [s]; absent: after all changes, and the drive holds the speed
     class(formulation_t), allocatable :: formulation
 
-    call mean_formulation(machine, formulation, holds_speed=.true.)
-    call set_up_balance(formulation, t_infinity, self%balance)
+    call mean_formulation(machine, formulation, holds_speed=.not. present(t))
+    if (present(t)) then
+      call set_up_balance(formulation, t, self%balance)
+    else
+      call set_up_balance(formulation, t_infinity, self%balance)
+    end if
     self%reference = reference
     allocate (self%ratio(size(self%balance%motions%free)))
     call find_ratios(self%balance, reference, self%ratio)
@@ -79,7 +85,8 @@ contains
     end if
     self%z = self%balance%start()
     allocate (self%q(self%balance%coordinates), source=0.0_wp)
-    self%sources = sources_of(self%balance)
+    allocate (self%sources(0))
+    if (.not. present(t)) self%sources = sources_of(self%balance)
     self%supply_holds = all_follow(self%balance, self%sources)
     self%last_speed = sum(self%ratio * self%z(:size(self%ratio)))
   end subroutine new_held_speeds

@@ -9,8 +9,8 @@ module nocdyn_schema
   use nocdyn_schema_response, only: response_examples, response_groups, response_keys, response_relations
   use nocdyn_schema_rules, only: a_body, a_document, a_flag, a_folder, a_name, a_number, a_selector, a_text, a_word, alias_t, &
     allowed_t, an_integer, any_number, any_times, anything, at_least_once, at_most_once, at_most_one, exactly_once, example_t, &
-    from_2, group_alias_t, group_rule_t, in_machine, in_simulation, key_rule_t, kind_rule_t, less_than, not_negative, positive, &
-    relation_rule_t, required, unset
+    from_2, group_alias_t, group_rule_t, in_machine, in_simulation, key_rule_t, kind_rule_t, less_than, not_negative, not_zero, &
+    positive, relation_rule_t, required, requires, unset
   use nocdyn_schema_sweep, only: sweep_aliases, sweep_examples, sweep_groups, sweep_keys, sweep_kinds, sweep_relations
   use nocdyn_schema_torques, only: engine_keys, engine_relations, torque_examples, torque_groups, torque_keys, torque_kinds, &
     torque_relations
@@ -57,7 +57,7 @@ module nocdyn_schema
       'dry friction of its bearings: against the motion, and up to as much at rest'), &
     key_rule_t('body', 'angle', a_number, 1, 'rad', '0', anything, 'angle at the start'), &
     key_rule_t('body', 'speed', a_number, 1, 'rad/s', '0', anything, &
-      'speed at the start; if not given it follows through the gears from others, else it is 0', follows=.true.), &
+      'speed at the start; if not given it follows through gears and couplings from others, else 0', follows=.true.), &
     key_rule_t('run', 't_start', a_number, 1, 's', '0', anything, 'time of the start'), &
     key_rule_t('run', 't_end', a_number, 1, 's', required, anything, 'time of the end, after t_start'), &
     key_rule_t('run', 'method', a_word, 1, '', default_method, methods, &
@@ -73,6 +73,11 @@ module nocdyn_schema
     key_rule_t('run', 'complement', a_word, 1, '', "'natural'", complements, 'orthogonal complement of the gear constraints'), &
     key_rule_t('run', 'start', a_word, 1, '', "'given'", starts, &
       'given speeds; projected: after an impact if they violate gears; equilibrium: steady'), &
+    key_rule_t('run', 'start_speed', a_number, 1, 'rad/s', unset, not_zero, &
+      'speed of start_body at which the start is in equilibrium, by the number that free names'), &
+    key_rule_t('run', 'start_body', a_body, 1, '', unset, anything, 'body that has start_speed'), &
+    key_rule_t('run', 'free', a_text, 1, '', unset, anything, &
+      "number that is found for it, e.g. 'load.water.quadratic'; if not given a constant torque"), &
     key_rule_t('run', 'max_steps', an_integer, 1, '', '1000000', steps, 'the run fails after this many steps'), &
     key_rule_t('run', 'load_case', a_text, 1, '', unset, anything, &
       'load case whose run it is; if not given, that of all cases without a &run of their own'), &
@@ -110,6 +115,8 @@ module nocdyn_schema
 
   type(relation_rule_t), parameter, public :: relation_rules(*) = [ &
     relation_rule_t('run', less_than, 't_start', 't_end'), &
+    relation_rule_t('run', requires, 'start_speed', 'start_body'), &
+    relation_rule_t('run', requires, 'start_body free', 'start_speed'), &
     relation_rule_t('output', at_most_one, 'interval', 'points'), &
     coupling_relations, joint_relations, torque_relations, engine_relations, response_relations, sweep_relations]
 

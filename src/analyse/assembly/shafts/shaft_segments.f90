@@ -8,7 +8,7 @@ module nocdyn_shaft_segments
   private
 
   public :: are_resolved, check_shaft, choose_elements, has_inertia, has_own_nodes, segments_of
-  public :: segment_inertia, segment_stiffness
+  public :: segment_inertia, segment_parts, segment_stiffness
 
   real(wp), parameter :: pi = acos(-1.0_wp)
   integer, parameter, public :: most_nodes = 1000   !! inside of a shaft
@@ -148,7 +148,7 @@ contains
     if (.not. has_inertia(group)) return
     segments = segments_of(group)
     if (group%has_value('nodes')) then
-      sums = given_orders(segments%length, group%whole_number('nodes') + 1)
+      sums = segment_parts(segments%length, group%whole_number('nodes') + 1)
       do i = 1, size(sums)
         parts = (sums(i) + highest_order - 1) / highest_order
         segment = [segment, spread(i, 1, parts)]
@@ -190,10 +190,10 @@ contains
     end do
   end function are_resolved
 
-  !> The orders of the segments whose sum is given, the higher the longer they are.
-  pure function given_orders(lengths, total) result(orders)
-    real(wp), intent(in) :: lengths(:)
-    integer, intent(in) :: total
+  !> The orders or parts of the segments whose sum is given, the more the longer they are.
+  pure function segment_parts(lengths, total) result(orders)
+    real(wp), intent(in) :: lengths(:)   !! of the segments [m]
+    integer, intent(in) :: total         !! at least as many as the segments
     integer :: orders(size(lengths))
     integer :: i, longest
 
@@ -202,7 +202,7 @@ contains
       longest = maxloc(lengths / orders, dim=1)
       orders(longest) = orders(longest) + 1
     end do
-  end function given_orders
+  end function segment_parts
 
   !> A whole number as the sum of some that differ by at most one.
   pure function spread_evenly(total, parts) result(list)

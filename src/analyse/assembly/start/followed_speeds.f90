@@ -12,7 +12,7 @@ module nocdyn_followed_speeds
   implicit none (type, external)
   private
 
-  public :: follow_speeds
+  public :: collect, follow_speeds, rounding_of
 
   real(wp), parameter :: rpm = acos(-1.0_wp) / 30.0_wp   ! rad/s
   real(wp), parameter :: rounding = 1.0e-9_wp            ! relative: a combination of speeds, of rows of the complement
@@ -27,11 +27,11 @@ module nocdyn_followed_speeds
     real(wp) :: unit = 1.0_wp           !! 1 rad/s or 1 rpm [rad/s]
   end type decimal_t
 
-  !> Combinations of the coordinates of a group whose values are known: orthonormal * speeds = value.
-  type :: known_t
+  !> Combinations of unknown speeds whose values are known: orthonormal * speeds = value.
+  type, public :: known_t
     integer :: count = 0
-    real(wp), allocatable :: orthonormal(:, :)   !! [coordinates, coordinates], the first `count` columns
-    real(wp), allocatable :: value(:)            !! [rad/s], [coordinates]
+    real(wp), allocatable :: orthonormal(:, :)   !! [unknowns, unknowns], the first `count` columns
+    real(wp), allocatable :: value(:)            !! [rad/s], [unknowns]
   end type known_t
 
 contains
@@ -42,7 +42,7 @@ contains
     integer, intent(in) :: group          !! of geared bodies
     logical, intent(in) :: is_given(:)    !! whether a start speed is given, [bodies]
     logical, intent(out) :: is_consistent
-    real(wp), allocatable :: complement(:, :), given(:)
+    real(wp), allocatable :: complement(:, :), given(:), slack(:)
     type(decimal_t), allocatable :: decimals(:)
     type(known_t) :: known
     integer, allocatable :: order(:)
@@ -50,14 +50,15 @@ contains
 
     associate (bodies => machine%groups(group)%bodies)
       allocate (complement, source=rows_of(machine, bodies))
-      allocate (given(size(bodies)), decimals(size(bodies)))
+      allocate (given(size(bodies)), slack(size(bodies)), decimals(size(bodies)))
       do i = 1, size(bodies)
         given(i) = machine%start_speed(1, bodies(i))
         decimals(i) = decimals_of(given(i))
+        slack(i) = rounding * abs(given(i)) + rounding_of(given(i))
       end do
       order = [(pack([(b, b=1, size(bodies))], decimals%digits == i .and. is_given(bodies)), i=0, most_digits)]
-      call collect(complement, given, decimals, order, known, is_consistent)
-      if (.not. is_consistent) call collect(complement, given, decimals, order(size(order):1:-1), known, is_consistent)
+      call collect(complement, given, slack, order, known, is_consistent)
+      if (.not. is_consistent) call collect(complement, given, slack, order(size(order):1:-1), known, is_consistent)
       if (.not. is_consistent) return
       call set_speeds(machine, bodies, complement, known, is_given(bodies), decimals)
     end associate
@@ -108,22 +109,32 @@ contains
     decimal%last = min(1.0_wp, 1.0_wp / scale) * unit
   end function decimals_in
 
-  !> Collects what given speeds say of the coordinates, in an order.
-  subroutine collect(complement, given, decimals, order, known, is_consistent)
-    real(wp), intent(in) :: complement(:, :)     !! [bodies, coordinates]
-    real(wp), intent(in) :: given(:)             !! [rad/s], [bodies]
-    type(decimal_t), intent(in) :: decimals(:)   !! [bodies]
-    integer, intent(in) :: order(:)              !! bodies
+  !> By how much a given speed may be rounded, half a unit of its last digit; 0 if it has too few digits [rad/s].
+  pure real(wp) function rounding_of(speed)
+    real(wp), intent(in) :: speed   !! [rad/s]
+    type(decimal_t) :: decimal
+
+    decimal = decimals_of(speed)
+    rounding_of = merge(0.499_wp * decimal%last, 0.0_wp, decimal%digits >= least_digits)
+  end function rounding_of
+
+  !> Collects what equations, row * unknowns = value, say of the unknowns, in an order. Those that follow from the ones before
+  !> must agree with them.
+  subroutine collect(rows, value, slack, order, known, is_consistent)
+    real(wp), intent(in) :: rows(:, :)   !! [equations, unknowns]
+    real(wp), intent(in) :: value(:)     !! [rad/s], [equations]
+    real(wp), intent(in) :: slack(:)     !! by which an equation may disagree [rad/s], [equations]
+    integer, intent(in) :: order(:)      !! equations
     type(known_t), intent(out) :: known
     logical, intent(out) :: is_consistent
-    real(wp) :: rest, row(size(complement, 2))
+    real(wp) :: rest, row(size(rows, 2))
     integer :: i, k, pass
 
     allocate (known%orthonormal(size(row), size(row)), known%value(size(row)))
     is_consistent = .true.
     do i = 1, size(order)
-      row = complement(order(i), :)
-      rest = given(order(i))
+      row = rows(order(i), :)
+      rest = value(order(i))
       do pass = 1, 2   ! the second one removes the rounding of the first
         do k = 1, known%count
           associate (part => dot_product(known%orthonormal(:, k), row))
@@ -132,15 +143,12 @@ contains
           end associate
         end do
       end do
-      if (norm2(row) > rounding * norm2(complement(order(i), :))) then
+      if (norm2(row) > rounding * norm2(rows(order(i), :))) then
         known%count = known%count + 1
         known%orthonormal(:, known%count) = row / norm2(row)
         known%value(known%count) = rest / norm2(row)
       else
-        associate (decimal => decimals(order(i)))
-          is_consistent = is_consistent .and. abs(rest) <= rounding * abs(given(order(i))) + &
-                          merge(0.499_wp * decimal%last, 0.0_wp, decimal%digits >= least_digits)
-        end associate
+        is_consistent = is_consistent .and. abs(rest) <= slack(order(i))
       end if
     end do
   end subroutine collect
