@@ -357,3 +357,72 @@ def test_a_ship_passes_the_range_that_its_limits_bar(nocdyn):
     work = sum(abs(value) for value in account["work_in_J"].values())
     assert abs(account["residual_J"]) < 1e-6 * work
     assert outcome.stdout.startswith("verdict: ")
+
+
+RAMP = "ramp_times = 1, 5, 9 ramp_speeds = 30, 70, 40"
+ON_RAMP = 2e-3  # of the mean speed: loads are straight between 100 points of a ramp [rad/s]
+CORNER = 0.98  # share of the time between two points in which the acceleration would be even, for the same speeds
+
+
+@pytest.mark.parametrize("load", ["", "&load name = 'fan' body = 'b' quadratic = 0.02 constant = 3 /\n"])
+def test_a_ramp_leads_the_mean_speed_through_its_points(nocdyn, load):
+    text = train(acceleration=0.0, more=TRANSIT.replace(" /", f" direction = 'both' {RAMP} /") + load + "&run t_end = 1 /\n")
+    report, _ = passed(nocdyn, text)
+    up, down = report["passages"]
+    slopes = 40 / (4 * CORNER), -30 / (4 * CORNER)
+    assert up["time_in_range"] == pytest.approx(10 / slopes[0], rel=1e-4)
+    assert down["time_in_range"] == pytest.approx(-10 / slopes[1], rel=1e-4)
+    # the middle between two points is reached in the middle of their times
+    table = nocdyn.values(name="transit.csv")
+    early = table["passage"] == 1
+    assert table["mean_omega_a"][early] == pytest.approx(50 + slopes[0] * (table["t"][early] - 3), abs=ON_RAMP)
+    assert table["mean_omega_a"][~early] == pytest.approx(55 + slopes[1] * (table["t"][~early] - 7), abs=ON_RAMP)
+    account = report["energy_account"]
+    work = account["work_in_J"]
+    assert abs(account["residual_J"]) < 1e-6 * sum(map(abs, work.values()))
+    # without a load the torques of the ramp give the kinetic energy of 40 rad/s instead of 30
+    if not load:
+        assert sum(work.values()) == pytest.approx(sum(INERTIAS) * (40**2 - 30**2) / 2, rel=1e-4)
+
+
+def test_a_ramp_drives_an_engine_at_its_cranks_and_the_propeller_takes_its_law(nocdyn):
+    nocdyn.write("diesel.csv", (SHIP.parent / "diesel.csv").read_text())
+    ramp = "&transit ramp_times = 0, 20 ramp_speeds_rpm = 40, 70 direction = 'up' /\n"
+    report, _ = passed(nocdyn, SHIP.read_text() + ramp)
+    work = report["energy_account"]["work_in_J"]
+    assert sum(name.startswith("excitation ramp of transit") for name in work) == 6
+    (passage,) = report["passages"]
+    # the propeller takes quadratic omega^2: 113 kN m in the middle of the ramp, which the torques of all cylinders give with the
+    # ones that accelerate, while the engine alone would give 645
+    table = nocdyn.values(name="transit.csv")
+    section = pi / 16 * 0.39**3
+    mean = np.trapezoid(table["stress_intermediate"], table["t"]) / np.ptp(table["t"]) * section
+    assert 3647 * (48 * RPM) ** 2 < abs(mean) < 1.25 * 3647 * (59 * RPM) ** 2
+    assert passage["passes"]
+
+
+GOVERNOR = " governor_speed = 60 governor_gain = 0.1 governor_time = 1 /"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (train().replace("torque = 20.0 /", "torque = 20.0" + GOVERNOR), "its governor keeps a speed of its own"),
+        (train() + "&body name = 'c' inertia = 1 /\n", "required: bodies that all turn with it"),
+        (
+            train() + "&drive name = 'd' body = 'b' table_time = 0, 4 table_speed = 30, 70 /\n",
+            "a ramp of &transit is for machines whose ratios are constant",
+        ),
+    ],
+)
+def test_a_ramp_that_the_machine_cannot_follow_is_refused(nocdyn, text, message):
+    nocdyn.write("machine.nml", text + TRANSIT.replace(" /", f" {RAMP} /") + RUN)
+    outcome = nocdyn("transit", "machine.nml")
+    assert outcome.returncode == 2 and message in outcome.stderr
+
+
+def test_a_ramp_has_times_and_speeds(nocdyn):
+    nocdyn.write("machine.nml", train(more=TRANSIT + RUN))
+    for key in ("ramp_times=0,1", "ramp_speeds=30,60"):
+        outcome = nocdyn("transit", "machine.nml", "--set", f"transit.{key}")
+        assert outcome.returncode == 2 and "is missing" in outcome.stderr

@@ -16,6 +16,7 @@ module nocdyn_transit_analysis
   use nocdyn_run_fatigue, only: run_fatigue_t
   use nocdyn_run_summary, only: column_extremes_t, run_summary_t
   use nocdyn_signals, only: find_signal, list_signals, signal_speed, signal_t
+  use nocdyn_speed_ramps, only: add_ramp
   use nocdyn_text, only: append, string_t
   use nocdyn_transit_settings, only: read_transit_settings, transit_settings_t
   implicit none (type, external)
@@ -62,7 +63,6 @@ module nocdyn_transit_analysis
     type(string_t), allocatable :: names(:)        !! of the angle and the speed of the body, then of the limited quantities
     type(passage_t), allocatable :: passages(:)
     real(wp) :: lowest = 0.0_wp, highest = 0.0_wp  !! mean speeds of the run [rad/s]
-    real(wp) :: t_end = 0.0_wp                     !! of the run [s]
     type(energy_balance_t), allocatable :: energy_balance
     type(string_t), allocatable :: notes(:)
   end type transit_analysis_t
@@ -76,6 +76,7 @@ contains
     type(transit_analysis_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
     type(run_summary_t) :: summary
+    type(input_t) :: driven   ! what is run
     real(wp) :: range(2)
     integer :: i, k
 
@@ -83,9 +84,11 @@ contains
     call read_transit_settings(input, machine, self%settings, self%notes, error)
     if (.not. allocated(error)) call find_columns(input, machine, self, error)
     if (allocated(error)) return
-    self%t_end = input%groups(input%position('run'))%number('t_end')
     if (size(self%settings%ranges) == 0) return
-    call run_whole(input, self, summary, error)
+    driven = input
+    if (input%groups(self%settings%group)%has_value('ramp_times')) call add_ramp(driven, self%body_name, error)
+    if (allocated(error)) return
+    call run_whole(driven, self, summary, error)
     if (allocated(error)) return
     do i = 1, size(summary%notes)
       call append(self%notes, summary%notes(i)%text)
@@ -100,7 +103,7 @@ contains
       call add_passages(self%windows, range, i, self%passages)
     end do
     do k = 1, size(self%passages)
-      call run_passage(input, machine, summary%extremes, self, self%passages(k), error)
+      call run_passage(driven, machine, summary%extremes, self, self%passages(k), error)
       if (allocated(error)) return
     end do
   end subroutine analyse_transit
@@ -143,13 +146,14 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(kept_rows_t) :: kept
     type(turn_window_t), allocatable :: windows(:)
-    real(wp) :: t_start
+    real(wp) :: span(2), turns
 
-    t_start = input%groups(input%position('run'))%number('t_start')
+    associate (run => input%groups(input%position('run')))
+      span = [run%number('t_start'), run%number('t_end')]
+    end associate
     kept%shows_motion = .false.
-    call run_part(input, self%names(:2), [t_start, self%t_end], &
-                  intervals_of((self%t_end - t_start) * rows_of_turn * maxval(self%settings%ranges%high) / turn), kept, summary, &
-                  error)
+    turns = (span(2) - span(1)) * maxval(self%settings%ranges%high) / turn
+    call run_part(input, self%names(:2), span, intervals_of(rows_of_turn * turns), kept, summary, error)
     if (allocated(error)) then
       error%message = input%shown_case() // ': ' // error%message
     else

@@ -134,6 +134,11 @@ module nocdyn_schema_response
       'the body whose speed counts; that of &response if not given'), &
     key_rule_t('transit', 'range', a_number, 2, 'rad/s', unset, not_zero, &
       'the range of its speed; those that &limit bars in the response if not given'), &
+    key_rule_t('transit', 'ramp_times', a_number, any_number, 's', unset, anything, &
+      'points of a run, the mean speed changes evenly between them; as &run and its drives if not given', &
+      fewest=2, ascends=.true.), &
+    key_rule_t('transit', 'ramp_speeds', a_number, any_number, 'rad/s', unset, not_zero, &
+      'mean speed of the body at these times; torques where it is driven make up for what is missing', fewest=2), &
     key_rule_t('transit', 'direction', a_word, 1, '', "'any'", directions, 'passages that the run must make'), &
     key_rule_t('transit', 'time_limit', a_number, 1, 's', unset, positive, 'longest time in the range'), &
     key_rule_t('transit', 'passages', a_number, 1, '', unset, positive, &
@@ -185,7 +190,8 @@ module nocdyn_schema_response
     relation_rule_t('fatigue', requires, 'reference_stress table_stress reference_moment table_moment', 'coupling shaft'), &
     relation_rule_t('fatigue', requires, 'reference_force table_force', 'mesh gear'), &
     relation_rule_t('fatigue', at_most_one, 'ultimate_stress', 'yield_stress'), &
-    relation_rule_t('fatigue', equal_lengths, 'profile_speeds profile_hours', '')]
+    relation_rule_t('fatigue', equal_lengths, 'profile_speeds profile_hours', ''), &
+    relation_rule_t('transit', equal_lengths, 'ramp_times ramp_speeds', '')]
 
   type(example_t), parameter, public :: response_examples(*) = [ &
     example_t('response', "body = 'motor'  speed_rpm = 50, 600  operating_rpm = 300, 400", .false.), &
