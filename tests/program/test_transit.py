@@ -197,6 +197,16 @@ def test_without_passages_damage_is_that_of_the_repeats_of_run_and_load_case(noc
     assert life["damage"] == pytest.approx(21 * report["passages"][0]["fatigue"][0]["damage"], rel=1e-12)
 
 
+def test_a_stay_shorter_than_a_turn_has_its_half_range(nocdyn):
+    # torques turn round where the mean speed has just come into the range
+    more = TRANSIT.replace(f"{RANGE[0]}, {RANGE[1]}", "49.6, 60") + BACK + "&run t_end = 4 /\n"
+    report, _ = passed(nocdyn, train(more=more.replace("time = 4", "time = 2")))
+    (passage,) = report["passages"]
+    assert passage["direction"] == "turns back" and passage["time_in_range"] < 0.1
+    peak = passage["peaks"][0]
+    assert 0.5 * peak["largest"] < peak["half_range"] < 1.01 * peak["largest"]
+
+
 def test_a_vibration_about_the_mean_speed_enters_the_range_once(nocdyn):
     text = train(40.0, acceleration=2.0, more=TRANSIT + "&run t_end = 16 /\n")
     report, _ = passed(nocdyn, text.replace("moment = 1000.0", "moment = 1e6"))
@@ -399,6 +409,13 @@ def test_a_ramp_drives_an_engine_at_its_cranks_and_the_propeller_takes_its_law(n
     mean = np.trapezoid(table["stress_intermediate"], table["t"]) / np.ptp(table["t"]) * section
     assert 3647 * (48 * RPM) ** 2 < abs(mean) < 1.25 * 3647 * (59 * RPM) ** 2
     assert passage["passes"]
+
+
+def test_a_range_that_a_rule_does_not_bar_is_none_to_pass(nocdyn):
+    # with a cylinder that misfires, the rule is broken above 0.8 of the rated speed, where it accepts no barred range
+    nocdyn.write("diesel.csv", (SHIP.parent / "diesel.csv").read_text())
+    report, _ = passed(nocdyn, SHIP.read_text(), "--set", "engine.diesel.misfire=1", "--set", "run.t_end=1")
+    assert all(high < 0.8 * 127 * RPM for _, high in (one["speeds_rad_s"] for one in report["ranges"]))
 
 
 GOVERNOR = " governor_speed = 60 governor_gain = 0.1 governor_time = 1 /"

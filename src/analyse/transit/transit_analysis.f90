@@ -226,7 +226,7 @@ contains
     type(kept_rows_t) :: kept
     type(run_summary_t) :: summary
     type(turn_window_t), allocatable :: windows(:)
-    real(wp) :: highest(machine%bodies), lowest(machine%bodies), rate, share
+    real(wp) :: highest(machine%bodies), lowest(machine%bodies), rate, share, span
     integer :: b, column
 
     do b = 1, machine%bodies
@@ -237,10 +237,9 @@ contains
     associate (high => self%settings%ranges(passage%range)%high, visit => passage%visit)
       share = min(1.0_wp, beyond * high / self%highest)
       rate = max(rows_of_period * fastest_rate(machine, share * lowest, share * highest), rows_of_turn * high)
-      kept%from = visit%begin
-      call run_part(input, self%names, [visit%begin, visit%end], &
-                    intervals_of((visit%end - input%groups(input%position('run'))%number('t_start')) * rate / turn), kept, &
-                    summary, error)
+      span = visit%end - input%groups(input%position('run'))%number('t_start')
+      kept%from = visit%begin - span / intervals_of(span * rate / turn)   ! the row before it too: whole turns begin at a row
+      call run_part(input, self%names, [visit%begin, visit%end], intervals_of(span * rate / turn), kept, summary, error)
       if (allocated(error)) then
         error%message = input%shown_case() // ': ' // error%message
         return

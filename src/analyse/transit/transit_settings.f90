@@ -160,6 +160,7 @@ contains
     settings%forwards = sign(1.0_wp, analysis%settings%speeds(1))
     allocate (settings%ranges(0))
     do i = 1, size(summary%barred)
+      if (.not. summary%barred(i)%is_allowed) cycle   ! the rule accepts no range to pass there
       associate (barred => settings%forwards * summary%barred(i)%barred)
         range = transit_range_t(minval(barred), maxval(barred))
       end associate
