@@ -42,51 +42,53 @@ contains
     type(transit_settings_t), intent(out) :: settings
     type(string_t), allocatable, intent(inout) :: notes(:)
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: of_response
+    character(len=:), allocatable :: body
+    integer, allocatable :: groups(:)
     integer :: i
-    logical :: has_range
 
-    settings%group = input%position('transit')
+    allocate (groups, source=input%groups_named('transit'))
+    if (size(groups) == 0) then
+      call raise(error, exit_input, input%shown_case() // ': there is no group &transit; required: for instance ' // &
+                 "&transit body = '" // machine%names(1)%text // "' range_rpm = 400, 500 /")
+      return
+    end if
+    settings%group = groups(1)
+    allocate (body, source=input%groups(groups(1))%text('body'))
     associate (group => input%groups(settings%group))
-      has_range = group%has_value('range')
-      call find_body_of_response(input, of_response)
-      if (.not. has_range .and. of_response == '') then
-        call raise(error, exit_input, input%shown_case() // ': there is no range of speeds to pass; required: range of ' // &
-                   '&transit, or &response with a &limit, whose barred ranges are taken')
-      else if (.not. group%has_value('body') .and. of_response == '') then
-        call raise(error, exit_input, input%location(settings%group) // ': body is required without &response')
-      else if (group%has_value('body')) then
-        if (.not. has_range .and. group%text('body') /= of_response) call raise(error, exit_input, &
-          input%location(settings%group, 'body') // ': body = ' // quoted(group%text('body')) // ' is not ' // &
-          quoted(of_response) // ' of &response, whose barred ranges are taken; allowed: that body, or a range')
-      end if
+      if (.not. group%has_value('range')) call check_response(input, settings%group, error)
       if (allocated(error)) return
-      if (group%has_value('body')) of_response = group%text('body')
-      settings%body = findloc([(machine%names(i)%text == of_response, i=1, machine%bodies)], .true., dim=1)
+      settings%body = findloc([(machine%names(i)%text == body, i=1, machine%bodies)], .true., dim=1)
+      call note_drive(input, body, notes)
       settings%needs_up = any(group%text('direction') == [character(len=4) :: 'up', 'both'])
       settings%needs_down = any(group%text('direction') == [character(len=4) :: 'down', 'both'])
       settings%time_limit = group%number('time_limit', absent=no_limit)
       settings%passages = group%number('passages', absent=0.0_wp)
       settings%turns = turns_of(input)
+      if (group%has_value('range')) then
+        call take_range(input, settings, error)
+      else
+        call find_barred_ranges(input, settings, error)
+      end if
     end associate
-    call note_drive(input, of_response, notes)
-    if (has_range) then
-      call take_range(input, settings, error)
-    else
-      call find_barred_ranges(input, settings, error)
-    end if
   end subroutine read_transit_settings
 
-  !> The body of &response, '' without that group.
-  subroutine find_body_of_response(input, name)
+  !> Refuses an input whose response has no barred ranges of the body.
+  subroutine check_response(input, index, error)
     type(input_t), intent(in) :: input
-    character(len=:), allocatable, intent(out) :: name
+    integer, intent(in) :: index   !! of &transit
+    type(error_t), allocatable, intent(out) :: error
     integer, allocatable :: groups(:)
 
-    name = ''
     allocate (groups, source=input%groups_named('response'))
-    if (size(groups) > 0) name = input%groups(groups(1))%text('body')
-  end subroutine find_body_of_response
+    if (size(groups) == 0) then
+      call raise(error, exit_input, input%location(index) // ': there is no range of speeds to pass; required: range, or ' // &
+                 '&response with a &limit, whose barred ranges are taken')
+    else if (input%groups(groups(1))%text('body') /= input%groups(index)%text('body')) then
+      call raise(error, exit_input, input%location(index, 'body') // ': body = ' // quoted(input%groups(index)%text('body')) // &
+                 ' is not ' // quoted(input%groups(groups(1))%text('body')) // ' of &response, whose barred ranges are ' // &
+                 'taken; allowed: that body, or a range')
+    end if
+  end subroutine check_response
 
   !> The turns of a window: two with half orders, such as those of engines with four strokes.
   integer function turns_of(input) result(turns)

@@ -130,8 +130,7 @@ module nocdyn_schema_response
       'speeds of the body of &response, for the damage that its oscillations do', fewest=1), &
     key_rule_t('fatigue', 'profile_hours', a_number, any_number, 'h', unset, positive, &
       'how long the machine runs at each of these speeds', fewest=1), &
-    key_rule_t('transit', 'body', a_body, 1, '', unset, anything, &
-      'the body whose speed counts; that of &response if not given'), &
+    key_rule_t('transit', 'body', a_body, 1, '', required, anything, 'the body whose speed counts'), &
     key_rule_t('transit', 'range', a_number, 2, 'rad/s', unset, not_zero, &
       'the range of its speed; those that &limit bars in the response if not given'), &
     key_rule_t('transit', 'ramp_times', a_number, any_number, 's', unset, anything, &
