@@ -129,6 +129,10 @@ ELEMENTS = {
     "lives": f"&coupling name = 'k' bodies = 'a', 'b' stiffness = 100 /\n&sweep design = 'grid' /\n{VARY} count = 3 /\n"
     "&fatigue name = 'f' coupling = 'k' reference_moment = 1e6 reference_cycles = 1e6 slope = 5 /\n"
     "&record fatigue = 'f' statistic = 'damage', 'cycles' /",
+    "any passage": "&transit body = 'a' range = 1, 2 direction = 'any' /",
+    "both passages": "&transit body = 'a' range = 1, 2 direction = 'both' ramp_times = 0, 1, 2 ramp_speeds = 0.5, 3, 0.5 /",
+    "passage up": "&transit body = 'a' range_rpm = 10, 20 direction = 'up' passages = 9 time_limit = 3 /",
+    "passage down": "&transit body = 'a' range = -1, -2 direction = 'down' order = 3 turns = 2 /",
 }
 RUN_WORDS = {
     "method": ("auto", "rk45", "rk853", "rosenbrock", "rodas4", "rodas5p", "taylor"),

@@ -9,7 +9,7 @@ module nocdyn_row_intervals
   implicit none (type, external)
   private
 
-  public :: choose_row_count, note_sparse_rows
+  public :: choose_row_count, fastest_rate, note_sparse_rows
 
   real(wp), parameter :: sparse = 0.25_wp        ! of an oscillation between two rows: what they show is not its size
   real(wp), parameter :: dense = 0.1_wp          ! what is recommended
@@ -70,6 +70,16 @@ contains
                   ' Hz, as &output gives no interval')
     end associate
   end subroutine choose_row_count
+
+  !> The fastest oscillation that counts at any of the speeds [rad/s].
+  real(wp) function fastest_rate(machine, lowest, highest) result(rate)
+    type(machine_t), intent(in) :: machine
+    real(wp), intent(in) :: lowest(:), highest(:)   !! of the bodies [rad/s], [bodies]
+    type(oscillation_t) :: fastest
+
+    fastest = fastest_oscillation(machine, lowest, highest)
+    rate = fastest%rate
+  end function fastest_rate
 
   !> The fastest oscillation of an excitation at any of the speeds, with an amplitude that counts among the ones of its element,
   !> or of the transients of a motor.

@@ -12,7 +12,7 @@ module nocdyn_run_verdict
   implicit none (type, external)
   private
 
-  public :: add_damage, add_end, add_run_limits
+  public :: add_damage, add_end, add_peaks, add_run_limits
 
   character(len=*), parameter :: peak_keys(*) = [character(len=7) :: 'moment', 'force', 'largest']   ! of the largest magnitude
   character(len=*), parameter :: steady_keys(*) = [character(len=19) :: 'vibratory_moment', 'vibratory_frequency', &
@@ -37,16 +37,13 @@ contains
     integer :: i, k
     logical :: is_steady   ! whether the machine oscillates steadily too: not a load case that only runs
 
+    call add_peaks(input, 'run', signals, extremes, verdict)
     is_steady = .true.
     if (allocated(input%load_case)) is_steady = input%load_case%is_for('response')
+    if (.not. is_steady) return
     allocate (groups, source=input%groups_named('limit'))
     do i = 1, size(groups)
       associate (group => input%groups(groups(i)))
-        do k = 1, size(peak_keys)
-          if (.not. group%has_value(trim(peak_keys(k)))) cycle
-          call add_peak(input, groups(i), trim(peak_keys(k)), signals, extremes, verdict)
-        end do
-        if (.not. is_steady) cycle
         do k = 1, size(steady_keys)
           if (group%has_value(trim(steady_keys(k)))) call add_steady(input, groups(i), trim(steady_keys(k)), verdict)
         end do
@@ -54,8 +51,28 @@ contains
     end do
   end subroutine add_run_limits
 
-  subroutine add_peak(input, index, key, signals, extremes, verdict)
+  !> Compares the extremes of columns with the limits of largest magnitudes.
+  subroutine add_peaks(input, analysis, signals, extremes, verdict)
     type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: analysis              !! of the lines
+    type(signal_t), intent(in) :: signals(:)              !! of the columns
+    type(column_extreme_t), intent(in) :: extremes(:)     !! theirs of largest magnitude
+    type(verdict_t), intent(inout) :: verdict
+    integer, allocatable :: groups(:)
+    integer :: i, k
+
+    allocate (groups, source=input%groups_named('limit'))
+    do i = 1, size(groups)
+      do k = 1, size(peak_keys)
+        if (.not. input%groups(groups(i))%has_value(trim(peak_keys(k)))) cycle
+        call add_peak(input, analysis, groups(i), trim(peak_keys(k)), signals, extremes, verdict)
+      end do
+    end do
+  end subroutine add_peaks
+
+  subroutine add_peak(input, analysis, index, key, signals, extremes, verdict)
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: analysis
     integer, intent(in) :: index           !! of the group
     character(len=*), intent(in) :: key    !! of the limit
     type(signal_t), intent(in) :: signals(:)
@@ -64,7 +81,7 @@ contains
     type(verdict_line_t) :: line
     integer :: column
 
-    call start_line(input, index, key, line)
+    call start_line(input, analysis, index, key, line)
     column = limited_signal(input%groups(index), signals)
     if (column == 0) then
       line%finding = is_not_assessed
@@ -88,15 +105,16 @@ contains
     type(verdict_t), intent(inout) :: verdict
     type(verdict_line_t) :: line
 
-    call start_line(input, index, key, line)
+    call start_line(input, 'run', index, key, line)
     if (key == 'rule') line%rule = input%groups(index)%text('rule')
     line%finding = is_not_assessed
     line%reason = 'for steady oscillations: nocdyn response compares with it'
     call verdict%add(line)
   end subroutine add_steady
 
-  subroutine start_line(input, index, key, line)
+  subroutine start_line(input, analysis, index, key, line)
     type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: analysis
     integer, intent(in) :: index           !! of the group
     character(len=*), intent(in) :: key    !! of the limit
     type(verdict_line_t), intent(out) :: line
@@ -107,7 +125,7 @@ contains
       criterion = in_words(key)
       if (any(key == ['largest  ', 'vibratory'])) criterion = in_words(group%text('quantity'))
       if (any(key == ['rule     ', 'rule_file'])) criterion = 'stress'
-      line = new_verdict_line('run', kind // ' ' // quoted(group%text(kind)), '', &
+      line = new_verdict_line(analysis, kind // ' ' // quoted(group%text(kind)), '', &
                               criterion // trim(merge(', steady ', ', largest', any(key == steady_keys))), input%place(index, ''))
     end associate
   end subroutine start_line

@@ -42,6 +42,7 @@ module nocdyn_transient
 
   !> What a run needs of its caller while it is integrated: somewhere to write the rows, and whether to stop.
   type, abstract, public :: run_output_t
+    logical :: shows_motion = .true.   !! whether the rows are to show the vibration
   contains
     procedure(start_interface), deferred :: start
     procedure(write_row_interface), deferred :: write_row
@@ -140,7 +141,7 @@ contains
     summary%t_start = times(1)
     call solve(formulation, settings, times, observer, summary, error)
     if (summary%has_run) call complete_summary(input, observer, error, summary)
-    if (summary%has_run .and. .not. allocated(error)) then
+    if (summary%has_run .and. .not. allocated(error) .and. output%shows_motion) then
       call note_sparse_rows(formulation%machine, observer%lowest, observer%highest, times(2) - times(1), summary%notes)
     end if
     if (.not. summary%has_run .or. allocated(error) .or. allocated(formulation%machine%steady_internal)) return

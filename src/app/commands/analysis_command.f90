@@ -66,7 +66,7 @@ contains
 
     select case (arguments%command)
     case ('check')
-      call analyse_files(arguments, check_results_t(is_steady=.false., locks_joints=.false.), code)
+      call analyse_files(arguments, check_results_t(is_steady=.false., locks_joints=.false., takes_joints=.true.), code)
     case ('matrices')
       call analyse_files(arguments, matrices_results_t(is_steady=.false., locks_joints=.false., has_report=.false.), code)
     case default

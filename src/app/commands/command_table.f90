@@ -112,6 +112,17 @@ contains
       '                     machine with more than 600 degrees of freedom 100' // nl // &
       '  --range_hz LOW,HIGH  only the modes in this range of frequencies at the first speed [Hz]' // nl // &
       '  --quiet            print nothing but errors', analysis_command)
+    call add_command(commands, 'transit', 'FILE...', '--out --set --case --strict --quiet', &
+      'run through barred ranges of speed: time, peaks, damage of a passage', &
+      'Runs the machine as nocdyn run does, and finds the passages of the range of speeds of &transit, or of the' // nl // &
+      'ranges that &limit bars: the time in the range, the largest moments and stresses in it against the limits' // nl // &
+      'for passing, the cycles and the damage by &fatigue. Writes transit.csv and transit.json.' // nl // nl // &
+      '  --out DIR          write to DIR, with several files to DIR/<name of the file>;' // nl // &
+      '                     default: &output directory, else results/<name of the file>' // nl // &
+      '  --set PATH=VALUE   override a key: transit.passages=20000' // nl // &
+      case_help // nl // &
+      '  --strict           exit code 1 if a limit is exceeded' // nl // &
+      '  --quiet            print nothing but errors', analysis_command)
   end subroutine list_torsional_analyses
 
   subroutine list_sweeps(commands)

@@ -1,4 +1,4 @@
-!> Rows of the schema: the forced response and what is judged by it, &response, &limit and &fatigue.
+!> Rows of the schema: the forced response and what is judged by it, &response, &limit, &fatigue and &transit.
 module nocdyn_schema_response
   use nocdyn_kinds, only: wp
   use nocdyn_schema_rules, only: a_body, a_file, a_line_file, a_name, a_number, a_text, a_word, allowed_t, an_integer, &
@@ -13,6 +13,7 @@ module nocdyn_schema_response
   type(allowed_t), parameter :: formats = allowed_t(words='csv netcdf')
   type(allowed_t), parameter :: factors = allowed_t(low=0.1_wp, high=1.5_wp)
   type(allowed_t), parameter :: margins = allowed_t(low=0.0_wp, high=0.9_wp)
+  type(allowed_t), parameter :: directions = allowed_t(words='any up down both')
   type(allowed_t), parameter :: mean_stresses = allowed_t(words='none goodman gerber soderberg')
 
   type(group_rule_t), parameter, public :: response_groups(*) = [ &
@@ -20,7 +21,9 @@ module nocdyn_schema_response
     group_rule_t('limit', in_torsional, any_times, '', &
                  'Limits of moments, stresses and forces of a coupling, a shaft or a mesh.'), &
     group_rule_t('fatigue', in_torsional, any_times, 'fatigue', &
-                 'Cycles and damage of a coupling, shaft, mesh or gear, in runs and responses.')]
+                 'Cycles and damage of a coupling, shaft, mesh or gear, in runs and responses.'), &
+    group_rule_t('transit', in_torsional, at_most_once, '', &
+                 "A range of speeds that the run passes, for 'nocdyn transit'; &run says how.")]
 
   type(key_rule_t), parameter, public :: response_keys(*) = [ &
     key_rule_t('response', 'body', a_body, 1, '', required, anything, &
@@ -132,7 +135,23 @@ module nocdyn_schema_response
     key_rule_t('fatigue', 'profile_speeds', a_number, any_number, 'rad/s', unset, not_zero, &
       'speeds of the body of &response, for the damage that its oscillations do', fewest=1), &
     key_rule_t('fatigue', 'profile_hours', a_number, any_number, 'h', unset, positive, &
-      'how long the machine runs at each of these speeds', fewest=1)]
+      'how long the machine runs at each of these speeds', fewest=1), &
+    key_rule_t('transit', 'body', a_body, 1, '', required, anything, 'the body whose speed counts'), &
+    key_rule_t('transit', 'range', a_number, 2, 'rad/s', unset, not_zero, &
+      'the range of its speed; those that &limit bars in the response if not given'), &
+    key_rule_t('transit', 'ramp_times', a_number, any_number, 's', unset, anything, &
+      'points of a run, the mean speed changes evenly between them; as &run and its drives if not given', &
+      fewest=2, ascends=.true.), &
+    key_rule_t('transit', 'ramp_speeds', a_number, any_number, 'rad/s', unset, not_zero, &
+      'mean speed of the body at these times; torques where it is driven make up for what is missing', fewest=2), &
+    key_rule_t('transit', 'direction', a_word, 1, '', "'any'", directions, 'passages that the run must make'), &
+    key_rule_t('transit', 'time_limit', a_number, 1, 's', unset, positive, 'longest time in the range'), &
+    key_rule_t('transit', 'passages', a_number, 1, '', unset, positive, &
+      'how often each passage occurs in the life of the machine; as the run if not given'), &
+    key_rule_t('transit', 'order', a_number, 1, '', unset, positive, &
+      'oscillations per turn that are counted; of barred ranges the largest one if not given'), &
+    key_rule_t('transit', 'turns', an_integer, 1, '', unset, from_1, &
+      'whole turns of the mean speed; 2 with an engine of four strokes, else 1, if not given')]
 
   type(relation_rule_t), parameter, public :: response_relations(*) = [ &
     relation_rule_t('response', requires, 'margin margin_rule margin_rule_file', 'operating'), &
@@ -185,12 +204,14 @@ module nocdyn_schema_response
                                          'moment_file', 'coupling shaft'), &
     relation_rule_t('fatigue', requires, 'reference_force table_force force_file', 'mesh gear'), &
     relation_rule_t('fatigue', at_most_one, 'ultimate_stress', 'yield_stress'), &
-    relation_rule_t('fatigue', equal_lengths, 'profile_speeds profile_hours', '')]
+    relation_rule_t('fatigue', equal_lengths, 'profile_speeds profile_hours', ''), &
+    relation_rule_t('transit', equal_lengths, 'ramp_times ramp_speeds', '')]
 
   type(example_t), parameter, public :: response_examples(*) = [ &
     example_t('response', "body = 'motor'  speed_rpm = 50, 600  operating_rpm = 300, 400", .false.), &
     example_t('limit', "coupling = 'coupling'  vibratory_moment = 40.0  moment = 200.0", .false.), &
     example_t('fatigue', "name = 'life'  coupling = 'coupling'|" // &
-                         'reference_moment = 150.0  reference_cycles = 2.0e6  slope = 5.0', .false.)]
+                         'reference_moment = 150.0  reference_cycles = 2.0e6  slope = 5.0', .false.), &
+    example_t('transit', "body = 'motor'  range_rpm = 350, 450  time_limit = 5.0  passages = 20000", .false.)]
 
 end module nocdyn_schema_response
