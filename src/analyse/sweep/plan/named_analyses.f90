@@ -10,7 +10,6 @@ module nocdyn_named_analyses
   use nocdyn_machine, only: machine_t
   use nocdyn_modes_results, only: modes_results_t
   use nocdyn_response_results, only: response_results_t
-  use nocdyn_transit_results, only: transit_results_t
   implicit none (type, external)
   private
 
@@ -22,7 +21,7 @@ contains
 
   !> An analysis before its solution.
   subroutine new_analysis(word, analysis)
-    character(len=*), intent(in) :: word   !! of `analysis_words`, or 'transit'
+    character(len=*), intent(in) :: word   !! of `analysis_words`
     class(analysis_t), allocatable, intent(out) :: analysis
 
     select case (word)
@@ -34,9 +33,6 @@ contains
       allocate (analysis, source=campbell_results_t(always_writes=.true., is_for_threads=.true.))
     case ('response')
       allocate (analysis, source=response_results_t(always_writes=.true., is_for_threads=.true.))
-    case ('transit')
-      allocate (analysis, source=transit_results_t(is_steady=.false., locks_joints=.false., takes_joints=.true., &
-                                                  always_writes=.true.))
     case default
       error stop 'nocdyn_named_analyses: there is no analysis of this name'
     end select
