@@ -280,14 +280,9 @@ contains
     call sum_life(input, analysis, lives)
     do i = 1, size(lives)
       associate (item => lives(i)%item)
-        line = new_verdict_line('transit', item%kind // ' ' // quoted(item%element), '', 'damage ' // quoted(item%name), '')
+        line = new_damage_line('transit', item%kind, item%element, item%name, lives(i)%exceeds_strength, lives(i)%damage)
       end associate
-      call line%compare(lives(i)%damage, 1.0_wp, '1')
       line%detail = rounded_text(lives(i)%repeats, 6) // ' times ' // to_text(size(analysis%passages)) // ' in the range'
-      if (lives(i)%exceeds_strength) then
-        line%finding = is_exceeded
-        line%reason = 'the mean of a cycle exceeds the strength'
-      end if
       call verdict%add(line)
     end do
   end subroutine add_damage
