@@ -5,13 +5,18 @@
 !> load asks for by the frequency of their supply instead: a factor would leave them at the slip of that speed on the mains, where
 !> their torque falls with the slip and their field is no spring. If there are no such motors, a torque on the reference body
 !> holds the speed. Governors leave their throttles open while the speed is found; then they hold it.
+!>
+!> A drive that turns the reference body holds its speed, whatever the torques are; drives that turn with it keep their ratios.
+!> What is free has the speeds at which its torques balance.
 module nocdyn_held_speeds
-  use nocdyn_bank, only: role_bearing, role_excitation, role_motor
+  use nocdyn_bank, only: role_bearing
+  use nocdyn_driven_speeds, only: moves_with
   use nocdyn_equilibrium, only: mean_formulation, t_infinity
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_finite, only: is_finite
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_held_drives, only: all_follow, close_speed_loops, idle_share, set_supplies
+  use nocdyn_held_drives, only: all_follow, close_speed_loops, find_free_speeds, follow_free_speeds, idle_share, set_supplies, &
+    sources_of
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_machine, only: machine_t
@@ -50,6 +55,9 @@ module nocdyn_held_speeds
     real(wp), allocatable, private :: q(:)           !! last angles of the coordinates [rad]
     type(twist_problem_t), private :: twists
     real(wp), private :: last_speed = 0.0_wp         !! of these
+    real(wp), allocatable, private :: carried(:)     !! speeds of the bodies that a drive turns with the reference body, per speed
+                                                     !! of that; not allocated: no drive turns it, [bodies]
+    real(wp), allocatable, private :: beside(:)      !! speeds that other drives give the bodies [rad/s], [bodies]
     logical, private :: motors_hold = .false.        !! whether the motors hold the speed, else a torque
     logical :: supply_holds = .false.                !! whether they do so by the frequency of their supply
     real(wp), private :: slip = 0.0_wp               !! last share of the frequency beyond that without slip of the first motor
@@ -65,24 +73,68 @@ contains
     integer, intent(in) :: reference         !! body
     type(held_speeds_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
-    class(formulation_t), allocatable :: formulation
 
-    call mean_formulation(machine, formulation, holds_speed=.true.)
-    call set_up_balance(formulation, t_infinity, self%balance)
     self%reference = reference
-    allocate (self%ratio(size(self%balance%motions%free)))
-    call find_ratios(self%balance, reference, self%ratio)
+    call set_up(machine, .true., self)
+    if (.not. any(abs(self%ratio) > 0) .and. allocated(machine%driven_speed)) then
+      if (abs(machine%driven_speed(reference)) > 0) call let_drive_hold(machine, self)
+      if (allocated(self%carried)) return
+    end if
     if (.not. any(abs(self%ratio) > 0)) then
       call raise(error, exit_input, quoted(machine%names(reference)%text) // ' is held by couplings or joints: it has no ' // &
                  'steady speed but 0; allowed: a body that can turn on')
       return
     end if
-    self%z = self%balance%start()
-    allocate (self%q(self%balance%coordinates), source=0.0_wp)
     self%sources = sources_of(self%balance)
     self%supply_holds = all_follow(self%balance, self%sources)
     self%last_speed = sum(self%ratio * self%z(:size(self%ratio)))
   end subroutine new_held_speeds
+
+  !> Sets up the balance at the start.
+  subroutine set_up(machine, holds_speed, self)
+    type(machine_t), intent(in) :: machine
+    logical, intent(in) :: holds_speed   !! as in `mean_formulation`
+    type(held_speeds_t), intent(inout) :: self
+    class(formulation_t), allocatable :: formulation
+
+    call mean_formulation(machine, formulation, holds_speed)
+    call set_up_balance(formulation, t_infinity, self%balance)
+    self%ratio = spread(0.0_wp, 1, size(self%balance%motions%free))
+    call find_ratios(self%balance, self%reference, self%ratio)
+    self%z = self%balance%start()
+    self%q = spread(0.0_wp, 1, self%balance%coordinates)
+  end subroutine set_up
+
+  !> Lets the drive that turns the reference body hold its speed.
+  subroutine let_drive_hold(machine, self)
+    type(machine_t), intent(in) :: machine
+    type(held_speeds_t), intent(inout) :: self
+    logical, allocatable :: is_carried(:)
+
+    allocate (is_carried, source=moves_with(machine, self%reference))
+    self%carried = merge(machine%driven_speed, 0.0_wp, is_carried) / machine%driven_speed(self%reference)
+    self%beside = merge(0.0_wp, machine%driven_speed, is_carried)
+    self%sources = [integer ::]
+    call set_up(machine, .false., self)
+  end subroutine let_drive_hold
+
+  !> Finds the speeds of what is free where a drive holds the speed.
+  subroutine follow_drive(self, speed, z, error)
+    type(held_speeds_t), intent(inout) :: self
+    real(wp), intent(in) :: speed   !! of the reference body [rad/s]
+    real(wp), intent(out) :: z(:)   !! rigid motions and internal states
+    type(error_t), allocatable, intent(out) :: error
+
+    z = self%z
+    call self%balance%turn_drives(speed * self%carried + self%beside)
+    if (abs(self%last_speed) > 0) then
+      z(:size(self%ratio)) = z(:size(self%ratio)) * (speed / self%last_speed)
+      call self%balance%settle(z)
+      call follow_free_speeds(self%balance, z, error)
+    else
+      call find_free_speeds(self%balance, z, error)
+    end if
+  end subroutine follow_drive
 
   !> The speed of a body in each rigid motion.
   subroutine find_ratios(balance, body, ratio)
@@ -99,26 +151,6 @@ contains
       ratio(i) = omega(body)
     end do
   end subroutine find_ratios
-
-  !> The elements that drive: motors; if there are none, the cylinders of engines.
-  function sources_of(balance) result(sources)
-    type(torque_balance_t), intent(in) :: balance
-    integer, allocatable :: sources(:)
-    integer :: b, i, role
-    logical :: is_source(size(balance%inelastic))
-
-    do role = role_motor, role_excitation
-      is_source = .false.
-      do b = 1, size(balance%formulation%machine%banks)
-        associate (bank => balance%formulation%machine%banks(b)%bank)
-          if (bank%role /= role .or. (role == role_excitation .and. .not. bank%is_engine)) cycle
-          is_source = is_source .or. (balance%inelastic >= bank%first .and. balance%inelastic <= bank%last())
-        end associate
-      end do
-      sources = pack([(i, i=1, size(is_source))], is_source)
-      if (size(sources) > 0) return
-    end do
-  end function sources_of
 
   subroutine iterate_supplies(self, speed, z, share, is_found)
     type(held_speeds_t), intent(inout) :: self
@@ -185,7 +217,12 @@ contains
 
     self%motors_hold = size(self%sources) > 0
     is_found = .false.
-    if (self%supply_holds) then
+    held = 0.0_wp
+    if (allocated(self%carried)) then
+      call follow_drive(self, speed, z, error)
+      if (allocated(error)) return
+      is_found = .true.
+    else if (self%supply_holds) then
       ! Solves for the frequency of the supplies, by Newton's method from the last slip, and from no slip if that fails: the
       ! torque over the slip is concave up to the largest one.
       do attempt = 1, 2
@@ -213,7 +250,7 @@ contains
       call balance_speeds(self, speed, z, held, is_found)
       self%motors_hold = is_found .and. held >= 0 .and. source_power(self) > 0
     end if
-    if (.not. self%motors_hold) call balance_speeds(self, speed, z, held, is_found)
+    if (.not. (self%motors_hold .or. allocated(self%carried))) call balance_speeds(self, speed, z, held, is_found)
     if (.not. is_found) then
       call raise(error, exit_failed, 'the speeds of the machine were not found: no torques of the drive balance the others')
       return
@@ -296,9 +333,14 @@ contains
     integer, intent(in) :: pivot       !! the rigid motion
     real(wp), intent(in) :: speed      !! [rad/s]
     real(wp), intent(inout) :: z(:)
+    real(wp) :: driven   ! by drives
 
+    driven = 0.0_wp
+    associate (machine => self%balance%formulation%machine)
+      if (allocated(machine%driven_speed)) driven = machine%driven_speed(self%reference)
+    end associate
     associate (r => size(self%ratio))
-      z(pivot) = z(pivot) + (speed - sum(self%ratio * z(:r))) / self%ratio(pivot)
+      z(pivot) = z(pivot) + (speed - driven - sum(self%ratio * z(:r))) / self%ratio(pivot)
     end associate
   end subroutine impose
 

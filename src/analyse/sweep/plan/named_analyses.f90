@@ -30,9 +30,9 @@ contains
     case ('modes')
       allocate (analysis, source=modes_results_t(locks_joints=.false.))
     case ('campbell')
-      allocate (analysis, source=campbell_results_t(always_writes=.true., is_for_threads=.true.))
+      allocate (analysis, source=campbell_results_t(sets_speed=.true., always_writes=.true., is_for_threads=.true.))
     case ('response')
-      allocate (analysis, source=response_results_t(always_writes=.true., is_for_threads=.true.))
+      allocate (analysis, source=response_results_t(sets_speed=.true., always_writes=.true., is_for_threads=.true.))
     case default
       error stop 'nocdyn_named_analyses: there is no analysis of this name'
     end select
@@ -46,10 +46,12 @@ contains
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
 
-    if (word /= 'check') call refuse_joints(input, analysis%is_steady, 'nocdyn ' // word, error)
+    if (word /= 'check') then
+      call refuse_joints(input, analysis%is_steady, 'nocdyn ' // word, error, sets_speed=analysis%sets_speed)
+    end if
     if (allocated(error)) return
     if (analysis%is_steady) then
-      call assemble_steady_machine(input, analysis%locks_joints, machine, error)
+      call assemble_steady_machine(input, analysis%locks_joints, machine, error, sets_speed=analysis%sets_speed)
     else
       call assemble_machine(input, machine, error)
     end if
