@@ -149,6 +149,7 @@ contains
       ! refuses ranges that begin with the faster speed, or whose ends differ in direction
       associate (group => input%groups(g))
         call check_range(input, g, 'speed', group%numbers('speed'), diagnostics)
+        call check_range(input, g, 'frequency', group%numbers('frequency'), diagnostics)
         call check_range(input, g, 'operating', group%numbers('operating'), diagnostics)
       end associate
     case ('fatigue')
@@ -329,17 +330,22 @@ contains
     character(len=:), allocatable :: text
 
     if (size(range) == 0) return
-    if (size(range) == 1 .and. key == 'speed') return
+    if (size(range) == 1 .and. key /= 'operating') return
     if (size(range) > 2) then
-      call input%report(group, key, to_text(size(range)) // ' speeds; allowed: one, or the slowest and the fastest one', &
-                 diagnostics)
+      text = ' speeds; allowed: one, or the slowest and the fastest one'
+      if (key == 'frequency') text = ' frequencies; allowed: one, or the lowest and the highest one'
+      call input%report(group, key, to_text(size(range)) // text, diagnostics)
       return
     end if
     if (range(1) * range(2) > 0 .and. abs(range(1)) < abs(range(2))) return
-    if (key == 'speed' .and. .not. abs(range(1) - range(2)) > 0) return
+    if (key /= 'operating' .and. .not. abs(range(1) - range(2)) > 0) return
     associate (written => input%groups(group))
       text = written_key(written, key) // ' = ' // written_number(written, key, range(1)) // ', ' // &
              written_number(written, key, range(2))
+      if (key == 'frequency') then
+        call input%report(group, key, text // '; allowed: first the lower frequency, then the higher one', diagnostics)
+        return
+      end if
       if (unit_of(written, key) == 0) text = text // ' rad/s, which is ' // rounded_text(from_si(range(1), unit_rpm), 6) // &
                                              ', ' // rounded_text(from_si(range(2), unit_rpm), 6) // ' rpm'
     end associate

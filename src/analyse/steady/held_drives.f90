@@ -3,19 +3,20 @@
 !> holds the speed, the speeds of what it leaves free.
 module nocdyn_held_drives
   use nocdyn_balance_starts, only: solve_by_newton
-  use nocdyn_bank, only: bank_of, role_excitation, role_motor
+  use nocdyn_bank, only: bank_of, role_bearing, role_excitation, role_motor
   use nocdyn_block_solutions, only: block_solutions_t
   use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability, nearest_equilibrium, t_infinity
-  use nocdyn_errors, only: error_t
+  use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_governed_banks, only: governed_bank_t
   use nocdyn_kinds, only: wp
-  use nocdyn_text, only: string_t
+  use nocdyn_text, only: quoted, string_t
   use nocdyn_torque_balance, only: torque_balance_t
   implicit none (type, external)
   private
 
-  public :: all_follow, close_speed_loops, find_free_speeds, follow_free_speeds, idle_share, set_supplies, sources_of
+  public :: all_follow, close_speed_loops, find_free_speeds, follow_free_speeds, idle_share, refuse_standing_friction, &
+    set_supplies, sources_of
 
 contains
 
@@ -172,5 +173,24 @@ contains
       call find_free_speeds(balance, z, error)
     end if
   end subroutine follow_free_speeds
+
+  !> Refuses bearings with friction that stand still: whether they hold in vibrations is not known.
+  subroutine refuse_standing_friction(balance, error)
+    type(torque_balance_t), intent(in) :: balance   !! evaluated
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: none = 1.0e-10_wp        ! relative to the largest speed
+    integer :: j
+
+    associate (joints => balance%joints, machine => balance%formulation%machine, &
+               speed => balance%formulation%state%elements%speed)
+      do j = 1, joints%count
+        if (machine%banks(joints%bank(j))%bank%role /= role_bearing) cycle
+        if (abs(speed(1, joints%element(j))) > none * maxval(abs(speed(1, :)))) cycle
+        call raise(error, exit_failed, quoted(machine%element_name(joints%element(j))) // ' stands still: whether the ' // &
+                   'friction of its bearing holds in vibrations is not known; allowed: bearing_friction = 0 there')
+        return
+      end do
+    end associate
+  end subroutine refuse_standing_friction
 
 end module nocdyn_held_drives

@@ -9,14 +9,13 @@
 !> A drive that turns the reference body holds its speed, whatever the torques are; drives that turn with it keep their ratios.
 !> What is free has the speeds at which its torques balance.
 module nocdyn_held_speeds
-  use nocdyn_bank, only: role_bearing
   use nocdyn_driven_speeds, only: moves_with
   use nocdyn_equilibrium, only: mean_formulation, t_infinity
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_finite, only: is_finite
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_held_drives, only: all_follow, close_speed_loops, find_free_speeds, follow_free_speeds, idle_share, set_supplies, &
-    sources_of
+  use nocdyn_held_drives, only: all_follow, close_speed_loops, find_free_speeds, follow_free_speeds, idle_share, &
+    refuse_standing_friction, set_supplies, sources_of
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_machine, only: machine_t
@@ -31,7 +30,7 @@ module nocdyn_held_speeds
 
   !> The machine linearised about a steady state. Moments act on `to` and, with the other sign, on `from`.
   type, public :: held_state_t
-    real(wp) :: speed = 0.0_wp    !! of the reference body [rad/s]
+    real(wp) :: speed = 0.0_wp    !! of the reference body, or the frequency of a shaker in a steady state [rad/s]
     real(wp) :: factor = 0.0_wp   !! on the torques of the motors that holds the speed; 0 if a torque does
     real(wp) :: supply = 0.0_wp   !! share of the frequency of the supplies that holds it; 0 if they do not follow
     real(wp) :: torque = 0.0_wp   !! on the reference body that holds the speed [N m]; 0 if the motors do
@@ -57,6 +56,8 @@ module nocdyn_held_speeds
     real(wp), private :: last_speed = 0.0_wp         !! of these
     real(wp), allocatable, private :: carried(:)     !! speeds of the bodies that a drive turns with the reference body, per speed
                                                      !! of that; not allocated: no drive turns it, [bodies]
+    logical, private :: is_free = .false.            !! whether nothing holds the speed: there is one steady state
+    type(held_state_t), allocatable, private :: steady   !! this one, once it is found
     real(wp), allocatable, private :: beside(:)      !! speeds that other drives give the bodies [rad/s], [bodies]
     logical, private :: motors_hold = .false.        !! whether the motors hold the speed, else a torque
     logical :: supply_holds = .false.                !! whether they do so by the frequency of their supply
@@ -68,21 +69,25 @@ module nocdyn_held_speeds
 contains
 
   !> Prepares the search. A reference body that cannot turn steadily is refused.
-  subroutine new_held_speeds(machine, reference, self, error)
+  subroutine new_held_speeds(machine, reference, self, error, is_free)
     type(machine_t), intent(in) :: machine   !! one lane
     integer, intent(in) :: reference         !! body
     type(held_speeds_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: is_free   !! whether it is the steady state nearest to the start; absent: no
 
     self%reference = reference
-    call set_up(machine, .true., self)
+    if (present(is_free)) self%is_free = is_free
+    self%sources = [integer ::]
+    call set_up(machine, .not. self%is_free, self)
+    if (self%is_free) return
     if (.not. any(abs(self%ratio) > 0) .and. allocated(machine%driven_speed)) then
       if (abs(machine%driven_speed(reference)) > 0) call let_drive_hold(machine, self)
       if (allocated(self%carried)) return
     end if
     if (.not. any(abs(self%ratio) > 0)) then
       call raise(error, exit_input, quoted(machine%names(reference)%text) // ' is held by couplings or joints: it has no ' // &
-                 'steady speed but 0; allowed: a body that can turn on')
+                 'steady speed but 0; allowed: a body that can turn on, or frequency in place of speed')
       return
     end if
     self%sources = sources_of(self%balance)
@@ -114,7 +119,6 @@ contains
     allocate (is_carried, source=moves_with(machine, self%reference))
     self%carried = merge(machine%driven_speed, 0.0_wp, is_carried) / machine%driven_speed(self%reference)
     self%beside = merge(0.0_wp, machine%driven_speed, is_carried)
-    self%sources = [integer ::]
     call set_up(machine, .false., self)
   end subroutine let_drive_hold
 
@@ -215,10 +219,19 @@ contains
     logical :: is_found
     integer :: attempt
 
+    if (allocated(self%steady)) then
+      state = self%steady
+      state%speed = speed
+      return
+    end if
     self%motors_hold = size(self%sources) > 0
-    is_found = .false.
+    is_found = self%is_free
     held = 0.0_wp
-    if (allocated(self%carried)) then
+    z = self%z
+    if (self%is_free) then
+      call find_free_speeds(self%balance, z, error)
+      if (allocated(error)) return
+    else if (allocated(self%carried)) then
       call follow_drive(self, speed, z, error)
       if (allocated(error)) return
       is_found = .true.
@@ -250,7 +263,9 @@ contains
       call balance_speeds(self, speed, z, held, is_found)
       self%motors_hold = is_found .and. held >= 0 .and. source_power(self) > 0
     end if
-    if (.not. (self%motors_hold .or. allocated(self%carried))) call balance_speeds(self, speed, z, held, is_found)
+    if (.not. (self%motors_hold .or. self%is_free .or. allocated(self%carried))) then
+      call balance_speeds(self, speed, z, held, is_found)
+    end if
     if (.not. is_found) then
       call raise(error, exit_failed, 'the speeds of the machine were not found: no torques of the drive balance the others')
       return
@@ -262,6 +277,7 @@ contains
     if (allocated(error)) return
     self%z = z
     self%last_speed = speed
+    if (self%is_free) self%steady = state
   end subroutine hold
 
   !> Whether motors or engines can hold the speed.
@@ -437,25 +453,6 @@ contains
     call linearise(self, z, weight, state, error)
   end subroutine find_state
 
-  !> Refuses bearings with friction that stand still: whether they hold in vibrations is not known.
-  subroutine refuse_standing_friction(balance, error)
-    type(torque_balance_t), intent(in) :: balance   !! evaluated
-    type(error_t), allocatable, intent(out) :: error
-    real(wp), parameter :: none = 1.0e-10_wp        ! relative to the largest speed
-    integer :: j
-
-    associate (joints => balance%joints, machine => balance%formulation%machine, &
-               speed => balance%formulation%state%elements%speed)
-      do j = 1, joints%count
-        if (machine%banks(joints%bank(j))%bank%role /= role_bearing) cycle
-        if (abs(speed(1, joints%element(j))) > none * maxval(abs(speed(1, :)))) cycle
-        call raise(error, exit_failed, quoted(machine%element_name(joints%element(j))) // ' stands still: whether the ' // &
-                   'friction of its bearing holds in vibrations is not known; allowed: bearing_friction = 0 there')
-        return
-      end do
-    end associate
-  end subroutine refuse_standing_friction
-
   subroutine linearise(self, z, weight, state, error)
     type(held_speeds_t), intent(inout) :: self
     real(wp), intent(in) :: z(:), weight(:)
@@ -471,7 +468,9 @@ contains
       call formulation%state%differentiate_elements(formulation%machine, balance%t)
       state%omega = formulation%omega(1, 1:)
       state%phi = formulation%phi(1, 1:)
-      state%phi = state%phi - state%omega * (state%phi(self%reference) / state%omega(self%reference))
+      if (.not. self%is_free) then
+        state%phi = state%phi - state%omega * (state%phi(self%reference) / state%omega(self%reference))
+      end if
     end associate
     associate (elements => self%balance%formulation%state%elements)
       state%twist = elements%angle(1, :)

@@ -68,12 +68,13 @@ def _of_run(sources: Sources, run: Run) -> Table:
 
 
 def _of_speeds(sources: Sources) -> list[Block]:
-    lives, unit = sources.response_report["fatigue"], sources.speed_unit
+    lives, axis = sources.response_report["fatigue"], sources.response.axis
+    unit = sources.axis_unit(axis)
     columns = [
         ("name", texts([one["name"] for one in lives])),
         ("element", texts([one["element"] for one in lives])),
         ("largest damage of an hour [1/h]", [life(one["largest_damage_per_hour"]) for one in lives]),
-        (f"at [{unit}]", [number(sources.speed(one["speed_rad_s"])) for one in lives]),
+        (f"at [{unit}]", [number(sources.on_axis(axis, axis.point(one))) for one in lives]),
         ("damage of the profile", [life(one.get("damage_of_profile"), _profile_tone(one)) for one in lives]),
         ("hours to failure [h]", [life(one.get("hours_to_failure")) for one in lives]),
         ("mean of a cycle", [_strength(one) for one in lives]),
@@ -106,12 +107,12 @@ def _hourly(sources: Sources) -> Figure | None:
     if not columns:
         return None
     response = sources.response
-    speed = [sources.of_rpm(one) for one in response.speed]
+    speed = [sources.on_axis(response.axis, one) for one in response.speed]
     order = table.iloc[:, 0].argsort(kind="stable")
     names, labels = [column.title for column in columns], [column.label for column in columns]
     curves = [sources.arrays.curve(name, speed, table[label].to_numpy()[order]) for name, label in zip(names, labels)]
     spec = {
-        "x": {"label": f"speed of {response.body}", "unit": sources.speed_unit},
+        "x": {"label": response.axis.label, "unit": sources.axis_unit(response.axis)},
         "y": {"label": columns[0].caption, "unit": columns[0].unit, "zero": True},
         "curves": curves,
         "name": "fatigue",

@@ -45,13 +45,16 @@ contains
     type(input_t), intent(in) :: input
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: responses(:)
+    logical :: sets_speed
 
-    if (word /= 'check') then
-      call refuse_joints(input, analysis%is_steady, 'nocdyn ' // word, error, sets_speed=analysis%sets_speed)
-    end if
+    sets_speed = analysis%sets_speed
+    allocate (responses, source=input%groups_named('response'))
+    if (size(responses) > 0) sets_speed = sets_speed .and. .not. input%groups(responses(1))%has_value('frequency')
+    if (word /= 'check') call refuse_joints(input, analysis%is_steady, 'nocdyn ' // word, error, sets_speed=sets_speed)
     if (allocated(error)) return
     if (analysis%is_steady) then
-      call assemble_steady_machine(input, analysis%locks_joints, machine, error, sets_speed=analysis%sets_speed)
+      call assemble_steady_machine(input, analysis%locks_joints, machine, error, sets_speed=sets_speed)
     else
       call assemble_machine(input, machine, error)
     end if
