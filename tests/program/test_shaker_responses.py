@@ -2,6 +2,9 @@
 
 import csv
 import json
+import os
+import subprocess
+import sys
 from math import pi, sqrt
 
 import numpy as np
@@ -215,3 +218,19 @@ def test_figures_are_over_the_frequency(nocdyn, monkeypatch):
     assert response.barred[0].start < 15.91 < response.barred[0].end
     figure = draw_page(response, response.quantities, Look((10, 20)), {})
     assert figure.axes[0].get_xlabel() == "frequency of shaker [Hz]"
+
+
+def test_a_report_is_over_the_frequency(nocdyn):
+    pytest.importorskip("jinja2")
+    life = "&fatigue name = 'f' coupling = 'spring' reference_moment = 1000 reference_cycles = 1e6 slope = 5 /\n"
+    nocdyn.write("machine.nml", DISC + OVER + "&limit coupling = 'spring' vibratory_moment = 100 /\n" + life + RUN)
+    words = [sys.executable, "-m", "nocdyn_report.report", "machine.nml", "--no-pdf", "--out", "out"]
+    settings = {**os.environ, "PYTHONPATH": str(SOURCE / "scripts")}
+    outcome = subprocess.run(words, cwd=nocdyn.folder, env=settings, capture_output=True, text=True, check=False)
+    assert outcome.returncode == 0, outcome.stderr
+    assert "campbell     left out: &response is over the frequency of a shaker" in outcome.stdout
+    page = (nocdyn.folder / "out/report.html").read_text()
+    for text in ("frequencies of shaker from 10 to 20 Hz", "Barred ranges of frequency", "triangles: resonances",
+                 "Damage of an hour over the frequency", "in which the shaker alone oscillates"):  # fmt: skip
+        assert text in page
+    assert "triangles: critical speeds" not in page

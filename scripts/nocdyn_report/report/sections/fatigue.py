@@ -17,7 +17,7 @@ def fatigue_section(sources: Sources) -> Section | None:
         if run.summary.get("fatigue"):
             (section.add_details if has_cases else section.add)(_of_run(sources, run))
     if sources.has("response") and sources.response_report.get("fatigue"):
-        blocks = [Heading("Continuous operation at a speed", "hourly"), *_of_speeds(sources)]
+        blocks = [Heading(f"Continuous operation at a {sources.response.axis.noun}", "hourly"), *_of_speeds(sources)]
         section.add(*blocks)
     return section if section.blocks else None
 
@@ -118,4 +118,5 @@ def _hourly(sources: Sources) -> Figure | None:
         "name": "fatigue",
     }
     largest = "; ".join(f"{name} {number_text(float(table[label].max()), 3)}" for name, label in zip(names, labels))
-    return Figure("Damage of an hour over the speed", [Panel("", f"Damage per hour over the speed. Largest: {largest}.", spec)])
+    over = f"over the {response.axis.noun}"
+    return Figure(f"Damage of an hour {over}", [Panel("", f"Damage per hour {over}. Largest: {largest}.", spec)])

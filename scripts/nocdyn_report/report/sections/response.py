@@ -70,7 +70,9 @@ def _limits(sources: Sources) -> list[Paragraph | Table | Figure]:
     blocks: list[Paragraph | Table | Figure] = _barred_ranges(sources)
     colours = _colours(limited, sources.response)
     panels = [_panel(sources, sources.response, one.in_short(), colours) for one in limited]
-    blocks.append(Figure("Half ranges with limits over the speed; triangles: critical speeds", panels, min(BIG, len(panels))))
+    axis = sources.response.axis
+    marks = "resonances" if axis.is_frequency else "critical speeds"
+    blocks.append(Figure(f"Half ranges with limits over the {axis.noun}; triangles: {marks}", panels, min(BIG, len(panels))))
     if others := _other_cases(sources):
         blocks.append(Figure("Other load cases: half ranges beyond their limits", others, min(BIG, len(others))))
     return blocks
