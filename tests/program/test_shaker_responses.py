@@ -147,12 +147,19 @@ def test_one_of_several_shakers_is_named(nocdyn):
         ("response", DISC + "&response body = 'disc' /\n", "speed or frequency is missing; one of them is needed"),
         ("response", DISC + "&response speed = 3, 4 /\n", "speed needs body"),
         ("response", DISC + "&response body = 'disc' speed = 3, 4 excitation = 'shaker' /\n", "excitation needs frequency"),
+        (
+            "response",
+            DISC
+            + OVER
+            + "&limit coupling = 'spring' rule = 'iacs_m68' diameter = 0.1 tensile_strength = 6e8 rated_speed = 9 /\n",
+            "rule is for speeds, and &response is over the frequency of a shaker",
+        ),
         ("campbell", DISC + OVER, "a Campbell diagram is over speeds"),
         (
             "response",
             DISC + OVER + "&fatigue name = 'f' coupling = 'spring' reference_moment = 1e3 reference_cycles = 1e6 slope = 5\n"
             "  profile_speeds = 9 profile_hours = 1 /\n",
-            "profile_speeds",
+            "profile_speeds are for speeds, and &response is over the frequency of a shaker",
         ),
     ],
 )

@@ -120,7 +120,7 @@ contains
     end do
   end subroutine find_shaker
 
-  !> Refuses what is judged by the speed, in a response over the frequency.
+  !> Refuses limits of rules, which are for speeds, in a response over the frequency.
   subroutine refuse_speed_rules(input, error)
     type(input_t), intent(in) :: input
     type(error_t), allocatable, intent(out) :: error
@@ -130,12 +130,9 @@ contains
     do i = 1, size(input%groups)
       associate (group => input%groups(i))
         key = ''
-        if (group%kind == 'limit') then
-          if (group%has_value('rule')) key = 'rule'
-          if (group%has_value('rule_file')) key = 'rule_file'
-        else if (group%kind == 'fatigue') then
-          if (group%has_value('profile_speeds')) key = 'profile_speeds'
-        end if
+        if (group%kind /= 'limit') cycle
+        if (group%has_value('rule')) key = 'rule'
+        if (group%has_value('rule_file')) key = 'rule_file'
         if (key == '') cycle
       end associate
       call raise(error, exit_input, input%location(i, key) // ': ' // key // ' is for speeds, and &response is over the ' // &
