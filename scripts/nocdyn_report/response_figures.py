@@ -30,7 +30,6 @@ from .speed_panels import (
     height_of,
     shade_operation,
     share_of,
-    speed_label,
     window_of,
 )
 from .speed_results import NAMED, NEAR, Quantity, Response, read_response
@@ -197,11 +196,11 @@ def draw_page(response: Response, page: Sequence[Quantity], look: Look, styles: 
     for axes in grid.flat[len(page) :]:
         axes.set_visible(False)
     for axes in grid.flat[max(len(page) - across, 0) : len(page)]:
-        axes.set_xlabel(plain(speed_label(response.body)))
+        axes.set_xlabel(plain(f"{response.axis.label} [{response.axis.unit}]"))
     figure.legend(
         handles=_legend(response, page, look, shades), loc="outside lower center", ncols=3 if across == 1 else 4, fontsize=8.5
     )
-    add_title(figure, response.title, "forced response: half range over the speed")
+    add_title(figure, response.title, f"forced response: half range over the {response.axis.noun}")
     return figure
 
 
@@ -223,11 +222,12 @@ def _legend(response: Response, page: Sequence[Quantity], look: Look, shades: li
         handles.append(Line2D([], [], label="limit of the magnitude", **PEAK_LIMIT))
     bars = [one for quantity in page for one in response.barred_by(quantity)]
     if bars:
-        handles.append(Patch(facecolor=BARRED[True], label="barred speeds"))
+        handles.append(Patch(facecolor=BARRED[True], label=f"barred {response.axis.plural}"))
     if not all(one.can_be_passed for one in bars):
         handles.append(Patch(facecolor=BARRED[False], label="not to be passed through"))
     if response.criticals:
-        handles.append(Line2D([], [], color="0.35", marker=7, linestyle="", markersize=4, label="critical: mode/order"))
+        named = "resonance: mode" if response.axis.is_frequency else "critical: mode/order"
+        handles.append(Line2D([], [], color="0.35", marker=7, linestyle="", markersize=4, label=named))
     return handles + shades
 
 
@@ -252,7 +252,9 @@ def figures_of(folder: Path, arguments: argparse.Namespace) -> Figures:
     for order in arguments.orders or ():
         if order not in orders:
             raise ResultsError(f"{folder}: no order {order:g}; there are: {', '.join(f'{one:g}' for one in orders)}")
-    look = Look(window_of(folder, response.speed, arguments), arguments.orders or (), arguments.peak, arguments.log)
+    look = Look(
+        window_of(folder, response.speed, arguments, response.axis.unit), arguments.orders or (), arguments.peak, arguments.log
+    )
     quantities = chosen(response, arguments.columns)
     styles = styles_of(response, quantities, look)
     of_columns = {quantity.column.label: quantity for quantity in quantities}

@@ -169,13 +169,13 @@ def arguments_of(parser: argparse.ArgumentParser) -> argparse.Namespace:
     return arguments
 
 
-def window_of(folder: Path, speed: np.ndarray, arguments: argparse.Namespace) -> tuple[float, float]:
+def window_of(folder: Path, speed: np.ndarray, arguments: argparse.Namespace, unit: str = "rpm") -> tuple[float, float]:
     """The chosen part of the speeds."""
     inside = speed[(speed >= arguments.start) & (speed <= arguments.end)]
     if len(inside) < 2 or inside[0] == inside[-1]:
         raise ResultsError(
             f"{folder}: nothing to draw: {len(inside)} row(s) at the chosen speeds; "
-            f"the table goes from {speed[0]:.6g} to {speed[-1]:.6g} rpm"
+            f"the table goes from {speed[0]:.6g} to {speed[-1]:.6g} {unit}"
         )
     return inside[0], inside[-1]
 

@@ -14,6 +14,7 @@ from .results import RPM
 from .trajectory_files import ResultsError, labels_of, read_columns
 
 SPEED = re.compile(r"omega_(?P<body>.+) \[(?P<unit>rad/s|rpm|Hz)\]")
+SHAKEN = "frequency [Hz]"
 FREQUENCY = re.compile(r"frequency_(?P<mode>\d+) \[Hz\]")
 LINE = re.compile(r"(order|line)_.+ \[Hz\]")
 TABLE, ORDERS = "response.csv", "response_orders.csv"
@@ -29,22 +30,61 @@ def rpm(speed: float) -> float:
 
 
 @dataclass(frozen=True)
+class Axis:
+    """What a response is over: the speed of a body [rpm], or the frequency of a shaker [Hz]."""
+
+    of: str
+    is_frequency: bool = False
+
+    @property
+    def noun(self) -> str:
+        return "frequency" if self.is_frequency else "speed"
+
+    @property
+    def plural(self) -> str:
+        return "frequencies" if self.is_frequency else "speeds"
+
+    @property
+    def label(self) -> str:
+        return f"{self.noun} of {self.of}"
+
+    @property
+    def unit(self) -> str:
+        return "Hz" if self.is_frequency else "rpm"
+
+    def point(self, entry: dict, before: str = "") -> float:
+        """Where a number of a report is."""
+        return entry[f"{before}frequency_Hz"] if self.is_frequency else rpm(entry[f"{before}speed_rad_s"])
+
+    def span(self, entry: dict) -> tuple[float, float]:
+        """The lower and the upper end of a range in a report."""
+        if self.is_frequency:
+            return entry["from_Hz"], entry["to_Hz"]
+        low, high = sorted((rpm(entry["from_rad_s"]), rpm(entry["to_rad_s"])))
+        return low, high
+
+
+@dataclass(frozen=True)
 class Line:
-    """An excitation: oscillations per turn of the body, or a frequency [Hz] at the first speed, with the name of the program."""
+    """An excitation: oscillations per turn of the body, or a frequency [Hz] at the first speed, with the name of the program; or a
+    shaker."""
 
     value: float
     is_order: bool
     word: str = "fixed"
+    shaker: str = ""
 
     @property
     def name(self) -> str:
+        if self.shaker:
+            return self.shaker
         if self.is_order:
             return f"{self.value:.6g}"
         return f"{self.value:.5g} Hz" if self.word == "fixed" else self.word
 
     @property
     def title(self) -> str:
-        return f"order {self.name}" if self.is_order else self.name
+        return f"order {self.name}" if self.is_order and not self.shaker else self.name
 
 
 @dataclass(frozen=True)
@@ -77,8 +117,8 @@ class Critical:
 
     @property
     def name(self) -> str:
-        """As 'II/4.5': mode and order."""
-        return f"{roman(self.mode)}/{self.line.name}"
+        """As 'II/4.5': mode and order; the mode alone where a shaker meets it."""
+        return roman(self.mode) if self.line.shaker else f"{roman(self.mode)}/{self.line.name}"
 
     @property
     def place(self) -> str:
@@ -92,7 +132,7 @@ class Critical:
 
 @dataclass(frozen=True)
 class Barred:
-    """A range of speeds [rpm] in which a limit is exceeded."""
+    """A range of the axis in which a limit is exceeded."""
 
     quantity: str
     start: float
@@ -145,8 +185,8 @@ class Quantity:
 class Response:
     folder: Path
     title: str
-    body: str
-    speed: np.ndarray  # rising [rpm]
+    axis: Axis
+    speed: np.ndarray  # rising, in the unit of the axis
     columns: list[Column]
     lines: list[Line]
     quantities: list[Quantity]
@@ -191,7 +231,8 @@ def roman(number: int) -> str:
 
 
 def read_response(folder: Path) -> Response:
-    report = _read_report(folder, "response", (TABLE, ORDERS), ("body", "lines", "critical_speeds"))
+    report = _read_report(folder, "response", (TABLE, ORDERS), ("body",))
+    axis = Axis(report.get("excitation", report["body"]), "excitation" in report)
     columns = read_column_list(folder, RESPONSE_COLUMNS)
     table, speed, rising = _read_table(folder / TABLE)
     order_table, order_speed, _ = _read_table(folder / ORDERS, rises=False)
@@ -208,17 +249,20 @@ def read_response(folder: Path) -> Response:
     quantities = [one.sorted_by(rising) for one in _quantities(table, order_table, columns, shape)]
     if not quantities:
         raise ResultsError(f"{folder / TABLE}: nothing to draw: there is no half range")
-    lines = [_line(entry, frequency) for entry, frequency in zip(report["lines"], frequencies[0])]
+    if axis.is_frequency:
+        lines = [Line(1.0, True, shaker=axis.of)]
+    else:
+        lines = [_line(entry, frequency) for entry, frequency in zip(report["lines"], frequencies[0])]
     return Response(
         folder,
         _title(report, folder),
-        report["body"],
+        axis,
         speed[rising],
         columns,
         lines,
         quantities,
-        [read_critical(entry) for entry in report["critical_speeds"]],
-        [_barred(entry) for entry in report.get("barred_speed_ranges", [])],
+        [read_critical(entry, axis) for entry in report["resonances" if axis.is_frequency else "critical_speeds"]],
+        [_barred(entry, axis) for entry in barred_in(report)],
         _operation(report),
     )
 
@@ -240,7 +284,7 @@ def read_campbell(folder: Path) -> Campbell:
         speed[rising],
         {mode: table[label].to_numpy()[rising] for mode, label in modes.items()},
         lines,
-        [read_critical(entry) for entry in report["crossings"]],
+        [read_critical(entry, Axis(report["body"])) for entry in report["crossings"]],
         _operation(report),
     )
 
@@ -263,15 +307,15 @@ def _read_report(folder: Path, command: str, tables: tuple[str, ...], keys: tupl
 
 
 def _read_table(file: Path, rises: bool = True) -> tuple[pd.DataFrame, np.ndarray, np.ndarray]:
-    """A table whose first column is a speed, that in rpm, and the order of rows in which it rises."""
+    """A table whose first column is a speed, that in rpm, or the frequency of a shaker; the order of rows in which it rises."""
     labels = labels_of(file)
     match = SPEED.fullmatch(labels[0]) if labels else None
-    if match is None:
+    if match is None and labels[:1] != [SHAKEN]:
         raise ResultsError(f"{file}: the first column must be a speed, as 'omega_motor [rad/s]'")
     table = read_columns(file, labels)
     if len(table) < 2 and rises:
         raise ResultsError(f"{file}: nothing to draw: the table has {len(table)} row(s)")
-    speed = table[labels[0]].to_numpy() * RPM.get(match["unit"], 1.0)
+    speed = table[labels[0]].to_numpy() * (RPM.get(match["unit"], 1.0) if match else 1.0)
     return table, speed, np.argsort(speed, kind="stable")
 
 
@@ -314,18 +358,22 @@ def _line(entry: dict, frequency: float) -> Line:
     return Line(entry["order"], True) if "order" in entry else Line(frequency, False, entry["line_name"])
 
 
-def read_critical(entry: dict) -> Critical:
+def barred_in(report: dict) -> list[dict]:
+    """The ranges of a response.json in which a limit is exceeded."""
+    return report.get("barred_speed_ranges", report.get("barred_frequency_ranges", []))
+
+
+def read_critical(entry: dict, axis: Axis) -> Critical:
     """One of the crossings of campbell.json or of the critical speeds of response.json."""
     distance = entry.get("distance_to_operation", math.nan)
-    line = _line(entry, entry["frequency_Hz"])
-    speed = rpm(entry["speed_rad_s"])
+    line = Line(1.0, True, shaker=axis.of) if axis.is_frequency else _line(entry, entry["frequency_Hz"])
+    speed = axis.point(entry)
     judged = entry.get("is_too_near", False), entry.get("is_electrical", False)
     return Critical(entry["mode"], line, speed, entry["frequency_Hz"], distance, *judged)
 
 
-def _barred(entry: dict) -> Barred:
-    start, end = sorted((rpm(entry["from_rad_s"]), rpm(entry["to_rad_s"])))
-    return Barred(entry["quantity"], start, end, entry["can_be_passed"])
+def _barred(entry: dict, axis: Axis) -> Barred:
+    return Barred(entry["quantity"], *axis.span(entry), entry["can_be_passed"])
 
 
 def _operation(report: dict) -> Operation | None:

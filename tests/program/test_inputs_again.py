@@ -126,6 +126,10 @@ ELEMENTS = {
     "&response body = 'a' speed = 10, 20 operating = 12, 18 /\n&limit coupling = 'k' moment = 100 /\n"
     "&record response = 'moment_k' statistic = 'peak', 'peak_speed', 'margin', 'ratio' /\n"
     "&record mode = 1 order = 1 statistic = 'crossing', 'crossing_margin' /",
+    "shaker": "&coupling name = 'k' bodies = 'a', 'b' stiffness = 100 damping = 1 /\n"
+    f"&sweep design = 'grid' /\n{VARY} count = 3 /\n"
+    "&excitation name = 'x' body = 'a' amplitude = 2 frequency_hz = 3 /\n"
+    "&response frequency_hz = 1, 2 excitation = 'x' /\n&record response = 'moment_k' statistic = 'peak_frequency' /",
     "lives": f"&coupling name = 'k' bodies = 'a', 'b' stiffness = 100 /\n&sweep design = 'grid' /\n{VARY} count = 3 /\n"
     "&fatigue name = 'f' coupling = 'k' reference_moment = 1e6 reference_cycles = 1e6 slope = 5 /\n"
     "&record fatigue = 'f' statistic = 'damage', 'cycles' /",

@@ -80,6 +80,9 @@ def calculate(
     results.of["modes"], results.of["holzer"] = _modes(program, words, stamps)
     for command in ("campbell", "response"):
         if "\n&response\n" in check["complete_input"]:
+            if command == "campbell" and "frequency" in f90nml.reads(check["complete_input"])["response"]:
+                results.of[command] = Calculation(command, "left out", "&response is over the frequency of a shaker")
+                continue
             in_csv = ["--set", "response.format=csv"] if _writes_netcdf(check) else []
             results.of[command] = _analyse(program, command, [*words, *in_csv], stamps)
         else:

@@ -12,7 +12,7 @@ import pandas as pd
 from ..columns import DETAIL, Column, columns_of, read_column_list
 from ..modes_results import Modes, read_modes
 from ..results import RPM, groups_of, ranges_of, trajectory_in
-from ..speed_results import Campbell, Critical, Response, read_campbell, read_response, rpm
+from ..speed_results import Axis, Campbell, Critical, Response, read_campbell, read_response, rpm
 from ..trajectory_files import ResultsError, labels_of, read_columns
 from .calculations import Calculations
 from .curves import Arrays
@@ -195,6 +195,13 @@ class Sources:
     def speed(self, value: float) -> float:
         """A speed [rad/s] in that unit."""
         return value if self.speed_unit == "rad/s" else self.of_rpm(rpm(value))
+
+    def on_axis(self, axis: Axis, value: float) -> float:
+        """A point of a response, from rpm or Hz, in `axis_unit`."""
+        return value if axis.is_frequency else self.of_rpm(value)
+
+    def axis_unit(self, axis: Axis) -> str:
+        return axis.unit if axis.is_frequency else self.speed_unit
 
     def of_rpm(self, value: float) -> float:
         return value / RPM.get(self.speed_unit, 1.0)

@@ -72,13 +72,15 @@ contains
 
   !> Builds the machine as it is in a steady state: with means over a turn, and, if it is asked for, with clutches and freewheels
   !> that are locked as constraint rows.
-  recursive subroutine assemble_steady_machine(input, locks_joints, machine, error, t)
+  recursive subroutine assemble_steady_machine(input, locks_joints, machine, error, t, sets_speed)
     type(input_t), intent(in) :: input
     logical, intent(in) :: locks_joints     !! whether locked joints are rows
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
     real(wp), intent(in), optional :: t   !! the time at which clutches are engaged or not [s]; absent: after all changes
+    logical, intent(in), optional :: sets_speed   !! whether an analysis sets the speed in place of a drive; absent: no
     type(steady_view_t) :: view
+    character(len=:), allocatable :: text
     logical :: is_changed
     integer :: trials
 
@@ -86,12 +88,15 @@ contains
     view%at = t_infinity
     if (present(t)) view%at = t
     view%locks_joints = locks_joints
+    if (present(sets_speed)) view%sets_speed = sets_speed
     allocate (view%overruns(size(input%groups)), source=.false.)
     do trials = 0, 2 * size(input%groups_named('freewheel'))
       call build_machine(input, view, machine, error)
       if (allocated(error)) return
       if (machine%coordinates%freedoms == 0) then
-        call raise(error, exit_failed, input%shown_file() // ': ' // machine%simplifications(1)%text // ', so that nothing moves')
+        text = ', so that nothing moves'
+        if (allocated(machine%driven_speed)) text = ', so that nothing is left that could oscillate'
+        call raise(error, exit_failed, input%shown_file() // ': ' // machine%simplifications(1)%text // text)
         return
       end if
       is_changed = .false.

@@ -205,7 +205,7 @@ contains
     bodies = new_body_index(machine%names)
     associate (run => start%input%groups(start%input%position('run')))
       reference = bodies_of(run, 'start_body', bodies)
-      call new_held_speeds(machine, reference(1), held, error, run%number('t_start'))
+      call new_held_speeds(machine, reference(1), held, error, t=run%number('t_start'))
     end associate
     if (.not. allocated(error)) call held%hold(start%speed, state, error)
     if (allocated(error)) return

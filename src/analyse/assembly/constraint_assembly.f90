@@ -6,7 +6,7 @@ module nocdyn_constraint_assembly
   use nocdyn_input, only: group_t, input_t
   use nocdyn_joint_assembly, only: engagement_at, find_rest_range
   use nocdyn_kinds, only: wp
-  use nocdyn_motion_assembly, only: holds_still
+  use nocdyn_motion_assembly, only: has_steady_speed, steady_speed
   use nocdyn_steady_views, only: steady_view_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -50,7 +50,7 @@ contains
         is_row = view%is_steady .and. view%locks_joints
         if (is_row) is_row = .not. is_open_joint(input, view, index)
       case ('drive')
-        is_row = view%is_steady .and. holds_still(group)
+        is_row = view%is_steady .and. has_steady_speed(group, view%sets_speed)
       case default
         is_row = .false.
       end select
@@ -201,6 +201,7 @@ contains
     constraints = new_constraints(bodies, names, units, first, body, coefficient, kinds, members)
     do i = 1, size(indices)
       call limit_of_lock(input%groups(indices(i)), view%at, constraints%least(i), constraints%most(i))
+      if (input%groups(indices(i))%kind == 'drive') constraints%demand(i) = steady_speed(input%groups(indices(i)))
     end do
     constraints%may_stop = [(any(kinds(i)%text == [character(len=9) :: 'clutch', 'freewheel', 'drive']), i=1, size(kinds))]
   end subroutine form_rows

@@ -7,6 +7,7 @@ module nocdyn_machine_parts
   use nocdyn_coupling_assembly, only: add_coupling_form, check_coupling, coupling_form
   use nocdyn_crank_assembly, only: add_cranks, check_crank
   use nocdyn_electrical_faults, only: check_fault
+  use nocdyn_driven_speeds, only: find_driven_speeds, moves_with
   use nocdyn_element_groups, only: add_banks, bodies_of, body_index_t, element_groups_t, new_body_index, new_element_groups
   use nocdyn_engine_checks, only: check_engine, check_order_torques
   use nocdyn_errors, only: add_error, error_t, exit_input, raise
@@ -21,13 +22,14 @@ module nocdyn_machine_parts
   use nocdyn_machine_start, only: start_bodies
   use nocdyn_massless_motion, only: massless_bodies
   use nocdyn_mesh_assembly, only: add_mesh_form, check_mesh, mesh_form
-  use nocdyn_motion_assembly, only: add_cardans, add_drive_form, add_relations, check_drive, check_relation, drive_form
+  use nocdyn_motion_assembly, only: add_cardans, add_drive_form, add_relations, check_drive, check_relation, drive_form, &
+    has_steady_speed, steady_speed
   use nocdyn_motor_assembly, only: add_motor_form, check_motor, motor_form
   use nocdyn_output_times, only: check_output_times
   use nocdyn_shaft_assembly, only: add_shafts, new_shaft_set, shaft_set_t
   use nocdyn_shaft_segments, only: check_shaft
   use nocdyn_steady_views, only: steady_view_t
-  use nocdyn_text, only: append, joined, rounded_text, selected, to_text
+  use nocdyn_text, only: append, joined, quoted, rounded_text, selected, to_text
   use nocdyn_torque_assembly, only: add_engines, add_excitation_form, add_load_form, add_steady_load_form, &
     excitation_form, load_form
   use nocdyn_units, only: from_si, unit_rpm
@@ -145,6 +147,7 @@ contains
       ! refuses ranges that begin with the faster speed, or whose ends differ in direction
       associate (group => input%groups(g))
         call check_range(input, g, 'speed', group%numbers('speed'), diagnostics)
+        call check_range(input, g, 'frequency', group%numbers('frequency'), diagnostics)
         call check_range(input, g, 'operating', group%numbers('operating'), diagnostics)
       end associate
     case ('fatigue')
@@ -229,6 +232,7 @@ contains
       call analyse_constraints(machine%constraints, machine%names, wanted, machine%trains, machine%groups, offending_row, error)
       if (.not. allocated(error)) then
         call refuse_massless_motion(input, machine, error)
+        if (.not. allocated(error)) call turn_by_drives(input, view, body_index, machine, error)
         if (allocated(error)) return
         call build_coordinates(machine%constraints, machine%names, machine%trains, machine%groups, machine%inertia, wanted, &
                                findloc(complement_names == run%text('complement'), .true., dim=1), machine%coordinates, error)
@@ -242,6 +246,42 @@ contains
       error%message = input%location(input%position('run'), 'independent') // ': independent ' // error%message
     end if
   end subroutine analyse_machine_constraints
+
+  !> Finds the speeds that drives give the bodies in a steady state. Drives are refused that contradict each other, gears or
+  !> elastic couplings, and drives whose speed changes where &response does not set it.
+  subroutine turn_by_drives(input, view, body_index, machine, error)
+    type(input_t), intent(in) :: input
+    type(steady_view_t), intent(in) :: view
+    type(body_index_t), intent(in) :: body_index
+    type(machine_t), intent(inout) :: machine   !! its rows are analysed
+    type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: body(:), indices(:), responses(:)
+    integer :: i, offending_row
+
+    call find_driven_speeds(machine, offending_row)
+    allocate (indices, source=constraint_groups(input, view))
+    if (offending_row > 0) then
+      associate (drive => input%groups(indices(offending_row)))
+        call raise(error, exit_input, input%location(indices(offending_row)) // ': gears, elastic couplings or other drives ' // &
+                   'do not let ' // quoted(drive%text('body')) // ' turn at ' // rounded_text(steady_speed(drive), 6) // &
+                   ' rad/s for good: there is no steady state')
+      end associate
+      return
+    end if
+    allocate (responses, source=input%groups_named('response'))
+    do i = 1, merge(size(indices), 0, view%sets_speed .and. size(responses) > 0)
+      associate (group => input%groups(indices(i)))
+        if (group%kind /= 'drive') cycle
+        if (has_steady_speed(group, .false.)) cycle
+        body = [bodies_of(group, 'body', body_index), bodies_of(input%groups(responses(1)), 'body', body_index)]
+        if (all(moves_with(machine, body(1)) .eqv. moves_with(machine, body(2)))) cycle
+        call raise(error, exit_input, input%location(indices(i)) // ': the speed of this drive changes, and ' // &
+                   quoted(machine%names(body(2))%text) // ' of &response does not turn with it: there is no steady state; ' // &
+                   'allowed: a drive of constant speed')
+        return
+      end associate
+    end do
+  end subroutine turn_by_drives
 
   !> Refuses bodies that can move while all bodies with inertia stand still: the reduced mass matrix is singular.
   subroutine refuse_massless_motion(input, machine, error)
@@ -268,17 +308,22 @@ contains
     character(len=:), allocatable :: text
 
     if (size(range) == 0) return
-    if (size(range) == 1 .and. key == 'speed') return
+    if (size(range) == 1 .and. key /= 'operating') return
     if (size(range) > 2) then
-      call input%report(group, key, to_text(size(range)) // ' speeds; allowed: one, or the slowest and the fastest one', &
-                 diagnostics)
+      text = ' speeds; allowed: one, or the slowest and the fastest one'
+      if (key == 'frequency') text = ' frequencies; allowed: one, or the lowest and the highest one'
+      call input%report(group, key, to_text(size(range)) // text, diagnostics)
       return
     end if
     if (range(1) * range(2) > 0 .and. abs(range(1)) < abs(range(2))) return
-    if (key == 'speed' .and. .not. abs(range(1) - range(2)) > 0) return
+    if (key /= 'operating' .and. .not. abs(range(1) - range(2)) > 0) return
     associate (written => input%groups(group))
       text = written_key(written, key) // ' = ' // written_number(written, key, range(1)) // ', ' // &
              written_number(written, key, range(2))
+      if (key == 'frequency') then
+        call input%report(group, key, text // '; allowed: first the lower frequency, then the higher one', diagnostics)
+        return
+      end if
       if (unit_of(written, key) == 0) text = text // ' rad/s, which is ' // rounded_text(from_si(range(1), unit_rpm), 6) // &
                                              ', ' // rounded_text(from_si(range(2), unit_rpm), 6) // ' rpm'
     end associate

@@ -54,22 +54,26 @@ contains
   end function word
 
   !> The harmonics of all elements at a steady state.
-  subroutine list_sources(machine, state, sources)
+  subroutine list_sources(machine, state, sources, shaker)
     type(machine_t), intent(in) :: machine      !! with its periodic torques
     type(held_state_t), intent(in) :: state
     type(source_t), allocatable, intent(out) :: sources(:)
+    integer, intent(in), optional :: shaker     !! the only element that counts, whose frequency is `speed` of the state;
+                                                !! absent or 0: all count
     type(harmonic_t), allocatable :: list(:)
     type(source_t), allocatable :: longer(:)
-    integer :: b, e, i, k, n
+    integer :: b, e, i, k, n, only
     real(wp) :: speed
 
+    only = 0
+    if (present(shaker)) only = shaker
     n = 0
     allocate (sources(64))
     do b = 1, size(machine%banks)
       associate (bank => machine%banks(b)%bank)
         if (bank%role == role_load) cycle
         do e = 1, bank%count
-          if (bank%has_ended(e)) cycle
+          if (only == 0 .and. bank%has_ended(e) .or. only > 0 .and. bank%first + e - 1 /= only) cycle
           speed = 0.0_wp
           do k = bank%rows%first(e), bank%rows%first(e + 1) - 1
             if (bank%rows%body(k) > 0) speed = speed + bank%rows%coefficient(k) * state%omega(bank%rows%body(k))
@@ -81,6 +85,7 @@ contains
             call move_alloc(longer, sources)
           end if
           do i = 1, size(list)
+            if (only > 0) list(i)%frequency = state%speed
             call set_source(list(i), state, sources(n + i))
             if (list(i)%by_element > 0) sources(n + i)%moment = state%mean(list(i)%by_element) * sources(n + i)%moment
           end do

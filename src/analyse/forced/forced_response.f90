@@ -10,6 +10,7 @@ module nocdyn_forced_response
   use nocdyn_held_speeds, only: held_speeds_t, held_state_t, new_held_speeds
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_response_axes, only: response_axis_t
   use nocdyn_response_points, only: keep_points, merge_points, response_point_t
   use nocdyn_moment_forms, only: list_moment_forms, moment_form_t
   use nocdyn_signals, only: list_signals, signal_angle, signal_t
@@ -27,6 +28,8 @@ module nocdyn_forced_response
   type, public :: forced_response_t
     type(machine_t) :: machine
     type(held_speeds_t) :: held
+    type(response_axis_t) :: axis
+    integer :: shaker = 0                              !! element whose frequency is varied at one steady state, 0: speeds are
     type(dynamic_stiffness_t) :: matrix
     type(line_t), allocatable :: lines(:)
     type(moment_form_t), allocatable :: quantities(:)  !! that are computed: all, or the ones of `keep`
@@ -55,12 +58,13 @@ module nocdyn_forced_response
 contains
 
   !> Prepares the response of a machine: its lines at the lowest and the highest speed, its quantities.
-  subroutine new_forced_response(machine, reference, speeds, self, error)
+  subroutine new_forced_response(machine, reference, speeds, self, error, shaker)
     type(machine_t), intent(in) :: machine   !! one lane, with its periodic torques
     integer, intent(in) :: reference         !! body
-    real(wp), intent(in) :: speeds(:)        !! from the lowest to the highest one [rad/s]
+    real(wp), intent(in) :: speeds(:)        !! from the lowest to the highest one [rad/s]; frequencies of a shaker
     type(forced_response_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error   !! a message of a steady state begins with its speed
+    integer, intent(in), optional :: shaker  !! an element; absent or 0: none
     type(held_state_t) :: high, low
     type(source_t), allocatable :: of_high(:), of_low(:)
     type(signal_t), allocatable :: signals(:)
@@ -70,7 +74,9 @@ contains
     real(wp) :: lowest   ! frequency [rad/s]
 
     self%machine = machine
-    call new_held_speeds(machine, reference, self%held, error)
+    if (present(shaker)) self%shaker = shaker
+    self%axis%is_frequency = self%shaker > 0
+    call new_held_speeds(machine, reference, self%held, error, is_free=self%shaker > 0)
     if (allocated(error)) return
     if (size(speeds) > 1) then
       call hold_first(self%held, speeds(size(speeds):1:-1), high, error)
@@ -79,8 +85,8 @@ contains
     end if
     if (.not. allocated(error)) call hold_first(self%held, speeds, low, error)
     if (allocated(error)) return
-    call list_sources(machine, low, of_low)
-    call list_sources(machine, high, of_high)
+    call list_sources(machine, low, of_low, self%shaker)
+    call list_sources(machine, high, of_high, self%shaker)
     call new_lines(of_low, of_high, self%lines)
     lowest = minval([unexcited, of_low%frequency], mask=[.true., of_low%frequency > 0])
     call new_dynamic_stiffness(machine, self%held%balance%incidence, lowest, &
@@ -220,10 +226,10 @@ contains
       if (are_of_grid .and. 2 * each <= most_values) then
         advice = 'allowed: at most count = ' // to_text(int(most_values / each)) // ', fewer orders or fewer signals'
       else
-        advice = 'allowed: fewer orders, fewer signals or a shorter range of speeds'
+        advice = 'allowed: fewer orders, fewer signals or a shorter range of ' // self%axis%plural()
       end if
       call raise(error, exit_input, 'the response of ' // to_text(size(self%lines)) // ' orders and frequencies at ' // &
-                 to_text(all) // ' speeds is ' // to_text(nint(each * all / 1.0e6_wp)) // &
+                 to_text(all) // ' ' // self%axis%plural() // ' is ' // to_text(nint(each * all / 1.0e6_wp)) // &
                  ' million numbers; at most ' // to_text(nint(most_values / 1.0e6_wp)) // ' million are kept; ' // advice)
     end associate
   end subroutine refuse_too_many
@@ -278,7 +284,7 @@ contains
     type(response_point_t), intent(inout) :: point
     integer :: l
 
-    call list_sources(self%machine, point%state, point%sources)
+    call list_sources(self%machine, point%state, point%sources, self%shaker)
     point%frequency = [(point%sources(self%lines(l)%source(1))%frequency, l=1, size(self%lines))]
   end subroutine set_lines
 

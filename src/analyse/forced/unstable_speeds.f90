@@ -5,9 +5,9 @@ module nocdyn_unstable_speeds
   use nocdyn_kinds, only: wp
   use nocdyn_mode_branches, only: speed_modes_t
   use nocdyn_mode_pairs, only: mode_pairs_t
+  use nocdyn_response_axes, only: response_axis_t
   use nocdyn_state_modes, only: find_pairs_at
   use nocdyn_text, only: append, rounded_text, string_t, to_text
-  use nocdyn_units, only: from_si, unit_rpm
   implicit none (type, external)
   private
 
@@ -97,25 +97,26 @@ contains
     if (size(list) > 0) then
       speed = list%speed
       call describe_first(list, text)
-      call describe_speeds(speed, speeds)
+      call describe_speeds(response%axis, speed, speeds)
       call append(notes, 'the steady state is unstable at ' // speeds // ': ' // text // '; ' // consequence)
     end if
     if (size(response%speeds_left_out) > 0) then
-      call describe_speeds(response%speeds_left_out, speeds)
+      call describe_speeds(response%axis, response%speeds_left_out, speeds)
       call append(notes, 'there is no steady state at ' // speeds // ', which are left out: ' // &
                          response%left_out_message)
     end if
   end subroutine note_speeds
 
   !> "3 speeds from 100 to 120 rpm".
-  subroutine describe_speeds(speed, text)
+  subroutine describe_speeds(axis, speed, text)
+    type(response_axis_t), intent(in) :: axis
     real(wp), intent(in) :: speed(:)   !! [rad/s]
     character(len=:), allocatable, intent(out) :: text
 
-    text = rounded_text(from_si(minval(abs(speed)), unit_rpm), 6)
-    if (size(speed) > 1) text = to_text(size(speed)) // ' speeds from ' // text // ' to ' // &
-                                rounded_text(from_si(maxval(abs(speed)), unit_rpm), 6)
-    text = text // ' rpm'
+    text = rounded_text(axis%shown(minval(abs(speed))), 6)
+    if (size(speed) > 1) text = to_text(size(speed)) // ' ' // axis%plural() // ' from ' // text // ' to ' // &
+                                rounded_text(axis%shown(maxval(abs(speed))), 6)
+    text = text // ' ' // axis%unit()
   end subroutine describe_speeds
 
 end module nocdyn_unstable_speeds

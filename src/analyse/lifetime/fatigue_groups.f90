@@ -187,12 +187,17 @@ contains
       return
     end if
     allocate (range, source=input%groups(responses(1))%numbers('speed'))
+    if (size(range) == 0) then
+      call input%report(index, 'profile_speeds', 'profile_speeds are for speeds, and &response is over the frequency of a ' // &
+                        'shaker; required: speed of &response', diagnostics)
+      return
+    end if
     do i = 1, size(speeds)
       if (minval(range) <= speeds(i) .and. speeds(i) <= maxval(range)) cycle
       associate (group => input%groups(index))
         call input%report(index, 'profile_speeds', written_element(group, 'profile_speeds', i) // &
                    ' is outside of the speeds of &response; allowed: ' // written_number(group, 'profile_speeds', range(1)) // &
-                   ' to ' // written_number(group, 'profile_speeds', range(2)) // ' [' // written_unit(group, &
+                   ' to ' // written_number(group, 'profile_speeds', range(size(range))) // ' [' // written_unit(group, &
                    'profile_speeds') // ']', diagnostics)
       end associate
       return

@@ -5,7 +5,7 @@
 module nocdyn_campbell
   use nocdyn_backward_speeds, only: refuse_backward_speeds
   use nocdyn_critical_speeds, only: crossing_t
-  use nocdyn_errors, only: error_t
+  use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_excitation_lines, only: line_t
   use nocdyn_followed_modes, only: follow_modes, frequencies_of
   use nocdyn_forced_response, only: forced_response_t, new_forced_response
@@ -57,6 +57,12 @@ contains
 
     call read_response_settings(input, machine, self%settings, error)
     if (allocated(error)) return
+    if (self%settings%axis%is_frequency) then
+      call raise(error, exit_input, input%location(self%settings%group, 'frequency') // &
+                 ': a Campbell diagram is over speeds; nocdyn response is over the frequency, nocdyn modes has the modes; ' // &
+                 'allowed: speed')
+      return
+    end if
     if (present(orders)) self%settings%orders = orders
     failed_speed = self%settings%speeds(1)
     call new_forced_response(machine, self%settings%body, self%settings%speeds, self%response, error)

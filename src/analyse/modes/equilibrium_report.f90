@@ -55,6 +55,8 @@ contains
     integer, allocatable :: reported(:)                 !! columns
     type(string_t), allocatable :: parts(:)             !! of the elements with power
     real(wp), allocatable :: power(:, :)                !! of these [W], [parts, equilibria]
+    integer, allocatable :: drives(:)                   !! rows that turn bodies
+    real(wp) :: lambda(formulation%machine%constraints%rows())
     integer :: i, k
 
     allocate (self%equilibria, source=equilibria)
@@ -72,7 +74,11 @@ contains
     end do
     allocate (self%labels, source=selected(table%labels, reported))
     allocate (parts, source=work_element_names(formulation%machine))
-    allocate (self%work_elements, source=whole_names(parts))
+    associate (rows => formulation%machine%constraints)
+      drives = pack([(i, i=1, size(lambda))], abs(rows%demand) > 0)
+      allocate (self%work_elements, source=[whole_names(parts), (string_t(rows%kinds(drives(i))%text // ' ' // &
+                                                                          rows%names(drives(i))%text), i=1, size(drives))])
+    end associate
     allocate (self%values(size(self%labels), size(equilibria)), self%power(size(self%work_elements), size(equilibria)))
     allocate (row(size(table%labels)), watts(1, size(parts)), power(size(parts), size(equilibria)))
     do k = 1, size(equilibria)
@@ -81,7 +87,8 @@ contains
       call with_works%state%power(with_works%machine, watts)
       self%values(:, k) = row(reported)
       power(:, k) = watts(1, :)
-      self%power(:, k) = whole_sums(parts, watts(1, :))
+      call with_works%reactions(1, lambda)
+      self%power(:, k) = [whole_sums(parts, watts(1, :)), lambda(drives) * formulation%machine%constraints%demand(drives)]
       i = findloc(is_finite([self%values(:, k), self%power(:, k)]), .false., dim=1)
       if (i == 0) cycle
       call raise(error, exit_failed, 'in steady state ' // to_text(k) // ' of ' // to_text(size(equilibria)) // ', ' // &

@@ -38,6 +38,7 @@ contains
     type(operating_point_t), intent(out) :: point
     type(error_t), allocatable, intent(out) :: error
     type(group_t) :: run
+    type(machine_t) :: still
     real(wp) :: time
 
     run = input%single('run')
@@ -48,12 +49,19 @@ contains
       call use_equilibrium(machine, point, error)
     case ('rest')
       ! takes the start angles without speeds, and the mean torques
-      call mean_formulation(machine, point%formulation)
+      still = machine
+      if (allocated(still%driven_speed)) deallocate (still%driven_speed)
+      call mean_formulation(still, point%formulation)
       point%y = point%formulation%start()
       point%y(1, :machine%coordinates%freedoms) = 0.0_wp
       point%t = t_infinity
       point%text = 'rest'
     case default
+      if (allocated(machine%driven_speed)) then
+        call raise(error, exit_input, input%shown_file() // ': --at ' // at // ': a drive turns bodies of this machine, ' // &
+                   'which is looked at in its steady state only; allowed: equilibrium or rest')
+        return
+      end if
       call read_time(input, run, at, time, error)
       if (.not. allocated(error)) call use_time(input, machine, time, point, error)
     end select

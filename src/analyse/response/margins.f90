@@ -205,7 +205,9 @@ contains
     if (size(unstable) == 0) return
     line = new_verdict_line(analysis, 'machine', '', 'stable steady states', '')
     line%finding = is_not_assessed
-    line%reason = 'unstable at ' // to_text(size(unstable)) // ' of ' // to_text(size(settings%speeds)) // ' speeds'
+    line%reason = 'unstable at ' // to_text(size(unstable)) // ' of ' // to_text(size(settings%speeds)) // ' ' // &
+                  settings%axis%plural()
+    line%are_frequencies = settings%axis%is_frequency
     line%speeds = 2
     line%speed = [minval(unstable%speed), maxval(unstable%speed)]
     call verdict%add(line)

@@ -16,8 +16,8 @@ module nocdyn_response_analysis
   use nocdyn_response_choice, only: choose_quantities, choose_shown, find_couplings
   use nocdyn_response_fatigue, only: find_response_fatigue, response_fatigue_t
   use nocdyn_response_limits, only: read_limits, response_limit_t
-  use nocdyn_response_notes, only: note_linear_ranges, note_numbers, note_overloads, note_rated_speeds, note_rules, &
-    note_separation, note_shaft_modes, note_simplifications, note_steady_states
+  use nocdyn_response_notes, only: note_linear_ranges, note_numbers, note_other_excitations, note_overloads, note_rated_speeds, &
+    note_rules, note_separation, note_shaft_modes, note_simplifications, note_steady_states
   use nocdyn_response_points, only: keep_points
   use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
   use nocdyn_state_modes, only: most_coordinates
@@ -70,7 +70,7 @@ contains
     self%writes_grid = wants_grid(input)
     associate (speeds => self%settings%speeds)
       failed_speed = speeds(1)
-      call new_forced_response(machine, self%settings%body, speeds, self%response, error)
+      call new_forced_response(machine, self%settings%body, speeds, self%response, error, self%settings%shaker)
       call place_error(input, self%settings, failed_speed, error)
       if (.not. allocated(error)) call choose_lines(input, self%settings, self%response%lines, error)
       if (.not. allocated(error)) call read_limits(input, self%response%quantities, self%limits, error)
@@ -92,6 +92,7 @@ contains
       call place_error(input, self%settings, failed_speed, error)
     else
       call note_speeds(self%response, self%unstable, 'they are left out', self%notes)
+      if (self%settings%shaker > 0) call note_other_excitations(self%settings, self%response, self%notes)
       call note_steady_states(self%response, self%notes)
       call note_numbers(self%modes, self%notes)
       if (self%modes%modes > 0) call note_shaft_modes(machine, self%modes, self%crossings, .false., self%notes)
@@ -206,9 +207,9 @@ contains
     call self%response%solve_oscillations()
     call refine_peaks(self%response, self%crossings, unrefined, error, failed_speed)
     if (.not. allocated(error) .and. unrefined > 0) then
-      call append(self%notes, 'there are too many peaks between the speeds of the grid to refine all: some may be higher by ' // &
-                              rounded_text(100.0_wp * unrefined, 2) // ' % of the largest one of their quantity; fewer ' // &
-                              'orders or a shorter range of speeds refine all')
+      call append(self%notes, 'there are too many peaks between the ' // self%settings%axis%plural() // ' of the grid to ' // &
+                              'refine all: some may be higher by ' // rounded_text(100.0_wp * unrefined, 2) // &
+                              ' % of the largest one of their quantity; fewer orders or a shorter range refine all')
     end if
     if (.not. allocated(error)) call refine_edges(self%response, self%limits, error, failed_speed)
     if (size(self%unstable) == 0 .or. allocated(error)) return

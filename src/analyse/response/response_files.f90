@@ -10,6 +10,7 @@ module nocdyn_response_files
   use nocdyn_margins, only: put_margin, put_mode
   use nocdyn_output_file, only: output_file_t
   use nocdyn_response_analysis, only: response_analysis_t
+  use nocdyn_response_axes, only: response_axis_t
   use nocdyn_response_limits, only: no_limit, response_limit_t
   use nocdyn_moment_forms, only: kind_moment, moment_form_t
   use nocdyn_response_summary, only: critical_t, response_summary_t, worst_ratio
@@ -57,9 +58,13 @@ contains
     integer :: i, k, q
 
     call list%start(trim(merge(response_grid // ' ', response_table, analysis%writes_grid)), wanted)
-    call list%add_named('omega', 'rad/s', 'speed that is held', 'body', analysis%body_name)
-    call list%add_named('drive', '1', 'share of the torques of the drives that holds the speed')
-    call list%add_named('drive_torque', 'N m', 'torque that holds the speed')
+    if (analysis%settings%axis%is_frequency) then
+      call list%add_named('frequency', 'Hz', 'frequency of the shaker')
+    else
+      call list%add_named('omega', 'rad/s', 'speed that is held', 'body', analysis%body_name)
+      call list%add_named('drive', '1', 'share of the torques of the drives that holds the speed')
+      call list%add_named('drive_torque', 'N m', 'torque that holds the speed')
+    end if
     associate (quantities => analysis%response%quantities, limits => analysis%limits)
       do i = 1, size(analysis%shown)
         q = analysis%shown(i)
@@ -140,9 +145,11 @@ contains
     n = 0
     associate (quantities => analysis%response%quantities, limits => analysis%limits, point => analysis%response%points(i), &
                speed => analysis%response%points(i)%state%speed)
-      call put(speed)
-      call put(point%state%factor)
-      call put(point%state%torque)
+      call put(analysis%settings%axis%stored(speed))
+      if (.not. analysis%settings%axis%is_frequency) then
+        call put(point%state%factor)
+        call put(point%state%torque)
+      end if
       do j = 1, size(analysis%shown)
         q = analysis%shown(j)
         row(n + 1:n + 3) = [point%mean(q), point%half_range(q), point%peak(q)]
@@ -206,15 +213,20 @@ contains
     type(response_analysis_t), intent(in) :: analysis
     integer, intent(in) :: i, l          !! point and line of the response
     real(wp), intent(out) :: row(:)
-    integer :: n
+    integer :: before, n
 
     associate (response => analysis%response, point => analysis%response%points(i), shown => analysis%shown, &
                angles => analysis%response%angle_place(analysis%response%angles(analysis%shown_angles)%source%index))
-      row(:3) = [point%state%speed, point%frequency(l) / abs(point%state%speed), point%frequency(l) / turn]
-      if (response%lines(l)%is_order) row(2) = response%lines(l)%order   ! without the rounding of the frequency
-      n = 3 + 2 * size(shown)
-      row(4:n:2) = abs(point%quantity(l, shown))
-      row(5:n:2) = phase(point%quantity(l, shown))
+      before = 1
+      row(1) = analysis%settings%axis%stored(point%state%speed)
+      if (.not. analysis%settings%axis%is_frequency) then
+        before = 3
+        row(2:3) = [point%frequency(l) / abs(point%state%speed), point%frequency(l) / turn]
+        if (response%lines(l)%is_order) row(2) = response%lines(l)%order   ! without the rounding of the frequency
+      end if
+      n = before + 2 * size(shown)
+      row(before + 1:n:2) = abs(point%quantity(l, shown))
+      row(before + 2:n:2) = phase(point%quantity(l, shown))
       row(n + 1::3) = abs(point%angle(l, angles))
       row(n + 2::3) = phase(point%angle(l, angles))
       row(n + 3::3) = point%frequency(l) * row(n + 1::3)
@@ -265,9 +277,13 @@ contains
     integer :: i
 
     call list%start(trim(merge(response_grid // '        ', orders_table, analysis%writes_grid)), wanted)
-    call list%add_named('omega', 'rad/s', 'speed that is held', 'body', analysis%body_name)
-    call list%add_named('order', '1', 'oscillations per turn of the body')
-    call list%add_named('frequency', 'Hz', 'frequency')
+    if (analysis%settings%axis%is_frequency) then
+      call list%add_named('frequency', 'Hz', 'frequency of the shaker')
+    else
+      call list%add_named('omega', 'rad/s', 'speed that is held', 'body', analysis%body_name)
+      call list%add_named('order', '1', 'oscillations per turn of the body')
+      call list%add_named('frequency', 'Hz', 'frequency')
+    end if
     do i = 1, size(analysis%shown)
       associate (signal => analysis%response%quantities(analysis%shown(i))%signal_t)
         call list%add(signal)
@@ -318,42 +334,49 @@ contains
     type(response_summary_t), intent(in) :: summary
     type(verdict_t), intent(in) :: verdict
     real(wp), allocatable :: unstable(:)
+    type(response_axis_t) :: axis
     integer :: i
 
+    axis = analysis%settings%axis
     call json%open_report(input%file, input%title())
     call verdict%put(json)
     call json%put('wall_time_s', analysis%wall_time)
     call json%put('notes', analysis%notes)
     if (size(analysis%unstable) > 0) then
-      unstable = analysis%unstable%speed
-      call json%put('unstable_speeds_rad_s', unstable)
+      unstable = axis%stored(analysis%unstable%speed)
+      call json%put('unstable_' // trim(merge('frequencies_Hz', 'speeds_rad_s  ', axis%is_frequency)), unstable)
     end if
+    if (axis%is_frequency) call json%put('excitation', analysis%settings%shaker_name)
     call json%put('body', analysis%body_name)
-    call json%put('speed_rad_s', [analysis%settings%speeds(1), analysis%settings%speeds(size(analysis%settings%speeds))])
+    associate (points => analysis%settings%speeds)
+      call json%put(axis%key(''), axis%stored([points(1), points(size(points))]))
+    end associate
     if (size(analysis%settings%operating) > 0) then
       call json%put('operating_rad_s', analysis%settings%operating)
       call json%put('margin', analysis%settings%margin)
     end if
     call json%open_list('lines')
-    do i = 1, size(analysis%response%lines)
+    do i = 1, merge(0, size(analysis%response%lines), axis%is_frequency)
       call json%open()
       call put_line(json, analysis, i)
       call json%close()
     end do
     call json%close_list()
     if (analysis%modes%modes > 0) call json%put('modes_numbered_at_rad_s', analysis%modes%numbered_at)
-    call json%open_list('critical_speeds')
+    call json%open_list(trim(merge('resonances     ', 'critical_speeds', axis%is_frequency)))
     do i = 1, size(summary%criticals)
       call json%open()
       call put_mode(json, analysis%response%machine, analysis%modes, summary%criticals(i)%crossing%mode)
-      call put_line(json, analysis, summary%criticals(i)%crossing%line)
-      call json%put('speed_rad_s', summary%criticals(i)%crossing%speed)
+      if (.not. axis%is_frequency) then
+        call put_line(json, analysis, summary%criticals(i)%crossing%line)
+        call json%put('speed_rad_s', summary%criticals(i)%crossing%speed)
+      end if
       call json%put('frequency_Hz', summary%criticals(i)%crossing%frequency / turn)
       call json%put('damping_ratio', summary%criticals(i)%crossing%damping_ratio)
       if (summary%criticals(i)%quantity > 0) then
         call json%put('coupling', analysis%response%quantities(summary%criticals(i)%quantity)%element)
         if (.not. summary%criticals(i)%is_unbounded) then
-          call json%put('peak_speed_rad_s', summary%criticals(i)%speed)
+          call json%put(axis%key('peak_'), axis%stored(summary%criticals(i)%speed))
           call json%put('moment_N_m', summary%criticals(i)%amplitude)
           if (summary%criticals(i)%stress > 0) call json%put('stress_Pa', summary%criticals(i)%stress)
           call json%put('half_range_N_m', summary%criticals(i)%half_range)
@@ -396,18 +419,19 @@ contains
     call json%open_list('largest')
     do i = 1, size(analysis%shown)
       q = analysis%shown(i)
-      associate (largest => summary%largest(q), points => analysis%response%points, one => analysis%response%quantities(q))
+      associate (largest => summary%largest(q), points => analysis%response%points, one => analysis%response%quantities(q), &
+                 axis => analysis%settings%axis)
         call json%open()
         call json%put('quantity', one%name)
         call json%put('unit', one%unit)
         call json%put('half_range', largest%half_range)
-        call json%put('half_range_speed_rad_s', points(largest%half_point)%state%speed)
-        call json%put('half_range_by_order', abs(points(largest%half_point)%quantity(:, q)))
+        call json%put(axis%key('half_range_'), axis%stored(points(largest%half_point)%state%speed))
+        if (.not. axis%is_frequency) call json%put('half_range_by_order', abs(points(largest%half_point)%quantity(:, q)))
         call json%put('peak', largest%peak)
-        call json%put('peak_speed_rad_s', points(largest%peak_point)%state%speed)
+        call json%put(axis%key('peak_'), axis%stored(points(largest%peak_point)%state%speed))
         if (largest%ratio_point > 0) then
           call json%put('ratio_to_limit', largest%ratio)
-          call json%put('ratio_speed_rad_s', points(largest%ratio_point)%state%speed)
+          call json%put(axis%key('ratio_'), axis%stored(points(largest%ratio_point)%state%speed))
         end if
         if (largest%peak_ratio > 0) call json%put('peak_ratio_to_limit', largest%peak_ratio)
         call json%close()
@@ -423,14 +447,14 @@ contains
     type(response_summary_t), intent(in) :: summary
     integer :: i
 
-    call json%open_list('barred_speed_ranges')
+    call json%open_list(trim(merge('barred_frequency_ranges', 'barred_speed_ranges    ', analysis%settings%axis%is_frequency)))
     do i = 1, size(summary%barred)
-      associate (range => summary%barred(i), limit => analysis%limits(summary%barred(i)%limit))
+      associate (range => summary%barred(i), limit => analysis%limits(summary%barred(i)%limit), axis => analysis%settings%axis)
         call json%open()
         call json%put('quantity', analysis%response%quantities(limit%quantity)%name)
         call json%put('limit_at', input%place(limit%group, ''))
-        call json%put('from_rad_s', range%from)
-        call json%put('to_rad_s', range%to)
+        call json%put(trim(merge('from_Hz   ', 'from_rad_s', axis%is_frequency)), axis%stored(range%from))
+        call json%put(trim(merge('to_Hz   ', 'to_rad_s', axis%is_frequency)), axis%stored(range%to))
         if (range%has_tolerance) call json%put('with_tolerance_rad_s', range%barred)
         call json%put('can_be_passed', range%can_be_passed)
         call json%put('is_allowed', range%is_allowed)
@@ -455,7 +479,8 @@ contains
         call json%put('element', item%element)
         call json%put('quantity', item%quantity)
         call json%put('largest_damage_per_hour', item%rate(item%largest))
-        call json%put('speed_rad_s', analysis%response%points(item%largest)%state%speed)
+        call json%put(analysis%settings%axis%key(''), &
+                      analysis%settings%axis%stored(analysis%response%points(item%largest)%state%speed))
         call json%put('mean_exceeds_strength', item%exceeds_strength)
         if (size(item%hours) > 0) then
           call json%put('profile_speeds_rad_s', item%speeds)

@@ -3,6 +3,7 @@ module nocdyn_response_notes
   use nocdyn_critical_speeds, only: crossing_t
   use nocdyn_element_sets, only: element_names
   use nocdyn_errors, only: error_t
+  use nocdyn_excitation_lines, only: list_sources, source_t
   use nocdyn_forced_response, only: forced_response_t
   use nocdyn_held_speeds, only: held_state_t
   use nocdyn_input, only: input_t
@@ -27,7 +28,7 @@ module nocdyn_response_notes
   private
 
   public :: note_simplifications, note_steady_states, note_separation, note_linear_ranges, note_overloads, note_rated_speeds, &
-    note_rules
+    note_other_excitations, note_rules
   public :: note_numbers, note_shaft_modes
 
 contains
@@ -111,7 +112,8 @@ contains
       end do
       if (open == 0) cycle
       call append(notes, quoted(names(e)%text) // ' has no stiffness at ' // to_text(open) // ' of ' // &
-                         to_text(size(response%points)) // ' speeds: it is inside its gap, whose edge counts as inside, ' // &
+                         to_text(size(response%points)) // ' ' // response%axis%plural() // &
+                         ': it is inside its gap, whose edge counts as inside, ' // &
                          'or its law is level there')
     end do
     call note_mean_slopes(response%machine, steepest_slopes(response), notes)
@@ -121,7 +123,7 @@ contains
         power(:, i) = state%mean(e) * state%rate(e)
       end associate
     end do
-    call note_power_signs(response%machine, power, 'W', 'speeds', notes)
+    call note_power_signs(response%machine, power, 'W', response%axis%plural(), notes)
     held = 0
     do i = 1, size(response%points)
       if (abs(response%points(i)%state%torque) > 0) held = held + 1
@@ -206,7 +208,8 @@ contains
     if (size(names) == 0) return
     call append(notes, 'the losses of ' // joined(names, ', ', most_names) // ' are left out, at the mean torques up to ' // &
                        rounded_text(largest, 4) // ' N m on the first wheel of ' // quoted(names(worst)%text) // ' at ' // &
-                       rounded_text(from_si(response%points(worst_point)%state%speed, unit_rpm), 6) // ' rpm')
+                       rounded_text(response%axis%shown(response%points(worst_point)%state%speed), 6) // ' ' // &
+                       response%axis%unit())
   end subroutine note_losses
 
   !> The torque that teeth would take from their first wheel in a steady state [N m].
@@ -242,7 +245,8 @@ contains
         end do
         if (open == 0) cycle
         call append(notes, quoted(one%element) // ' oscillates by more than its mean at ' // to_text(open) // ' of ' // &
-                           to_text(size(response%points)) // ' speeds and leaves contact: the linear response does not hold ' // &
+                           to_text(size(response%points)) // ' ' // response%axis%plural() // &
+                           ' and leaves contact: the linear response does not hold ' // &
                            'there; nocdyn run gives the motion')
       end associate
     end do
@@ -269,9 +273,11 @@ contains
           change = rounded_text(one%equivalent, 3) // ', and about 0 at its mean'
         end if
         call append(notes, 'over the vibration of ' // quoted(response%machine%element_name(one%element)) // ' at ' // &
-                           rounded_text(from_si(response%points(one%worst)%state%speed, unit_rpm), 6) // ' rpm its ' // law // &
+                           rounded_text(response%axis%shown(response%points(one%worst)%state%speed), 6) // ' ' // &
+                           response%axis%unit() // ' its ' // law // &
                            ' is on average ' // change // '; by more than 1 % at ' // to_text(one%points) // ' of ' // &
-                           to_text(size(response%points)) // ' speeds: the linear response does not hold there, nocdyn run ' // &
+                           to_text(size(response%points)) // ' ' // response%axis%plural() // &
+                           ': the linear response does not hold there, nocdyn run ' // &
                            'gives the motion')
       end associate
     end do
@@ -305,13 +311,28 @@ contains
         if (slipping == 0) cycle
         call allowed_torques(constraints%least(row), constraints%most(row), allowed)
         call append(notes, constraints%kinds(row)%text // ' ' // quoted(constraints%names(row)%text) // ' does not hold at ' // &
-                           to_text(slipping) // ' of ' // to_text(size(points)) // ' speeds: locked it would carry up to ' // &
+                           to_text(slipping) // ' of ' // to_text(size(points)) // ' ' // response%axis%plural() // &
+                           ': locked it would carry up to ' // &
                            rounded_text(points(worst)%peak(q), 4) // ' N m at ' // &
-                           rounded_text(from_si(points(worst)%state%speed, unit_rpm), 6) // ' rpm; allowed: ' // &
+                           rounded_text(response%axis%shown(points(worst)%state%speed), 6) // ' ' // response%axis%unit() // &
+                           '; allowed: ' // &
                            allowed // ' N m; nocdyn run gives the motion')
       end do
     end associate
   end subroutine note_overloads
+
+  !> Excitations beside the shaker of a response over its frequency.
+  subroutine note_other_excitations(settings, response, notes)
+    type(response_settings_t), intent(in) :: settings
+    type(forced_response_t), intent(in) :: response
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    type(source_t), allocatable :: sources(:)
+
+    call list_sources(response%machine, response%points(1)%state, sources)
+    if (all(sources%element == settings%shaker)) return
+    call append(notes, 'the response is the one of ' // quoted(settings%shaker_name) // ' alone: the oscillations ' // &
+                       'that other excitations add are left out')
+  end subroutine note_other_excitations
 
   !> Rated speeds of the rule iacs_m68 that are far from the ones of the body of &response, to which they belong.
   subroutine note_rated_speeds(input, settings, notes)

@@ -8,7 +8,6 @@ module nocdyn_response_report
   use nocdyn_table_text, only: cell, padded, text_width
   use nocdyn_text, only: counted, quoted, rounded_text, to_text
   use nocdyn_text_buffer, only: text_buffer_t
-  use nocdyn_units, only: from_si, unit_rpm
   implicit none (type, external)
   private
 
@@ -34,10 +33,15 @@ contains
       call report%append_line(file // ': note: ' // analysis%notes(i)%text)
     end do
     associate (speeds => analysis%settings%speeds)
-      range = 'at ' // rpm(speeds(1))
-      if (size(speeds) > 1) range = 'from ' // rpm(speeds(1)) // ' to ' // rpm(speeds(size(speeds)))
-      call report%append_line(file // ': forced response ' // range // ' rpm of ' // analysis%body_name // ', ' // &
-                              counted(size(analysis%response%lines), 'order', 'orders'))
+      range = 'at ' // shown(analysis, speeds(1))
+      if (size(speeds) > 1) range = 'from ' // shown(analysis, speeds(1)) // ' to ' // shown(analysis, speeds(size(speeds)))
+      range = file // ': forced response ' // range // ' ' // analysis%settings%axis%unit() // ' of '
+      if (analysis%settings%axis%is_frequency) then
+        call report%append_line(range // 'excitation ' // analysis%settings%shaker_name)
+      else
+        call report%append_line(range // analysis%body_name // ', ' // &
+                                counted(size(analysis%response%lines), 'order', 'orders'))
+      end if
     end associate
     call put_criticals(analysis, summary, report)
     call put_largest(analysis, summary, report)
@@ -45,12 +49,22 @@ contains
     text = report%text()
   end function response_text
 
-  function rpm(speed) result(text)
-    real(wp), intent(in) :: speed   !! [rad/s]
+  !> A speed in rpm, or a frequency in Hz.
+  function shown(analysis, point) result(text)
+    type(response_analysis_t), intent(in) :: analysis
+    real(wp), intent(in) :: point   !! [rad/s]
     character(len=:), allocatable :: text
 
-    text = rounded_text(from_si(speed, unit_rpm), 6)
-  end function rpm
+    text = rounded_text(analysis%settings%axis%shown(point), 6)
+  end function shown
+
+  !> The heading of such a column.
+  pure function at_heading(analysis) result(text)
+    type(response_analysis_t), intent(in) :: analysis
+    character(len=:), allocatable :: text
+
+    text = 'at [' // analysis%settings%axis%unit() // ']'
+  end function at_heading
 
   !> Mode by order.
   subroutine put_criticals(analysis, summary, report)
@@ -62,15 +76,19 @@ contains
     logical :: has_ratio, has_stress
 
     if (size(summary%criticals) == 0) then
-      call report%append_line('  no order meets a natural frequency in this range')
+      if (analysis%settings%axis%is_frequency) call report%append_line('  no natural frequency is in this range')
+      if (.not. analysis%settings%axis%is_frequency) then
+        call report%append_line('  no order meets a natural frequency in this range')
+      end if
       return
     end if
     width = maxval([8, (text_width(coupling_name(analysis, summary%criticals(i))), i=1, size(summary%criticals))])
     order_width = 2 + maxval([6, (len(order_word(analysis, summary%criticals(i))), i=1, size(summary%criticals))])
     has_ratio = any(summary%criticals%ratio > 0)
     has_stress = any(summary%criticals%stress > 0)
-    line = '  mode  frequency [Hz]' // right('order', order_width) // '  critical [rpm]  damping ratio  ' // &
-           padded('coupling', width) // cell('moment [N m]') // cell('at [rpm]')
+    line = '  mode  frequency [Hz]' // right('order', order_width) // '  critical [rpm]  damping ratio  '
+    if (analysis%settings%axis%is_frequency) line = '  mode  resonance [Hz]  damping ratio  '
+    line = line // padded('coupling', width) // cell('moment [N m]') // cell(at_heading(analysis))
     if (has_stress) line = line // cell('stress [MPa]')
     if (has_ratio) line = line // cell('of limit')
     if (size(analysis%settings%operating) > 0) line = line // '  distance to operation'
@@ -107,11 +125,13 @@ contains
     integer, intent(in) :: order_width, width   !! of the orders, of the names
     logical, intent(in) :: has_stress, has_ratio
     type(text_buffer_t), intent(inout) :: report
-    character(len=:), allocatable :: line, stress
+    character(len=:), allocatable :: at_order, line, stress
 
+    at_order = ''
+    if (.not. analysis%settings%axis%is_frequency) at_order = right(order_word(analysis, critical), order_width) // &
+                                                              right(shown(analysis, critical%crossing%speed), 16)
     line = right(to_text(critical%crossing%mode), 6) // right(rounded_text(critical%crossing%frequency / turn, 7), 16) // &
-           right(order_word(analysis, critical), order_width) // &
-           right(rpm(critical%crossing%speed), 16) // right(rounded_text(critical%crossing%damping_ratio, 3), 15) // &
+           at_order // right(rounded_text(critical%crossing%damping_ratio, 3), 15) // &
            '  ' // padded(coupling_name(analysis, critical), width)
     if (critical%quantity == 0) then
       call report%append_line(line)
@@ -120,7 +140,7 @@ contains
     if (critical%is_unbounded) then
       line = line // cell('unbounded') // cell('')
     else
-      line = line // cell(amplitude_text(analysis, critical)) // cell(rpm(critical%speed))
+      line = line // cell(amplitude_text(analysis, critical)) // cell(shown(analysis, critical%speed))
     end if
     stress = ''
     if (critical%stress > 0) stress = rounded_text(critical%stress / mega, 4)
@@ -174,9 +194,11 @@ contains
       if (shown == 0) return
       width = maxval([(text_width(quantities(analysis%shown(q))%name // ' [' // quantities(analysis%shown(q))%unit // ']'), &
                        q=1, shown)])
-      line = '  ' // padded('largest', width) // cell('half range') // cell('at [rpm]') // cell('peak') // cell('at [rpm]')
-      if (any(summary%largest%ratio > 0)) line = line // cell('of limit') // cell('at [rpm]')
-      call report%append_line(line // '  orders in the half range')
+      line = '  ' // padded('largest', width) // cell('half range') // cell(at_heading(analysis)) // cell('peak') // &
+             cell(at_heading(analysis))
+      if (any(summary%largest%ratio > 0)) line = line // cell('of limit') // cell(at_heading(analysis))
+      if (.not. analysis%settings%axis%is_frequency) line = line // '  orders in the half range'
+      call report%append_line(line)
       do q = 1, shown
         call put_largest_of(analysis, summary, analysis%shown(q), width, report)
       end do
@@ -196,14 +218,15 @@ contains
 
     associate (largest => summary%largest(q), points => analysis%response%points, one => analysis%response%quantities(q))
       line = '  ' // padded(one%name // ' [' // one%unit // ']', width) // &
-             cell(rounded_text(largest%half_range, 5)) // cell(rpm(points(largest%half_point)%state%speed)) // &
-             cell(rounded_text(largest%peak, 5)) // cell(rpm(points(largest%peak_point)%state%speed))
+             cell(rounded_text(largest%half_range, 5)) // cell(shown(analysis, points(largest%half_point)%state%speed)) // &
+             cell(rounded_text(largest%peak, 5)) // cell(shown(analysis, points(largest%peak_point)%state%speed))
       if (largest%ratio_point > 0) then
-        line = line // cell(ratio_text(largest%ratio)) // cell(rpm(points(largest%ratio_point)%state%speed))
+        line = line // cell(ratio_text(largest%ratio)) // cell(shown(analysis, points(largest%ratio_point)%state%speed))
       else if (any(summary%largest%ratio > 0)) then
         line = line // cell('') // cell('')
       end if
-      call report%append_line(line // '  ' // orders_text(analysis, points(largest%half_point), q))
+      if (.not. analysis%settings%axis%is_frequency) line = line // '  ' // orders_text(analysis, points(largest%half_point), q)
+      call report%append_line(line)
     end associate
   end subroutine put_largest_of
 
@@ -247,9 +270,9 @@ contains
         line = '  fatigue ' // quoted(item%name) // ': '
         if (item%rate(item%largest) > 0) then
           line = line // 'damage per hour up to ' // rounded_text(item%rate(item%largest), 4) // ' at ' // &
-                 rpm(points(item%largest)%state%speed) // ' rpm'
+                 shown(analysis, points(item%largest)%state%speed) // ' ' // analysis%settings%axis%unit()
         else
-          line = line // 'no damage at any speed'
+          line = line // 'no damage at any ' // analysis%settings%axis%noun()
         end if
         if (size(item%hours) > 0) then
           line = line // '; damage of the profile of ' // rounded_text(sum(item%hours), 6) // ' h: ' // &

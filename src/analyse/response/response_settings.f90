@@ -1,16 +1,17 @@
 !> What &response asks for: body, speeds, orders, speeds in operation.
 module nocdyn_response_settings
+  use nocdyn_bank, only: role_excitation
   use nocdyn_element_groups, only: bodies_of, new_body_index
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_limit_rules, only: load_rule
   use nocdyn_machine, only: machine_t
+  use nocdyn_response_axes, only: response_axis_t
   use nocdyn_response_limits, only: read_limits, response_limit_t
   use nocdyn_moment_forms, only: list_moment_forms, moment_form_t
   use nocdyn_rule_files, only: rule_t
-  use nocdyn_text, only: counted, rounded_text
-  use nocdyn_units, only: from_si, unit_rpm
+  use nocdyn_text, only: append, counted, joined, quoted, rounded_text, string_t
   implicit none (type, external)
   private
 
@@ -19,13 +20,18 @@ module nocdyn_response_settings
   type, public :: response_settings_t
     integer :: group = 0                        !! &response in the input
     integer :: body = 0                         !! whose speed is held
-    real(wp), allocatable :: speeds(:)          !! of the grid, from `speed(1)` to `speed(2)` [rad/s]
+    type(response_axis_t) :: axis
+    integer :: shaker = 0                       !! element whose frequency is varied, 0: speeds are
+    character(len=:), allocatable :: shaker_name
+    real(wp), allocatable :: speeds(:)          !! of the grid, from `speed(1)` to `speed(2)`, or frequencies [rad/s]
     real(wp), allocatable :: orders(:)          !! oscillations per turn of the body; empty: the ones of the excitations
     real(wp), allocatable :: operating(:)       !! lowest and highest speed in operation [rad/s]; empty: unknown
     real(wp) :: margin = 0.0_wp                 !! as a share of the speed
     logical :: has_margin_rule = .false.
     type(rule_t) :: margin_rule                 !! with the margin of each critical speed
   end type response_settings_t
+
+  integer, parameter :: most_names = 6   ! of excitations in a message
 
 contains
 
@@ -47,14 +53,21 @@ contains
     end if
     settings%group = groups(1)
     associate (group => input%groups(groups(1)))
-      bodies = bodies_of(group, 'body', new_body_index(machine%names))
-      settings%body = bodies(1)
+      settings%axis%is_frequency = group%has_value('frequency')
+      if (settings%axis%is_frequency) then
+        call find_shaker(input, machine, settings, error)
+        if (.not. allocated(error)) call refuse_speed_rules(input, error)
+        if (allocated(error)) return
+      else
+        bodies = bodies_of(group, 'body', new_body_index(machine%names))
+        settings%body = bodies(1)
+      end if
       settings%orders = group%numbers('orders')
       settings%operating = group%numbers('operating')
       settings%margin = group%number('margin', absent=0.0_wp)
       settings%has_margin_rule = group%has_value('margin_rule') .or. group%has_value('margin_rule_file')
       count = group%whole_number('count')
-      range = group%numbers('speed')
+      range = group%numbers(trim(settings%axis%noun()))
     end associate
     associate (last => range(size(range)))
       if (.not. abs(last - range(1)) > 0) count = 1
@@ -63,6 +76,70 @@ contains
     end associate
     if (settings%has_margin_rule) call load_rule(input, groups(1), 'margin_', settings%margin_rule, error)
   end subroutine read_response_settings
+
+  !> Finds the shaker: the harmonic excitation that &response names, or the only one.
+  subroutine find_shaker(input, machine, settings, error)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    type(response_settings_t), intent(inout) :: settings
+    type(error_t), allocatable, intent(out) :: error
+    type(string_t), allocatable :: shakers(:)
+    integer, allocatable :: groups(:)
+    character(len=:), allocatable :: text
+    integer :: b, e, i
+
+    allocate (groups, source=input%groups_named('excitation'))
+    allocate (shakers(0))
+    do i = 1, size(groups)
+      if (input%groups(groups(i))%text('kind') /= 'harmonic') cycle
+      if (input%groups(groups(i))%number('frequency') > 0) call append(shakers, input%groups(groups(i))%name)
+    end do
+    associate (group => input%groups(settings%group))
+      settings%shaker_name = ''
+      if (size(shakers) == 1) settings%shaker_name = shakers(1)%text
+      if (group%has_value('excitation')) settings%shaker_name = group%text('excitation')
+      if (.not. any([(shakers(i)%text == settings%shaker_name, i=1, size(shakers))])) then
+        text = ': several harmonic excitations may be the shaker'
+        if (size(shakers) == 0) text = ": there is no shaker; required: an &excitation of kind 'harmonic' with a frequency"
+        if (group%has_value('excitation')) text = ': ' // quoted(settings%shaker_name) // ' is no harmonic excitation'
+        if (size(shakers) > 0) text = text // '; allowed: excitation = ' // joined(shakers, ', ', most_names)
+        call raise(error, exit_input, input%location(settings%group, trim(merge('excitation', 'frequency ', &
+                                                                                group%has_value('excitation')))) // text)
+        return
+      end if
+    end associate
+    do b = 1, size(machine%banks)
+      associate (bank => machine%banks(b)%bank)
+        if (bank%role /= role_excitation .or. bank%is_engine) cycle
+        do e = 1, bank%count
+          if (bank%names(e)%text /= settings%shaker_name) cycle
+          settings%shaker = bank%first + e - 1
+          settings%body = bank%rows%last_body(e)
+        end do
+      end associate
+    end do
+  end subroutine find_shaker
+
+  !> Refuses limits of rules, which are for speeds, in a response over the frequency.
+  subroutine refuse_speed_rules(input, error)
+    type(input_t), intent(in) :: input
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: key
+    integer :: i
+
+    do i = 1, size(input%groups)
+      associate (group => input%groups(i))
+        key = ''
+        if (group%kind /= 'limit') cycle
+        if (group%has_value('rule')) key = 'rule'
+        if (group%has_value('rule_file')) key = 'rule_file'
+        if (key == '') cycle
+      end associate
+      call raise(error, exit_input, input%location(i, key) // ': ' // key // ' is for speeds, and &response is over the ' // &
+                 'frequency of a shaker')
+      return
+    end do
+  end subroutine refuse_speed_rules
 
   !> Checks &response and &limit, if there are any.
   subroutine check_response(input, machine, text, error)
@@ -81,9 +158,11 @@ contains
     call list_moment_forms(machine, settings%body, quantities)
     call read_limits(input, quantities, limits, error)
     associate (speeds => settings%speeds)
-      text = new_line('a') // '  response: ' // counted(size(speeds), 'speed', 'speeds') // ' of ' // &
-             machine%names(settings%body)%text // ' from ' // rounded_text(from_si(speeds(1), unit_rpm), 6) // ' to ' // &
-             rounded_text(from_si(speeds(size(speeds)), unit_rpm), 6) // ' rpm'
+      text = new_line('a') // '  response: ' // counted(size(speeds), settings%axis%noun(), settings%axis%plural()) // ' of '
+      if (settings%axis%is_frequency) text = text // settings%shaker_name
+      if (.not. settings%axis%is_frequency) text = text // machine%names(settings%body)%text
+      text = text // ' from ' // rounded_text(settings%axis%shown(speeds(1)), 6) // ' to ' // &
+             rounded_text(settings%axis%shown(speeds(size(speeds))), 6) // ' ' // settings%axis%unit()
     end associate
   end subroutine check_response
 
@@ -104,8 +183,9 @@ contains
 
     if (.not. allocated(error)) return
     if (error%code == exit_failed) then
-      error%message = input%location(settings%group, 'speed') // ': at ' // rounded_text(from_si(speed, unit_rpm), 6) // &
-                      ' rpm (' // rounded_text(speed, 6) // ' rad/s): ' // error%message
+      error%message = input%location(settings%group, settings%axis%noun()) // ': at ' // &
+                      rounded_text(settings%axis%shown(speed), 6) // ' ' // settings%axis%unit() // ' (' // &
+                      rounded_text(speed, 6) // ' rad/s): ' // error%message
     else
       error%message = input%location(settings%group) // ': ' // error%message
     end if

@@ -210,8 +210,8 @@ contains
       associate (point => points(worst(1)), frequency => points(worst(1))%frequency(worst(2)))
         call line%compare(abs(point%quantity(worst(2), limit%quantity)), limit%amplitude_limit(frequency), line%unit)
         call line%stand_at(point%state%speed)
-        line%detail = title_of(analysis%response%lines(worst(2))) // ', ' // &
-                      rounded_text(from_si(frequency, unit_hz), 4) // ' Hz'
+        if (.not. line%are_frequencies) line%detail = title_of(analysis%response%lines(worst(2))) // ', ' // &
+                                                      rounded_text(from_si(frequency, unit_hz), 4) // ' Hz'
       end associate
       line%rule = ''
       call verdict%add(line)
@@ -307,6 +307,7 @@ contains
         line = new_verdict_line('response', one%element_kind // ' ' // quoted(one%element), one%name, &
                                 in_words(one%symbol) // ', ' // what, input%place(limit%group, ''))
         line%unit = one%unit
+        line%are_frequencies = analysis%settings%axis%is_frequency
       end associate
       call limit%write_rule(line%rule)
     end associate

@@ -29,6 +29,7 @@ module nocdyn_analyses
     logical :: is_steady = .true.       !! whether it looks at the machine in a steady state, else over the time
     logical :: locks_joints = .true.    !! whether clutches and freewheels are locked or open for good then
     logical :: takes_joints = .false.   !! whether it takes joints as they are, as a run does
+    logical :: sets_speed = .false.     !! whether it sets the speed of a body, in place of a drive
     logical :: always_writes = .false.  !! whether it writes files without --out too
     logical :: has_report = .true.      !! whether it has a report in JSON
     logical :: is_for_threads = .false. !! whether threads may call `solve` at the same time

@@ -5,7 +5,7 @@ module nocdyn_verdicts
   use nocdyn_table_text, only: padded, text_width
   use nocdyn_text, only: quoted, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
-  use nocdyn_units, only: from_si, unit_rpm
+  use nocdyn_units, only: from_si, unit_hz, unit_rpm
   implicit none (type, external)
   private
 
@@ -37,6 +37,7 @@ module nocdyn_verdicts
     real(wp) :: ratio = 0.0_wp                      !! above 1: the limit is exceeded
     integer :: speeds = 0                           !! number of the speeds that follow: at one, or from one to another
     real(wp) :: speed(2) = 0.0_wp                   !! [rad/s]
+    logical :: are_frequencies = .false.            !! whether they are frequencies of a shaker
     logical :: has_time = .false.
     real(wp) :: time = 0.0_wp                       !! [s]
   contains
@@ -216,8 +217,13 @@ contains
       call json%put('unit', line%unit)
     end if
     if (line%has_ratio) call json%put('ratio', line%ratio)
-    if (line%speeds == 1) call json%put('speed_rad_s', line%speed(1))
-    if (line%speeds == 2) call json%put('speeds_rad_s', line%speed)
+    if (line%are_frequencies) then
+      if (line%speeds == 1) call json%put('frequency_Hz', from_si(line%speed(1), unit_hz))
+      if (line%speeds == 2) call json%put('frequencies_Hz', from_si(line%speed, unit_hz))
+    else
+      if (line%speeds == 1) call json%put('speed_rad_s', line%speed(1))
+      if (line%speeds == 2) call json%put('speeds_rad_s', line%speed)
+    end if
     if (line%has_time) call json%put('time', line%time)
     if (line%detail /= '') call json%put('detail', line%detail)
     call json%close()
@@ -366,16 +372,16 @@ contains
   subroutine write_place(self, text)
     class(verdict_line_t), intent(in) :: self
     character(len=:), allocatable, intent(out) :: text
-    real(wp) :: speed(2)   ! [rpm]
+    real(wp) :: speed(2)   ! [rpm] or [Hz]
     integer :: all_digits
 
     text = ''
-    speed = from_si(self%speed, unit_rpm)
+    speed = from_si(self%speed, merge(unit_hz, unit_rpm, self%are_frequencies))
     all_digits = digits
     if (self%speeds == 2 .and. rounded_text(speed(1), digits) == rounded_text(speed(2), digits)) all_digits = more_digits
     if (self%speeds > 0) text = rounded_text(speed(1), all_digits)
     if (self%speeds > 1) text = text // ' to ' // rounded_text(speed(2), all_digits)
-    if (self%speeds > 0) text = text // ' rpm'
+    if (self%speeds > 0) text = text // trim(merge(' Hz ', ' rpm', self%are_frequencies))
     if (self%has_time) text = 't = ' // rounded_text(self%time, digits) // ' s'
     if (self%detail == '') return
     if (text /= '') text = text // ', '

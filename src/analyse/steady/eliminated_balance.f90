@@ -86,7 +86,7 @@ contains
     end if
     call set_basis(self%row, self%basis)
     do e = 1, size(elements)
-      self%knees = [self%knees, knees_along(self, element_knees(balance, elements(e)), rows(e, :))]
+      self%knees = [self%knees, knees_along(self, element_knees(balance, elements(e)) - balance%driven(elements(e)), rows(e, :))]
     end do
     call collect_rising(self, pack(elements, rises), rows(pack([(e, e=1, size(rises))], rises), :))
   end subroutine new_eliminated_balance
@@ -105,7 +105,8 @@ contains
       do e = 1, size(elements)
         ratios = matmul(rows(e, :), self%basis)
         if (count(abs(ratios) > 0.0_wp) /= 1 .or. abs(ratios(k)) <= 0.0_wp) cycle
-        self%rising(k)%knees = [self%rising(k)%knees, element_knees(self%balance, elements(e)) / ratios(k)]
+        self%rising(k)%knees = [self%rising(k)%knees, (element_knees(self%balance, elements(e)) &
+                                                       - self%balance%driven(elements(e))) / ratios(k)]
       end do
     end do
   end subroutine collect_rising

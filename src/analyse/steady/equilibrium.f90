@@ -166,6 +166,11 @@ contains
     integer :: i
 
     call set_up_balance(formulation, t, balance, is_at_rest)
+    if (balance%motions%contradiction > 0) then
+      call raise(error, exit_failed, 'joints cannot be at rest where drives turn them')
+      call move_alloc(balance%formulation, formulation)
+      return
+    end if
     call hold_floating(balance)
     if (balance%joints%count > 0) then   ! dense matrices
       resting = new_resting_joints(balance)

@@ -1,16 +1,44 @@
-!> What drives a machine whose speed is held: the frequency of the supplies of motors; the speed control, whose governors have
-!> that speed as the set one, and a throttle between its limits that follows the oscillations.
+!> What drives a machine whose speed is held: its motors or engines; the frequency of the supplies of motors; the speed control,
+!> whose governors have that speed as the set one, and a throttle between its limits that follows the oscillations. Where a drive
+!> holds the speed, the speeds of what it leaves free.
 module nocdyn_held_drives
-  use nocdyn_bank, only: bank_of
+  use nocdyn_balance_starts, only: solve_by_newton
+  use nocdyn_bank, only: bank_of, role_bearing, role_excitation, role_motor
+  use nocdyn_block_solutions, only: block_solutions_t
+  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability, nearest_equilibrium, t_infinity
+  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_formulation, only: formulation_t
   use nocdyn_governed_banks, only: governed_bank_t
   use nocdyn_kinds, only: wp
+  use nocdyn_text, only: quoted, string_t
   use nocdyn_torque_balance, only: torque_balance_t
   implicit none (type, external)
   private
 
-  public :: all_follow, close_speed_loops, idle_share, set_supplies
+  public :: all_follow, close_speed_loops, find_free_speeds, follow_free_speeds, idle_share, refuse_standing_friction, &
+    set_supplies, sources_of
 
 contains
+
+  !> The elements that drive: motors; if there are none, the cylinders of engines.
+  function sources_of(balance) result(sources)
+    type(torque_balance_t), intent(in) :: balance
+    integer, allocatable :: sources(:)
+    integer :: b, i, role
+    logical :: is_source(size(balance%inelastic))
+
+    do role = role_motor, role_excitation
+      is_source = .false.
+      do b = 1, size(balance%formulation%machine%banks)
+        associate (bank => balance%formulation%machine%banks(b)%bank)
+          if (bank%role /= role .or. (role == role_excitation .and. .not. bank%is_engine)) cycle
+          is_source = is_source .or. (balance%inelastic >= bank%first .and. balance%inelastic <= bank%last())
+        end associate
+      end do
+      sources = pack([(i, i=1, size(is_source))], is_source)
+      if (size(sources) > 0) return
+    end do
+  end function sources_of
 
   !> Whether all that drives can follow the frequency of a supply.
   logical function all_follow(balance, sources)
@@ -104,5 +132,65 @@ contains
       end if
     end associate
   end subroutine close_loop
+
+  !> Finds the steady state that is nearest to the start, a stable one if there is one.
+  subroutine find_free_speeds(balance, z, error)
+    type(torque_balance_t), intent(in) :: balance
+    real(wp), intent(inout) :: z(:)                      !! rigid motions and internal states
+    type(error_t), allocatable, intent(out) :: error     !! there is none, or none was found
+    class(formulation_t), allocatable :: formulation
+    type(equilibrium_t), allocatable :: equilibria(:)
+    type(string_t), allocatable :: notes(:)
+    integer :: nearest
+
+    if (size(z) == 0) return
+    call find_equilibria(balance%formulation%machine, t_infinity, formulation, equilibria, notes, error)
+    if (allocated(error)) return
+    if (size(equilibria) > 1) call find_stability(formulation, t_infinity, equilibria)
+    nearest = nearest_equilibrium(formulation, equilibria)
+    associate (y => equilibria(nearest)%y)
+      z = [y(1, balance%motions%free), y(1, 2 * balance%coordinates + 1:)]
+    end associate
+  end subroutine find_free_speeds
+
+  !> Follows a steady state that is near, by Newton's method; searches for one if that fails.
+  subroutine follow_free_speeds(balance, z, error)
+    type(torque_balance_t), intent(inout) :: balance
+    real(wp), intent(inout) :: z(:)                      !! rigid motions and internal states
+    type(error_t), allocatable, intent(out) :: error
+    type(block_solutions_t) :: block
+    real(wp) :: ahead(size(z))
+    integer :: i
+
+    if (size(z) == 0) return
+    block%members = [(i, i=1, size(z))]
+    allocate (block%values(size(z), 0), block%is_range(0))
+    ahead = z
+    call solve_by_newton(balance, ahead, block)
+    if (size(block%values, 2) > 0) then
+      z = ahead
+    else
+      call find_free_speeds(balance, z, error)
+    end if
+  end subroutine follow_free_speeds
+
+  !> Refuses bearings with friction that stand still: whether they hold in vibrations is not known.
+  subroutine refuse_standing_friction(balance, error)
+    type(torque_balance_t), intent(in) :: balance   !! evaluated
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: none = 1.0e-10_wp        ! relative to the largest speed
+    integer :: j
+
+    associate (joints => balance%joints, machine => balance%formulation%machine, &
+               speed => balance%formulation%state%elements%speed)
+      do j = 1, joints%count
+        if (machine%banks(joints%bank(j))%bank%role /= role_bearing) cycle
+        if (abs(speed(1, joints%element(j))) > none * maxval(abs(speed(1, :)))) cycle
+        call raise(error, exit_failed, quoted(machine%element_name(joints%element(j))) // ' stands still: whether the ' // &
+                   'friction of its bearing holds in vibrations is not known; allowed: bearing_friction = 0 there')
+        return
+      end do
+    end associate
+  end subroutine refuse_standing_friction
 
 end module nocdyn_held_drives

@@ -5,13 +5,17 @@
 !> load asks for by the frequency of their supply instead: a factor would leave them at the slip of that speed on the mains, where
 !> their torque falls with the slip and their field is no spring. If there are no such motors, a torque on the reference body
 !> holds the speed. Governors leave their throttles open while the speed is found; then they hold it.
+!>
+!> A drive that turns the reference body holds its speed, whatever the torques are; drives that turn with it keep their ratios.
+!> What is free has the speeds at which its torques balance.
 module nocdyn_held_speeds
-  use nocdyn_bank, only: role_bearing, role_excitation, role_motor
+  use nocdyn_driven_speeds, only: moves_with
   use nocdyn_equilibrium, only: mean_formulation, t_infinity
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_finite, only: is_finite
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_held_drives, only: all_follow, close_speed_loops, idle_share, set_supplies
+  use nocdyn_held_drives, only: all_follow, close_speed_loops, find_free_speeds, follow_free_speeds, idle_share, &
+    refuse_standing_friction, set_supplies, sources_of
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_machine, only: machine_t
@@ -26,7 +30,7 @@ module nocdyn_held_speeds
 
   !> The machine linearised about a steady state. Moments act on `to` and, with the other sign, on `from`.
   type, public :: held_state_t
-    real(wp) :: speed = 0.0_wp    !! of the reference body [rad/s]
+    real(wp) :: speed = 0.0_wp    !! of the reference body, or the frequency of a shaker in a steady state [rad/s]
     real(wp) :: factor = 0.0_wp   !! on the torques of the motors that holds the speed; 0 if a torque does
     real(wp) :: supply = 0.0_wp   !! share of the frequency of the supplies that holds it; 0 if they do not follow
     real(wp) :: torque = 0.0_wp   !! on the reference body that holds the speed [N m]; 0 if the motors do
@@ -50,6 +54,11 @@ module nocdyn_held_speeds
     real(wp), allocatable, private :: q(:)           !! last angles of the coordinates [rad]
     type(twist_problem_t), private :: twists
     real(wp), private :: last_speed = 0.0_wp         !! of these
+    real(wp), allocatable, private :: carried(:)     !! speeds of the bodies that a drive turns with the reference body, per speed
+                                                     !! of that; not allocated: no drive turns it, [bodies]
+    logical, private :: is_free = .false.            !! whether nothing holds the speed: there is one steady state
+    type(held_state_t), allocatable, private :: steady   !! this one, once it is found
+    real(wp), allocatable, private :: beside(:)      !! speeds that other drives give the bodies [rad/s], [bodies]
     logical, private :: motors_hold = .false.        !! whether the motors hold the speed, else a torque
     logical :: supply_holds = .false.                !! whether they do so by the frequency of their supply
     real(wp), private :: slip = 0.0_wp               !! last share of the frequency beyond that without slip of the first motor
@@ -61,35 +70,82 @@ contains
 
   !> Prepares the search. A reference body that cannot turn steadily is refused. At a time a torque holds the speed, beside motors
   !> with their governors and supplies.
-  subroutine new_held_speeds(machine, reference, self, error, t)
+  subroutine new_held_speeds(machine, reference, self, error, is_free, t)
     type(machine_t), intent(in) :: machine   !! one lane
     integer, intent(in) :: reference         !! body
     type(held_speeds_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
-    real(wp), intent(in), optional :: t   !! the time [s]; absent: after all changes, and the drive holds the speed
-    class(formulation_t), allocatable :: formulation
+    logical, intent(in), optional :: is_free   !! whether it is the steady state nearest to the start; absent: no
+    real(wp), intent(in), optional :: t        !! the time [s]; absent: after all changes, and the drive holds the speed
 
-    call mean_formulation(machine, formulation, holds_speed=.not. present(t))
-    if (present(t)) then
-      call set_up_balance(formulation, t, self%balance)
-    else
-      call set_up_balance(formulation, t_infinity, self%balance)
-    end if
     self%reference = reference
-    allocate (self%ratio(size(self%balance%motions%free)))
-    call find_ratios(self%balance, reference, self%ratio)
+    if (present(is_free)) self%is_free = is_free
+    self%sources = [integer ::]
+    if (present(t)) then
+      call set_up(machine, .false., t, self)
+    else
+      call set_up(machine, .not. self%is_free, t_infinity, self)
+    end if
+    if (self%is_free) return
+    if (.not. any(abs(self%ratio) > 0) .and. allocated(machine%driven_speed)) then
+      if (abs(machine%driven_speed(reference)) > 0) call let_drive_hold(machine, self)
+      if (allocated(self%carried)) return
+    end if
     if (.not. any(abs(self%ratio) > 0)) then
       call raise(error, exit_input, quoted(machine%names(reference)%text) // ' is held by couplings or joints: it has no ' // &
-                 'steady speed but 0; allowed: a body that can turn on')
+                 'steady speed but 0; allowed: a body that can turn on, or frequency in place of speed')
       return
     end if
-    self%z = self%balance%start()
-    allocate (self%q(self%balance%coordinates), source=0.0_wp)
-    allocate (self%sources(0))
     if (.not. present(t)) self%sources = sources_of(self%balance)
     self%supply_holds = all_follow(self%balance, self%sources)
     self%last_speed = sum(self%ratio * self%z(:size(self%ratio)))
   end subroutine new_held_speeds
+
+  !> Sets up the balance at the start.
+  subroutine set_up(machine, holds_speed, t, self)
+    type(machine_t), intent(in) :: machine
+    logical, intent(in) :: holds_speed   !! as in `mean_formulation`
+    real(wp), intent(in) :: t            !! [s]
+    type(held_speeds_t), intent(inout) :: self
+    class(formulation_t), allocatable :: formulation
+
+    call mean_formulation(machine, formulation, holds_speed)
+    call set_up_balance(formulation, t, self%balance)
+    self%ratio = spread(0.0_wp, 1, size(self%balance%motions%free))
+    call find_ratios(self%balance, self%reference, self%ratio)
+    self%z = self%balance%start()
+    self%q = spread(0.0_wp, 1, self%balance%coordinates)
+  end subroutine set_up
+
+  !> Lets the drive that turns the reference body hold its speed.
+  subroutine let_drive_hold(machine, self)
+    type(machine_t), intent(in) :: machine
+    type(held_speeds_t), intent(inout) :: self
+    logical, allocatable :: is_carried(:)
+
+    allocate (is_carried, source=moves_with(machine, self%reference))
+    self%carried = merge(machine%driven_speed, 0.0_wp, is_carried) / machine%driven_speed(self%reference)
+    self%beside = merge(0.0_wp, machine%driven_speed, is_carried)
+    call set_up(machine, .false., t_infinity, self)
+  end subroutine let_drive_hold
+
+  !> Finds the speeds of what is free where a drive holds the speed.
+  subroutine follow_drive(self, speed, z, error)
+    type(held_speeds_t), intent(inout) :: self
+    real(wp), intent(in) :: speed   !! of the reference body [rad/s]
+    real(wp), intent(out) :: z(:)   !! rigid motions and internal states
+    type(error_t), allocatable, intent(out) :: error
+
+    z = self%z
+    call self%balance%turn_drives(speed * self%carried + self%beside)
+    if (abs(self%last_speed) > 0) then
+      z(:size(self%ratio)) = z(:size(self%ratio)) * (speed / self%last_speed)
+      call self%balance%settle(z)
+      call follow_free_speeds(self%balance, z, error)
+    else
+      call find_free_speeds(self%balance, z, error)
+    end if
+  end subroutine follow_drive
 
   !> The speed of a body in each rigid motion.
   subroutine find_ratios(balance, body, ratio)
@@ -106,26 +162,6 @@ contains
       ratio(i) = omega(body)
     end do
   end subroutine find_ratios
-
-  !> The elements that drive: motors; if there are none, the cylinders of engines.
-  function sources_of(balance) result(sources)
-    type(torque_balance_t), intent(in) :: balance
-    integer, allocatable :: sources(:)
-    integer :: b, i, role
-    logical :: is_source(size(balance%inelastic))
-
-    do role = role_motor, role_excitation
-      is_source = .false.
-      do b = 1, size(balance%formulation%machine%banks)
-        associate (bank => balance%formulation%machine%banks(b)%bank)
-          if (bank%role /= role .or. (role == role_excitation .and. .not. bank%is_engine)) cycle
-          is_source = is_source .or. (balance%inelastic >= bank%first .and. balance%inelastic <= bank%last())
-        end associate
-      end do
-      sources = pack([(i, i=1, size(is_source))], is_source)
-      if (size(sources) > 0) return
-    end do
-  end function sources_of
 
   subroutine iterate_supplies(self, speed, z, share, is_found)
     type(held_speeds_t), intent(inout) :: self
@@ -190,9 +226,23 @@ contains
     logical :: is_found
     integer :: attempt
 
+    if (allocated(self%steady)) then
+      state = self%steady
+      state%speed = speed
+      return
+    end if
     self%motors_hold = size(self%sources) > 0
-    is_found = .false.
-    if (self%supply_holds) then
+    is_found = self%is_free
+    held = 0.0_wp
+    z = self%z
+    if (self%is_free) then
+      call find_free_speeds(self%balance, z, error)
+      if (allocated(error)) return
+    else if (allocated(self%carried)) then
+      call follow_drive(self, speed, z, error)
+      if (allocated(error)) return
+      is_found = .true.
+    else if (self%supply_holds) then
       ! Solves for the frequency of the supplies, by Newton's method from the last slip, and from no slip if that fails: the
       ! torque over the slip is concave up to the largest one.
       do attempt = 1, 2
@@ -220,7 +270,9 @@ contains
       call balance_speeds(self, speed, z, held, is_found)
       self%motors_hold = is_found .and. held >= 0 .and. source_power(self) > 0
     end if
-    if (.not. self%motors_hold) call balance_speeds(self, speed, z, held, is_found)
+    if (.not. (self%motors_hold .or. self%is_free .or. allocated(self%carried))) then
+      call balance_speeds(self, speed, z, held, is_found)
+    end if
     if (.not. is_found) then
       call raise(error, exit_failed, 'the speeds of the machine were not found: no torques of the drive balance the others')
       return
@@ -232,6 +284,7 @@ contains
     if (allocated(error)) return
     self%z = z
     self%last_speed = speed
+    if (self%is_free) self%steady = state
   end subroutine hold
 
   !> Whether motors or engines can hold the speed.
@@ -303,9 +356,14 @@ contains
     integer, intent(in) :: pivot       !! the rigid motion
     real(wp), intent(in) :: speed      !! [rad/s]
     real(wp), intent(inout) :: z(:)
+    real(wp) :: driven   ! by drives
 
+    driven = 0.0_wp
+    associate (machine => self%balance%formulation%machine)
+      if (allocated(machine%driven_speed)) driven = machine%driven_speed(self%reference)
+    end associate
     associate (r => size(self%ratio))
-      z(pivot) = z(pivot) + (speed - sum(self%ratio * z(:r))) / self%ratio(pivot)
+      z(pivot) = z(pivot) + (speed - driven - sum(self%ratio * z(:r))) / self%ratio(pivot)
     end associate
   end subroutine impose
 
@@ -402,25 +460,6 @@ contains
     call linearise(self, z, weight, state, error)
   end subroutine find_state
 
-  !> Refuses bearings with friction that stand still: whether they hold in vibrations is not known.
-  subroutine refuse_standing_friction(balance, error)
-    type(torque_balance_t), intent(in) :: balance   !! evaluated
-    type(error_t), allocatable, intent(out) :: error
-    real(wp), parameter :: none = 1.0e-10_wp        ! relative to the largest speed
-    integer :: j
-
-    associate (joints => balance%joints, machine => balance%formulation%machine, &
-               speed => balance%formulation%state%elements%speed)
-      do j = 1, joints%count
-        if (machine%banks(joints%bank(j))%bank%role /= role_bearing) cycle
-        if (abs(speed(1, joints%element(j))) > none * maxval(abs(speed(1, :)))) cycle
-        call raise(error, exit_failed, quoted(machine%element_name(joints%element(j))) // ' stands still: whether the ' // &
-                   'friction of its bearing holds in vibrations is not known; allowed: bearing_friction = 0 there')
-        return
-      end do
-    end associate
-  end subroutine refuse_standing_friction
-
   subroutine linearise(self, z, weight, state, error)
     type(held_speeds_t), intent(inout) :: self
     real(wp), intent(in) :: z(:), weight(:)
@@ -436,7 +475,9 @@ contains
       call formulation%state%differentiate_elements(formulation%machine, balance%t)
       state%omega = formulation%omega(1, 1:)
       state%phi = formulation%phi(1, 1:)
-      state%phi = state%phi - state%omega * (state%phi(self%reference) / state%omega(self%reference))
+      if (.not. self%is_free) then
+        state%phi = state%phi - state%omega * (state%phi(self%reference) / state%omega(self%reference))
+      end if
     end associate
     associate (elements => self%balance%formulation%state%elements)
       state%twist = elements%angle(1, :)

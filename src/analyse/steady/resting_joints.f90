@@ -46,14 +46,18 @@ contains
     logical, allocatable, intent(out) :: sets(:, :)      !! [joints, sets]
     logical, intent(out) :: is_complete                  !! whether all are listed
     real(wp), allocatable :: n(:, :), rows(:, :)
-    real(wp) :: rates(balance%joints%count, size(balance%loose%free))
+    real(wp) :: rates(balance%joints%count, size(balance%loose%free) + 1)   ! also by drives
     logical :: is_candidate(size(rates, 1)), larger(size(rates, 1))
     integer :: i, j, next
 
     is_complete = .true.
     allocate (n, source=dense_motions(balance%loose))
     allocate (rows, source=rates_of_elements(balance%incidence, balance%joints%element, balance%coordinates))
-    rates = matmul(rows, n)
+    rates(:, :size(n, 2)) = matmul(rows, n)
+    rates(:, size(n, 2) + 1) = 0.0_wp
+    if (allocated(balance%formulation%driven_rate)) then
+      rates(:, size(n, 2) + 1) = balance%formulation%driven_rate(balance%joints%element)
+    end if
     larger = .false.
     do j = 1, size(larger)
       call look_at_bounds(balance, j, is_candidate(j), larger(j))

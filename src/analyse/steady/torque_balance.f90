@@ -3,7 +3,7 @@
 !>
 !> With the rigid motions q' = N s, elastic elements do no work, as their twists are constant. The torques along s are the sum of
 !> G^T M over the other elements, whose speeds are G s. The unknowns are z = (s, internal states). Joints that are at rest have no
-!> speed in the rigid motions.
+!> speed in the rigid motions. Bodies that drives turn have their speeds beside those of s (`driven_speed` of a machine).
 module nocdyn_torque_balance
   use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates
   use nocdyn_formulation, only: formulation_t
@@ -38,6 +38,7 @@ module nocdyn_torque_balance
     integer, allocatable :: first(:)                !! first entry of each inelastic element, [inelastic + 1]
     integer, allocatable :: freedom(:)              !! rigid motion, [entries]
     real(wp), allocatable :: ratio(:)               !! G, [entries]
+    real(wp), allocatable :: driven(:)              !! speeds of the inelastic elements without s [rad/s], [inelastic]
     real(wp), allocatable :: y(:, :)   !! state after `set_state`, [1, states]
     real(wp), allocatable :: rate(:, :)
     real(wp), allocatable :: drag(:, :)       !! torques that keep motions that float at their start, by rigid motions
@@ -45,7 +46,7 @@ module nocdyn_torque_balance
     real(wp), allocatable, private :: start_twist(:)   !! [rad], [elements]
   contains
     procedure :: unknowns, start, set_state, settle, moments_at, inertia, evaluate, differentiate
-    procedure :: blocks, body_speeds, differentiate_at_start
+    procedure :: turn_drives, blocks, body_speeds, differentiate_at_start
     procedure, private :: evaluate_laws, differentiate_losses
   end type torque_balance_t
 
@@ -59,6 +60,7 @@ contains
     logical, intent(in), optional :: is_at_rest(:)   !! joints that are; absent: none, and teeth lose nothing
     integer :: e
     integer, allocatable :: rigid(:)   ! elements
+    real(wp) :: offset(formulation%machine%elements%count)
 
     call move_alloc(formulation, self%formulation)
     associate (machine => self%formulation%machine)
@@ -79,7 +81,9 @@ contains
       ! holds joints at rest, and finds what the teeth carry
       self%joints%is_at_rest = is_at_rest
       rigid = [self%elastic, pack(self%joints%element, is_at_rest)]
-      if (any(is_at_rest)) self%motions = new_rigid_motions(self%coordinates, self%incidence, rigid)
+      offset = 0.0_wp
+      if (allocated(self%formulation%driven_rate)) offset = self%formulation%driven_rate
+      if (any(is_at_rest)) self%motions = new_rigid_motions(self%coordinates, self%incidence, rigid, offset)
       call self%differentiate_at_start()
       associate (joints => self%joints, formulation => self%formulation)
         joints%by_moment = loads_by_moments(joints%teeth, formulation%machine, formulation%state%elements, self%incidence, &
@@ -87,6 +91,7 @@ contains
       end associate
     end if
     call gather_ratios(self)
+    call set_driven(self)
     allocate (self%y(1, self%formulation%states), source=0.0_wp)
     allocate (self%rate, source=self%y)
     allocate (self%residual(self%unknowns()), self%scale(self%unknowns()), source=0.0_wp)
@@ -105,6 +110,34 @@ contains
       call state%differentiate_elements(machine, self%t)
     end associate
   end subroutine differentiate_at_start
+
+  !> Gives the bodies other speeds by drives.
+  subroutine turn_drives(self, driven_speed)
+    class(torque_balance_t), intent(inout) :: self
+    real(wp), intent(in) :: driven_speed(:)   !! [rad/s], [bodies]
+
+    call self%formulation%turn_drives(driven_speed)
+    call set_driven(self)
+  end subroutine turn_drives
+
+  !> The speeds of the inelastic elements without s: by drives, and by what joints at rest make of these.
+  subroutine set_driven(self)
+    type(torque_balance_t), intent(inout) :: self
+    integer :: i, k
+
+    if (.not. allocated(self%driven)) allocate (self%driven(size(self%inelastic)))
+    self%driven = 0.0_wp
+    if (.not. allocated(self%formulation%driven_rate)) return
+    self%driven = self%formulation%driven_rate(self%inelastic)
+    do i = 1, size(self%inelastic)
+      do k = self%incidence%first(self%inelastic(i)), self%incidence%first(self%inelastic(i) + 1) - 1
+        self%driven(i) = self%driven(i) + self%incidence%ratio(1, k) * self%motions%drift(self%incidence%coordinate(k))
+      end do
+    end do
+    do i = 1, size(self%inelastic)   ! without rounding
+      if (any(self%joints%element == self%inelastic(i) .and. self%joints%is_at_rest)) self%driven(i) = 0.0_wp
+    end do
+  end subroutine set_driven
 
   !> Computes G = U N of the inelastic elements.
   subroutine gather_ratios(self)
@@ -151,7 +184,7 @@ contains
     real(wp), allocatable :: y(:, :)
 
     allocate (y, source=self%formulation%start())
-    z(:size(self%motions%free)) = mean_motion(self, y(1, :self%coordinates))
+    z(:size(self%motions%free)) = mean_motion(self, y(1, :self%coordinates) - self%motions%drift)
     z(size(self%motions%free) + 1:) = y(1, 2 * self%coordinates + 1:self%formulation%states)
   end function start
 
@@ -238,7 +271,7 @@ contains
     real(wp), intent(in) :: z(:)   !! [unknowns]
 
     associate (f => self%coordinates, s => z(:size(self%motions%free)))
-      self%y(1, :f) = self%motions%speeds(s)
+      self%y(1, :f) = self%motions%speeds(s) + self%motions%drift
       self%y(1, f + 1:2 * f) = 0.0_wp
       self%y(1, 2 * f + 1:) = z(size(s) + 1:)
     end associate
@@ -255,7 +288,7 @@ contains
       elements%angle(1, :) = self%start_twist
       elements%speed(1, :) = 0.0_wp
       do i = 1, size(self%inelastic)
-        speed = 0.0_wp
+        speed = self%driven(i)
         do k = self%first(i), self%first(i + 1) - 1
           speed = speed + self%ratio(k) * z(self%freedom(k))
         end do

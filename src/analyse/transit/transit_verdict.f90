@@ -11,7 +11,7 @@ module nocdyn_transit_verdict
   use nocdyn_transit_analysis, only: passage_t, transit_analysis_t
   use nocdyn_transit_settings, only: transit_range_t
   use nocdyn_units, only: from_si, unit_rpm
-  use nocdyn_verdicts, only: in_words, is_exceeded, is_not_assessed, new_verdict_line, verdict_line_t, verdict_t
+  use nocdyn_verdicts, only: in_words, is_not_assessed, new_damage_line, new_verdict_line, verdict_line_t, verdict_t
   implicit none (type, external)
   private
 

@@ -26,12 +26,16 @@ module nocdyn_schema_response
                  "A range of speeds that the run passes, for 'nocdyn transit'; &run says how.")]
 
   type(key_rule_t), parameter, public :: response_keys(*) = [ &
-    key_rule_t('response', 'body', a_body, 1, '', required, anything, &
+    key_rule_t('response', 'body', a_body, 1, '', unset, anything, &
       'the body whose speed is held, and to whose turns orders refer'), &
-    key_rule_t('response', 'speed', a_number, any_number, 'rad/s', required, not_zero, &
+    key_rule_t('response', 'speed', a_number, any_number, 'rad/s', unset, not_zero, &
       'lowest and highest speed of this body, or one speed, with the sign of its steady speed', fewest=1), &
+    key_rule_t('response', 'frequency', a_number, any_number, 'rad/s', unset, positive, &
+      'in place of speeds: lowest and highest frequency of a shaker, a harmonic &excitation', fewest=1), &
+    key_rule_t('response', 'excitation', a_text, 1, '', unset, anything, &
+      'name of the shaker, if there are several harmonic excitations'), &
     key_rule_t('response', 'count', an_integer, 1, '', '201', speed_counts, &
-      'number of speeds from the lowest to the highest; peaks between them are found'), &
+      'number of speeds or frequencies from the lowest to the highest; peaks between them are found'), &
     key_rule_t('response', 'orders', a_number, any_number, '', unset, positive, &
       'oscillations per turn of the body; those of the excitations if not given', fewest=1), &
     key_rule_t('response', 'signals', a_text, any_number, '', unset, anything, &
@@ -154,6 +158,10 @@ module nocdyn_schema_response
       'whole turns of the mean speed; 2 with an engine of four strokes, else 1, if not given')]
 
   type(relation_rule_t), parameter, public :: response_relations(*) = [ &
+    relation_rule_t('response', exactly_one, 'speed', 'frequency'), &
+    relation_rule_t('response', requires, 'speed', 'body'), &
+    relation_rule_t('response', requires, 'excitation', 'frequency'), &
+    relation_rule_t('response', at_most_one, 'frequency', 'orders operating'), &
     relation_rule_t('response', requires, 'margin margin_rule margin_rule_file', 'operating'), &
     relation_rule_t('response', at_most_one, 'margin_rule', 'margin_rule_file'), &
     relation_rule_t('response', requires, 'margin_rule_lines', 'margin_rule_file'), &

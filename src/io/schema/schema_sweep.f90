@@ -43,6 +43,7 @@ module nocdyn_schema_sweep
     kind_rule_t('record', 'crossing_margin', 'of mode: distance of that speed to operation, as a share'), &
     kind_rule_t('record', 'peak',          'of response: largest amplitude of the order, or half range of all orders'), &
     kind_rule_t('record', 'peak_speed',    'of response: where the peak is'), &
+    kind_rule_t('record', 'peak_frequency', 'of response over the frequency of a shaker: where the peak is'), &
     kind_rule_t('record', 'margin',        'of response: distance of the peak to the speeds in operation, as a share'), &
     kind_rule_t('record', 'ratio',         'of response: largest ratio to the limits of &limit over the speed')]
 

@@ -16,7 +16,8 @@ module nocdyn_constraints
     real(wp), allocatable :: factor(:, :)     !! coefficient of the member in the row, [lanes, members]
   end type member_torques_t
 
-  !> Row r: sum over its entries of coefficient * omega(body) = 0, entries first(r) to first(r + 1) - 1.
+  !> Row r: sum over its entries of coefficient * omega(body) = demand, entries first(r) to first(r + 1) - 1. Only drives of a
+  !> steady state have a demand; the coordinates leave it out (`driven_speed` of a machine).
   type, public :: constraints_t
     integer :: bodies = 0                        !! bodies of the machine
     type(string_t), allocatable :: kinds(:)      !! what the input calls each row, such as 'gear'
@@ -26,6 +27,7 @@ module nocdyn_constraints
     integer, allocatable :: body(:)              !! [entries], different bodies in each row
     real(wp), allocatable :: coefficient(:, :)   !! never 0, [lanes, entries]
     real(wp), allocatable :: least(:), most(:)   !! the multipliers that steady states may have, huge without bounds, [rows]
+    real(wp), allocatable :: demand(:)           !! [rad/s] of a drive, [rows]
     logical, allocatable :: may_stop(:)          !! whether bodies may be held still by the row, as by a closed brake
     type(member_torques_t) :: members
   contains
@@ -65,6 +67,7 @@ contains
       allocate (constraints%kinds, source=strings(spread('constraint', 1, size(names))))
     end if
     allocate (constraints%may_stop(size(names)), source=.false.)
+    allocate (constraints%demand(size(names)), source=0.0_wp)
     allocate (constraints%most(size(names)), source=huge(1.0_wp))
     allocate (constraints%least, source=-constraints%most)
     if (present(members)) then

@@ -96,8 +96,11 @@ contains
     integer, intent(in) :: lane
     real(wp), intent(inout) :: y(:)   !! [states + quadratures]
 
-    call self%machine%coordinates%project(lane, self%machine%inertia(lane, :), self%machine%start_speed(lane, :), &
-                                          y(:self%machine%coordinates%freedoms))
+    real(wp) :: speed(self%machine%bodies)
+
+    speed = self%machine%start_speed(lane, :)
+    if (allocated(self%machine%driven_speed)) speed = speed - self%machine%driven_speed
+    call self%machine%coordinates%project(lane, self%machine%inertia(lane, :), speed, y(:self%machine%coordinates%freedoms))
   end subroutine project_start_speeds
 
   !> omega = L_tau q', eq. (82) of section 5, phi = start_angle + L_tau (origin + q), and the internal states.
@@ -110,6 +113,7 @@ contains
     if (self%internal > 0) self%state%elements%internal%value(:, :) = y(:, self%mechanical + 1:self%states)
     if (self%lanes == 1) then
       call set_single_state(self, size(y, 2), y)
+      if (allocated(self%machine%driven_speed)) self%omega(1, 1:) = self%omega(1, 1:) + self%machine%driven_speed
       return
     end if
     associate (coordinates => self%machine%coordinates, start_angle => self%machine%start_angle)
@@ -159,6 +163,7 @@ contains
     call self%set_state(y)
     associate (f => self%machine%coordinates%freedoms, elements => self%state%elements)
       call self%twists%multiply_pair(self%twist_at_origin, y(:, f + 1:2 * f), y(:, :f), elements%angle, elements%speed)
+      if (allocated(self%driven_rate)) elements%speed(1, :) = elements%speed(1, :) + self%driven_rate
     end associate
   end subroutine gather
 
@@ -288,6 +293,7 @@ contains
 
     angle = self%twist_at_origin(lane, self%machine%switches%moving(place))
     speed = 0.0_wp
+    if (allocated(self%driven_rate)) speed = self%driven_rate(self%machine%switches%moving(place))
     associate (switching => self%switching, f => self%machine%coordinates%freedoms)
       do k = switching%first(place), switching%first(place + 1) - 1
         angle = angle + switching%ratio(lane, k) * y(f + switching%coordinate(k))

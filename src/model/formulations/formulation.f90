@@ -25,6 +25,8 @@ module nocdyn_formulation
     real(wp), allocatable :: phi(:, :)       !! angles [rad] after `set_state`, [lanes, 0:bodies], body 0 is the ground
     real(wp), allocatable :: omega(:, :)     !! speeds [rad/s] after `set_state`, [lanes, 0:bodies]
     real(wp), allocatable :: zero_twist(:, :)   !! twists where the angles in the state are zero [rad], [lanes, elements]
+    real(wp), allocatable :: driven_rate(:)     !! rates of the elements by drives of a steady state; not allocated: none,
+                                                !! [elements]
     type(error_measures_t) :: norm              !! quantities in which errors are measured
     type(joint_sets_t) :: joints                !! clutches and freewheels; see `joint_formulation_t`
     real(wp), allocatable, private :: lane_state(:)   !! the state of one lane, work space, [states]
@@ -35,7 +37,7 @@ module nocdyn_formulation
     procedure(set_state_interface), deferred :: set_state
     procedure(reactions_interface), deferred :: reactions
     procedure(motion_interface), deferred :: switch_motion
-    procedure :: allocate_state, set_norm, gather, reset_origin, angle_at_zero, twist_at_zero, component_name
+    procedure :: allocate_state, turn_drives, set_norm, gather, reset_origin, angle_at_zero, twist_at_zero, component_name
     procedure :: measure, measure_name
     procedure :: observe => observe_elements
     procedure :: refresh_lane
@@ -113,8 +115,18 @@ contains
       if (allocated(self%phi)) deallocate (self%phi, self%omega, self%torque)
       allocate (self%phi(machine%lanes, 0:machine%bodies), source=0.0_wp)
       allocate (self%omega, self%torque, source=self%phi)
+      if (allocated(machine%driven_speed)) self%driven_rate = machine%driven_rates()
     end associate
   end subroutine allocate_state
+
+  !> Gives the bodies other speeds by drives.
+  subroutine turn_drives(self, driven_speed)
+    class(formulation_t), intent(inout) :: self   !! of a steady state, with drives
+    real(wp), intent(in) :: driven_speed(:)       !! [rad/s], [bodies]
+
+    self%machine%driven_speed = driven_speed
+    self%driven_rate = self%machine%driven_rates()
+  end subroutine turn_drives
 
   !> Name of a component of the state, for messages.
   function component_name(self, index) result(name)

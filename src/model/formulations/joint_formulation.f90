@@ -121,7 +121,7 @@ contains
     real(wp), contiguous, intent(inout) :: g(:)   !! [switches]
 
     associate (joint => self%joints%joint_of(switch))
-      g(switch) = self%joints%indicator(self%machine%banks, joint, t, self%joint_rate(joint, y))
+      g(switch) = self%joints%indicator(self%machine%banks, joint, t, self%joint_slip(joint, y))
     end associate
   end subroutine set_joint_indicator
 
@@ -162,7 +162,7 @@ contains
 
     if (joint == 0) return
     if (self%joints%mode(joint) == locked) return
-    if (abs(self%joint_rate(joint, y)) <= rest_width * speed_scale(self, y)) call settle_at_event(self, joint, t, y)
+    if (abs(self%joint_slip(joint, y)) <= rest_width * speed_scale(self, y)) call settle_at_event(self, joint, t, y)
   end subroutine engage_at_rest
 
   !> The speed by which slips that are none are measured [rad/s].
@@ -195,12 +195,12 @@ contains
         call decide_at(self, merge(by_state, which, is_struck), t, y, is_at_rest)
         if (which == by_state .or. .not. any(joints%is_jammed)) exit
       end do
-      call self%hold(joints%motions%speed, y)
+      call self%hold(joints%motions%speed, y, of_speeds=.true.)
       call self%find_held_moments(t, y(:self%states))
       call joints%shift_boundaries(self%machine%banks, self%state%elements, t)
       do j = 1, joints%count
         if (is_at_rest(j) .and. joints%mode(j) /= locked) then   ! a drive may leave it a slip in the other direction
-          joints%shift(j) = boundary_shift * speed + max(0.0_wp, -direction_of(joints%mode(j)) * self%joint_rate(j, y))
+          joints%shift(j) = boundary_shift * speed + max(0.0_wp, -direction_of(joints%mode(j)) * self%joint_slip(j, y))
         end if
         if (joints%mode(j) == idle) joints%shift(j) = rest_width * speed
       end do
@@ -222,7 +222,7 @@ contains
     associate (joints => self%joints, elements => self%state%elements)
       tolerance = rest_width * speed_scale(self, y)
       do j = 1, joints%count
-        slip(j) = self%joint_rate(j, y)
+        slip(j) = self%joint_slip(j, y)
         is_at_rest(j) = abs(slip(j)) <= tolerance .or. j > joints%locking
         if (which /= by_state) is_at_rest(j) = is_at_rest(j) .or. joints%mode(j) == locked &
                                                .or. (j == which .and. joints%has_stopped(j, slip(j)))
@@ -235,11 +235,11 @@ contains
         ! The state after a joint has stopped, in which those at rest have no slip left, so that no acceleration comes from one.
         ! Others are at rest as well that they now hold there: of joints that stop at one time, the first one stops them all.
         associate (joints => self%joints)
-          call self%hold(joints%motions%speed, resting(:size(self%moving)))
+          call self%hold(joints%motions%speed, resting(:size(self%moving)), of_speeds=.true.)
           is_changed = .false.
           do j = 1, joints%locking
             if (is_at_rest(j) .or. abs(slip(j)) > near * tolerance) cycle
-            slip(j) = self%joint_rate(j, resting)
+            slip(j) = self%joint_slip(j, resting)
             is_at_rest(j) = abs(slip(j)) <= tolerance
             is_changed = is_changed .or. is_at_rest(j)
           end do
@@ -266,7 +266,7 @@ contains
     logical :: is_hit
 
     associate (joints => self%joints, elements => self%state%elements)
-      before = [(self%joint_rate(j, y), j=1, joints%count)]
+      before = [(self%joint_slip(j, y), j=1, joints%count)]
       slip = before
       slip(joints%locking + 1:) = 0.0_wp
       call joints%find_impact(self%machine%banks, t, slip, tolerance, impulse, is_hit)
@@ -285,7 +285,7 @@ contains
         work = findloc(self%machine%with_work, joints%element(j), dim=1)
         if (work == 0) cycle   ! it has none
         work = self%states + work
-        y(work) = y(work) + 0.5_wp * impulse(j) * (before(j) + self%joint_rate(j, y))
+        y(work) = y(work) + 0.5_wp * impulse(j) * (before(j) + self%joint_slip(j, y))
       end do
     end associate
   end subroutine strike
@@ -300,7 +300,7 @@ contains
     real(wp) :: slip(self%joints%count)
 
     before = self%joints%mode
-    slip = [(self%joint_rate(j, y), j=1, self%joints%count)]
+    slip = [(self%joint_slip(j, y), j=1, self%joints%count)]
     call self%settle_joints(which, t, y)
     do j = 1, self%joints%locking
       if (self%joints%mode(j) == before(j)) cycle

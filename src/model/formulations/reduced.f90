@@ -196,6 +196,7 @@ contains
     real(wp), intent(in) :: y(2 * n + internal)   !! state
 
     call self%twists%multiply_pair(self%twist_at_origin, y(n + 1), y(1), self%state%elements%angle, self%state%elements%speed)
+    if (allocated(self%driven_rate)) self%state%elements%speed(1, :) = self%state%elements%speed(1, :) + self%driven_rate
     if (internal > 0) call copy(internal, y(2 * n + 1), self%state%elements%internal%value)
     call self%state%evaluate_elements(self%machine, t)
   end subroutine evaluate_at
@@ -206,6 +207,7 @@ contains
     character(len=:), allocatable, intent(out) :: obstacle
 
     obstacle = ''
+    if (allocated(self%driven_rate)) obstacle = 'bodies that drives turn in a steady state have no motion over the time'
     if (.not. self%joints%only_lock()) obstacle = 'rows that move and teeth with losses have no Taylor series'
   end subroutine series_obstacle
 

@@ -27,7 +27,7 @@ module nocdyn_row_formulation
     procedure(accelerate_interface), deferred :: accelerate
     procedure(rate_interface), deferred :: element_rate
     procedure(push_interface), deferred :: push_element
-    procedure :: prepare_joints, joint_rate, push, move_rows, hold, find_accelerations
+    procedure :: prepare_joints, joint_rate, joint_slip, push, move_rows, hold, find_accelerations
     procedure, private :: hold_accelerations
     procedure :: find_held_moments, clean_rates, add_powers, differentiate_rows, hold_derivative, hold_columns
     procedure, private :: hold_column, differentiate_drags
@@ -76,6 +76,16 @@ contains
       if (driver > 0) joint_rate = joint_rate - self%joints%slope(joint) * self%element_rate(driver, rates)
     end associate
   end function joint_rate
+
+  !> The rate of the row of a joint at a state, with what drives of a steady state turn.
+  pure real(wp) function joint_slip(self, joint, y)
+    class(row_formulation_t), intent(in) :: self
+    integer, intent(in) :: joint
+    real(wp), intent(in) :: y(:)   !! speeds of the first states [rad/s], [moving] at least
+
+    joint_slip = self%joint_rate(joint, y)
+    if (allocated(self%driven_rate)) joint_slip = joint_slip + self%driven_rate(self%joints%element(joint))
+  end function joint_slip
 
   !> Adds what the moment or the impulse of a joint does to the accelerations or speeds of the first states.
   pure subroutine push(self, joint, moment, rates)
@@ -184,16 +194,21 @@ contains
 
   !> Adds the moments of the joints that hold to the accelerations of the first states, and puts them among the moments of the
   !> elements.
-  subroutine hold(self, demand, acceleration, drag)
+  subroutine hold(self, demand, acceleration, drag, of_speeds)
     class(row_formulation_t), intent(inout) :: self
     real(wp), intent(in) :: demand(:)            !! what the rates of the rows that move must be [rad/s2], [rows that move]
     real(wp), intent(inout) :: acceleration(:)   !! [rad/s2], [moving] at least; or speeds [rad/s]
     real(wp), intent(in), optional :: drag(:)    !! of teeth [N m], [losses]; absent: those that turn have no moments
+    logical, intent(in), optional :: of_speeds   !! whether speeds are held, to which drives of a steady state add; absent: no
     integer :: j
+    logical :: are_speeds
 
+    are_speeds = .false.
+    if (present(of_speeds)) are_speeds = of_speeds
     associate (joints => self%joints, applied => self%state%elements%applied)
       do j = 1, joints%count
         joints%rate(j) = self%joint_rate(j, acceleration)
+        if (are_speeds) joints%rate(j) = self%joint_slip(j, acceleration)
         if (j > joints%locking) joints%rate(j) = joints%rate(j) - demand(j - joints%locking)
       end do
       call joints%find_moments(drag)
@@ -400,7 +415,7 @@ contains
       if (any(abs(motions%position) > far * motions%terms)) then
         self%joints%lost = self%joints%locking + maxloc(abs(motions%position) / motions%terms, dim=1)
       end if
-      call self%hold(motions%speed, y(:n))
+      call self%hold(motions%speed, y(:n), of_speeds=.true.)
     end associate
   end subroutine project
 

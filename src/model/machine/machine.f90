@@ -31,6 +31,8 @@ module nocdyn_machine
     real(wp), allocatable :: inertia(:, :)                !! J [kg m2], shape [lanes, bodies]
     real(wp), allocatable :: start_angle(:, :)            !! [rad], [lanes, bodies]
     real(wp), allocatable :: start_speed(:, :)            !! [rad/s], [lanes, bodies], obeys the constraints
+    real(wp), allocatable :: driven_speed(:)              !! of the bodies beside their coordinates, where drives turn some in a
+                                                          !! steady state; not allocated: none [rad/s], [bodies]
     type(start_impulse_t), allocatable :: start_impulse   !! if the start speeds of the input were projected
     real(wp), allocatable :: steady_internal(:, :)        !! internal states of a steady start, [lanes, internal states]
     type(string_t), allocatable :: start_notes(:)         !! how the start was found; joints that do nothing
@@ -56,6 +58,7 @@ module nocdyn_machine
     procedure :: elastic
     procedure :: element_name
     procedure :: start_twist
+    procedure :: driven_rates
     procedure :: start_internal
     procedure :: internal_name
     procedure :: is_electrical
@@ -189,6 +192,18 @@ contains
     angle(:, 1:) = self%start_angle
     call self%elements%rows%combine(self%lanes, self%bodies, angle, twist)
   end function start_twist
+
+  !> Rates of twist of the elements that drives turn while the coordinates stand still [rad/s], [elements]. Elastic ones have
+  !> none.
+  pure function driven_rates(self) result(rates)
+    class(machine_t), intent(in) :: self   !! of one lane, with drives
+    real(wp) :: rates(self%elements%count)
+    real(wp) :: by_lane(1, self%elements%count)
+
+    call self%elements%rows%combine(1, self%bodies, reshape([0.0_wp, self%driven_speed], [1, self%bodies + 1]), by_lane)
+    rates = by_lane(1, :)
+    rates(self%elastic()) = 0.0_wp
+  end function driven_rates
 
   !> Internal states at the start, [lanes, internal states].
   function start_internal(self) result(internal)

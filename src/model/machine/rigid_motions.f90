@@ -3,6 +3,9 @@
 !>
 !> The rows of the map are eliminated one after the other, each at its highest coordinate, which becomes a combination of lower
 !> ones. A chain of n bodies takes time linear in n.
+!>
+!> Where drives turn bodies, elements turn while all coordinates stand still. The coordinates then have a drift, with which the
+!> elements do not turn; it is found by the same elimination, in which a clock is coordinate 0.
 module nocdyn_rigid_motions
   use nocdyn_element_coordinates, only: element_coordinates_t
   use nocdyn_kinds, only: wp
@@ -23,16 +26,18 @@ module nocdyn_rigid_motions
     integer, allocatable :: first(:)     !! first entry of each coordinate, [coordinates + 1]
     integer, allocatable :: freedom(:)   !! rigid motion, [entries]
     real(wp), allocatable :: ratio(:)    !! [entries]
+    real(wp), allocatable :: drift(:)    !! speeds q' where all s are zero; all are zero without drives [rad/s], [coordinates]
+    integer :: contradiction = 0         !! an element that turns whatever the coordinates do, numbered in `elastic`; 0: none
   contains
     procedure :: combine, speeds, project_torques
   end type rigid_motions_t
 
   !> A sparse row during the elimination.
   type :: row_t
-    integer, allocatable :: active(:)   !! coordinates with an entry, the first `used` of them
+    integer, allocatable :: active(:)   !! coordinates with an entry, the first `used` of them; 0 is the clock
     integer :: used = 0
-    real(wp), allocatable :: value(:)   !! [coordinates]
-    real(wp), allocatable :: scale(:)   !! sum of the absolute terms of `value`, [coordinates]
+    real(wp), allocatable :: value(:)   !! [0:coordinates]
+    real(wp), allocatable :: scale(:)   !! sum of the absolute terms of `value`, [0:coordinates]
     logical, allocatable :: is_active(:)
   end type row_t
 
@@ -41,24 +46,32 @@ module nocdyn_rigid_motions
 contains
 
   !> The rigid motions of a machine.
-  type(rigid_motions_t) function new_rigid_motions(freedoms, incidence, elastic) result(self)
+  type(rigid_motions_t) function new_rigid_motions(freedoms, incidence, elastic, offset) result(self)
     integer, intent(in) :: freedoms                        !! number of coordinates
     type(element_coordinates_t), intent(in) :: incidence   !! twists of the elements by coordinates; the first lane is used
     integer, intent(in) :: elastic(:)                      !! elements that must not be twisted
-    type(linear_combination_t) :: definition(freedoms)
+    real(wp), intent(in), optional :: offset(:)            !! rates of all elements while the coordinates stand still [rad/s],
+                                                           !! [elements]; absent: zero
+    type(linear_combination_t) :: definition(0:freedoms)
     type(row_t) :: row
     integer, allocatable :: left(:)
     integer :: c, e, freedom_of(freedoms), i, k
 
-    allocate (row%active(freedoms), row%value(freedoms), row%scale(freedoms), row%is_active(freedoms))
+    allocate (row%active(freedoms + 1), row%value(0:freedoms), row%scale(0:freedoms), row%is_active(0:freedoms))
+    allocate (self%drift(freedoms), source=0.0_wp)
     row%is_active = .false.
     do e = 1, size(elastic)
       do k = incidence%first(elastic(e)), incidence%first(elastic(e) + 1) - 1
         call add(row, incidence%coordinate(k), incidence%ratio(1, k), abs(incidence%ratio(1, k)))
       end do
+      if (present(offset)) call add(row, 0, offset(elastic(e)), abs(offset(elastic(e))))
       call substitute(row, definition, left)
       if (size(left) == 0) cycle
       c = maxval(left)
+      if (c == 0) then
+        if (self%contradiction == 0) self%contradiction = e
+        cycle
+      end if
       left = pack(left, left /= c)
       definition(c)%of = left
       definition(c)%ratio = -row%value(left) / row%value(c)
@@ -71,6 +84,12 @@ contains
       call substitute(row, definition, left)
       definition(c)%of = left
       definition(c)%ratio = row%value(left)
+    end do
+    do c = 1, freedoms
+      if (.not. allocated(definition(c)%of)) cycle
+      self%drift(c) = sum(definition(c)%ratio, mask=definition(c)%of == 0)
+      definition(c)%ratio = pack(definition(c)%ratio, definition(c)%of > 0)
+      definition(c)%of = pack(definition(c)%of, definition(c)%of > 0)
     end do
     do i = 1, size(self%free)
       definition(self%free(i))%of = [self%free(i)]
@@ -106,7 +125,7 @@ contains
   !> the next `add`.
   pure subroutine substitute(row, definition, left)
     type(row_t), intent(inout) :: row
-    type(linear_combination_t), intent(in) :: definition(:)
+    type(linear_combination_t), intent(in) :: definition(0:)
     integer, allocatable, intent(out) :: left(:)   ! coordinates of the row whose sums are not rounding
     integer :: c, i, position
     real(wp) :: scale, value

@@ -17,7 +17,7 @@ def fatigue_section(sources: Sources) -> Section | None:
         if run.summary.get("fatigue"):
             (section.add_details if has_cases else section.add)(_of_run(sources, run))
     if sources.has("response") and sources.response_report.get("fatigue"):
-        blocks = [Heading("Continuous operation at a speed", "hourly"), *_of_speeds(sources)]
+        blocks = [Heading(f"Continuous operation at a {sources.response.axis.noun}", "hourly"), *_of_speeds(sources)]
         section.add(*blocks)
     return section if section.blocks else None
 
@@ -68,12 +68,13 @@ def _of_run(sources: Sources, run: Run) -> Table:
 
 
 def _of_speeds(sources: Sources) -> list[Block]:
-    lives, unit = sources.response_report["fatigue"], sources.speed_unit
+    lives, axis = sources.response_report["fatigue"], sources.response.axis
+    unit = sources.axis_unit(axis)
     columns = [
         ("name", texts([one["name"] for one in lives])),
         ("element", texts([one["element"] for one in lives])),
         ("largest damage of an hour [1/h]", [life(one["largest_damage_per_hour"]) for one in lives]),
-        (f"at [{unit}]", [number(sources.speed(one["speed_rad_s"])) for one in lives]),
+        (f"at [{unit}]", [number(sources.on_axis(axis, axis.point(one))) for one in lives]),
         ("damage of the profile", [life(one.get("damage_of_profile"), _profile_tone(one)) for one in lives]),
         ("hours to failure [h]", [life(one.get("hours_to_failure")) for one in lives]),
         ("mean of a cycle", [_strength(one) for one in lives]),
@@ -106,15 +107,16 @@ def _hourly(sources: Sources) -> Figure | None:
     if not columns:
         return None
     response = sources.response
-    speed = [sources.of_rpm(one) for one in response.speed]
+    speed = [sources.on_axis(response.axis, one) for one in response.speed]
     order = table.iloc[:, 0].argsort(kind="stable")
     names, labels = [column.title for column in columns], [column.label for column in columns]
     curves = [sources.arrays.curve(name, speed, table[label].to_numpy()[order]) for name, label in zip(names, labels)]
     spec = {
-        "x": {"label": f"speed of {response.body}", "unit": sources.speed_unit},
+        "x": {"label": response.axis.label, "unit": sources.axis_unit(response.axis)},
         "y": {"label": columns[0].caption, "unit": columns[0].unit, "zero": True},
         "curves": curves,
         "name": "fatigue",
     }
     largest = "; ".join(f"{name} {number_text(float(table[label].max()), 3)}" for name, label in zip(names, labels))
-    return Figure("Damage of an hour over the speed", [Panel("", f"Damage per hour over the speed. Largest: {largest}.", spec)])
+    over = f"over the {response.axis.noun}"
+    return Figure(f"Damage of an hour {over}", [Panel("", f"Damage per hour {over}. Largest: {largest}.", spec)])

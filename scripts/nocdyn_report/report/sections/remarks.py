@@ -16,6 +16,10 @@ ASSUMED = {  # what each calculation takes for granted, as the documentation say
         "their phases, and the half range is that of the sum.",
         "Limits of speeds apply to continuous operation; where they are exceeded the range is barred.",
     ],
+    "shaker": [
+        "Forced response: linearised about the steady state, in which the shaker alone oscillates, with its amplitude.",
+        "Limits apply to continuous operation; where they are exceeded the range of frequencies is barred.",
+    ],
     "run": ["Motion over the time: nonlinear, as the input describes the elements."],
 }
 
@@ -28,7 +32,8 @@ def notes_section(sources: Sources) -> Section:
     section = Section("notes", "Assumptions and notes", is_appendix=True)
     assumed = list(ASSUMED["all"])
     for command in ("equilibrium", "modes", "campbell", "response", "run"):
-        assumed += ASSUMED[command] if sources.has(command) else []
+        kind = "shaker" if command == "response" and sources.has(command) and sources.response.axis.is_frequency else command
+        assumed += ASSUMED[kind] if sources.has(command) else []
     section.add(Items(assumed))
     rows = [[text(origin), text(note)] for origin, note in program_notes(sources)]
     if rows:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...columns import LOADS, MOMENT, Column
-from ...speed_results import NEAR, Quantity, Response
+from ...speed_results import NEAR, Quantity, Response, barred_in
 from ..content import Figure, Heading, Panel, Paragraph, Section, Table, by_columns, cut, number, share, text
 from ..curves import band
 from ..naming import WHOLE, name_of
@@ -24,11 +24,12 @@ def response_section(sources: Sources) -> Section | None:
         return None
     section = Section("response", f"Forced response{sources.main('response')}")
     report = sources.response_report
-    ends = [number_text(sources.speed(speed)) for speed in (report["speed_rad_s"][0], report["speed_rad_s"][-1])]
-    span = f"speeds of {report['body']} from {ends[0]} to {ends[1]} {sources.speed_unit}"
+    axis = sources.response.axis
+    ends = [number_text(sources.on_axis(axis, one)) for one in (sources.response.speed[0], sources.response.speed[-1])]
+    span = f"{axis.plural} of {axis.of} from {ends[0]} to {ends[1]} {sources.axis_unit(axis)}"
     told = f"{len(report['lines'])} orders are computed at {span}. Half range: of the oscillation of all orders together."
-    section.add(Paragraph(told))
-    section.add(Heading("Limits and barred ranges of speed", "limits"), *_limits(sources))
+    section.add(Paragraph(f"The response is computed at {span}." if axis.is_frequency else told))
+    section.add(Heading(f"Limits and barred ranges of {axis.noun}", "limits"), *_limits(sources))
     section.add(Heading("Largest values", "largest"), *_largest(sources, whole=True))
     section.add_details(*_largest(sources, whole=False))
     if others := [one for one in told_quantities(sources.response) if not has_limit(one)]:
@@ -69,7 +70,9 @@ def _limits(sources: Sources) -> list[Paragraph | Table | Figure]:
     blocks: list[Paragraph | Table | Figure] = _barred_ranges(sources)
     colours = _colours(limited, sources.response)
     panels = [_panel(sources, sources.response, one.in_short(), colours) for one in limited]
-    blocks.append(Figure("Half ranges with limits over the speed; triangles: critical speeds", panels, min(BIG, len(panels))))
+    axis = sources.response.axis
+    marks = "resonances" if axis.is_frequency else "critical speeds"
+    blocks.append(Figure(f"Half ranges with limits over the {axis.noun}; triangles: {marks}", panels, min(BIG, len(panels))))
     if others := _other_cases(sources):
         blocks.append(Figure("Other load cases: half ranges beyond their limits", others, min(BIG, len(others))))
     return blocks
@@ -94,18 +97,19 @@ def _other_cases(sources: Sources) -> list[Panel]:
 
 
 def _barred_ranges(sources: Sources) -> list[Paragraph | Table | Figure]:
-    barred = sources.response_report["barred_speed_ranges"]
+    barred, axis = barred_in(sources.response_report), sources.response.axis
     if not barred:
-        return [Paragraph("No range of speeds is barred.", "good")]
+        return [Paragraph(f"No range of {axis.plural} is barred.", "good")]
     columns = {one.name: one for one in sources.response.columns}
     rows = []
     for one in barred:
-        ends = sorted((sources.speed(one["from_rad_s"]), sources.speed(one["to_rad_s"])))
+        ends = sorted(sources.on_axis(axis, end) for end in axis.span(one))
         column = columns.get(one["quantity"])
         named = f"{name_of(column)}: {column.caption}" if column else one["quantity"]
         rows.append([text(named), *map(number, ends), text(*passage(one)), text(one["limit_at"])])
-    columns = ["limit of", f"from [{sources.speed_unit}]", f"to [{sources.speed_unit}]", "passage", "set at"]
-    return [Table("Barred ranges of speed", columns, rows, "No continuous operation within these speeds.")]
+    unit = sources.axis_unit(axis)
+    columns = ["limit of", f"from [{unit}]", f"to [{unit}]", "passage", "set at"]
+    return [Table(f"Barred ranges of {axis.noun}", columns, rows, f"No continuous operation within these {axis.plural}.")]
 
 
 def _largest(sources: Sources, whole: bool) -> list[Table]:
@@ -122,12 +126,13 @@ def _largest(sources: Sources, whole: bool) -> list[Table]:
 
 
 def _largest_of(sources: Sources, entries: Sequence[dict], columns: dict[str, Column]) -> Table:
-    unit, speed = entries[0]["unit"], sources.speed_unit
+    axis = sources.response.axis
+    unit, speed = entries[0]["unit"], sources.axis_unit(axis)
     factor, _ = sources.units.shown(unit, max(max(one["half_range"], one["peak"]) for one in entries))
     like = max(max(one["half_range"], one["peak"]) for one in entries)
     orders = []
     for one in entries:
-        strongest = sorted(zip(one["half_range_by_order"], sources.response.lines), key=lambda pair: -pair[0])[:3]
+        strongest = sorted(zip(one.get("half_range_by_order", []), sources.response.lines), key=lambda pair: -pair[0])[:3]
         orders.append(
             ", ".join(f"{line.name} ({number_text(factor * value, 3)})" for value, line in strongest if value > 1e-6 * like)
         )
@@ -136,14 +141,15 @@ def _largest_of(sources: Sources, entries: Sequence[dict], columns: dict[str, Co
     content = [
         ("of", texts([name_of(columns[one["quantity"]]) for one in entries])),
         (f"half range{head}", values[: len(entries)]),
-        (f"at [{speed}]", [number(sources.speed(one["half_range_speed_rad_s"])) for one in entries]),
+        (f"at [{speed}]", [number(sources.on_axis(axis, axis.point(one, "half_range_"))) for one in entries]),
         (f"largest magnitude{head}", values[len(entries) :]),
-        (f"largest at [{speed}]", [number(sources.speed(one["peak_speed_rad_s"])) for one in entries]),
+        (f"largest at [{speed}]", [number(sources.on_axis(axis, axis.point(one, "peak_"))) for one in entries]),
         ("of its limit [%]", [share(one, 3, "bad" if one is not None and one > 1 else "") for one in shares]),
         (f"largest orders{head}", texts(orders)),
     ]
     caption = columns[entries[0]["quantity"]].caption
-    return cut(by_columns(f"Largest over the speeds: {caption}", content), MOST_ROWS, "response.json")
+    content = content[:-1] if axis.is_frequency else content
+    return cut(by_columns(f"Largest over the {axis.plural}: {caption}", content), MOST_ROWS, "response.json")
 
 
 def _small(sources: Sources, quantities: list[Quantity]) -> list[Figure | Paragraph]:
@@ -158,7 +164,11 @@ def _small(sources: Sources, quantities: list[Quantity]) -> list[Figure | Paragr
         panels = [_panel(sources, sources.response, one.in_short(largest), colours, is_small=True) for one in part]
         caption = part[0].column.caption if len({one.column.caption for one in part}) == 1 else kind.replace("_", " ")
         blocks.append(
-            Figure(f"{caption[0].upper()}{caption[1:]}: half ranges over the speed", panels, min(SMALL, max(BIG, len(panels))))
+            Figure(
+                f"{caption[0].upper()}{caption[1:]}: half ranges over the {sources.response.axis.noun}",
+                panels,
+                min(SMALL, max(BIG, len(panels))),
+            )
         )
     if len(chosen) < len(quantities):
         blocks.append(Paragraph(f"Drawn are the {len(chosen)} largest of {len(quantities)} quantities; response.csv has all."))
@@ -175,9 +185,10 @@ def _panel(
     sources: Sources, response: Response, quantity: Quantity, colours: dict[int, int], before: str = "", is_small: bool = False
 ) -> Panel:
     arrays, column = sources.arrays, quantity.column
-    speed = np.array([sources.of_rpm(one) for one in response.speed])
-    curves = [arrays.curve("all orders", speed, quantity.half_range, role="total")]
-    for line in sorted(response.largest_lines(quantity)):
+    axis = response.axis
+    speed = np.array([sources.on_axis(axis, one) for one in response.speed])
+    curves = [arrays.curve(axis.of if axis.is_frequency else "all orders", speed, quantity.half_range, role="total")]
+    for line in sorted([] if axis.is_frequency else response.largest_lines(quantity)):
         curves.append(arrays.curve(response.lines[line].title, speed, quantity.orders[:, line], colour=colours[line]))
     top = quantity.largest
     for name, values, role in (("limit", quantity.limit, "limit"), ("limit for passing", quantity.transient_limit, "passing")):
@@ -190,22 +201,23 @@ def _panel(
             )
             curves.append(arrays.curve(told, speed, values, role=role, shown=bool(is_near)))
     spec = {
-        "x": {"label": f"speed of {response.body}", "unit": sources.speed_unit},
+        "x": {"label": axis.label, "unit": sources.axis_unit(axis)},
         "y": {"label": "" if is_small else "half range", "unit": quantity.unit, "zero": True},
         "curves": curves,
         "bands": [*operation_bands(sources, response), *_barred(sources, response, quantity)],
-        "marks": [] if is_small else [[sources.of_rpm(one.speed), one.name] for one in response.criticals],
+        "marks": [] if is_small else [[sources.on_axis(axis, one.speed), one.name] for one in response.criticals],
         "name": "order",
     }
     at = number_text(float(speed[np.nanargmax(quantity.half_range)]))
     title = name_of(column) if is_small else f"{before}{name_of(column)}: {column.caption}"
-    largest = f"the largest is {number_text(top)} {quantity.unit} at {at} {sources.speed_unit}"
-    return Panel(title, f"Half range of {quantity.label} over the speed of {response.body}; {largest}.", spec)
+    largest = f"the largest is {number_text(top)} {quantity.unit} at {at} {sources.axis_unit(axis)}"
+    return Panel(title, f"Half range of {quantity.label} over the {axis.label}; {largest}.", spec)
 
 
 def _barred(sources: Sources, response: Response, quantity: Quantity) -> list[dict]:
     bands = []
     for one in response.barred_by(quantity):
         kind, label = ("passable", "barred") if one.can_be_passed else ("barred", "barred, also for passing")
-        bands.append(band(sources.of_rpm(one.start), sources.of_rpm(one.end), kind, label))
+        ends = [sources.on_axis(response.axis, end) for end in (one.start, one.end)]
+        bands.append(band(*ends, kind, label))
     return bands

@@ -17,7 +17,7 @@ module nocdyn_motion_assembly
   private
 
   public :: check_drive, check_relation, add_cardans, add_relations, drive_form, add_drive_form, &
-    holds_still, spline_shape, drive_interpolation
+    has_steady_speed, steady_speed, spline_shape, drive_interpolation
 
   integer, parameter :: by_formula = 1, by_table = 2
   integer, parameter :: forms_of_speed = 2   ! as many follow of angles
@@ -108,21 +108,32 @@ contains
     end select
   end subroutine find_table_mistake
 
-  !> Whether a group is a drive that holds its body still in the end.
-  pure logical function holds_still(group)
+  !> Whether a group is a drive whose body has a constant speed, or comes to rest in the end. Where an analysis sets the speed
+  !> instead, it may change.
+  pure logical function has_steady_speed(group, is_replaced)
     type(group_t), intent(in) :: group
+    logical, intent(in) :: is_replaced   !! whether an analysis may set another speed
     real(wp), allocatable :: speeds(:)
 
-    holds_still = .false.
+    has_steady_speed = .false.
     if (group%kind /= 'drive') return
+    if (group%has_value('speed_amplitude') .or. group%has_value('angle_amplitude')) return
+    has_steady_speed = is_replaced .and. group%text('kind') == 'speed' .or. .not. group%has_value('table_time')
+    if (has_steady_speed .or. group%text('kind') == 'angle') return
+    allocate (speeds, source=group%numbers('table_speed'))
+    has_steady_speed = all(abs(speeds - speeds(1)) <= 0) .or. .not. abs(steady_speed(group)) > 0
+  end function has_steady_speed
+
+  !> The speed of the body of a drive in the end [rad/s].
+  pure real(wp) function steady_speed(group)
+    type(group_t), intent(in) :: group   !! with `has_steady_speed`
+    real(wp), allocatable :: speeds(:)
+
+    steady_speed = 0.0_wp
+    if (group%text('kind') == 'angle') return
     allocate (speeds, source=[0.0_wp, group%numbers('table_speed')])
-    holds_still = .not. (group%has_value('speed_amplitude') .or. group%has_value('angle_amplitude'))
-    if (group%text('kind') == 'angle') then
-      holds_still = holds_still .and. .not. group%has_value('table_time')
-    else
-      holds_still = holds_still .and. .not. abs(group%number('speed') + speeds(size(speeds))) > 0
-    end if
-  end function holds_still
+    steady_speed = group%number('speed') + speeds(size(speeds))
+  end function steady_speed
 
   !> Adds the bank of the relations and the one of their drivers.
   subroutine add_relations(groups, banks)

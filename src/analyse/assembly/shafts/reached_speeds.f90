@@ -45,6 +45,7 @@ contains
           speed = abs(group%number('speed', absent=0.0_wp)) + abs(group%number('speed_amplitude', absent=0.0_wp))
           speed = max(speed, maxval([0.0_wp, abs(group%numbers('table_speed'))]))
         case ('response')
+          if (group%has_value('frequency')) cycle
           speed = maxval(abs([group%numbers('speed'), group%numbers('operating')]))
         case default
           cycle

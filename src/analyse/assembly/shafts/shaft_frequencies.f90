@@ -67,7 +67,7 @@ contains
         case ('excitation')
           frequency = max(frequency, frequency_of_excitation(group, speed_of('body')))
         case ('response')
-          frequency = max(frequency, largest(group, 'orders') * largest(group, 'speed'))
+          frequency = maxval([frequency, largest(group, 'orders') * largest(group, 'speed'), group%numbers('frequency')])
         case ('engine')
           frequency = max(frequency, order_of_engine(group) * speed_of('cylinders'))
         case ('crank')

@@ -109,6 +109,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer :: offending_row
 
+    ! gears ask for speeds beside those that drives give
+    if (allocated(machine%driven_speed)) machine%start_speed(1, :) = machine%start_speed(1, :) - machine%driven_speed
     associate (run => input%groups(input%position('run')))
       call fit_start_speeds(machine, is_known, run%text('start') == 'projected', shared_unit(input, 'body', 'speed'), &
                             offending_row, error)
@@ -117,6 +119,7 @@ contains
         call fit_start_speeds(machine, is_known, .true., 0, offending_row, error)
       end if
     end associate
+    if (allocated(machine%driven_speed)) machine%start_speed(1, :) = machine%start_speed(1, :) + machine%driven_speed
     if (allocated(error)) then
       error%message = input%location(fit%row_groups(offending_row)) // ': ' // error%message
       return

@@ -48,7 +48,8 @@ contains
     if (formulation%joints%count == 0) return
     if (.not. formulation%joints%only_lock()) setup%lanes = 1
     setup%has_energy_balance = .true.   ! a run has it, which takes the same steps
-    if (size(plan%analyses) > 0) call refuse_joints(plan%input, .true., 'a sweep of modes or responses', error)
+    if (size(plan%analyses) == 0) return
+    call refuse_joints(plan%input, .true., 'a sweep of modes or responses', error, sets_speed=.true.)
   end subroutine prepare_sweep
 
   !> Computes the variants that `scheduler` hands out, by threads with a block of lanes each.

@@ -18,10 +18,12 @@ module nocdyn_analysis_results
   integer, parameter, public :: analysis_crossing = 7        !! speed at which an order meets a mode, as nocdyn campbell has it
   integer, parameter, public :: analysis_crossing_margin = 8 !! distance of that speed to the speeds in operation
 
-  character(len=*), parameter, public :: analysis_names(8) = [character(len=15) :: 'frequency', 'damping_ratio', 'peak', &
-    'peak_speed', 'margin', 'ratio', 'crossing', 'crossing_margin']
-  character(len=*), parameter, public :: analysis_owners(8) = [character(len=8) :: 'mode', 'mode', 'response', 'response', &
-    'response', 'response', 'mode', 'mode']   !! the key of &record that each belongs to
+  integer, parameter, public :: analysis_peak_frequency = 9  !! of a shaker, where the peak is
+
+  character(len=*), parameter, public :: analysis_names(9) = [character(len=15) :: 'frequency', 'damping_ratio', 'peak', &
+    'peak_speed', 'margin', 'ratio', 'crossing', 'crossing_margin', 'peak_frequency']
+  character(len=*), parameter, public :: analysis_owners(9) = [character(len=8) :: 'mode', 'mode', 'response', 'response', &
+    'response', 'response', 'mode', 'mode', 'response']   !! the key of &record that each belongs to
 
   integer, parameter, public :: of_path = -1
 
@@ -118,6 +120,9 @@ contains
     case (analysis_peak_speed)
       self%unit = 'rad/s'
       self%long_name = what // 'speed of the peak'
+    case (analysis_peak_frequency)
+      self%unit = 'rad/s'
+      self%long_name = what // 'frequency of the peak'
     case (analysis_margin)
       self%long_name = what // 'distance of the peak to operation'
     case default   ! analysis_ratio

@@ -30,9 +30,9 @@ contains
     case ('modes')
       allocate (analysis, source=modes_results_t(locks_joints=.false.))
     case ('campbell')
-      allocate (analysis, source=campbell_results_t(always_writes=.true., is_for_threads=.true.))
+      allocate (analysis, source=campbell_results_t(sets_speed=.true., always_writes=.true., is_for_threads=.true.))
     case ('response')
-      allocate (analysis, source=response_results_t(always_writes=.true., is_for_threads=.true.))
+      allocate (analysis, source=response_results_t(sets_speed=.true., always_writes=.true., is_for_threads=.true.))
     case default
       error stop 'nocdyn_named_analyses: there is no analysis of this name'
     end select
@@ -45,11 +45,16 @@ contains
     type(input_t), intent(in) :: input
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: responses(:)
+    logical :: sets_speed
 
-    if (.not. analysis%takes_joints) call refuse_joints(input, analysis%is_steady, 'nocdyn ' // word, error)
+    sets_speed = analysis%sets_speed
+    allocate (responses, source=input%groups_named('response'))
+    if (size(responses) > 0) sets_speed = sets_speed .and. .not. input%groups(responses(1))%has_value('frequency')
+    if (.not. analysis%takes_joints) call refuse_joints(input, analysis%is_steady, 'nocdyn ' // word, error, sets_speed=sets_speed)
     if (allocated(error)) return
     if (analysis%is_steady) then
-      call assemble_steady_machine(input, analysis%locks_joints, machine, error)
+      call assemble_steady_machine(input, analysis%locks_joints, machine, error, sets_speed=sets_speed)
     else
       call assemble_machine(input, machine, error)
     end if

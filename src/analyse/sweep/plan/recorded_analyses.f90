@@ -2,7 +2,8 @@
 module nocdyn_recorded_analyses
   use nocdyn_analyses, only: analysis_t
   use nocdyn_analysis_results, only: analysis_crossing, analysis_crossing_margin, analysis_margin, analysis_names, &
-    analysis_owners, analysis_peak_speed, analysis_ratio, analysis_result_t, new_mode_result, new_path_result, new_response_result
+    analysis_owners, analysis_peak_frequency, analysis_peak_speed, analysis_ratio, analysis_result_t, new_mode_result, &
+    new_path_result, new_response_result
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_errors, only: error_t
   use nocdyn_excitation_lines, only: line_order
@@ -20,7 +21,7 @@ module nocdyn_recorded_analyses
   use nocdyn_response_settings, only: read_response_settings, response_settings_t
   use nocdyn_schema_text, only: suggestion
   use nocdyn_text, only: append, quoted, string_t, to_text
-  use nocdyn_units, only: unit_for, units
+  use nocdyn_units, only: unit_for, unit_hz, units
   use nocdyn_variant_analysis, only: limited_kinds, matching_quantities, oscillating_modes, recorded_kinds
   implicit none (type, external)
   private
@@ -67,7 +68,7 @@ contains
     call read_limits(input, self%quantities, self%limits, error)
     if (allocated(error)) return
     allocate (response)
-    call new_forced_response(machine, self%settings%body, self%settings%speeds, response, failure)
+    call new_forced_response(machine, self%settings%body, self%settings%speeds, response, failure, self%settings%shaker)
     if (.not. allocated(failure)) call move_alloc(response, self%response)
   end subroutine new_analysis_reader
 
@@ -251,6 +252,10 @@ contains
         call input%report(record, 'response', 'response = ' // quoted(group%text('response')) // ' is no coupling, shaft or ' // &
                           'mesh, and no column of response.csv' // suggestion(group%text('response'), names), diagnostics)
       end if
+      if (group%has_value('order') .and. self%settings%axis%is_frequency) then
+        call input%report(record, 'order', 'order: &response is over the frequency of a shaker, which has no orders', diagnostics)
+        return
+      end if
       if (.not. group%has_value('order') .or. .not. allocated(self%response)) return
       if (line_order(self%response%lines, group%number('order')) > 0) return
       call list_orders(self%response%lines, known)
@@ -271,7 +276,12 @@ contains
     integer, allocatable :: quantities(:)
     integer :: k
 
-    if (statistic == analysis_margin .and. size(self%settings%operating) == 0) then
+    if (any(statistic == [analysis_peak_speed, analysis_peak_frequency]) .and. &
+        (statistic == analysis_peak_frequency .neqv. self%settings%axis%is_frequency)) then
+      call input%report(record, 'statistic', 'statistic = ' // quoted(trim(analysis_names(statistic))) // &
+                        ': &response is over the ' // self%settings%axis%noun() // '; allowed: ' // &
+                        quoted('peak_' // self%settings%axis%noun()), diagnostics)
+    else if (statistic == analysis_margin .and. size(self%settings%operating) == 0) then
       call input%report(record, 'statistic', "statistic = 'margin' is the distance to the speeds in operation; needed: " // &
                         'operating of &response', diagnostics)
     else if (statistic == analysis_ratio) then
@@ -305,6 +315,9 @@ contains
       one%signal = first%signal_t
     end associate
     if (statistic == analysis_peak_speed) call turn_unit(self, one)
+    if (statistic /= analysis_peak_frequency) return
+    one%in_unit = unit_hz
+    one%unit = 'Hz'
   end subroutine make_response_result
 
   !> Gives a result the unit that the input asks for.

@@ -2,7 +2,7 @@
 module nocdyn_variant_analysis
   use nocdyn_analyses, only: analysis_t
   use nocdyn_analysis_results, only: analysis_crossing, analysis_damping_ratio, analysis_frequency, analysis_margin, &
-    analysis_peak, analysis_peak_speed, analysis_ratio, analysis_result_t
+    analysis_peak, analysis_peak_frequency, analysis_peak_speed, analysis_ratio, analysis_result_t
   use nocdyn_campbell, only: analyse_campbell, campbell_t
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_excitation_lines, only: line_order
@@ -167,7 +167,7 @@ contains
       select case (one%statistic)
       case (analysis_peak)
         value = amplitude(peak)
-      case (analysis_peak_speed)
+      case (analysis_peak_speed, analysis_peak_frequency)
         value = speed
       case (analysis_margin)
         value = operating_distance(analysis%settings, critical_speed(analysis, line, speed))

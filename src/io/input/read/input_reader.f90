@@ -9,9 +9,9 @@ module nocdyn_input_reader
   use nocdyn_name_checks, only: check_duplicate_names, check_references, collect_names
   use nocdyn_namelist, only: namelist_group_t, namelist_t
   use nocdyn_namelist_scanner, only: scan_namelist
-  use nocdyn_schema, only: first_key, group_rule_index, group_rules, is_single, key_rules, last_key
+  use nocdyn_schema, only: first_key, group_rule_index, group_rules, is_single, key_rules, last_key, relation_rules
   use nocdyn_schema_relations, only: relations_of, relations_t
-  use nocdyn_schema_rules, only: at_least_once, exactly_once, occurrence_texts, required
+  use nocdyn_schema_rules, only: at_least_once, exactly_once, exactly_one, occurrence_texts, required
   use nocdyn_schema_text, only: group_names, suggest_group, suggestion
   use nocdyn_near_words, only: nearest_word
   use nocdyn_text, only: append, quoted, shortened, string_t, to_text
@@ -196,7 +196,9 @@ contains
     do rule = 1, size(group_rules)
       if (.not. is_single(rule)) cycle
       if (any([(namelist%groups(g)%name == group_rules(rule)%name, g=1, namelist%group_count)])) cycle
-      if (any(key_rules(first_key(rule):last_key(rule))%default == required) .and. all(overrides%group_rule /= rule)) cycle
+      if ((any(key_rules(first_key(rule):last_key(rule))%default == required) .or. &
+           any(relation_rules%group == group_rules(rule)%name .and. relation_rules%form == exactly_one)) .and. &
+          all(overrides%group_rule /= rule)) cycle
       added = [added, rule]
     end do
     n = namelist%group_count
