@@ -66,8 +66,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Line:
-    """An excitation: oscillations per turn of the body, or a frequency [Hz] at the first speed, with the name of the program; or a
-    shaker."""
+    """An excitation: oscillations per turn of the body; a frequency [Hz] at the first speed, with its name; or a shaker."""
 
     value: float
     is_order: bool

@@ -51,7 +51,8 @@ contains
     sets_speed = analysis%sets_speed
     allocate (responses, source=input%groups_named('response'))
     if (size(responses) > 0) sets_speed = sets_speed .and. .not. input%groups(responses(1))%has_value('frequency')
-    if (.not. analysis%takes_joints) call refuse_joints(input, analysis%is_steady, 'nocdyn ' // word, error, sets_speed=sets_speed)
+    if (.not. analysis%takes_joints) call refuse_joints(input, analysis%is_steady, 'nocdyn ' // word, error, &
+                                                        sets_speed=sets_speed)
     if (allocated(error)) return
     if (analysis%is_steady) then
       call assemble_steady_machine(input, analysis%locks_joints, machine, error, sets_speed=sets_speed)
