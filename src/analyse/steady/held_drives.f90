@@ -5,11 +5,12 @@ module nocdyn_held_drives
   use nocdyn_balance_starts, only: solve_by_newton
   use nocdyn_bank, only: bank_of, role_bearing, role_excitation, role_motor
   use nocdyn_block_solutions, only: block_solutions_t
-  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability, nearest_equilibrium, t_infinity
+  use nocdyn_equilibrium, only: equilibrium_t, t_infinity
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_governed_banks, only: governed_bank_t
   use nocdyn_kinds, only: wp
+  use nocdyn_steady_start, only: find_operating_state
   use nocdyn_text, only: quoted, string_t
   use nocdyn_torque_balance, only: torque_balance_t
   implicit none (type, external)
@@ -144,10 +145,8 @@ contains
     integer :: nearest
 
     if (size(z) == 0) return
-    call find_equilibria(balance%formulation%machine, t_infinity, formulation, equilibria, notes, error)
+    call find_operating_state(balance%formulation%machine, t_infinity, formulation, equilibria, nearest, notes, error)
     if (allocated(error)) return
-    if (size(equilibria) > 1) call find_stability(formulation, t_infinity, equilibria)
-    nearest = nearest_equilibrium(formulation, equilibria)
     associate (y => equilibria(nearest)%y)
       z = [y(1, balance%motions%free), y(1, 2 * balance%coordinates + 1:)]
     end associate
