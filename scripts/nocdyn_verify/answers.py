@@ -11,12 +11,12 @@ from typing import Any
 
 from .cases import INPUT, Case
 
-TABLES = {
-    "run": "trajectory.csv",
-    "modes": "modes.csv",
-    "campbell": "campbell.csv",
-    "response": "response.csv",
-    "sweep": "sweep.csv",
+TABLES = {  # of several the first one that has the column
+    "run": ("trajectory.csv",),
+    "modes": ("modes.csv",),
+    "campbell": ("campbell.csv",),
+    "response": ("response.csv", "response_orders.csv"),
+    "sweep": ("sweep.csv",),
 }
 EXTREMES = {"maximum": "max", "minimum": "min", "end": "last"}
 SAME = 1e-9  # relative: places that are equal
@@ -41,10 +41,9 @@ class Answers:
         folder = self.folder_of(case)
         command = shlex.split(case.command)[0]
         if case.at in EXTREMES:
-            return column(read_json(folder / "summary.json")["extremes"], case.signal)[EXTREMES[case.at]]
-        table = folder / TABLES.get(command, "")
-        if table.is_file():
-            found = in_table(table, case)
+            return column(read_json(folder / "summary.json")["columns"], case.signal)[EXTREMES[case.at]]
+        for table in TABLES.get(command, ()):
+            found = in_table(folder / table, case) if (folder / table).is_file() else None
             if found is not None:
                 return found
         report = {"run": "summary"}.get(command, command)
