@@ -12,11 +12,11 @@ from typing import Any
 from .cases import INPUT, Case
 
 TABLES = {
-    "run": "trajectory.csv",
-    "modes": "modes.csv",
-    "campbell": "campbell.csv",
-    "response": "response.csv",
-    "sweep": "sweep.csv",
+    "run": ("trajectory.csv",),
+    "modes": ("modes.csv",),
+    "campbell": ("campbell.csv",),
+    "response": ("response.csv", "response_orders.csv"),
+    "sweep": ("sweep.csv",),
 }
 EXTREMES = {"maximum": "max", "minimum": "min", "end": "last"}
 SAME = 1e-9  # relative: places that are equal
@@ -41,10 +41,9 @@ class Answers:
         folder = self.folder_of(case)
         command = shlex.split(case.command)[0]
         if case.at in EXTREMES:
-            return column(read_json(folder / "summary.json")["extremes"], case.signal)[EXTREMES[case.at]]
-        table = folder / TABLES.get(command, "")
-        if table.is_file():
-            found = in_table(table, case)
+            return column(read_json(folder / "summary.json")["columns"], case.signal)[EXTREMES[case.at]]
+        for name in TABLES.get(command, ()):
+            found = in_table(folder / name, case)
             if found is not None:
                 return found
         report = {"run": "summary"}.get(command, command)
@@ -118,7 +117,9 @@ def fits(content: Any, wanted: str) -> bool:
 
 
 def in_table(path: Path, case: Case) -> float | None:
-    """The value in the row with these values of other columns; nothing if the quantity is no column."""
+    """The value in the row with these values of other columns; nothing if there is no such table or column."""
+    if not path.is_file():
+        return None
     with path.open(newline="", encoding="utf-8") as file:
         reader = csv.reader(line for line in file if not line.startswith("#"))
         names = [label.partition(" [")[0] for label in next(reader)]
