@@ -46,7 +46,7 @@ class Answers:
             found = in_table(folder / name, case)
             if found is not None:
                 return found
-        report = {"run": "summary"}.get(command, command)
+        report = {"run": "summary", "sweep": "summary"}.get(command, command)
         return in_report(read_json(folder / f"{report}.json"), case)
 
     def folder_of(self, case: Case) -> Path:
