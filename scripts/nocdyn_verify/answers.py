@@ -46,7 +46,7 @@ class Answers:
             found = in_table(folder / table, case) if (folder / table).is_file() else None
             if found is not None:
                 return found
-        report = {"run": "summary"}.get(command, command)
+        report = {"run": "summary", "sweep": "summary"}.get(command, command)
         return in_report(read_json(folder / f"{report}.json"), case)
 
     def folder_of(self, case: Case) -> Path:
@@ -117,7 +117,9 @@ def fits(content: Any, wanted: str) -> bool:
 
 
 def in_table(path: Path, case: Case) -> float | None:
-    """The value in the row with these values of other columns; nothing if the quantity is no column."""
+    """The value in the row with these values of other columns; nothing if there is no such table or column."""
+    if not path.is_file():
+        return None
     with path.open(newline="", encoding="utf-8") as file:
         reader = csv.reader(line for line in file if not line.startswith("#"))
         names = [label.partition(" [")[0] for label in next(reader)]
