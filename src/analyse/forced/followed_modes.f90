@@ -1,10 +1,9 @@
 !> The modes at all speeds of a response, and the critical speeds, at which its lines meet them.
 module nocdyn_followed_modes
-  use nocdyn_critical_speeds, only: crossing_t, find_crossings
+  use nocdyn_critical_speeds, only: crossing_t, find_crossings, keep_new
   use nocdyn_errors, only: error_t
   use nocdyn_forced_response, only: forced_response_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lapack, only: sort_ascending
   use nocdyn_machine, only: machine_t
   use nocdyn_mode_branches, only: new_speed_modes, speed_modes_t
   use nocdyn_steady_start, only: find_steady_speed
@@ -43,8 +42,8 @@ contains
       call find_crossings(speed, frequencies_of(response, orders), modes, crossings)
       if (modes%is_constant .or. round == rounds .or. size(crossings) == 0) return
       more = crossings%speed
-      call sort_ascending(more)
-      if (speed(1) < 0) more = more(size(more):1:-1)
+      call keep_new(response, more)
+      if (size(more) == 0) return
       call response%add_points(more, .false., error, failed_speed, only_states=.true.)
       if (allocated(error)) return
     end do
@@ -75,7 +74,9 @@ contains
     if (.not. has_state) return
     speed = response%speeds()
     if (steady_speed < minval(speed) .or. steady_speed > maxval(speed)) return
-    call response%add_points([steady_speed], .false., error, failed_speed, only_states=.true.)
+    speed = [steady_speed]
+    call keep_new(response, speed)
+    if (size(speed) > 0) call response%add_points(speed, .false., error, failed_speed, only_states=.true.)
   end subroutine add_steady_speed
 
   !> The frequencies of orders, or of the lines of a response, at its speeds [rad/s], [lines, points].

@@ -205,7 +205,10 @@ contains
     end if
     call find_couplings(forms, self%modes, self%response, self%crossings)
     call self%response%solve_oscillations()
-    call refine_peaks(self%response, self%crossings, unrefined, error, failed_speed)
+    unrefined = 0.0_wp
+    if (self%response%matrix%coordinates <= most_coordinates) then
+      call refine_peaks(self%response, self%crossings, unrefined, error, failed_speed)
+    end if
     if (.not. allocated(error) .and. unrefined > 0) then
       call append(self%notes, 'there are too many peaks between the ' // self%settings%axis%plural() // ' of the grid to ' // &
                               'refine all: some may be higher by ' // rounded_text(100.0_wp * unrefined, 2) // &

@@ -29,7 +29,7 @@ module nocdyn_response_limits
     type(limit_rule_t), private :: rule
   contains
     procedure :: continuous_limit, transient_limit, peak_limit, ratio, allows_passing, has_continuous, has_transient
-    procedure :: amplitude_limit, has_tolerance, find_barred, list_notes, write_rule, write_place, write_unbarred
+    procedure :: amplitude_limit, curve_ratio, has_tolerance, find_barred, list_notes, write_rule, write_place, write_unbarred
   end type response_limit_t
 
 contains
@@ -233,6 +233,17 @@ contains
     end associate
   end function amplitude_limit
 
+  !> The ratio of the amplitude of one line to the limit at its frequency; 0 without a curve.
+  elemental real(wp) function curve_ratio(self, frequency, amplitude) result(ratio)
+    class(response_limit_t), intent(in) :: self
+    real(wp), intent(in) :: frequency   !! [rad/s]
+    real(wp), intent(in) :: amplitude   !! in the unit of the quantity
+
+    ratio = 0.0_wp
+    if (.not. allocated(self%frequency)) return
+    if (size(self%frequency) > 0) ratio = amplitude / self%amplitude_limit(frequency)
+  end function curve_ratio
+
   !> The limit of the largest magnitude, with the mean.
   elemental real(wp) function peak_limit(self) result(limit)
     class(response_limit_t), intent(in) :: self
@@ -314,7 +325,9 @@ contains
     real(wp), intent(in) :: speed               !! [rad/s]
     real(wp), intent(in) :: half_range, peak    !! in the unit of the quantity
 
-    ratio = max(half_range / self%continuous_limit(speed), peak / self%peak)
+    ratio = 0.0_wp
+    if (self%continuous_limit(speed) < no_limit) ratio = half_range / self%continuous_limit(speed)
+    if (self%peak < no_limit) ratio = max(ratio, peak / self%peak)
   end function ratio
 
 end module nocdyn_response_limits

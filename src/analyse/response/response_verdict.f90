@@ -199,7 +199,7 @@ contains
       largest = -1.0_wp
       do i = 1, size(points)
         do k = 1, size(points(i)%frequency)
-          ratio = abs(points(i)%quantity(k, limit%quantity)) / limit%amplitude_limit(points(i)%frequency(k))
+          ratio = limit%curve_ratio(points(i)%frequency(k), abs(points(i)%quantity(k, limit%quantity)))
           if (ratio <= largest) cycle
           largest = ratio
           worst = [i, k]

@@ -144,7 +144,7 @@ module nocdyn_schema_response
     key_rule_t('transit', 'range', a_number, 2, 'rad/s', unset, not_zero, &
       'the range of its speed; those that &limit bars in the response if not given'), &
     key_rule_t('transit', 'ramp_times', a_number, any_number, 's', unset, anything, &
-      'points of a run, the mean speed changes evenly between them; as &run and its drives if not given', &
+      'points between which the mean speed changes evenly; if not given, &run and its drives lead it', &
       fewest=2, ascends=.true.), &
     key_rule_t('transit', 'ramp_speeds', a_number, any_number, 'rad/s', unset, not_zero, &
       'mean speed of the body at these times; torques where it is driven make up for what is missing', fewest=2), &

@@ -16,7 +16,7 @@ module nocdyn_recorded_analyses
   use nocdyn_named_analyses, only: analysis_words, solve_named
   use nocdyn_output_units, only: output_units
   use nocdyn_response_analysis, only: list_orders
-  use nocdyn_response_limits, only: no_limit, read_limits, response_limit_t
+  use nocdyn_response_limits, only: read_limits, response_limit_t
   use nocdyn_moment_forms, only: list_moment_forms, kind_moment, moment_form_t
   use nocdyn_response_settings, only: read_response_settings, response_settings_t
   use nocdyn_schema_text, only: suggestion
@@ -290,7 +290,7 @@ contains
       do k = 1, size(self%limits)
         if (all(self%limits(k)%quantity /= quantities)) cycle
         if (.not. input%groups(record)%has_value('order')) return
-        if (self%limits(k)%continuous_limit(self%settings%speeds(1)) < no_limit) return
+        if (self%limits(k)%has_continuous() .or. size(self%limits(k)%frequency) > 0) return
       end do
       call input%report(record, 'statistic', "statistic = 'ratio' needs a &limit of " // quoted(name) // &
                         '; with order one of its oscillation', diagnostics)

@@ -207,6 +207,7 @@ contains
     integer, intent(in) :: line            !! 0 stands for all together
     integer, intent(in) :: quantities(:)
     integer :: i, k
+    real(wp) :: amplitude
 
     ratio = 0.0_wp
     do i = 1, size(analysis%response%points)
@@ -219,7 +220,9 @@ contains
           do k = 1, size(analysis%limits)
             associate (limit => analysis%limits(k))
               if (all(limit%quantity /= quantities)) cycle
-              ratio = max(ratio, abs(point%quantity(line, limit%quantity)) / limit%continuous_limit(point%state%speed))
+              amplitude = abs(point%quantity(line, limit%quantity))
+              ratio = max(ratio, limit%ratio(point%state%speed, amplitude, 0.0_wp), &
+                          limit%curve_ratio(point%frequency(line), amplitude))
             end associate
           end do
         end if
