@@ -52,7 +52,8 @@ def tables(browser, caption):
     return browser.ask(
         """return [...document.querySelectorAll('table')].filter((one) => one.caption.textContent.includes(arguments[0])).map(
           (table) => [...table.tHead.rows[0].cells].reduce((columns, head, i) => ({...columns,
-            [head.textContent.trim().split(' [')[0]]: [...table.tBodies[0].rows].map((row) => row.cells[i].textContent)}), {}))""",
+            [head.textContent.trim().split(' [')[0]]:
+              [...table.tBodies[0].rows].map((row) => row.cells[i].textContent)}), {}))""",
         caption,
     )
 
@@ -70,13 +71,15 @@ def test_passages_of_all_load_cases_are_told_with_times_peaks_and_damage(reports
         report = transit(reports, case)
         entries = report["passages"]
         assert passages["direction"] == ["up", "down"] and passages["range"] == ["430 to 525"] * 2
-        assert list(map(float, passages["time in range"])) == pytest.approx([one["time_in_range"] for one in entries], rel=1e-4)
+        times = [one["time_in_range"] for one in entries]
+        assert list(map(float, passages["time in range"])) == pytest.approx(times, rel=1e-4)
         assert list(map(float, passages["cycles of order"])) == pytest.approx(
             [one["cycles_of_order"] for one in entries], rel=1e-3
         )
         assert peaks["of"] == ["coupling 'shaft', moment"] * 2 + ["coupling 'shaft', stress"] * 2
         moment, stress = entries[0]["peaks"]
-        assert peaks["largest"][0] == f"{moment['largest']:.4g} N m" and peaks["its limit"] == ["60 N m", "60 N m", "", ""]
+        assert peaks["largest"][0] == f"{moment['largest']:.4g} N m"
+        assert peaks["its limit"] == ["60 N m", "60 N m", "", ""]
         assert peaks["half range"][2] == f"{stress['half_range'] / 1e6:.4g} MPa"
         assert peaks["limit for passing"] == ["", "", "50 MPa", "50 MPa"]
         assert float(peaks["of limit for passing"][2]) == pytest.approx(2e-6 * stress["half_range"], rel=1e-3)
