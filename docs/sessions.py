@@ -22,7 +22,8 @@ NUMBER = re.compile(r"[+-]?\d[\d.]*(?:[eE][+-]?\d+)?")
 PROGRESS = re.compile(r"^.* variants, .* left\n", re.MULTILINE)  # lines of a sweep that takes more than 10 s
 SAME = {"relative": 1e-4, "absolute": 1e-8}  # the output has seven digits; sums that should be 0 are rounding errors
 
-SCRIPTS = ("plot", "plot_campbell", "plot_modes", "plot_response", "plot_sweep", "report")  # run without installing packages
+# run without installing packages
+SCRIPTS = ("plot", "plot_campbell", "plot_modes", "plot_response", "plot_sweep", "plot_transit", "report")
 
 
 def sessions_of(page):

@@ -40,16 +40,25 @@ def mark_criticals(labels: Labels, response: Response, quantity: Quantity) -> No
         return
     axes.plot([one.speed for one in inside], np.full(len(inside), 0.985), marker=7, linestyle="", color="0.35", markersize=4,
               transform=above(axes), zorder=5)  # fmt: skip
+    turned = not response.axis.is_frequency  # the names of resonances are short
     sizes = {id(one): _amplitude(one, response, quantity) for one in inside}
     smallest = SHARE * np.nan_to_num(quantity.half_range).max()
     for one in sorted(inside, key=lambda one: -sizes[id(one)]):
-        height = (0.6 * len(one.name) + 0.3) * SMALL / 72
+        height = (0.6 * len(one.name) + 0.3) * SMALL / 72 if turned else TURNED
         top = 1.0 - 0.08 / labels.size[1]
         if sizes[id(one)] < smallest:
             break
         if labels.is_free(share_of(axes, one.speed), top - height / 2 / labels.size[1], TURNED, height):
             axes.axvline(one.speed, color="0.55", linewidth=0.5, zorder=1)
-            style = {"fontsize": SMALL, "color": "0.2", "ha": "center", "va": "top", "rotation": 90, "bbox": HALO, "zorder": 5}
+            style = {
+                "fontsize": SMALL,
+                "color": "0.2",
+                "ha": "center",
+                "va": "top",
+                "rotation": 90 if turned else 0,
+                "bbox": HALO,
+                "zorder": 5,
+            }
             axes.text(one.speed, top, one.name, transform=above(axes), **style)
 
 

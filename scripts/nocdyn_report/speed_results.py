@@ -29,6 +29,13 @@ def rpm(speed: float) -> float:
     return speed * RPM["rad/s"]
 
 
+def short_unit(unit: str, largest: float) -> tuple[float, str]:
+    """What numbers up to the largest are divided by, and their unit then: kN m, MN m or MPa if they are large."""
+    steps = ((1e6, "M", 1e4),) if unit == "Pa" else ((1e6, "M", 1e7), (1e3, "k", 1e4))
+    factor, prefix = next(((f, p) for f, p, least in steps if least <= largest < np.inf), (1.0, ""))
+    return factor, prefix + unit
+
+
 @dataclass(frozen=True)
 class Axis:
     """What a response is over: the speed of a body [rpm], or the frequency of a shaker [Hz]."""
@@ -174,10 +181,9 @@ class Quantity:
     def in_short(self, largest: float | None = None) -> "Quantity":
         """In kN m, MN m or MPa, if the numbers, or the largest of a figure, are large."""
         largest = self.largest if largest is None else largest
-        steps = ((1e6, "M", 1e4),) if self.unit == "Pa" else ((1e6, "M", 1e7), (1e3, "k", 1e4))
-        factor, prefix = next(((f, p) for f, p, least in steps if least <= largest < np.inf), (1.0, ""))
+        factor, unit = short_unit(self.unit, largest)
         scaled = {name: values / factor for name, values in self._values().items()}
-        return replace(self, unit=prefix + self.unit, stress=self.stress and self.stress * factor, **scaled)
+        return replace(self, unit=unit, stress=self.stress and self.stress * factor, **scaled)
 
 
 @dataclass(frozen=True)

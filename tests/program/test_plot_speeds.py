@@ -542,6 +542,6 @@ def test_bodies_of_any_machine_have_places_of_their_own(seed):
     assert len(set(zip(train.place, train.row))) == bodies and min(train.place) == 0
 
 
-@pytest.mark.parametrize("script", ["plot_response", "plot_campbell"])
+@pytest.mark.parametrize("script", ["plot_response", "plot_campbell", "plot_transit"])
 def test_the_scripts_name_their_modules(script):
     assert f"nocdyn_report.{script.removeprefix('plot_')}_figures" in (SCRIPTS / script).read_text(encoding="utf-8")

@@ -330,7 +330,8 @@ def test_only_what_does_not_belong_to_the_input_is_computed_again(fresh):
     def states():
         outcome = fresh("m.nml", "--no-pdf")
         assert (outcome.returncode, outcome.stderr) == (0, "")
-        return {line.split()[0]: line.split()[1].rstrip(":") for line in outcome.stdout.splitlines()[:-1]}
+        lines = [line for line in outcome.stdout.splitlines()[:-1] if "left out" not in line]
+        return {line.split()[0]: line.split()[1].rstrip(":") for line in lines}
 
     commands = ("equilibrium", "modes", "holzer", "campbell", "response", "run")
     assert states() == dict.fromkeys(commands, "computed")
@@ -775,4 +776,10 @@ def test_the_report_of_a_plant_has_few_pages(fresh):
         fresh.write(name, (SOURCE / "docs/tutorial" / name).read_text(encoding="utf-8"))
     assert fresh("ship_plant.nml", "--quiet").returncode == 0
     content = (fresh.folder / "results/ship_plant/report.pdf").read_bytes()
-    assert 5 < len(re.findall(rb"/Type */Page\b", content)) <= 15
+    assert 5 < len(re.findall(rb"/Type */Page\b", content)) <= 10
+    page = html.unescape(fresh.page("ship_plant").read_text(encoding="utf-8"))
+    # tables of Holzer have a row for each node of a shaft: not more of them than rows for which there is room
+    assert "Holzer table of undamped mode 1, 5.3447 Hz" in page and "Holzer table of undamped mode 2" not in page
+    assert "frequency in modes.csv" not in page and "holzer.csv has the tables of all 37 modes" in page
+    assert "Modes above 85.42 Hz: 31, in the appendix" in page and "31 more modes are in campbell.csv" in page
+    assert "with tolerance" in page and page.count("may be passed quickly</td>") == 2

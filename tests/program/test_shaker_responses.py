@@ -225,6 +225,8 @@ def test_figures_are_over_the_frequency(nocdyn, monkeypatch):
     assert response.barred[0].start < 15.91 < response.barred[0].end
     figure = draw_page(response, response.quantities, Look((10, 20)), {})
     assert figure.axes[0].get_xlabel() == "frequency of shaker [Hz]"
+    (name,) = [text for text in figure.axes[0].texts if text.get_text() == "I"]
+    assert name.get_rotation() == 0  # turned it would be a dash
 
 
 def test_a_report_is_over_the_frequency(nocdyn):
@@ -238,6 +240,7 @@ def test_a_report_is_over_the_frequency(nocdyn):
     assert "campbell     left out: &response is over the frequency of a shaker" in outcome.stdout
     page = (nocdyn.folder / "out/report.html").read_text()
     for text in ("frequencies of shaker from 10 to 20 Hz", "Barred ranges of frequency", "triangles: resonances",
-                 "Damage of an hour over the frequency", "in which the shaker alone oscillates"):  # fmt: skip
+                 "Damage of an hour over the frequency", "in which the shaker alone oscillates",
+                 '"markName":"resonance, mode"', "no limit for passing is given"):  # fmt: skip
         assert text in page
-    assert "triangles: critical speeds" not in page
+    assert "triangles: critical speeds" not in page and "may be passed quickly" not in page

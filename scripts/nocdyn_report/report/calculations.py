@@ -20,6 +20,7 @@ FILES = {
     "modes": ["modes.json", "modes.csv"],
     "response": ["response.json", "response.csv", "response_orders.csv"],
     "campbell": ["campbell.json", "campbell.csv"],
+    "transit": ["transit.json", "transit.csv"],
 }
 HOLZER = ["holzer.csv"]
 SWEEP = "sweep.nc"
@@ -87,6 +88,10 @@ def calculate(
             results.of[command] = _analyse(program, command, [*words, *in_csv], stamps)
         else:
             results.of[command] = Calculation(command, "left out", "the input has no &response")
+    if "\n&transit\n" in check["complete_input"]:
+        results.of["transit"] = _analyse(program, "transit", words, stamps)
+    else:
+        results.of["transit"] = Calculation("transit", "left out", "the input has no &transit")
     results.of["run"] = _run(program, results, words)
     for calculation in results.of.values():
         tell(_line(calculation))

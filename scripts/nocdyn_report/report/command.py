@@ -28,6 +28,7 @@ from .sections.response import response_section
 from .sections.scope import scope_section
 from .sections.steady import steady_section
 from .sections.summary import summary_section
+from .sections.transit import transit_section
 from .sources import NOTES_FILE, Sources
 
 PAGE, PDF = "report.html", "report.pdf"
@@ -97,7 +98,7 @@ def _text(file: str) -> str:
 
 def _sections(sources: Sources, arguments: argparse.Namespace) -> list[Section]:
     made = [make(sources) for make in (machine_section, steady_section, data_section, modes_section, campbell_section)]
-    made += [make(sources) for make in (response_section, motion_section, energy_section, fatigue_section)]
+    made += [make(sources) for make in (response_section, transit_section, motion_section, energy_section, fatigue_section)]
     there = [section for section in made if section is not None]
     folder = Folder(Path(arguments.file).parent, arguments.allow_outside)
     remarks = remarks_section(_notes(sources, arguments.file, folder))

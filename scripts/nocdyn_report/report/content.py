@@ -177,6 +177,11 @@ def number(value: object, digits: int = 5, tone: str = "") -> Cell:
     return Cell(number_text(value, digits), key, "", tone, True)
 
 
+def panels_beside(count: int) -> int:
+    """Small panels of a figure in a row: up to four in one, more in rows of three or four, of which there are few."""
+    return count if count <= 4 else 3 if count in (5, 6, 9) else 4
+
+
 def by_columns(caption: str, columns: Sequence[tuple[str, list[Cell]]], note: str = "", is_sorted: bool = True) -> Table:
     """A table of its columns; one without any content is left out."""
     shown = [(head, cells) for head, cells in columns if any(cell.text not in ("", NONE) for cell in cells)]

@@ -11,8 +11,11 @@ MAIN_FILES = {  # what a command reports, of the machine or of one load case
     "campbell": "campbell.json",
     "response": "response.json",
     "run": "summary.json",
+    "transit": "transit.json",
 }
-CASES = {"run": "cases.json"} | {name: f"{name}_cases.json" for name in ("equilibrium", "modes", "campbell", "response")}
+CASES = {"run": "cases.json"} | {
+    name: f"{name}_cases.json" for name in ("equilibrium", "modes", "campbell", "response", "transit")
+}
 DONE = "done"
 
 

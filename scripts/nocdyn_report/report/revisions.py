@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..columns import LOADS, RESPONSE_COLUMNS, read_column_list
-from ..speed_results import read_critical, roman
+from ..speed_results import Axis, read_critical, roman
 from ..trajectory_files import ResultsError
 from .failure import USAGE, ReportError
 from .naming import is_end, name_of
@@ -106,16 +106,20 @@ def _frequencies(files: ResultFiles) -> Iterable[tuple]:
 
 def _criticals(files: ResultFiles) -> Iterable[tuple]:
     if folder := _main(files, "campbell"):
-        for one in _read(folder / "campbell.json")["crossings"]:
-            yield ("critical speed", read_critical(one).name), (one["speed_rad_s"], "rad/s")
+        report = _read(folder / "campbell.json")
+        axis = Axis(report["body"])
+        for one in report["crossings"]:
+            yield ("critical speed", read_critical(one, axis).name), (one["speed_rad_s"], "rad/s")
 
 
 def _response(files: ResultFiles) -> Iterable[tuple]:
     if folder := _main(files, "response"):
         loads = {one.name: one for one in read_column_list(folder, RESPONSE_COLUMNS) if one.rank in LOADS and not is_end(one)}
-        for one in _read(folder / "response.json")["largest"]:
+        report = _read(folder / "response.json")
+        axis = Axis(report.get("excitation", report["body"]), "excitation" in report)
+        for one in report["largest"]:
             if column := loads.get(one["quantity"]):
-                yield (f"half range over the speeds: {column.caption}", name_of(column)), (one["half_range"], one["unit"])
+                yield (f"half range over the {axis.plural}: {column.caption}", name_of(column)), (one["half_range"], one["unit"])
 
 
 def _runs(files: ResultFiles) -> Iterable[tuple]:

@@ -14,6 +14,7 @@ from ..modes_results import Modes, read_modes
 from ..results import RPM, groups_of, ranges_of, trajectory_in
 from ..speed_results import Axis, Campbell, Critical, Response, read_campbell, read_response, rpm
 from ..trajectory_files import ResultsError, labels_of, read_columns
+from ..transit_results import Transit, read_transit
 from .calculations import Calculations
 from .curves import Arrays
 from .failure import FILES, ReportError
@@ -130,6 +131,11 @@ class Sources:
     @property
     def campbell(self) -> Campbell:
         return self._shown("campbell")
+
+    @cached_property
+    def transits(self) -> list[Transit]:
+        """Of all load cases."""
+        return [_told(read_transit, case.folder) for case in self.cases_of("transit")]
 
     @cached_property
     def cases(self) -> dict:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from .result_files import ResultFiles
 
-ANALYSES = ("response", "campbell", "run")  # that compare with limits; of equal lines the first one's stays
+ANALYSES = ("response", "campbell", "run", "transit")  # that compare with limits; of equal lines the first one's stays
 FINDINGS = ("exceeded", "not assessed", "restricted", "kept")  # the worst first
 OPEN = "not assessed"
 STEADY = ("steady", "continuous", "transient")  # words of criteria on steady oscillations; others are on largest values
@@ -29,7 +29,7 @@ class Line:
     unit: str = ""
     ratio: float | None = None
     detail: str = ""
-    lower: int = 0  # number of load cases in which the criterion is kept with a smaller ratio
+    lower: frozenset[str] = frozenset()  # other load cases, in which the criterion is kept with a smaller ratio
 
     @property
     def subject(self) -> str:
@@ -74,7 +74,7 @@ def one_for_each_criterion(lines: list[Line]) -> list[Line]:
             else one.shown
         )
         first = shown.get(key)
-        shown[key] = replace(first, lower=first.lower + len(one.cases)) if first else one
+        shown[key] = replace(first, lower=first.lower | set(one.cases) - set(first.cases)) if first else one
     return list(shown.values())
 
 
@@ -111,14 +111,17 @@ def _line(entry: dict) -> Line:
 
 
 def _answered(lines: list[Line]) -> list[Line]:
-    """Without lines that are not assessed where another analysis answers the question, or has asked it before."""
+    """Without lines that are not assessed where another analysis answers the question, or has asked it before, and without
+    distances of critical speeds of which an earlier analysis has told the same finding."""
     answered = {(one.cases, one.question) for one in lines if one.finding != OPEN}
     kept, asked = [], {}
     for one in lines:
         key = one.cases, one.question
-        if one.finding == OPEN and (key in answered or asked.get(key, one.analysis) != one.analysis):
+        first = asked.setdefault(key, one)
+        is_asked = first.analysis != one.analysis
+        is_told = is_asked and first.finding == one.finding and one.question[0] == DISTANCE
+        if is_told or (one.finding == OPEN and (key in answered or is_asked)):
             continue
-        asked.setdefault(key, one.analysis)
         kept.append(one)
     return kept
 

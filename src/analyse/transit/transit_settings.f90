@@ -25,7 +25,7 @@ module nocdyn_transit_settings
   type, public :: transit_settings_t
     integer :: group = 0                      !! &transit in the input
     integer :: body = 0
-    real(wp) :: forwards = 1.0_wp             !! -1: the body turns backwards
+    real(wp) :: forwards = 1.0_wp             !! -1 if the body turns backwards
     integer :: turns = 1                      !! over which the mean speed is taken
     logical :: needs_up = .false., needs_down = .false.   !! passages that the run has to make, beside at least one
     real(wp) :: time_limit = no_limit         !! of the time in a range [s]

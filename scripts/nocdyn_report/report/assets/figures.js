@@ -238,10 +238,11 @@ const report = (() => {
       entry.append(label);
       legend.append(entry);
     }
-    if (charts.some((chart) => (chart.spec.marks || []).length)) {
+    const marked = charts.find((chart) => (chart.spec.marks || []).length);
+    if (marked) {
       const entry = document.createElement("span");
       entry.innerHTML = '<svg width="20" height="10" aria-hidden="true"><path class="mark" d="M10 9l-4 -7h8z"/></svg>';
-      entry.append("critical speed, mode/order");
+      entry.append(marked.spec.markName);
       legend.append(entry);
     }
   }

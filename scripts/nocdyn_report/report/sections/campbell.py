@@ -11,6 +11,7 @@ from ..curves import band
 from ..numbers import unit_text
 from ..readable import texts
 from ..sources import Sources
+from .modes import LEAST_MODES, of_interest
 
 MOST_MODES = 24
 MOST_ROWS = 120
@@ -135,10 +136,13 @@ def _units(sources: Sources) -> dict[str, int]:
 def _modes(sources: Sources) -> Table:
     table = sources.table("campbell", "campbell.csv")
     rows = []
-    for mode, frequency in sources.campbell.modes.items():
+    modes = list(sources.campbell.modes.items())
+    count = max(LEAST_MODES, sum(frequency.min() <= of_interest(sources) for _, frequency in modes))
+    for mode, frequency in modes[:count]:
         damping = table[f"damping_ratio_{mode} [1]"]
         least, most = float(frequency.min()), float(frequency.max())
         rows.append([number(mode), number(least), number(most), number(float(damping.min()), 3), number(float(damping.max()), 3)])
     rows, more = first(rows, MOST_ROWS, "campbell.csv")
+    more = more or (f"{len(modes) - count} more modes are in campbell.csv." if len(modes) > count else "")
     columns = ["mode", "lowest frequency [Hz]", "highest frequency [Hz]", "least damping ratio", "largest damping ratio"]
     return Table("Natural frequencies within the range of speeds", columns, rows, more)

@@ -1,6 +1,7 @@
 """The energy account of runs."""
 
 from ..content import Heading, Section, Table, by_columns, cut
+from ..numbers import number_text
 from ..readable import texts
 from ..sources import Run, Sources
 
@@ -26,8 +27,9 @@ def _work(sources: Sources, run: Run) -> Table:
     work = sorted(account["work_in_J"].items(), key=lambda item: -item[1])
     columns = [("element", texts([name for name, _ in work])), sources.units.column("work", "J", [amount for _, amount in work])]
     largest = max((abs(amount) for _, amount in work), default=0.0)
-    note = f"The balance error is {sources.units.amount(account['residual_J'], 'J', 3)}"
-    note += f", {account['residual_J'] / largest:.0e} of the largest work. Negative work was taken out." if largest else "."
+    residual = abs(account["residual_J"])
+    note = f"The balance error is {sources.units.amount(residual, 'J', 3)}"
+    note += f", {number_text(residual / largest, 1)} of the largest work. Negative work was taken out." if largest else "."
     return cut(by_columns(f"Work into the machine{_which(run)}", columns, note), MOST_ROWS, "summary.json")
 
 

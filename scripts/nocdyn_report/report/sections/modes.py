@@ -12,12 +12,14 @@ from ..readable import texts
 from ..sources import Sources
 
 MOST_ROWS = 60
+MOST_FURTHER = 12  # modes above those of the section
 MOST_SHAPES = 8  # that are drawn
 SHOWN_SHAPES = 3  # at first
 MOST_TABLES = 4  # of Holzer
-MOST_BODIES = 60  # of such a table
+MOST_BODIES = 60  # of all of these tables
 LEAST_MODES = 6  # that the section has
 BEYOND = 1.5  # times the highest frequency of an order: modes above are no part of the section
+LUMPED = "frequency in modes.csv [Hz]"  # in tables of machines whose shafts have inertia
 SHARES, SMALLEST_SHARE = 3, 0.02  # of energies that are named
 
 
@@ -28,12 +30,14 @@ def modes_section(sources: Sources) -> Section | None:
     modes = sources.modes
     section.add(Paragraph(f"The machine is linearised about {modes.content['about']}."))
     if modes.oscillating:
-        count = max(LEAST_MODES, sum(mode["frequency_Hz"] <= _of_interest(sources) for mode in modes.oscillating))
+        count = max(LEAST_MODES, sum(mode["frequency_Hz"] <= of_interest(sources) for mode in modes.oscillating))
         section.add(_frequencies(modes, modes.oscillating[:count], "Natural frequencies"))
         if further := modes.oscillating[count:]:
-            told = f"Modes above {number_text(_of_interest(sources), 3)} Hz: {len(further)}, in the appendix."
+            told = (
+                f"Modes above {number_text(modes.oscillating[count - 1]['frequency_Hz'], 4)} Hz: {len(further)}, in the appendix."
+            )
             section.add(Paragraph(told))
-            section.add_details(_frequencies(modes, further, "Further natural frequencies"))
+            section.add_details(_frequencies(modes, further, "Further natural frequencies", MOST_FURTHER))
         if modes.shaped and len(modes.bodies) > 1:
             section.add(_shapes(sources, modes.shaped[:MOST_SHAPES]))
     else:
@@ -43,7 +47,7 @@ def modes_section(sources: Sources) -> Section | None:
     return section.add_details(Heading("Holzer tables", "holzer"), *_holzer(sources))
 
 
-def _of_interest(sources: Sources) -> float:
+def of_interest(sources: Sources) -> float:
     """A frequency [Hz] above all that excite the machine; without a Campbell diagram all modes are of interest."""
     if not sources.has("campbell") or not sources.campbell.lines:
         return math.inf
@@ -56,7 +60,7 @@ def _shares(values: list[float], names: list[str]) -> str:
     return ", ".join(f"{name} {percent(value, 2)}" for value, name in ranked if value >= SMALLEST_SHARE)
 
 
-def _frequencies(modes: Modes, shown: list[dict], caption: str) -> Table:
+def _frequencies(modes: Modes, shown: list[dict], caption: str, most: int = MOST_ROWS) -> Table:
     damping = [number(mode["damping_ratio"], 3, "bad" if mode["damping_ratio"] < 0 else "") for mode in shown]
     marks = [", ".join(marks_of(mode)) for mode in shown]
     columns = [
@@ -69,7 +73,7 @@ def _frequencies(modes: Modes, shown: list[dict], caption: str) -> Table:
         ("remark", [text(mark, "warn" if mark else "") for mark in marks]),
     ]
     grows = any(mode["damping_ratio"] < 0 for mode in shown)
-    return cut(by_columns(caption, columns, "Negative damping: the mode grows." if grows else ""), MOST_ROWS, "modes.csv")
+    return cut(by_columns(caption, columns, "Negative damping: the mode grows." if grows else ""), most, "modes.csv")
 
 
 def _others(others: list[dict], modes: Modes) -> Table:
@@ -135,11 +139,17 @@ def _holzer(sources: Sources) -> list[Paragraph | Table]:
     if not len(table):
         return [Paragraph("No mode oscillates: there is no table.")]
     blocks: list[Paragraph | Table] = []
-    shown = list(dict.fromkeys(table["mode"]))
-    columns = [name for name in table.columns if name not in ("mode", "frequency [Hz]")]
-    for mode in shown[:MOST_TABLES]:
+    frequencies = dict(zip(table["mode"], table["frequency [Hz]"].astype(float)))
+    limit = of_interest(sources)
+    rows = len(table) // len(frequencies)  # of a table: many if shafts have nodes
+    most = max(1, min(MOST_TABLES, MOST_BODIES // rows))
+    shown = [mode for mode, frequency in frequencies.items() if frequency <= limit][:most] or list(frequencies)[:1]
+    columns = [name for name in table.columns if name not in ("mode", "frequency [Hz]", LUMPED)]
+    for mode in shown:
         part = table[table["mode"] == mode]
-        caption = f"Holzer table of undamped mode {mode}, {number_text(float(part['frequency [Hz]'].iloc[0]))} Hz"
+        caption = f"Holzer table of undamped mode {mode}, {number_text(frequencies[mode])} Hz"
+        if LUMPED in part and (other := number_text(float(part[LUMPED].iloc[0]))) != number_text(frequencies[mode]):
+            caption += f"; the modes have {other} Hz"
         content = []
         for name in columns:
             head, unit = name_and_unit(name.replace("omega^2", "ω²").replace("theta", "θ"))
@@ -148,8 +158,8 @@ def _holzer(sources: Sources) -> list[Paragraph | Table]:
             else:
                 content.append(sources.units.column(head, unit if unit != "rad" else "1", list(map(_finite, part[name])), 4))
         blocks.append(cut(by_columns(caption, content, is_sorted=False), MOST_BODIES, "holzer.csv"))
-    if len(shown) > MOST_TABLES:
-        blocks.append(Paragraph(f"holzer.csv has the tables of all {len(shown)} modes."))
+    if len(shown) < len(frequencies):
+        blocks.append(Paragraph(f"holzer.csv has the tables of all {len(frequencies)} modes."))
     return blocks
 
 

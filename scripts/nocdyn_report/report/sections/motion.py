@@ -5,7 +5,22 @@ import re
 from ...columns import DETAIL, LOADS, LOSS, MOMENT, SLIP, SPEED, TORQUE, TWIST, Column, by_sort
 from ...results import TIME
 from ...selection import widest
-from ..content import Block, Cell, Figure, Heading, Panel, Paragraph, Section, Table, by_columns, cut, first, number, text
+from ..content import (
+    Block,
+    Cell,
+    Figure,
+    Heading,
+    Panel,
+    Paragraph,
+    Section,
+    Table,
+    by_columns,
+    cut,
+    first,
+    number,
+    panels_beside,
+    text,
+)
 from ..naming import WHOLE, is_end, name_of
 from ..numbers import number_text
 from ..readable import texts
@@ -14,8 +29,7 @@ from ..sources import Run, Sources
 CYLINDER = re.compile(r"_\d+(_\d+)?$")  # that a torque of an engine ends with
 MOST_CURVES = 3  # of a panel of speeds or torques
 MOST_PANELS = 6  # of loads, of one of several load cases
-MOST_OF_ONE = 15  # likewise, of a single run
-PANELS_BESIDE = 3
+MOST_OF_ONE = 6  # likewise, of a single run
 PANEL = 180  # width of a panel on paper [pixels]
 MOST_ROWS = 60
 
@@ -172,12 +186,7 @@ def _figures(sources: Sources, run: Run) -> list[Figure]:
     some = f": {most} of {len(moments)} moments, those with limits first" if len(moments) > most else ""
     has_bands = any("low" in curve for panel in panels for curve in panel.spec["curves"])
     bands = "; filled: between the smallest and the largest value" if has_bands else ""
-    return [Figure(f"Motion{_of(run)} over the time{some}{bands}", panels, _beside(len(panels)))]
-
-
-def _beside(count: int) -> int:
-    """Panels beside one another: four in one row, else three."""
-    return count if count <= PANELS_BESIDE + 1 else PANELS_BESIDE
+    return [Figure(f"Motion{_of(run)} over the time{some}{bands}", panels, panels_beside(len(panels)))]
 
 
 def _of_each_engine(sources: Sources, run: Run, columns: list[Column]) -> list[Column]:

@@ -20,6 +20,9 @@ ASSUMED = {  # what each calculation takes for granted, as the documentation say
         "Forced response: linearised about the steady state, in which the shaker alone oscillates, with its amplitude.",
         "Limits apply to continuous operation; where they are exceeded the range of frequencies is barred.",
     ],
+    "transit": [
+        "Passage of barred ranges: nonlinear, over the time; the mean speed, over whole turns, says when it is in the range.",
+    ],
     "run": ["Motion over the time: nonlinear, as the input describes the elements."],
 }
 
@@ -31,7 +34,7 @@ def remarks_section(html: str) -> Section | None:
 def notes_section(sources: Sources) -> Section:
     section = Section("notes", "Assumptions and notes", is_appendix=True)
     assumed = list(ASSUMED["all"])
-    for command in ("equilibrium", "modes", "campbell", "response", "run"):
+    for command in ("equilibrium", "modes", "campbell", "response", "transit", "run"):
         kind = "shaker" if command == "response" and sources.has(command) and sources.response.axis.is_frequency else command
         assumed += ASSUMED[kind] if sources.has(command) else []
     section.add(Items(assumed))
@@ -50,6 +53,8 @@ def program_notes(sources: Sources) -> list[tuple[str, str]]:
     given += [("modes", sources.modes.content["notes"])] if sources.has("modes") else []
     given += [("campbell", sources.campbell_report["notes"])] if sources.has("campbell") else []
     given += [("response", sources.response_report["notes"])] if sources.has("response") else []
+    if sources.has("transit"):
+        given += [(f"transit {one.case}".strip(), one.report["notes"]) for one in sources.transits]
     given += [(f"run {run.name}".strip(), run.summary.get("machine", {}).get("notes", [])) for run in sources.runs]
     origins: dict[str, list[str]] = {}
     for origin, notes in given:

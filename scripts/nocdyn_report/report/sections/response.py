@@ -6,7 +6,7 @@ import numpy as np
 
 from ...columns import LOADS, MOMENT, Column
 from ...speed_results import NEAR, Quantity, Response, barred_in
-from ..content import Figure, Heading, Panel, Paragraph, Section, Table, by_columns, cut, number, share, text
+from ..content import Figure, Heading, Panel, Paragraph, Section, Table, by_columns, cut, number, panels_beside, share, text
 from ..curves import band
 from ..naming import WHOLE, name_of
 from ..numbers import number_text
@@ -16,7 +16,7 @@ from .campbell import operation_bands
 
 MOST_PANELS = 24
 MOST_ROWS = 60
-BIG, SMALL = 2, 3  # panels beside one another
+BIG = 2  # panels beside one another
 
 
 def response_section(sources: Sources) -> Section | None:
@@ -50,13 +50,13 @@ def has_limit(quantity: Quantity) -> bool:
     return any(values is not None and np.isfinite(values).any() for values in limits)
 
 
-def passage(barred: dict) -> tuple[str, str]:
+def passage(barred: dict, has_passing_limit: bool) -> tuple[str, str]:
     """What a barred range means, and its tone. A rule may accept none, however small the stress."""
     if not barred.get("is_allowed", True):
         return "not allowed from 0.8 of the rated speed on", "bad"
-    if barred["can_be_passed"]:
-        return "may be passed quickly", "warn"
-    return "limit for passing through exceeded, or none given", "bad"
+    if not has_passing_limit:
+        return "no limit for passing is given", "warn"
+    return ("may be passed quickly", "warn") if barred["can_be_passed"] else ("limit for passing exceeded too", "bad")
 
 
 def ratio_tone(ratio: float) -> tuple[str, str]:
@@ -101,14 +101,24 @@ def _barred_ranges(sources: Sources) -> list[Paragraph | Table | Figure]:
     if not barred:
         return [Paragraph(f"No range of {axis.plural} is barred.", "good")]
     columns = {one.name: one for one in sources.response.columns}
+    has_passing_limit = {one.name for one in sources.response.columns if one.statistic == "transient_limit"}
+    has_tolerance = any("with_tolerance_rad_s" in one for one in barred)
     rows = []
     for one in barred:
         ends = sorted(sources.on_axis(axis, end) for end in axis.span(one))
         column = columns.get(one["quantity"])
         named = f"{name_of(column)}: {column.caption}" if column else one["quantity"]
-        rows.append([text(named), *map(number, ends), text(*passage(one)), text(one["limit_at"])])
+        cells = [text(named), *map(number, ends)]
+        if has_tolerance:
+            cells += [
+                number(sources.speed(one["with_tolerance_rad_s"][end])) if "with_tolerance_rad_s" in one else number(None)
+                for end in (0, 1)
+            ]
+        rows.append([*cells, text(*passage(one, one["quantity"] in has_passing_limit)), text(one["limit_at"])])
     unit = sources.axis_unit(axis)
     columns = ["limit of", f"from [{unit}]", f"to [{unit}]", "passage", "set at"]
+    if has_tolerance:
+        columns[3:3] = [f"with tolerance from [{unit}]", f"with tolerance to [{unit}]"]
     return [Table(f"Barred ranges of {axis.noun}", columns, rows, f"No continuous operation within these {axis.plural}.")]
 
 
@@ -167,7 +177,7 @@ def _small(sources: Sources, quantities: list[Quantity]) -> list[Figure | Paragr
             Figure(
                 f"{caption[0].upper()}{caption[1:]}: half ranges over the {sources.response.axis.noun}",
                 panels,
-                min(SMALL, max(BIG, len(panels))),
+                max(BIG, panels_beside(len(panels))),
             )
         )
     if len(chosen) < len(quantities):
@@ -206,6 +216,7 @@ def _panel(
         "curves": curves,
         "bands": [*operation_bands(sources, response), *_barred(sources, response, quantity)],
         "marks": [] if is_small else [[sources.on_axis(axis, one.speed), one.name] for one in response.criticals],
+        "markName": "resonance, mode" if axis.is_frequency else "critical speed, mode/order",
         "name": "order",
     }
     at = number_text(float(speed[np.nanargmax(quantity.half_range)]))

@@ -10,6 +10,7 @@ TITLES = {
     "holzer": ("Holzer tables", "holzer", "holzer.csv"),
     "campbell": ("Campbell diagram", "campbell", "campbell.json, campbell.csv"),
     "response": ("Forced response", "response", "response.json, response.csv, response_orders.csv"),
+    "transit": ("Passage of barred ranges", "transit", "transit.json, transit.csv"),
     "run": ("Motion over the time", "motion", "trajectory.csv, summary.json"),
 }
 

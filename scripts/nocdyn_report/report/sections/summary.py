@@ -22,7 +22,7 @@ def summary_section(sources: Sources) -> Section:
     if sources.verdict:
         section.add(*_verdict(sources))
     rows: list[list[Cell]] = []
-    for make in (_failures, _steady, _frequencies, _criticals, _peaks):
+    for make in (_failures, _steady, _frequencies, _criticals, _passages, _peaks):
         rows += make(sources)
     return section.add(Table("Key results", ["subject", "finding", "assessment"], rows, is_sorted=False))
 
@@ -54,7 +54,7 @@ def _table(sources: Sources, lines: list[Line]) -> tuple[list[str], list[list[Ce
 def _cases(line: Line) -> str:
     named = [name for name in line.cases if name]
     told = ", ".join(named[:MOST_CASES]) + (f" and {len(named) - MOST_CASES} more" if len(named) > MOST_CASES else "")
-    return (told or "all") + (f"; less in {line.lower}" if line.lower else "")
+    return (told or "all") + (f"; less in {len(line.lower)}" if line.lower else "")
 
 
 def _key(value: float | None) -> float:
@@ -72,7 +72,12 @@ def _listed(words: list[str], most: int = MOST_NAMED) -> str:
 def _failures(sources: Sources) -> list[list[Cell]]:
     """Commands that the input asks for and that gave no result: nothing below tells of what they would have shown."""
     rows = []
-    for command, subject in (("run", "Run"), ("response", "Forced response"), ("campbell", "Campbell diagram")):
+    for command, subject in (
+        ("run", "Run"),
+        ("response", "Forced response"),
+        ("campbell", "Campbell diagram"),
+        ("transit", "Passage"),
+    ):
         one = sources.results.of[command]
         if one.state in ("failed", "refused"):
             rows.append(_row(subject, "scope", one.message, one.state, "bad"))
@@ -119,6 +124,26 @@ def _criticals(sources: Sources) -> list[list[Cell]]:
     named = list(map(sources.named, crossings))
     words, tone = ("clear of operation", "good") if sources.campbell.operation else ("", "")
     return [_row("Critical speeds", "critical", _listed(named), words, tone)]
+
+
+def _passages(sources: Sources) -> list[list[Cell]]:
+    """Of barred ranges."""
+    rows = []
+    for transit in sources.transits if sources.has("transit") else []:
+        told = [f"{one.entry['direction']}: {number_text(one.entry['time_in_range'], 4)} s" for one in transit.passages]
+        passes = all(one.entry["passes"] for one in transit.passages)
+        which = f", {transit.case}" if transit.case else ""
+        finding = f"{_listed(told) or 'none'}{which}"
+        if transit.report["ranges"]:
+            rows.append(
+                _row(
+                    "Passages of barred ranges",
+                    "transit",
+                    finding,
+                    *(("passed", "") if told and passes else ("not passed", "warn")),
+                )
+            )
+    return rows
 
 
 def _peaks(sources: Sources) -> list[list[Cell]]:
