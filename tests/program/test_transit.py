@@ -445,7 +445,7 @@ GOVERNOR = " governor_speed = 60 governor_gain = 0.1 governor_time = 1 /"
         (train() + "&body name = 'c' inertia = 1 /\n", "required: bodies that all turn with it"),
         (
             train() + "&drive name = 'd' body = 'b' table_time = 0, 4 table_speed = 30, 70 /\n",
-            "a ramp of &transit is for machines whose ratios are constant",
+            "a ramp of &transit is about a steady state, and the speed of this drive changes; allowed: a constant speed",
         ),
     ],
 )
