@@ -181,7 +181,7 @@ contains
       if (excess(i) > 0) then
         range%from = edge(speed, excess, i, i - 1)
         range%worst = i
-        range%can_be_passed = .true.
+        range%can_be_passed = limit%has_transient()
         range%is_allowed = .true.
         do
           if (excess(i) > excess(range%worst)) range%worst = i
