@@ -26,6 +26,7 @@ module nocdyn_arguments
     option_t('--kind', value='KIND'), &
     option_t('--holzer', may_repeat=.true.), &
     option_t('--code', may_repeat=.true.), &
+    option_t('--json', may_repeat=.true.), &
     option_t('--threads', value='NUMBER'), &
     option_t('--compile', value=trim(compile_choices(1)) // '|' // trim(compile_choices(2)) // '|' // trim(compile_choices(3))), &
     option_t('--shard', value='K/N'), &

@@ -31,12 +31,13 @@ contains
       'Writes a commented input file that runs. A file that exists is not overwritten.' // nl // nl // &
       '  --kind KIND        of a machine: car, compressor, genset, mill, motor_fan, ship, wind; default: two bodies' // nl // &
       '                     with the groups that most inputs have', new_command)
-    call add_command(commands, 'help', '[COMMAND]', '', 'help on a command', &
+    call add_command(commands, 'help', '[COMMAND]', '--json', 'help on a command', &
       'Without a COMMAND, all commands with one line each.' // nl // nl // &
       '  nocdyn help input          the groups of an input file by topics, one line each' // nl // &
       '  nocdyn help input TOPIC    the groups of a topic with their keys and examples' // nl // &
       '  nocdyn help input GROUP    one group with its keys and examples' // nl // &
-      '  nocdyn help input all      all groups with their keys, and an example')
+      '  nocdyn help input all      all groups with their keys, and an example' // nl // &
+      '  nocdyn help input --json   the same for programs: a JSON Schema')
   end subroutine list_commands
 
   subroutine list_analyses(commands)

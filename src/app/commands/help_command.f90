@@ -4,6 +4,7 @@ module nocdyn_help_command
   use nocdyn_commands, only: command_index, command_names, command_t
   use nocdyn_console, only: print_text, report_error
   use nocdyn_errors, only: error_t, exit_done, exit_input, raise
+  use nocdyn_input_schema, only: input_schema
   use nocdyn_schema, only: group_rule_index
   use nocdyn_schema_topics, only: input_help, input_overview, topic_index
   use nocdyn_text, only: joined, lower_case, quoted, string_t
@@ -17,7 +18,7 @@ module nocdyn_help_command
 
 contains
 
-  !> help, help COMMAND, help input, help input TOPIC, help input GROUP, help input all.
+  !> help, help COMMAND, help input, help input --json, help input TOPIC, help input GROUP, help input all.
   subroutine help_command(commands, arguments, code)
     type(command_t), intent(in) :: commands(:)
     type(arguments_t), intent(in) :: arguments
@@ -30,7 +31,10 @@ contains
     if (size(arguments%operands) > 0) word = arguments%operands(1)%text
     row = 0
     if (size(arguments%operands) == 1) row = command_index(commands, word)
-    if (size(arguments%operands) == 0) then
+    if (arguments%is_given('--json')) then
+      if (word == 'input' .and. size(arguments%operands) == 1) text = input_schema()
+      if (.not. allocated(text)) call raise(error, exit_input, '--json is for nocdyn help input')
+    else if (size(arguments%operands) == 0) then
       text = overview(commands)
     else if (word == 'input') then
       call help_on_input(arguments%operands(2:), text, error)
