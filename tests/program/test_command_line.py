@@ -113,6 +113,7 @@ OPTIONS = {
     "--shard": "1/2",
     "--compile": "never",
     "--code": None,
+    "--json": None,
     "--resume": None,
     "--csv": None,
     "--strict": None,

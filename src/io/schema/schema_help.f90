@@ -110,7 +110,7 @@ contains
       text = type_text(rule) // ', ' // allowed_text(rule)
     case (a_word, a_flag)
       text = allowed_text(rule)
-      if (rule%count /= 1) text = 'some of ' // text
+      if (rule%count /= 1) text = 'any of ' // text
     case (a_selector)
       text = trim(merge('one of those below        ', 'one or more of those below', rule%count == 1))
     case (body_or_ground)

@@ -144,10 +144,10 @@ module nocdyn_schema_response
     key_rule_t('transit', 'range', a_number, 2, 'rad/s', unset, not_zero, &
       'the range of its speed; those that &limit bars in the response if not given'), &
     key_rule_t('transit', 'ramp_times', a_number, any_number, 's', unset, anything, &
-      'points between which the mean speed changes evenly; if not given, &run and its drives lead it', &
+      'points between which the mean speed changes evenly; without them &run and its drives lead it', &
       fewest=2, ascends=.true.), &
     key_rule_t('transit', 'ramp_speeds', a_number, any_number, 'rad/s', unset, not_zero, &
-      'mean speed of the body at these times; torques where it is driven make up for what is missing', fewest=2), &
+      'mean speed of the body at these times; torques where it is driven add what is missing', fewest=2), &
     key_rule_t('transit', 'direction', a_word, 1, '', "'any'", directions, 'passages that the run must make'), &
     key_rule_t('transit', 'time_limit', a_number, 1, 's', unset, positive, 'longest time in the range'), &
     key_rule_t('transit', 'passages', a_number, 1, '', unset, positive, &
