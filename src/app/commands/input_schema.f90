@@ -77,8 +77,8 @@ contains
         if (other_unit(key_rules(key)) > 0) call put_key(json, key_rules(key), other_unit(key_rules(key)))
         ! a key in two units is one of two names, and so no required one
         if (key_rules(key)%default /= required .or. key_rules(key)%only_if /= '' .or. other_unit(key_rules(key)) > 0) cycle
-        if (index(default_text(key_rules(key)), 'required') == 1) &
-          call append(needed, trim(key_rules(key)%name))
+        if (index(default_text(key_rules(key)), 'required') /= 1) cycle
+        call append(needed, trim(key_rules(key)%name))
       end do
       call json%close()
       if (size(needed) > 0) call json%put('required', needed)
