@@ -9,6 +9,9 @@ endif()
 if(TARGET nocdyn_mpi_program)
   install(TARGETS nocdyn_mpi_program RUNTIME)
 endif()
+if(TARGET nocdyn_c)   # machines in other programs: nocdyn.h
+  install(TARGETS nocdyn_c LIBRARY PUBLIC_HEADER)
+endif()
 # to read, and to begin rules of one's own with: the program has their texts
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/analyse/rules/ DESTINATION ${CMAKE_INSTALL_DATADIR}/nocdyn/rules FILES_MATCHING PATTERN "*.rule")
 install(TARGETS nocdyn EXPORT nocdyn_targets ARCHIVE)

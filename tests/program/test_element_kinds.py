@@ -82,7 +82,7 @@ def test_check_counts_elements_of_one_role_together(nocdyn):
 
 def test_check_counts_electrical_machines_and_faults(nocdyn):
     outcome = nocdyn("check", ELECTRICAL_KINDS)
-    assert "0 gears, 4 couplings, 6 motors, 1 load, 2 excitations" in outcome.stdout
+    assert "0 gears, 4 couplings, 6 motors, 1 load, 3 excitations" in outcome.stdout
 
 
 def test_matrices_name_the_laws_that_are_not_those_of_the_paper(nocdyn):

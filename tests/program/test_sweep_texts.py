@@ -14,6 +14,7 @@ from conftest import SOURCE
 
 THREADS = "nocdyn_sweep"  # runs the threads
 SERIAL = "nocdyn_serial_work"  # what one thread at a time does
+EMBEDDED = {"nocdyn_live_machine", "nocdyn_c_interface"}  # likewise, of machines in the threads of another program
 
 # Modules that threads could reach, by `use`, and that have such lengths: in procedures that threads do not call at the same time.
 BEFORE_THREADS = {
@@ -69,10 +70,10 @@ def with_lengths(sources):
     return {object_files[name] for name in LENGTHS.findall(symbols)}
 
 
-def test_critical_sections_are_in_one_module():
+def test_critical_sections_are_in_few_modules():
     critical = re.compile(r"^ *!\$omp critical", re.MULTILINE)
     sources = (SOURCE / "src").rglob("*.f90")
-    assert {f"nocdyn_{path.stem}" for path in sources if critical.search(path.read_text(encoding="utf-8"))} == {SERIAL}
+    assert {f"nocdyn_{path.stem}" for path in sources if critical.search(path.read_text(encoding="utf-8"))} == {SERIAL} | EMBEDDED
 
 
 def test_what_threads_run_at_the_same_time_has_no_length_of_a_text_in_static_memory():

@@ -8,6 +8,7 @@ module nocdyn_test_full_machines
   use nocdyn_double_cage_motors, only: new_double_cage_motors
   use nocdyn_element_rows, only: element_rows_t, new_element_rows
   use nocdyn_excitation_banks, only: excitation_bank_t
+  use nocdyn_external_excitations, only: external_excitations_t, new_external_excitations
   use nocdyn_fault_excitations, only: fault_terms_t, new_fault_excitations
   use nocdyn_flux_motors, only: new_flux_motors
   use nocdyn_gap_couplings, only: gap_couplings_t, new_gap_couplings
@@ -311,6 +312,13 @@ contains
     call given%add_table('table_time', curves([0.1_wp, 0.3_wp, 0.6_wp], [0.0_wp, 20.0_wp, -10.0_wp], interpolation_linear, &
                                               extrapolation_constant, variants, 1))
     call append_bank(machine%banks, new_table_excitations(given))
+    call append_bank(machine%banks, new_external_excitations(lane_keys('outside', [1, bodies], variants, 'amplitude', [3.0_wp])))
+    select type (bank => machine%banks(size(machine%banks))%bank)
+    class is (external_excitations_t)
+      call bank%set_torque(2, 3.0_wp, -7.0_wp, 0.1_wp)
+    class default
+      error stop 'full_machine: these torques come from outside'
+    end select
   end subroutine add_excitations
 
   !> A constant and two sines that decay.

@@ -36,7 +36,7 @@ module nocdyn_transient
   implicit none (type, external)
   private
 
-  public :: run_transient
+  public :: build_formulation, run_transient
 
   real(wp), parameter :: rest = 1.0e-9_wp   ! a machine that turns less than this stands still, however loose the tolerance [rad]
 

@@ -8,7 +8,7 @@ module nocdyn_case_choice
   implicit none (type, external)
   private
 
-  public :: choose_case, find_wanted, wanted_case
+  public :: choose_case, find_case, find_wanted, wanted_case
 
 contains
 
@@ -45,18 +45,28 @@ contains
     type(input_t), intent(in) :: machine   !! with the load cases of its file
     integer, intent(out) :: chosen         !! of its load cases
     type(error_t), allocatable, intent(out) :: error   !! there is none of this name
+
+    chosen = 0
+    if (arguments%is_given('--case')) call find_case(arguments%value('--case'), machine, chosen, error)
+  end subroutine choose_case
+
+  !> Finds a load case by its name.
+  subroutine find_case(name, machine, chosen, error)
+    character(len=*), intent(in) :: name
+    type(input_t), intent(in) :: machine   !! with the load cases of its file
+    integer, intent(out) :: chosen         !! of its load cases
+    type(error_t), allocatable, intent(out) :: error   !! there is none of this name
     type(string_t), allocatable :: names(:)
     integer :: c
 
     chosen = 0
-    if (.not. arguments%is_given('--case')) return
     allocate (names(0))
     do c = 1, size(machine%load_cases)
       call append(names, machine%load_cases(c)%name)
-      if (names(c)%text == arguments%value('--case')) chosen = c
+      if (names(c)%text == name) chosen = c
     end do
     if (chosen == 0) call raise(error, exit_input, machine%shown_file() // ': --case: there is no &load_case ' // &
-                                quoted(shortened(arguments%value('--case'))) // suggestion(arguments%value('--case'), names))
-  end subroutine choose_case
+                                quoted(shortened(name)) // suggestion(name, names))
+  end subroutine find_case
 
 end module nocdyn_case_choice

@@ -16,7 +16,7 @@ module nocdyn_after_step
   implicit none (type, external)
   private
 
-  public :: process_steps, change_branches
+  public :: process_steps, change_branches, output_until
 
   real(wp), parameter :: same_time = 16.0_wp   ! spacings of the time by which a row may be before a crossing that it is at
 

@@ -23,7 +23,7 @@ module nocdyn_integration
   implicit none (type, external)
   private
 
-  public :: integrate, integrate_ensemble, integrate_with
+  public :: integrate, integrate_ensemble, integrate_with, begin_integration, try_steps, accept_steps
 
 contains
 
@@ -76,13 +76,7 @@ contains
     type(integrator_t) :: integrator
     logical :: are_taken, is_interrupted
 
-    if (size(times) < 2) error stop 'nocdyn_integration: times needs a start and an end'
-    if (.not. all(times(2:) > times(:size(times) - 1))) error stop 'nocdyn_integration: times must ascend'
-    call system%prepare_integration(settings%rtol, settings%atol, times(size(times)))
-    call allocate_solver_status(solver_status, system%lanes)
-    if (stepper%series_order > 0) call system%prepare_series(stepper%series_order)
-    call prepare_integrator(integrator, stepper, system, settings, times, observer)
-    call prepare_plain_steps(integrator, stepper, system, times, observer)
+    call begin_integration(integrator, stepper, system, settings, times, observer, solver_status)
     do
       call fill_lanes(integrator, stepper, system, ensemble, times, observer, solver_status)
       if (integrator%free == system%lanes) exit
@@ -94,8 +88,43 @@ contains
     end do
   end subroutine integrate_with
 
+  !> Allocates all that an integration needs; the lanes are free.
+  subroutine begin_integration(integrator, stepper, system, settings, times, observer, solver_status)
+    type(integrator_t), intent(out) :: integrator
+    class(stepper_t), intent(inout) :: stepper
+    class(system_t), intent(inout) :: system
+    type(integration_settings_t), intent(in) :: settings
+    real(wp), contiguous, intent(in) :: times(:)   !! output times [s], ascending, at least 2
+    class(observer_t), intent(inout) :: observer
+    type(solver_status_t), intent(out) :: solver_status
+
+    if (size(times) < 2) error stop 'nocdyn_integration: times needs a start and an end'
+    if (.not. all(times(2:) > times(:size(times) - 1))) error stop 'nocdyn_integration: times must ascend'
+    call system%prepare_integration(settings%rtol, settings%atol, times(size(times)))
+    call allocate_solver_status(solver_status, system%lanes)
+    if (stepper%series_order > 0) call system%prepare_series(stepper%series_order)
+    call prepare_integrator(integrator, stepper, system, settings, times, observer)
+    call prepare_plain_steps(integrator, stepper, system, times, observer)
+  end subroutine begin_integration
+
   !> Attempts a step in all running lanes.
   subroutine attempt_steps(integrator, stepper, system, times, observer, solver_status)
+    type(integrator_t), intent(inout) :: integrator
+    class(stepper_t), intent(inout) :: stepper
+    class(system_t), intent(inout) :: system
+    real(wp), contiguous, intent(in) :: times(:)   !! output times [s]
+    class(observer_t), intent(inout) :: observer
+    type(solver_status_t), intent(inout) :: solver_status
+
+    call try_steps(integrator, stepper, system, times, observer, solver_status)
+    if (any_true(system%lanes, integrator%accepted)) then
+      call accept_steps(integrator, stepper, system, times, observer, solver_status)
+    end if
+  end subroutine attempt_steps
+
+  !> Computes a step of all running lanes, and passes what lies in those that are accepted to the observer. The lanes stay where
+  !> they are.
+  subroutine try_steps(integrator, stepper, system, times, observer, solver_status)
     type(integrator_t), intent(inout) :: integrator
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(inout) :: system
@@ -113,12 +142,23 @@ contains
     if (integrator%wants_steps) then
       call stepper%pass_steps(integrator%steps, integrator%attempt, integrator%coefficients, observer)
     end if
+  end subroutine try_steps
+
+  !> Moves the lanes that have been accepted to the ends of their steps, where their branches change.
+  subroutine accept_steps(integrator, stepper, system, times, observer, solver_status)
+    type(integrator_t), intent(inout) :: integrator
+    class(stepper_t), intent(inout) :: stepper
+    class(system_t), intent(inout) :: system
+    real(wp), contiguous, intent(in) :: times(:)   !! output times [s]
+    class(observer_t), intent(inout) :: observer
+    type(solver_status_t), intent(inout) :: solver_status
+
     call advance_lanes(integrator, times)
     if (system%projects) call project_states(integrator, system)
     if (integrator%may_shift) call shift_states(integrator, system, observer)
     call stepper%accept(integrator%accepted)
     if (integrator%has_switches) call change_branches(integrator, stepper, system, times, observer, solver_status)
-  end subroutine attempt_steps
+  end subroutine accept_steps
 
   !> Ends all running lanes if the observer wants to stop at the time that the slowest lane has reached.
   subroutine interrupt_if_asked(integrator, observer, solver_status, is_interrupted)

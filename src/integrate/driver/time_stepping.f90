@@ -23,7 +23,7 @@ module nocdyn_time_stepping
   implicit none (type, external)
   private
 
-  public :: prepare_integrator, fill_lanes, evaluate_starts, begin_attempts, advance_lanes, project_states, &
+  public :: prepare_integrator, fill_lanes, start_lanes, evaluate_starts, begin_attempts, advance_lanes, project_states, &
     shift_states, release_lanes
 
   type, public :: integrator_t

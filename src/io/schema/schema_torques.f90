@@ -37,6 +37,7 @@ module nocdyn_schema_torques
     kind_rule_t('excitation', 'ramp',      'linear rise from 0 at time to amplitude within duration, then constant'), &
     kind_rule_t('excitation', 'pulse',     'half a sine of height amplitude from time to time + duration'), &
     kind_rule_t('excitation', 'startup',   'amplitude sin(2 (frequency t - pole_pairs phi) + phase), synchronous motor'), &
+    kind_rule_t('excitation', 'external',  'what the program that runs the machine sets (nocdyn.h), amplitude until then'), &
     kind_rule_t('excitation', 'fault',     'decaying sines from time on: short circuits, faulty synchronisation')]
 
   type(key_rule_t), parameter, public :: torque_keys(*) = [ &
@@ -184,7 +185,7 @@ module nocdyn_schema_torques
     key_rule_t('excitation', 'body', a_body, 1, '', required, anything, 'the excited body'), &
     key_rule_t('excitation', 'kind', a_selector, 1, '', "'harmonic'", anything, 'which law the torque follows'), &
     key_rule_t('excitation', 'amplitude', a_number, 1, 'N m', required, anything, &
-      'largest torque', 'harmonic step ramp pulse startup'), &
+      'largest torque', 'harmonic step ramp pulse startup external'), &
     key_rule_t('excitation', 'frequency', a_number, 1, 'rad/s', required, not_negative, &
       'angular frequency; that of the mains for a start-up and a fault', 'harmonic startup fault'), &
     key_rule_t('excitation', 'phase', a_number, 1, 'rad', '0', anything, 'phase at t = 0', 'harmonic startup'), &

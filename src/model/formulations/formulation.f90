@@ -40,7 +40,7 @@ module nocdyn_formulation
     procedure :: allocate_state, turn_drives, set_norm, gather, reset_origin, angle_at_zero, twist_at_zero, component_name
     procedure :: measure, measure_name
     procedure :: observe => observe_elements
-    procedure :: refresh_lane
+    procedure :: refresh_lane, refresh_laws
     procedure :: start_lane => start_branches
     procedure :: limit_steps, fastest_wave, indicator_values
     procedure :: set_indicator => indicate_branch
@@ -236,6 +236,15 @@ contains
     class(formulation_t), intent(inout) :: self
     integer, intent(in) :: lane
   end subroutine refresh_lane
+
+  !> Computes what the laws keep of the parameters of a lane, after values of elements have changed, in a motion too.
+  subroutine refresh_laws(self, lane)
+    class(formulation_t), intent(inout) :: self
+    integer, intent(in) :: lane
+
+    call self%machine%refresh_lane(lane)
+    call self%state%refresh_lane(self%machine, lane)
+  end subroutine refresh_laws
 
   !> Prepares a lane that starts at time t and state y, with new parameters perhaps.
   subroutine start_branches(self, lane, t, y)

@@ -38,7 +38,7 @@ module nocdyn_reduced
     real(wp), allocatable, private :: moment(:, :)             !! M [N m], [lanes, elements], work space
     real(wp), allocatable, private :: free_jacobian(:, :)      !! without locked joints, if there are joints, [lanes, positions]
   contains
-    procedure :: formulate, update_inertia, pass_parameters, refresh_lane, refresh_parameters, derivative, jacobian
+    procedure :: formulate, update_inertia, pass_parameters, refresh_lane, refresh_parameters, refresh_laws, derivative, jacobian
     procedure :: evaluate_at, hold_jacobian, spread_jacobian
     procedure :: jacobian_pattern, series_obstacle, prepare_series, series, find_sets
     procedure :: write_code, write_program, attach_code, runs_code, takes_plain_steps, take_plain_steps
@@ -144,10 +144,18 @@ contains
     integer, intent(in) :: lane
 
     call self%reset_origin(lane)
+    call self%refresh_laws(lane)
+  end subroutine refresh_parameters
+
+  !> The same of laws alone; the series copy those that are polynomials.
+  subroutine refresh_laws(self, lane)
+    class(reduced_t), intent(inout) :: self
+    integer, intent(in) :: lane
+
     call self%machine%refresh_lane(lane)
     call self%state%refresh_lane(self%machine, lane)
     call self%series_kernel%refresh_lane(lane, self%machine%laws, self%twists, self%accelerations)
-  end subroutine refresh_parameters
+  end subroutine refresh_laws
 
   !> q'' = R M, and the derivatives of internal states and work integrals.
   subroutine derivative(self, t, y, dydt, status)

@@ -6,6 +6,7 @@ module nocdyn_torque_assembly
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_excitation_banks, only: excitation_bank_t
   use nocdyn_excitations, only: new_excitations
+  use nocdyn_external_excitations, only: new_external_excitations
   use nocdyn_fault_excitations, only: fault_terms_t, new_fault_excitations
   use nocdyn_harmonic_tables, only: table_torque
   use nocdyn_input, only: group_t
@@ -25,7 +26,7 @@ module nocdyn_torque_assembly
 
   integer, parameter :: viscous = 1, nonlinear = 2, table = 3     ! forms of loads; those that damp vibrations have the ones after
   ! Forms of excitations, in the order of their columns; one with a start, an end or a decay has the form after its own.
-  integer, parameter :: harmonic = 1, waves = 3, tables = 5, timed = 7, orders = 9, shares = 11, faults = 13
+  integer, parameter :: harmonic = 1, waves = 3, tables = 5, timed = 7, orders = 9, shares = 11, faults = 13, given = 15
 
 contains
 
@@ -72,6 +73,8 @@ contains
       excitation_form = tables
     case ('fault')
       excitation_form = faults
+    case ('external')
+      excitation_form = given
     case default
       excitation_form = timed
     end select
@@ -106,6 +109,8 @@ contains
         if (has_failed) error stop 'nocdyn_torque_assembly: the groups are checked'
       end do
       call append_bank(banks, new_fault_excitations(groups, terms))
+    case (given)
+      call append_bank(banks, new_external_excitations(groups))
     case default
       shape = shape_pulse
       do i = 1, size(shape)

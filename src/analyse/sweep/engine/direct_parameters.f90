@@ -40,16 +40,18 @@ module nocdyn_direct_parameters
     integer, allocatable, private :: signs(:, :)                  !! accepted patterns of signs, [targets, patterns]
     real(wp), allocatable, private :: lowest(:), highest(:)       !! values known to be allowed, [targets]
   contains
-    procedure :: accept, are_accepted, allow, are_allowed, write_values
+    procedure :: accept, are_accepted, allow, are_allowed, write_values, write_elements
   end type direct_parameters_t
 
 contains
 
-  !> Finds the targets in the machine of a block.
-  type(direct_parameters_t) function new_direct_parameters(input, targets, machine) result(self)
+  !> Finds the targets in the machine of a block, or in one that has started.
+  type(direct_parameters_t) function new_direct_parameters(input, targets, machine, has_started) result(self)
     type(input_t), intent(in) :: input
     type(target_t), intent(in) :: targets(:)
     type(machine_t), intent(in) :: machine
+    logical, intent(in), optional :: has_started   !! whether only its elements can change; absent: no
+    logical :: of_elements
     logical :: holds_inertia   ! whether the machine has what follows from inertias: sums of them, or projected start speeds
     integer :: b, g, i
 
@@ -59,9 +61,11 @@ contains
     self%unit(:) = targets%in_unit
     allocate (self%lowest(size(targets)), source=huge(1.0_wp))
     allocate (self%highest(size(targets)), source=-huge(1.0_wp))
-    self%are_direct = .not. allocated(machine%steady_internal)   ! the start follows from all values
+    of_elements = .false.
+    if (present(has_started)) of_elements = has_started
+    self%are_direct = of_elements .or. .not. allocated(machine%steady_internal)   ! the start follows from all values
     if (.not. self%are_direct) return
-    holds_inertia = allocated(machine%start_impulse)
+    holds_inertia = allocated(machine%start_impulse) .or. of_elements
     do b = 1, size(machine%banks)
       associate (bank => machine%banks(b)%bank)
         holds_inertia = holds_inertia .or. bank%has_parts .or. bank%moving_rows > 0 .or. bank%follows_inertias
@@ -239,22 +243,32 @@ contains
     class(reduced_t), intent(inout) :: block
     real(wp), contiguous, intent(inout) :: y(:)            !! the start state of another variant, then of this one
     logical, intent(out) :: is_set                         !! not if rounding makes the mass matrix indefinite
-    integer :: i
     logical :: is_indefinite
 
-    do i = 1, size(self%target)
-      associate (place => self%place(i), target => self%target(i))
-        associate (bank => block%machine%banks(place%bank)%bank)
-          bank%parameters(place%parameter)%value(lane, place%column) = in_si(values(target), self%unit(target))
-          call bank%set_terms(place%parameter, place%column, lane, block%machine%laws)
-        end associate
-      end associate
-    end do
+    call self%write_elements(values, lane, block%machine)
     is_set = .true.
     if (size(self%inertia_target) == 0) return
     call block%update_inertia(lane, self%body, values(self%inertia_target), self%groups, is_indefinite)
     is_set = .not. is_indefinite
     if (is_set) call block%project_start_speeds(lane, y)
   end subroutine write_values
+
+  !> Writes the values of elements into a lane.
+  subroutine write_elements(self, values, lane, machine)
+    class(direct_parameters_t), intent(in) :: self
+    real(wp), contiguous, intent(in) :: values(:)   !! [targets]
+    integer, intent(in) :: lane
+    type(machine_t), intent(inout) :: machine
+    integer :: i
+
+    do i = 1, size(self%target)
+      associate (place => self%place(i), target => self%target(i))
+        associate (bank => machine%banks(place%bank)%bank)
+          bank%parameters(place%parameter)%value(lane, place%column) = in_si(values(target), self%unit(target))
+          call bank%set_terms(place%parameter, place%column, lane, machine%laws)
+        end associate
+      end associate
+    end do
+  end subroutine write_elements
 
 end module nocdyn_direct_parameters

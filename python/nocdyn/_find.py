@@ -1,0 +1,31 @@
+"""Where the program and its library are: named by the environment, beside this package, on the path, or in a build."""
+
+import os
+import shutil
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+BUILD = HERE.parents[1] / "build/release"
+LIBRARY = "libnocdyn_c.so"
+
+
+def program():
+    """The path of `nocdyn`."""
+    places = [os.environ.get("NOCDYN"), HERE / "bin/nocdyn", shutil.which("nocdyn"), BUILD / "bin/nocdyn"]
+    return _first(places, "the program nocdyn", "NOCDYN")
+
+
+def library():
+    """The path of `libnocdyn_c.so`, the library of nocdyn.h."""
+    places = [os.environ.get("NOCDYN_LIBRARY"), HERE / "lib" / LIBRARY]
+    found = shutil.which("nocdyn")
+    if found:
+        places.append(Path(found).resolve().parents[1] / "lib" / LIBRARY)
+    return _first([*places, BUILD / "lib" / LIBRARY], LIBRARY, "NOCDYN_LIBRARY")
+
+
+def _first(places, what, variable):
+    for place in places:
+        if place and Path(place).exists():
+            return str(place)
+    raise FileNotFoundError(f"{what} is not installed; the variable {variable} of the environment may hold its path")
