@@ -62,7 +62,7 @@ def test_nothing_is_allocated_when_auto_switches(nocdyn, counter):
     assert abs(many - few) <= DOUBLINGS
 
 
-@pytest.mark.parametrize(("kinds", "end"), [("every_kind.nml", 3), ("electrical_kinds.nml", 10)])
+@pytest.mark.parametrize(("kinds", "end"), [("every_kind.nml", 3), ("electrical_kinds.nml", 11)])
 @pytest.mark.parametrize("method", ["auto", "rk45", "rodas5p"])
 @pytest.mark.parametrize("formulation", ["reduced", "paper", "multiplier"])
 def test_nothing_is_allocated_by_elements_of_every_kind(nocdyn, counter, kinds, end, formulation, method):

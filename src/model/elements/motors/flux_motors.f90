@@ -376,14 +376,17 @@ contains
     integer, intent(in) :: quantity   !! index in `quantities`
     integer, intent(in) :: lane
     real(wp), intent(out) :: values(:)   !! [elements of the bank]; the current is the one of a line, rms
-    real(wp) :: z(self%states)
-    integer :: e, first
+    integer, parameter :: most_fluxes = 3   ! an array whose size is not known is allocated
+    complex(wp) :: flux(most_fluxes)
+    integer :: e, k, first
 
     if (quantity /= 2) error stop 'nocdyn_flux_motors: the current is the quantity without a form'
     do e = 1, size(values)
-      first = self%first_internal + self%states * (e - 1)
-      z = elements%internal%value(lane, first:first + self%states - 1)
-      values(e) = sqrt(0.5_wp) * abs(self%stator_current(lane, e, cmplx(z(1::2), z(2::2), wp)))
+      do k = 1, self%states / 2
+        first = self%first_internal + self%states * (e - 1) + 2 * (k - 1)
+        flux(k) = cmplx(elements%internal%value(lane, first), elements%internal%value(lane, first + 1), wp)
+      end do
+      values(e) = sqrt(0.5_wp) * abs(self%stator_current(lane, e, flux(:self%states / 2)))
     end do
   end subroutine observe
 
