@@ -29,7 +29,8 @@ module nocdyn_response_limits
     type(limit_rule_t), private :: rule
   contains
     procedure :: continuous_limit, transient_limit, peak_limit, ratio, allows_passing, has_continuous, has_transient
-    procedure :: amplitude_limit, curve_ratio, has_tolerance, find_barred, list_notes, write_rule, write_place, write_unbarred
+    procedure :: amplitude_limit, curve_ratio, has_curve, has_tolerance
+    procedure :: find_barred, list_notes, write_rule, write_place, write_unbarred
   end type response_limit_t
 
 contains
@@ -96,7 +97,7 @@ contains
     limit%heat = group%number('heat', absent=no_limit)
     limit%frequency = group%numbers('vibratory_frequency')
     limit%amplitude = factor * group%numbers('vibratory_moments')
-    if (min(limit%vibratory, limit%peak, limit%heat) >= no_limit .and. size(limit%frequency) == 0) return
+    if (min(limit%vibratory, limit%peak, limit%heat) >= no_limit .and. .not. limit%has_curve()) return
     limit%quantity = limited_signal(group, signals)
     if (limit%quantity > 0) call add_one(limit, limits)
   end subroutine add_limit
@@ -240,9 +241,16 @@ contains
     real(wp), intent(in) :: amplitude   !! in the unit of the quantity
 
     ratio = 0.0_wp
-    if (.not. allocated(self%frequency)) return
-    if (size(self%frequency) > 0) ratio = amplitude / self%amplitude_limit(frequency)
+    if (self%has_curve()) ratio = amplitude / self%amplitude_limit(frequency)
   end function curve_ratio
+
+  !> Whether there is a curve of amplitudes over the frequency.
+  elemental logical function has_curve(self)
+    class(response_limit_t), intent(in) :: self
+
+    has_curve = .false.
+    if (allocated(self%frequency)) has_curve = size(self%frequency) > 0
+  end function has_curve
 
   !> The limit of the largest magnitude, with the mean.
   elemental real(wp) function peak_limit(self) result(limit)

@@ -155,8 +155,9 @@ contains
     ratio = 0.0_wp
     do k = 1, size(limits)
       if (limits(k)%quantity /= quantity) cycle
-      ratio = max(ratio, limits(k)%ratio(point%state%speed, point%half_range(quantity), point%peak(quantity)), &
-                  maxval(limits(k)%curve_ratio(point%frequency, abs(point%quantity(:, quantity)))))
+      ratio = max(ratio, limits(k)%ratio(point%state%speed, point%half_range(quantity), point%peak(quantity)))
+      if (limits(k)%has_curve()) ratio = max(ratio, maxval(limits(k)%curve_ratio(point%frequency, &
+                                                                                 abs(point%quantity(:, quantity)))))
     end do
   end function worst_ratio
 

@@ -194,8 +194,7 @@ contains
     integer :: i, k, worst(2)
 
     associate (limit => analysis%limits(number), points => analysis%response%points)
-      if (.not. allocated(limit%frequency)) return
-      if (size(limit%frequency) == 0) return
+      if (.not. limit%has_curve()) return
       largest = -1.0_wp
       do i = 1, size(points)
         do k = 1, size(points(i)%frequency)

@@ -290,7 +290,7 @@ contains
       do k = 1, size(self%limits)
         if (all(self%limits(k)%quantity /= quantities)) cycle
         if (.not. input%groups(record)%has_value('order')) return
-        if (self%limits(k)%has_continuous() .or. size(self%limits(k)%frequency) > 0) return
+        if (self%limits(k)%has_continuous() .or. self%limits(k)%has_curve()) return
       end do
       call input%report(record, 'statistic', "statistic = 'ratio' needs a &limit of " // quoted(name) // &
                         '; with order one of its oscillation', diagnostics)
