@@ -176,7 +176,7 @@ def figures_of(folder: Path, arguments: argparse.Namespace) -> Figures:
 
 
 def main() -> None:
-    parser = figure_parser("scripts/plot_campbell", "campbell", __doc__)
+    parser = figure_parser("nocdyn plot campbell", "campbell", __doc__)
     parser.add_argument("--top", type=finite, metavar="HZ", help="highest frequency (just above those that the orders meet)")
     arguments = arguments_of(parser)
     if arguments.top is not None and arguments.top <= 0:

@@ -271,7 +271,7 @@ def figures_of(folder: Path, arguments: argparse.Namespace) -> Figures:
 
 
 def main() -> None:
-    parser = figure_parser("scripts/plot_response", "response", __doc__)
+    parser = figure_parser("nocdyn plot response", "response", __doc__)
     parser.usage = (
         "%(prog)s RESULTS ... [--columns PATTERN ...] [--orders ORDER ...] [--peak] [--log] [--from RPM] [--to RPM] "
         "[--format KINDS] [--out DIR]"
