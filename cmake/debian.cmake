@@ -16,6 +16,6 @@ set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_DEPENDS "python3 (>= 3.11)")
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS
-  "python3-h5netcdf, python3-h5py, python3-jinja2, python3-markdown-it, python3-matplotlib, python3-numpy, python3-pandas")
+  "python3-h5netcdf, python3-h5py, python3-jinja2, python3-markdown-it, python3-matplotlib, python3-numpy, python3-pandas, python3-xarray")
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS "chromium, fonts-liberation, gcc")
 include(CPack)

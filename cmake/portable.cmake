@@ -9,26 +9,21 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$" AND NOT NOCDYN_NATIVE)
 endif()
 list(POP_FRONT faster_levels base_level)   # both are empty on other processors
 
-set(nocdyn_runtime stdc++)
 add_library(nocdyn_bundled INTERFACE)   # for the programs
 if(NOCDYN_BUNDLED)
-  function(find_static out name)
-    execute_process(COMMAND ${CMAKE_Fortran_COMPILER} -print-file-name=${name} OUTPUT_VARIABLE file OUTPUT_STRIP_TRAILING_WHITESPACE)
-    if(NOT IS_ABSOLUTE "${file}")
-      message(FATAL_ERROR "NOCDYN_BUNDLED needs ${name}, which ${CMAKE_Fortran_COMPILER} does not find")
+  # A folder with the static libraries of the compilers, which is searched first. quadmath: not on all kinds of processors.
+  set(static_folder ${PROJECT_BINARY_DIR}/static)
+  file(MAKE_DIRECTORY ${static_folder})
+  foreach(name IN ITEMS gfortran quadmath stdc++ gomp)
+    execute_process(COMMAND ${CMAKE_Fortran_COMPILER} -print-file-name=lib${name}.a OUTPUT_VARIABLE file OUTPUT_STRIP_TRAILING_WHITESPACE)
+    if(IS_ABSOLUTE "${file}")
+      file(CREATE_LINK ${file} ${static_folder}/lib${name}.a SYMBOLIC)
+    elseif(NOT name STREQUAL quadmath)
+      message(FATAL_ERROR "NOCDYN_BUNDLED needs lib${name}.a, which ${CMAKE_Fortran_COMPILER} does not find")
     endif()
-    set(${out} ${file} PARENT_SCOPE)
-  endfunction()
-  find_static(fortran libgfortran.a)
-  find_static(stdcxx libstdc++.a)
-  set(nocdyn_runtime ${fortran} ${stdcxx})
-  find_static(gomp libgomp.a)
-  set(OpenMP_gomp_LIBRARY ${gomp})   # what find_package(OpenMP) would look for
-  target_link_options(nocdyn_bundled INTERFACE -static-libgcc -s LINKER:--as-needed)
-  execute_process(COMMAND ${CMAKE_Fortran_COMPILER} -print-file-name=libquadmath.a OUTPUT_VARIABLE quadmath OUTPUT_STRIP_TRAILING_WHITESPACE)
-  if(IS_ABSOLUTE "${quadmath}")   # libgfortran, which comes later, needs it; not on processors whose long numbers are quadruple
-    target_link_options(nocdyn_bundled INTERFACE LINKER:--whole-archive,${quadmath},--no-whole-archive)
-  endif()
+  endforeach()
+  set(OpenMP_gomp_LIBRARY ${static_folder}/libgomp.a)   # what find_package(OpenMP) would look for
+  target_link_options(nocdyn_bundled INTERFACE -L${static_folder} -static-libgcc -s)
   # DT_RPATH: the libraries of NetCDF find each other there too
   set(CMAKE_INSTALL_RPATH "$ORIGIN/../lib/nocdyn")
   set(CMAKE_BUILD_WITH_INSTALL_RPATH ON)
