@@ -16,6 +16,8 @@ PACKAGES = {
     "numpy": "numpy",
     "pandas": "pandas",
     "h5py": "h5py",
+    "h5netcdf": "h5netcdf",
+    "xarray": "xarray",
     "f90nml": "f90nml",
 }
 EXTRAS = {"plot": "figures", "report": "report", "verify": "figures"}
