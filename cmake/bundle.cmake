@@ -5,6 +5,9 @@ file(GET_RUNTIME_DEPENDENCIES EXECUTABLES ${program}
 if(missing)
   message(FATAL_ERROR "${program} needs libraries that are not there: ${missing}")
 endif()
-foreach(library IN LISTS libraries)
-  file(INSTALL ${library} DESTINATION ${folder} FOLLOW_SYMLINK_CHAIN)
+file(MAKE_DIRECTORY ${folder})
+foreach(library IN LISTS libraries)   # by the names that programs ask for; a wheel has no links
+  cmake_path(GET library FILENAME name)
+  file(REAL_PATH ${library} file)
+  file(COPY_FILE ${file} ${folder}/${name})
 endforeach()
