@@ -12,6 +12,7 @@ KINDS = {
     "modes": ("mode_figures", "modes.json"),
     "campbell": ("campbell_figures", "campbell.json"),
     "response": ("response_figures", "response.json"),
+    "transit": ("transit_figures", "transit*.json"),
     "sweep": ("sweep_figures", "sweep.nc"),
 }
 PAPER = "paper"
