@@ -14,9 +14,19 @@ if(CMAKE_Fortran_COMPILER_ID STREQUAL GNU)
     $<$<AND:$<COMPILE_LANGUAGE:Fortran>,$<BOOL:${NOCDYN_WARNINGS_AS_ERRORS}>>:-Werror>)
   # No contraction to fused multiply-adds: vector loops and their remainders then round alike, and a lane's result does
   # not depend on its place in a block.
-  set(CMAKE_Fortran_FLAGS_RELEASE "-O3 -ffp-contract=off")
+  # No vector forms of sines and powers, which glibc has and declares to gfortran in a file that it reads first: they have other
+  # bits than the scalar ones, and other bits for each length of vectors. The option that hides the file hides the intrinsic modules too.
+  execute_process(COMMAND ${CMAKE_Fortran_COMPILER} -print-file-name=finclude
+    OUTPUT_VARIABLE intrinsic_modules OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
+  set(CMAKE_Fortran_FLAGS_RELEASE "-O3 -ffp-contract=off -nostdinc -fintrinsic-modules-path ${intrinsic_modules}")
   if(NOCDYN_NATIVE)
     string(APPEND CMAKE_Fortran_FLAGS_RELEASE " -march=native")
+  elseif(base_level)
+    string(APPEND CMAKE_Fortran_FLAGS_RELEASE " -march=${base_level}")
+    if(base_level MATCHES "v[34]$")
+      # gfortran 12 fuses the products of complex numbers into vfmaddsub whatever -ffp-contract says, where it may use the instruction
+      string(APPEND CMAKE_Fortran_FLAGS_RELEASE " -mno-fma")
+    endif()
   endif()
   set(CMAKE_Fortran_FLAGS_DEBUG "-O0 -g -fcheck=all -ffpe-trap=invalid,zero,overflow -finit-real=snan")
 elseif(CMAKE_Fortran_COMPILER_ID STREQUAL LLVMFlang)

@@ -3,7 +3,7 @@
 usage: sessions.py NOCDYN PAGE...
 
 In a block of code, a line that begins with '$ ' is a command; the lines up to the next one are its output. The commands of
-a page run in the order of the page, in a new folder that has the project's folders docs, input and scripts in it. This script
+a page run in the order of the page, in a new folder that has the project's folders docs and input in it. This script
 runs them with the program NOCDYN and writes their output into the pages.
 """
 
@@ -22,9 +22,6 @@ NUMBER = re.compile(r"[+-]?\d[\d.]*(?:[eE][+-]?\d+)?")
 PROGRESS = re.compile(r"^.* variants, .* left\n", re.MULTILINE)  # lines of a sweep that takes more than 10 s
 SAME = {"relative": 1e-4, "absolute": 1e-8}  # the output has seven digits; sums that should be 0 are rounding errors
 
-# run without installing packages
-SCRIPTS = ("plot", "plot_campbell", "plot_modes", "plot_response", "plot_sweep", "plot_transit", "report")
-
 
 def sessions_of(page):
     """The commands of a page, each with the output that stands below it."""
@@ -35,13 +32,8 @@ def make_folder(folder, nocdyn):
     """The folder in which the commands of a page run; the environment that they need."""
     for name in ("docs", "input"):
         (folder / name).symlink_to(ROOT / name)
-    (folder / "scripts").mkdir()
-    for script in SCRIPTS:
-        module = re.search(r"-m (\S+)", (ROOT / "scripts" / script).read_text(encoding="utf-8"))[1]
-        stand_in = folder / "scripts" / script
-        stand_in.write_text(f'#!/bin/sh\nPYTHONPATH={ROOT}/scripts exec {sys.executable} -m {module} "$@"\n', encoding="utf-8")
-        stand_in.chmod(0o755)
-    return os.environ | {"PATH": f"{Path(nocdyn).resolve().parent}:{os.environ['PATH']}"}
+    path = f"{Path(nocdyn).resolve().parent}:{os.environ['PATH']}"
+    return os.environ | {"PATH": path, "NOCDYN_PYTHON": sys.executable}
 
 
 def output_of(command, folder, environment):

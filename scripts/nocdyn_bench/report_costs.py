@@ -32,7 +32,7 @@ def report_costs(root: Path, scratch: Path, rounds: int) -> list[str]:
     opened = [_seconds_to_open(page) for _ in range(rounds)]
     megabytes = page.stat().st_size / 1e6
     rows = [
-        ["`scripts/report plant.nml`", f"{median(seconds[()]):.2g} s", f"{MOST_SECONDS:g} s", median(seconds[()]) < MOST_SECONDS],
+        ["`nocdyn report plant.nml`", f"{median(seconds[()]):.2g} s", f"{MOST_SECONDS:g} s", median(seconds[()]) < MOST_SECONDS],
         ["the same with `--no-pdf`", f"{median(seconds[('--no-pdf',)]):.2g} s", "-", None],
         ["`report.html`", f"{megabytes:.2g} MB", f"{MOST_MEGABYTES:g} MB", megabytes < MOST_MEGABYTES],
         ["Chromium opens it", f"{median(opened):.2g} s", f"{MOST_SECONDS_TO_OPEN:g} s", median(opened) < MOST_SECONDS_TO_OPEN],

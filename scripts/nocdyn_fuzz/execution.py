@@ -88,7 +88,7 @@ def wait_quickly(process, limits):
 def command_line(program, words):
     """Reports are made by a script, which calls the program."""
     if words[:1] == ("report",):
-        return (sys.executable, "-m", "nocdyn_report.report", *words[1:])
+        return (sys.executable, "-m", "nocdyn_report", "report", *words[1:])
     return (program, *words)
 
 

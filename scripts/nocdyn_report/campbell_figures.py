@@ -30,7 +30,7 @@ from .speed_panels import (
 )
 from .speed_results import Campbell, Critical, roman
 from .speed_results import read_campbell as read
-from .style import COLOURS, PIXELS, add_title, plain
+from .style import COLOURS, PIXELS, add_legend, add_title, plain
 from .thinning import thin
 
 SIZE = (9.5, 6.6)  # of the figure [in]
@@ -66,7 +66,7 @@ def draw_campbell(campbell: Campbell, window: tuple[float, float], top: float | 
     axes.set_ylabel("frequency [Hz]")
     above = [mode for mode, frequency in campbell.modes.items() if frequency.min() > axes.get_ylim()[1]]
     lines = Line2D([], [], label="orders, named at the border", **ORDER)
-    figure.legend(handles=[lines, *handles, *shades], loc="outside lower center", ncols=4, fontsize=8.5)
+    add_legend(figure, handles=[lines, *handles, *shades], ncols=4, fontsize=8.5)
     add_title(figure, campbell.title, "natural frequencies and orders over the speed" + _hidden(above))
     return figure
 
@@ -176,7 +176,7 @@ def figures_of(folder: Path, arguments: argparse.Namespace) -> Figures:
 
 
 def main() -> None:
-    parser = figure_parser("scripts/plot_campbell", "campbell", __doc__)
+    parser = figure_parser("nocdyn plot campbell", "campbell", __doc__)
     parser.add_argument("--top", type=finite, metavar="HZ", help="highest frequency (just above those that the orders meet)")
     arguments = arguments_of(parser)
     if arguments.top is not None and arguments.top <= 0:

@@ -32,19 +32,21 @@ def largest_difference(one: pd.DataFrame, other: pd.DataFrame) -> tuple[float, s
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="differences", description=__doc__)
+    parser.add_argument("--exactly", action="store_true", help="allow no difference")
     parser.add_argument("programs", nargs=2, type=Path, metavar="NOCDYN", help="the two programs")
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="input files")
     arguments = parser.parse_args()
     programs = [program.resolve() for program in arguments.programs]
+    allowed = 0.0 if arguments.exactly else ACCURACY
     different = 0
     with tempfile.TemporaryDirectory() as folder:
         for file in arguments.files:
             pairs = zip(*(trajectories(programs[i], file, Path(folder) / str(i) / file.stem) for i in range(2)), strict=True)
             difference, column = max(largest_difference(one, other) for one, other in pairs)
-            different += difference > ACCURACY
+            different += difference > allowed
             print(f"{file.stem:24} " + ("same numbers" if difference == 0.0 else f"differs by {difference:.1e} in {column}"))
     if different:
-        sys.exit(f"{different} of {len(arguments.files)} results differ by more than {ACCURACY:g}")
+        sys.exit(f"{different} of {len(arguments.files)} results differ by more than {allowed:g}")
 
 
 if __name__ == "__main__":

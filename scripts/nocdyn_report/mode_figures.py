@@ -99,7 +99,7 @@ def draw_all(modes: Modes, most: int, folder: Path, formats: Sequence[str]) -> l
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="scripts/plot_modes", description=__doc__)
+    parser = argparse.ArgumentParser(prog="nocdyn plot modes", description=__doc__)
     parser.add_argument("results", type=Path, metavar="RESULTS", help="folder that 'nocdyn modes --out' wrote")
     parser.add_argument(
         "--modes",

@@ -35,7 +35,7 @@ def table(results: Results) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="scripts/reproduce", description=__doc__)
+    parser = argparse.ArgumentParser(prog="nocdyn plot paper", description=__doc__)
     parser.add_argument("results", nargs="+", type=Path, metavar="RESULTS", help="results folder of a case of the paper")
     arguments = parser.parse_args()
     try:

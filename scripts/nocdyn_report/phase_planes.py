@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from .results import Results, Series
-from .style import COLOURS, WIDTH, plain
+from .style import COLOURS, WIDTH, add_legend, plain
 from .thinning import thin_curve
 
 MOST_PLANES = 9
@@ -41,7 +41,7 @@ def draw_phase_planes(results: Results, labels: Sequence[str] | None = None) -> 
         _draw_plane(axes, plane)
     for axes in grid.flat[len(panels) :]:
         axes.set_visible(False)
-    figure.legend(*grid.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    add_legend(figure, *grid.flat[0].get_legend_handles_labels(), ncols=2)
     return figure
 
 

@@ -33,7 +33,7 @@ from .speed_panels import (
     window_of,
 )
 from .speed_results import NAMED, NEAR, Quantity, Response, read_response
-from .style import COLOURS, PIXELS, WIDTH, add_title, plain
+from .style import COLOURS, PIXELS, WIDTH, add_legend, add_title, plain
 from .thinning import thin
 
 MOST_PANELS = 6  # of a figure
@@ -197,9 +197,7 @@ def draw_page(response: Response, page: Sequence[Quantity], look: Look, styles: 
         axes.set_visible(False)
     for axes in grid.flat[max(len(page) - across, 0) : len(page)]:
         axes.set_xlabel(plain(f"{response.axis.label} [{response.axis.unit}]"))
-    figure.legend(
-        handles=_legend(response, page, look, shades), loc="outside lower center", ncols=3 if across == 1 else 4, fontsize=8.5
-    )
+    add_legend(figure, handles=_legend(response, page, look, shades), ncols=3 if across == 1 else 4, fontsize=8.5)
     add_title(figure, response.title, f"forced response: half range over the {response.axis.noun}")
     return figure
 
@@ -271,7 +269,7 @@ def figures_of(folder: Path, arguments: argparse.Namespace) -> Figures:
 
 
 def main() -> None:
-    parser = figure_parser("scripts/plot_response", "response", __doc__)
+    parser = figure_parser("nocdyn plot response", "response", __doc__)
     parser.usage = (
         "%(prog)s RESULTS ... [--columns PATTERN ...] [--orders ORDER ...] [--peak] [--log] [--from RPM] [--to RPM] "
         "[--format KINDS] [--out DIR]"

@@ -168,7 +168,7 @@ def _advise(results: Results) -> str:
 
 def _parser() -> argparse.ArgumentParser:
     usage = "%(prog)s RESULTS [--columns PATTERN ...] [--from T] [--to T] [--rpm] [--format KINDS] [--out DIR]"
-    parser = argparse.ArgumentParser(prog="scripts/plot", usage=usage, description=__doc__)
+    parser = argparse.ArgumentParser(prog="nocdyn plot run", usage=usage, description=__doc__)
     parser.add_argument("results", type=Path, metavar="RESULTS", help="folder that 'nocdyn run' wrote")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where the figures go (RESULTS/figures)")
     parser.add_argument(

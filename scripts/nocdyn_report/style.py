@@ -76,6 +76,16 @@ def draw_lines(axes: Axes, names: Sequence[str], lines: Sequence[tuple[np.ndarra
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
+def add_legend(figure: Figure, *entries: Sequence, place: str = "center", **look: object) -> None:
+    """Below the axes; Matplotlib before 3.7, as in Debian 12, has no word for that."""
+    if matplotlib.__version_info__ >= (3, 7):
+        figure.legend(*entries, loc=f"outside lower {place}", **look)
+        return
+    legend = figure.legend(*entries, loc=f"lower {place}", **look)
+    height = legend.get_window_extent().height / figure.bbox.height
+    figure.get_layout_engine().set(rect=(0.0, height, 1.0, 1.0 - height))
+
+
 def add_format_option(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--format",

@@ -158,7 +158,7 @@ def _paged(name: str, sweep: Sweep, draw: Callable[[Sweep, Sequence[Variable]], 
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="scripts/plot_sweep", description=__doc__)
+    parser = argparse.ArgumentParser(prog="nocdyn plot sweep", description=__doc__)
     parser.add_argument("results", type=Path, metavar="RESULTS", help="folder that 'nocdyn sweep' wrote")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where the figures go (RESULTS/figures)")
     add_format_option(parser)

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.tri import Triangulation
 
-from .style import COLOURS, plain
+from .style import COLOURS, add_legend, plain
 from .sweep_results import Sweep, Variable
 
 MOST_POINTS = 20_000  # that are drawn one by one
@@ -222,7 +222,7 @@ def explain_not_done(figure: Figure, sweep: Sweep, most: int = MOST_MARKS, **sty
         return
     share = -(-count // most)
     label = sweep.not_done_words + (f" (one in {share} is shown)" if share > 1 else "")
-    figure.legend([Line2D([], [], color=NOT_DONE, **style)], [label], loc="outside lower right")
+    add_legend(figure, [Line2D([], [], color=NOT_DONE, **style)], [label], place="right")
 
 
 def draw_map(axes: Axes, sweep: Sweep, result: Variable) -> None:

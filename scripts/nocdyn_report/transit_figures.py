@@ -162,7 +162,7 @@ def figures_of(folder: Path) -> Figures:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="scripts/plot_transit", description=__doc__)
+    parser = argparse.ArgumentParser(prog="nocdyn plot transit", description=__doc__)
     parser.add_argument(
         "results",
         type=Path,

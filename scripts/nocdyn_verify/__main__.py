@@ -14,7 +14,7 @@ from .page import verdict, write_page
 from .paper import write_paper
 
 HERE = Path(__file__).resolve().parent
-PLACES = (HERE.parents[1] / "verification", HERE.parent / "verification", HERE / "verification")
+CASES = HERE.parents[1] / "verification"  # of the sources, or of what is installed
 NAME = "verification"
 
 
@@ -40,11 +40,10 @@ def find_program() -> Path:
 
 
 def find_cases(wanted: Path | None) -> Path:
-    places = PLACES if wanted is None else (wanted,)
-    for place in places:
-        if place.is_dir():
-            return place
-    raise VerificationError(f"{places[0]}: the folder of the verification cases does not exist")
+    place = wanted or CASES
+    if not place.is_dir():
+        raise VerificationError(f"{place}: the folder of the verification cases does not exist")
+    return place
 
 
 def write_results(folder: Path, program: Path, cases: Path, outcomes: Sequence[Outcome], version: str) -> None:

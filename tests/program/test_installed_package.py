@@ -1,7 +1,10 @@
 """cmake --install, and a project that finds and calls what was installed."""
 
+import json
 import os
+import re
 import subprocess
+import sys
 
 import pytest
 from conftest import CASE_1, SOURCE
@@ -40,6 +43,59 @@ def test_the_installed_program_has_the_rules_and_shows_their_files(prefix, tmp_p
         "amplitudes = 1 /\n&limit coupling = 'k' rule = 'kr_generator' rated_speed = 18 /\n"
     )
     assert "KR generator shaft" in run(prefix / "bin/nocdyn", "response", tmp_path / "machine.nml", "--out", tmp_path / "out")
+
+
+@pytest.fixture
+def elsewhere(prefix, tmp_path, monkeypatch):
+    """An empty folder, and the installed program, called there without the sources in sight."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("NOCDYN", "NOCDYN_SOURCE", "NOCDYN_BUILD", "PYTHONPATH"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("NOCDYN_PYTHON", sys.executable)
+    monkeypatch.setenv("PATH", "/usr/bin:/bin")
+    return prefix / "bin/nocdyn"
+
+
+def test_the_installed_program_verifies_itself(elsewhere, prefix, tmp_path):
+    assert run(elsewhere, "verify").startswith("All ")
+    outcome = json.loads((tmp_path / "results/verification.json").read_text())
+    assert outcome["passes"] and len(outcome["cases"]) > 0
+    assert sorted(path.name for path in (prefix / "share/nocdyn/verification").iterdir()) == sorted(
+        path.name for path in (SOURCE / "verification").iterdir()
+    )
+
+
+def test_the_installed_program_reports_and_plots(elsewhere, prefix, tmp_path):
+    run(elsewhere, "new", "machine.nml")
+    assert "report.html" in run(elsewhere, "report", "machine.nml", "--no-pdf")
+    page = (tmp_path / "results/machine/report.html").read_text()
+    assert (prefix / "share/nocdyn/d3.min.js").read_text() in page
+    assert "figures" in run(elsewhere, "plot", "results/machine", "--format", "png")
+    assert list((tmp_path / "results/machine/figures").glob("*.png"))
+
+
+def test_the_installed_program_draws_the_figures_of_the_paper(elsewhere, tmp_path):
+    run(elsewhere, "plot", "paper")
+    assert (tmp_path / "results/figures/figure5.pdf").is_file()
+
+
+@pytest.mark.parametrize(
+    ("page", "words"),
+    [
+        ("man1/nocdyn.1", ["NAME", "nocdyn run FILE... [--out DIR]", "nocdyn plot KIND DIR", "EXIT STATUS"]),
+        ("man5/nocdyn-input.5", ["&coupling", "stiffness (number", "nocdyn(1)", "moment of inertia about the axis"]),
+    ],
+)
+def test_the_manual_pages_say_what_the_program_says(prefix, page, words):
+    roff = (prefix / "share/man" / page).read_text()
+    assert not [line for line in roff.splitlines() if line.startswith((".", "'")) and line.split()[0] not in REQUESTS]
+    plain = re.sub(r"\\(&|f[BIR])", "", roff).replace("\\-", "-").replace("\\(aq", "'")
+    assert all(word in plain for word in words)
+    assert max(map(len, plain.splitlines())) < LONGEST_LINE
+
+
+REQUESTS = {".TH", ".SH", ".SS", ".TP", ".P", ".RS", ".RE", ".nf", ".fi"}
+LONGEST_LINE = 1000
 
 
 @pytest.fixture(scope="module")

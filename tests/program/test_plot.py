@@ -1,4 +1,4 @@
-"""scripts/plot: figures of runs, the choice of columns and times, and what it says of folders that it cannot draw."""
+"""nocdyn plot run: figures of runs, the choice of columns and times, and what it says of folders that it cannot draw."""
 
 import json
 import os
@@ -235,7 +235,7 @@ def test_only_the_columns_that_are_drawn_are_read(tmp_path):
 )
 def test_choices_of_nothing_are_refused(options, message, tmp_path, monkeypatch):
     results = turning(tmp_path / "results")
-    assert refusal(monkeypatch, "run_figures", results, *options).startswith(f"scripts/plot: {results}: {message}")
+    assert refusal(monkeypatch, "run_figures", results, *options).startswith(f"nocdyn plot run: {results}: {message}")
     assert not (results / "figures").exists()
 
 
@@ -257,7 +257,7 @@ def test_options_that_are_wrong_are_usage_errors(options, message, tmp_path, mon
 def test_patterns_before_the_folder_are_told_by_the_usage(tmp_path, monkeypatch, capsys):
     assert refusal(monkeypatch, "run_figures", "--columns", "omega_*", tmp_path) == 2
     said = capsys.readouterr().err
-    assert said.startswith("usage: scripts/plot RESULTS [--columns PATTERN ...]") and "are required: RESULTS" in said
+    assert said.startswith("usage: nocdyn plot run RESULTS [--columns PATTERN ...]") and "are required: RESULTS" in said
 
 
 def many(folder, elements, rows=50):
@@ -385,10 +385,10 @@ def test_a_folder_of_load_cases_names_those_of_the_cases(tmp_path, monkeypatch):
 
 def test_refusals_leave_with_exit_code_1_and_one_line(tmp_path):
     result = subprocess.run(
-        [sys.executable, "-m", "nocdyn_report.run_figures", tmp_path / "none"],
+        [sys.executable, "-m", "nocdyn_report", "plot", "run", tmp_path / "none"],
         text=True,
         capture_output=True,
         env={**os.environ, "PYTHONPATH": str(SCRIPTS)},
     )
     assert result.returncode == 1
-    assert result.stderr.count("\n") == 1 and result.stderr.startswith("scripts/plot: ")
+    assert result.stderr.count("\n") == 1 and result.stderr.startswith("nocdyn plot run: ")

@@ -1,4 +1,4 @@
-"""scripts/plot_response, scripts/plot_campbell and the drawing of a train: what is in the figures, and what is refused."""
+"""nocdyn plot response, nocdyn plot campbell and the drawing of a train: what is in the figures, and what is refused."""
 
 import json
 import math
@@ -238,7 +238,7 @@ def test_quantities_speeds_and_folders_are_chosen(tmp_path, monkeypatch, capsys)
 )
 def test_choices_of_nothing_are_refused(options, message, tmp_path, monkeypatch):
     results = response(tmp_path / "r")
-    assert refusal(monkeypatch, "response_figures", results, *options) == f"scripts/plot_response: {results}: {message}"
+    assert refusal(monkeypatch, "response_figures", results, *options) == f"nocdyn plot response: {results}: {message}"
     assert not (results / "figures").exists()
 
 
@@ -277,7 +277,7 @@ def test_a_folder_that_is_no_response_is_refused(name, content, message, tmp_pat
     results = response(tmp_path / "r")
     (results / name).unlink() if content is None else write(results, name, content)
     said = refusal(monkeypatch, "response_figures", results)
-    assert said.startswith(f"scripts/plot_response: {results}") and message in said and "\n" not in said
+    assert said.startswith(f"nocdyn plot response: {results}") and message in said and "\n" not in said
 
 
 def test_orders_at_other_speeds_are_refused(tmp_path, monkeypatch):
@@ -374,7 +374,7 @@ def test_a_folder_without_campbell_s_diagram_is_refused(name, content, message, 
     results = campbell(tmp_path / "c")
     (results / name).unlink() if content is None else write(results, name, content)
     said = refusal(monkeypatch, "campbell_figures", results)
-    assert said.startswith(f"scripts/plot_campbell: {results}") and message in said and "\n" not in said
+    assert said.startswith(f"nocdyn plot campbell: {results}") and message in said and "\n" not in said
 
 
 MACHINE = """\
@@ -542,6 +542,8 @@ def test_bodies_of_any_machine_have_places_of_their_own(seed):
     assert len(set(zip(train.place, train.row))) == bodies and min(train.place) == 0
 
 
-@pytest.mark.parametrize("script", ["plot_response", "plot_campbell", "plot_transit"])
-def test_the_scripts_name_their_modules(script):
-    assert f"nocdyn_report.{script.removeprefix('plot_')}_figures" in (SCRIPTS / script).read_text(encoding="utf-8")
+@pytest.mark.parametrize("kind", ["run", "modes", "campbell", "response", "sweep", "transit"])
+def test_a_script_calls_the_command_of_its_kind(kind):
+    script = "plot" if kind == "run" else f"plot_{kind}"
+    words = "" if kind == "run" else f" {kind}"
+    assert f'-m nocdyn_report plot{words} "$@"' in (SCRIPTS / script).read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""scripts/plot_sweep: figures of sweeps of every kind, and what it says of folders that it cannot draw."""
+"""nocdyn plot sweep: figures of sweeps of every kind, and what it says of folders that it cannot draw."""
 
 import importlib
 import importlib.util
@@ -447,7 +447,7 @@ def test_unusable_results_are_one_clear_line(files, message, tmp_path, monkeypat
     with pytest.raises(SystemExit) as leaving:
         main()
     said = leaving.value.code  # a text: exit code 1
-    assert said.startswith("scripts/plot_sweep: ") and message in said and str(folder) in said and "\n" not in said
+    assert said.startswith("nocdyn plot sweep: ") and message in said and str(folder) in said and "\n" not in said
 
 
 def test_netcdf_file_of_something_else_is_refused(tmp_path, monkeypatch):

@@ -1,4 +1,4 @@
-"""scripts/plot_transit: what is in the figures of passages of barred ranges, and what is refused."""
+"""nocdyn plot transit: what is in the figures of passages of barred ranges, and what is refused."""
 
 import json
 import math
@@ -210,4 +210,4 @@ def without_a_column(results):
 def test_a_folder_that_is_no_transit_is_refused(spoil, message, results, monkeypatch):
     spoil(results)
     said = refusal(monkeypatch, "transit_figures", results)
-    assert said.startswith(f"scripts/plot_transit: {results}") and message in said and "\n" not in said
+    assert said.startswith(f"nocdyn plot transit: {results}") and message in said and "\n" not in said

@@ -1,4 +1,4 @@
-"""scripts/report: the page in headless Chromium, the PDF, what is computed again, what is refused."""
+"""nocdyn report: the page in headless Chromium, the PDF, what is computed again, what is refused."""
 
 import base64
 import html
@@ -464,7 +464,7 @@ def test_without_a_browser_there_is_no_half_a_report(reports):
     outcome = reports("m.nml", "--quiet", PATH="/nowhere")
     assert outcome.returncode == 3
     assert outcome.stderr == (
-        "scripts/report: there is no chromium, which prints the PDF: apt-get install chromium, or use --no-pdf\n"
+        "nocdyn report: there is no chromium, which prints the PDF: apt-get install chromium, or use --no-pdf\n"
     )
     assert reports.page().read_bytes() == before
     assert not list(reports.page().parent.glob(".*"))
@@ -540,7 +540,7 @@ def test_numbers_look_the_same_in_tables_and_under_the_pointer(opened):
 def process(fresh):
     """Starts the script in a process of its own."""
     fresh.write("m.nml", without_notes(PLANT))
-    words = [sys.executable, "-m", "nocdyn_report.report", "m.nml", "--no-pdf"]
+    words = [sys.executable, "-m", "nocdyn_report", "report", "m.nml", "--no-pdf"]
     environment = os.environ | {"PYTHONPATH": str(SOURCE / "scripts"), "PYTHONUNBUFFERED": "1"}
     return lambda: subprocess.Popen(words, cwd=fresh.folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
@@ -556,7 +556,7 @@ def test_an_interruption_leaves_no_report_and_one_sentence(fresh, process):
     assert started.stdout.readline() != b""  # it computes
     started.send_signal(signal.SIGINT)
     _, errors = started.communicate(timeout=60)
-    assert (started.returncode, errors) == (130, b"scripts/report: interrupted; there is no new report\n")
+    assert (started.returncode, errors) == (130, b"nocdyn report: interrupted\n")
     assert not fresh.page().exists()
 
 
@@ -729,7 +729,7 @@ def test_changes_since_another_revision_are_told(fresh, browser):
     assert "-  stiffness = 4" in browser.find("#details").text and "+  stiffness = 5" in browser.find("#details").text
     assert fresh("m.nml", "--no-pdf", "--quiet", "--against", "results/m").returncode == 2
     outcome = fresh("m.nml", "--no-pdf", "--quiet", "--against", "none")
-    assert (outcome.returncode, outcome.stderr) == (2, "scripts/report: --against none: has no results of nocdyn\n")
+    assert (outcome.returncode, outcome.stderr) == (2, "nocdyn report: --against none: has no results of nocdyn\n")
 
 
 def test_lines_that_fill_a_panel_are_bands():

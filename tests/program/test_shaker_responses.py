@@ -233,7 +233,7 @@ def test_a_report_is_over_the_frequency(nocdyn):
     pytest.importorskip("jinja2")
     life = "&fatigue name = 'f' coupling = 'spring' reference_moment = 1000 reference_cycles = 1e6 slope = 5 /\n"
     nocdyn.write("machine.nml", DISC + OVER + "&limit coupling = 'spring' vibratory_moment = 100 /\n" + life + RUN)
-    words = [sys.executable, "-m", "nocdyn_report.report", "machine.nml", "--no-pdf", "--out", "out"]
+    words = [sys.executable, "-m", "nocdyn_report", "report", "machine.nml", "--no-pdf", "--out", "out"]
     settings = {**os.environ, "PYTHONPATH": str(SOURCE / "scripts")}
     outcome = subprocess.run(words, cwd=nocdyn.folder, env=settings, capture_output=True, text=True, check=False)
     assert outcome.returncode == 0, outcome.stderr

@@ -1,1 +1,1 @@
-"""The report on a machine: scripts/report."""
+"""The report on a machine: nocdyn report."""

@@ -3,7 +3,7 @@
 import argparse
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from .calculations import FAILED, Calculations, calculate
@@ -32,15 +32,14 @@ from .sections.transit import transit_section
 from .sources import NOTES_FILE, Sources
 
 PAGE, PDF = "report.html", "report.pdf"
-INTERRUPTED = 130
 
 
-def main() -> None:
-    arguments = _parser().parse_args()
+def main(words: Sequence[str] | None = None) -> None:
+    arguments = _parser().parse_args(words)
     try:
         sys.exit(_make(arguments))
     except ReportError as error:
-        message = str(error) if str(error).startswith("nocdyn: ") else f"scripts/report: {error}"
+        message = str(error) if str(error).startswith("nocdyn: ") else f"nocdyn report: {error}"
         print(message, file=sys.stderr)
         sys.exit(error.code)
     except BrokenPipeError:  # who reads the output has gone: what is still to be printed goes nowhere
@@ -52,17 +51,14 @@ def main() -> None:
             place = place.tb_next
         where = f"{Path(place.tb_frame.f_code.co_filename).name}:{place.tb_lineno}"
         print(
-            f"scripts/report: a mistake in this script, please report it: {type(error).__name__}: {error} ({where})",
+            f"nocdyn report: a mistake in this script, please report it: {type(error).__name__}: {error} ({where})",
             file=sys.stderr,
         )
         sys.exit(FAILED)
-    except KeyboardInterrupt:
-        print("scripts/report: interrupted; there is no new report", file=sys.stderr)
-        sys.exit(INTERRUPTED)
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="scripts/report", description=__doc__)
+    parser = argparse.ArgumentParser(prog="nocdyn report", description=__doc__)
     parser.add_argument("file", metavar="FILE", help="input file")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the results (results/<name of the file>)")
     parser.add_argument(

@@ -11,10 +11,12 @@ import jinja2
 from markupsafe import Markup
 
 from .content import Section, set_beside
+from .failure import FILES, ReportError
 from .sources import Sources
 
 ASSETS = Path(__file__).parent / "assets"
-LIBRARY = Path("/usr/share/nodejs/d3/dist/d3.min.js")  # of Debian's node-d3
+# D3: installed with nocdyn, else of Debian's node-d3
+LIBRARIES = (Path(__file__).parents[3] / "d3.min.js", Path("/usr/share/nodejs/d3/dist/d3.min.js"))
 SCRIPTS = ("numbers.js", "picture.js", "figures.js", "page.js")
 
 
@@ -28,7 +30,7 @@ def render(sources: Sources, sections: Sequence[Section]) -> str:
         lstrip_blocks=True,
     )
     environment.filters["css"] = _css_text
-    scripts = [LIBRARY.read_text(encoding="utf-8"), *((ASSETS / name).read_text(encoding="utf-8") for name in SCRIPTS)]
+    scripts = [_library(), *((ASSETS / name).read_text(encoding="utf-8") for name in SCRIPTS)]
     blocks = [block for section in sections for block in section.blocks if block.kind == "figure"]
     figures = {panel.id: panel.spec for block in blocks for panel in block.panels}
     case = sources.case
@@ -43,6 +45,14 @@ def render(sources: Sources, sections: Sequence[Section]) -> str:
         hashes=" ".join(f"'sha256-{_digest(script)}'" for script in scripts),
         data=Markup(_embedded({"arrays": sources.arrays.texts, "figures": figures})),
     )
+
+
+def _library() -> str:
+    """The text of D3."""
+    for path in LIBRARIES:
+        if path.is_file():
+            return path.read_text(encoding="utf-8")
+    raise ReportError(f"{LIBRARIES[-1]}: there is no such file; D3 draws the figures: apt-get install node-d3", FILES)
 
 
 def number_all(sections: Sequence[Section]) -> None:

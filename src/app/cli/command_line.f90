@@ -1,7 +1,7 @@
 !> Parses the command line by the tables of commands and options.
 module nocdyn_command_line
   use nocdyn_arguments, only: arguments_t, option_index, option_t, options
-  use nocdyn_commands, only: command_index, command_names, command_t, commands_with_option
+  use nocdyn_commands, only: command_index, command_names, command_t, commands_with_option, passed_on
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_kinds, only: wp
   use nocdyn_literals, only: literal_ok, read_real
@@ -44,6 +44,7 @@ contains
     call parse_command(words, commands, arguments, error)
     takes_options = .true.
     i = 2
+    if (.not. allocated(error) .and. leaves_words(commands, arguments%command)) return
     do while (i <= size(words) .and. .not. allocated(error))
       if (words(i)%text == '--') then
         takes_options = .false.
@@ -57,6 +58,17 @@ contains
     if (.not. allocated(error)) call check_options(commands, arguments, error)
     if (.not. allocated(error)) call check_operands(commands, arguments, error)
   end subroutine parse_command_line
+
+  !> Whether another program reads the words after a command.
+  pure logical function leaves_words(commands, command)
+    type(command_t), intent(in) :: commands(:)
+    character(len=*), intent(in) :: command
+    integer :: row
+
+    leaves_words = .false.
+    row = command_index(commands, command)
+    if (row > 0) leaves_words = commands(row)%options == passed_on
+  end function leaves_words
 
   subroutine parse_command(words, commands, arguments, error)
     type(string_t), intent(in) :: words(:)

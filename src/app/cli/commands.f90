@@ -7,10 +7,13 @@ module nocdyn_commands
 
   public :: add_command, remove_procedures, command_index, command_names, commands_with_option
 
+  !> Options of a command whose words another program reads.
+  character(len=*), parameter, public :: passed_on = '...'
+
   type, public :: command_t
     character(len=:), allocatable :: name
     character(len=:), allocatable :: operands   !! 'FILE...': at least one; 'FILE', 'DIR': exactly one; else in brackets
-    character(len=:), allocatable :: options    !! long names, separated by blanks; every command has --help
+    character(len=:), allocatable :: options    !! long names, separated by blanks, or `passed_on`; every command has --help
     character(len=:), allocatable :: summary    !! one line
     character(len=:), allocatable :: help       !! lines after the usage
     procedure(command_interface), pointer, nopass :: run => null()   !! not associated: this program does not run it

@@ -1,9 +1,10 @@
 !> The table of commands. A new command is a row here and a module with its procedure.
 module nocdyn_command_table
   use nocdyn_analysis_command, only: analysis_command
-  use nocdyn_commands, only: add_command, command_t
+  use nocdyn_commands, only: add_command, command_t, passed_on
   use nocdyn_companion_command, only: companion_command
   use nocdyn_new_command, only: new_command
+  use nocdyn_python_command, only: python_command
   use nocdyn_run_command, only: run_command
   implicit none (type, external)
   private
@@ -27,6 +28,7 @@ contains
       '  --code             print the equations of motion as a program in C instead, to be built into others' // nl // &
       '  --case NAME        look at the machine of this &load_case', analysis_command)
     call list_sweeps(commands)
+    call list_python_commands(commands)
     call add_command(commands, 'new', 'FILE', '--kind', 'write a commented input to start from', &
       'Writes a commented input file that runs. A file that exists is not overwritten.' // nl // nl // &
       '  --kind KIND        of a machine: car, compressor, genset, mill, motor_fan, ship, wind; default: two bodies' // nl // &
@@ -151,5 +153,26 @@ contains
       '  --quiet            print nothing but errors' // nl // nl // &
       'Exit code 2: the journals are not of one sweep, or variants are missing.', companion_command)
   end subroutine list_sweeps
+
+  !> Their options are told by themselves, after --help.
+  subroutine list_python_commands(commands)
+    type(command_t), allocatable, intent(inout) :: commands(:)
+    character(len=*), parameter :: on_python = nl // nl // 'Needs Python 3.11 or newer: the one that NOCDYN_PYTHON ' // &
+      'names, else one beside nocdyn, else python3 in the PATH.'
+
+    call add_command(commands, 'plot', '[KIND] DIR', passed_on, 'draw results', &
+      'Draws the results of run, modes, campbell, response or sweep in DIR, to DIR/figures.' // nl // nl // &
+      '  nocdyn plot DIR           all that DIR holds' // nl // &
+      '  nocdyn plot KIND DIR      results of one KIND: run, modes, campbell, response, sweep' // nl // &
+      '  nocdyn plot KIND --help   the options of a KIND' // nl // &
+      '  nocdyn plot paper         compute the two cases of the paper and draw its figures 2 to 5' // on_python, python_command)
+    call add_command(commands, 'report', 'FILE', passed_on, 'a report on a machine, HTML and PDF', &
+      'Runs what is missing, and writes report.html and report.pdf beside the results.' // nl // nl // &
+      '  nocdyn report --help      the options' // on_python, python_command)
+    call add_command(commands, 'verify', '[CASE]...', passed_on, 'compute cases with known answers and compare', &
+      'Computes the verification cases with this program on this machine, all or the chosen ones, and writes' // nl // &
+      'verification.html, verification.pdf and verification.json.' // nl // nl // &
+      '  nocdyn verify --help      the options' // on_python // nl // nl // 'Exit code 1: a case fails.', python_command)
+  end subroutine list_python_commands
 
 end module nocdyn_command_table

@@ -4,7 +4,8 @@ module nocdyn_companion_command
   use nocdyn_command_line, only: command_line
   use nocdyn_console, only: report_error
   use nocdyn_errors, only: error_t, exit_done, exit_file, raise
-  use nocdyn_posix_programs, only: exec_program, program_folder
+  use nocdyn_posix_programs, only: exec_program, program_file, program_folder
+  use nocdyn_processor_levels, only: level_of
   use nocdyn_text, only: quoted
   implicit none (type, external)
   private
@@ -29,7 +30,7 @@ contains
     character(len=:), allocatable :: failure, path
     logical :: exists
 
-    path = program_folder() // 'nocdyn-sweep'
+    path = program_folder() // 'nocdyn-sweep' // level_of(program_file())
     inquire (file=path, exist=exists)
     if (exists) then
       call exec_program(path, command_line(), failure)

@@ -1,7 +1,7 @@
 !> Help on the program and on its commands, made of the tables of commands and options.
 module nocdyn_help_command
   use nocdyn_arguments, only: arguments_t, options
-  use nocdyn_commands, only: command_index, command_names, command_t
+  use nocdyn_commands, only: command_index, command_names, command_t, passed_on
   use nocdyn_console, only: print_text, report_error
   use nocdyn_errors, only: error_t, exit_done, exit_input, raise
   use nocdyn_input_schema, only: input_schema
@@ -11,7 +11,7 @@ module nocdyn_help_command
   implicit none (type, external)
   private
 
-  public :: help_command
+  public :: help_command, usage
 
   character(len=*), parameter :: nl = new_line('a')
   integer, parameter :: max_width = 112   ! of a line of usage
@@ -79,6 +79,7 @@ contains
     integer :: i, start
 
     text = 'nocdyn ' // command%name // ' ' // command%operands
+    if (command%options == passed_on) text = text // ' [OPTION]...'
     start = 0
     do i = 1, size(options)
       if (options(i)%name == '--help' .or. .not. command%takes(trim(options(i)%name))) cycle

@@ -4,6 +4,7 @@ program nocdyn_sweep_program
   use nocdyn_command_table, only: list_commands
   use nocdyn_commands, only: command_index, command_t, remove_procedures
   use nocdyn_merge_command, only: merge_command
+  use nocdyn_processor_levels, only: become_faster
   use nocdyn_program, only: run_program
   use nocdyn_sweep_command, only: respond_netcdf_command, run_netcdf_command, sweep_command
   implicit none (type, external)
@@ -11,6 +12,7 @@ program nocdyn_sweep_program
   type(command_t), allocatable :: commands(:)
   integer :: code
 
+  call become_faster()
   call list_commands(commands)
   call remove_procedures(commands)
   commands(command_index(commands, 'run'))%run => run_netcdf_command

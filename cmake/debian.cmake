@@ -1,0 +1,21 @@
+# cpack makes nocdyn_VERSION_ARCHITECTURE.deb (scripts/deb): the programs, linked to the system's NetCDF, and the Python packages.
+set(NOCDYN_PYTHON_PACKAGES "" CACHE STRING "Folders of Python packages that go into the Debian package, for Debian has none of them")
+foreach(package IN LISTS NOCDYN_PYTHON_PACKAGES)
+  install(DIRECTORY ${package} DESTINATION ${data_dir}/python COMPONENT python_packages PATTERN __pycache__ EXCLUDE)
+endforeach()
+
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_CONTACT "the authors of nocdyn <nocdyn@localhost>")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_COMPONENTS_ALL programs python_packages)
+set(CPACK_COMPONENTS_GROUPING ALL_COMPONENTS_IN_ONE)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_DEPENDS "python3 (>= 3.11)")
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS
+  "python3-h5netcdf, python3-h5py, python3-jinja2, python3-markdown-it, python3-matplotlib, python3-numpy, python3-pandas, python3-xarray")
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS "chromium, fonts-liberation, gcc")
+include(CPack)
