@@ -76,6 +76,7 @@ def test_modes_are_chosen_by_their_number_or_by_a_range(nocdyn, count):
     low, high = damped(count, 12)[0], damped(count, 20)[0]
     content, modes = modes_of(nocdyn, chain(count), "--range_hz", f"{low * 0.999},{high * 1.001}")
     assert len(modes) == len(content["modes"]) == 9
+    assert [mode["mode"] for mode in content["modes"]] == list(range(12, 21))  # as without the range
     check(modes[0], count, 12)
     check(modes[-1], count, 20)
     assert any(f"of {count - 1} undamped ones, 11 are below" in note for note in content["notes"])

@@ -22,6 +22,7 @@ module nocdyn_critical_speeds
   !> Where a line crosses a mode.
   type, public :: crossing_t
     integer :: mode = 0
+    integer :: number = 0             !! of the mode among all of the machine
     integer :: line = 0
     real(wp) :: speed = 0.0_wp        !! of the reference body [rad/s]
     real(wp) :: frequency = 0.0_wp    !! [rad/s]
@@ -58,7 +59,7 @@ contains
           if (before * after > 0 .or. (abs(after) <= 0 .and. i < size(speed) - 1)) cycle
           if (abs(before - after) <= 0) cycle
           share = before / (before - after)
-          crossings = [crossings, crossing_t(m, l, between(speed(i), speed(i + 1), share), &
+          crossings = [crossings, crossing_t(m, modes%number(m), l, between(speed(i), speed(i + 1), share), &
                                              between(modes%frequency(m, i), modes%frequency(m, i + 1), share), &
                                              between(modes%damping_ratio(m, i), modes%damping_ratio(m, i + 1), share))]
         end do

@@ -20,6 +20,7 @@ module nocdyn_mode_branches
   !> The oscillating modes, in the order of their frequencies at one speed; then those that begin at other speeds.
   type, public :: speed_modes_t
     integer :: modes = 0
+    integer :: below = 0                           !! modes of lower frequencies, which are left out
     real(wp) :: numbered_at = 0.0_wp               !! the speed at whose frequencies they are numbered [rad/s]
     logical :: change_places = .false.             !! whether their order is not the same at all points, or some begin or end
     logical, allocatable :: exists(:, :)           !! whether a mode oscillates, [modes, points]
@@ -33,6 +34,8 @@ module nocdyn_mode_branches
     real(wp), allocatable :: shape(:, :)           !! angles of the bodies where a mode begins, the largest 1, [bodies, modes]
     complex(wp), allocatable :: twists(:, :)       !! of all elements there, in any scale, [elements, modes]
     logical :: is_constant = .true.                !! whether all points have the same frequencies
+  contains
+    procedure :: number
   end type speed_modes_t
 
   integer, parameter :: most_halvings = 12, most_speeds_between = 400   ! of all intervals together
@@ -91,8 +94,17 @@ contains
     end if
     call set_modes(tracks, numbered_at, self)
     self%numbered_at = response%points(numbered_at)%state%speed
+    self%below = first%pairs%below
     self%is_electrical = [(response%machine%is_electrical(self%internal(m)), m=1, self%modes)]
   end subroutine new_speed_modes
+
+  !> The number of a mode among all modes of the machine, 1 at the lowest frequency.
+  pure integer function number(self, mode)
+    class(speed_modes_t), intent(in) :: self
+    integer, intent(in) :: mode   !! index
+
+    number = self%below + mode
+  end function number
 
   !> Connects the modes of two points, and finds the ones of all points between.
   recursive subroutine connect(response, tracks, a, b, error)

@@ -87,6 +87,7 @@ contains
     else if (response%choice%has_range) then
       ends = in_si(response%choice%range_hz, unit_hz)
       kept = pack([(m, m=1, size(pairs%value))], aimag(pairs%value) >= ends(1) .and. aimag(pairs%value) <= ends(2))
+      pairs%below = count(aimag(pairs%value) < ends(1))
     else
       kept = [(m, m=1, min(response%choice%count, size(pairs%value)))]
     end if
@@ -117,6 +118,7 @@ contains
       call find_obstacle(machine, found%damped, found%chosen, .false., obstacle)
       if (obstacle /= '') return
       call set_pairs(response, found%damped, found%linear, found%first, pairs)
+      pairs%below = max(0, wanted(1) - 1 - pencil%rigid)
     end associate
     call keep_pairs(pack(found%chosen, aimag(pairs%value(found%chosen)) > 0), pairs)
   end subroutine find_first

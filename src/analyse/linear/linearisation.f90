@@ -37,6 +37,7 @@ module nocdyn_linearisation
     real(wp), allocatable :: twists(:, :)   !! modes in the twists of all elements, [elements, modes]
     real(wp), allocatable :: natural(:)     !! natural frequencies, negative for diverging modes [rad/s], [modes]
     integer, allocatable :: flexible(:)     !! modes that are not rigid
+    integer :: below = 0                    !! modes that are not rigid and are left out, of lower frequencies
     real(wp), allocatable :: stiffness(:)   !! k of all elements [N m/rad], [elements]
     real(wp), allocatable :: loss(:)        !! the imaginary part of k [N m/rad], [elements]
     integer, allocatable :: held(:)         !! elements of joints that hold

@@ -25,6 +25,7 @@ module nocdyn_mode_pairs
     real(wp) :: highest = 0.0_wp                 !! frequency of excitation: a large machine has no modes far above it [rad/s]
     type(linearisation_t) :: linear              !! the undamped modes
     integer :: numbers(2) = 0                    !! the first and the last of these, if band matrices find them; else 0
+    integer :: below = 0                         !! modes of lower frequencies, which were left out at the first of several states
     complex(wp), allocatable :: value(:)         !! eigenvalues, imaginary part > 0 [1/s], [modes]
     complex(wp), allocatable :: x(:, :)          !! coordinates, with x^T T'(lambda) x = 1, [coordinates, modes]
     complex(wp), allocatable :: twist(:, :)      !! [elements, modes]

@@ -200,6 +200,7 @@ contains
     linear%shapes = linear%shapes(:, first:last)
     linear%twists = linear%twists(:, first:last)
     linear%natural = linear%natural(first:last)
+    linear%below = linear%below + count(linear%flexible < first)
     linear%flexible = pack(linear%flexible, linear%flexible >= first .and. linear%flexible <= last) - first + 1
   end subroutine keep_numbers
 

@@ -12,7 +12,7 @@ module nocdyn_campbell_results
   use nocdyn_margins, only: add_coverage, add_critical, add_nearest, margin_text, mode_text, put_margin, put_mode, unknown_ratio
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: output_units
-  use nocdyn_table_text, only: cell
+  use nocdyn_table_text, only: cell, right
   use nocdyn_text, only: counted, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_units, only: from_si, unit_hz, unit_rpm
@@ -66,14 +66,14 @@ contains
     call list%start('campbell.csv', output_units(input))
     call list%add_named('omega', 'rad/s', 'speed that is held', 'body', self%body)
     do m = 1, self%campbell%modes%modes
-      call list%add_named('frequency_' // to_text(m), 'Hz', 'damped natural frequency')
+      call list%add_named('frequency_' // to_text(self%campbell%modes%number(m)), 'Hz', 'damped natural frequency')
     end do
     do m = 1, self%campbell%modes%modes
-      call list%add_named('damping_ratio_' // to_text(m), '1', 'damping ratio')
+      call list%add_named('damping_ratio_' // to_text(self%campbell%modes%number(m)), '1', 'damping ratio')
     end do
     do m = 1, self%campbell%modes%modes
       if (self%campbell%modes%internal(m) > 0) cycle
-      call list%add_named('undamped_frequency_' // to_text(m), 'Hz', 'undamped natural frequency')
+      call list%add_named('undamped_frequency_' // to_text(self%campbell%modes%number(m)), 'Hz', 'undamped natural frequency')
     end do
     do l = 1, size(self%campbell%order)
       call list%add_named(line_name(self%campbell, l), 'Hz', 'frequency of the line')
@@ -257,7 +257,7 @@ contains
                             // cell('undamped [Hz]') // cell('highest'))
     do m = 1, min(self%modes%modes, most_modes)
       associate (natural => from_si(self%modes%frequency(m, :), unit_hz), exists => self%modes%exists(m, :))
-        call report%append_line('  ' // repeat(' ', 4 - len(to_text(m))) // to_text(m) // cell(natural(1)) // &
+        call report%append_line('  ' // right(to_text(self%modes%number(m)), 4) // cell(natural(1)) // &
                                 cell(natural(last)) // cell(minval(natural, mask=exists)) // cell(maxval(natural)) // &
                                 cell(rounded_text(minval(self%modes%damping_ratio(m, :), mask=exists), 3)) // &
                                 cell(rounded_text(maxval(self%modes%damping_ratio(m, :), mask=exists), 3)) // &
@@ -307,7 +307,7 @@ contains
     call report%append_line(line)
     do i = 1, min(size(self%crossings), most_crossings)
       associate (crossing => self%crossings(i))
-        line = '  ' // repeat(' ', 4 - len(to_text(crossing%mode))) // to_text(crossing%mode)
+        line = '  ' // right(to_text(crossing%number), 4)
         line = line // cell(line_word(self, crossing%line)) // cell(rpm(crossing%speed)) // &
                cell(from_si(crossing%frequency, unit_hz))
         line = line // margin_text(self%settings, self%modes, crossing%mode, self%distance(i)) // &

@@ -55,10 +55,10 @@ contains
     associate (linear => report%linear, machine => report%machine)
       do m = 1, size(linear%natural)
         if (.not. linear%natural(m) > 0) cycle
-        table%number = table%number + 1
+        table%number = linear%below + m - count(.not. linear%natural(:m) > 0)
         table%omega = linear%natural(m)
         table%unlumped = 0.0_wp
-        if (table%number <= size(unlumped)) table%unlumped = unlumped(table%number)
+        if (table%number - linear%below <= size(unlumped)) table%unlumped = unlumped(table%number - linear%below)
         call holzer%fill(machine, machine%coordinates%body_speeds(1, linear%shapes(:, m)), table%omega, table%theta, &
                          table%torque, table%total)
         call put_rows(machine, holzer, table, rows)

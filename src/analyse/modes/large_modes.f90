@@ -63,8 +63,10 @@ contains
       if (.not. has_fallback) call note_approximate(slopes, found, point%notes)
       linear = found%linear
       call keep_numbers(wanted(1) - found%first + 1, wanted(2) - found%first + 1, linear)
+      linear%below = max(0, wanted(1) - 1 - pencil%rigid)
+      where (modes%number > 0) modes%number = modes%number + linear%below
       associate (flexible => pencil%modes - pencil%rigid)
-        call note_choice(choice, flexible, max(0, wanted(1) - 1 - pencil%rigid), count(modes%kind == mode_oscillating), &
+        call note_choice(choice, flexible, linear%below, count(modes%kind == mode_oscillating), &
                          point%notes)
       end associate
       if (machine%elements%internal%count > most_internal) then

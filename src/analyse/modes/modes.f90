@@ -25,6 +25,7 @@ module nocdyn_modes
   !> A mode, or a pair of conjugate complex ones.
   type, public :: mode_t
     integer :: kind = mode_oscillating
+    integer :: number = 0                !! of an oscillating mode, 1 at the lowest frequency of all
     integer :: internal = 0              !! the internal state that takes part most, if they do more than the motion
     complex(wp) :: eigenvalue = 0.0_wp   !! imaginary part >= 0 [1/s]
     real(wp) :: undamped = 0.0_wp        !! frequency of the most similar undamped mode, negative if that diverges; of
@@ -133,6 +134,7 @@ contains
              + count(modes(:i - 1)%kind == modes(i)%kind .and. abs(value(:i - 1) - value(i)) <= 0.0_wp)
       associate (mode => modes(i), place => sorted(rank))
         place%kind = mode%kind
+        if (mode%kind == mode_oscillating) place%number = rank - count(modes%kind < mode_oscillating)
         place%internal = mode%internal
         place%eigenvalue = mode%eigenvalue
         place%undamped = mode%undamped

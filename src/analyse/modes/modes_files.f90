@@ -34,7 +34,7 @@ contains
     call put_names('potential_', self%elastic_names, ' [1]')
     call file%put(new_line('a'))
     do i = 1, size(self%modes)
-      call put_row(file, self%modes(i), count(self%modes(:i)%kind == mode_oscillating), i <= self%shapes)
+      call put_row(file, self%modes(i), i <= self%shapes)
     end do
 
   contains
@@ -52,13 +52,12 @@ contains
   end subroutine write_modes
 
   !> Modes that do not oscillate have no number, and those that neither decay nor grow no time constant.
-  subroutine put_row(file, mode, number, has_shape)
+  subroutine put_row(file, mode, has_shape)
     type(output_file_t), intent(inout) :: file
     type(mode_t), intent(in) :: mode
-    integer, intent(in) :: number
     logical, intent(in) :: has_shape   !! whether there are a shape and shares; else their cells are empty
 
-    if (mode%kind == mode_oscillating) call file%put(to_text(number))
+    if (mode%number > 0) call file%put(to_text(mode%number))
     call file%put(',' // trim(kind_names(mode%kind)) // ',' // to_text(mode%frequency()) // ',')
     if (mode%internal == 0) call file%put(to_text(mode%undamped))
     call file%put(',' // to_text(mode%damping_ratio()) // ',')
@@ -168,7 +167,7 @@ contains
 
     associate (mode => self%modes(i))
       call json%open()
-      if (mode%kind == mode_oscillating) call json%put('mode', count(self%modes(:i)%kind == mode_oscillating))
+      if (mode%number > 0) call json%put('mode', mode%number)
       call json%put('kind', trim(kind_names(mode%kind)))
       if (mode%internal > 0) call json%put('state', self%machine%internal_name(mode%internal))
       call json%put('frequency_Hz', mode%frequency())

@@ -13,7 +13,7 @@ module nocdyn_modes_report
   use nocdyn_operating_point, only: operating_point_t
   use nocdyn_damping_notes, only: note_mean_slopes, note_stand_ins
   use nocdyn_power_notes, only: note_power_signs
-  use nocdyn_table_text, only: cell, cell_width, padded, text_width
+  use nocdyn_table_text, only: cell, cell_width, padded, right, text_width
   use nocdyn_text, only: append, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_units, only: from_si, in_si, unit_hz, unit_rpm
@@ -173,7 +173,7 @@ contains
         last = min(first + shapes_per_row - 1, size(chosen))
         line = '  ' // padded('shape of mode', width)
         do i = first, last
-          line = line // cell(to_text(i))
+          line = line // cell(to_text(self%modes(chosen(i))%number))
         end do
         call report%append_line(line)
         do b = 1, size(self%body_names)
@@ -209,7 +209,7 @@ contains
     do i = 1, shown
       associate (mode => self%modes(chosen(i)))
         if (has_rpm) rpm = cell(from_si(in_si(mode%frequency(), unit_hz), unit_rpm))
-        call report%append_line(repeat(' ', number_width - len(to_text(i))) // to_text(i) // cell(mode%frequency()) // rpm // &
+        call report%append_line(right(to_text(mode%number), number_width) // cell(mode%frequency()) // rpm // &
                                 undamped_cell(mode) // cell(mode%damping_ratio()) // time_cell(mode) // '  ' // &
                                 padded(shares_text(mode%kinetic, self%kinetic_names), width) // '  ' // &
                                 shares_text(mode%potential, self%elastic_names) // internal_text(self, mode) // &

@@ -173,7 +173,7 @@ contains
     real(wp), intent(in) :: distance           !! as of `operating_distance`
     type(verdict_line_t), intent(out) :: line
 
-    line = new_verdict_line(analysis, 'mode ' // to_text(crossing%mode), '', distance_criterion, '')
+    line = new_verdict_line(analysis, 'mode ' // to_text(crossing%number), '', distance_criterion, '')
     line%has_value = .true.
     line%value = percent * distance
     line%limit = percent * settings%margin
@@ -227,7 +227,7 @@ contains
     type(speed_modes_t), intent(in) :: modes
     integer, intent(in) :: mode
 
-    call json%put('mode', mode)
+    call json%put('mode', modes%number(mode))
     if (modes%internal(mode) == 0) return
     call json%put('mostly', machine%internal_name(modes%internal(mode)))
     call json%put('is_electrical', modes%is_electrical(mode))

@@ -5,7 +5,7 @@ module nocdyn_response_report
   use nocdyn_response_analysis, only: response_analysis_t
   use nocdyn_response_points, only: response_point_t
   use nocdyn_response_summary, only: critical_t, response_summary_t
-  use nocdyn_table_text, only: cell, padded, text_width
+  use nocdyn_table_text, only: cell, padded, right, text_width
   use nocdyn_text, only: counted, quoted, rounded_text, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
@@ -130,7 +130,7 @@ contains
     at_order = ''
     if (.not. analysis%settings%axis%is_frequency) at_order = right(order_word(analysis, critical), order_width) // &
                                                               right(shown(analysis, critical%crossing%speed), 16)
-    line = right(to_text(critical%crossing%mode), 6) // right(rounded_text(critical%crossing%frequency / turn, 7), 16) // &
+    line = right(to_text(critical%crossing%number), 6) // right(rounded_text(critical%crossing%frequency / turn, 7), 16) // &
            at_order // right(rounded_text(critical%crossing%damping_ratio, 3), 15) // &
            '  ' // padded(coupling_name(analysis, critical), width)
     if (critical%quantity == 0) then
@@ -172,14 +172,6 @@ contains
     text = ''
     if (ratio > 0) text = rounded_text(100.0_wp * ratio, 3) // ' %'
   end function ratio_text
-
-  pure function right(text, width)
-    character(len=*), intent(in) :: text
-    integer, intent(in) :: width
-    character(len=:), allocatable :: right
-
-    right = repeat(' ', max(0, width - len(text))) // text
-  end function right
 
   !> Per quantity the largest half range with its speed and orders.
   subroutine put_largest(analysis, summary, report)

@@ -7,7 +7,7 @@ module nocdyn_table_text
   implicit none (type, external)
   private
 
-  public :: append_table, cell, clear_rounding, padded, text_width
+  public :: append_table, cell, clear_rounding, padded, right, text_width
 
   integer, parameter, public :: cell_width = 15    !! of a column
   integer, parameter, public :: cell_digits = 7    !! significant digits of a number
@@ -118,6 +118,15 @@ contains
 
     padded = text // repeat(' ', max(0, length - text_width(text)))
   end function padded
+
+  !> Text after blanks.
+  pure function right(text, width)
+    character(len=*), intent(in) :: text
+    integer, intent(in) :: width   !! characters of the result, at least
+    character(len=:), allocatable :: right
+
+    right = repeat(' ', max(0, width - text_width(text))) // text
+  end function right
 
   !> The number of characters of a text in UTF-8.
   pure integer function text_width(text) result(width)
