@@ -3,6 +3,9 @@ set(NOCDYN_PYTHON_PACKAGES "" CACHE STRING "Folders of Python packages that go i
 foreach(package IN LISTS NOCDYN_PYTHON_PACKAGES)
   install(DIRECTORY ${package} DESTINATION ${data_dir}/python COMPONENT python_packages PATTERN __pycache__ EXCLUDE)
 endforeach()
+if(NOCDYN_PYTHON_PACKAGES)
+  install(DIRECTORY python/nocdyn DESTINATION lib/python3/dist-packages COMPONENT python_packages PATTERN __pycache__ EXCLUDE)
+endif()
 
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_CONTACT "the authors of nocdyn <nocdyn@localhost>")

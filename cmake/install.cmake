@@ -38,13 +38,14 @@ install(DIRECTORY ${PROJECT_BINARY_DIR}/modules/ DESTINATION ${CMAKE_INSTALL_LIB
   COMPONENT library FILES_MATCHING PATTERN *.mod)
 install(EXPORT nocdyn_targets NAMESPACE nocdyn:: DESTINATION ${package_dir} COMPONENT library)
 
-# With NOCDYN_BUNDLED: the libraries of NetCDF and what they need but glibc, beside nocdyn-sweep, which finds them by its RPATH. A
-# component of its own: a package of a system with NetCDF leaves it out.
-if(NOCDYN_BUNDLED AND TARGET nocdyn_sweep_program)
+# With NOCDYN_BUNDLED: the libraries of NetCDF and of the compilers, and what they need but glibc, for nocdyn-sweep and libnocdyn_c, which
+# find them by their RPATH. A component of its own: a package of a system with NetCDF leaves it out.
+if(NOCDYN_BUNDLED)
   install(CODE "
-    set(program \"$<TARGET_FILE:nocdyn_sweep_program>\")
+    set(programs \"$<$<TARGET_EXISTS:nocdyn_sweep_program>:$<TARGET_FILE:nocdyn_sweep_program>>\")
+    set(library \"$<$<TARGET_EXISTS:nocdyn_c>:$<TARGET_FILE:nocdyn_c>>\")
     set(folder \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/lib/nocdyn\")
-    include(\"${PROJECT_SOURCE_DIR}/cmake/bundle.cmake\")" COMPONENT netcdf_libraries)
+    include(\"${PROJECT_SOURCE_DIR}/cmake/bundle.cmake\")" COMPONENT bundled_libraries)
 endif()
 
 configure_package_config_file(cmake/nocdyn-config.cmake.in nocdyn-config.cmake INSTALL_DESTINATION ${package_dir})

@@ -9,6 +9,9 @@ if(NOCDYN_SWEEP)
 endif()
 
 add_custom_target(nocdyn_package DEPENDS ${level_targets} nocdyn_manual_pages)   # what a wheel has
+if(TARGET nocdyn_c)
+  add_dependencies(nocdyn_package nocdyn_c)
+endif()
 if(NOCDYN_MPI)
   add_dependencies(nocdyn_package nocdyn_mpi_program)
 endif()
@@ -20,7 +23,7 @@ foreach(level IN LISTS faster_levels)
     BINARY_DIR ${folder}
     CMAKE_ARGS -DCMAKE_BUILD_TYPE=${CMAKE_BUILD_TYPE} -DCMAKE_Fortran_COMPILER=${CMAKE_Fortran_COMPILER}
       -DCMAKE_CXX_COMPILER=${CMAKE_CXX_COMPILER} -DNOCDYN_NATIVE=OFF -DNOCDYN_LEVELS=${level} -DNOCDYN_BUNDLED=${NOCDYN_BUNDLED}
-      -DNOCDYN_SWEEP=${NOCDYN_SWEEP} -DNOCDYN_MPI=OFF -DBUILD_TESTING=OFF
+      -DNOCDYN_SWEEP=${NOCDYN_SWEEP} -DNOCDYN_MPI=OFF -DNOCDYN_C=OFF -DBUILD_TESTING=OFF
     BUILD_COMMAND ${CMAKE_COMMAND} --build ${folder} --target ${level_targets}
     BUILD_ALWAYS ON
     INSTALL_COMMAND ""

@@ -22,8 +22,11 @@ if(NOCDYN_BUNDLED)
       message(FATAL_ERROR "NOCDYN_BUNDLED needs lib${name}.a, which ${CMAKE_Fortran_COMPILER} does not find")
     endif()
   endforeach()
-  set(OpenMP_gomp_LIBRARY ${static_folder}/libgomp.a)   # what find_package(OpenMP) would look for
   target_link_options(nocdyn_bundled INTERFACE -L${static_folder} -static-libgcc -s)
+  # libgomp by its path: find_package(OpenMP) gives that of the shared one, which libnocdyn_c needs (static ones are for programs only)
+  set(is_program "$<STREQUAL:$<TARGET_PROPERTY:TYPE>,EXECUTABLE>")
+  set_property(TARGET OpenMP::OpenMP_Fortran PROPERTY INTERFACE_LINK_LIBRARIES
+    "$<IF:${is_program},${static_folder}/libgomp.a,${OpenMP_gomp_LIBRARY}>;${OpenMP_pthread_LIBRARY}")
   # DT_RPATH: the libraries of NetCDF find each other there too
   set(CMAKE_INSTALL_RPATH "$ORIGIN/../lib/nocdyn")
   set(CMAKE_BUILD_WITH_INSTALL_RPATH ON)

@@ -20,7 +20,6 @@ PACKAGES = {
     "xarray": "xarray",
     "f90nml": "f90nml",
 }
-EXTRAS = {"plot": "figures", "report": "report", "verify": "figures"}
 
 
 def main(command, words):
@@ -35,8 +34,8 @@ def main(command, words):
         module = (error.name or "").split(".")[0]
         if module not in PACKAGES:
             raise
-        extra = f"pip install nocdyn[{EXTRAS[command]}] brings it"
-        return refuse(f"nocdyn {command} needs the Python package {PACKAGES[module]}; {extra}")
+        package = PACKAGES[module]
+        return refuse(f"nocdyn {command} needs the Python package {package}; {sys.executable} -m pip install {package} brings it")
     except KeyboardInterrupt:
         print(f"nocdyn {command}: interrupted", file=sys.stderr)
         return INTERRUPTED
