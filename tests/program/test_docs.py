@@ -265,7 +265,10 @@ def test_site_gets_search_and_scripts_that_need_no_network(tmp_path):
 
 PAGES_WITH_SESSIONS = [
     SOURCE / "README.md",
-    *(PAGES / f"{name}.md" for name in ("tutorial", "input", "signs", "equilibrium-and-modes", "report", "results", "sweeps")),
+    *(
+        PAGES / f"{name}.md"
+        for name in ("tutorial", "input", "editors", "signs", "equilibrium-and-modes", "report", "results", "sweeps")
+    ),
 ]
 
 
