@@ -139,4 +139,4 @@ def test_completions_have_every_group_with_the_keys_it_must_have(tmp_path, schem
 def test_python_of_the_page_prints_what_it_shows(documents, monkeypatch):
     monkeypatch.setenv("PATH", f"{Path(os.environ['NOCDYN']).parent}:{os.environ['PATH']}")
     failed, count = doctest.testfile(str(SOURCE / "docs/pages/editors.md"), module_relative=False, encoding="utf-8")
-    assert (failed, count) == (0, 6)
+    assert failed == 0 and count > 5
