@@ -24,7 +24,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PLACE = re.compile(r"<!-- fill: (\w+)(?: ([^\n]+))? -->\n.*?<!-- filled -->", re.DOTALL)
-LANGUAGES = {".f90": "fortran", ".nml": "fortran", ".txt": "cmake"}
+LANGUAGES = {".f90": "fortran", ".nml": "fortran", ".py": "python", ".txt": "cmake"}
 VERDICT = re.compile(r".*\*\*(?:reached|missed)\*\*.*\n*")
 
 

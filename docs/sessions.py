@@ -32,7 +32,7 @@ def make_folder(folder, nocdyn):
     """The folder in which the commands of a page run; the environment that they need."""
     for name in ("docs", "input"):
         (folder / name).symlink_to(ROOT / name)
-    path = f"{Path(nocdyn).resolve().parent}:{os.environ['PATH']}"
+    path = f"{Path(nocdyn).resolve().parent}:{Path(sys.executable).parent}:{os.environ['PATH']}"
     return os.environ | {"PATH": path, "NOCDYN_PYTHON": sys.executable}
 
 

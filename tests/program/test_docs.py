@@ -1,5 +1,6 @@
 """What the documentation claims about the program, its sources and its tests."""
 
+import csv
 import importlib.util
 import os
 import re
@@ -265,7 +266,10 @@ def test_site_gets_search_and_scripts_that_need_no_network(tmp_path):
 
 PAGES_WITH_SESSIONS = [
     SOURCE / "README.md",
-    *(PAGES / f"{name}.md" for name in ("tutorial", "input", "signs", "equilibrium-and-modes", "report", "results", "sweeps")),
+    *(
+        PAGES / f"{name}.md"
+        for name in ("tutorial", "input", "editors", "signs", "equilibrium-and-modes", "report", "results", "sweeps")
+    ),
 ]
 
 
@@ -325,3 +329,34 @@ def test_no_doc_comment_begins_with_a_word_and_a_colon():
                 found.append(f"{name_of(path)}:{number}: {line.strip()}")
             above = comment is not None
     assert not found
+
+
+PAPER = SOURCE / "docs" / "paper"
+PAPER_WORDS = range(750, 1751)  # of the Journal of Open Source Software
+
+
+def test_the_paper_has_the_length_and_sections_of_its_journal():
+    _, head, text = (PAPER / "paper.md").read_text(encoding="utf-8").split("---\n", 2)
+    text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
+    assert len(text.split()) in PAPER_WORDS
+    sections = [
+        "Summary",
+        "Statement of need",
+        "State of the field",
+        "Software design",
+        "Research impact statement",
+        "References",
+    ]
+    assert re.findall(r"^# (.*)$", text, re.MULTILINE) == sections
+    assert "The nocdyn authors" in head and "The nocdyn authors" in (SOURCE / "CITATION.cff").read_text()
+
+
+def test_the_paper_cites_all_of_its_bibliography_and_nothing_else():
+    cited = set(re.findall(r"(?<!\w)@(\w+)", (PAPER / "paper.md").read_text(encoding="utf-8")))
+    assert cited == set(re.findall(r"^@\w+{(\w+),$", (PAPER / "paper.bib").read_text(encoding="utf-8"), re.MULTILINE))
+
+
+def test_the_paper_counts_the_cases_of_the_verification():
+    origins = [row["origin"] for file in (SOURCE / "verification").glob("*/cases.csv") for row in csv.DictReader(file.open())]
+    assert len(origins) > 450 and origins.count("closed form") > len(origins) / 2
+    assert "more than 450 cases" in (PAPER / "paper.md").read_text(encoding="utf-8")

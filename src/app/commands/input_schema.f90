@@ -1,5 +1,6 @@
 !> The schema of inputs as a JSON Schema (draft 2020-12), for editors and programs: of an input as f90nml and others read it, an
-!> object with a member for each group, which is an object where the group occurs once, else a list of objects.
+!> object with a member for each group, which is an object where the group occurs once, else a list of objects; either where it
+!> occurs once for each load case.
 module nocdyn_input_schema
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
@@ -68,7 +69,15 @@ contains
         call json%put('type', 'array')
         call json%open('items')
       end if
-      call json%put('type', 'object')
+      if (any(key_rules(first_key(rule):last_key(rule))%name == 'load_case')) then   ! one more for each load case
+        call json%put('type', [string_t('object'), string_t('array')])
+        call json%open('items')
+        call json%put('$ref', '#/properties/'//trim(group%name))
+        call json%put('type', 'object')
+        call json%close()
+      else
+        call json%put('type', 'object')
+      end if
       call json%put('additionalProperties', .false.)
       call json%open('properties')
       allocate (needed(0))
@@ -93,8 +102,12 @@ contains
     integer, intent(in) :: unit   !! as in `name_in_unit`
 
     call json%open(name_in_unit(rule, unit))
-    call json%put('description', trim(rule%help))
-    if (unit_name(rule, unit) /= '') call json%put('x-unit', unit_name(rule, unit))
+    if (unit_name(rule, unit) == '') then
+      call json%put('description', trim(rule%help))
+    else   ! in the description too, for editors show nothing else
+      call json%put('description', trim(rule%help)//' ['//trim(unit_name(rule, unit))//']')
+      call json%put('x-unit', unit_name(rule, unit))
+    end if
     if (rule%only_if /= '') call json%put('x-only-if', trim(rule%only_if))
     if (rule%default /= required .and. rule%default /= unset .and. unit == 0) call json%put('x-default', trim(rule%default))
     if (rule%count == any_number) then   ! one value may stand without brackets

@@ -17,7 +17,7 @@ typedef struct nocdyn_state nocdyn_state;
 /* What calls return: the exit codes of the program. */
 enum { nocdyn_done = 0, nocdyn_failed = 1, nocdyn_wrong_input = 2, nocdyn_file = 3 };
 
-/* The version of nocdyn, such as "0.1.0". */
+/* The version of nocdyn, such as "0.2.0". */
 const char *nocdyn_release(void);
 
 /* A machine at its start, from a file, or from a text that messages call `name`. `overrides` are as of --set, 'run.t_end=2', and

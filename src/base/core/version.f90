@@ -4,7 +4,7 @@ module nocdyn_version
   implicit none (type, external)
   private
 
-  character(len=*), parameter, public :: version = '0.1.0'   !! as in CMakeLists.txt, which a test compares
+  character(len=*), parameter, public :: version = '0.2.0'   !! as in CMakeLists.txt, which a test compares
   character(len=*), parameter, public :: compiler_text = compiler_version()   !! name and version
 
 end module nocdyn_version
