@@ -35,7 +35,8 @@ def main(command, words):
         if module not in PACKAGES:
             raise
         package = PACKAGES[module]
-        return refuse(f"nocdyn {command} needs the Python package {package}; {sys.executable} -m pip install {package} brings it")
+        what = f"the Python package {package}, which {sys.executable} does not have"
+        return refuse(f"nocdyn {command} needs {what}: pip install {package}, or name another Python by NOCDYN_PYTHON")
     except KeyboardInterrupt:
         print(f"nocdyn {command}: interrupted", file=sys.stderr)
         return INTERRUPTED

@@ -92,9 +92,9 @@ def test_a_missing_package_is_named_with_what_brings_it(nocdyn, command, words, 
     bare = nocdyn.write("python", f'#!/bin/sh\nexec {sys.executable} -S "$@"\n')  # without what is installed
     bare.chmod(0o755)
     message = refusal(nocdyn, command, *words, NOCDYN_PYTHON=str(bare))
-    name = message.removeprefix(f"nocdyn: nocdyn {command} needs the Python package ").split(";")[0]
+    name = message.removeprefix(f"nocdyn: nocdyn {command} needs the Python package ").split(",")[0]
     assert name in packages.split("|")
-    assert message.endswith(f"; {sys.executable} -m pip install {name} brings it\n")
+    assert message.endswith(f" does not have: pip install {name}, or name another Python by NOCDYN_PYTHON\n")
 
 
 def test_modules_in_the_folder_of_work_are_not_taken(nocdyn):
