@@ -165,7 +165,7 @@ def test_the_package_adds_no_link_options(prefix):
 
 
 def test_a_version_that_does_not_fit_is_refused(prefix, tmp_path):
-    project = (SOURCE / "tests/package/CMakeLists.txt").read_text().replace("nocdyn 0.1", "nocdyn 99")
+    project = (SOURCE / "tests/package/CMakeLists.txt").read_text().replace("nocdyn 0.2", "nocdyn 99")
     (tmp_path / "CMakeLists.txt").write_text(project)
     (tmp_path / "spin_up.f90").write_text("end\n")
     (tmp_path / "wrong_formulas.f90").write_text("end\n")
