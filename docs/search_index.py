@@ -21,7 +21,9 @@ from lunr.index import Index
 HEADING = re.compile(r"^#{2,4} +(.*)$", re.MULTILINE)
 FENCED = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 LIST_ROW = re.compile(r"<tr[^>]*>\s*<td><a href='\.\./([^']+)'>([^<]+)</a></td>.*?<td>(?!.*<td>)(.*?)</td>\s*</tr>", re.DOTALL)
-MARKUP = re.compile(r"<!--.*?-->|<[^>]+>|\]\([^)]*\)|\[\[|[\[\]]|\$\$|\\[()]|^```\w*$|^[\s|:-]+$|[`*|]", re.MULTILINE | re.DOTALL)
+MARKUP = re.compile(
+    r"\[TOC\]|<!--.*?-->|<[^>]+>|\]\([^)]*\)|\[\[|[\[\]]|\$\$|\\[()]|^```\w*$|^[\s|:-]+$|[`*|]", re.MULTILINE | re.DOTALL
+)
 LISTS = {"modules": "module", "procedures": "procedure", "types": "type", "programs": "program"}
 
 TITLE_BOOST, GUIDE_BOOST = 10, 5  # a heading before text, the guide before the sources
