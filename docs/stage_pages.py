@@ -18,7 +18,7 @@ PAGES = Path(__file__).resolve().parent / "pages"
 PAGE_LINK = re.compile(r"\]\(([a-z-]+)\.md(#[^)]*)?\)")
 CODE_BLOCK = re.compile(r"^```$(.*?^```$)", re.MULTILINE | re.DOTALL)
 FENCED = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
-SECTION = re.compile(r"^## ", re.MULTILINE)
+SECTION = re.compile(r"^#{2,3} ", re.MULTILINE)
 CONTENTS = "\n\n[TOC]\n\n"
 SECTIONS = 3  # pages of fewer are their own contents
 

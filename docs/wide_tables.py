@@ -16,7 +16,7 @@ ROW = re.compile(r"<tr>.*?</tr>", re.DOTALL)
 CELL = re.compile(r"<(t[hd])((?: [^>]*)?)>(.*?)</\1>", re.DOTALL)
 
 FEW_WORDS, SENTENCE = 18, 60  # longest text of a column: up to so many characters it is not broken; from so many on it is wide
-MANY = 7  # a table of so many columns is set smaller
+FEW, MANY = 3, 7  # tables of at most so many columns fit on a narrow screen; of so many they are set smaller
 
 
 def length_of(cell):
@@ -35,13 +35,13 @@ def kinds_of(table):
 def boxed(table):
     """The table in its box, with the classes of its columns."""
     kinds = kinds_of(table)
-    many = " many" if len(kinds) >= MANY else ""
+    size = " few" if len(kinds) <= FEW else " many" if len(kinds) >= MANY else ""
 
     def marked(row):
         columns = iter(kinds)
         return CELL.sub(lambda cell: f'<{cell[1]}{cell[2]} class="{next(columns)}">{cell[3]}</{cell[1]}>', row)
 
-    return f'<div class="table-box{many}" tabindex="0">{ROW.sub(lambda row: marked(row[0]), table)}</div>'
+    return f'<div class="table-box{size}" tabindex="0">{ROW.sub(lambda row: marked(row[0]), table)}</div>'
 
 
 def main(site):
