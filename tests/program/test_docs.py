@@ -250,7 +250,7 @@ def test_tables_of_the_site_scroll_in_boxes_and_keep_words_together():
     wide_tables = script_of_docs("wide_tables")
     sentence = "a sentence that is longer than sixty characters, so that its column is wide"
     table = (
-        '<table>\n<tr>\n<th>key</th>\n<th>what</th>\n<th style="text-align: right;">n</th>\n</tr>\n'
+        '<table>\n<tr>\n<th>key</th>\n<th>what</th>\n<th style="text-align: right;">a head of many words</th>\n</tr>\n'
         f'<tr>\n<td><code>a_key</code></td>\n<td>{sentence}</td>\n<td style="text-align: right;">1</td>\n</tr>\n</table>'
     )
     boxed = wide_tables.boxed(table)
@@ -258,11 +258,7 @@ def test_tables_of_the_site_scroll_in_boxes_and_keep_words_together():
     assert wide_tables.boxed(f"<table>{wide}</table>").startswith('<div class="table-box many" tabindex="0"><table>')
     assert boxed.startswith('<div class="table-box few" tabindex="0"><table>') and boxed.endswith("</table></div>")
     assert f'<td class="long">{sentence}</td>' in boxed
-    assert (
-        boxed.count('class="short"') == 4
-        and "many" not in boxed
-        and '<td style="text-align: right;" class="short">1</td>' in boxed
-    )
+    assert boxed.count('class="short"') == 4 and '<td style="text-align: right;" class="short">1</td>' in boxed
 
 
 @pytest.fixture(scope="module")
