@@ -18,13 +18,17 @@ from pathlib import Path
 from lunr import lunr
 from lunr.index import Index
 
+KEY_ROW = re.compile(r"^\| (`[^|]*`) \| \[`&(\w+)`\]\(\./([^)]*)\)(?:[^|]*\|){3} (.*) \|$", re.MULTILINE)
 HEADING = re.compile(r"^#{2,4} +(.*)$", re.MULTILINE)
 FENCED = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 LIST_ROW = re.compile(r"<tr[^>]*>\s*<td><a href='\.\./([^']+)'>([^<]+)</a></td>.*?<td>(?!.*<td>)(.*?)</td>\s*</tr>", re.DOTALL)
-MARKUP = re.compile(r"<!--.*?-->|<[^>]+>|\]\([^)]*\)|\[\[|[\[\]]|\$\$|\\[()]|^```\w*$|^[\s|:-]+$|[`*|]", re.MULTILINE | re.DOTALL)
+MARKUP = re.compile(
+    r"\[TOC\]|<!--.*?-->|<[^>]+>|\]\([^)]*\)|\[\[|[\[\]]|\$\$|\\[()]|^```\w*$|^[\s|:-]+$|[`*|]", re.MULTILINE | re.DOTALL
+)
 LISTS = {"modules": "module", "procedures": "procedure", "types": "type", "programs": "program"}
 
-TITLE_BOOST, GUIDE_BOOST = 10, 5  # a heading before text, the guide before the sources
+TITLE_BOOST = 10  # a heading before text
+GUIDE_BOOST, KEY_BOOST = 5, 4  # groups before keys of their name, the guide before the sources
 FORM = """
             <div class="d-flex align-items-end flex-grow-1">
               <form action="{root}search.html" role="search" class="ms-auto">
@@ -46,8 +50,17 @@ def slug(heading):
     return re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", heading).strip().lower())
 
 
+def keys_of(text):
+    """The keys in their index, each of which leads to its group in the reference."""
+    for names, group, target, meaning in KEY_ROW.findall(text):
+        yield {"url": f"page/{target}", "title": plain(names), "part": f"key of &{group}", "text": plain(meaning)}
+
+
 def sections_of(name, text):
-    """What there is to find in a page: the part before the first heading, and that below each heading."""
+    """What there is to find in a page: the part before the first heading, and that below each heading, or keys."""
+    if name == "keys.md":
+        yield from keys_of(text)
+        return
     title = re.match(r"title: *(.*)", text)[1]
     blank = FENCED.sub(lambda block: " " * len(block[0]), text)  # comments in code are no headings
     starts = [match.start() for match in HEADING.finditer(blank)] + [len(text)]
@@ -73,12 +86,19 @@ def sources_of(site):
                     yield {"url": match[1], "title": match[2], "part": part, "text": plain(match[3])}
 
 
+def boost_of(document):
+    """How much a word in the document counts."""
+    if document["part"].startswith("key of "):
+        return KEY_BOOST
+    return GUIDE_BOOST if document["url"].startswith("page/") else 1
+
+
 def index_of(documents):
     """A lunr index of the documents, which are known in it by their numbers."""
     numbered = [
         (
             {"id": number, "title": document["title"], "names": document["title"].replace("_", " "), "text": document["text"]},
-            {"boost": GUIDE_BOOST if document["url"].startswith("page/") else 1},
+            {"boost": boost_of(document)},
         )
         for number, document in enumerate(documents)
     ]

@@ -2,6 +2,7 @@
 
 import csv
 import importlib.util
+import json
 import os
 import re
 import subprocess
@@ -38,13 +39,14 @@ def slug(heading):
     return re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", heading).strip().lower())
 
 
-def headings(page):
-    text = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+def headings(text):
+    text = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
     return {slug(heading) for heading in re.findall(r"^#+ +(.*)$", text, re.MULTILINE)}
 
 
 @pytest.mark.parametrize("page", DOCUMENTS, ids=name_of)
-def test_relative_links_lead_to_files_and_headings(page):
+def test_relative_links_lead_to_files_and_headings(page, staged):
+    """A page has the headings too that it gets when the site is built."""
     for target in re.findall(r"\]\(([^)\s]+)\)", re.sub(r"\\\(.*?\\\)", "", page.read_text())):
         if re.match(r"[a-z]+:", target):
             continue
@@ -52,7 +54,8 @@ def test_relative_links_lead_to_files_and_headings(page):
         linked = page.parent / file if file else page
         assert linked.exists(), f"{target}: no such file"
         if anchor:
-            assert anchor in headings(linked), f"{target}: no such heading"
+            made = staged[linked.name] if linked.parent == PAGES else ""
+            assert anchor in headings(linked.read_text() + made), f"{target}: no such heading"
 
 
 @pytest.mark.parametrize("page", DOCUMENTS, ids=name_of)
@@ -201,11 +204,69 @@ def test_input_reference_has_the_topics_and_groups_of_the_help_in_their_order(no
 
 
 @pytest.fixture(scope="module")
-def index(reference):
+def schema(reference):
+    """What `nocdyn help input --json` says of the groups."""
+    said = subprocess.run([os.environ["NOCDYN"], "help", "input", "--json"], check=True, capture_output=True, text=True).stdout
+    return json.loads(said)["properties"]
+
+
+@pytest.fixture(scope="module")
+def staged(reference, schema):
+    """The pages as scripts/docs makes them for FORD."""
+    return script_of_docs("stage_pages").staged_pages(reference, schema)
+
+
+def test_index_of_keys_has_every_key_of_every_group_once(staged, schema):
+    rows = re.findall(r"^\| (`[^|]*`) \| \[`&(\w+)`\]", staged["keys.md"], re.MULTILINE)
+    listed = [(group, key) for keys, group in rows for key in re.findall(r"`(\w+)`", keys)]
+    groups = {group: rule.get("items", rule)["properties"] for group, rule in schema.items()}
+    assert sorted(listed) == sorted((group, key) for group, keys in groups.items() for key in keys)
+
+
+def test_index_of_keys_tells_group_kinds_unit_default_and_meaning(staged):
+    assert (
+        "| `breakdown_torque` | [`&motor`](./reference.html#motor): induction | N m |  "
+        "| T_k, the largest torque; it has the sign of synchronous_speed |" in staged["keys.md"]
+    )
+    assert "| `angle`, `angle_deg` | [`&body`](./reference.html#body) | rad, deg | 0 | angle at the start |" in staged["keys.md"]
+    assert "| `inertia` | [`&body`](./reference.html#body) | kg m2 | required |" in staged["keys.md"]
+
+
+def test_links_to_groups_and_sections_of_the_former_page_on_inputs_lead_on(staged, schema):
+    anchors = set(re.findall(r'<span id="([\w-]+)">', staged["input.md"]))
+    moved = script_of_docs("stage_pages").MOVED
+    assert anchors == {*schema, *(anchor for part in moved.values() for anchor in part)}
+    for page, sections in moved.items():
+        assert headings(staged[f"{page}.md"]) >= set(sections)
+
+
+def test_a_page_of_several_sections_begins_with_its_contents(staged):
+    contents = "\n\n[TOC]\n\n"
+    for name, text in staged.items():
+        sections = len(re.findall(r"^#{2,3} ", re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL), re.MULTILINE))
+        assert text.count(contents) == (sections >= 3), name
+
+
+def test_tables_of_the_site_scroll_in_boxes_and_keep_words_together():
+    wide_tables = script_of_docs("wide_tables")
+    sentence = "a sentence that is longer than sixty characters, so that its column is wide"
+    table = (
+        '<table>\n<tr>\n<th>key</th>\n<th>what</th>\n<th style="text-align: right;">a head of many words</th>\n</tr>\n'
+        f'<tr>\n<td><code>a_key</code></td>\n<td>{sentence}</td>\n<td style="text-align: right;">1</td>\n</tr>\n</table>'
+    )
+    boxed = wide_tables.boxed(table)
+    wide = "".join(f"<tr>{'<td>1</td>' * wide_tables.MANY}</tr>" for _ in range(2))
+    assert wide_tables.boxed(f"<table>{wide}</table>").startswith('<div class="table-box many" tabindex="0"><table>')
+    assert boxed.startswith('<div class="table-box few" tabindex="0"><table>') and boxed.endswith("</table></div>")
+    assert f'<td class="long">{sentence}</td>' in boxed
+    assert boxed.count('class="short"') == 4 and '<td style="text-align: right;" class="short">1</td>' in boxed
+
+
+@pytest.fixture(scope="module")
+def index(staged):
     """A function that finds words in the guide as the search of the site does."""
     search_index = script_of_docs("search_index")
-    pages = script_of_docs("stage_pages").staged_pages(reference)
-    documents = [section for name, text in pages.items() for section in search_index.sections_of(name, text)]
+    documents = [section for name, text in staged.items() for section in search_index.sections_of(name, text)]
     serialized = search_index.index_of(documents).serialize()
     return lambda words: [document["url"] for document in search_index.search(serialized, documents, words)]
 
@@ -213,9 +274,11 @@ def index(reference):
 @pytest.mark.parametrize(
     ("words", "first"),
     [
-        ("planetary", "page/input.html#planetary"),
-        ("planet", "page/input.html#planetary"),
-        ("&gear", "page/input.html#gear"),
+        ("planetary", "page/reference.html#planetary"),
+        ("planet", "page/reference.html#planetary"),
+        ("&gear", "page/reference.html#gear"),
+        ("share_of_load", "page/reference.html#excitation"),
+        ("damping_frequency_hz", "page/reference.html#coupling"),
         ("tolerances", "page/choosing-a-method.html#tolerances"),
         ("natural orthogonal complement", "page/theory.html#the-natural-orthogonal-complement-73-to-82"),
     ],
@@ -268,7 +331,7 @@ PAGES_WITH_SESSIONS = [
     SOURCE / "README.md",
     *(
         PAGES / f"{name}.md"
-        for name in ("tutorial", "input", "editors", "signs", "equilibrium-and-modes", "report", "results", "sweeps")
+        for name in ("tutorial", "modelling", "input", "editors", "signs", "equilibrium-and-modes", "report", "results", "sweeps")
     ),
 ]
 

@@ -66,7 +66,7 @@ contains
     allocate (sentences, source=sentences_on(rule))
     if (size(sentences) > 0) call buffer%append_line('')
     do k = 1, size(sentences)
-      call buffer%append_line(sentences(k)%text)
+      call buffer%append_line('- ' // sentences(k)%text)
     end do
     call buffer%append_line('')
     call buffer%append_line('```')
