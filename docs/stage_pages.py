@@ -41,9 +41,14 @@ def groups_of(reference):
     return reference[reference.index("\n## ") + 1 :]
 
 
+def object_of(rule):
+    """What the schema says of one group of those that may repeat."""
+    return rule if "properties" in rule else rule["items"]
+
+
 def keys_of(rule):
     """The keys of a group: name -> what the schema says of it."""
-    return rule.get("items", rule)["properties"]
+    return object_of(rule)["properties"]
 
 
 def overview(schema):
@@ -69,9 +74,10 @@ def index_row(group, name, schema):
     names = [name, *(other for other in keys if other != name and base_of(other, keys) == name)]
     units = ", ".join(keys[one].get("x-unit", "") for one in names)
     kinds = f": {', '.join(rule['x-only-if'].split())}" if "x-only-if" in rule else ""
+    meaning = rule["description"].removesuffix(f" [{rule.get('x-unit')}]")
     where = f"[`&{group}`](reference.md#{group}){kinds}"
-    default = rule.get("x-default", "required" if name in schema[group].get("items", schema[group]).get("required", ()) else "")
-    cells = (", ".join(f"`{one}`" for one in names), where, units, default, rule["description"])
+    default = rule.get("x-default", "required" if name in object_of(schema[group]).get("required", ()) else "")
+    cells = (", ".join(f"`{one}`" for one in names), where, units, default, meaning)
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 

@@ -219,7 +219,7 @@ def staged(reference, schema):
 def test_index_of_keys_has_every_key_of_every_group_once(staged, schema):
     rows = re.findall(r"^\| (`[^|]*`) \| \[`&(\w+)`\]", staged["keys.md"], re.MULTILINE)
     listed = [(group, key) for keys, group in rows for key in re.findall(r"`(\w+)`", keys)]
-    groups = {group: rule.get("items", rule)["properties"] for group, rule in schema.items()}
+    groups = {group: (rule if "properties" in rule else rule["items"])["properties"] for group, rule in schema.items()}
     assert sorted(listed) == sorted((group, key) for group, keys in groups.items() for key in keys)
 
 
