@@ -18,9 +18,9 @@ def program():
 def library():
     """The path of `libnocdyn_c.so`, the library of nocdyn.h."""
     places = [os.environ.get("NOCDYN_LIBRARY"), HERE / "lib" / LIBRARY]
-    found = shutil.which("nocdyn")
-    if found:
-        places.append(Path(found).resolve().parents[1] / "lib" / LIBRARY)
+    for found in (os.environ.get("NOCDYN"), shutil.which("nocdyn")):
+        if found:
+            places.append(Path(found).resolve().parents[1] / "lib" / LIBRARY)
     return _first([*places, BUILD / "lib" / LIBRARY], LIBRARY, "NOCDYN_LIBRARY")
 
 
