@@ -172,10 +172,9 @@ contains
     call add_command(commands, 'fmu', 'FILE', passed_on, 'a unit for co-simulation with other programs (FMI)', &
       'Writes a machine as an FMU, NAME.fmu, by FMI 2.0 or 3.0: its inputs are the torques of &excitation kind =' // nl // &
       "'external', its outputs the columns of a run, its parameters the numbers of its elements." // nl // nl // &
-      '  --out FILE         write to FILE; default: the name of the input with .fmu, in this folder' // nl // &
-      '  --fmi 2 | 3        by FMI 2.0 (default) or 3.0' // nl // &
-      '  --set PATH=VALUE   override a key: run.rtol=1e-9' // nl // &
-      '  --case NAME        the machine of this &load_case' // on_python, python_command)
+      '  nocdyn fmu machine.nml          machine.fmu in this folder, by FMI 2.0' // nl // &
+      '  nocdyn fmu machine.nml --fmi 3  by FMI 3.0' // nl // &
+      '  nocdyn fmu --help               the options' // on_python, python_command)
     call add_command(commands, 'verify', '[CASE]...', passed_on, 'compute cases with known answers and compare', &
       'Computes the verification cases with this program on this machine, all or the chosen ones, and writes' // nl // &
       'verification.html, verification.pdf and verification.json.' // nl // nl // &
