@@ -3,6 +3,7 @@
 import argparse
 import platform
 import re
+import subprocess
 import sys
 import uuid
 import zipfile
@@ -39,6 +40,15 @@ _BASE_UNITS = {  # exponents of the base units of FMI, and what one of it is of 
 _FACTOR = re.compile(r"([A-Za-z]+|1)(\d*)")
 _STRUCTURED = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", re.ASCII)  # a name that FMI parts at its dots
 _KINDS = {"at start": "fixed", "in motion": "tunable", "by torque": "input"}
+_LIBRARY = re.compile(r"^\s*(\S+) => (/\S+)", re.MULTILINE)  # a line of ldd
+_OF_GLIBC = re.compile(r"(ld-linux.*|lib(c|m|mvec|dl|rt|pthread|resolv|util|anl))\.so\.\d+")
+_LICENSE = """\
+The library of this unit is nocdyn, Copyright (c) 2026 The nocdyn authors, under the MIT License. It contains LAPACK and BLAS,
+under the modified BSD license: https://netlib.org/lapack
+The libraries beside it are of GCC, https://gcc.gnu.org: libgfortran, libgomp, libstdc++ and libgcc_s under the GNU General
+Public License, version 3, with the GCC Runtime Library Exception, version 3.1; libquadmath under the GNU Lesser General Public
+License, version 2.1.
+"""
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # of the files of the archive: the same machine gives the same archive
 
 
@@ -57,7 +67,6 @@ def fmu(given, out=None, fmi=FMI_2, set=None, case=None):  # noqa: A002, the wor
         text, variables = machine.input, _variables(machine)
         description = _description(machine, text, variables, name, identifier, fmi)
     lines = [f"{kind}\t{path}\t{value!r}\n" for kind, path, value in (variable[:3] for variable in variables)]
-    library = Path(_find.library())
     token = (
         f"{{{uuid.uuid5(uuid.NAMESPACE_URL, release() + text + ''.join(lines) + ElementTree.tostring(description, 'unicode'))}}}"
     )
@@ -69,8 +78,10 @@ def fmu(given, out=None, fmi=FMI_2, set=None, case=None):  # noqa: A002, the wor
         "modelDescription.xml": ElementTree.tostring(description, "utf-8", xml_declaration=True),
         "resources/machine.nml": text.encode(),
         "resources/variables.txt": "".join([f"{token}\n", *lines]).encode(),
-        f"binaries/{folder}/{identifier}.so": library.read_bytes(),
+        f"binaries/{folder}/{identifier}.so": Path(_find.library()).read_bytes(),
+        "documentation/licenses/license.txt": _LICENSE.encode(),
     }
+    files |= {f"binaries/{folder}/{needed}": file.read_bytes() for needed, file in _libraries(_find.library())}
     _write(path, files)
     return path
 
@@ -151,6 +162,12 @@ def _caption(signal):
     """What a signal is, of which element, and when it is positive."""
     parts = [signal["caption"], f"{signal['kind']} {signal['element']}".strip()]
     return ", ".join(filter(None, [*parts, signal["positive"] and f"positive {signal['positive']}"]))
+
+
+def _libraries(library):
+    """The shared libraries that a library needs, but those of glibc: names and files."""
+    needed = subprocess.run(["ldd", library], check=True, capture_output=True, text=True).stdout
+    return [(name, Path(file)) for name, file in _LIBRARY.findall(needed) if not _OF_GLIBC.fullmatch(name)]
 
 
 def _define_unit(element, unit):

@@ -5,6 +5,7 @@ import doctest
 import os
 import re
 import shutil
+import subprocess
 import sys
 import threading
 import zipfile
@@ -433,7 +434,25 @@ def test_the_same_machine_gives_the_same_file(nocdyn):
     changed = write(nocdyn, ROTOR, 2, "--set", "load.work.viscous=2")
     with zipfile.ZipFile(changed) as archive:
         assert b"viscous = 2\n" in archive.read("resources/machine.nml")
-        assert sorted(archive.namelist())[1:] == ["modelDescription.xml", "resources/machine.nml", "resources/variables.txt"]
+        names = [name for name in archive.namelist() if not name.startswith("binaries/")]
+    assert names == [
+        "modelDescription.xml",
+        "resources/machine.nml",
+        "resources/variables.txt",
+        "documentation/licenses/license.txt",
+    ]
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_unit_brings_all_libraries_but_glibc(nocdyn, version):
+    folder = Path(fmpy.extract(write(nocdyn, ROTOR, version), str(nocdyn.folder / "elsewhere")))
+    (library,) = folder.glob("binaries/*/machine.so")
+    assert library.parent.name == ("linux64" if version == 2 else "x86_64-linux")
+    found = dict(
+        re.findall(r"(\S+) => (/\S+)", subprocess.run(["ldd", library], capture_output=True, text=True, check=True).stdout)
+    )
+    assert {name for name, file in found.items() if Path(file).parent != library.parent} == {"libc.so.6", "libm.so.6"}
+    assert "libgfortran.so.5" in found
 
 
 @fast_only
@@ -472,3 +491,13 @@ def test_the_examples_of_the_page_give_what_it_shows(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     failed, tried = doctest.testfile(str(SOURCE / "docs/pages/fmu.md"), module_relative=False, verbose=False)
     assert failed == 0 and tried > 10
+
+
+def test_a_library_that_is_not_there_is_named(nocdyn, monkeypatch, capsys):
+    for name in ("NOCDYN", "NOCDYN_LIBRARY"):
+        monkeypatch.delenv(name)
+    monkeypatch.setenv("PATH", "/none")
+    monkeypatch.setattr(package._find, "BUILD", nocdyn.folder)
+    assert package._fmu.main([str(nocdyn.write("machine.nml", ROTOR)), "--out", str(nocdyn.folder / "a.fmu")]) == 3
+    assert capsys.readouterr().err.startswith("nocdyn: libnocdyn_c.so is not installed; the variable NOCDYN_LIBRARY")
+    assert nocdyn.files(".") == ["machine.nml"]
