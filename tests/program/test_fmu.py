@@ -235,6 +235,19 @@ def test_a_rate_holds_for_one_step_and_its_torque_stays(nocdyn):
 
 
 @pytest.mark.parametrize("version", VERSIONS)
+def test_an_input_that_stays_as_it_is_ends_no_step(nocdyn, version):
+    fmu = write(nocdyn, ROTOR, version)
+    nocdyn.done(ROTOR, "--set", "excitation.outside.amplitude=2")
+    with unit(fmu, nocdyn.folder) as one:
+        one.initialise(stop=4.0, **{TORQUE: 2.0})
+        times = nocdyn.values()["t"]
+        for time, following, speed in zip(times, times[1:], nocdyn.values()["omega_rotor"], strict=False):
+            assert one.get("omega_rotor") == [speed]
+            one.set(**{TORQUE: 2.0})
+            one.step(time, following - time)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("path", all_if_fast(CLUTCHES, FAN), ids=lambda path: path.stem)
 def test_a_state_that_is_kept_goes_on_with_the_same_bits(nocdyn, path, version):
     fmu = write(nocdyn, path, version)
