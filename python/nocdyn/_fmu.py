@@ -67,13 +67,12 @@ def fmu(given, out=None, fmi=FMI_2, set=None, case=None):  # noqa: A002, the wor
         text, variables = machine.input, _variables(machine)
         description = _description(machine, text, variables, name, identifier, fmi)
     lines = [f"{kind}\t{path}\t{value!r}\n" for kind, path, value in (variable[:3] for variable in variables)]
-    token = (
-        f"{{{uuid.uuid5(uuid.NAMESPACE_URL, release() + text + ''.join(lines) + ElementTree.tostring(description, 'unicode'))}}}"
-    )
+    content = "".join([release(), text, *lines, ElementTree.tostring(description, "unicode")])
+    token = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, content)}}}"  # a fingerprint
     description.set("guid" if fmi == FMI_2 else "instantiationToken", token)
     ElementTree.indent(description)
-    machine_name = platform.machine()
-    folder = _FOLDERS[fmi].get(machine_name, f"{machine_name}-linux")
+    processor = platform.machine()
+    folder = _FOLDERS[fmi].get(processor, f"{processor}-linux")
     files = {
         "modelDescription.xml": ElementTree.tostring(description, "utf-8", xml_declaration=True),
         "resources/machine.nml": text.encode(),
