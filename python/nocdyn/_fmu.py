@@ -39,7 +39,8 @@ _BASE_UNITS = {  # exponents of the base units of FMI, and what one of it is of 
 }
 _FACTOR = re.compile(r"([A-Za-z]+|1)(\d*)")
 _STRUCTURED = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", re.ASCII)  # a name that FMI parts at its dots
-_KINDS = {"at start": "fixed", "in motion": "tunable", "by torque": "input"}
+_KINDS = {"at start": "fixed", "in motion": "tunable", "by torque": "torque", "as set point": "set_point"}
+_INPUTS = ("torque", "set_point")
 _LIBRARY = re.compile(r"^\s*(\S+) => (/\S+)", re.MULTILINE)  # a line of ldd
 _OF_GLIBC = re.compile(r"(ld-linux.*|lib(c|m|mvec|dl|rt|pthread|resolv|util|anl))\.so\.\d+")
 _LICENSE = """\
@@ -90,7 +91,7 @@ def _variables(machine):
     variables = []
     for path, number in machine.numbers.items():
         kind, name, caption = _KINDS[number["change"]], path, number["caption"]
-        if kind == "input":
+        if kind == "torque":
             name = path.removesuffix("amplitude") + "torque"
             caption = f"torque of {path.removesuffix('.amplitude').replace('.', ' ', 1)}"
         variables.append((kind, path, number["value"], name, number["unit"], caption))
@@ -128,7 +129,7 @@ def _description(machine, text, variables, name, identifier, fmi):
     rows += [(output["name"], output["unit"], _caption(output), of_output, None) for output in outputs]
     for kind, _, value, variable, unit, caption in variables:
         causality = {"causality": "parameter", "variability": kind, "initial": "exact"}
-        if kind == "input":
+        if kind in _INPUTS:
             causality = {"causality": "input", "variability": "continuous"}
         rows.append((variable, unit, caption, causality, value))
     _describe_variables(root, rows, range(1, 1 + len(outputs)), fmi)

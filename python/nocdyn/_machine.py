@@ -11,7 +11,7 @@ from nocdyn._errors import raise_error
 from nocdyn._input import as_input
 
 _TEXTS = ("name", "unit", "caption", "positive", "kind", "element")  # of a signal
-_CHANGES = ("at start", "in motion", "by torque")
+_CHANGES = ("at start", "in motion", "by torque", "as set point")
 
 
 class _Number(ctypes.Structure):

@@ -219,6 +219,39 @@ def test_a_torque_that_jumps_is_that_of_a_step(nocdyn, version):
     assert result["omega_rotor"] == pytest.approx(nocdyn.values()["omega_rotor"], abs=INTEGRATED)
 
 
+GOVERNED = """&body name = 'rotor' inertia = 2.0 /
+&motor name = 'drive' body = 'rotor' kind = 'inverter' torque_limit = 100.0
+       governor_speed = 0.0 governor_gain = 0.05 governor_time = 0.5 /
+&run t_end = 4.0 rtol = 1e-11 atol = 1e-11 /
+"""
+
+
+def governed(state, set_speed, t):
+    """Speed and integral of the rotor after a time: 2 omega' = 100 y, y = z + 0.05 (set_speed - omega), z' = (y - z) / 0.5."""
+    rates, modes = np.linalg.eig(np.array([[-2.5, 50.0], [-0.1, 0.0]]))
+    steady = np.array([set_speed, 0.0])
+    return steady + (modes @ np.diag(np.exp(rates * t)) @ np.linalg.inv(modes) @ (state - steady)).real
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_set_speed_of_a_governor_is_an_input_of_any_sign(nocdyn, version):
+    fmu = write(nocdyn, GOVERNED, version)
+    assert validate_fmu(fmu) == []
+    name, state = "motor.drive.governor_speed", np.array([0.0, 0.0])
+    with unit(fmu, nocdyn.folder) as one:
+        (found,) = (variable for variable in one.description.modelVariables if variable.causality == "input")
+        assert (found.name, found.unit) == (name, "rad/s")
+        one.initialise()
+        for i, set_speed in enumerate([0.0, 10.0, 10.0, -5.0, 0.0]):
+            one.set(**{name: set_speed})
+            one.step(float(i), 1.0)
+            state = governed(state, set_speed, 1.0)
+            assert one.get("omega_rotor", name) == [pytest.approx(state[0], abs=INTEGRATED), set_speed]
+        if version == 2:
+            message = one.refused(one.slave.setRealInputDerivatives, [one.references[name]], [1], [6.0])
+            assert "motor.drive.governor_speed has no rate: it changes at once" in message
+
+
 def test_a_rate_holds_for_one_step_and_its_torque_stays(nocdyn):
     fmu = write(nocdyn, ROTOR, 2)
     with unit(fmu, nocdyn.folder) as one:

@@ -16,6 +16,7 @@ module nocdyn_live_numbers
   integer, parameter, public :: change_at_start = 0    !! by a setting, before the machine is assembled
   integer, parameter, public :: change_in_motion = 1   !! also while it moves
   integer, parameter, public :: change_by_torque = 2   !! the torque of an excitation of the kind 'external'
+  integer, parameter, public :: change_as_set_point = 3   !! also while it moves, to any sign: the set speed of a governor
 
   !> A number that is given in the group of an element.
   type, public :: live_number_t
@@ -72,7 +73,7 @@ contains
     number%caption = target(1)%long_name
     number%value = group%number(key)
     call find_direct(input, target, formulation, place)
-    if (place%are_direct) number%change = change_in_motion
+    if (place%are_direct) number%change = merge(change_as_set_point, change_in_motion, place%is_set_point(1))
     if (group%kind == 'excitation' .and. key == 'amplitude') then
       if (group%text('kind') == 'external') number%change = change_by_torque
     end if

@@ -171,7 +171,8 @@ contains
       '  nocdyn report --help      the options' // on_python, python_command)
     call add_command(commands, 'fmu', 'FILE', passed_on, 'a unit for co-simulation with other programs (FMI)', &
       'Writes a machine as an FMU, NAME.fmu, by FMI 2.0 or 3.0: its inputs are the torques of &excitation kind =' // nl // &
-      "'external', its outputs the columns of a run, its parameters the numbers of its elements." // nl // nl // &
+      "'external' and the set speeds of governors, its outputs the columns of a run, its parameters the numbers" // nl // &
+      'of its elements.' // nl // nl // &
       '  nocdyn fmu machine.nml          machine.fmu in this folder, by FMI 2.0' // nl // &
       '  nocdyn fmu machine.nml --fmi 3  by FMI 3.0' // nl // &
       '  nocdyn fmu --help               the options' // on_python, python_command)

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <map>
 #include <utility>
 
 namespace nocdyn_fmu {
@@ -21,6 +22,10 @@ std::string text_of(double value) {
 
 // resources/variables.txt: the token, then a line for each variable: its kind, its path, its value, with tabs between.
 std::vector<Variable> read_variables(const std::string &path, const std::string &token) {
+    static const std::map<std::string, Variable::Kind> kinds = {{"torque", Variable::torque_input},
+                                                                {"set_point", Variable::set_point},
+                                                                {"tunable", Variable::tunable},
+                                                                {"fixed", Variable::fixed}};
     std::ifstream lines(path);
     std::string line;
     if (!std::getline(lines, line)) throw Refusal("'" + path + "' cannot be read");
@@ -31,8 +36,7 @@ std::vector<Variable> read_variables(const std::string &path, const std::string 
         const std::string kind = line.substr(0, first), name = line.substr(first + 1, last - first - 1);
         const double value = std::stod(line.substr(last + 1));
         const auto dot = name.find('.');
-        variables.push_back({kind == "input" ? Variable::input : kind == "tunable" ? Variable::tunable : Variable::fixed, name,
-                             name.substr(dot + 1, name.rfind('.') - dot - 1), value, value});
+        variables.push_back({kinds.at(kind), name, name.substr(dot + 1, name.rfind('.') - dot - 1), value, value});
     }
     return variables;
 }
@@ -137,7 +141,7 @@ void Fmu::set(const unsigned *references, std::size_t count, const double *value
             require(Situation::stepping, "setting a variable");
             if (variable.kind == Variable::fixed)
                 throw Refusal(variable.path + " is fixed: it can be set before the unit leaves its initialisation mode only");
-            if (variable.kind == Variable::tunable) check(nocdyn_set(machine(), variable.path.c_str(), values[i]));
+            if (variable.kind != Variable::torque_input) check(nocdyn_set(machine(), variable.path.c_str(), values[i]));
         }
         variable.value = values[i];
     }
@@ -146,7 +150,7 @@ void Fmu::set(const unsigned *references, std::size_t count, const double *value
 void Fmu::set_rates(const unsigned *references, std::size_t count, const int *orders, const double *values) {
     for (std::size_t i = 0; i < count; i++) {
         Variable &variable = this->variable(references[i]);
-        if (variable.kind != Variable::input) throw Refusal(variable.path + " is no input");
+        if (variable.kind != Variable::torque_input) throw Refusal(variable.path + " has no rate: it changes at once");
         if (orders[i] != 1) throw Refusal("of inputs the first derivative can be set, not that of order " + std::to_string(orders[i]));
         if (!std::isfinite(values[i])) throw Refusal("the rate of " + variable.path + " must be a finite number");
         variable.rate = values[i];
@@ -157,7 +161,7 @@ void Fmu::set_rates(const unsigned *references, std::size_t count, const int *or
 void Fmu::apply_inputs() {
     const double t = time();
     for (Variable &input : now.variables) {
-        if (input.kind != Variable::input) continue;
+        if (input.kind != Variable::torque_input) continue;
         if (input.value == input.torque + input.slope * (t - input.since) && input.rate == input.slope) continue;
         check(nocdyn_set_torque(machine(), input.element.c_str(), input.value, input.rate));
         input.torque = input.value, input.slope = input.rate, input.since = t;

@@ -26,7 +26,7 @@ struct Refusal : std::exception {
 
 // An input or a parameter, as a line of resources/variables.txt tells it.
 struct Variable {
-    enum Kind { input, tunable, fixed } kind;
+    enum Kind { torque_input, set_point, tunable, fixed } kind;
     std::string path;          // of the number in the input: 'load.work.viscous', of an input 'excitation.push.amplitude'
     std::string element;       // the name in the path
     double start;              // value in the input

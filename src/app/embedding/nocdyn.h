@@ -47,8 +47,8 @@ const char *nocdyn_signal_element(const nocdyn_machine *machine, int signal);
 const char *nocdyn_whole_input(nocdyn_machine *machine);
 
 /* The numbers that elements of the input give, which may take other values: by a setting when a machine is opened, by `nocdyn_set`
- * too, or by `nocdyn_set_torque`. The count finds them; texts last until the next count. */
-enum { nocdyn_change_at_start = 0, nocdyn_change_by_set = 1, nocdyn_change_by_torque = 2 };
+ * too, as a set point to any sign, or by `nocdyn_set_torque`. The count finds them; texts last until the next count. */
+enum { nocdyn_change_at_start = 0, nocdyn_change_by_set = 1, nocdyn_change_by_torque = 2, nocdyn_change_as_set_point = 3 };
 typedef struct {
   const char *path, *unit, *caption;
   double value;

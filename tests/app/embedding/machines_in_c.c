@@ -210,6 +210,29 @@ static void numbers_tell_their_paths_values_and_when_they_may_change(void) {
   nocdyn_close(machine);
 }
 
+/* Of any sign, and as the start of the governor follows from it, only in a motion: the integral stays as it is. */
+static void the_set_speed_of_a_governor_is_a_set_point(void) {
+  nocdyn_machine *machine = open_text(
+      "&body name = 'rotor' inertia = 2.0 /\n"
+      "&motor name = 'drive' body = 'rotor' kind = 'inverter' torque_limit = 100.0\n"
+      "  governor_speed = 4.0 governor_gain = 0.05 governor_time = 0.5 /\n"
+      "&run t_end = 20.0 rtol = 1e-11 atol = 1e-11 /\n");
+  nocdyn_number number;
+  int count = nocdyn_number_count(machine), points = 0;
+  for (int i = 0; i < count; i++) {
+    nocdyn_describe_number(machine, i, &number);
+    if (number.change == nocdyn_change_as_set_point) points++;
+    CHECK((number.change == nocdyn_change_as_set_point) == (strcmp(number.path, "motor.drive.governor_speed") == 0));
+  }
+  CHECK(points == 1);
+  CHECK(nocdyn_set(machine, "motor.drive.governor_speed", -4.0) == nocdyn_done);
+  NEAR(value_of(machine, "torque_drive"), -100.0 * 8.0 * 0.05, 1e-10);
+  CHECK(nocdyn_run_to(machine, 20.0) == nocdyn_done);
+  NEAR(value_of(machine, "omega_rotor"), -4.0, 1e-6);
+  CHECK(nocdyn_set(machine, "motor.drive.governor_gain", 0.1) == nocdyn_wrong_input);
+  nocdyn_close(machine);
+}
+
 static void the_whole_input_is_a_file_by_itself(void) {
   const char *setting = "load.work.viscous=4";
   double given[most_signals], again[most_signals];
@@ -377,6 +400,7 @@ static const struct {
     TEST(the_end_moves_to_any_time_ahead),
     TEST(a_moved_end_is_that_of_a_run),
     TEST(numbers_tell_their_paths_values_and_when_they_may_change),
+    TEST(the_set_speed_of_a_governor_is_a_set_point),
     TEST(the_whole_input_is_a_file_by_itself),
     TEST(numbers_that_cannot_be_set_are_refused),
     TEST(torques_from_outside_drive_in_every_formulation_and_by_every_method),
