@@ -42,7 +42,7 @@ contains
       call put(plain(commands(i)%summary) // '.')
       call put_lines(usage(commands(i)) // nl // nl // commands(i)%help)
     end do
-    call head('ENVIRONMENT', '\fBNOCDYN_PYTHON\fR: the Python of the commands plot, report and verify. ' // &
+    call head('ENVIRONMENT', '\fBNOCDYN_PYTHON\fR: the Python of the commands plot, report, fmu and verify. ' // &
               '\fBOMP_NUM_THREADS\fR: the number of threads of a sweep.')
     call head('EXIT STATUS', '0 done, 1 a computation failed, 2 wrong usage or input, 3 a file cannot be read or written.')
     call head('SEE ALSO', 'nocdyn-input(5)')

@@ -2,6 +2,7 @@
 
 from nocdyn._analyses import campbell, equilibrium, modes, response, run, sweep, transit
 from nocdyn._errors import InputError, Mistake, NocdynError
+from nocdyn._fmu import fmu
 from nocdyn._input import Group, Input
 from nocdyn._machine import Machine, State
 from nocdyn._results import Result
@@ -17,6 +18,7 @@ __all__ = [
     "State",
     "campbell",
     "equilibrium",
+    "fmu",
     "modes",
     "response",
     "run",

@@ -18,10 +18,10 @@ def program():
 
 def library():
     """The path of `libnocdyn_c.so`, the library of nocdyn.h."""
-    places = [os.environ.get("NOCDYN_LIBRARY"), *_libraries(PREFIX)]
-    found = shutil.which("nocdyn")
-    if found:
-        places += _libraries(Path(found).resolve().parents[1])
+    places = [os.environ.get("NOCDYN_LIBRARY")]
+    for found in (os.environ.get("NOCDYN"), PREFIX / "bin/nocdyn", shutil.which("nocdyn")):
+        if found:
+            places += _libraries(Path(found).resolve().parents[1])
     return _first([*places, BUILD / "lib" / LIBRARY], LIBRARY, "NOCDYN_LIBRARY")
 
 

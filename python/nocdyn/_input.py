@@ -6,6 +6,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 
+class Written(str):
+    """A value as an input writes it."""
+
+    __slots__ = ()
+
+
 class Group:
     """A group of an input: its keys are its items, or its attributes."""
 
@@ -104,6 +110,8 @@ def as_input(given, settings=None):
 
 def literal(value):
     """A value as an input writes it."""
+    if isinstance(value, Written):
+        return str(value)
     if hasattr(value, "tolist"):  # of numpy
         value = value.tolist()
     if isinstance(value, bool):

@@ -11,12 +11,18 @@ from nocdyn._errors import raise_error
 from nocdyn._input import as_input
 
 _TEXTS = ("name", "unit", "caption", "positive", "kind", "element")  # of a signal
+_CHANGES = ("at start", "in motion", "by torque", "as set point")
+
+
+class _Number(ctypes.Structure):
+    _fields_ = (("path", c_char_p), ("unit", c_char_p), ("caption", c_char_p), ("value", c_double), ("change", c_int))
 
 
 @cache
 def _library():
     library = ctypes.CDLL(_find.library())
     for name, result, *arguments in (
+        ("release", c_char_p),
         ("open", c_void_p, c_char_p, c_int, POINTER(c_char_p), c_char_p),
         ("open_text", c_void_p, c_char_p, c_char_p, c_int, POINTER(c_char_p), c_char_p),
         ("close", None, c_void_p),
@@ -25,8 +31,12 @@ def _library():
         ("notes", c_char_p, c_void_p),
         ("signal_count", c_int, c_void_p),
         *((f"signal_{text}", c_char_p, c_void_p, c_int) for text in _TEXTS),
+        ("whole_input", c_char_p, c_void_p),
+        ("number_count", c_int, c_void_p),
+        ("describe_number", None, c_void_p, c_int, POINTER(_Number)),
         ("time", c_double, c_void_p),
         ("end_time", c_double, c_void_p),
+        ("set_end_time", c_int, c_void_p, c_double),
         ("steps", c_int, c_void_p),
         ("run_to", c_int, c_void_p, c_double),
         ("read", c_int, c_void_p, POINTER(c_double)),
@@ -39,6 +49,11 @@ def _library():
         function = getattr(library, f"nocdyn_{name}")
         function.restype, function.argtypes = result, arguments
     return library
+
+
+def release():
+    """The version of nocdyn."""
+    return _library().nocdyn_release().decode()
 
 
 class State:
@@ -104,8 +119,27 @@ class Machine:
 
     @property
     def end_time(self):
-        """t_end of &run, beyond which it does not go [s]."""
+        """The end, beyond which it does not go: t_end of &run, or what it has been set to [s]."""
         return self._call("end_time")
+
+    @end_time.setter
+    def end_time(self, t):
+        self._raise_if_wrong(self._call("set_end_time", t))
+
+    @property
+    def input(self):
+        """The text of the whole input, with settings, numbers that have been set and tables."""
+        return self._call("whole_input").decode()
+
+    @property
+    def numbers(self):
+        """The numbers that elements of the input give, by their paths: unit, caption, value, and when they may change."""
+        numbers = {}
+        for i in range(self._call("number_count")):
+            self._call("describe_number", i, number := _Number())
+            texts = {"unit": number.unit.decode(), "caption": number.caption.decode()}
+            numbers[number.path.decode()] = texts | {"value": number.value, "change": _CHANGES[number.change]}
+        return numbers
 
     @property
     def steps(self):

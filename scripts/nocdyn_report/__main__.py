@@ -1,12 +1,18 @@
 """The commands of nocdyn that are written in Python: python -m nocdyn_report COMMAND [WORD]...; older Pythons read it too."""
 
 import importlib
+import os
 import sys
 
 OLDEST = (3, 11)
 FILES = 3  # exit code
 INTERRUPTED = 130
-MODULES = {"plot": "nocdyn_report.plot", "report": "nocdyn_report.report.command", "verify": "nocdyn_verify.__main__"}
+MODULES = {
+    "fmu": "nocdyn._fmu",
+    "plot": "nocdyn_report.plot",
+    "report": "nocdyn_report.report.command",
+    "verify": "nocdyn_verify.__main__",
+}
 # The packages that a command needs, by the names of their modules: what pip calls them.
 PACKAGES = {
     "jinja2": "Jinja2",
@@ -28,6 +34,7 @@ def main(command, words):
         oldest, found = (".".join(map(str, version[:2])) for version in (OLDEST, sys.version_info))
         return refuse(f"{sys.executable}: nocdyn {command} needs Python {oldest} or newer, this is {found}")
     sys.argv = [f"nocdyn {command}", *words]
+    sys.path.append(os.path.join(os.path.dirname(__file__), "../../python"))  # of the sources; an installed nocdyn is beside this
     try:
         return importlib.import_module(MODULES[command]).main(words)
     except ModuleNotFoundError as error:

@@ -56,6 +56,12 @@ def elsewhere(prefix, tmp_path, monkeypatch):
     return prefix / "bin/nocdyn"
 
 
+def test_the_installed_program_writes_units_for_co_simulation(elsewhere, tmp_path, monkeypatch):
+    monkeypatch.delenv("NOCDYN_LIBRARY", raising=False)
+    assert run(elsewhere, "fmu", CASE_1) == "case1.fmu: FMI 2.0, co-simulation\n"
+    assert (tmp_path / "case1.fmu").stat().st_size > 0
+
+
 def test_the_installed_program_verifies_itself(elsewhere, prefix, tmp_path):
     assert run(elsewhere, "verify").startswith("All ")
     outcome = json.loads((tmp_path / "results/verification.json").read_text())

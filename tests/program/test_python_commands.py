@@ -1,4 +1,4 @@
-"""nocdyn plot, report and verify: which Python they become, what they pass on, what is said where something is missing."""
+"""nocdyn plot, report, fmu and verify: which Python they become, what they pass on, what is said where something is missing."""
 
 import os
 import shutil
@@ -190,7 +190,7 @@ def test_verify_computes_with_this_program(nocdyn):
     assert nocdyn.files("out") == ["verification.html", "verification.json", "verification.pdf"]
 
 
-@pytest.mark.parametrize("command", ["plot", "report", "verify"])
+@pytest.mark.parametrize("command", ["plot", "report", "fmu", "verify"])
 def test_their_help_is_of_the_program_and_says_how_to_get_the_options(nocdyn, command):
     text = nocdyn("help", command).stdout
     assert text.startswith(f"nocdyn {command} ") and text.split("\n")[0].endswith(" [OPTION]...")

@@ -72,6 +72,24 @@ def test_a_number_and_a_torque_are_set_between_calls():
         machine.run_to(3.0)
 
 
+def test_a_machine_tells_its_numbers_and_its_input_and_moves_its_end():
+    machine = package.Machine(ROTOR, set={"load.work.viscous": 2.0})
+    changes = {path: (number["value"], number["unit"], number["change"]) for path, number in machine.numbers.items()}
+    assert changes == {
+        "body.rotor.inertia": (2.0, "kg m2", "at start"),
+        "body.rotor.speed": (3.0, "rad/s", "at start"),
+        "load.work.viscous": (2.0, "N m s/rad", "in motion"),
+        "excitation.outside.amplitude": (0.0, "N m", "by torque"),
+    }
+    again = package.Machine(machine.input)
+    for one in (machine, again):
+        one.end_time = 20.0
+        one.run_to(20.0)
+    assert machine.read() == again.read()
+    with pytest.raises(package.InputError, match="a time after the present one, 20 s"):
+        machine.end_time = 30.0
+
+
 def test_machines_in_threads_have_the_bits_that_they_have_alone():
     def work(found):
         machine = package.Machine(CASE_1)

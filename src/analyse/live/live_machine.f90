@@ -5,18 +5,19 @@
 module nocdyn_live_machine
   use nocdyn_column_names, only: choose_columns
   use nocdyn_continued_integration, only: continued_integration_t
-  use nocdyn_direct_parameters, only: direct_parameters_t, new_direct_parameters
+  use nocdyn_direct_parameters, only: direct_parameters_t
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_external_excitations, only: external_excitations_t
   use nocdyn_finite, only: is_finite
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
+  use nocdyn_input_text, only: input_text
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
+  use nocdyn_live_numbers, only: find_direct, list_live_numbers, live_number_t
   use nocdyn_machine_parts, only: refuse_mistakes
   use nocdyn_observer, only: observer_t
   use nocdyn_output_units, only: output_units
-  use nocdyn_reduced, only: reduced_t
   use nocdyn_signals, only: signal_t
   use nocdyn_solver_status, only: failure_message
   use nocdyn_targets, only: find_target, set_targets, target_t
@@ -42,10 +43,10 @@ module nocdyn_live_machine
     type(integration_settings_t), private :: settings
     type(trajectory_table_t), private :: table
     integer, allocatable, private :: chosen(:)     !! signals that are columns of a run
-    real(wp), private :: end_time = 0.0_wp         !! [s]
     logical, private :: is_ready = .false.
   contains
-    procedure :: start, run_to, time, last_time, read_row, list_columns, steps, set_number, set_torque, keep, restore
+    procedure :: start, run_to, time, last_time, end_at, read_row, list_columns, list_numbers, write_input, steps
+    procedure :: set_number, set_torque, keep, restore
     procedure, private :: settle_changes, refuse_if_stopped, note_failure
   end type live_machine_t
 
@@ -78,7 +79,6 @@ contains
     associate (run => input%groups(input%position('run')))
       span = [run%number('t_start'), run%number('t_end')]
     end associate
-    self%end_time = span(2)
     self%table = new_trajectory_table(self%motion%formulation, span(1), output_units(input))
     self%table%columns%in_motion = .true.
     call choose_columns(input, self%table%signals, self%chosen, notes, error)
@@ -100,10 +100,10 @@ contains
 
     call self%settle_changes(error)
     if (allocated(error)) return
-    if (.not. (t >= self%time() .and. t <= self%end_time)) then
+    if (.not. (t >= self%time() .and. t <= self%last_time())) then
       !$omp critical (texts)
       call raise(error, exit_input, 't = ' // to_text(t) // ' s is not ahead; allowed: from the present time, ' // &
-                 to_text(self%time()) // ' s, to t_end of &run, ' // to_text(self%end_time) // ' s')
+                 to_text(self%time()) // ' s, to the end, ' // to_text(self%last_time()) // ' s')
       !$omp end critical (texts)
       return
     end if
@@ -119,12 +119,31 @@ contains
     time = self%motion%integration%t
   end function time
 
-  !> The end of the run of the input [s].
+  !> The end of the run: t_end of the input, or what `end_at` has set [s].
   pure real(wp) function last_time(self)
     class(live_machine_t), intent(in) :: self
 
-    last_time = self%end_time
+    last_time = 0.0_wp
+    if (self%is_ready) last_time = self%motion%integration%end_time()
   end function last_time
+
+  !> Moves the end, beyond which no step goes, before it is reached.
+  subroutine end_at(self, t, error)
+    class(live_machine_t), intent(inout) :: self
+    real(wp), intent(in) :: t                          !! [s]
+    type(error_t), allocatable, intent(out) :: error   !! the time is not ahead, or the end has been reached
+
+    call self%refuse_if_stopped(error)
+    if (allocated(error)) return
+    if (t > self%time() .and. t <= huge(t) .and. self%time() < self%last_time()) then
+      call self%motion%integration%end_at(t)
+      return
+    end if
+    !$omp critical (texts)
+    call raise(error, exit_input, 'the run cannot end at ' // to_text(t) // ' s; allowed: a time after the present one, ' // &
+               to_text(self%time()) // ' s, before the end, ' // to_text(self%last_time()) // ' s, is reached')
+    !$omp end critical (texts)
+  end subroutine end_at
 
   !> Steps that have been accepted so far.
   pure integer function steps(self)
@@ -142,6 +161,29 @@ contains
     allocate (columns(0))
     if (self%is_ready) columns = self%table%signals(self%chosen)
   end subroutine list_columns
+
+  !> The numbers of elements that may be given values, none of a machine that is refused. One thread at a time may ask, in
+  !> `critical (texts)`.
+  subroutine list_numbers(self, numbers)
+    class(live_machine_t), intent(in) :: self
+    type(live_number_t), allocatable, intent(out) :: numbers(:)
+
+    if (self%is_ready) then
+      call list_live_numbers(self%motion%input, self%motion%formulation, numbers)
+    else
+      allocate (numbers(0))
+    end if
+  end subroutine list_numbers
+
+  !> The whole input, with settings and numbers that have been set, and with its tables: a file by itself. '' of a machine that is
+  !> refused. One thread at a time may ask, in `critical (texts)`.
+  subroutine write_input(self, text)
+    class(live_machine_t), intent(in) :: self
+    character(len=:), allocatable, intent(out) :: text
+
+    text = ''
+    if (self%is_ready) text = input_text(self%motion%input)
+  end subroutine write_input
 
   !> The values of the columns at the present time.
   subroutine read_row(self, values, error)
@@ -190,15 +232,10 @@ contains
 
     call find_target(motion%input, path, target(1), message)
     if (message /= '') return
-    select type (formulation => motion%formulation)
-    class is (reduced_t)
-      place = new_direct_parameters(motion%input, target, formulation%machine, has_started=.true.)
-    class default
-      message = path // " cannot be set while the machine runs; allowed: with formulation = 'reduced'"
-      return
-    end select
+    call find_direct(motion%input, target, motion%formulation, place)
     if (.not. place%are_direct) then
-      message = path // ' cannot be set while the machine runs; allowed: numbers of elements that stand in their laws as they are'
+      message = path // ' cannot be set while the machine runs; allowed: numbers of elements that stand in their laws as ' // &
+                "they are, with formulation = 'reduced'"
       return
     end if
     changed = motion%input

@@ -169,6 +169,13 @@ contains
     call add_command(commands, 'report', 'FILE', passed_on, 'a report on a machine, HTML and PDF', &
       'Runs what is missing, and writes report.html and report.pdf beside the results.' // nl // nl // &
       '  nocdyn report --help      the options' // on_python, python_command)
+    call add_command(commands, 'fmu', 'FILE', passed_on, 'a unit for co-simulation with other programs (FMI)', &
+      'Writes a machine as an FMU, NAME.fmu, by FMI 2.0 or 3.0: its inputs are the torques of &excitation kind =' // nl // &
+      "'external' and the set speeds of governors, its outputs the columns of a run, its parameters the numbers" // nl // &
+      'of its elements.' // nl // nl // &
+      '  nocdyn fmu machine.nml          machine.fmu in this folder, by FMI 2.0' // nl // &
+      '  nocdyn fmu machine.nml --fmi 3  by FMI 3.0' // nl // &
+      '  nocdyn fmu --help               the options' // on_python, python_command)
     call add_command(commands, 'verify', '[CASE]...', passed_on, 'compute cases with known answers and compare', &
       'Computes the verification cases with this program on this machine, all or the chosen ones, and writes' // nl // &
       'verification.html, verification.pdf and verification.json.' // nl // nl // &

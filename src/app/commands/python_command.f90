@@ -1,4 +1,4 @@
-!> The commands that are written in Python: plot, report, verify. They replace this program by Python.
+!> The commands that are written in Python: plot, report, fmu, verify. They replace this program by Python.
 module nocdyn_python_command
   use nocdyn_arguments, only: arguments_t
   use nocdyn_command_line, only: command_line

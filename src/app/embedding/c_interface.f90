@@ -2,14 +2,15 @@
 !>
 !> Threads may call it at the same time: nothing that they share makes a text but in `critical (texts)`.
 module nocdyn_c_interface
-  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_int, c_loc, c_null_char, c_null_ptr, &
-    c_ptr, c_size_t
-  use nocdyn_c_texts, only: copy_text
+  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_int, c_loc, c_null_char, c_null_ptr, c_ptr
   use nocdyn_case_choice, only: find_case
   use nocdyn_errors, only: error_t, exit_done
+  use nocdyn_given_texts, only: c_text_t, give_lines, give_text, take_text
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input, read_input_text
+  use nocdyn_kinds, only: wp
   use nocdyn_live_machine, only: live_machine_t, live_motion_t
+  use nocdyn_live_numbers, only: live_number_t
   use nocdyn_signals, only: signal_t
   use nocdyn_text, only: string_t
   use nocdyn_version, only: version
@@ -20,15 +21,25 @@ module nocdyn_c_interface
   public :: nocdyn_code, nocdyn_message, nocdyn_notes, nocdyn_time, nocdyn_end_time, nocdyn_steps
   public :: nocdyn_signal_count, nocdyn_signal_name, nocdyn_signal_unit, nocdyn_signal_caption, nocdyn_signal_positive, &
     nocdyn_signal_kind, nocdyn_signal_element
+  public :: nocdyn_whole_input, nocdyn_number_count, nocdyn_describe_number, nocdyn_set_end_time
   public :: nocdyn_keep, nocdyn_restore, nocdyn_free_state, nocdyn_release
-
-  !> A text that C reads, with its end.
-  type :: c_text_t
-    character(kind=c_char), allocatable :: characters(:)
-  end type c_text_t
 
   ! The texts of a signal.
   integer, parameter :: of_name = 1, of_unit = 2, of_caption = 3, of_positive = 4, of_kind = 5, of_element = 6
+
+  !> A number that may be given values.
+  type :: number_t
+    type(c_text_t) :: path, unit, caption
+    real(wp) :: value = 0.0_wp
+    integer :: change = 0
+  end type number_t
+
+  !> The same for C.
+  type, bind(c) :: described_number_t
+    type(c_ptr) :: path, unit, caption
+    real(c_double) :: value
+    integer(c_int) :: change
+  end type described_number_t
 
   !> What a `nocdyn_machine *` points to.
   type :: handle_t
@@ -36,6 +47,8 @@ module nocdyn_c_interface
     integer :: code = exit_done
     type(c_text_t) :: message, notes
     type(c_text_t), allocatable :: signals(:, :)   !! [texts of a signal, signals]
+    type(number_t), allocatable :: numbers(:)      !! once they have been asked for
+    type(c_text_t) :: input
   end type handle_t
 
   !> What a `nocdyn_state *` points to.
@@ -45,13 +58,6 @@ module nocdyn_c_interface
 
   character(kind=c_char), parameter :: release(*) = [transfer(version, [character(kind=c_char) ::], len(version)), c_null_char]
   character(kind=c_char), target :: kept_release(size(release)) = release
-
-  interface
-    integer(c_size_t) function c_strlen(text) bind(c, name='strlen')
-      import :: c_ptr, c_size_t
-      type(c_ptr), value, intent(in) :: text
-    end function c_strlen
-  end interface
 
 contains
 
@@ -245,6 +251,60 @@ contains
     text = c_loc(handle%signals(which, signal + 1)%characters)
   end function text_of_signal
 
+  !> The whole input.
+  type(c_ptr) function nocdyn_whole_input(machine) result(text) bind(c)
+    type(c_ptr), value, intent(in) :: machine
+    type(handle_t), pointer :: handle
+    character(len=:), allocatable :: written
+
+    call c_f_pointer(machine, handle)
+    !$omp critical (texts)
+    call handle%machine%write_input(written)
+    !$omp end critical (texts)
+    call give_text(written, handle%input)
+    text = c_loc(handle%input%characters)
+  end function nocdyn_whole_input
+
+  !> How many numbers may be given values; they are found anew.
+  integer(c_int) function nocdyn_number_count(machine) result(count) bind(c)
+    type(c_ptr), value, intent(in) :: machine
+    type(handle_t), pointer :: handle
+    type(live_number_t), allocatable :: numbers(:)
+    integer :: i
+
+    call c_f_pointer(machine, handle)
+    !$omp critical (texts)
+    call handle%machine%list_numbers(numbers)
+    !$omp end critical (texts)
+    if (allocated(handle%numbers)) deallocate (handle%numbers)
+    allocate (handle%numbers(size(numbers)))
+    do i = 1, size(numbers)
+      call give_text(numbers(i)%path, handle%numbers(i)%path)
+      call give_text(numbers(i)%unit, handle%numbers(i)%unit)
+      call give_text(numbers(i)%caption, handle%numbers(i)%caption)
+      handle%numbers(i)%value = numbers(i)%value
+      handle%numbers(i)%change = numbers(i)%change
+    end do
+    count = size(numbers)
+  end function nocdyn_number_count
+
+  !> One of them; its number is not checked.
+  subroutine nocdyn_describe_number(machine, number, described) bind(c)
+    type(c_ptr), value, intent(in) :: machine
+    integer(c_int), value, intent(in) :: number   !! from 0
+    type(described_number_t), intent(out) :: described
+    type(handle_t), pointer :: handle
+    type(number_t), pointer :: found
+
+    call c_f_pointer(machine, handle)
+    found => handle%numbers(number + 1)
+    described%path = c_loc(found%path%characters)
+    described%unit = c_loc(found%unit%characters)
+    described%caption = c_loc(found%caption%characters)
+    described%value = found%value
+    described%change = found%change
+  end subroutine nocdyn_describe_number
+
   !> The present time.
   real(c_double) function nocdyn_time(machine) result(t) bind(c)
     type(c_ptr), value, intent(in) :: machine
@@ -262,6 +322,19 @@ contains
     call c_f_pointer(machine, handle)
     t = handle%machine%last_time()
   end function nocdyn_end_time
+
+  !> Moves the end of the run.
+  integer(c_int) function nocdyn_set_end_time(machine, t) result(code) bind(c)
+    type(c_ptr), value, intent(in) :: machine
+    real(c_double), value, intent(in) :: t
+    type(handle_t), pointer :: handle
+    type(error_t), allocatable :: error
+
+    call c_f_pointer(machine, handle)
+    call handle%machine%end_at(t, error)
+    call take_error(handle, error)
+    code = handle%code
+  end function nocdyn_set_end_time
 
   !> The steps so far.
   integer(c_int) function nocdyn_steps(machine) result(steps) bind(c)
@@ -402,42 +475,5 @@ contains
       call give_text(columns(i)%element, handle%signals(of_element, i))
     end do
   end subroutine list_signals
-
-  !> A text of C as one of Fortran.
-  subroutine take_text(address, text)
-    type(c_ptr), intent(in) :: address
-    character(len=:), allocatable, intent(out) :: text
-
-    call copy_text(address, c_strlen(address), text)
-  end subroutine take_text
-
-  !> A text of Fortran as one of C.
-  subroutine give_text(text, given)
-    character(len=*), intent(in) :: text
-    type(c_text_t), intent(inout) :: given
-    integer :: i
-
-    if (allocated(given%characters)) deallocate (given%characters)
-    allocate (given%characters(len(text) + 1))
-    do i = 1, len(text)
-      given%characters(i) = text(i:i)
-    end do
-    given%characters(len(text) + 1) = c_null_char
-  end subroutine give_text
-
-  !> Lines as one text of C.
-  subroutine give_lines(lines, given)
-    type(string_t), intent(in) :: lines(:)
-    type(c_text_t), intent(inout) :: given
-    character(len=:), allocatable :: text
-    integer :: i
-
-    text = ''
-    do i = 1, size(lines)
-      if (i > 1) text = text // new_line('a')
-      text = text // lines(i)%text
-    end do
-    call give_text(text, given)
-  end subroutine give_lines
 
 end module nocdyn_c_interface

@@ -43,9 +43,25 @@ const char *nocdyn_signal_positive(const nocdyn_machine *machine, int signal);
 const char *nocdyn_signal_kind(const nocdyn_machine *machine, int signal);
 const char *nocdyn_signal_element(const nocdyn_machine *machine, int signal);
 
-/* The present time, the end of the run of the input, t_end, beyond which it does not go [s], and the steps so far. */
+/* The whole input, with settings, numbers that have been set and tables: a file by itself; '' of a machine that was refused. */
+const char *nocdyn_whole_input(nocdyn_machine *machine);
+
+/* The numbers that elements of the input give, which may take other values: by a setting when a machine is opened, by `nocdyn_set`
+ * too, as a set point to any sign, or by `nocdyn_set_torque`. The count finds them; texts last until the next count. */
+enum { nocdyn_change_at_start = 0, nocdyn_change_by_set = 1, nocdyn_change_by_torque = 2, nocdyn_change_as_set_point = 3 };
+typedef struct {
+  const char *path, *unit, *caption;
+  double value;
+  int change;
+} nocdyn_number;
+int nocdyn_number_count(nocdyn_machine *machine);
+void nocdyn_describe_number(const nocdyn_machine *machine, int number, nocdyn_number *described);
+
+/* The present time, the end of the run, beyond which it does not go, t_end of the input if it has not been moved [s], and the steps
+ * so far. The end may be moved to any time ahead before it is reached. */
 double nocdyn_time(const nocdyn_machine *machine);
 double nocdyn_end_time(const nocdyn_machine *machine);
+int nocdyn_set_end_time(nocdyn_machine *machine, double t);
 int nocdyn_steps(const nocdyn_machine *machine);
 
 /* Integrates to a time that is not before the present one. */

@@ -19,6 +19,7 @@ module nocdyn_laws
   type, public :: law_parameter_t
     character(len=24) :: name
     logical :: is_key = .false.            !! whether it holds the values of the key with this name as they are
+    logical :: is_set_point = .false.      !! whether it does so, of any sign, in a motion: the start follows from them too
     integer, allocatable :: element(:)     !! of each column, numbered in the bank
     real(wp), allocatable :: value(:, :)   !! in the unit of the key, [lanes, columns]
   end type law_parameter_t

@@ -31,7 +31,7 @@ module nocdyn_continued_integration
     type(integrator_t), private :: integrator
     logical, private :: holds = .false.        !! whether the lane has not moved to the end of its last step
   contains
-    procedure :: begin, advance_to, cut_step, resume, has_failed
+    procedure :: begin, end_at, end_time, advance_to, cut_step, resume, has_failed
   end type continued_integration_t
 
 contains
@@ -57,6 +57,26 @@ contains
     call fill_lanes(self%integrator, self%stepper, system, ensemble, span, observer, self%solver_status)
     call count_work(self)
   end subroutine begin
+
+  !> Moves the end. A step that is held and goes to the present end stays as it is.
+  subroutine end_at(self, t_end)
+    class(continued_integration_t), intent(inout) :: self
+    real(wp), intent(in) :: t_end   !! after the present time, which is before the present end [s]
+
+    associate (control => self%integrator%control)
+      if (.not. (t_end > self%t .and. self%t < control%t_end)) error stop 'nocdyn_continued_integration: the end is not ahead'
+      control%t_end = t_end
+      control%ends_at_t_end(1) = .false.
+    end associate
+    if (self%solver_status%code(1) == integration_done) self%solver_status%code(1) = integration_running
+  end subroutine end_at
+
+  !> The end beyond which no step goes [s].
+  pure real(wp) function end_time(self)
+    class(continued_integration_t), intent(in) :: self
+
+    end_time = self%integrator%control%t_end
+  end function end_time
 
   !> Whether the integration has ended before its time.
   pure logical function has_failed(self)

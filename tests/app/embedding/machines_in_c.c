@@ -143,6 +143,110 @@ static void a_number_that_is_set_before_the_first_step_is_the_one_of_the_input(v
   nocdyn_close(machine);
 }
 
+/* Beyond t_end of the input, with the steps of a longer run but where that of the input cuts one. */
+static void the_end_moves_to_any_time_ahead(void) {
+  nocdyn_machine *machine = open_text(rotor);
+  CHECK(nocdyn_end_time(machine) == 10.0);
+  CHECK(nocdyn_run_to(machine, 4.0) == nocdyn_done);
+  nocdyn_state *state = nocdyn_keep(machine);
+  CHECK(nocdyn_set_end_time(machine, 4.0) == nocdyn_wrong_input);
+  CHECK(strstr(nocdyn_message(machine), "allowed: a time after the present one, 4") != NULL);
+  CHECK(nocdyn_set_end_time(machine, NAN) == nocdyn_wrong_input);
+  CHECK(nocdyn_set_end_time(machine, 1e300) == nocdyn_done);
+  CHECK(nocdyn_end_time(machine) == 1e300);
+  CHECK(nocdyn_run_to(machine, 20.0) == nocdyn_done);
+  NEAR(value_of(machine, "omega_rotor"), 3 * exp(-10.0), integrated);
+  CHECK(nocdyn_restore(machine, state) == nocdyn_done);
+  CHECK(nocdyn_end_time(machine) == 10.0);
+  CHECK(nocdyn_run_to(machine, 20.0) == nocdyn_wrong_input);
+  CHECK(nocdyn_run_to(machine, 10.0) == nocdyn_done);
+  CHECK(nocdyn_set_end_time(machine, 20.0) == nocdyn_wrong_input);
+  nocdyn_free_state(state);
+  nocdyn_close(machine);
+}
+
+/* As if t_end were that of the input, also in a step that is held. */
+static void a_moved_end_is_that_of_a_run(void) {
+  const char *setting = "run.t_end=3";
+  double given[most_signals], moved[most_signals];
+  nocdyn_machine *machine = nocdyn_open_text(clutch, "given.nml", 1, &setting, NULL);
+  nocdyn_run_to(machine, 3.0);
+  nocdyn_read(machine, given);
+  int signals = nocdyn_signal_count(machine);
+  nocdyn_close(machine);
+  machine = open_text(clutch);
+  CHECK(nocdyn_set_end_time(machine, 3.0) == nocdyn_done);
+  CHECK(nocdyn_run_to(machine, 3.0) == nocdyn_done);
+  nocdyn_read(machine, moved);
+  CHECK(memcmp(given, moved, signals * sizeof *moved) == 0);
+  nocdyn_close(machine);
+  machine = open_text(rotor);
+  CHECK(nocdyn_run_to(machine, 9.9999) == nocdyn_done); /* the step to the end is held */
+  CHECK(nocdyn_set_end_time(machine, 12.0) == nocdyn_done);
+  CHECK(nocdyn_run_to(machine, 12.0) == nocdyn_done);
+  NEAR(value_of(machine, "omega_rotor"), 3 * exp(-6.0), integrated);
+  nocdyn_close(machine);
+}
+
+static void numbers_tell_their_paths_values_and_when_they_may_change(void) {
+  nocdyn_machine *machine = open_text(rotor);
+  nocdyn_number number;
+  CHECK(nocdyn_set(machine, "load.work.viscous", 4.0) == nocdyn_done);
+  CHECK(nocdyn_number_count(machine) == 4);
+  nocdyn_describe_number(machine, 0, &number);
+  CHECK(strcmp(number.path, "body.rotor.inertia") == 0 && number.value == 2.0);
+  CHECK(number.change == nocdyn_change_at_start);
+  nocdyn_describe_number(machine, 2, &number);
+  CHECK(strcmp(number.path, "load.work.viscous") == 0 && strcmp(number.unit, "N m s/rad") == 0);
+  CHECK(number.value == 4.0 && number.change == nocdyn_change_by_set);
+  CHECK(strstr(number.caption, "viscous of &load 'work'") == number.caption);
+  nocdyn_describe_number(machine, 3, &number);
+  CHECK(strcmp(number.path, "excitation.outside.amplitude") == 0 && number.change == nocdyn_change_by_torque);
+  nocdyn_close(machine);
+  machine = open_text("&run /");
+  CHECK(nocdyn_number_count(machine) == 0);
+  CHECK(strcmp(nocdyn_whole_input(machine), "") == 0);
+  CHECK(nocdyn_set_end_time(machine, 1.0) == nocdyn_wrong_input);
+  nocdyn_close(machine);
+}
+
+/* Of any sign, and as the start of the governor follows from it, only in a motion: the integral stays as it is. */
+static void the_set_speed_of_a_governor_is_a_set_point(void) {
+  nocdyn_machine *machine = open_text(
+      "&body name = 'rotor' inertia = 2.0 /\n"
+      "&motor name = 'drive' body = 'rotor' kind = 'inverter' torque_limit = 100.0\n"
+      "  governor_speed = 4.0 governor_gain = 0.05 governor_time = 0.5 /\n"
+      "&run t_end = 20.0 rtol = 1e-11 atol = 1e-11 /\n");
+  nocdyn_number number;
+  int count = nocdyn_number_count(machine), points = 0;
+  for (int i = 0; i < count; i++) {
+    nocdyn_describe_number(machine, i, &number);
+    if (number.change == nocdyn_change_as_set_point) points++;
+    CHECK((number.change == nocdyn_change_as_set_point) == (strcmp(number.path, "motor.drive.governor_speed") == 0));
+  }
+  CHECK(points == 1);
+  CHECK(nocdyn_set(machine, "motor.drive.governor_speed", -4.0) == nocdyn_done);
+  NEAR(value_of(machine, "torque_drive"), -100.0 * 8.0 * 0.05, 1e-10);
+  CHECK(nocdyn_run_to(machine, 20.0) == nocdyn_done);
+  NEAR(value_of(machine, "omega_rotor"), -4.0, 1e-6);
+  CHECK(nocdyn_set(machine, "motor.drive.governor_gain", 0.1) == nocdyn_wrong_input);
+  nocdyn_close(machine);
+}
+
+static void the_whole_input_is_a_file_by_itself(void) {
+  const char *setting = "load.work.viscous=4";
+  double given[most_signals], again[most_signals];
+  nocdyn_machine *machine = nocdyn_open_text(rotor, "given.nml", 1, &setting, NULL);
+  nocdyn_machine *other = open_text(nocdyn_whole_input(machine));
+  nocdyn_run_to(machine, 1.0);
+  nocdyn_run_to(other, 1.0);
+  nocdyn_read(machine, given);
+  nocdyn_read(other, again);
+  CHECK(memcmp(given, again, nocdyn_signal_count(machine) * sizeof *given) == 0);
+  nocdyn_close(machine);
+  nocdyn_close(other);
+}
+
 static void numbers_that_cannot_be_set_are_refused(void) {
   nocdyn_machine *machine = open_text(rotor);
   CHECK(nocdyn_set(machine, "load.work.vicsous", 1.0) == nocdyn_wrong_input);
@@ -293,6 +397,11 @@ static const struct {
     TEST(calls_without_changes_leave_every_bit_as_it_is),
     TEST(a_number_that_is_set_applies_from_then_on),
     TEST(a_number_that_is_set_before_the_first_step_is_the_one_of_the_input),
+    TEST(the_end_moves_to_any_time_ahead),
+    TEST(a_moved_end_is_that_of_a_run),
+    TEST(numbers_tell_their_paths_values_and_when_they_may_change),
+    TEST(the_set_speed_of_a_governor_is_a_set_point),
+    TEST(the_whole_input_is_a_file_by_itself),
     TEST(numbers_that_cannot_be_set_are_refused),
     TEST(torques_from_outside_drive_in_every_formulation_and_by_every_method),
     TEST(clutches_lock_between_calls_and_slip_by_torques_from_outside),

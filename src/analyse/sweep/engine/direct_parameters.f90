@@ -31,6 +31,7 @@ module nocdyn_direct_parameters
 
   type, public :: direct_parameters_t
     logical :: are_direct = .false.                               !! whether all targets are
+    logical, allocatable :: is_set_point(:)                       !! whether a target may have any sign, [targets]
     integer, allocatable, private :: unit(:)                      !! of the values of each target: index of `units`
     integer, allocatable, private :: target(:)                    !! targets whose values are in arrays of banks ...
     type(place_t), allocatable, private :: place(:)               !! ... and where each of them is
@@ -58,6 +59,7 @@ contains
     allocate (self%target(0), self%place(0), self%inertia_target(0), self%body(0))
     allocate (self%signs(size(targets), 0))
     allocate (self%unit(size(targets)))
+    allocate (self%is_set_point(size(targets)), source=.false.)
     self%unit(:) = targets%in_unit
     allocate (self%lowest(size(targets)), source=huge(1.0_wp))
     allocate (self%highest(size(targets)), source=-huge(1.0_wp))
@@ -78,7 +80,7 @@ contains
         self%inertia_target = [self%inertia_target, i]
         self%body = [self%body, findloc(input%groups_named('body'), targets(i)%group, dim=1)]
       else
-        call add_element_value(self, i, input, targets(i), machine)
+        call add_element_value(self, i, input, targets(i), machine, of_elements)
       end if
       if (.not. self%are_direct) return
     end do
@@ -88,12 +90,13 @@ contains
   end function new_direct_parameters
 
   !> A value of an element, if its bank declares where it stands.
-  subroutine add_element_value(self, number, input, target, machine)
+  subroutine add_element_value(self, number, input, target, machine, in_motion)
     type(direct_parameters_t), intent(inout) :: self
     integer, intent(in) :: number   !! of the target
     type(input_t), intent(in) :: input
     type(target_t), intent(in) :: target
     type(machine_t), intent(in) :: machine
+    logical, intent(in) :: in_motion   !! whether set points count
     type(place_t) :: place
     integer :: b, e
 
@@ -107,6 +110,8 @@ contains
             if (bank%names(e)%text /= group%name) cycle
             place = place_of(machine, b, trim(parameter_of(key_of(input, target))), e)
             if (place%parameter == 0) cycle
+            self%is_set_point(number) = bank%parameters(place%parameter)%is_set_point
+            if (self%is_set_point(number) .and. .not. in_motion) cycle
             self%are_direct = .true.
             self%target = [self%target, number]
             self%place = [self%place, place]
@@ -126,7 +131,7 @@ contains
 
     associate (parameters => machine%banks(bank)%bank%parameters)
       do p = 1, size(parameters)
-        if (.not. parameters(p)%is_key .or. parameters(p)%name /= key) cycle
+        if (.not. (parameters(p)%is_key .or. parameters(p)%is_set_point) .or. parameters(p)%name /= key) cycle
         column = findloc(parameters(p)%element, element, dim=1)
         if (column > 0) place = place_t(bank, p, column)
       end do
@@ -202,7 +207,7 @@ contains
     are_accepted = .false.
     if (.not. self%are_direct) return
     do pattern = 1, size(self%signs, 2)
-      are_accepted = all(sign_of(values) == self%signs(:, pattern))
+      are_accepted = all(sign_of(values) == self%signs(:, pattern) .or. self%is_set_point)
       if (are_accepted) return
     end do
   end function are_accepted

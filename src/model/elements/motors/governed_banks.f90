@@ -74,6 +74,7 @@ contains
       end do
     end do
     call self%add_parameter('governor_speed', set_speed, is_key=.false.)
+    self%parameters(size(self%parameters))%is_set_point = .not. self%has_course
     call self%add_parameter('governor_gain', keys%values('governor_gain'), is_key=.false.)
     call self%add_key(keys, 'governor_time')
     call self%add_parameter('governor_start', keys%values('governor_start'), is_key=.false.)
