@@ -9,6 +9,7 @@ from .failure import USAGE, VerificationError
 
 TABLE = "cases.csv"
 PREVIOUS = "previous.csv"
+PREVIOUS_COLUMNS = ("id", "version", "value")
 INPUT = "case.nml"
 ORIGINS = ("closed form", "published", "conservation", "other code", "measured")
 ERRORS = ("relative", "absolute")
@@ -125,13 +126,35 @@ def read_case(path: Path, line: int, row: dict[str, str], feature: str) -> Case:
 
 
 def read_previous(folder: Path) -> tuple[str, dict[str, float]]:
-    """The version of the previous release, and what it computed."""
+    """The version of the previous release, and what it computed; nothing without such a file."""
     path = folder / PREVIOUS
-    if not path.is_file():
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        return rows[0]["version"], {row["id"]: float(row["value"]) for row in rows}
+    except FileNotFoundError:
         return "", {}
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    return (rows[0]["version"] if rows else ""), {row["id"]: float(row["value"]) for row in rows}
+    except OSError as error:
+        raise VerificationError(f"{path}: cannot be read: {error.strerror}") from None
+    except (IndexError, KeyError, TypeError, ValueError):
+        needed = f"{', '.join(PREVIOUS_COLUMNS)} in each row, as nocdyn verify --keep writes them"
+        raise VerificationError(f"{path}: needed: {needed}", USAGE) from None
+
+
+def write_previous(folder: Path, version: str, values: dict[str, float]) -> Path:
+    """Keeps what this version computed, for the next one; the file."""
+    path = folder / PREVIOUS
+    part = path.with_suffix(".part")
+    try:
+        with part.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(PREVIOUS_COLUMNS)
+            writer.writerows((name, version, repr(value)) for name, value in sorted(values.items()))
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise VerificationError(f"{path}: cannot be written: {error.strerror}") from None
+    return path
 
 
 def chosen(cases: Sequence[Case], words: Sequence[str]) -> list[Case]:
