@@ -59,13 +59,13 @@ def figure_of(cases):
 
 
 def cell(text):
-    return escape(text, quote=False).replace("|", "\\|").replace("*", "\\*").replace("_", "\\_")
+    return escape(text, quote=False).replace("|", "&#124;").replace("*", "\\*").replace("_", "\\_")
 
 
 def row(case):
     """The quantity, below it the origin of the expected value; the name of the case may be broken at its points."""
     place = f" ({case['at']})" if case["at"] else ""
-    unit = "" if case["unit"] == "1" else f" {cell(case['unit'])}"
+    unit = "" if case["unit"] == "1" else f" {cell(case['unit']).replace(' ', '&nbsp;')}"
     values = (
         "<br>".join(f"`{part}`" for part in case["id"].split(".")[1:]),
         f"{cell(case['quantity'] + place)}<br><small>{case['origin']}: {cell(case['reference'])}</small>",
