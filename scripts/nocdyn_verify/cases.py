@@ -1,6 +1,7 @@
 """The cases: for each feature a folder with cases.csv, a row for each quantity that is known, and the folders of inputs."""
 
 import csv
+import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,6 +65,11 @@ class Case:
     error: str  # of the tolerance: relative or absolute
     origin: str
     reference: str  # the formula with its source, or the publication
+
+    @property
+    def home(self) -> str:
+        """The folder of the feature."""
+        return self.id.partition(".")[0]
 
     def difference(self, computed: float) -> float:
         """Computed less expected, as the tolerance counts it."""
@@ -158,11 +164,13 @@ def write_previous(folder: Path, version: str, values: dict[str, float]) -> Path
 
 
 def chosen(cases: Sequence[Case], words: Sequence[str]) -> list[Case]:
-    """Those of some features or with some names; all without words."""
+    """Those of some features, with underscores or spaces, or with some names; all without words."""
     if not words:
         return list(cases)
-    known = {case.feature for case in cases} | {case.id for case in cases}
-    for word in words:
-        if word not in known:
-            raise VerificationError(f"there is no case or feature {word!r}; allowed: {', '.join(sorted(known))}", USAGE)
-    return [case for case in cases if case.id in words or case.feature in words]
+    wanted = {word.replace("_", " ") if word in {case.home for case in cases} else word for word in words}
+    features = list(dict.fromkeys(case.feature for case in cases))
+    for word in wanted - {case.id for case in cases} - set(features):
+        near = difflib.get_close_matches(word, [*features, *(case.id for case in cases)], 1)
+        hint = f"did you mean {near[0]!r}?" if near else f"allowed: a name as in the table, or a feature: {', '.join(features)}"
+        raise VerificationError(f"there is no case or feature {word!r}; {hint}", USAGE)
+    return [case for case in cases if case.id in wanted or case.feature in wanted]

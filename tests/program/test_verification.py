@@ -82,6 +82,15 @@ def test_the_picture_is_inside_of_the_first_page_on_paper(monkeypatch):
     assert 0 < drawn.x0 < drawn.x1 < figure.bbox.width and 0 < drawn.y0 < drawn.y1 < figure.bbox.height
 
 
+def test_a_row_of_the_guide_has_a_cell_for_each_heading(monkeypatch):
+    monkeypatch.syspath_prepend(SOURCE / "docs")
+    import verification_pages as pages
+    from nocdyn_verify.cases import read_cases
+
+    for case in read_cases(CASES):
+        assert pages.row({**vars(case), "computed": 1.0, "difference": 0.0}).count("|") == pages.HEADING.count("|"), case.id
+
+
 def test_every_feature_says_what_is_not_verified():
     for folder in {path.parent for path in CASES.glob("*/cases.csv")}:
         assert "## What is not verified\n" in (folder / "about.md").read_text(), folder.name
@@ -203,8 +212,21 @@ def test_tables_are_refused_with_their_line(own, changes, message):
 def test_features_and_cases_are_chosen_by_name(tmp_path):
     assert verify(tmp_path, "campbell", "modes.two_discs.f1", "--quiet").stdout == ""
     assert {case["feature"] for case in report(tmp_path)["cases"]} == {"campbell", "modes"}
-    outcome = verify(tmp_path, "sails")
-    assert outcome.returncode == 2 and "there is no case or feature 'sails'; allowed: " in outcome.stderr
+    verify(tmp_path, "joints_that_lock.held_torque", "steady_states")
+    assert {case["feature"] for case in report(tmp_path)["cases"]} == {"joints that lock", "steady states"}
+
+
+@pytest.mark.parametrize(
+    ("word", "hint"),
+    [
+        ("sails", "allowed: a name as in the table, or a feature: bodies, couplings, shafts, "),
+        ("mode", "did you mean 'modes'?"),
+        ("modes.two_disc.f1", "did you mean 'modes.two_discs.f1'?"),
+    ],
+)
+def test_an_unknown_name_is_refused_with_a_hint(tmp_path, word, hint):
+    outcome = verify(tmp_path, word)
+    assert outcome.returncode == 2 and f"there is no case or feature {word!r}; {hint}" in outcome.stderr
 
 
 def test_a_folder_without_cases_is_refused(tmp_path):
