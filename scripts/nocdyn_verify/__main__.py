@@ -79,7 +79,7 @@ def tell(outcomes: Sequence[Outcome]) -> None:
     """The cases that fail."""
     for one in outcomes:
         if not one.passes:
-            reason = one.problem or f"{one.computed:.10g}, expected {one.case.expected:.10g} {one.case.unit}"
+            reason = one.problem or f"{one.computed:.15g}, expected {one.case.expected:.15g} {one.case.unit}"
             print(f"{one.case.id}: {one.case.quantity}: {reason}", file=sys.stderr)
 
 

@@ -29,6 +29,7 @@ FEATURES = (
     "modes",
     "campbell",
     "response",
+    "transit",
     "fatigue",
     "sweeps",
 )

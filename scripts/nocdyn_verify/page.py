@@ -29,6 +29,11 @@ def number(value: float | None, digits: int = 10) -> str:
     return "" if value is None else f"{value:.{digits}g}"
 
 
+def digits(one: Outcome) -> int:
+    """Of the values: so many that the difference of a case that fails shows."""
+    return 10 if one.passes else 15
+
+
 def difference_text(one: Outcome) -> str:
     if one.difference is None:
         return ""
@@ -101,8 +106,8 @@ def write_row(one: Outcome) -> str:
             escape(case.quantity + (f" ({case.at})" if case.at else ""))
             + f'<div class="origin">{escape(case.origin)}: {escape(case.reference)}</div>',
         ),
-        ("number", number(case.expected)),
-        ("number", number(one.computed)),
+        ("number", number(case.expected, digits(one))),
+        ("number", number(one.computed, digits(one))),
         ("", escape(case.unit)),
         ("number", difference_text(one)),
         ("number", f"{case.tolerance:.3g} {case.error[:3]}."),
