@@ -8,6 +8,7 @@ verification.md the table of features.
 
 import json
 import sys
+from html import escape
 from pathlib import Path
 
 import matplotlib
@@ -21,7 +22,7 @@ from nocdyn_verify.cases import FEATURES  # noqa: E402
 from nocdyn_verify.picture import STYLE, as_svg  # noqa: E402
 
 CASES = ROOT / "verification"
-HEADING = "| case | quantity | expected | computed | unit | difference | tolerance | origin |"
+HEADING = "| case | quantity, origin | expected | computed | difference | tolerance |"
 PLACE = "<!-- verification: table -->"
 
 
@@ -58,20 +59,20 @@ def figure_of(cases):
 
 
 def cell(text):
-    return text.replace("|", "\\|").replace("*", "\\*").replace("_", "\\_")
+    return escape(text, quote=False).replace("|", "&#124;").replace("*", "\\*").replace("_", "\\_")
 
 
 def row(case):
+    """The quantity, below it the origin of the expected value; the name of the case may be broken at its points."""
     place = f" ({case['at']})" if case["at"] else ""
+    unit = "" if case["unit"] == "1" else f" {cell(case['unit']).replace(' ', '&nbsp;')}"
     values = (
-        f"`{case['id'].partition('.')[2]}`",
-        cell(case["quantity"] + place),
-        f"{case['expected']:.10g}",
-        f"{case['computed']:.10g}",
-        cell(case["unit"]),
+        "<br>".join(f"`{part}`" for part in case["id"].split(".")[1:]),
+        f"{cell(case['quantity'] + place)}<br><small>{case['origin']}: {cell(case['reference'])}</small>",
+        f"{case['expected']:.10g}{unit}",
+        f"{case['computed']:.10g}{unit}",
         f"{case['difference']:.1e}",
-        f"{case['tolerance']:.0e}",
-        f"{case['origin']}: {cell(case['reference'])}",
+        f"{case['tolerance']:.3g}",
     )
     return f"| {' | '.join(values)} |"
 

@@ -7,9 +7,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from .cases import chosen, read_cases, read_previous
+from .cases import PREVIOUS, chosen, read_cases, read_previous, write_previous
 from .failure import FAILED, VerificationError
-from .outcomes import Outcome, installation, verify, write_json
+from .outcomes import Installation, Outcome, installation, verify, write_json
 from .page import verdict, write_page
 from .paper import write_paper
 
@@ -24,10 +24,13 @@ def read_arguments(words: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help="write to DIR; default: results")
     parser.add_argument("--cases", type=Path, metavar="DIR", help="cases of one's own: a folder like that of the program")
     parser.add_argument("--threads", type=int, default=len(os.sched_getaffinity(0)), metavar="NUMBER")
+    parser.add_argument("--keep", action="store_true", help=f"write the values to {PREVIOUS} beside the cases, at a release")
     parser.add_argument("--quiet", action="store_true", help="print nothing but errors and failed cases")
     arguments = parser.parse_args(words)
     if arguments.threads < 1:
         parser.error(f"--threads {arguments.threads}: allowed: 1 or more")
+    if arguments.keep and arguments.chosen:
+        parser.error("--keep keeps the values of all cases, not of chosen ones")
     return arguments
 
 
@@ -46,21 +49,38 @@ def find_cases(wanted: Path | None) -> Path:
     return place
 
 
-def write_results(folder: Path, program: Path, cases: Path, outcomes: Sequence[Outcome], version: str) -> None:
-    """All files, each whole or not at all."""
-    machine = installation(program, cases, [one.case for one in outcomes])
+def prepare(folder: Path) -> Path:
+    """The file in a folder that results are written to before they get their names; refused before anything is computed."""
     part = folder / f"{NAME}.part"
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        part.touch()
+        part.unlink()
+    except OSError as error:
+        raise VerificationError(f"{folder}: cannot be written: {error.strerror}") from None
+    return part
+
+
+def write_results(part: Path, machine: Installation, outcomes: Sequence[Outcome], version: str) -> None:
+    """All files, each whole or not at all."""
+    try:
         part.write_text(write_page(machine, outcomes, version), encoding="utf-8")
-        part.replace(folder / f"{NAME}.html")
+        part.replace(part.with_suffix(".html"))
         write_paper(part, machine, outcomes, version)
-        part.replace(folder / f"{NAME}.pdf")
+        part.replace(part.with_suffix(".pdf"))
         write_json(part, machine, outcomes)
-        part.replace(folder / f"{NAME}.json")
+        part.replace(part.with_suffix(".json"))
     except OSError as error:
         part.unlink(missing_ok=True)
-        raise VerificationError(f"{folder}: cannot be written: {error.strerror}") from None
+        raise VerificationError(f"{part.parent}: cannot be written: {error.strerror}") from None
+
+
+def tell(outcomes: Sequence[Outcome]) -> None:
+    """The cases that fail."""
+    for one in outcomes:
+        if not one.passes:
+            reason = one.problem or f"{one.computed:.15g}, expected {one.case.expected:.15g} {one.case.unit}"
+            print(f"{one.case.id}: {one.case.quantity}: {reason}", file=sys.stderr)
 
 
 def main(words: Sequence[str]) -> int:
@@ -69,18 +89,21 @@ def main(words: Sequence[str]) -> int:
         program, folder = find_program(), find_cases(arguments.cases)
         version, previous = read_previous(folder)
         cases = chosen(read_cases(folder), arguments.chosen)
+        part = prepare(arguments.out)
+        machine = installation(program, folder, cases)
         outcomes = verify(program, folder, cases, previous, arguments.threads)
-        write_results(arguments.out, program, folder, outcomes, version)
+        write_results(part, machine, outcomes, version)
+        tell(outcomes)
+        code = 0 if all(one.passes for one in outcomes) else FAILED
+        if arguments.keep and code == 0:
+            write_previous(folder, machine.version, {one.case.id: one.computed for one in outcomes})
     except VerificationError as error:
         print(f"nocdyn: verify: {error}", file=sys.stderr)
         return error.code
-    for one in outcomes:
-        if not one.passes:
-            reason = one.problem or f"{one.computed:.10g}, expected {one.case.expected:.10g} {one.case.unit}"
-            print(f"{one.case.id}: {one.case.quantity}: {reason}", file=sys.stderr)
     if not arguments.quiet:
-        print(f"{verdict(outcomes)} {arguments.out} has {NAME}.html, {NAME}.pdf and {NAME}.json")
-    return 0 if all(one.passes for one in outcomes) else FAILED
+        kept = f" {folder / PREVIOUS} has the values of {machine.version}." if arguments.keep and code == 0 else ""
+        print(f"{verdict(outcomes)} {arguments.out} has {NAME}.html, {NAME}.pdf and {NAME}.json.{kept}")
+    return code
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """The cases: for each feature a folder with cases.csv, a row for each quantity that is known, and the folders of inputs."""
 
 import csv
+import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +10,7 @@ from .failure import USAGE, VerificationError
 
 TABLE = "cases.csv"
 PREVIOUS = "previous.csv"
+PREVIOUS_COLUMNS = ("id", "version", "value")
 INPUT = "case.nml"
 ORIGINS = ("closed form", "published", "conservation", "other code", "measured")
 ERRORS = ("relative", "absolute")
@@ -27,6 +29,7 @@ FEATURES = (
     "modes",
     "campbell",
     "response",
+    "transit",
     "fatigue",
     "sweeps",
 )
@@ -63,6 +66,11 @@ class Case:
     error: str  # of the tolerance: relative or absolute
     origin: str
     reference: str  # the formula with its source, or the publication
+
+    @property
+    def home(self) -> str:
+        """The folder of the feature."""
+        return self.id.partition(".")[0]
 
     def difference(self, computed: float) -> float:
         """Computed less expected, as the tolerance counts it."""
@@ -125,21 +133,45 @@ def read_case(path: Path, line: int, row: dict[str, str], feature: str) -> Case:
 
 
 def read_previous(folder: Path) -> tuple[str, dict[str, float]]:
-    """The version of the previous release, and what it computed."""
+    """The version of the previous release, and what it computed; nothing without such a file."""
     path = folder / PREVIOUS
-    if not path.is_file():
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        return rows[0]["version"], {row["id"]: float(row["value"]) for row in rows}
+    except FileNotFoundError:
         return "", {}
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    return (rows[0]["version"] if rows else ""), {row["id"]: float(row["value"]) for row in rows}
+    except OSError as error:
+        raise VerificationError(f"{path}: cannot be read: {error.strerror}") from None
+    except (IndexError, KeyError, TypeError, ValueError):
+        needed = f"{', '.join(PREVIOUS_COLUMNS)} in each row, as nocdyn verify --keep writes them"
+        raise VerificationError(f"{path}: needed: {needed}", USAGE) from None
+
+
+def write_previous(folder: Path, version: str, values: dict[str, float]) -> Path:
+    """Keeps what this version computed, for the next one; the file."""
+    path = folder / PREVIOUS
+    part = path.with_suffix(".part")
+    try:
+        with part.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(PREVIOUS_COLUMNS)
+            writer.writerows((name, version, repr(value)) for name, value in sorted(values.items()))
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise VerificationError(f"{path}: cannot be written: {error.strerror}") from None
+    return path
 
 
 def chosen(cases: Sequence[Case], words: Sequence[str]) -> list[Case]:
-    """Those of some features or with some names; all without words."""
+    """Those of some features, with underscores or spaces, or with some names; all without words."""
     if not words:
         return list(cases)
-    known = {case.feature for case in cases} | {case.id for case in cases}
-    for word in words:
-        if word not in known:
-            raise VerificationError(f"there is no case or feature {word!r}; allowed: {', '.join(sorted(known))}", USAGE)
-    return [case for case in cases if case.id in words or case.feature in words]
+    wanted = {word.replace("_", " ") if word in {case.home for case in cases} else word for word in words}
+    features = list(dict.fromkeys(case.feature for case in cases))
+    for word in wanted - {case.id for case in cases} - set(features):
+        near = difflib.get_close_matches(word, [*features, *(case.id for case in cases)], 1)
+        hint = f"did you mean {near[0]!r}?" if near else f"allowed: a name as in the table, or a feature: {', '.join(features)}"
+        raise VerificationError(f"there is no case or feature {word!r}; {hint}", USAGE)
+    return [case for case in cases if case.id in wanted or case.feature in wanted]

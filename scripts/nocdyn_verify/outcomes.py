@@ -16,6 +16,8 @@ from .answers import Answers, NoAnswerError
 from .cases import INPUT, Case
 from .failure import VerificationError
 
+NOTABLE = 0.1  # share of the tolerance by which a value differs from that of the previous release and is marked
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -36,6 +38,17 @@ class Outcome:
     def share(self) -> float | None:
         """The difference as a share of the tolerance."""
         return None if self.difference is None else abs(self.difference) / self.case.tolerance
+
+    @property
+    def change(self) -> float | None:
+        """How far the value is from that of the previous release, as a share of the tolerance."""
+        if self.computed is None or self.previous is None:
+            return None
+        return abs(self.case.difference(self.computed) - self.case.difference(self.previous)) / self.case.tolerance
+
+    @property
+    def has_changed(self) -> bool:
+        return self.change is not None and not self.change <= NOTABLE
 
 
 @dataclass(frozen=True)
@@ -115,6 +128,8 @@ def write_json(path: Path, machine: Installation, outcomes: Sequence[Outcome]) -
             "passes": one.passes,
             "problem": one.problem,
             "previous": one.previous,
+            "change": one.change,
+            "has_changed": one.has_changed,
         }
         for one in outcomes
     ]

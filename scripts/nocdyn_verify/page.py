@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from html import escape
 
-from .outcomes import Installation, Outcome
+from .outcomes import NOTABLE, Installation, Outcome
 from .picture import as_svg, draw
 
 WIDTH = 9.0  # of the picture [in]
@@ -16,9 +16,11 @@ h1 { font-size: 1.6rem; } h2 { font-size: 1.15rem; margin-top: 2rem; }
 table { border-collapse: collapse; font-size: .82rem; } th, td { text-align: left; vertical-align: top; padding: .2rem .6rem;
 border-bottom: 1px solid #ddd; }
 td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-tr.failed td { background: #fdf0e6; } td.id { font-family: ui-monospace, monospace; white-space: nowrap; }
+tr.failed td { background: #fdf0e6; } td.id { font-family: ui-monospace, monospace; }
+.origin { color: #555; } td.changed { font-weight: 600; color: #8a4b00; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: .15rem 1rem; font-size: .9rem; } dd { margin: 0;
 overflow-wrap: anywhere; } svg { max-width: 100%; height: auto; }
+@media (max-width: 45rem) { body { margin: 1rem auto; } dl { display: block; } dt { color: #555; } dd { margin: 0 0 .3rem; } }
 @media print { body { font-size: 9pt; margin: 0; max-width: none; } .scroll { overflow: visible; } tr { break-inside: avoid; } }
 """
 
@@ -27,10 +29,20 @@ def number(value: float | None, digits: int = 10) -> str:
     return "" if value is None else f"{value:.{digits}g}"
 
 
+def digits(one: Outcome) -> int:
+    """Of the values: so many that the difference of a case that fails shows."""
+    return 10 if one.passes else 15
+
+
 def difference_text(one: Outcome) -> str:
     if one.difference is None:
         return ""
     return f"{one.difference:.1e}" if one.difference else "0"
+
+
+def previous_text(one: Outcome) -> str:
+    """The value of the previous release, and how far the new one is from it where that is a notable part of the tolerance."""
+    return number(one.previous) + (f" ({one.change:.2g} tol.)" if one.has_changed else "")
 
 
 def verdict(outcomes: Sequence[Outcome]) -> str:
@@ -53,44 +65,57 @@ def facts(machine: Installation, outcomes: Sequence[Outcome], version: str) -> l
         ("System", machine.system),
         ("Date", machine.date),
         ("Cases", f"{len(outcomes)}: {', '.join(counts)}"),
-        ("Previous release", version or "none"),
+        ("Previous release", changes(outcomes, version)),
     ]
 
 
-def write_row(one: Outcome) -> str:
-    case = one.case
-    cells = [
-        ("id", case.id),
-        ("", case.quantity + (f" ({case.at})" if case.at else "")),
-        ("number", number(case.expected)),
-        ("number", number(one.computed)),
-        ("", case.unit),
-        ("number", difference_text(one)),
-        ("number", f"{case.tolerance:.0e}"),
-        ("", case.error),
-        ("", "pass" if one.passes else "FAIL" + (f": {one.problem}" if one.problem else "")),
-        ("number", number(one.previous)),
-        ("", case.origin),
-        ("", case.reference),
-    ]
-    columns = "".join(f'<td class="{kind}">{escape(text)}</td>' if kind else f"<td>{escape(text)}</td>" for kind, text in cells)
-    return f"<tr{'' if one.passes else ' class=failed'}>{columns}</tr>"
+def changes(outcomes: Sequence[Outcome], version: str) -> str:
+    """What is different from the previous release."""
+    if not version:
+        return "none"
+    known = [one for one in outcomes if one.previous is not None]
+    changed = [one.case.id for one in known if one.has_changed]
+    text = f"{version}, which computed {len(known)} of these values; "
+    if not changed:
+        return text + f"none differs by more than {NOTABLE:g} of its tolerance"
+    return text + f"by more than {NOTABLE:g} of the tolerance differ {len(changed)}: {', '.join(changed)}"
 
 
 HEADINGS = (
-    ("", "id"),
+    ("", "case"),
     ("", "quantity"),
     ("number", "expected"),
     ("number", "computed"),
     ("", "unit"),
     ("number", "difference"),
     ("number", "tolerance"),
-    ("", "kind"),
     ("", "result"),
     ("number", "previous release"),
-    ("", "origin"),
-    ("", "reference"),
 )
+
+
+def write_row(one: Outcome) -> str:
+    """A row of values, and the origin of the expected one below its quantity."""
+    case = one.case
+    result = "pass" if one.passes else "FAIL" + (f": {one.problem}" if one.problem else "")
+    feature, _, name = case.id.partition(".")
+    cells = [
+        ("id", f"{escape(feature)}.<wbr>{escape(name).replace('.', '.<wbr>')}"),
+        (
+            "",
+            escape(case.quantity + (f" ({case.at})" if case.at else ""))
+            + f'<div class="origin">{escape(case.origin)}: {escape(case.reference)}</div>',
+        ),
+        ("number", number(case.expected, digits(one))),
+        ("number", number(one.computed, digits(one))),
+        ("", escape(case.unit)),
+        ("number", difference_text(one)),
+        ("number", f"{case.tolerance:.3g} {case.error[:3]}."),
+        ("", escape(result)),
+        ("number changed" if one.has_changed else "number", previous_text(one)),
+    ]
+    columns = "".join(f'<td class="{kind}">{text}</td>' if kind else f"<td>{text}</td>" for kind, text in cells)
+    return f"<tr{'' if one.passes else ' class=failed'}>{columns}</tr>"
 
 
 def write_page(machine: Installation, outcomes: Sequence[Outcome], version: str) -> str:

@@ -9,8 +9,8 @@ from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
 from .outcomes import Installation, Outcome
-from .page import difference_text, facts, number, verdict
-from .picture import STYLE, draw
+from .page import difference_text, facts, number, previous_text, verdict
+from .picture import STYLE, draw_on
 
 SIZE = (11.69, 8.27)  # A4, lying [in]
 LEFT, TOP, BOTTOM = 0.04, 0.95, 0.06  # of the page
@@ -43,18 +43,13 @@ def write_paper(path: Path, machine: Installation, outcomes: Sequence[Outcome], 
 
 def first_page(machine: Installation, outcomes: Sequence[Outcome], version: str) -> Figure:
     """The verdict, what was verified, and the picture."""
-    picture = draw(outcomes, SIZE[0] * 0.9)
     figure = Figure(figsize=SIZE)
     figure.text(LEFT, TOP, f"Verification of nocdyn {machine.version}", size=16, va="top")
     figure.text(LEFT, TOP - 0.05, "\n".join(textwrap.wrap(verdict(outcomes), 130)), size=11, weight="bold", va="top")
     for place, (name, text) in enumerate(facts(machine, outcomes, version)):
         figure.text(LEFT, TOP - 0.12 - 0.024 * place, name, va="top", color="0.35")
-        figure.text(LEFT + 0.16, TOP - 0.12 - 0.024 * place, text, va="top")
-    axes = picture.axes[0]
-    axes.remove()
-    axes.figure = figure
-    figure.add_axes(axes)
-    axes.set_position((0.17, 0.1, 0.78, 0.5))
+        figure.text(LEFT + 0.16, TOP - 0.12 - 0.024 * place, textwrap.shorten(text, 130, placeholder=" ..."), va="top")
+    draw_on(figure.add_axes((0.17, 0.11, 0.78, 0.49)), outcomes)
     return figure
 
 
@@ -68,9 +63,9 @@ def rows(one: Outcome) -> list[tuple[str, ...]]:
         number(one.computed),
         case.unit,
         difference_text(one),
-        f"{case.tolerance:.0e} {case.error[:3]}.",
+        f"{case.tolerance:.3g} {case.error[:3]}.",
         "pass" if one.passes else f"FAIL {one.problem}",
-        number(one.previous),
+        previous_text(one),
         f"{case.origin}: {case.reference}",
     )
     wrapped = [textwrap.wrap(text, width) or [""] for text, (_, _, width) in zip(texts, COLUMNS)]

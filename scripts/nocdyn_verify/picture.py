@@ -28,20 +28,25 @@ STYLE = {
 
 
 def draw(outcomes: Sequence[Outcome], width: float) -> Figure:
-    """Each case a point: its difference as a share of its tolerance, by features."""
-    features = list(dict.fromkeys(one.case.feature for one in outcomes))
+    """The picture by itself."""
+    features = {one.case.feature for one in outcomes}
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(width, 0.9 + 0.26 * len(features)), layout="constrained")
-        axes = figure.add_subplot()
-        for row, feature in enumerate(features):
-            draw_row(axes, row, [one for one in outcomes if one.case.feature == feature])
-        axes.set_xscale("log")
-        axes.set_xlim(LOWEST / 2, 1e3 if any(not one.passes for one in outcomes) else 3)
-        axes.axvline(1, color="#D55E00", linewidth=1.2)
-        axes.set_yticks(range(len(features)), features)
-        axes.set_ylim(len(features) - 0.4, -0.6)
-        axes.set_xlabel(f"difference / tolerance (the line: allowed; at the left edge: below {LOWEST:g})")
+        draw_on(figure.add_subplot(), outcomes)
     return figure
+
+
+def draw_on(axes: Axes, outcomes: Sequence[Outcome]) -> None:
+    """Each case a point: its difference as a share of its tolerance, by features."""
+    features = list(dict.fromkeys(one.case.feature for one in outcomes))
+    for row, feature in enumerate(features):
+        draw_row(axes, row, [one for one in outcomes if one.case.feature == feature])
+    axes.set_xscale("log")
+    axes.set_xlim(LOWEST / 2, 1e3 if any(not one.passes for one in outcomes) else 3)
+    axes.axvline(1, color="#D55E00", linewidth=1.2)
+    axes.set_yticks(range(len(features)), features)
+    axes.set_ylim(len(features) - 0.4, -0.6)
+    axes.set_xlabel(f"difference / tolerance (the line: allowed; at the left edge: below {LOWEST:g})")
 
 
 def draw_row(axes: Axes, row: int, outcomes: Sequence[Outcome]) -> None:

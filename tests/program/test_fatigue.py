@@ -171,20 +171,6 @@ def test_what_is_counted_begins_with_extremes_from(nocdyn):
     assert life["cycles"] == pytest.approx(50.5, abs=0.5)
 
 
-def test_a_jump_of_the_moment_is_a_turning_point(nocdyn):
-    """The moment of a step of excitation on a body without inertia jumps: the gear carries it at once."""
-    (life,) = fatigue_of(
-        nocdyn,
-        "&body name='a' inertia=1 /\n&body name='b' inertia=1 /\n&gear name='g' bodies='a', 'b' radii=1, 1 /\n"
-        "&excitation name='on' body='a' kind='step' amplitude=10 time=0.3 /\n"
-        "&excitation name='off' body='a' kind='step' amplitude=-20 time=0.6 /\n&run t_end=1 /\n"
-        "&fatigue name='life' gear='g' reference_force=1 reference_cycles=1 slope=1 /\n",
-    )
-    assert life["cycles"] == 1.0
-    assert life["largest_range"] == pytest.approx(10.0)
-    assert life["damage"] == pytest.approx(0.5 * (5.0 + 10.0) / 2)
-
-
 def test_without_the_group_there_is_no_file(nocdyn):
     text = RELEASED.format(t_end=PERIOD)
     fatigue_of(nocdyn, text + f"&fatigue name='life' coupling='c' {CURVE} /\n")

@@ -98,14 +98,6 @@ def test_peaks_have_the_mean_torques_of_the_resistances(nocdyn):
             assert -summary["columns"]["torque_f [N m]"]["min"] == pytest.approx(expected, abs=0.6)
 
 
-def test_without_time_constants_there_is_no_decay_and_the_peaks_are_the_known_ones(nocdyn):
-    peaks = {"three_phase": 5.0, "two_phase": 5 * 0.75 * np.sqrt(3), "resynchronisation": 5 * (np.sqrt(0.75) + np.sqrt(3))}
-    for fault, peak in peaks.items():
-        columns_of(nocdyn, FAULT.format(fault=fault, more="") + BODY)
-        summary = json.loads((nocdyn.folder / "results/machine/summary.json").read_text())
-        assert -summary["columns"]["torque_f [N m]"]["min"] == pytest.approx(peak * RATED, rel=1e-6)
-
-
 def test_given_terms_are_summed(nocdyn):
     text = (
         "&excitation name='f' body='b' kind='fault' term_amplitudes=30, -20, 5 term_multiples=1, 2, 0 term_times=0.1, 0.2, 0.3 "

@@ -79,27 +79,6 @@ def test_a_clutch_locks_after_the_time_of_the_closed_form_and_keeps_the_heat(noc
     assert nocdyn.summary("out")["energy_account"]["work_in_J"]["clutch c"] == pytest.approx(-heat, rel=1e-12)
 
 
-def test_engagement_over_the_time_opens_and_closes(nocdyn):
-    ramp = "table_time = 0, 1 table_level = 0, 1"
-    _, events = run(nocdyn, PAIR.replace("KEYS", ramp) + "&run t_end = 2 rtol = 1e-10 /\n")
-    assert events[0]["time"] == pytest.approx(1.0, abs=1e-9)  # 40 t^2 / 2 = 20
-    pulses = "times = 0.2, 0.4, 0.6 levels = 1, 0, 0.5"
-    table, events = run(nocdyn, PAIR.replace("KEYS", pulses) + "&run t_end = 2 /\n&output interval = 0.1 /\n")
-    assert [table["torque_c [N m]"][i] for i in (1, 3, 5, 7)] == [0, 40, 0, 20]
-    assert events[0]["time"] == pytest.approx(0.6 + (0.5 - 0.2) * 2, abs=1e-12)
-
-
-def test_a_brake_holds_until_the_torque_is_above_what_it_holds_at_rest(nocdyn):
-    text = BODY.format("drum", 3.0, 0) + "&clutch name = 'brake' bodies = 'drum', 'ground' capacity = 50 static_capacity = 60 /\n"
-    text += "&excitation name = 'load' body = 'drum' kind = 'ramp' amplitude = 100 time = 0 duration = 1 /\n"
-    table, events = run(nocdyn, text + "&run t_end = 1 rtol = 1e-10 /\n&output interval = 0.1 /\n")
-    assert changes(events) == [("brake", "slips ahead")]
-    assert events[0]["time"] == pytest.approx(0.6, abs=1e-9)
-    assert table["torque_brake [N m]"][5] == pytest.approx(50, abs=1e-9)  # the load, on the ground
-    assert table["phi_drum [rad]"][6] == pytest.approx(0, abs=1e-12)
-    assert table["omega_drum [rad/s]"][-1] == pytest.approx((80 - 50) * 0.4 / 3, rel=1e-9)
-
-
 @pytest.mark.parametrize(("direction", "first", "second"), [("forward", "one", "two"), ("backward", "two", "one")])
 def test_a_freewheel_drives_in_one_direction_and_overruns_in_the_other(nocdyn, direction, first, second):
     """The motor drives both for half a second; then it is braked, and the load runs on until the motor has caught up."""
@@ -114,25 +93,6 @@ def test_a_freewheel_drives_in_one_direction_and_overruns_in_the_other(nocdyn, d
     assert table["omega_one [rad/s]"][20] == pytest.approx(0.0, abs=1e-9)
     assert abs(table["torque_f [N m]"][5]) == pytest.approx(6.0, rel=1e-9)
     assert table["omega_one [rad/s]"][-1] == pytest.approx(1.0 + 2.0 * 0.875, rel=1e-9)
-
-
-def test_a_freewheel_slips_above_its_capacity(nocdyn):
-    text = BODY.format("one", 1.0, 0) + BODY.format("two", 3.0, 0)
-    text += "&freewheel name = 'f' bodies = 'one', 'two' capacity = 3 /\n"
-    text += "&excitation name = 'motor' body = 'one' kind = 'step' amplitude = 8 time = 0.5 /\n"
-    table, events = run(nocdyn, text + "&run t_end = 1 /\n&output interval = 0.1 /\n")
-    assert changes(events) == [("f", "slips ahead")]
-    assert table["omega_two [rad/s]"][-1] == pytest.approx(0.5, rel=1e-9)
-    assert table["omega_one [rad/s]"][-1] == pytest.approx(2.5, rel=1e-9)
-
-
-def test_redundant_locks_share_the_moment(nocdyn):
-    text = PAIR.replace("KEYS", "") + "&clutch name = 'd' bodies = 'one', 'two' capacity = 40 /\n"
-    text += "&excitation name = 'pull' body = 'one' kind = 'step' amplitude = 10 time = 0.5 /\n"
-    table, events = run(nocdyn, text + "&run t_end = 1 /\n&output interval = 0.1 /\n")
-    assert [event["time"] for event in events] == pytest.approx([0.25, 0.25], abs=1e-12)
-    assert table["torque_c [N m]"][-1] == pytest.approx(2.5, rel=1e-9)
-    assert table["torque_d [N m]"][-1] == pytest.approx(2.5, rel=1e-9)
 
 
 def test_a_dog_clutch_locks_by_an_impact_and_lets_go(nocdyn):
@@ -161,13 +121,6 @@ def test_a_dog_clutch_beside_a_gear_of_another_ratio_ends_the_run_with_its_name(
     assert "t = 1 s: clutch 'd' contradicts the gears between its bodies: locked, it stops both" in outcome.stderr
     _, events = run(nocdyn, text + dog.format("three"))
     assert changes(events) == [("d", "locked")]
-
-
-def test_a_freewheel_that_starts_the_wrong_way_strikes(nocdyn):
-    text = BODY.format("one", 1.0, 6) + BODY.format("two", 2.0, 0) + "&freewheel name = 'f' bodies = 'one', 'two' /\n"
-    table, _ = run(nocdyn, text + "&run t_end = 1 /\n&output points = 3 /\n")
-    assert table["omega_two [rad/s]"][1:] == pytest.approx((2.0, 2.0), rel=1e-12)
-    assert nocdyn.summary("out")["energy_account"]["work_in_J"]["freewheel f"] == pytest.approx(-12, rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 import csv
 import itertools
 import json
-import math
 
 import numpy as np
 import pytest
@@ -30,11 +29,6 @@ def motion() -> np.ndarray:
     return matrix
 
 
-def dynamic_stiffness(frequency: float) -> complex:
-    parts = (stiffness * 1j * frequency * time / (1 + 1j * frequency * time) for stiffness, time in zip(BRANCHES, TIMES))
-    return STIFFNESS + sum(parts)
-
-
 @pytest.mark.parametrize("method", ["auto", "rk45", "rodas5p", "taylor"])
 def test_a_run_follows_the_exact_motion_and_keeps_the_energy(nocdyn, method):
     nocdyn.write("m.nml", MACHINE.format(start="angle = 0.1"))
@@ -55,37 +49,6 @@ def test_a_run_follows_the_exact_motion_and_keeps_the_energy(nocdyn, method):
     lost = [float(row["work_out [J]"]) for row in rows]
     assert all(after >= before - 1e-9 for before, after in itertools.pairwise(lost))  # the dampers only lose
     assert summary["energy_account"]["work_in_J"]["coupling k"] == pytest.approx(-lost[-1], abs=1e-9)
-
-
-def test_modes_are_those_of_the_matrix(nocdyn):
-    nocdyn.write("m.nml", MACHINE.format(start=""))
-    assert nocdyn("modes", "m.nml", "--out", "out").returncode == 0
-    modes = json.loads((nocdyn.folder / "out/modes.json").read_text())["modes"]
-    value = max(np.linalg.eigvals(motion()), key=lambda one: one.imag)
-    (oscillating,) = (mode for mode in modes if mode["kind"] == "oscillating")
-    assert oscillating["frequency_Hz"] == pytest.approx(value.imag / (2 * math.pi), rel=1e-9)
-    assert oscillating["damping_ratio"] == pytest.approx(-value.real / abs(value), rel=1e-9)
-
-
-def test_a_response_has_the_stiffness_of_its_frequency(nocdyn):
-    nocdyn.write(
-        "m.nml",
-        MACHINE.format(start="")
-        + "&excitation name = 'x' body = 'a' kind = 'orders' orders = 1 amplitudes = 10.0 /\n"
-        + "&response body = 'a' speed = 10.0, 30.0 count = 5 /\n",
-    )
-    assert nocdyn("response", "m.nml").returncode == 0
-    with (nocdyn.folder / "results/m/response.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    reduced = INERTIA[0] * INERTIA[1] / sum(INERTIA)
-    for row in rows:
-        speed = float(row["omega_a [rad/s]"])
-        stiffness = dynamic_stiffness(speed)
-        moment = 10.0 * reduced / INERTIA[0] * stiffness / (stiffness - speed**2 * reduced)
-        assert float(row["half_range_total_moment_k [N m]"]) == pytest.approx(abs(moment), rel=1e-9)
-        twist = moment / stiffness
-        heat = 0.5 * speed * abs(twist) ** 2 * stiffness.imag
-        assert float(row["heat_k [W]"]) == pytest.approx(heat, rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from math import asin, atan2, cos, pi, radians, sin, sqrt
 import numpy as np
 import pytest
 from conftest import SOURCE, all_if_fast, fast_only
+from verified import known
 
 BODY = "&body name = '{}' inertia = {} speed = {} /\n"
 FREE = "&body name = '{}' inertia = {} /\n"
@@ -70,7 +71,9 @@ def test_a_cardan_joint_turns_freely_as_by_the_closed_form(nocdyn, formulation, 
     assert table["phi_a"][[1, 4]] == pytest.approx([pi / 2, 2 * pi], abs=1e-9)
     assert table["phi_b"][[1, 4]] == pytest.approx([pi / 2, 2 * pi], abs=1e-9)
     assert table["omega_a"][[1, 4]] == pytest.approx([12.110601416390, 10], abs=1e-9)
-    assert table["omega_b"][[0, 1]] == pytest.approx([10 / cos(radians(30)), 10.488088481702], abs=1e-9)
+    assert table["omega_b"][[0, 1]] == pytest.approx(
+        [known("joints_that_move.cardan_start"), known("joints_that_move.cardan_driven")], abs=1e-9
+    )
     assert max(abs(table["energy_residual"])) < 1e-9
 
 

@@ -185,7 +185,7 @@ def test_plot_paper_computes_and_draws_the_cases_of_the_paper(nocdyn):
 
 
 def test_verify_computes_with_this_program(nocdyn):
-    outcome = nocdyn("verify", "--out", "out", env=PYTHON)
+    outcome = nocdyn("verify", "modes.two_discs.f1", "--out", "out", env=PYTHON)
     assert outcome.returncode == 0, outcome.stderr
     assert nocdyn.files("out") == ["verification.html", "verification.json", "verification.pdf"]
 

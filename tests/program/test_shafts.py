@@ -9,7 +9,6 @@ import pytest
 from conftest import peak_memory
 
 EXACT = 1e-8  # relative error of the frequencies that are asked for
-STATIC = 1e-9
 
 LONG = """&body name = 'a' inertia = 200.0 /
 &body name = 'b' inertia = 10.0 /
@@ -97,25 +96,6 @@ def test_orders_of_a_response_ask_for_nodes(nocdyn):
     found = modes_of(nocdyn, LONG.format("") + response.format(24))
     wanted = [f for f in exact if f < 24]
     assert found[: len(wanted)] == pytest.approx(wanted, rel=EXACT)
-
-
-def test_a_massless_shaft_is_a_coupling(nocdyn):
-    k = 1 / sum(1 / each for each in stiffnesses(STEPPED))
-    frequency = sqrt(k * (1 / 20 + 1 / 3)) / (2 * pi)
-    assert modes_of(nocdyn, machine(density=0)) == pytest.approx([frequency], rel=1e-12)
-
-
-def test_a_steady_moment_gives_twist_and_the_largest_stress(nocdyn):
-    text = machine(bodies="'a', 'b'", more="damping_ratio = 0.01 damping_frequency_hz = 50") + (
-        "&coupling name = 'wall' bodies = 'ground', 'a' stiffness = 1e6 /\n"
-        "&motor name = 'jack' body = 'b' kind = 'constant' torque = 700.0 /\n"
-    )
-    table = run(nocdyn, text, "--set", "run.start=equilibrium")
-    for name in ("total_moment_line_1 [N m]", "total_moment_line_2 [N m]", "total_moment_line_max [N m]"):
-        assert table[name] == pytest.approx([700.0] * 11, rel=STATIC)
-    assert table["twist_line [rad]"][-1] == pytest.approx(700 * sum(1 / k for k in stiffnesses(STEPPED)), rel=STATIC)
-    modulus = pi / 16 * (0.25**4 - 0.2**4) / 0.25
-    assert table["stress_line [Pa]"][-1] == pytest.approx(700 / modulus, rel=STATIC)
 
 
 @pytest.mark.parametrize("formulation", ["paper", "multiplier"])

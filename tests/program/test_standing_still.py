@@ -151,19 +151,6 @@ def test_a_brake_breaks_away_whenever_the_torques_exceed_its_capacity(nocdyn, se
     assert break_aways(summary) == pytest.approx(brake.break_aways(), abs=1e-6)
 
 
-def test_a_table_between_two_rests_moves_the_drum(nocdyn):
-    text = """\
-&body name = 'drum' inertia = 2 /
-&excitation name = 'g' body = 'drum' kind = 'table' interpolation = 'cubic'
- table_time = 0, 5, 5.5, 6, 6.5, 7, 20 table_torque = -50, -50, -70, -80, -70, -50, -50 /
-&clutch name = 'brake' bodies = 'drum', 'ground' capacity = 72 /
-&run t_end = 20 /
-"""
-    _, summary = run(nocdyn, text)
-    assert break_aways(summary) == pytest.approx([5.5731], abs=1e-4)
-    assert summary["columns"]["phi_drum [rad]"]["last"] == pytest.approx(-1.59143, rel=1e-5)
-
-
 @pytest.mark.parametrize("amplitude", [100.0001, 103, 110])
 def test_every_peak_above_the_capacity_breaks_the_brake_away(nocdyn, amplitude):
     _, summary = run(nocdyn, HELD, "--set", f"excitation.x.amplitude={amplitude}")

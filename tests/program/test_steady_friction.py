@@ -76,22 +76,6 @@ def test_friction_that_slips_acts_with_its_whole_moment_and_damps_nothing(nocdyn
     assert f"{2 * abs(k * twist):.5g}"[:4] in outcome.stdout or f"{abs(k * twist):.5g}"[:4] in outcome.stdout
 
 
-LOSSY = """&body name = 'motor' inertia = 1 /
-&body name = 'drum' inertia = 2 /
-&gear name = 'g' bodies = 'motor', 'drum' radii = 1, 1 internal = .true. efficiency = 0.8 /
-&motor name = 'M' body = 'motor' kind = 'induction' breakdown_torque = 100 breakdown_slip = 0.2 synchronous_speed = 100 /
-&load name = 'L' body = 'drum' constant = {constant} constant_speed = 0.5 /
-&run t_end = 60 /
-"""
-
-
-@pytest.mark.parametrize(("constant", "speeds"), [(36, [0.646345, 15.8654, 95.24571]), (45, [0.420582, 35.04721, 93.84168])])
-def test_all_steady_states_with_lossy_teeth_are_found(nocdyn, constant, speeds):
-    found = states(nocdyn, LOSSY.format(constant=constant))["steady_states"]
-    assert [state["values"]["omega_motor [rad/s]"] for state in found] == pytest.approx(speeds, rel=1e-6)
-    assert [state["stability"] for state in found] == ["stable", "unstable", "stable"]
-
-
 def test_teeth_hold_between_two_torques(nocdyn):
     text = """&body name = 'motor' inertia = 0.05 /
 &body name = 'drum' inertia = 3 /

@@ -9,9 +9,11 @@ import sys
 
 import pytest
 from conftest import SOURCE
+from verified import cases, known
 
 CASES = SOURCE / "verification"
 LEAST, LEAST_BY_HAND = 120, 40
+TWO_DISCS = known("modes.two_discs.f1")
 
 
 def verify(folder, *words):
@@ -38,12 +40,12 @@ def own(tmp_path):
         rows = list(csv.DictReader(file))
     row = next(row for row in rows if row["id"] == "two_discs.f1")
 
-    def write(**changes):
+    def write(*words, **changes):
         with (folder / "modes/cases.csv").open("w", newline="") as file:
             writer = csv.DictWriter(file, row.keys())
             writer.writeheader()
             writer.writerow({**row, **changes})
-        return verify(tmp_path, "--cases", folder)
+        return verify(tmp_path, "--cases", folder, *words)
 
     write.folder = tmp_path
     write.input = folder / "modes/two_discs/case.nml"
@@ -57,12 +59,36 @@ def test_all_cases_pass(tmp_path):
     assert result["passes"] and len(result["cases"]) >= LEAST
     origins = [case["origin"] for case in result["cases"]]
     assert origins.count("closed form") + origins.count("published") >= LEAST_BY_HAND
-    assert len({case["feature"] for case in result["cases"]}) == 15
+    assert len({case["feature"] for case in result["cases"]}) == 16
     page = (tmp_path / "out/verification.html").read_text()
     assert f"All {len(origins)} cases pass." in page and result["installation"]["program"] in page
-    assert all(case["id"] in page for case in result["cases"])
+    text = page.replace("<wbr>", "")
+    assert all(case["id"] in text for case in result["cases"])
     assert (tmp_path / "out/verification.pdf").read_bytes().startswith(b"%PDF-")
     assert not list((tmp_path / "out").glob("*.part"))
+
+
+def test_the_picture_is_inside_of_the_first_page_on_paper(monkeypatch):
+    monkeypatch.syspath_prepend(SOURCE / "scripts")
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from nocdyn_verify.cases import read_cases
+    from nocdyn_verify.outcomes import Installation, Outcome
+    from nocdyn_verify.paper import first_page
+
+    outcomes = [Outcome(case, case.expected, "", None) for case in read_cases(CASES)]
+    figure = first_page(Installation(*["text"] * 7), outcomes, "")
+    (axes,) = figure.axes
+    drawn = axes.get_tightbbox(FigureCanvasAgg(figure).get_renderer())
+    assert 0 < drawn.x0 < drawn.x1 < figure.bbox.width and 0 < drawn.y0 < drawn.y1 < figure.bbox.height
+
+
+def test_a_row_of_the_guide_has_a_cell_for_each_heading(monkeypatch):
+    monkeypatch.syspath_prepend(SOURCE / "docs")
+    import verification_pages as pages
+    from nocdyn_verify.cases import read_cases
+
+    for case in read_cases(CASES):
+        assert pages.row({**vars(case), "computed": 1.0, "difference": 0.0}).count("|") == pages.HEADING.count("|"), case.id
 
 
 def test_every_feature_says_what_is_not_verified():
@@ -75,6 +101,68 @@ def test_every_folder_of_a_case_is_used():
         with table.open(newline="") as file:
             used = {row["folder"] for row in csv.DictReader(file)}
         assert used == {path.parent.name for path in table.parent.glob("*/case.nml")}, table
+
+
+def test_a_release_keeps_its_values_for_the_next_one(own):
+    assert own().returncode == 0
+    assert report(own.folder)["cases"][0]["previous"] is None
+    previous = own.folder / "cases/previous.csv"
+    outcome = own("--keep")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    version = report(own.folder)["installation"]["version"]
+    assert outcome.stdout.endswith(f"previous.csv has the values of {version}.\n")
+    value = report(own.folder)["cases"][0]["computed"]
+    assert previous.read_text() == f"id,version,value\nmodes.two_discs.f1,{version},{value!r}\n"
+    previous.write_text(previous.read_text().replace(version, "0.0.9"))
+    own()
+    (case,) = report(own.folder)["cases"]
+    assert (case["previous"], case["change"], case["has_changed"]) == (value, 0, False)
+    page = (own.folder / "out/verification.html").read_text()
+    assert "0.0.9, which computed 1 of these values; none differs by more than 0.1 of its tolerance" in page
+
+
+def test_a_value_that_differs_from_the_previous_release_by_a_part_of_its_tolerance_is_marked(own):
+    for share, is_marked in ((0.09, False), (0.5, True)):
+        value = TWO_DISCS * (1 + share * 1e-6)
+        (own.folder / "cases/previous.csv").write_text(f"id,version,value\nmodes.two_discs.f1,0.0.9,{value!r}\n")
+        assert own(tolerance="1e-6").returncode == 0
+        (case,) = report(own.folder)["cases"]
+        assert case["change"] == pytest.approx(share, rel=1e-6) and case["has_changed"] == is_marked
+        page = (own.folder / "out/verification.html").read_text()
+        assert ('<td class="number changed">7.957751133 (0.5 tol.)</td>' in page) == is_marked
+        assert ("by more than 0.1 of the tolerance differ 1: modes.two_discs.f1" in page) == is_marked
+
+
+def test_the_values_of_a_case_that_fails_are_not_kept(own):
+    assert own("--keep", expected="7.9").returncode == 1
+    assert not (own.folder / "cases/previous.csv").exists()
+
+
+def test_the_values_of_chosen_cases_are_not_kept(own):
+    outcome = own("--keep", "modes")
+    assert outcome.returncode == 2 and "--keep keeps the values of all cases" in outcome.stderr
+
+
+@pytest.mark.parametrize("text", ["", "id,value\n", "id,version,value\nmodes.two_discs.f1,0.0.9,seven\n", "id,version\na,b\n"])
+def test_values_of_a_release_that_cannot_be_read_are_refused(own, text):
+    (own.folder / "cases/previous.csv").write_text(text)
+    outcome = own()
+    assert outcome.returncode == 2
+    assert "previous.csv: needed: id, version, value in each row, as nocdyn verify --keep writes them" in outcome.stderr
+
+
+def test_the_values_of_the_previous_release_are_of_these_cases():
+    with (CASES / "previous.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len({row["version"] for row in rows}) == 1
+    names = {f"{table.parent.name}.{name}" for table in CASES.glob("*/cases.csv") for name in cases(table.parent.name)}
+    assert {row["id"] for row in rows} <= names
+
+
+def test_a_folder_that_cannot_be_written_is_told_before_anything_is_computed(own):
+    (own.folder / "out").write_text("a file")
+    outcome = own(command="none")
+    assert (outcome.returncode, outcome.stderr) == (3, "nocdyn: verify: out: cannot be written: File exists\n")
 
 
 def test_another_machine_fails(own):
@@ -124,8 +212,21 @@ def test_tables_are_refused_with_their_line(own, changes, message):
 def test_features_and_cases_are_chosen_by_name(tmp_path):
     assert verify(tmp_path, "campbell", "modes.two_discs.f1", "--quiet").stdout == ""
     assert {case["feature"] for case in report(tmp_path)["cases"]} == {"campbell", "modes"}
-    outcome = verify(tmp_path, "sails")
-    assert outcome.returncode == 2 and "there is no case or feature 'sails'; allowed: " in outcome.stderr
+    verify(tmp_path, "joints_that_lock.held_torque", "steady_states")
+    assert {case["feature"] for case in report(tmp_path)["cases"]} == {"joints that lock", "steady states"}
+
+
+@pytest.mark.parametrize(
+    ("word", "hint"),
+    [
+        ("sails", "allowed: a name as in the table, or a feature: bodies, couplings, shafts, "),
+        ("mode", "did you mean 'modes'?"),
+        ("modes.two_disc.f1", "did you mean 'modes.two_discs.f1'?"),
+    ],
+)
+def test_an_unknown_name_is_refused_with_a_hint(tmp_path, word, hint):
+    outcome = verify(tmp_path, word)
+    assert outcome.returncode == 2 and f"there is no case or feature {word!r}; {hint}" in outcome.stderr
 
 
 def test_a_folder_without_cases_is_refused(tmp_path):

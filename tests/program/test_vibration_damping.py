@@ -185,15 +185,6 @@ def test_numbers_of_the_damping_vary_in_sweeps(nocdyn, target, low, high):
         assert nocdyn.values()["omega_c"][-1] == pytest.approx(final, rel=1e-9)
 
 
-def test_entrained_water_is_a_share_of_the_inertia(nocdyn):
-    natural = []
-    for inertia in ("2.0 entrained = 0.25", "2.5"):
-        nocdyn.done(TRAIN.replace("inertia = 2.0", f"inertia = {inertia}") + RESPONSE, command="modes")
-        modes = json.loads((nocdyn.folder / "out/modes.json").read_text())["modes"]
-        natural.append([mode["frequency_Hz"] for mode in modes])
-    assert natural[0] == natural[1]
-
-
 @pytest.mark.parametrize(
     "group, complaint",
     [

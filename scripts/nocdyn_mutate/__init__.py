@@ -1,0 +1,1 @@
+"""Mutants of the laws, each with one wrong constant or sign: does a verification case fail?"""
