@@ -4,7 +4,11 @@ import csv
 import json
 
 import pytest
-from test_response import TURBINES
+from conftest import SOURCE
+
+# Two turbines, two stages of gears and a propeller.
+TURBINES = (SOURCE / "verification/response/marine_turbines/case.nml").read_text()
+TURBINES = TURBINES.replace("speed_rpm = 30, 41  count = 12", "speed_rpm = 20, 60  count = 41  operating_rpm = 38, 45")
 
 REFINED = 1e-5  # of a peak between the speeds of the grid
 LIMIT = "&limit coupling = 'line_shaft' vibratory_moment = 4e5 /\n"
