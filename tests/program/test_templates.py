@@ -59,6 +59,8 @@ def test_an_unknown_kind_and_a_file_that_exists_are_refused(nocdyn, template):
         "nocdyn: --kind: 'shipp' is no kind of machine; did you mean 'ship'?; allowed: "
         "'car', 'compressor', 'genset', 'mill', 'motor_fan', 'ship', 'wind'\n"
     )
+    outcome = nocdyn("new", "--kind", "boat", "other.nml")
+    assert outcome.stderr.count("allowed") == 1
     path = template("mill")
     outcome = nocdyn("new", "--kind", "car", "machine.nml")
     assert outcome.returncode == 3 and "exists and was not changed" in outcome.stderr

@@ -266,6 +266,9 @@ def test_a_critical_speed_in_operation_is_judged_by_the_limits_of_its_response(n
     report, _ = answer(nocdyn, "response", TRAIN + inside + "&limit coupling = 'shaft' vibratory_moment = 1e4 /\n")
     (line,) = lines_of(report, detail="order 1", **distance)
     assert line["finding"] == "restricted" and line["value"] == 0
+    report, _ = answer(nocdyn, "response", TRAIN + inside + "&limit coupling = 'shaft' vibratory_moment = 10 /\n")
+    (line,) = lines_of(report, detail="order 1", **distance)
+    assert line["finding"] == "exceeded" and "% of its limit" in line["assessment"]
     outside = RESPONSE.format(f"operating_rpm = {1.25 * speed}, {1.3 * speed}  margin = 0.1")
     report, _ = answer(nocdyn, "response", TRAIN + outside)
     (line,) = lines_of(report, **distance)

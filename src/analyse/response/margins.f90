@@ -108,7 +108,7 @@ contains
     line%reason = 'too near to operation'
     if (distance <= 0) line%reason = 'in operation'
     if (ratio > 0) then
-      line%finding = is_restricted
+      line%finding = merge(is_exceeded, is_restricted, ratio > 1)
       line%reason = line%reason // ', the response of ' // quoted(element) // ' has ' // rounded_text(percent * ratio, 3) // &
                     ' % of its limit'
     else if (ratio < 0) then

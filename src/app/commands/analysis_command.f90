@@ -218,7 +218,8 @@ contains
       if (size(results) > 1) call verdict%write_table(report)
       if (reading%folder /= '' .and. .not. allocated(error)) then
         call report%append_line(reading%machine%shown_file() // ': ' // counted(size(results), 'load case', 'load cases') // &
-                                '; ' // name // ' is in ' // shown_path(reading%folder))
+                                '; ' // name // ' is in ' // shown_path(reading%folder) // &
+                                trim(merge('; --case NAME prints more of one', repeat(' ', 32), size(results) > 1)))
       end if
       call print_text(report%text())
     end if

@@ -6,7 +6,7 @@ module nocdyn_new_command
   use nocdyn_errors, only: error_t, exit_done, exit_file, exit_input, raise
   use nocdyn_output_file, only: write_file
   use nocdyn_schema_help, only: input_template
-  use nocdyn_schema_text, only: suggestion
+  use nocdyn_schema_text, only: suggest
   use nocdyn_text, only: joined, quoted, shortened, shown_path, string_t
   implicit none (type, external)
   private
@@ -51,6 +51,8 @@ contains
     type(arguments_t), intent(in) :: arguments
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(out) :: error   !! there is no such kind
+    character(len=:), allocatable :: hint
+    logical :: is_near
     type(string_t), allocatable :: kinds(:)
 
     if (.not. arguments%is_given('--kind')) then
@@ -59,8 +61,9 @@ contains
     end if
     call find_built_in('template', arguments%value('--kind'), text, kinds)
     if (allocated(text)) return
-    call raise(error, exit_input, '--kind: ' // quoted(shortened(arguments%value('--kind'))) // ' is no kind of machine' // &
-               suggestion(arguments%value('--kind'), kinds) // '; allowed: ' // joined(kinds, ', '))
+    call suggest(arguments%value('--kind'), kinds, hint, is_near)
+    if (is_near) hint = hint // '; allowed: ' // joined(kinds, ', ')
+    call raise(error, exit_input, '--kind: ' // quoted(shortened(arguments%value('--kind'))) // ' is no kind of machine' // hint)
   end subroutine find_text
 
 end module nocdyn_new_command
