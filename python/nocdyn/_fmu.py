@@ -233,5 +233,7 @@ def main(words):
     except FileNotFoundError as error:
         print(f"nocdyn: {error}", file=sys.stderr)
         return 3
+    if given.case is None and re.search(r"^\s*&load_case\b", Path(given.file).read_text(errors="replace"), re.MULTILINE):
+        print(f"{given.file}: note: the machine by itself, without its load cases; --case NAME takes one")
     print(f"{path}: FMI {given.fmi}.0, co-simulation")
     return 0

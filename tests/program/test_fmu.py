@@ -502,10 +502,14 @@ def test_a_unit_brings_all_libraries_but_glibc(nocdyn, version):
 
 
 @fast_only
+def test_a_note_tells_that_load_cases_are_left_out(nocdyn):
+    assert "generator_set.nml: note: the machine by itself, without its load cases" in nocdyn("fmu", GENSET, env=PYTHON).stdout
+
+
 def test_the_name_is_that_of_the_input_and_of_the_load_case(nocdyn):
     case = first_case(GENSET)[1]
     assert nocdyn("fmu", GENSET, "--case", case, env=PYTHON).returncode == 0
-    assert nocdyn("fmu", nocdyn.write("3 rotors.nml", ROTOR), env=PYTHON).returncode == 0
+    assert nocdyn("fmu", nocdyn.write("3 rotors.nml", ROTOR), env=PYTHON).stdout == "3 rotors.fmu: FMI 2.0, co-simulation\n"
     assert nocdyn.files(".") == ["3 rotors.fmu", "3 rotors.nml", f"generator_set_{case}.fmu"]
     assert fmpy.read_model_description(str(nocdyn.folder / "3 rotors.fmu")).coSimulation.modelIdentifier == "m_3_rotors"
 
