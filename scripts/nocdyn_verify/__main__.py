@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from .cases import PREVIOUS, chosen, read_cases, read_previous, write_previous
+from .cases import RELEASED, chosen, read_cases, read_released, write_released
 from .failure import FAILED, VerificationError
 from .outcomes import Installation, Outcome, installation, verify, write_json
 from .page import verdict, write_page
@@ -24,7 +24,7 @@ def read_arguments(words: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help="write to DIR; default: results")
     parser.add_argument("--cases", type=Path, metavar="DIR", help="cases of one's own: a folder like that of the program")
     parser.add_argument("--threads", type=int, default=len(os.sched_getaffinity(0)), metavar="NUMBER")
-    parser.add_argument("--keep", action="store_true", help=f"write the values to {PREVIOUS} beside the cases, at a release")
+    parser.add_argument("--keep", action="store_true", help=f"write the values to {RELEASED} beside the cases, at a release")
     parser.add_argument("--quiet", action="store_true", help="print nothing but errors and failed cases")
     arguments = parser.parse_args(words)
     if arguments.threads < 1:
@@ -87,21 +87,21 @@ def main(words: Sequence[str]) -> int:
     arguments = read_arguments(words)
     try:
         program, folder = find_program(), find_cases(arguments.cases)
-        version, previous = read_previous(folder)
+        version, released = read_released(folder)
         cases = chosen(read_cases(folder), arguments.chosen)
         part = prepare(arguments.out)
         machine = installation(program, folder, cases)
-        outcomes = verify(program, folder, cases, previous, arguments.threads)
+        outcomes = verify(program, folder, cases, released, arguments.threads)
         write_results(part, machine, outcomes, version)
         tell(outcomes)
         code = 0 if all(one.passes for one in outcomes) else FAILED
         if arguments.keep and code == 0:
-            write_previous(folder, machine.version, {one.case.id: one.computed for one in outcomes})
+            write_released(folder, machine.version, {one.case.id: one.computed for one in outcomes})
     except VerificationError as error:
         print(f"nocdyn: verify: {error}", file=sys.stderr)
         return error.code
     if not arguments.quiet:
-        kept = f" {folder / PREVIOUS} has the values of {machine.version}." if arguments.keep and code == 0 else ""
+        kept = f" {folder / RELEASED} has the values of {machine.version}." if arguments.keep and code == 0 else ""
         print(f"{verdict(outcomes)} {arguments.out} has {NAME}.html, {NAME}.pdf and {NAME}.json.{kept}")
     return code
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from .failure import USAGE, VerificationError
 
 TABLE = "cases.csv"
-PREVIOUS = "previous.csv"
-PREVIOUS_COLUMNS = ("id", "version", "value")
+RELEASED = "released.csv"
+RELEASED_COLUMNS = ("id", "version", "value")
 INPUT = "case.nml"
 ORIGINS = ("closed form", "published", "conservation", "other code", "measured")
 ERRORS = ("relative", "absolute")
@@ -132,9 +132,9 @@ def read_case(path: Path, line: int, row: dict[str, str], feature: str) -> Case:
     return Case(**{**row, **numbers, **own})
 
 
-def read_previous(folder: Path) -> tuple[str, dict[str, float]]:
-    """The version of the previous release, and what it computed; nothing without such a file."""
-    path = folder / PREVIOUS
+def read_released(folder: Path) -> tuple[str, dict[str, float]]:
+    """The version of the latest release, and what it computed; nothing without such a file."""
+    path = folder / RELEASED
     try:
         with path.open(newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
@@ -144,18 +144,18 @@ def read_previous(folder: Path) -> tuple[str, dict[str, float]]:
     except OSError as error:
         raise VerificationError(f"{path}: cannot be read: {error.strerror}") from None
     except (IndexError, KeyError, TypeError, ValueError):
-        needed = f"{', '.join(PREVIOUS_COLUMNS)} in each row, as nocdyn verify --keep writes them"
+        needed = f"{', '.join(RELEASED_COLUMNS)} in each row, as nocdyn verify --keep writes them"
         raise VerificationError(f"{path}: needed: {needed}", USAGE) from None
 
 
-def write_previous(folder: Path, version: str, values: dict[str, float]) -> Path:
+def write_released(folder: Path, version: str, values: dict[str, float]) -> Path:
     """Keeps what this version computed, for the next one; the file."""
-    path = folder / PREVIOUS
+    path = folder / RELEASED
     part = path.with_suffix(".part")
     try:
         with part.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(PREVIOUS_COLUMNS)
+            writer.writerow(RELEASED_COLUMNS)
             writer.writerows((name, version, repr(value)) for name, value in sorted(values.items()))
         part.replace(path)
     except OSError as error:

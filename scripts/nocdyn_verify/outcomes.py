@@ -16,7 +16,7 @@ from .answers import Answers, NoAnswerError
 from .cases import INPUT, Case
 from .failure import VerificationError
 
-NOTABLE = 0.1  # share of the tolerance by which a value differs from that of the previous release and is marked
+NOTABLE = 0.1  # share of the tolerance by which a value differs from that of the latest release and is marked
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Outcome:
     case: Case
     computed: float | None
     problem: str  # why there is none, '' if there is one
-    previous: float | None  # of the previous release
+    released: float | None  # of the latest release
 
     @property
     def difference(self) -> float | None:
@@ -41,10 +41,10 @@ class Outcome:
 
     @property
     def change(self) -> float | None:
-        """How far the value is from that of the previous release, as a share of the tolerance."""
-        if self.computed is None or self.previous is None:
+        """How far the value is from that of the latest release, as a share of the tolerance."""
+        if self.computed is None or self.released is None:
             return None
-        return abs(self.case.difference(self.computed) - self.case.difference(self.previous)) / self.case.tolerance
+        return abs(self.case.difference(self.computed) - self.case.difference(self.released)) / self.case.tolerance
 
     @property
     def has_changed(self) -> bool:
@@ -64,7 +64,7 @@ class Installation:
     date: str
 
 
-def verify(program: Path, folder: Path, cases: Sequence[Case], previous: dict[str, float], threads: int) -> list[Outcome]:
+def verify(program: Path, folder: Path, cases: Sequence[Case], released: dict[str, float], threads: int) -> list[Outcome]:
     """The outcomes of the cases, in their order."""
 
     def key(case: Case) -> tuple[str, str]:
@@ -76,17 +76,17 @@ def verify(program: Path, folder: Path, cases: Sequence[Case], previous: dict[st
         def work(numbered: tuple[int, list[Case]]) -> list[Outcome]:
             number, group = numbered
             answers = Answers(program, folder, Path(results) / str(number))
-            return [outcome(answers, case, previous.get(case.id)) for case in group]
+            return [outcome(answers, case, released.get(case.id)) for case in group]
 
         found = {one.case.id: one for group in pool.map(work, enumerate(groups)) for one in group}
     return [found[case.id] for case in cases]
 
 
-def outcome(answers: Answers, case: Case, previous: float | None) -> Outcome:
+def outcome(answers: Answers, case: Case, released: float | None) -> Outcome:
     try:
-        return Outcome(case, answers.value(case), "", previous)
+        return Outcome(case, answers.value(case), "", released)
     except NoAnswerError as reason:
-        return Outcome(case, None, str(reason), previous)
+        return Outcome(case, None, str(reason), released)
 
 
 def installation(program: Path, folder: Path, cases: Sequence[Case]) -> Installation:
@@ -127,7 +127,7 @@ def write_json(path: Path, machine: Installation, outcomes: Sequence[Outcome]) -
             "difference": one.difference,
             "passes": one.passes,
             "problem": one.problem,
-            "previous": one.previous,
+            "released": one.released,
             "change": one.change,
             "has_changed": one.has_changed,
         }

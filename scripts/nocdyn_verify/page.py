@@ -40,9 +40,9 @@ def difference_text(one: Outcome) -> str:
     return f"{one.difference:.1e}" if one.difference else "0"
 
 
-def previous_text(one: Outcome) -> str:
-    """The value of the previous release, and how far the new one is from it where that is a notable part of the tolerance."""
-    return number(one.previous) + (f" ({one.change:.2g} tol.)" if one.has_changed else "")
+def released_text(one: Outcome) -> str:
+    """The value of the latest release, and how far the new one is from it where that is a notable part of the tolerance."""
+    return number(one.released) + (f" ({one.change:.2g} tol.)" if one.has_changed else "")
 
 
 def verdict(outcomes: Sequence[Outcome]) -> str:
@@ -65,17 +65,17 @@ def facts(machine: Installation, outcomes: Sequence[Outcome], version: str) -> l
         ("System", machine.system),
         ("Date", machine.date),
         ("Cases", f"{len(outcomes)}: {', '.join(counts)}"),
-        ("Previous release", changes(outcomes, version)),
+        ("As released", changes(outcomes, version)),
     ]
 
 
 def changes(outcomes: Sequence[Outcome], version: str) -> str:
-    """What is different from the previous release."""
+    """What is different from the values of the latest release."""
     if not version:
         return "none"
-    known = [one for one in outcomes if one.previous is not None]
+    known = [one for one in outcomes if one.released is not None]
     changed = [one.case.id for one in known if one.has_changed]
-    text = f"{version}, which computed {len(known)} of these values; "
+    text = f"{version} computed {len(known)} of these values where it was made; "
     if not changed:
         return text + f"none differs by more than {NOTABLE:g} of its tolerance"
     return text + f"by more than {NOTABLE:g} of the tolerance differ {len(changed)}: {', '.join(changed)}"
@@ -90,7 +90,7 @@ HEADINGS = (
     ("number", "difference"),
     ("number", "tolerance"),
     ("", "result"),
-    ("number", "previous release"),
+    ("number", "as released"),
 )
 
 
@@ -112,7 +112,7 @@ def write_row(one: Outcome) -> str:
         ("number", difference_text(one)),
         ("number", f"{case.tolerance:.3g} {case.error[:3]}."),
         ("", escape(result)),
-        ("number changed" if one.has_changed else "number", previous_text(one)),
+        ("number changed" if one.has_changed else "number", released_text(one)),
     ]
     columns = "".join(f'<td class="{kind}">{text}</td>' if kind else f"<td>{text}</td>" for kind, text in cells)
     return f"<tr{'' if one.passes else ' class=failed'}>{columns}</tr>"

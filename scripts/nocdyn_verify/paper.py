@@ -9,7 +9,7 @@ from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
 from .outcomes import Installation, Outcome
-from .page import difference_text, facts, number, previous_text, verdict
+from .page import difference_text, facts, number, released_text, verdict
 from .picture import STYLE, draw_on
 
 SIZE = (11.69, 8.27)  # A4, lying [in]
@@ -25,7 +25,7 @@ COLUMNS = (  # heading, place, characters
     ("difference", 0.508, 10),
     ("allowed", 0.555, 14),
     ("result", 0.615, 10),
-    ("previous", 0.655, 14),
+    ("as released", 0.655, 14),
     ("origin and reference", 0.725, 52),
 )
 
@@ -65,7 +65,7 @@ def rows(one: Outcome) -> list[tuple[str, ...]]:
         difference_text(one),
         f"{case.tolerance:.3g} {case.error[:3]}.",
         "pass" if one.passes else f"FAIL {one.problem}",
-        previous_text(one),
+        released_text(one),
         f"{case.origin}: {case.reference}",
     )
     wrapped = [textwrap.wrap(text, width) or [""] for text, (_, _, width) in zip(texts, COLUMNS)]

@@ -105,26 +105,26 @@ def test_every_folder_of_a_case_is_used():
 
 def test_a_release_keeps_its_values_for_the_next_one(own):
     assert own().returncode == 0
-    assert report(own.folder)["cases"][0]["previous"] is None
-    previous = own.folder / "cases/previous.csv"
+    assert report(own.folder)["cases"][0]["released"] is None
+    released = own.folder / "cases/released.csv"
     outcome = own("--keep")
     assert (outcome.returncode, outcome.stderr) == (0, "")
     version = report(own.folder)["installation"]["version"]
-    assert outcome.stdout.endswith(f"previous.csv has the values of {version}.\n")
+    assert outcome.stdout.endswith(f"released.csv has the values of {version}.\n")
     value = report(own.folder)["cases"][0]["computed"]
-    assert previous.read_text() == f"id,version,value\nmodes.two_discs.f1,{version},{value!r}\n"
-    previous.write_text(previous.read_text().replace(version, "0.0.9"))
+    assert released.read_text() == f"id,version,value\nmodes.two_discs.f1,{version},{value!r}\n"
+    released.write_text(released.read_text().replace(version, "0.0.9"))
     own()
     (case,) = report(own.folder)["cases"]
-    assert (case["previous"], case["change"], case["has_changed"]) == (value, 0, False)
+    assert (case["released"], case["change"], case["has_changed"]) == (value, 0, False)
     page = (own.folder / "out/verification.html").read_text()
-    assert "0.0.9, which computed 1 of these values; none differs by more than 0.1 of its tolerance" in page
+    assert "0.0.9 computed 1 of these values where it was made; none differs by more than 0.1 of its tolerance" in page
 
 
-def test_a_value_that_differs_from_the_previous_release_by_a_part_of_its_tolerance_is_marked(own):
+def test_a_value_that_differs_from_the_release_by_a_part_of_its_tolerance_is_marked(own):
     for share, is_marked in ((0.09, False), (0.5, True)):
         value = TWO_DISCS * (1 + share * 1e-6)
-        (own.folder / "cases/previous.csv").write_text(f"id,version,value\nmodes.two_discs.f1,0.0.9,{value!r}\n")
+        (own.folder / "cases/released.csv").write_text(f"id,version,value\nmodes.two_discs.f1,0.0.9,{value!r}\n")
         assert own(tolerance="1e-6").returncode == 0
         (case,) = report(own.folder)["cases"]
         assert case["change"] == pytest.approx(share, rel=1e-6) and case["has_changed"] == is_marked
@@ -135,7 +135,7 @@ def test_a_value_that_differs_from_the_previous_release_by_a_part_of_its_toleran
 
 def test_the_values_of_a_case_that_fails_are_not_kept(own):
     assert own("--keep", expected="7.9").returncode == 1
-    assert not (own.folder / "cases/previous.csv").exists()
+    assert not (own.folder / "cases/released.csv").exists()
 
 
 def test_the_values_of_chosen_cases_are_not_kept(own):
@@ -145,14 +145,14 @@ def test_the_values_of_chosen_cases_are_not_kept(own):
 
 @pytest.mark.parametrize("text", ["", "id,value\n", "id,version,value\nmodes.two_discs.f1,0.0.9,seven\n", "id,version\na,b\n"])
 def test_values_of_a_release_that_cannot_be_read_are_refused(own, text):
-    (own.folder / "cases/previous.csv").write_text(text)
+    (own.folder / "cases/released.csv").write_text(text)
     outcome = own()
     assert outcome.returncode == 2
-    assert "previous.csv: needed: id, version, value in each row, as nocdyn verify --keep writes them" in outcome.stderr
+    assert "released.csv: needed: id, version, value in each row, as nocdyn verify --keep writes them" in outcome.stderr
 
 
-def test_the_values_of_the_previous_release_are_of_these_cases():
-    with (CASES / "previous.csv").open(newline="") as file:
+def test_the_released_values_are_of_these_cases():
+    with (CASES / "released.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert len({row["version"] for row in rows}) == 1
     names = {f"{table.parent.name}.{name}" for table in CASES.glob("*/cases.csv") for name in cases(table.parent.name)}
