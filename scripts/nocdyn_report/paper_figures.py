@@ -8,9 +8,10 @@ from pathlib import Path
 from matplotlib import pyplot
 from matplotlib.figure import Figure
 
+from .failure import ResultsError
 from .paper_machine import steady_state
 from .phase_planes import draw_phase_planes
-from .results import Results, ResultsError, read_results
+from .results import Results, read_results
 from .style import REFERENCE, WIDTH, add_title, draw_lines, save
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -59,7 +60,8 @@ def main() -> None:
     try:
         names = draw_paper_figures(*map(read_results, arguments.results), arguments.out)
     except ResultsError as error:
-        sys.exit(f"{parser.prog}: {error}")
+        print(f"{parser.prog}: {error}", file=sys.stderr)
+        sys.exit(error.code)
     if arguments.media:
         MEDIA.mkdir(parents=True, exist_ok=True)
         for name in names:

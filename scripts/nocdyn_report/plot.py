@@ -6,6 +6,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from .failure import USAGE, ResultsError
+
 # Kind of results -> the module that draws it, the names of its files.
 KINDS = {
     "run": ("run_figures", "trajectory.*"),
@@ -17,7 +19,6 @@ KINDS = {
 }
 PAPER = "paper"
 SHARED = ("--out", "--format")  # options of every kind
-USAGE = 2
 HELP = f"""\
 usage: nocdyn plot [KIND] RESULTS [OPTION]...
 
@@ -27,6 +28,14 @@ Draws the results in the folder RESULTS. KIND: {", ".join(KINDS)}; without it, a
 
 
 def main(words: Sequence[str]) -> int:
+    try:
+        return _plot(words)
+    except ResultsError as error:
+        print(f"{sys.argv[0]}: {error}", file=sys.stderr)
+        return error.code
+
+
+def _plot(words: Sequence[str]) -> int:
     if not words or words[0] in ("--help", "-h"):
         print(HELP)
         return 0 if words else USAGE

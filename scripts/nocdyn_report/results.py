@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 
 from .columns import COLUMNS, Column, read_column_list
-from .trajectory_files import ResultsError, labels_of, read_columns
+from .failure import ChoiceError, ResultsError
+from .trajectory_files import labels_of, read_columns
 
 TIME = "t [s]"
 FILES = ("trajectory.csv", "trajectory.nc", "trajectory.partial.csv", "trajectory.partial.nc")
@@ -88,7 +89,7 @@ class Results:
         """The rows from one time to another."""
         inside = self.table[(self.time >= start) & (self.time <= end)]
         if len(inside) < 2:
-            raise ResultsError(
+            raise ChoiceError(
                 f"{self.folder}: nothing to draw: {len(inside)} row(s) in the chosen time; "
                 f"the trajectory goes from {self.time[0]:g} to {self.time[-1]:g} s"
             )

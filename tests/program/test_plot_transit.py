@@ -199,7 +199,7 @@ def without_a_column(results):
         (shutil.rmtree, "there is no such results folder"),
         (remove("transit.json"), "no transit.json here; 'nocdyn transit FILE --out "),
         (remove("transit.csv"), "no transit.csv here; 'nocdyn transit FILE --out "),
-        (write("transit.json", "{"), "transit.json: cannot be read: "),
+        (write("transit.json", "{"), "transit.json: is no complete JSON: line 1"),
         (write("transit.json", "{}"), "transit.json: this is no transit.json of nocdyn"),
         (write("transit.csv", "passage\n1\n2\n"), "transit.csv: there is no column 't [s]'; it must be of the same run"),
         (without_a_column, "transit.csv: there is no column 'stress_s$ [Pa]'; it must be of the same run as transit.json"),

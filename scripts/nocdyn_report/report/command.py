@@ -42,9 +42,8 @@ def main(words: Sequence[str] | None = None) -> None:
         message = str(error) if str(error).startswith("nocdyn: ") else f"nocdyn report: {error}"
         print(message, file=sys.stderr)
         sys.exit(error.code)
-    except BrokenPipeError:  # who reads the output has gone: what is still to be printed goes nowhere
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(FILES)
+    except OSError:  # the caller tells it, with the file or the output
+        raise
     except Exception as error:  # a traceback helps nobody at the keyboard
         place = error.__traceback__
         while place.tb_next:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..columns import LOADS, RESPONSE_COLUMNS, read_column_list
+from ..failure import ResultsError
 from ..speed_results import Axis, read_critical, roman
-from ..trajectory_files import ResultsError
 from .failure import USAGE, ReportError
 from .naming import is_end, name_of
 from .result_files import ResultFiles
