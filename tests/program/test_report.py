@@ -347,6 +347,12 @@ def test_only_what_does_not_belong_to_the_input_is_computed_again(fresh):
     assert states() == dict.fromkeys(commands, "computed")
     (fresh.folder / "results/m/blow/trajectory.csv").unlink()
     assert states() == dict.fromkeys(commands, "reused") | {"run": "computed"}
+    for name in ("calm/summary.json", "blow/trajectory.csv"):  # a number by hand, a table that lost its end
+        file = fresh.folder / "results/m" / name
+        whole = file.read_text()
+        file.write_text(whole.replace("5", "6", 1) if name.endswith("json") else whole[: len(whole) // 2])
+        assert states() == dict.fromkeys(commands, "reused") | {"run": "computed"}
+        assert states() == dict.fromkeys(commands, "reused")
 
 
 def test_a_load_case_without_a_steady_state_leaves_the_sections_to_the_next(fresh, browser):
