@@ -171,6 +171,7 @@ def test_findings_are_those_of_the_files(reports, opened):
     ]
     assert ratios == sorted(ratios, reverse=True) and ratios[-1] > 100
     assert opened.find("#summary p").text.startswith("exceeded: coupling 'tyre', ")
+    assert "(load case calm" in opened.find("#summary p").text or "(load case blow" in opened.find("#summary p").text
     shown = zip(column(opened, "Barred ranges", "from"), column(opened, "Barred ranges", "to"))
     ranges = [(one["from_rad_s"] * RPM, one["to_rad_s"] * RPM) for one in report["barred_speed_ranges"]]
     assert ranges and [tuple(map(plain, pair)) for pair in shown] == [pytest.approx(pair, rel=1e-4) for pair in ranges]
@@ -474,6 +475,13 @@ def test_without_a_browser_there_is_no_half_a_report(reports):
     )
     assert reports.page().read_bytes() == before
     assert not list(reports.page().parent.glob(".*"))
+    assert reports("m.nml", "--quiet", "--out", "nothing", PATH="/nowhere").returncode == 3
+    assert not (reports.folder / "nothing").exists()  # told before anything is computed
+
+
+def test_a_folder_is_no_input(fresh):
+    outcome = fresh(".", "--no-pdf")
+    assert (outcome.returncode, outcome.stderr) == (3, "nocdyn report: .: is no file; the report shows the text of the input\n")
 
 
 def test_a_folder_with_a_sweep_is_refused(fresh):
@@ -736,6 +744,7 @@ def test_changes_since_another_revision_are_told(fresh, browser):
     assert fresh("m.nml", "--no-pdf", "--quiet", "--against", "results/m").returncode == 2
     outcome = fresh("m.nml", "--no-pdf", "--quiet", "--against", "none")
     assert (outcome.returncode, outcome.stderr) == (2, "nocdyn report: --against none: has no results of nocdyn\n")
+    assert fresh("m.nml", "--no-pdf", "--out", "new", "--against", "none").stdout == ""  # nothing was computed
 
 
 def test_lines_that_fill_a_panel_are_bands():
