@@ -20,3 +20,8 @@ def read_json(file: Path, keys: Collection[str]) -> dict:
     if not isinstance(content, dict) or not set(keys) <= content.keys():
         raise ResultsError(f"{file}: this is no {file.name} of nocdyn")
     return content
+
+
+def with_case(title: str, case: str) -> str:
+    """The title of a machine, with the load case that results are of, if there is one."""
+    return f"{title}: load case {case}" if case else title

@@ -11,7 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .failure import ResultsError
+from .json_files import with_case
 from .modes_results import Modes, read_modes
+from .report.result_files import case_of
 from .style import COLOURS, WIDTH, add_format_option, add_title, plain, save, saved
 from .train_drawing import EDGE, MOST_NAMES, ROW, draw_shape, draw_train
 
@@ -87,7 +89,10 @@ def draw_all(modes: Modes, most: int, folder: Path, formats: Sequence[str]) -> l
     chosen = modes.shaped[:most]
     if not chosen:
         raise ResultsError(f"{modes.folder / 'modes.json'}: nothing to draw: no mode oscillates")
-    titles = modes.content["title"] or Path(modes.content["input"]).name, f"modes about {modes.content['about']}"
+    titles = (
+        with_case(modes.content["title"] or Path(modes.content["input"]).name, case_of(modes.folder, "modes")),
+        f"modes about {modes.content['about']}",
+    )
     names = []
     for part in range(math.ceil(len(chosen) / MOST_MODES)):
         figure = draw_modes(modes, chosen[part * MOST_MODES : (part + 1) * MOST_MODES])

@@ -3,6 +3,7 @@
 import argparse
 import shutil
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib import pyplot
@@ -12,7 +13,7 @@ from .failure import ResultsError
 from .paper_machine import steady_state
 from .phase_planes import draw_phase_planes
 from .results import Results, read_results
-from .style import REFERENCE, WIDTH, add_title, draw_lines, save
+from .style import FORMATS, REFERENCE, WIDTH, add_format_option, add_title, draw_lines, save, saved
 
 ROOT = Path(__file__).resolve().parents[2]
 MEDIA = ROOT / "docs" / "media"
@@ -32,7 +33,7 @@ def draw_elastic_moments(results: Results) -> Figure:
     return figure
 
 
-def draw_paper_figures(case1: Results, case2: Results, folder: Path) -> list[str]:
+def draw_paper_figures(case1: Results, case2: Results, folder: Path, formats: Sequence[str] = FORMATS) -> list[str]:
     """Saves the figures and gives their names."""
     drawn = []
     for number, results in ((2, case1), (4, case2)):
@@ -41,7 +42,7 @@ def draw_paper_figures(case1: Results, case2: Results, folder: Path) -> list[str
         add_title(moments, f"Figure {number + 1}. Elastic moments. {results.title}")
         for offset, figure in enumerate((planes, moments)):
             drawn.append(f"figure{number + offset}")
-            save(figure, folder, drawn[-1])
+            save(figure, folder, drawn[-1], formats)
     return drawn
 
 
@@ -55,10 +56,11 @@ def main() -> None:
         metavar="DIR",
         help="where figure2 ... figure5 go, as PNG, SVG and PDF (%(default)s)",
     )
+    add_format_option(parser)
     parser.add_argument("--media", action="store_true", help="also copy the PNG files to docs/media, for the README")
     arguments = parser.parse_args()
     try:
-        names = draw_paper_figures(*map(read_results, arguments.results), arguments.out)
+        names = draw_paper_figures(*map(read_results, arguments.results), arguments.out, arguments.format)
     except ResultsError as error:
         print(f"{parser.prog}: {error}", file=sys.stderr)
         sys.exit(error.code)
@@ -66,7 +68,7 @@ def main() -> None:
         MEDIA.mkdir(parents=True, exist_ok=True)
         for name in names:
             shutil.copy(arguments.out / f"{name}.png", MEDIA)
-    print(f"{', '.join(names)} (PNG, SVG, PDF) are in {arguments.out}")
+    print(saved(names, arguments.format, arguments.out))
 
 
 if __name__ == "__main__":

@@ -10,7 +10,8 @@ import pandas as pd
 
 from .columns import MOMENT, RESPONSE_COLUMNS, STRESS, Column, read_column_list
 from .failure import ResultsError
-from .json_files import read_json
+from .json_files import read_json, with_case
+from .report.result_files import case_of
 from .results import RPM
 from .trajectory_files import labels_of, read_columns
 
@@ -261,7 +262,7 @@ def read_response(folder: Path) -> Response:
         lines = [_line(entry, frequency) for entry, frequency in zip(report["lines"], frequencies[0])]
     return Response(
         folder,
-        _title(report, folder),
+        _title(report, folder, "response"),
         axis,
         speed[rising],
         columns,
@@ -285,7 +286,7 @@ def read_campbell(folder: Path) -> Campbell:
         lines.append((_line(entry, frequency[0]), frequency[rising]))
     return Campbell(
         folder,
-        _title(report, folder),
+        _title(report, folder, "campbell"),
         report["body"],
         speed[rising],
         {mode: table[label].to_numpy()[rising] for mode, label in modes.items()},
@@ -382,5 +383,5 @@ def _operation(report: dict) -> Operation | None:
     return Operation(slow, fast, report.get("margin", 0.0))
 
 
-def _title(report: dict, folder: Path) -> str:
-    return report.get("title") or Path(report.get("input") or folder.resolve()).name
+def _title(report: dict, folder: Path, command: str) -> str:
+    return with_case(report.get("title") or Path(report.get("input") or folder.resolve()).name, case_of(folder, command))

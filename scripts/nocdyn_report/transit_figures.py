@@ -19,7 +19,7 @@ from .speed_panels import DANGER, HALO, SMALL, Figures, draw_folders
 from .speed_results import short_unit
 from .style import COLOURS, PIXELS, WIDTH, add_format_option, add_title, plain
 from .thinning import thin
-from .transit_results import NEAR, Limited, Passage, Transit, folders_of, read_transit
+from .transit_results import NEAR, Limited, Passage, Transit, read_transit
 
 BESIDE = 2  # passages in a figure
 MOST_ROWS = 5  # quantities in a figure
@@ -168,14 +168,13 @@ def main() -> None:
         type=Path,
         nargs="+",
         metavar="RESULTS",
-        help="folders that 'nocdyn transit' wrote, of load cases all of theirs",
+        help="folders that 'nocdyn transit' wrote",
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="where the figures of one folder go (RESULTS/figures)")
     add_format_option(parser)
     arguments = parser.parse_args()
-    arguments.results = [one for folder in arguments.results for one in folders_of(folder)]
     if arguments.out and len(arguments.results) > 1:
-        parser.error("--out is for one folder of results, or one load case")
+        parser.error("--out is for one folder of results")
     draw_folders(arguments, figures_of)
 
 

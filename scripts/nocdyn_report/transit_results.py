@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 
 from .failure import ResultsError
-from .json_files import read_json
+from .json_files import read_json, with_case
 from .results import RPM, TIME
 from .speed_results import SPEED, rpm
 from .trajectory_files import labels_of, read_columns
 
-REPORT, TABLE, CASES = "transit.json", "transit.csv", "transit_cases.json"
+REPORT, TABLE = "transit.json", "transit.csv"
 PASSAGE = "passage"
 NEAR = 4.0  # times what is reached: limits beyond are not in the picture
 TRANSIENT = "transient"  # the last word of criteria on half ranges
@@ -90,8 +90,7 @@ class Transit:
 
     @property
     def title(self) -> str:
-        named = self.report.get("title") or Path(self.report["input"]).stem
-        return f"{named}: load case {self.case}" if self.case else named
+        return with_case(self.report.get("title") or Path(self.report["input"]).stem, self.case)
 
     @property
     def case(self) -> str:
@@ -123,14 +122,6 @@ class Transit:
         element, criterion = (lines[0]["element"], lines[0]["criterion"]) if lines else (name, "")
         limits = [one["limit"] for one in lines if not one["criterion"].endswith(TRANSIENT) and "limit" in one]
         return Limited(name, unit, element, criterion.rpartition(", ")[0] or name, min(limits, default=None))
-
-
-def folders_of(folder: Path) -> list[Path]:
-    """The folder itself, or those of its load cases."""
-    if (folder / REPORT).is_file() or not (folder / CASES).is_file():
-        return [folder]
-    listed = read_json(folder / CASES, ["load_cases"])["load_cases"]
-    return [folder / one["folder"] for one in listed if one["status"] == "done"]
 
 
 def read_transit(folder: Path) -> Transit:
