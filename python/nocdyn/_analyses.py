@@ -1,5 +1,6 @@
 """The commands of the program."""
 
+import json
 import os
 import re
 import subprocess
@@ -81,8 +82,18 @@ def _results(command, folder, case):
     report, tables = _FILES[command]
     if (folder / report).exists():
         return Result(folder, report, tables)
-    cases = {path.parent.name: Result(path.parent, report, tables) for path in sorted(folder.glob(f"*/{report}"))}
+    cases = {name: Result(folder / name, report, tables) for name in _case_names(command, folder, report)}
     return cases[case] if case else cases
+
+
+def _case_names(command, folder, report):
+    """Of the load cases that have results, in the order of the input where there is a report on all of them."""
+    names = sorted(path.parent.name for path in folder.glob(f"*/{report}"))
+    index = folder / ("cases.json" if command == "run" else f"{command}_cases.json")
+    if not index.exists():
+        return names
+    listed = [one["folder"] for one in json.loads(index.read_text(encoding="utf-8"))["load_cases"]]
+    return sorted(names, key=lambda name: listed.index(name) if name in listed else len(listed))
 
 
 def _execute(words, folder, progress):

@@ -1,6 +1,7 @@
 """Machines in this process, by the library of nocdyn.h."""
 
 import ctypes
+import difflib
 import weakref
 from ctypes import POINTER, c_char_p, c_double, c_int, c_void_p
 from functools import cache
@@ -54,6 +55,21 @@ def _library():
 def release():
     """The version of nocdyn."""
     return _library().nocdyn_release().decode()
+
+
+def _number(value, what):
+    """A number, also one of NumPy; no text."""
+    try:
+        if not isinstance(value, str):
+            return float(value)
+    except (TypeError, ValueError):
+        pass
+    raise TypeError(f"{what} must be a number, not {value!r}")
+
+
+def _hint(name, names):
+    near = difflib.get_close_matches(str(name), names, 1)
+    return f"; did you mean {near[0]!r}?" if near else "; signals has all of them"
 
 
 class State:
@@ -124,7 +140,7 @@ class Machine:
 
     @end_time.setter
     def end_time(self, t):
-        self._raise_if_wrong(self._call("set_end_time", t))
+        self._raise_if_wrong(self._call("set_end_time", _number(t, "a time")))
 
     @property
     def input(self):
@@ -148,7 +164,7 @@ class Machine:
 
     def run_to(self, t):
         """Integrates to a time [s]."""
-        self._raise_if_wrong(self._call("run_to", t))
+        self._raise_if_wrong(self._call("run_to", _number(t, "a time")))
 
     def read(self):
         """The signals at the present time, by their names."""
@@ -157,14 +173,17 @@ class Machine:
 
     def __getitem__(self, name):
         """A signal at the present time."""
+        if name not in self.signals:
+            raise KeyError(f"there is no signal {name!r}{_hint(name, self.signals)}")
         return self.read()[name]
 
     def __setitem__(self, path, value):
         """Sets a number from the present time on: machine['load.work.viscous'] = 80."""
-        self._raise_if_wrong(self._call("set", path.encode(), value))
+        self._raise_if_wrong(self._call("set", path.encode(), _number(value, f"'{path}'")))
 
     def set_torque(self, name, torque, rate=0.0):
         """Sets the torque of an `&excitation kind = 'external'` from the present time on [N m], and its rate [N m/s]."""
+        torque, rate = _number(torque, "a torque"), _number(rate, "a rate")
         self._raise_if_wrong(self._call("set_torque", name.encode(), torque, rate))
 
     def keep(self):
@@ -175,6 +194,8 @@ class Machine:
 
     def restore(self, state):
         """Goes back to a state of this machine."""
+        if not isinstance(state, State):
+            raise TypeError(f"restore needs a state that keep has given, not {state!r}")
         if state.machine is not self:
             raise ValueError("the state is of another machine")
         self._raise_if_wrong(self._call("restore", state.address))

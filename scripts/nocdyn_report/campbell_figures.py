@@ -181,7 +181,7 @@ def main() -> None:
     arguments = arguments_of(parser)
     if arguments.top is not None and arguments.top <= 0:
         parser.error("--top must be above 0")
-    draw_folders(parser.prog, arguments, partial(figures_of, arguments=arguments))
+    draw_folders(arguments, partial(figures_of, arguments=arguments))
 
 
 if __name__ == "__main__":

@@ -1,12 +1,12 @@
 """What the columns of tables of results are: columns.json, of a response response_columns.json. Figures and report name, order
 and choose columns by it."""
 
-import json
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from .trajectory_files import ResultsError
+from .failure import ResultsError
+from .json_files import read_json
 
 COLUMNS, RESPONSE_COLUMNS = "columns.json", "response_columns.json"
 MOMENT, REACTION, FORCE, STRESS, TORQUE, LOSS, SPEED, SLIP, TWIST, CURRENT, DETAIL = range(1, 12)  # ranks
@@ -57,9 +57,9 @@ def read_column_list(folder: Path, name: str = COLUMNS) -> list[Column]:
     if not file.is_file():
         raise ResultsError(f"{folder}: no {name} here, as results of older releases have none; compute the results again")
     try:
-        return columns_of(json.loads(file.read_text(encoding="utf-8"))["columns"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise ResultsError(f"{file}: cannot be read: {' '.join(str(error).split())}") from None
+        return columns_of(read_json(file, ["columns"])["columns"])
+    except (AttributeError, TypeError):
+        raise ResultsError(f"{file}: this is no {file.name} of nocdyn") from None
 
 
 def columns_of(entries: Iterable[dict]) -> list[Column]:

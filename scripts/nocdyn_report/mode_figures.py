@@ -2,7 +2,6 @@
 
 import argparse
 import math
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,10 +10,12 @@ from matplotlib import pyplot
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from .failure import ResultsError
+from .json_files import with_case
 from .modes_results import Modes, read_modes
+from .report.result_files import case_of
 from .style import COLOURS, WIDTH, add_format_option, add_title, plain, save, saved
 from .train_drawing import EDGE, MOST_NAMES, ROW, draw_shape, draw_train
-from .trajectory_files import ResultsError
 
 MOST_LETTERS = 24  # of names that stand side by side under the narrower axes
 MOST_MODES = 6  # of a figure
@@ -88,7 +89,10 @@ def draw_all(modes: Modes, most: int, folder: Path, formats: Sequence[str]) -> l
     chosen = modes.shaped[:most]
     if not chosen:
         raise ResultsError(f"{modes.folder / 'modes.json'}: nothing to draw: no mode oscillates")
-    titles = modes.content["title"] or Path(modes.content["input"]).name, f"modes about {modes.content['about']}"
+    titles = (
+        with_case(modes.content["title"] or Path(modes.content["input"]).name, case_of(modes.folder, "modes")),
+        f"modes about {modes.content['about']}",
+    )
     names = []
     for part in range(math.ceil(len(chosen) / MOST_MODES)):
         figure = draw_modes(modes, chosen[part * MOST_MODES : (part + 1) * MOST_MODES])
@@ -114,10 +118,7 @@ def main() -> None:
     if arguments.modes < 1:
         parser.error("--modes must be at least 1")
     folder = arguments.out or arguments.results / "figures"
-    try:
-        names = draw_all(read_modes(arguments.results), arguments.modes, folder, arguments.format)
-    except ResultsError as error:
-        sys.exit(f"{parser.prog}: {error}")
+    names = draw_all(read_modes(arguments.results), arguments.modes, folder, arguments.format)
     print(saved(names, arguments.format, folder))
 
 

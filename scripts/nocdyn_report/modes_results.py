@@ -1,14 +1,15 @@
 """The modes that 'nocdyn modes --out' wrote, read from their folder."""
 
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from .failure import ResultsError
+from .json_files import read_json
 from .train_layout import GROUND, Train, lay_out
-from .trajectory_files import ResultsError, labels_of
+from .trajectory_files import labels_of
 
 TOO_FEW = 1.0e-3  # relative error of a frequency, by the nodes of shafts, from which on the program marks it
 VAGUE = 0.03  # from which on it is not known better
@@ -73,12 +74,6 @@ def marks_of(mode: dict) -> list[str]:
 
 def read_modes(folder: Path) -> Modes:
     file = folder / "modes.json"
-    try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ResultsError(f"{folder}: no modes.json here; 'nocdyn modes FILE --out {folder}' writes it") from None
-    except (OSError, ValueError) as error:
-        raise ResultsError(f"{file}: cannot be read: {error}") from None
-    if not isinstance(content, dict) or not {"bodies", "couplings", "gears", "modes", "about"} <= content.keys():
-        raise ResultsError(f"{file}: this is no modes.json of nocdyn")
-    return Modes(folder, content)
+    if not file.is_file():
+        raise ResultsError(f"{folder}: no modes.json here; 'nocdyn modes FILE --out {folder}' writes it")
+    return Modes(folder, read_json(file, ("bodies", "couplings", "gears", "modes", "about")))

@@ -3,15 +3,17 @@
 import argparse
 import shutil
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib import pyplot
 from matplotlib.figure import Figure
 
+from .failure import ResultsError
 from .paper_machine import steady_state
 from .phase_planes import draw_phase_planes
-from .results import Results, ResultsError, read_results
-from .style import REFERENCE, WIDTH, add_title, draw_lines, save
+from .results import Results, read_results
+from .style import FORMATS, REFERENCE, WIDTH, add_format_option, add_title, draw_lines, save, saved
 
 ROOT = Path(__file__).resolve().parents[2]
 MEDIA = ROOT / "docs" / "media"
@@ -31,7 +33,7 @@ def draw_elastic_moments(results: Results) -> Figure:
     return figure
 
 
-def draw_paper_figures(case1: Results, case2: Results, folder: Path) -> list[str]:
+def draw_paper_figures(case1: Results, case2: Results, folder: Path, formats: Sequence[str] = FORMATS) -> list[str]:
     """Saves the figures and gives their names."""
     drawn = []
     for number, results in ((2, case1), (4, case2)):
@@ -40,7 +42,7 @@ def draw_paper_figures(case1: Results, case2: Results, folder: Path) -> list[str
         add_title(moments, f"Figure {number + 1}. Elastic moments. {results.title}")
         for offset, figure in enumerate((planes, moments)):
             drawn.append(f"figure{number + offset}")
-            save(figure, folder, drawn[-1])
+            save(figure, folder, drawn[-1], formats)
     return drawn
 
 
@@ -54,17 +56,19 @@ def main() -> None:
         metavar="DIR",
         help="where figure2 ... figure5 go, as PNG, SVG and PDF (%(default)s)",
     )
+    add_format_option(parser)
     parser.add_argument("--media", action="store_true", help="also copy the PNG files to docs/media, for the README")
     arguments = parser.parse_args()
     try:
-        names = draw_paper_figures(*map(read_results, arguments.results), arguments.out)
+        names = draw_paper_figures(*map(read_results, arguments.results), arguments.out, arguments.format)
     except ResultsError as error:
-        sys.exit(f"{parser.prog}: {error}")
+        print(f"{parser.prog}: {error}", file=sys.stderr)
+        sys.exit(error.code)
     if arguments.media:
         MEDIA.mkdir(parents=True, exist_ok=True)
         for name in names:
             shutil.copy(arguments.out / f"{name}.png", MEDIA)
-    print(f"{', '.join(names)} (PNG, SVG, PDF) are in {arguments.out}")
+    print(saved(names, arguments.format, arguments.out))
 
 
 if __name__ == "__main__":

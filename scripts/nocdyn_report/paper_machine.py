@@ -3,7 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from .results import Results, ResultsError
+from .failure import ResultsError
+from .results import Results
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from .failure import ResultsError
 from .paper_machine import steady_state
-from .results import Results, ResultsError, read_results
+from .results import Results, read_results
 
 
 def last_period(results: Results) -> np.ndarray:
@@ -41,7 +42,8 @@ def main() -> None:
     try:
         print("\n\n".join(table(read_results(folder)) for folder in arguments.results))
     except ResultsError as error:
-        sys.exit(f"{parser.prog}: {error}")
+        print(f"{parser.prog}: {error}", file=sys.stderr)
+        sys.exit(error.code)
 
 
 if __name__ == "__main__":

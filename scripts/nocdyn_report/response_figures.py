@@ -16,8 +16,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from .columns import by_sort
+from .failure import ChoiceError
 from .response_marks import BARRED, draw_barred, mark_criticals
-from .results import ResultsError
 from .selection import matches
 from .speed_panels import (
     DANGER,
@@ -238,7 +238,7 @@ def chosen(response: Response, patterns: Sequence[str] | None) -> list[Quantity]
         found = {one.label for one in response.quantities if matches(pattern, one.label)}
         if not found:
             there = ", ".join(one.label for one in response.quantities[:8])
-            raise ResultsError(f"{response.folder}: no quantity matches '{pattern}'; there are: {there}")
+            raise ChoiceError(f"{response.folder}: no quantity matches '{pattern}'; there are: {there}")
         labels |= found
     return [one for one in response.quantities if one.label in labels]
 
@@ -249,7 +249,7 @@ def figures_of(folder: Path, arguments: argparse.Namespace) -> Figures:
     orders = [line.value for line in response.lines if line.is_order]
     for order in arguments.orders or ():
         if order not in orders:
-            raise ResultsError(f"{folder}: no order {order:g}; there are: {', '.join(f'{one:g}' for one in orders)}")
+            raise ChoiceError(f"{folder}: no order {order:g}; there are: {', '.join(f'{one:g}' for one in orders)}")
     look = Look(
         window_of(folder, response.speed, arguments, response.axis.unit), arguments.orders or (), arguments.peak, arguments.log
     )
@@ -290,7 +290,7 @@ def main() -> None:
     parser.add_argument("--peak", action="store_true", help="also the mean and the largest magnitude, the mean included")
     parser.add_argument("--log", action="store_true", help="logarithmic moments")
     arguments = arguments_of(parser)
-    draw_folders(parser.prog, arguments, partial(figures_of, arguments=arguments))
+    draw_folders(arguments, partial(figures_of, arguments=arguments))
 
 
 if __name__ == "__main__":

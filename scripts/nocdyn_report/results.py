@@ -11,7 +11,9 @@ import numpy as np
 import pandas as pd
 
 from .columns import COLUMNS, Column, read_column_list
-from .trajectory_files import ResultsError, labels_of, read_columns
+from .failure import ChoiceError, ResultsError
+from .json_files import with_case
+from .trajectory_files import labels_of, read_columns
 
 TIME = "t [s]"
 FILES = ("trajectory.csv", "trajectory.nc", "trajectory.partial.csv", "trajectory.partial.nc")
@@ -35,6 +37,7 @@ class Header:
     columns: dict[str, Column]  # by their labels, all but the time
     ranges: dict[str, float] = field(default_factory=dict)  # largest less smallest value, as far as summary.json has them
     machine: f90nml.Namelist = field(default_factory=f90nml.Namelist)  # input.nml
+    case: str = ""  # load case
 
     def of(self, *kinds: str) -> list[str]:
         """Labels."""
@@ -60,7 +63,7 @@ class Results:
 
     @property
     def title(self) -> str:
-        return self.header.machine.get("case", {}).get("title") or self.folder.resolve().name
+        return with_case(self.header.machine.get("case", {}).get("title") or self.folder.resolve().name, self.header.case)
 
     def values(self, label: str) -> np.ndarray:
         """A column by its label in trajectory.csv."""
@@ -88,7 +91,7 @@ class Results:
         """The rows from one time to another."""
         inside = self.table[(self.time >= start) & (self.time <= end)]
         if len(inside) < 2:
-            raise ResultsError(
+            raise ChoiceError(
                 f"{self.folder}: nothing to draw: {len(inside)} row(s) in the chosen time; "
                 f"the trajectory goes from {self.time[0]:g} to {self.time[-1]:g} s"
             )
@@ -130,9 +133,8 @@ def read_results(folder: Path, choose: Callable[[Header], Iterable[str]] | None 
     if TIME not in labels:
         raise ResultsError(f"{file}: not a trajectory of nocdyn: there is no column '{TIME}'")
     summary, machine = _read_summary(folder), folder / "input.nml"
-    header = Header(
-        folder, _columns(folder, labels), ranges_of(summary), f90nml.read(machine) if machine.is_file() else f90nml.Namelist()
-    )
+    groups = f90nml.read(machine) if machine.is_file() else f90nml.Namelist()
+    header = Header(folder, _columns(folder, labels), ranges_of(summary), groups, summary.get("load_case", ""))
     table = read_columns(file, {TIME, *choose(header)} if choose else set(labels))
     if len(table) < 2:
         raise ResultsError(f"{file}: nothing to draw: the trajectory has {len(table)} row(s)")

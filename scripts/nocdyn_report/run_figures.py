@@ -13,9 +13,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .columns import CURRENT, FORCE, LOSS, MOMENT, REACTION, SLIP, SPEED, STRESS, TORQUE, TWIST, Column, by_sort
+from .failure import ResultsError
 from .multiples import MOST_PANELS, draw_multiples
 from .phase_planes import MOST_PLANES, draw_phase_planes
-from .results import Header, Results, ResultsError, read_results
+from .results import Header, Results, read_results
 from .selection import matching, widest
 from .style import COLOURS, PIXELS, WIDTH, add_format_option, add_title, draw_lines, save, saved
 from .thinning import thin
@@ -219,16 +220,13 @@ def main() -> None:
     if arguments.start >= arguments.end:
         parser.error(f"--from {arguments.start:g} must be less than --to {arguments.end:g}")
     folder = arguments.out or arguments.results / "figures"
-    try:
-        results = read_results(arguments.results, lambda header: _needed(header, arguments.columns), arguments.rpm)
-        results = results.between(arguments.start, arguments.end)
-    except ResultsError as error:
-        sys.exit(f"{parser.prog}: {error}")
+    results = read_results(arguments.results, lambda header: _needed(header, arguments.columns), arguments.rpm)
+    results = results.between(arguments.start, arguments.end)
     if results.shortfall:
         print(f"{parser.prog}: {arguments.results}: the trajectory is partial: {results.shortfall}", file=sys.stderr)
     figures = _drawn(results, arguments)
     if not figures:
-        sys.exit(f"{parser.prog}: {arguments.results}: nothing to draw: the trajectory has the time only")
+        raise ResultsError(f"{arguments.results}: nothing to draw: the trajectory has the time only")
     for name, figure in figures.items():
         save(figure, folder, name, arguments.format)
     print(saved(list(figures), arguments.format, folder))

@@ -5,7 +5,8 @@ import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from .columns import Column
-from .results import Header, ResultsError
+from .failure import ChoiceError
+from .results import Header
 
 
 def matches(pattern: str, *names: str) -> bool:
@@ -21,7 +22,7 @@ def matching(header: Header, patterns: Iterable[str]) -> list[str]:
         found = [one.label for one in header.columns.values() if matches(pattern, one.name, one.label)]
         if not found:
             hint = _nearest(pattern, header.columns.values())
-            raise ResultsError(f"{header.folder}: no column matches '{pattern}'{hint}")
+            raise ChoiceError(f"{header.folder}: no column matches '{pattern}'{hint}")
         chosen.update(found)
     return [label for label in header.columns if label in chosen]
 

@@ -2,7 +2,6 @@
 
 import argparse
 import math
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
@@ -12,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.transforms import blended_transform_factory
 
-from .results import ResultsError
+from .failure import ChoiceError
 from .speed_results import Operation
 from .style import COLOURS, add_format_option, save, saved
 
@@ -173,22 +172,19 @@ def window_of(folder: Path, speed: np.ndarray, arguments: argparse.Namespace, un
     """The chosen part of the speeds."""
     inside = speed[(speed >= arguments.start) & (speed <= arguments.end)]
     if len(inside) < 2 or inside[0] == inside[-1]:
-        raise ResultsError(
+        raise ChoiceError(
             f"{folder}: nothing to draw: {len(inside)} row(s) at the chosen speeds; "
             f"the table goes from {speed[0]:.6g} to {speed[-1]:.6g} {unit}"
         )
     return inside[0], inside[-1]
 
 
-def draw_folders(program: str, arguments: argparse.Namespace, draw: Callable[[Path], Figures]) -> None:
+def draw_folders(arguments: argparse.Namespace, draw: Callable[[Path], Figures]) -> None:
     """Draws and saves the figures of every folder."""
     for results in arguments.results:
         folder = arguments.out or results / "figures"
         names = []
-        try:
-            for name, figure in draw(results):
-                save(figure, folder, name, arguments.format)
-                names.append(name)
-        except ResultsError as error:
-            sys.exit(f"{program}: {error}")
+        for name, figure in draw(results):
+            save(figure, folder, name, arguments.format)
+            names.append(name)
         print(saved(names, arguments.format, folder))

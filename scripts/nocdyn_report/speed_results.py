@@ -1,6 +1,5 @@
 """The results of `nocdyn response` and `nocdyn campbell`, read from their folders."""
 
-import json
 import math
 import re
 from dataclasses import dataclass, replace
@@ -10,8 +9,11 @@ import numpy as np
 import pandas as pd
 
 from .columns import MOMENT, RESPONSE_COLUMNS, STRESS, Column, read_column_list
+from .failure import ResultsError
+from .json_files import read_json, with_case
+from .report.result_files import case_of
 from .results import RPM
-from .trajectory_files import ResultsError, labels_of, read_columns
+from .trajectory_files import labels_of, read_columns
 
 SPEED = re.compile(r"omega_(?P<body>.+) \[(?P<unit>rad/s|rpm|Hz)\]")
 SHAKEN = "frequency [Hz]"
@@ -260,7 +262,7 @@ def read_response(folder: Path) -> Response:
         lines = [_line(entry, frequency) for entry, frequency in zip(report["lines"], frequencies[0])]
     return Response(
         folder,
-        _title(report, folder),
+        _title(report, folder, "response"),
         axis,
         speed[rising],
         columns,
@@ -284,7 +286,7 @@ def read_campbell(folder: Path) -> Campbell:
         lines.append((_line(entry, frequency[0]), frequency[rising]))
     return Campbell(
         folder,
-        _title(report, folder),
+        _title(report, folder, "campbell"),
         report["body"],
         speed[rising],
         {mode: table[label].to_numpy()[rising] for mode, label in modes.items()},
@@ -301,14 +303,7 @@ def _read_report(folder: Path, command: str, tables: tuple[str, ...], keys: tupl
     for name in (*tables, f"{command}.json"):
         if not (folder / name).is_file():
             raise ResultsError(f"{folder}: no {name} here; 'nocdyn {command} FILE --out {folder}' writes it")
-    file = folder / f"{command}.json"
-    try:
-        report = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise ResultsError(f"{file}: cannot be read: {error}") from None
-    if not isinstance(report, dict) or not set(keys) <= report.keys():
-        raise ResultsError(f"{file}: this is no {command}.json of nocdyn")
-    return report
+    return read_json(folder / f"{command}.json", keys)
 
 
 def _read_table(file: Path, rises: bool = True) -> tuple[pd.DataFrame, np.ndarray, np.ndarray]:
@@ -388,5 +383,5 @@ def _operation(report: dict) -> Operation | None:
     return Operation(slow, fast, report.get("margin", 0.0))
 
 
-def _title(report: dict, folder: Path) -> str:
-    return report.get("title") or Path(report.get("input") or folder.resolve()).name
+def _title(report: dict, folder: Path, command: str) -> str:
+    return with_case(report.get("title") or Path(report.get("input") or folder.resolve()).name, case_of(folder, command))

@@ -1,7 +1,6 @@
 """Draws the results of a sweep: how each is distributed, and how it depends on what was varied."""
 
 import argparse
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -10,7 +9,6 @@ import numpy as np
 from matplotlib import pyplot
 from matplotlib.figure import Figure
 
-from .results import ResultsError
 from .style import WIDTH, add_format_option, add_title, plain, save, saved
 from .sweep_curves import Family, add_hertz, draw_family, explain_marks, family_of
 from .sweep_influence import MOST_BARS, Influence, draw_influence
@@ -164,10 +162,7 @@ def main() -> None:
     add_format_option(parser)
     arguments = parser.parse_args()
     folder = arguments.out or arguments.results / "figures"
-    try:
-        sweep = read_sweep(arguments.results)
-    except ResultsError as error:
-        sys.exit(f"{parser.prog}: {error}")
+    sweep = read_sweep(arguments.results)
     names = []
     for name, figure in figures_of(sweep):
         add_title(figure, sweep.title, sweep.remark)

@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 
 from .columns import Column, read_column_list
-from .trajectory_files import ResultsError, text_of
+from .failure import ResultsError
+from .trajectory_files import text_of
 
 DONE, REFUSED, FAILED = 0, 1, 2
 STATUS_WORDS = {"done": DONE, "refused": REFUSED, "failed": FAILED}

@@ -6,9 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-
-class ResultsError(Exception):
-    """A folder whose results cannot be used; the message is one line for the person at the keyboard."""
+from .failure import ResultsError
 
 
 def labels_of(file: Path) -> list[str]:

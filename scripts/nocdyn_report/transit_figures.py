@@ -1,7 +1,6 @@
 """Draws passages of barred ranges over the time: the speed, and below it the quantities that have limits, with their peaks."""
 
 import argparse
-import sys
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,13 +12,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from .failure import ResultsError
 from .response_figures import PEAK_LIMIT, TRANSIENT
 from .response_marks import BARRED
 from .speed_panels import DANGER, HALO, SMALL, Figures, draw_folders
 from .speed_results import short_unit
 from .style import COLOURS, PIXELS, WIDTH, add_format_option, add_title, plain
 from .thinning import thin
-from .transit_results import NEAR, Limited, Passage, ResultsError, Transit, folders_of, read_transit
+from .transit_results import NEAR, Limited, Passage, Transit, read_transit
 
 BESIDE = 2  # passages in a figure
 MOST_ROWS = 5  # quantities in a figure
@@ -168,18 +168,14 @@ def main() -> None:
         type=Path,
         nargs="+",
         metavar="RESULTS",
-        help="folders that 'nocdyn transit' wrote, of load cases all of theirs",
+        help="folders that 'nocdyn transit' wrote",
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="where the figures of one folder go (RESULTS/figures)")
     add_format_option(parser)
     arguments = parser.parse_args()
-    try:
-        arguments.results = [one for folder in arguments.results for one in folders_of(folder)]
-    except ResultsError as error:
-        sys.exit(f"{parser.prog}: {error}")
     if arguments.out and len(arguments.results) > 1:
-        parser.error("--out is for one folder of results, or one load case")
-    draw_folders(parser.prog, arguments, figures_of)
+        parser.error("--out is for one folder of results")
+    draw_folders(arguments, figures_of)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,5 @@
 """The results of `nocdyn transit`, read from their folder."""
 
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -8,11 +7,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from .failure import ResultsError
+from .json_files import read_json, with_case
 from .results import RPM, TIME
 from .speed_results import SPEED, rpm
-from .trajectory_files import ResultsError, labels_of, read_columns
+from .trajectory_files import labels_of, read_columns
 
-REPORT, TABLE, CASES = "transit.json", "transit.csv", "transit_cases.json"
+REPORT, TABLE = "transit.json", "transit.csv"
 PASSAGE = "passage"
 NEAR = 4.0  # times what is reached: limits beyond are not in the picture
 TRANSIENT = "transient"  # the last word of criteria on half ranges
@@ -89,8 +90,7 @@ class Transit:
 
     @property
     def title(self) -> str:
-        named = self.report.get("title") or Path(self.report["input"]).stem
-        return f"{named}: load case {self.case}" if self.case else named
+        return with_case(self.report.get("title") or Path(self.report["input"]).stem, self.case)
 
     @property
     def case(self) -> str:
@@ -124,21 +124,13 @@ class Transit:
         return Limited(name, unit, element, criterion.rpartition(", ")[0] or name, min(limits, default=None))
 
 
-def folders_of(folder: Path) -> list[Path]:
-    """The folder itself, or those of its load cases."""
-    if (folder / REPORT).is_file() or not (folder / CASES).is_file():
-        return [folder]
-    listed = _read_json(folder / CASES, "load_cases")["load_cases"]
-    return [folder / one["folder"] for one in listed if one["status"] == "done"]
-
-
 def read_transit(folder: Path) -> Transit:
     if not folder.is_dir():
         raise ResultsError(f"{folder}: there is no such results folder")
     for name in (REPORT, TABLE):
         if not (folder / name).is_file():
             raise ResultsError(f"{folder}: no {name} here; 'nocdyn transit FILE --out {folder}' writes it")
-    report = _read_json(folder / REPORT, "passages")
+    report = read_json(folder / REPORT, ["passages"])
     table = read_columns(folder / TABLE, labels_of(folder / TABLE))
     found = Transit(folder, report, table)
     missing = [name for name in (PASSAGE, TIME, *(one.label for one in found.quantities)) if name not in table]
@@ -147,13 +139,3 @@ def read_transit(folder: Path) -> Transit:
     if report["passages"] and set(table[PASSAGE]) != set(range(1, len(report["passages"]) + 1)):
         raise ResultsError(f"{folder / TABLE}: its passages are not those of {REPORT}; both must be of the same run")
     return found
-
-
-def _read_json(file: Path, key: str) -> dict:
-    try:
-        report = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise ResultsError(f"{file}: cannot be read: {error}") from None
-    if not isinstance(report, dict) or key not in report:
-        raise ResultsError(f"{file}: this is no {file.name} of nocdyn")
-    return report

@@ -49,7 +49,7 @@ def verdict(outcomes: Sequence[Outcome]) -> str:
     """The sentence at the top."""
     failed = [one.case.id for one in outcomes if not one.passes]
     if not failed:
-        return f"All {len(outcomes)} cases pass."
+        return f"All {len(outcomes)} cases pass." if len(outcomes) > 1 else "The case passes."
     return f"{len(failed)} of {len(outcomes)} cases fail: {', '.join(failed)}."
 
 

@@ -70,10 +70,13 @@ def call(monkeypatch, module: str, *arguments: object) -> None:
     main()
 
 
-def refusal(monkeypatch, module: str, *arguments: object) -> str:
-    with pytest.raises(SystemExit) as leaving:
+def refusal(monkeypatch, module: str, *arguments: object) -> str | int:
+    """The line of results that are refused; the exit code of wrong usage."""
+    plot, failure = (importlib.import_module(f"nocdyn_report.{name}") for name in ("plot", "failure"))
+    kind = next(kind for kind, (drawn_by, _) in plot.KINDS.items() if drawn_by == module)
+    with pytest.raises((SystemExit, failure.ResultsError)) as leaving:
         call(monkeypatch, module, *arguments)
-    return leaving.value.code
+    return leaving.value.code if leaving.type is SystemExit else f"nocdyn plot {kind}: {leaving.value}"
 
 
 def assert_figures(folder: Path, *names: str, formats: tuple[str, ...] = tuple(SIGNATURES)) -> None:

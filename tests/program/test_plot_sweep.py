@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from figure_files import refusal
 
 SOURCE = Path(os.environ["NOCDYN_SOURCE"])
 SIGNATURES = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
@@ -296,12 +297,11 @@ def test_what_chance_gives_is_said_to_be_grey(tmp_path):
     assert 3 <= beyond <= 20  # 5 % of 200, give or take three deviations
 
 
-def test_a_file_is_not_a_folder(tmp_path, monkeypatch, capsys):
+def test_a_file_is_not_a_folder(tmp_path, monkeypatch):
     numbers = random_numbers(10, 2)
     folder = write_sweep(tmp_path, "random", {"body.a.inertia": numbers[0]}, {SPEED: numbers[1]})
-    with pytest.raises(SystemExit) as leaving:
-        draw(monkeypatch, capsys, folder / "sweep.nc")
-    assert "is a file; the folder that it is in is what is drawn" in str(leaving.value)
+    said = refusal(monkeypatch, "sweep_figures", folder / "sweep.nc")
+    assert "is a file; the folder that it is in is what is drawn" in said
 
 
 def test_parallel_axes_say_what_they_leave_out(tmp_path):
@@ -442,11 +442,7 @@ def test_unusable_results_are_one_clear_line(files, message, tmp_path, monkeypat
         (folder / name).write_text(text, encoding="utf-8")
     if files == {}:
         folder.mkdir()
-    main = importlib.import_module("nocdyn_report.sweep_figures").main
-    monkeypatch.setattr(sys, "argv", ["plot_sweep", str(folder)])
-    with pytest.raises(SystemExit) as leaving:
-        main()
-    said = leaving.value.code  # a text: exit code 1
+    said = refusal(monkeypatch, "sweep_figures", folder)
     assert said.startswith("nocdyn plot sweep: ") and message in said and str(folder) in said and "\n" not in said
 
 
@@ -456,8 +452,4 @@ def test_netcdf_file_of_something_else_is_refused(tmp_path, monkeypatch):
     with h5netcdf.File(tmp_path / "sweep.nc", "w") as file:
         file.dimensions = {"time": 2}
         file.create_variable("pressure", ("time",), data=np.zeros(2))
-    main = importlib.import_module("nocdyn_report.sweep_figures").main
-    monkeypatch.setattr(sys, "argv", ["plot_sweep", str(tmp_path)])
-    with pytest.raises(SystemExit) as leaving:
-        main()
-    assert "this is no sweep.nc of nocdyn: status is missing" in leaving.value.code
+    assert "this is no sweep.nc of nocdyn: status is missing" in refusal(monkeypatch, "sweep_figures", tmp_path)

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from figure_files import NOCDYN, assert_figures, call, refusal
-from nocdyn_report import style, transit_figures
+from nocdyn_report import plot, style, transit_figures
 from nocdyn_report.transit_results import read_transit
 
 pytestmark = pytest.mark.filterwarnings("error::UserWarning")  # as Matplotlib's of a layout that does not fit
@@ -156,15 +156,15 @@ def test_many_passages_and_quantities_go_on_several_figures(results, monkeypatch
     assert grid_of(figures["transit_4"])[0][0].get_title("left").startswith("3: up")
 
 
-def test_each_load_case_has_its_figures(computed, tmp_path, monkeypatch, capsys):
+def test_each_load_case_has_its_figures(computed, tmp_path, capsys):
     folder = shutil.copytree(computed / "cases", tmp_path / "r")
-    call(monkeypatch, "transit_figures", folder, computed / "one", "--format", "svg")
+    assert plot.main(["transit", str(folder), str(computed / "one"), "--format", "svg"]) == 0
     told = capsys.readouterr().out.splitlines()
     assert told == [f"transit (SVG) are in {one / 'figures'}" for one in (folder / "weak", folder / "strong", computed / "one")]
     assert "Costs $5: load case weak" in (folder / "weak/figures/transit.svg").read_text(encoding="utf-8")
-    with pytest.raises(SystemExit) as leaving:
-        call(monkeypatch, "transit_figures", folder, "--out", tmp_path / "f")
-    assert leaving.value.code == 2
+    assert plot.main(["transit", str(folder), "--out", str(tmp_path / "f")]) == 2
+    said = capsys.readouterr().err
+    assert said == f"nocdyn plot transit: --out is for one folder of results; there are: {folder / 'weak'}, {folder / 'strong'}\n"
 
 
 def test_figures_appear_in_three_formats(results, tmp_path, monkeypatch):
@@ -199,7 +199,7 @@ def without_a_column(results):
         (shutil.rmtree, "there is no such results folder"),
         (remove("transit.json"), "no transit.json here; 'nocdyn transit FILE --out "),
         (remove("transit.csv"), "no transit.csv here; 'nocdyn transit FILE --out "),
-        (write("transit.json", "{"), "transit.json: cannot be read: "),
+        (write("transit.json", "{"), "transit.json: is no complete JSON: line 1"),
         (write("transit.json", "{}"), "transit.json: this is no transit.json of nocdyn"),
         (write("transit.csv", "passage\n1\n2\n"), "transit.csv: there is no column 't [s]'; it must be of the same run"),
         (without_a_column, "transit.csv: there is no column 'stress_s$ [Pa]'; it must be of the same run as transit.json"),

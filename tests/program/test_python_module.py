@@ -190,6 +190,30 @@ def test_load_cases_come_by_their_names():
     assert one.table.equals(results[names[0]].table)
 
 
+@pytest.mark.parametrize("command", ["run", "modes"])
+def test_load_cases_are_in_the_order_of_the_input(command):
+    train = ROTOR + "&coupling name = 'mount' bodies = 'ground', 'rotor' stiffness = 10.0 /\n"
+    results = getattr(package, command)(train + "&load_case name = 'zeta' /\n&load_case name = 'alpha' /\n")
+    assert list(results) == ["zeta", "alpha"]
+
+
+def test_arguments_that_are_no_numbers_signals_or_states_are_told_in_words():
+    machine = package.Machine(ROTOR)
+    for call, kind, words in (
+        (lambda: machine.run_to("1"), TypeError, "a time must be a number, not '1'"),
+        (lambda: machine.__setitem__("load.work.viscous", "a"), TypeError, "'load.work.viscous' must be a number, not 'a'"),
+        (lambda: machine.set_torque("outside", None), TypeError, "a torque must be a number, not None"),
+        (lambda: machine.restore(None), TypeError, "restore needs a state that keep has given, not None"),
+        (lambda: machine["omega_rotr"], KeyError, "there is no signal 'omega_rotr'; did you mean 'omega_rotor'?"),
+        (lambda: machine["x"], KeyError, "there is no signal 'x'; signals has all of them"),
+    ):
+        with pytest.raises(kind) as raised:
+            call()
+        assert raised.value.args == (words,)
+    machine.run_to(np.float64(0.5))
+    assert machine.time == 0.5
+
+
 def test_passages_have_a_table(nocdyn):
     nocdyn("new", "ship.nml", "--kind", "ship")
     results = package.transit(nocdyn.folder / "ship.nml")

@@ -171,6 +171,7 @@ def test_findings_are_those_of_the_files(reports, opened):
     ]
     assert ratios == sorted(ratios, reverse=True) and ratios[-1] > 100
     assert opened.find("#summary p").text.startswith("exceeded: coupling 'tyre', ")
+    assert "(load case calm" in opened.find("#summary p").text or "(load case blow" in opened.find("#summary p").text
     shown = zip(column(opened, "Barred ranges", "from"), column(opened, "Barred ranges", "to"))
     ranges = [(one["from_rad_s"] * RPM, one["to_rad_s"] * RPM) for one in report["barred_speed_ranges"]]
     assert ranges and [tuple(map(plain, pair)) for pair in shown] == [pytest.approx(pair, rel=1e-4) for pair in ranges]
@@ -347,6 +348,12 @@ def test_only_what_does_not_belong_to_the_input_is_computed_again(fresh):
     assert states() == dict.fromkeys(commands, "computed")
     (fresh.folder / "results/m/blow/trajectory.csv").unlink()
     assert states() == dict.fromkeys(commands, "reused") | {"run": "computed"}
+    for name in ("calm/summary.json", "blow/trajectory.csv"):  # a number by hand, a table that lost its end
+        file = fresh.folder / "results/m" / name
+        whole = file.read_text()
+        file.write_text(whole.replace("5", "6", 1) if name.endswith("json") else whole[: len(whole) // 2])
+        assert states() == dict.fromkeys(commands, "reused") | {"run": "computed"}
+        assert states() == dict.fromkeys(commands, "reused")
 
 
 def test_a_load_case_without_a_steady_state_leaves_the_sections_to_the_next(fresh, browser):
@@ -468,6 +475,13 @@ def test_without_a_browser_there_is_no_half_a_report(reports):
     )
     assert reports.page().read_bytes() == before
     assert not list(reports.page().parent.glob(".*"))
+    assert reports("m.nml", "--quiet", "--out", "nothing", PATH="/nowhere").returncode == 3
+    assert not (reports.folder / "nothing").exists()  # told before anything is computed
+
+
+def test_a_folder_is_no_input(fresh):
+    outcome = fresh(".", "--no-pdf")
+    assert (outcome.returncode, outcome.stderr) == (3, "nocdyn report: .: is no file; the report shows the text of the input\n")
 
 
 def test_a_folder_with_a_sweep_is_refused(fresh):
@@ -556,7 +570,7 @@ def test_an_interruption_leaves_no_report_and_one_sentence(fresh, process):
     assert started.stdout.readline() != b""  # it computes
     started.send_signal(signal.SIGINT)
     _, errors = started.communicate(timeout=60)
-    assert (started.returncode, errors) == (130, b"nocdyn report: interrupted\n")
+    assert (started.returncode, errors) == (1, b"nocdyn report: interrupted\n")
     assert not fresh.page().exists()
 
 
@@ -730,6 +744,7 @@ def test_changes_since_another_revision_are_told(fresh, browser):
     assert fresh("m.nml", "--no-pdf", "--quiet", "--against", "results/m").returncode == 2
     outcome = fresh("m.nml", "--no-pdf", "--quiet", "--against", "none")
     assert (outcome.returncode, outcome.stderr) == (2, "nocdyn report: --against none: has no results of nocdyn\n")
+    assert fresh("m.nml", "--no-pdf", "--out", "new", "--against", "none").stdout == ""  # nothing was computed
 
 
 def test_lines_that_fill_a_panel_are_bands():

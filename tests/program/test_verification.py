@@ -211,6 +211,8 @@ def test_tables_are_refused_with_their_line(own, changes, message):
 
 def test_features_and_cases_are_chosen_by_name(tmp_path):
     assert verify(tmp_path, "campbell", "modes.two_discs.f1", "--quiet").stdout == ""
+    assert verify(tmp_path, "modes.two_discs.f1").stdout.startswith("The case passes. ")
+    verify(tmp_path, "campbell", "modes.two_discs.f1")
     assert {case["feature"] for case in report(tmp_path)["cases"]} == {"campbell", "modes"}
     verify(tmp_path, "joints_that_lock.held_torque", "steady_states")
     assert {case["feature"] for case in report(tmp_path)["cases"]} == {"joints that lock", "steady states"}

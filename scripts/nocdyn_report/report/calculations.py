@@ -23,6 +23,7 @@ FILES = {
     "transit": ["transit.json", "transit.csv"],
 }
 HOLZER = ["holzer.csv"]
+RUN = ["summary.json", "input.nml", "columns.json", "trajectory.csv", "trajectory.nc", "cycles.csv"]  # those that are there
 SWEEP = "sweep.nc"
 
 
@@ -92,7 +93,7 @@ def calculate(
         results.of["transit"] = _analyse(program, "transit", words, stamps)
     else:
         results.of["transit"] = Calculation("transit", "left out", "the input has no &transit")
-    results.of["run"] = _run(program, results, words)
+    results.of["run"] = _run(program, results, words, stamps)
     for calculation in results.of.values():
         tell(_line(calculation))
     stamps.write()
@@ -154,16 +155,21 @@ def _modes(program: Program, words: Sequence[str], stamps: Stamps) -> tuple[Calc
     return modes, _refusal("holzer", answer) if modes.is_there else Calculation("holzer", "left out", "there are no modes")
 
 
-def _run(program: Program, results: Calculations, words: Sequence[str]) -> Calculation:
-    """The run or the runs of all load cases. A sweep in the folder is in the way."""
+def _run(program: Program, results: Calculations, words: Sequence[str], stamps: Stamps) -> Calculation:
+    """The run or the runs of all load cases, also those of 'nocdyn run' itself. A sweep in the folder is in the way."""
     checks = {results.folder / name: check for name, check in results.case_checks.items()} or {results.folder: results.check}
     is_told = not results.cases or _tells_of(results)
-    if is_told and all(is_run_of(folder, check, program) for folder, check in checks.items()):
+    is_there = is_told and all(is_run_of(folder, check, program) for folder, check in checks.items())
+    if is_there and not stamps.differs("run", RUN):
+        stamps.put("run", RUN)
         return Calculation("run", "reused")
     answer = program("run", "--quiet", *words)
     if answer.code == REFUSED and (results.folder / SWEEP).is_file():
         raise ReportError(answer.message, answer.code)
-    return Calculation("run", "computed", seconds=answer.seconds) if answer.code == 0 else _refusal("run", answer)
+    if answer.code:
+        return _refusal("run", answer)
+    stamps.put("run", RUN)
+    return Calculation("run", "computed", seconds=answer.seconds)
 
 
 def _tells_of(results: Calculations) -> bool:

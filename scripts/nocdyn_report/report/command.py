@@ -9,12 +9,12 @@ from pathlib import Path
 from .calculations import FAILED, Calculations, calculate
 from .confined import Folder
 from .content import Section
-from .failure import FILES, USAGE, ReportError
+from .failure import FILES, ReportError
 from .notes_text import read_notes
 from .page import render
-from .pdf import print_pdf
+from .pdf import find_browser, print_pdf
 from .program import find_program
-from .revisions import former
+from .revisions import former, results_of_revision
 from .sections.appendix import details_section, input_section
 from .sections.campbell import campbell_section
 from .sections.changes import changes_section
@@ -42,9 +42,8 @@ def main(words: Sequence[str] | None = None) -> None:
         message = str(error) if str(error).startswith("nocdyn: ") else f"nocdyn report: {error}"
         print(message, file=sys.stderr)
         sys.exit(error.code)
-    except BrokenPipeError:  # who reads the output has gone: what is still to be printed goes nowhere
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(FILES)
+    except OSError:  # the caller tells it, with the file or the output
+        raise
     except Exception as error:  # a traceback helps nobody at the keyboard
         place = error.__traceback__
         while place.tb_next:
@@ -77,8 +76,12 @@ def _make(arguments: argparse.Namespace) -> int:
     """Returns the exit code."""
     tell: Callable[[str], None] = (lambda line: None) if arguments.quiet else lambda line: print(f"  {line}", flush=True)
     if Path(arguments.file).exists() and not Path(arguments.file).is_file():  # a pipe has its text once
-        raise ReportError(f"{arguments.file}: is no file; the report shows the text of the input", USAGE)
+        raise ReportError(f"{arguments.file}: is no file; the report shows the text of the input", FILES)
     program = find_program()
+    if not arguments.no_pdf:
+        find_browser()
+    if arguments.against:
+        results_of_revision(arguments.against)
     results = calculate(program, arguments.file, arguments.out, arguments.set, tell)
     sources = Sources(results, _text(arguments.file), arguments.set)
     page = render(sources, list(_sections(sources, arguments)))

@@ -25,14 +25,19 @@ OPTIONS = (
 MOST_SECONDS = 300
 
 
-def print_pdf(page: Path, pdf: Path) -> None:
-    """Writes `pdf`; the page is a file on this machine."""
+def find_browser() -> str:
+    """Chromium, without which no PDF is printed."""
     browser = shutil.which("chromium")
     if browser is None:
         raise ReportError("there is no chromium, which prints the PDF: apt-get install chromium, or use --no-pdf", FILES)
+    return browser
+
+
+def print_pdf(page: Path, pdf: Path) -> None:
+    """Writes `pdf`; the page is a file on this machine."""
     root = ("--no-sandbox",) if os.geteuid() == 0 else ()  # Chromium refuses to be run by root otherwise
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
-        words = [browser, *OPTIONS, *root, f"--user-data-dir={profile}", f"--print-to-pdf={pdf}", page.resolve().as_uri()]
+        words = [find_browser(), *OPTIONS, *root, f"--user-data-dir={profile}", f"--print-to-pdf={pdf}", page.resolve().as_uri()]
         try:
             done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, check=False, timeout=MOST_SECONDS)
         except subprocess.TimeoutExpired:

@@ -19,6 +19,12 @@ CASES = {"run": "cases.json"} | {
 DONE = "done"
 
 
+def case_of(folder: Path, command: str) -> str:
+    """The load case whose results of a command are in a folder, by the report on all of them beside it; '' without."""
+    cases = ResultFiles(folder.resolve().parent, True).cases(command)
+    return next((one.name for one in cases if one.folder.name == folder.resolve().name), "")
+
+
 @dataclass(frozen=True)
 class CaseResult:
     """The results of a command for one load case, or why there are none; without load cases the name is ''."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..columns import LOADS, RESPONSE_COLUMNS, read_column_list
+from ..failure import ResultsError
 from ..speed_results import Axis, read_critical, roman
-from ..trajectory_files import ResultsError
 from .failure import USAGE, ReportError
 from .naming import is_end, name_of
 from .result_files import ResultFiles
@@ -35,9 +35,13 @@ class Change:
 
 def former(folder: Path, present: Path) -> ResultFiles:
     """The results of another revision."""
-    files = ResultFiles(folder)
     if folder.resolve() == present.resolve():
         raise ReportError(f"--against {folder}: is the folder of this report; allowed: a copy of an earlier one", USAGE)
+    return results_of_revision(folder)
+
+
+def results_of_revision(folder: Path) -> ResultFiles:
+    files = ResultFiles(folder)
     if not any(files.there(command) for command in ("modes", "campbell", "response", "run")):
         raise ReportError(f"--against {folder}: has no results of nocdyn", USAGE)
     return files

@@ -10,10 +10,11 @@ import f90nml
 import pandas as pd
 
 from ..columns import DETAIL, Column, columns_of, read_column_list
+from ..failure import ResultsError
 from ..modes_results import Modes, read_modes
 from ..results import RPM, groups_of, ranges_of, trajectory_in
 from ..speed_results import Axis, Campbell, Critical, Response, read_campbell, read_response, rpm
-from ..trajectory_files import ResultsError, labels_of, read_columns
+from ..trajectory_files import labels_of, read_columns
 from ..transit_results import Transit, read_transit
 from .calculations import Calculations
 from .curves import Arrays

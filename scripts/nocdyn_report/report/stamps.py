@@ -53,6 +53,10 @@ class Stamps:
         known = self.files.get(command)
         return isinstance(known, dict) and bool(known) and known == self._digests(command, names)
 
+    def differs(self, command: str, names: Sequence[str]) -> bool:
+        """Whether the files of a command are not those that a report used before."""
+        return command in self.files and not self.holds(command, names)
+
     def put(self, command: str, names: Sequence[str]) -> None:
         self.files[command] = self._digests(command, names)
 

@@ -9,6 +9,7 @@ ANALYSES = ("response", "campbell", "run", "transit")  # that compare with limit
 FINDINGS = ("exceeded", "not assessed", "restricted", "kept")  # the worst first
 OPEN = "not assessed"
 STEADY = ("steady", "continuous", "transient")  # words of criteria on steady oscillations; others are on largest values
+MOST_CASES = 2  # that are named in a line
 DISTANCE = "distance of a critical speed"
 
 
@@ -47,6 +48,12 @@ class Line:
             return (DISTANCE, self.element, self.detail)
         kind = "steady" if self.criterion.rpartition(", ")[2] in STEADY else "largest"
         return (kind, self.element, self.limit_at) if self.limit_at else (self.criterion, self.element)
+
+    @property
+    def case_names(self) -> str:
+        """Of the load cases, '' of the machine."""
+        named = [name for name in self.cases if name]
+        return ", ".join(named[:MOST_CASES]) + (f" and {len(named) - MOST_CASES} more" if len(named) > MOST_CASES else "")
 
     @property
     def shown(self) -> tuple:
@@ -89,7 +96,7 @@ def sentence(lines: list[Line]) -> tuple[str, str]:
     if not lines:
         return "Nothing was compared: the input sets no limits.", ""
     if exceeded := [one for one in lines if one.finding == "exceeded"]:
-        told = "; ".join(f"{one.subject}, {one.assessment}" for one in exceeded[:3])
+        told = "; ".join(_told(one) for one in exceeded[:3])
         return f"exceeded: {told}{f'; and {len(exceeded) - 3} more' if len(exceeded) > 3 else ''}.", "bad"
     count = {finding: sum(one.finding == finding for one in lines) for finding in FINDINGS}
     on_condition = f", {count['restricted']} of {len(lines)} on a condition" if count["restricted"] else ""
@@ -98,6 +105,10 @@ def sentence(lines: list[Line]) -> tuple[str, str]:
     if count[OPEN]:
         return f"kept{on_condition}, as far as assessed: {_criteria(count[OPEN])} not assessed.", "warn"
     return f"kept{on_condition}: no limit is exceeded.", "warn" if on_condition else "good"
+
+
+def _told(one: Line) -> str:
+    return f"{one.subject}, {one.assessment}" + (f" (load case {one.case_names})" if one.case_names else "")
 
 
 def _criteria(count: int) -> str:

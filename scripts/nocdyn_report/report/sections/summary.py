@@ -12,7 +12,6 @@ from .steady import ordered_states, stability_text
 MOST_NAMED = 6  # of one sort
 MOST_PEAKS = 2  # of a kind
 MOST_LINES = 40
-MOST_CASES = 2  # that are named in a line of the verdict
 TONES = {"exceeded": "bad", "not assessed": "warn", "restricted": "warn", "kept": "good"}
 
 
@@ -52,9 +51,7 @@ def _table(sources: Sources, lines: list[Line]) -> tuple[list[str], list[list[Ce
 
 
 def _cases(line: Line) -> str:
-    named = [name for name in line.cases if name]
-    told = ", ".join(named[:MOST_CASES]) + (f" and {len(named) - MOST_CASES} more" if len(named) > MOST_CASES else "")
-    return (told or "all") + (f"; less in {len(line.lower)}" if line.lower else "")
+    return (line.case_names or "all") + (f" (largest of {len(line.cases) + len(line.lower)} load cases)" if line.lower else "")
 
 
 def _key(value: float | None) -> float:
