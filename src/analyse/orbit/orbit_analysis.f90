@@ -3,6 +3,7 @@ module nocdyn_orbit_analysis
   use nocdyn_assembly, only: assemble_machine
   use nocdyn_column_names, only: choose_signals
   use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_harmonic_basis, only: padded_series
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -23,7 +24,6 @@ module nocdyn_orbit_analysis
   public :: analyse_orbits
 
   integer, parameter :: first_harmonics = 5          ! of the equations before the branch chooses its own
-  real(wp), parameter :: unresolved = 1.0e-3_wp      ! error of a motion that harmonics do not describe
 
   type, public :: orbit_analysis_t
     type(orbit_settings_t) :: settings
@@ -64,7 +64,6 @@ contains
       allocate (finer, source=equations)
       call follow_branch(equations, finer, self%settings, guess, self%branch, error)
     end if
-    if (.not. allocated(error)) call check_first(equations, self%branch, input, error)
     if (.not. allocated(error)) call measure_points(finer, self, error)
     if (.not. allocated(error)) return
     if (index(error%message, input%shown_case()) /= 1) error%message = input%shown_case() // ': ' // error%message
@@ -112,6 +111,7 @@ contains
     call find_floating(equations)
     call equations%prepare()
     call equations%set_harmonics(first_harmonics, error)
+    if (.not. allocated(error)) call check_period(input, equations, guess, error)
   end subroutine state_equations
 
   !> The free rotations of the machine.
@@ -219,30 +219,43 @@ contains
     end associate
   end function mean_torque
 
-  !> Refuses a machine whose first motion does not repeat itself, or that harmonics do not describe.
-  subroutine check_first(equations, branch, input, error)
-    type(orbit_equations_t), intent(inout) :: equations
-    type(branch_t), intent(inout) :: branch
+  !> Refuses a machine that stands still where its turning excites it, or whose torques do not repeat themselves.
+  subroutine check_period(input, equations, guess, error)
     type(input_t), intent(in) :: input
+    type(orbit_equations_t), intent(inout) :: equations
+    type(orbit_t), intent(in) :: guess
     type(error_t), allocatable, intent(out) :: error
-    real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)
-    logical :: repeats_soon, repeats_late
+    real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp), none = 1.0e-9_wp   ! [rad], [rad/s]
+    type(orbit_t) :: motion
+    logical :: repeats_late, repeats_soon
     integer :: turns
 
-    associate (point => branch%points(1))
-      if (point%error > unresolved) then
-        call raise(error, exit_failed, 'the harmonics do not describe the motion at the first value: error ' // &
-                   rounded_text(point%error, 3) // ' of the motion; laws with jumps, such as dry friction, need other methods')
-        return
-      end if
-      turns = ceiling(input%groups(input%position('run'))%number('t_end') * point%orbit%rate / turn) + 1
-      call equations%repeats(point%orbit, 1, repeats_soon, error)
-      if (.not. allocated(error)) call equations%repeats(point%orbit, turns, repeats_late, error)
-      if (allocated(error) .or. repeats_soon .and. repeats_late) return
-      call raise(error, exit_failed, 'the torques do not repeat themselves with the period of the excitations, ' // &
-                 rounded_text(turn / point%orbit%rate, 6) // ' s: some follow the time in another way')
-    end associate
-  end subroutine check_first
+    motion = guess
+    call equations%take_apart(equations%put_together(padded(guess, equations)), motion)
+    call equations%set_value(motion, error)
+    if (allocated(error)) return
+    if (.not. motion%rate > none) then
+      call raise(error, exit_failed, 'the machine does not turn at its start, so that its orders have no period; required: ' // &
+                 'speeds of the bodies at the start')
+      return
+    end if
+    turns = ceiling(input%groups(input%position('run'))%number('t_end') * motion%rate / turn) + 1
+    call equations%repeats(motion, 1, repeats_soon, error)
+    if (.not. allocated(error)) call equations%repeats(motion, turns, repeats_late, error)
+    if (allocated(error)) return
+    if (repeats_soon .and. repeats_late) return
+    call raise(error, exit_failed, 'the torques do not repeat themselves with the period of the excitations, ' // &
+               rounded_text(turn / motion%rate, 6) // ' s: some follow the time in another way')
+  end subroutine check_period
+
+  !> A motion with the harmonics of the equations.
+  type(orbit_t) function padded(guess, equations) result(motion)
+    type(orbit_t), intent(in) :: guess
+    type(orbit_equations_t), intent(in) :: equations
+
+    motion = guess
+    motion%series = padded_series(guess%series, equations%basis%length)
+  end function padded
 
   !> The signals of all points.
   subroutine measure_points(finer, self, error)

@@ -5,10 +5,10 @@ module nocdyn_orbit_branch
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_harmonic_basis, only: padded_series
   use nocdyn_kinds, only: wp
-  use nocdyn_orbit_corrector, only: correct, measured
+  use nocdyn_orbit_corrector, only: correct, measured, oscillation, set_least_oscillation
   use nocdyn_orbit_equations, only: orbit_equations_t, orbit_t
-  use nocdyn_orbit_points, only: adapt_harmonics, add_multipliers, branch_t, complete_point, least_harmonics, more_harmonics, &
-    most_harmonics, settle_at, take_step, walk_t
+  use nocdyn_orbit_points, only: adapt_harmonics, add_multipliers, branch_t, complete_point, find_fault, least_harmonics, &
+    more_harmonics, settle_at, take_step, walk_t
   use nocdyn_orbit_settings, only: orbit_settings_t
   use nocdyn_orbit_specials, only: add_between
   use nocdyn_text, only: rounded_text, to_text
@@ -31,6 +31,7 @@ contains
     type(branch_t), intent(out) :: branch
     type(error_t), allocatable, intent(out) :: error
     type(walk_t) :: walk, next
+    character(len=:), allocatable :: fault
     real(wp) :: step
     integer :: iterations
     logical :: is_done, is_good
@@ -48,27 +49,44 @@ contains
         exit
       end if
       call take_step(equations, walk, step, next, iterations, is_good, error)
-      if (allocated(error)) return
       if (.not. is_good) then
         step = step / 2
         if (step > shortest_step) cycle
-        branch%ending = 'at ' // rounded_text(walk%x(size(walk%x)), 8) // ': no convergence with ' // &
-                        to_text(equations%basis%harmonics) // ' harmonics'
+        call end_branch(walk, 'no convergence with ' // to_text(equations%basis%harmonics) // ' harmonics', branch, error)
         exit
       end if
       call complete_point(equations, finer, next, error)
-      if (allocated(error)) return
-      if (next%settings%harmonics == 0) then
+      if (dot_product(walk%weights**2 * walk%tangent, next%tangent) < 0) call next%turn()
+      if (.not. allocated(error) .and. next%settings%harmonics == 0) then
         call adapt_harmonics(equations, finer, walk, next, error)
-        if (allocated(error)) return
       end if
-      call conclude_step(equations, finer, walk, next, branch, is_done, error)
-      if (allocated(error)) return
+      fault = ''
+      if (.not. allocated(error)) call find_fault(equations, next%point, fault)
+      if (.not. allocated(error) .and. fault == '') then
+        call conclude_step(equations, finer, walk, next, branch, is_done, error)
+      end if
+      if (allocated(error) .or. fault /= '') then
+        call end_branch(walk, fault, branch, error)
+        exit
+      end if
       if (is_done) exit
       call adapt_step(iterations, walk, next, step)
       walk = next
     end do
   end subroutine follow_branch
+
+  !> Ends a branch before it leaves the range. An error then is no reason to drop its points.
+  subroutine end_branch(walk, fault, branch, error)
+    type(walk_t), intent(in) :: walk
+    character(len=*), intent(in) :: fault   !! why, without an error
+    type(branch_t), intent(inout) :: branch
+    type(error_t), allocatable, intent(inout) :: error
+
+    branch%ending = 'at ' // rounded_text(walk%x(size(walk%x)), 8) // ': ' // fault
+    if (.not. allocated(error)) return
+    branch%ending = 'at ' // rounded_text(walk%x(size(walk%x)), 8) // ': ' // error%message
+    deallocate (error)
+  end subroutine end_branch
 
   !> The first point, with as many harmonics as it needs, and the direction into the range.
   subroutine start_walk(equations, finer, settings, guess, walk, error)
@@ -78,6 +96,7 @@ contains
     type(walk_t), intent(inout) :: walk
     type(error_t), allocatable, intent(out) :: error
     type(orbit_t) :: start
+    character(len=:), allocatable :: fault
     real(wp), allocatable :: row(:)
     integer :: harmonics, iterations
     logical :: has_converged
@@ -102,16 +121,37 @@ contains
                    to_text(harmonics) // ' harmonics; what helps: a range that begins far from resonances')
         return
       end if
+      call set_least_oscillation(equations, walk%x, walk%range)
+      if (.not. oscillates(equations, walk)) then
+        call raise(error, exit_failed, 'nothing oscillates at the first value, ' // rounded_text(settings%from, 8) // &
+                   ', nor near it; required: an excitation with an amplitude')
+        return
+      end if
       call complete_point(equations, finer, walk, error)
       if (allocated(error)) return
-      if (settings%harmonics > 0 .or. walk%point%error <= settings%tolerance .or. harmonics >= most_harmonics) exit
-      harmonics = more_harmonics(harmonics)
+      if (settings%harmonics > 0 .or. walk%point%error <= settings%tolerance) exit
+      if (harmonics >= more_harmonics(harmonics, walk%point%crossed)) exit
+      harmonics = more_harmonics(harmonics, walk%point%crossed)
       start = walk%point%orbit
     end do
+    call find_fault(equations, walk%point, fault)
+    if (fault /= '') then
+      call raise(error, exit_failed, 'at the first value, ' // rounded_text(settings%from, 8) // ', ' // fault)
+      return
+    end if
     if ((settings%to - settings%from) * walk%tangent(size(row)) < 0) walk%tangent = -walk%tangent
     walk%point%direction = walk%tangent(size(row)) / walk%range
-    call add_multipliers(equations, walk%point, error)
+    call add_multipliers(equations, walk%settings, walk%point, error)
   end subroutine start_walk
+
+  !> Whether a machine oscillates, or begins to.
+  pure logical function oscillates(equations, walk)
+    type(orbit_equations_t), intent(in) :: equations
+    type(walk_t), intent(in) :: walk
+    real(wp), parameter :: none = 1.0e-20_wp   ! [rad]
+
+    oscillates = oscillation(equations, walk%x) > none
+  end function oscillates
 
   !> Longer steps where the branch is straight and Newton's method fast.
   subroutine adapt_step(iterations, walk, next, step)
@@ -139,15 +179,15 @@ contains
     real(wp) :: bound, value
 
     value = next%x(size(next%x))
-    is_done = value > max(walk%settings%from, walk%settings%to) .or. value < min(walk%settings%from, walk%settings%to)
-    if (is_done) then
+    is_done = value >= equations%bounds(2) .or. value <= equations%bounds(1)
+    if (value > equations%bounds(2) .or. value < equations%bounds(1)) then
       bound = walk%settings%to
       if ((value - walk%settings%to) * (walk%settings%to - walk%settings%from) < 0) bound = walk%settings%from
       beyond = next
       call settle_at(equations, finer, walk, beyond, bound, next, error)
       if (allocated(error)) return
     end if
-    call add_multipliers(equations, next%point, error)
+    call add_multipliers(equations, next%settings, next%point, error)
     if (allocated(error)) return
     call add_between(equations, finer, walk, next, branch, error)
     if (.not. allocated(error)) call branch%add(next%point)

@@ -9,7 +9,7 @@ module nocdyn_orbit_corrector
   implicit none (type, external)
   private
 
-  public :: correct, find_tangent, weights_of, measured, oscillation
+  public :: correct, find_tangent, weights_of, measured, oscillation, set_least_oscillation
 
   integer, parameter :: most_iterations = 14
   integer, parameter :: most_growths = 3
@@ -103,18 +103,36 @@ contains
     measured = norm2(weights * change)
   end function measured
 
-  !> The largest harmonic of the coordinates [rad].
+  !> The largest harmonic of the coordinates, or what counts as the least [rad].
   pure real(wp) function oscillation(equations, x)
     type(orbit_equations_t), intent(in) :: equations
     real(wp), intent(in) :: x(:)
     integer :: i, n
 
-    oscillation = silent
+    oscillation = max(silent, equations%least_oscillation)
     do n = 1, equations%freedoms
       i = equations%first_unknown(n)
       oscillation = max(oscillation, maxval(abs(x(i + 1:i + equations%basis%length - 1))))
     end do
   end function oscillation
+
+  !> Where nothing oscillates at the first value, the least oscillation is a part of what would be at the last one if the machine
+  !> were linear; 0 if nothing would.
+  subroutine set_least_oscillation(equations, x, range)
+    type(orbit_equations_t), intent(inout) :: equations   !! just corrected
+    real(wp), intent(in) :: x(:)
+    real(wp), intent(in) :: range
+    real(wp), parameter :: part = 0.01_wp
+    real(wp) :: tangent(size(x)), weights(size(x))
+
+    equations%least_oscillation = 0.0_wp
+    if (oscillation(equations, x) > silent) return
+    weights = 0.0_wp
+    weights(size(x)) = 1.0_wp / range
+    call find_tangent(equations, weights, tangent)
+    equations%least_oscillation = part * oscillation(equations, tangent)
+    if (equations%least_oscillation <= part * silent) equations%least_oscillation = 0.0_wp
+  end subroutine set_least_oscillation
 
   !> The weights of the unknowns and of the parameter.
   pure function weights_of(equations, x, range) result(weights)

@@ -31,6 +31,7 @@ module nocdyn_orbit_equations
     type(harmonic_basis_t) :: basis
     type(orbit_period_t) :: period
     integer :: subharmonic = 1
+    real(wp) :: least_oscillation = 0.0_wp           !! from which sizes of changes are measured [rad]
     real(wp) :: bounds(2) = 0.0_wp                   !! lowest and highest value of the parameter
     integer :: held = 0                              !! body whose mean speed is the parameter; 0: none
     integer :: freedoms = 0                          !! coordinates; the first nodes
@@ -225,7 +226,7 @@ contains
     type(orbit_t), intent(in) :: orbit
     type(harmonic_basis_t), intent(in) :: basis
     real(wp), intent(out) :: t(:), y(:, :)       !! [samples], [samples, states]
-    integer, intent(in), optional :: turns       !! absent: 0
+    integer, intent(in), optional :: turns       !! 0 if absent
     real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)
     real(wp) :: series(basis%length, self%nodes), steady(self%freedoms)
     integer :: c, i

@@ -12,7 +12,8 @@ module nocdyn_orbit_points
   implicit none (type, external)
   private
 
-  public :: adapt_harmonics, add_multipliers, complete_point, least_harmonics, more_harmonics, settle_at, span, take_step
+  public :: adapt_harmonics, add_multipliers, complete_point, find_fault, least_harmonics, more_harmonics, settle_at, span, &
+    take_step
 
   character(len=*), parameter, public :: fold = 'fold', doubling = 'period_doubling', neimark_sacker = 'neimark_sacker', &
     branch_point = 'branch_point'
@@ -22,6 +23,7 @@ module nocdyn_orbit_points
     real(wp) :: direction = 0.0_wp                 !! change of the parameter along the branch, as a share of its range
     real(wp) :: error = 0.0_wp                     !! estimated, as a share of the motion
     integer :: harmonics = 0
+    integer :: crossed = 0                         !! a switch whose branches the motion changes, 0: none
     complex(wp), allocatable :: multipliers(:)     !! by descending modulus
     character(len=:), allocatable :: kind          !! of a special point, else ''
   contains
@@ -42,10 +44,15 @@ module nocdyn_orbit_points
     real(wp) :: range = 1.0_wp                     !! of the parameter
     real(wp), allocatable :: x(:), tangent(:), weights(:)
     type(orbit_point_t) :: point
+  contains
+    procedure :: turn
   end type walk_t
 
   integer, parameter :: first_harmonics = 5
-  integer, parameter, public :: most_harmonics = 200
+  integer, parameter :: most_harmonics = 200
+  integer, parameter :: most_of_kinks = 60       ! where laws have kinks, more are of little use
+  real(wp), parameter :: kinked = 1.0e-6_wp      ! error above which a motion across kinks is none
+  real(wp), parameter :: unresolved = 1.0e-3_wp  ! error above which any motion is none
   real(wp), parameter :: straight = 0.97_wp      ! cosine between the tangents at both ends of a step
   real(wp), parameter :: neutral = 1.0e-8_wp     ! of a modulus above 1 by rounding
 
@@ -90,12 +97,30 @@ contains
     least_harmonics = max(first_harmonics, (maxval(equations%period%multiples) + 1) * equations%subharmonic)
   end function least_harmonics
 
-  !> A larger number of harmonics.
-  pure integer function more_harmonics(harmonics)
+  !> A larger number of harmonics, unless it is the largest already.
+  pure integer function more_harmonics(harmonics, crossed)
     integer, intent(in) :: harmonics
+    integer, intent(in) :: crossed   !! as of a point
 
-    more_harmonics = min(most_harmonics, harmonics + max(2, harmonics / 3))
+    more_harmonics = max(harmonics, min(merge(most_of_kinks, most_harmonics, crossed > 0), harmonics + max(2, harmonics / 3)))
   end function more_harmonics
+
+  !> Why a point is not good enough, '' if it is.
+  subroutine find_fault(equations, point, fault)
+    type(orbit_equations_t), intent(in) :: equations
+    type(orbit_point_t), intent(in) :: point
+    character(len=:), allocatable, intent(out) :: fault
+
+    fault = ''
+    if (point%crossed > 0 .and. point%error > kinked) then
+      fault = 'the motion crosses the ' // equations%machine%formulation%switch_name(point%crossed) // ', a kink or jump of ' // &
+              'its law that ' // to_text(point%harmonics) // ' harmonics do not describe (error ' // &
+              rounded_text(point%error, 2) // ' of the motion)'
+    else if (point%error > unresolved) then
+      fault = to_text(point%harmonics) // ' harmonics do not describe the motion (error ' // rounded_text(point%error, 2) // &
+              ' of it)'
+    end if
+  end subroutine find_fault
 
   !> Tangent, weights, orbit and error of a point that has just been corrected.
   subroutine complete_point(equations, finer, walk, error)
@@ -115,18 +140,32 @@ contains
     walk%point%harmonics = equations%basis%harmonics
     walk%point%kind = ''
     call estimate_error(equations, finer, walk%x, walk%point%orbit, walk%point%error, error)
+    walk%point%crossed = finer%machine%crossed_switch()
   end subroutine complete_point
 
-  !> The multipliers of a point.
-  subroutine add_multipliers(equations, point, error)
+  !> The multipliers of a point, none without stability.
+  subroutine add_multipliers(equations, settings, point, error)
     type(orbit_equations_t), intent(inout) :: equations
+    type(orbit_settings_t), intent(in) :: settings
     type(orbit_point_t), intent(inout) :: point
     type(error_t), allocatable, intent(out) :: error
 
-    call find_multipliers(equations, point%orbit, point%multipliers, error)
+    if (settings%has_stability) then
+      call find_multipliers(equations, point%orbit, point%multipliers, error)
+    else
+      point%multipliers = [complex(wp) ::]
+    end if
   end subroutine add_multipliers
 
-  !> A point at a distance along the tangent.
+  !> Turns the direction round.
+  subroutine turn(self)
+    class(walk_t), intent(inout) :: self
+
+    self%tangent = -self%tangent
+    self%point%direction = -self%point%direction
+  end subroutine turn
+
+  !> A point at a distance along the tangent, or at the end of the range if this is nearer.
   subroutine take_step(equations, walk, step, next, iterations, is_good, error)
     type(orbit_equations_t), intent(inout) :: equations
     type(walk_t), intent(in) :: walk
@@ -135,16 +174,26 @@ contains
     integer, intent(out) :: iterations
     logical, intent(out) :: is_good
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: row(size(walk%x)), tangent(size(walk%x))
+    real(wp) :: along(size(walk%x)), row(size(walk%x)), tangent(size(walk%x)), value
 
     next%settings = walk%settings
     next%range = walk%range
-    row = walk%weights**2 * walk%tangent
+    along = walk%weights**2 * walk%tangent
     next%x = walk%x + step * walk%tangent
+    row = along
+    associate (last => size(row), bounds => equations%bounds)
+      value = min(max(next%x(last), bounds(1)), bounds(2))
+      if (abs(value - next%x(last)) > 0) then
+        next%x = walk%x + (value - walk%x(last)) / walk%tangent(last) * walk%tangent
+        next%x(last) = value
+        row = 0.0_wp
+        row(last) = 1.0_wp
+      end if
+    end associate
     call correct(equations, walk%range, row, dot_product(row, next%x), next%x, iterations, is_good, error)
     if (allocated(error) .or. .not. is_good) return
     call find_tangent(equations, walk%weights, tangent)
-    is_good = dot_product(row, tangent) >= straight .and. measured(next%x - walk%x, walk%weights) < 2 * step
+    is_good = abs(dot_product(along, tangent)) >= straight .and. measured(next%x - walk%x, walk%weights) < 2 * step
   end subroutine take_step
 
   !> A point between two others at a value of the parameter.
@@ -197,7 +246,7 @@ contains
     do
       harmonics = equations%basis%harmonics
       if (next%point%error > walk%settings%tolerance) then
-        harmonics = more_harmonics(harmonics)
+        harmonics = more_harmonics(harmonics, next%point%crossed)
       else if (next%point%error < spare * walk%settings%tolerance) then
         harmonics = max(least, harmonics - max(1, harmonics / 6))
       end if

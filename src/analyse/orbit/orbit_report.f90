@@ -63,7 +63,7 @@ contains
         call json%open()
         call json%put('from', points(parts(i)%first)%orbit%value)
         call json%put('to', points(parts(i)%last)%orbit%value)
-        call json%put('stable', parts(i)%is_stable)
+        if (analysis%settings%has_stability) call json%put('stable', parts(i)%is_stable)
         call json%close()
       end do
       call json%close_list()
@@ -110,7 +110,7 @@ contains
       call json%put('largest', analysis%ranges(i, at)%largest)
       call json%put('mean', analysis%ranges(i, at)%mean)
       call json%put('value', analysis%branch%points(at)%orbit%value)
-      call json%put('stable', analysis%branch%points(at)%is_stable())
+      if (analysis%settings%has_stability) call json%put('stable', analysis%branch%points(at)%is_stable())
       call json%close()
     end do
     call json%close_list()
@@ -132,7 +132,8 @@ contains
     shown = min(most_multipliers, size(analysis%branch%points(1)%multipliers))
     labels = [string_t('branch')]
     call append(labels, with_unit(analysis%parameter, analysis%unit))
-    labels = [labels, strings([character(len=12) :: 'rate [rad/s]', 'stable', 'special', 'harmonics', 'error'])]
+    labels = [labels, strings([character(len=12) :: 'rate [rad/s]', 'special', 'harmonics', 'error'])]
+    if (analysis%settings%has_stability) call append(labels, 'stable')
     if (analysis%body_name /= '') call append(labels, 'torque_' // analysis%body_name // ' [N m]')
     do k = 1, shown
       call append(labels, 'multiplier_' // to_text(k) // '_real')
@@ -146,8 +147,8 @@ contains
     call write_header(file, labels)
     do i = 1, analysis%branch%count
       associate (point => analysis%branch%points(i))
-        row = [1.0_wp, point%orbit%value, point%orbit%rate, merge(1.0_wp, 0.0_wp, point%is_stable()), number_of(point), &
-               real(point%harmonics, wp), point%error]
+        row = [1.0_wp, point%orbit%value, point%orbit%rate, number_of(point), real(point%harmonics, wp), point%error]
+        if (analysis%settings%has_stability) row = [row, merge(1.0_wp, 0.0_wp, point%is_stable())]
         if (analysis%body_name /= '') row = [row, point%orbit%torque]
         row = [row, (real(point%multipliers(k), wp), aimag(point%multipliers(k)), k=1, shown)]
         row = [row, (from_si(analysis%ranges(k, i)%half_range, unit(k)), from_si(analysis%ranges(k, i)%largest, unit(k)), &
@@ -169,7 +170,18 @@ contains
   pure real(wp) function number_of(point)
     type(orbit_point_t), intent(in) :: point
 
-    number_of = findloc([character(len=16) :: fold, doubling, neimark_sacker, branch_point], point%kind, dim=1)
+    select case (point%kind)
+    case (fold)
+      number_of = 1.0_wp
+    case (doubling)
+      number_of = 2.0_wp
+    case (neimark_sacker)
+      number_of = 3.0_wp
+    case (branch_point)
+      number_of = 4.0_wp
+    case default
+      number_of = 0.0_wp
+    end select
   end function number_of
 
   !> The parts of the branch.
@@ -243,7 +255,8 @@ contains
     do i = 2, size(points) - 1
       select case (points(i)%kind)
       case (fold)
-        words = 'fold; the motion turns back there, both sides are unstable'
+        words = 'fold'
+        if (analysis%settings%has_stability) words = 'fold; the motions on both sides of it are unstable'
         if (points(i - 1)%is_stable() .and. points(i - 1)%direction > 0) words = 'fold; a rising value jumps there'
         if (points(i - 1)%is_stable() .and. points(i - 1)%direction < 0) words = 'fold; a falling value jumps there'
         if (points(i + 1)%is_stable() .and. points(i + 1)%direction > 0) words = 'fold; a falling value jumps there'
@@ -269,6 +282,10 @@ contains
     type(part_t), allocatable :: parts(:)
     integer :: i
 
+    if (.not. analysis%settings%has_stability) then
+      call report%append_line('  the stability is not determined; stability = .true. in &orbit does so')
+      return
+    end if
     call find_parts(points, parts)
     if (all(parts%is_stable)) then
       call report%append_line('  all motions are stable')

@@ -11,15 +11,20 @@ module nocdyn_orbit_settings
 
   public :: read_orbit_settings
 
+  integer, parameter :: most_states = 100      ! for which multipliers are computed unasked: they take the cube of it
+
+  character(len=*), parameter :: no_machine = ' case run load_case output response orbit limit fatigue transit sweep vary record '
+
   type, public :: orbit_settings_t
     integer :: group = 0                       !! &orbit in the input
     type(target_t), allocatable :: targets(:)  !! the number over which it goes, none if it is a speed
     integer :: body = 0                        !! whose mean speed it goes over, 0: none
     real(wp) :: from = 0.0_wp, to = 0.0_wp     !! in the unit of the target, or [rad/s]
-    integer :: harmonics = 0                   !! 0: by error
+    integer :: harmonics = 0                   !! by error if it is 0
     integer :: subharmonic = 1
     integer :: count = 0                       !! points at even distances, beside others
     integer :: most_points = 0
+    logical :: has_stability = .true.          !! whether multipliers are computed
     real(wp) :: tolerance = 0.0_wp             !! error of a point as a share of its motion
   end type orbit_settings_t
 
@@ -64,6 +69,8 @@ contains
       settings%subharmonic = group%whole_number('subharmonic')
       settings%most_points = group%whole_number('most_points')
       settings%tolerance = group%number('tolerance')
+      settings%has_stability = 2 * machine%coordinates%freedoms + machine%elements%internal%count <= most_states
+      if (group%has_value('stability')) settings%has_stability = group%flag('stability')
     end associate
   end subroutine read_orbit_settings
 
@@ -79,6 +86,9 @@ contains
     call find_target(input, path, settings%targets(1), message)
     if (message /= '') then
       call raise(error, exit_input, input%location(settings%group, 'over') // ': over = ' // quoted(path) // ': ' // message)
+    else if (index(no_machine, ' ' // input%groups(settings%targets(1)%group)%kind // ' ') > 0) then
+      call raise(error, exit_input, input%location(settings%group, 'over') // ': over = ' // quoted(path) // &
+                 ' is no number of the machine; allowed: numbers of bodies and elements')
     else if (settings%targets(1)%is_integer) then
       call raise(error, exit_input, input%location(settings%group, 'over') // ': over = ' // quoted(path) // &
                  ' is a whole number, which does not change continuously; allowed: other numbers')

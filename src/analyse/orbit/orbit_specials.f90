@@ -1,8 +1,9 @@
 !> What lies between two points of a branch: special points, and points at even distances of the parameter.
 !>
-!> Special points are where a function changes its sign from one point to the other; they are found by the method of Illinois (a
-!> false position that halves the value at an end that stays) in planes across the tangent of the first one.
+!> Special points are where a function changes its sign from one point to the other; they are found in planes across the tangent
+!> of the first one.
 module nocdyn_orbit_specials
+  use nocdyn_brackets, only: bracket_t, new_bracket
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_kinds, only: wp
   use nocdyn_orbit_corrector, only: correct
@@ -117,7 +118,7 @@ contains
         if ((value - first) * (value - second) >= 0) cycle
         call settle_at(equations, finer, begin, end, value, middle, error)
         if (allocated(error)) return
-        call add_multipliers(equations, middle%point, error)
+        call add_multipliers(equations, middle%settings, middle%point, error)
         if (allocated(error)) return
         call branch%add(middle%point)
       end do
@@ -132,55 +133,40 @@ contains
     integer, intent(in) :: number
     type(walk_t), intent(inout) :: at
     type(error_t), allocatable, intent(out) :: error
-    integer, parameter :: most = 60
+    integer, parameter :: most = 60            ! evaluations
     real(wp), parameter :: exact = 1.0e-11_wp
-    real(wp) :: a, b, c, fa, fb, fc, row(size(walk%x))
-    integer :: i, iterations, side
+    type(bracket_t) :: bracket
+    real(wp) :: place, row(size(walk%x))
+    integer :: i, iterations
     logical :: has_converged
 
-    a = 0.0_wp
-    b = length
-    fa = test_value(walk)
-    fb = test_value(next)
-    side = 0
+    bracket = new_bracket([0.0_wp, length], [test_value(walk), test_value(next)])
     row = walk%weights**2 * walk%tangent
     at%settings = walk%settings
     at%range = walk%range
     do i = 1, most
-      c = (a * fb - b * fa) / (fb - fa)
-      at%x = walk%x + (c / length) * (next%x - walk%x)
-      call correct(equations, walk%range, row, dot_product(row, walk%x) + c, at%x, iterations, has_converged, error)
+      place = bracket%next()
+      at%x = walk%x + (place / length) * (next%x - walk%x)
+      call correct(equations, walk%range, row, dot_product(row, walk%x) + place, at%x, iterations, has_converged, error)
       if (allocated(error)) return
       if (.not. has_converged) call raise(error, exit_failed, 'no convergence at a special point of the branch near ' // &
                                           rounded_text(walk%x(size(walk%x)), 8))
+      if (.not. allocated(error)) call complete_point(equations, finer, at, error)
+      if (.not. allocated(error)) call add_multipliers(equations, at%settings, at%point, error)
       if (allocated(error)) return
-      call complete_point(equations, finer, at, error)
-      if (.not. allocated(error)) call add_multipliers(equations, at%point, error)
-      if (allocated(error)) return
-      fc = test_value(at)
-      if (abs(fc) <= exact .or. b - a <= exact * length) return
-      if (fc * fb > 0) then
-        b = c
-        fb = fc
-        if (side == -1) fa = fa / 2
-        side = -1
-      else
-        a = c
-        fa = fc
-        if (side == 1) fb = fb / 2
-        side = 1
-      end if
+      call bracket%narrow(place, test_value(at))
+      if (abs(test_value(at)) <= exact .or. abs(bracket%x(2) - bracket%x(1)) <= exact * length) return
     end do
 
   contains
 
-    pure real(wp) function test_value(place)
-      type(walk_t), intent(in) :: place
+    pure real(wp) function test_value(there)
+      type(walk_t), intent(in) :: there
 
       if (number == 0) then
-        test_value = place%tangent(size(place%tangent)) / place%range
+        test_value = there%tangent(size(there%tangent)) / there%range
       else
-        test_value = log(max(abs(place%point%multipliers(number)), tiny(1.0_wp)))
+        test_value = log(max(abs(there%point%multipliers(number)), tiny(1.0_wp)))
       end if
     end function test_value
 

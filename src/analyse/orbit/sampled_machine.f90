@@ -27,7 +27,7 @@ module nocdyn_sampled_machine
     type(target_t), allocatable, private :: targets(:)   !! the number that changes, or none
     type(direct_parameters_t), private :: place          !! where it stands in the block
   contains
-    procedure :: set_samples, set_value, rates, slopes
+    procedure :: set_samples, set_value, rates, slopes, crossed_switch
     procedure, private :: assemble, write_value, choose_branches
   end type sampled_machine_t
 
@@ -174,5 +174,22 @@ contains
     call self%formulation%gather(y)
     call self%formulation%state%choose_branches(self%formulation%machine, t)
   end subroutine choose_branches
+
+  !> The first switch that is on several branches of its law at the samples evaluated last, 0: none.
+  pure integer function crossed_switch(self) result(crossed)
+    class(sampled_machine_t), intent(in) :: self
+    integer :: b, s
+
+    crossed = 0
+    associate (banks => self%formulation%state%banks)
+      do b = 1, size(banks)
+        do s = 1, size(banks(b)%branch, 2)
+          crossed = crossed + 1
+          if (any(banks(b)%branch(:, s) /= banks(b)%branch(1, s))) return
+        end do
+      end do
+    end associate
+    crossed = 0
+  end function crossed_switch
 
 end module nocdyn_sampled_machine

@@ -2,7 +2,7 @@
 !> the nonlinear one, &orbit.
 module nocdyn_schema_response
   use nocdyn_kinds, only: wp
-  use nocdyn_schema_rules, only: a_body, a_file, a_line_file, a_name, a_number, a_text, a_word, allowed_t, an_integer, &
+  use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_line_file, a_name, a_number, a_text, a_word, allowed_t, an_integer, &
     any_number, any_times, anything, at_most_once, at_most_one, equal_lengths, exactly_one, example_t, extrapolations, from_1, &
     group_rule_t, in_torsional, key_rule_t, linear, not_negative, not_zero, positive, relation_rule_t, required, requires, unset
   implicit none (type, external)
@@ -161,6 +161,8 @@ module nocdyn_schema_response
       'error of a point, as a share of its motion, that decides the number of harmonics'), &
     key_rule_t('orbit', 'count', an_integer, 1, '', unset, speed_counts, &
       'number of values at even distances at which there are points, beside those that the branch needs'), &
+    key_rule_t('orbit', 'stability', a_flag, 1, '', unset, anything, &
+      'whether multipliers are computed; if not given, for machines of up to 100 states'), &
     key_rule_t('orbit', 'most_points', an_integer, 1, '', '2000', speed_counts, 'points of a branch at most'), &
     key_rule_t('orbit', 'signals', a_text, any_number, '', unset, anything, &
       "columns of orbit.csv: names, or patterns with *, e.g. 'phi_*'; all if not given", fewest=1), &
