@@ -5,7 +5,7 @@ import random
 
 import numpy as np
 import pytest
-from conftest import Values, all_if_fast
+from conftest import SOURCE, Values, all_if_fast
 
 # Numbers of an independent program for m 1, c 0.05, k 1, k3 0.1, P 0.18.
 DUFFING = """\
@@ -30,7 +30,7 @@ TWO_MASSES = """\
 """
 NEIMARK_SACKER = (1.1127, 1.1957)
 
-SPECIAL = {"fold": 1, "period_doubling": 2, "neimark_sacker": 3, "branch_point": 4}
+SPECIAL = {"fold": 1, "period_doubling": 2, "neimark_sacker": 3, "branch_point": 4, "torque_fold": 5}
 
 
 def branch(nocdyn, text, *words):
@@ -223,6 +223,23 @@ def test_the_mean_speed_of_a_free_train_is_found_and_can_be_held(nocdyn):
         assert held[label][0] == pytest.approx(free[label][0], rel=1e-7)
     assert held["mean_omega_b0"] == pytest.approx(held["mean_speed_b0"])
     assert held["torque_b0"][-1] > 0  # the load grows with the speed, the torque of the motor falls
+
+
+def test_a_held_speed_has_folds_of_its_own_and_multipliers_at_constant_torque(nocdyn):
+    text = (SOURCE / "docs/tutorial/hardening.nml").read_text()
+    values, report = branch(nocdyn, text)
+    speeds, torques = values["mean_speed_engine"], values["torque_engine"]
+    assert len(specials(report, "fold")) == len(specials(report, "torque_fold")) == 4
+    for row in np.flatnonzero(values["special"]):
+        turns = speeds if values["special"][row] == SPECIAL["fold"] else torques
+        before, after = turns[row] - turns[row - 1], turns[row + 1] - turns[row]
+        assert before * after < 0  # it turns back exactly there
+    rows = values["special"] == SPECIAL["torque_fold"]
+    assert values["multiplier_1_real"][rows] == pytest.approx(1, abs=1e-8)
+    free = text.replace("body = 'engine'  speed_rpm = 600, 1400", "over = 'motor.mean.torque' range = 210.0, 225.0")
+    assert free != text
+    _, over_torque = branch(nocdyn, free)
+    assert specials(over_torque, "fold") == pytest.approx(150 + torques[rows], rel=1e-7)
 
 
 PERIOD_DOUBLING = """\

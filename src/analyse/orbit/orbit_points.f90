@@ -16,7 +16,7 @@ module nocdyn_orbit_points
     take_step
 
   character(len=*), parameter, public :: fold = 'fold', doubling = 'period_doubling', neimark_sacker = 'neimark_sacker', &
-    branch_point = 'branch_point'
+    branch_point = 'branch_point', torque_fold = 'torque_fold'
 
   type, public :: orbit_point_t
     type(orbit_t) :: orbit

@@ -5,7 +5,7 @@ module nocdyn_orbit_report
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_orbit_analysis, only: orbit_analysis_t
-  use nocdyn_orbit_points, only: branch_point, doubling, fold, neimark_sacker, orbit_point_t
+  use nocdyn_orbit_points, only: branch_point, doubling, fold, neimark_sacker, orbit_point_t, torque_fold
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: output_units, turn_units
   use nocdyn_quantities, only: rank_moment
@@ -179,6 +179,8 @@ contains
       number_of = 3.0_wp
     case (branch_point)
       number_of = 4.0_wp
+    case (torque_fold)
+      number_of = 5.0_wp
     case default
       number_of = 0.0_wp
     end select
@@ -261,6 +263,9 @@ contains
         if (points(i - 1)%is_stable() .and. points(i - 1)%direction < 0) words = 'fold; a falling value jumps there'
         if (points(i + 1)%is_stable() .and. points(i + 1)%direction > 0) words = 'fold; a falling value jumps there'
         if (points(i + 1)%is_stable() .and. points(i + 1)%direction < 0) words = 'fold; a rising value jumps there'
+        if (analysis%body_name /= '') words = 'fold; the mean speed turns back there'
+      case (torque_fold)
+        words = 'the holding torque turns back there'
       case (doubling)
         words = 'period doubling; a motion of twice the period branches off'
       case (neimark_sacker)
@@ -287,6 +292,7 @@ contains
       return
     end if
     call find_parts(points, parts)
+    if (analysis%body_name /= '') call report%append_line('  stability with a constant holding torque:')
     if (all(parts%is_stable)) then
       call report%append_line('  all motions are stable')
       return

@@ -9,7 +9,7 @@ module nocdyn_orbit_specials
   use nocdyn_orbit_corrector, only: correct
   use nocdyn_orbit_equations, only: orbit_equations_t
   use nocdyn_orbit_points, only: add_multipliers, branch_point, branch_t, complete_point, doubling, fold, neimark_sacker, &
-    settle_at, span, walk_t
+    settle_at, span, torque_fold, walk_t
   use nocdyn_text, only: rounded_text
   implicit none (type, external)
   private
@@ -50,6 +50,8 @@ contains
             k = k + 1
           else if (multiplier%re < 0) then
             call note(doubling)
+          else if (equations%held > 0) then
+            call note(torque_fold)   ! where the speed turns back the torque does not, and multipliers are those at constant torque
           else if (.not. has_fold) then
             call note(branch_point)
           end if
