@@ -268,7 +268,7 @@ PAGES_WITH_SESSIONS = [
     SOURCE / "README.md",
     *(
         PAGES / f"{name}.md"
-        for name in ("tutorial", "input", "editors", "signs", "equilibrium-and-modes", "report", "results", "sweeps")
+        for name in ("tutorial", "input", "editors", "signs", "equilibrium-and-modes", "orbits", "report", "results", "sweeps")
     ),
 ]
 

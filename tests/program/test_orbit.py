@@ -69,7 +69,7 @@ def test_the_motion_between_the_folds_is_unstable_and_the_report_says_where_it_j
     outcome = nocdyn.done(DUFFING + OVER.format(0.8, 1.6, ""), command="orbit")
     assert "at 1.269601956 rad/s: fold; a rising value jumps there" in outcome.stdout
     assert "at 1.115700252 rad/s: fold; a falling value jumps there" in outcome.stdout
-    assert "unstable from 1.2696 rad/s to 1.1157 rad/s" in outcome.stdout
+    assert "unstable from 1.269601956 rad/s to 1.115700252 rad/s" in outcome.stdout
 
 
 def test_a_branch_from_the_other_end_has_the_same_folds(nocdyn):

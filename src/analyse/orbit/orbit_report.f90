@@ -299,8 +299,8 @@ contains
     end if
     do i = 1, size(parts)
       if (parts(i)%is_stable) cycle
-      call report%append_line('  unstable from ' // shown(analysis, points(parts(i)%first)%orbit%value) // ' to ' // &
-                              shown(analysis, points(parts(i)%last)%orbit%value))
+      call report%append_line('  unstable from ' // shown(analysis, points(parts(i)%first)%orbit%value, exact) // ' to ' // &
+                              shown(analysis, points(parts(i)%last)%orbit%value, exact))
     end do
   end subroutine append_parts
 

@@ -51,7 +51,7 @@ contains
           else if (multiplier%re < 0) then
             call note(doubling)
           else if (equations%held > 0) then
-            call note(torque_fold)   ! where the speed turns back the torque does not, and multipliers are those at constant torque
+            call note(torque_fold)   ! multipliers are those at a constant torque
           else if (.not. has_fold) then
             call note(branch_point)
           end if
