@@ -314,6 +314,25 @@ PLAY = """\
 &run t_end = 10.0 /
 """
 
+
+def test_a_branch_can_begin_on_the_motion_of_a_settled_run(nocdyn):
+    frequency = 1.22  # between the folds: a run from rest settles on the lower motion
+    _, report = branch(nocdyn, DUFFING + OVER.format(frequency, 1.6, "start = 'settled_run'"))
+    assert specials(report, "fold") == []
+    outcome = nocdyn.done(DUFFING + OVER.format(1.1, 1.6, "harmonics = 3"), command="orbit")
+    assert "note: the first motion is the one on which a run settles" in outcome.stdout  # Newton's method finds none from rest
+    assert len(specials(json.loads((nocdyn.folder / "out/orbit.json").read_text()), "fold")) == 2
+
+
+def test_a_settled_run_of_a_free_train_gives_the_same_branch(nocdyn):
+    text, over, amplitude = random_machine(2)
+    text += f"&run t_end = 1.0 /\n&orbit over = '{over}' range = {amplitude!r}, {1.05 * amplitude!r}"
+    low, _ = branch(nocdyn, text + " /\n")
+    settled, _ = branch(nocdyn, text + " start = 'settled_run' /\n")
+    for label in ("rate", "half_range_twist_c1", "mean_twist_c1", "multiplier_1_real"):
+        assert settled[label][0] == pytest.approx(low[label][0], rel=1e-8)
+
+
 REFUSED = [
     (DUFFING, "there is no group &orbit"),
     (DUFFING + "&orbit over = 'excitation.shaker.frequenzy' range = 1, 2 /\n", "frequenzy"),
@@ -321,6 +340,7 @@ REFUSED = [
     (DUFFING + "&orbit over = 'excitation.shaker.frequency' range = 1, 1 /\n", "the two numbers are the same"),
     (DUFFING + "&orbit over = 'excitation.shaker.frequency' /\n", "range"),
     (DUFFING + "&orbit body = 'mass' speed = 1, 2 /\n", "'mass' does not turn freely"),
+    (DUFFING + "&orbit body = 'mass' speed = 1, 2 start = 'settled_run' /\n", "a run does not hold the mean speed"),
     (DUFFING + OVER.format(0.8, 1.6, "signals = 'phi_mas'"), "matches no column of orbit.csv; did you mean 'phi_mass'?"),
     (DUFFING.replace("amplitude = 0.18", "amplitude = 0.0") + OVER.format(0.8, 1.6, ""), "nothing oscillates"),
     (

@@ -1,6 +1,5 @@
 !> Periodic motions of a machine over a number of its input or over a speed: from the input to the branch.
 module nocdyn_orbit_analysis
-  use nocdyn_assembly, only: assemble_machine
   use nocdyn_column_names, only: choose_signals
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_harmonic_basis, only: padded_series
@@ -9,15 +8,15 @@ module nocdyn_orbit_analysis
   use nocdyn_machine, only: machine_t
   use nocdyn_orbit_branch, only: follow_branch
   use nocdyn_orbit_equations, only: body_turning, orbit_equations_t, orbit_t, samples_of
+  use nocdyn_orbit_guess, only: find_settled_guess, find_steady_guess
   use nocdyn_orbit_period, only: find_period
   use nocdyn_orbit_points, only: branch_t
   use nocdyn_orbit_settings, only: orbit_settings_t, read_orbit_settings
   use nocdyn_orbit_signals, only: list_orbit_signals, measure_signals, signal_range_t
   use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
-  use nocdyn_sampled_machine, only: new_sampled_machine, with_start
+  use nocdyn_sampled_machine, only: new_sampled_machine
   use nocdyn_signals, only: signal_t
-  use nocdyn_targets, only: set_targets
-  use nocdyn_text, only: quoted, rounded_text, string_t
+  use nocdyn_text, only: append, quoted, rounded_text, string_t
   implicit none (type, external)
   private
 
@@ -62,12 +61,35 @@ contains
     if (.not. allocated(error)) call choose_orbit_signals(input, equations, self, error)
     if (.not. allocated(error)) then
       allocate (finer, source=equations)
-      call follow_branch(equations, finer, self%settings, guess, self%branch, error)
+      call follow_from(input, equations, finer, guess, self, error)
     end if
     if (.not. allocated(error)) call measure_points(finer, self, error)
     if (.not. allocated(error)) return
     if (index(error%message, input%shown_case()) /= 1) error%message = input%shown_case() // ': ' // error%message
   end subroutine analyse_orbits
+
+  !> Follows the branch from the steady state, or from the motion on which a run settles: if this is asked for, or if Newton's
+  !> method does not find a motion from the steady state.
+  subroutine follow_from(input, equations, finer, guess, self, error)
+    type(input_t), intent(in) :: input
+    type(orbit_equations_t), intent(inout) :: equations, finer
+    type(orbit_t), intent(inout) :: guess
+    type(orbit_analysis_t), intent(inout) :: self
+    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable :: first
+
+    if (.not. self%settings%settles) then
+      call follow_branch(equations, finer, self%settings, guess, self%branch, first)
+      if (.not. allocated(first)) return
+      if (self%branch%has_begun .or. self%settings%body > 0) then
+        error = first
+        return
+      end if
+      call append(self%notes, 'the first motion is the one on which a run settles: from the steady state none was found')
+    end if
+    call find_settled_guess(input, self%settings, equations, guess, error)
+    if (.not. allocated(error)) call follow_branch(equations, finer, self%settings, guess, self%branch, error)
+  end subroutine follow_from
 
   !> Chooses the columns.
   subroutine choose_orbit_signals(input, equations, self, error)
@@ -107,7 +129,7 @@ contains
         return
       end if
     end if
-    call find_guess(input, settings, equations, guess)
+    call find_steady_guess(input, settings, equations, guess)
     call find_floating(equations)
     call equations%prepare()
     call equations%set_harmonics(first_harmonics, error)
@@ -132,46 +154,6 @@ contains
     end do
     allocate (equations%turning, source=body_turning(equations%machine, equations%rigid))
   end subroutine find_rigid
-
-  !> A motion without oscillation: in the steady state of the machine, if there is one, else at its start.
-  subroutine find_guess(input, settings, equations, guess)
-    type(input_t), intent(in) :: input
-    type(orbit_settings_t), intent(in) :: settings
-    type(orbit_equations_t), intent(inout) :: equations
-    type(orbit_t), intent(inout) :: guess
-    type(input_t) :: changed
-    type(machine_t) :: steady
-    type(error_t), allocatable :: error
-    character(len=:), allocatable :: message
-    integer :: c
-
-    changed = with_start(input, 'equilibrium')
-    if (size(settings%targets) > 0) call set_targets(changed, settings%targets, [settings%from], message)
-    call assemble_machine(changed, steady, error)
-    associate (machine => equations%machine%formulation%machine, f => equations%machine%freedoms)
-      if (allocated(error)) steady = machine
-      guess%value = settings%from
-      allocate (guess%series(1, equations%machine%states - f), source=0.0_wp)
-      guess%speed = steady%start_speed(1, machine%coordinates%body(equations%free))
-      do c = 1, f
-        associate (b => machine%coordinates%body(c))
-          guess%series(1, c) = steady%start_angle(1, b) - machine%start_angle(1, b)
-        end associate
-      end do
-      guess%series(1, :f) = guess%series(1, :f) - matmul(equations%rigid, guess%series(1, equations%free))
-      guess%series(1, f + 1:) = first_internal(steady)
-    end associate
-  end subroutine find_guess
-
-  !> Internal states at the start, of the first lane.
-  function first_internal(machine) result(internal)
-    type(machine_t), intent(in) :: machine
-    real(wp) :: internal(machine%elements%internal%count)
-    real(wp) :: all(machine%lanes, machine%elements%internal%count)
-
-    all = machine%start_internal()
-    internal = all(1, :)
-  end function first_internal
 
   !> Rigid motions on which no torque depends: their speed remains the one of the start.
   subroutine find_floating(equations)
@@ -223,7 +205,7 @@ contains
   subroutine check_period(input, equations, guess, error)
     type(input_t), intent(in) :: input
     type(orbit_equations_t), intent(inout) :: equations
-    type(orbit_t), intent(in) :: guess
+    type(orbit_t), intent(inout) :: guess   !! gets its rate
     type(error_t), allocatable, intent(out) :: error
     real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp), none = 1.0e-9_wp   ! [rad], [rad/s]
     type(orbit_t) :: motion
@@ -239,6 +221,7 @@ contains
                  'speeds of the bodies at the start')
       return
     end if
+    guess%rate = motion%rate
     turns = ceiling(input%groups(input%position('run'))%number('t_end') * motion%rate / turn) + 1
     call equations%repeats(motion, 1, repeats_soon, error)
     if (.not. allocated(error)) call equations%repeats(motion, turns, repeats_late, error)

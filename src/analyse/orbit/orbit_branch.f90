@@ -38,7 +38,7 @@ contains
 
     allocate (branch%points(0))
     branch%ending = ''
-    call start_walk(equations, finer, settings, guess, walk, error)
+    call start_walk(equations, finer, settings, guess, walk, branch%has_begun, error)
     if (allocated(error)) return
     call branch%add(walk%point)
     step = first_step
@@ -89,11 +89,12 @@ contains
   end subroutine end_branch
 
   !> The first point, with as many harmonics as it needs, and the direction into the range.
-  subroutine start_walk(equations, finer, settings, guess, walk, error)
+  subroutine start_walk(equations, finer, settings, guess, walk, has_begun, error)
     type(orbit_equations_t), intent(inout) :: equations, finer
     type(orbit_settings_t), intent(in) :: settings
     type(orbit_t), intent(in) :: guess
     type(walk_t), intent(inout) :: walk
+    logical, intent(out) :: has_begun   !! whether there is a point, with however many harmonics
     type(error_t), allocatable, intent(out) :: error
     type(orbit_t) :: start
     character(len=:), allocatable :: fault
@@ -106,6 +107,7 @@ contains
     harmonics = least_harmonics(equations)
     if (settings%harmonics > 0) harmonics = settings%harmonics
     start = guess
+    has_begun = .false.
     do
       call equations%set_harmonics(harmonics, error)
       if (allocated(error)) return
@@ -121,6 +123,7 @@ contains
                    to_text(harmonics) // ' harmonics; what helps: a range that begins far from resonances')
         return
       end if
+      has_begun = .true.
       call set_least_oscillation(equations, walk%x, walk%range)
       if (.not. oscillates(equations, walk)) then
         call raise(error, exit_failed, 'nothing oscillates at the first value, ' // rounded_text(settings%from, 8) // &

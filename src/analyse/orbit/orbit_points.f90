@@ -3,9 +3,8 @@ module nocdyn_orbit_points
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_harmonic_basis, only: padded_series
   use nocdyn_kinds, only: wp
-  use nocdyn_orbit_corrector, only: correct, find_tangent, measured, weights_of
+  use nocdyn_orbit_corrector, only: correct, estimate_error, find_tangent, measured, weights_of
   use nocdyn_orbit_equations, only: orbit_equations_t, orbit_t
-  use nocdyn_orbit_errors, only: estimate_error
   use nocdyn_orbit_multipliers, only: find_multipliers
   use nocdyn_orbit_settings, only: orbit_settings_t
   use nocdyn_text, only: rounded_text, to_text
@@ -33,6 +32,7 @@ module nocdyn_orbit_points
   type, public :: branch_t
     type(orbit_point_t), allocatable :: points(:)  !! along the branch
     integer :: count = 0
+    logical :: has_begun = .false.                 !! whether Newton's method has found the first point
     character(len=:), allocatable :: ending        !! why it ends where it does not leave the range, else ''
   contains
     procedure :: add

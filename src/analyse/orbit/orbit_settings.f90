@@ -24,6 +24,7 @@ module nocdyn_orbit_settings
     integer :: subharmonic = 1
     integer :: count = 0                       !! points at even distances, beside others
     integer :: most_points = 0
+    logical :: settles = .false.               !! whether a run settles on the first motion
     logical :: has_stability = .true.          !! whether multipliers are computed
     real(wp) :: tolerance = 0.0_wp             !! error of a point as a share of its motion
   end type orbit_settings_t
@@ -57,6 +58,12 @@ contains
         range = group%numbers('speed')
       end if
       if (allocated(error)) return
+      settings%settles = group%text('start') == 'settled_run'
+      if (settings%settles .and. settings%body > 0) then
+        call raise(error, exit_input, input%location(groups(1), 'start') // ": start = 'settled_run': a run does not hold " // &
+                   "the mean speed of a body; allowed: start = 'low', or over in place of body")
+        return
+      end if
       if (.not. abs(range(2) - range(1)) > 0) then
         call raise(error, exit_input, input%location(groups(1), trim(merge('speed', 'range', settings%body > 0))) // &
                    ': the two numbers are the same; required: a range')
