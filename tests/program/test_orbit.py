@@ -306,6 +306,28 @@ def test_load_cases_have_branches_of_their_own(nocdyn):
     assert [len(found) for found in folds] == [0, 2]
 
 
+ISOLATED = (1.37013788, 1.38623761)  # largest angles of both motions at 1.6 rad/s with P 0.15, by another harmonic balance
+
+
+def test_scattered_starts_find_an_isolated_branch(nocdyn):
+    text = TWO_MASSES.replace("amplitude = 0.11", "amplitude = 0.15") + OVER.format(1.9, 0.8, "starts = 64 count = 12")
+    outcome = nocdyn.done(text, command="orbit")
+    assert "64 scattered starts" in outcome.stdout and "branch 2 is isolated: from 1.574" in outcome.stdout
+    report = json.loads((nocdyn.folder / "out/orbit.json").read_text())
+    assert report["starts"]["isolated_branches"] == 1
+    rows = at(nocdyn.values("out", "orbit.csv"), "excitation.shaker.frequency", 1.6)
+    assert rows["branch"].tolist() == [1, 2, 2]
+    assert sorted(rows["largest_phi_a"][1:]) == pytest.approx(ISOLATED, abs=1e-8)
+    assert rows["stable"].tolist() == [1, 0, 0]
+    assert [point["branch"] for point in report["special_points"] if point["value"] > 1.5] == [2, 2]
+
+
+def test_scattered_starts_find_no_branch_twice(nocdyn):
+    _, report = branch(nocdyn, DUFFING + OVER.format(0.8, 1.6, "starts = 16"))
+    assert (report["starts"]["tried"], report["starts"]["isolated_branches"]) == (16, 0)
+    assert report["starts"]["periodic"] > 8
+
+
 PLAY = """\
 &body name = 'a' inertia = 1.0 /
 &coupling name = 'play' bodies = 'ground', 'a' stiffness = 100.0 damping = 0.5 gap = 0.02 /

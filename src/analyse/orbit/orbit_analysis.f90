@@ -11,6 +11,7 @@ module nocdyn_orbit_analysis
   use nocdyn_orbit_guess, only: find_settled_guess, find_steady_guess
   use nocdyn_orbit_period, only: find_period
   use nocdyn_orbit_points, only: branch_t
+  use nocdyn_orbit_scatter, only: find_isolated, scatter_t
   use nocdyn_orbit_settings, only: orbit_settings_t, read_orbit_settings
   use nocdyn_orbit_signals, only: list_orbit_signals, measure_signals, signal_range_t
   use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
@@ -29,7 +30,8 @@ module nocdyn_orbit_analysis
     character(len=:), allocatable :: parameter, unit   !! what changes
     character(len=:), allocatable :: body_name         !! whose speed is held, ''
     type(signal_t), allocatable :: signals(:)          !! in SI units
-    type(branch_t) :: branch
+    type(branch_t) :: branch                           !! with the points of all branches
+    type(scatter_t) :: found                           !! what scattered starts have found
     type(signal_range_t), allocatable :: ranges(:, :)  !! [signals, points]
     type(string_t), allocatable :: notes(:)
   end type orbit_analysis_t
@@ -62,6 +64,9 @@ contains
     if (.not. allocated(error)) then
       allocate (finer, source=equations)
       call follow_from(input, equations, finer, guess, self, error)
+    end if
+    if (.not. allocated(error) .and. self%settings%starts > 0) then
+      call find_isolated(input, self%settings, equations, finer, self%branch, self%found)
     end if
     if (.not. allocated(error)) call measure_points(finer, self, error)
     if (.not. allocated(error)) return

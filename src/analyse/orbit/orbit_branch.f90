@@ -7,19 +7,20 @@ module nocdyn_orbit_branch
   use nocdyn_kinds, only: wp
   use nocdyn_orbit_corrector, only: correct, measured, oscillation, set_least_oscillation
   use nocdyn_orbit_equations, only: orbit_equations_t, orbit_t
-  use nocdyn_orbit_points, only: adapt_harmonics, add_multipliers, branch_t, complete_point, find_fault, least_harmonics, &
-    more_harmonics, settle_at, take_step, walk_t
+  use nocdyn_orbit_points, only: adapt_harmonics, add_multipliers, branch_t, complete_point, distance_between, find_fault, &
+    least_harmonics, more_harmonics, orbit_point_t, settle_at, take_step, walk_t
   use nocdyn_orbit_settings, only: orbit_settings_t
   use nocdyn_orbit_specials, only: add_between
   use nocdyn_text, only: rounded_text, to_text
   implicit none (type, external)
   private
 
-  public :: follow_branch
+  public :: follow_branch, start_walk
 
   real(wp), parameter :: first_step = 0.01_wp, longest_step = 0.06_wp, shortest_step = 1.0e-7_wp
   real(wp), parameter :: very_straight = 0.997_wp   ! cosine between tangents
   integer, parameter :: usual_iterations = 4
+  real(wp), parameter :: near = 0.05_wp             ! distance between motions, as a share of the motion
 
 contains
 
@@ -69,11 +70,22 @@ contains
         call end_branch(walk, fault, branch, error)
         exit
       end if
-      if (is_done) exit
+      branch%is_closed = comes_back(branch%points(1), walk%point, next%point)
+      if (is_done .or. branch%is_closed) exit
       call adapt_step(iterations, walk, next, step)
       walk = next
     end do
   end subroutine follow_branch
+
+  !> Whether a branch passes its first point again between two others, in the same direction.
+  pure logical function comes_back(first, walk, next)
+    type(orbit_point_t), intent(in) :: first, walk, next
+
+    comes_back = .false.
+    if ((first%orbit%value - walk%orbit%value) * (first%orbit%value - next%orbit%value) >= 0) return
+    if (first%direction * next%direction <= 0 .or. first%direction * walk%direction <= 0) return
+    comes_back = distance_between(first%orbit, walk%orbit, next%orbit) < near
+  end function comes_back
 
   !> Ends a branch before it leaves the range. An error then is no reason to drop its points.
   subroutine end_branch(walk, fault, branch, error)
@@ -116,17 +128,17 @@ contains
       if (allocated(row)) deallocate (row)
       allocate (row(size(walk%x)), source=0.0_wp)
       row(size(row)) = 1.0_wp
-      call correct(equations, walk%range, row, settings%from, walk%x, iterations, has_converged, error)
+      call correct(equations, walk%range, row, settings%at, walk%x, iterations, has_converged, error)
       if (allocated(error)) return
       if (.not. has_converged) then
-        call raise(error, exit_failed, 'no convergence at the first value, ' // rounded_text(settings%from, 8) // ', with ' // &
+        call raise(error, exit_failed, 'no convergence at the first value, ' // rounded_text(settings%at, 8) // ', with ' // &
                    to_text(harmonics) // ' harmonics; what helps: a range that begins far from resonances')
         return
       end if
       has_begun = .true.
       call set_least_oscillation(equations, walk%x, walk%range)
       if (.not. oscillates(equations, walk)) then
-        call raise(error, exit_failed, 'nothing oscillates at the first value, ' // rounded_text(settings%from, 8) // &
+        call raise(error, exit_failed, 'nothing oscillates at the first value, ' // rounded_text(settings%at, 8) // &
                    ', nor near it; required: an excitation with an amplitude')
         return
       end if
@@ -139,10 +151,10 @@ contains
     end do
     call find_fault(equations, walk%point, fault)
     if (fault /= '') then
-      call raise(error, exit_failed, 'at the first value, ' // rounded_text(settings%from, 8) // ', ' // fault)
+      call raise(error, exit_failed, 'at the first value, ' // rounded_text(settings%at, 8) // ', ' // fault)
       return
     end if
-    if ((settings%to - settings%from) * walk%tangent(size(row)) < 0) walk%tangent = -walk%tangent
+    if (settings%ahead * walk%tangent(size(row)) < 0) walk%tangent = -walk%tangent
     walk%point%direction = walk%tangent(size(row)) / walk%range
     call add_multipliers(equations, walk%settings, walk%point, error)
   end subroutine start_walk
@@ -184,8 +196,7 @@ contains
     value = next%x(size(next%x))
     is_done = value >= equations%bounds(2) .or. value <= equations%bounds(1)
     if (value > equations%bounds(2) .or. value < equations%bounds(1)) then
-      bound = walk%settings%to
-      if ((value - walk%settings%to) * (walk%settings%to - walk%settings%from) < 0) bound = walk%settings%from
+      bound = merge(equations%bounds(2), equations%bounds(1), value > equations%bounds(2))
       beyond = next
       call settle_at(equations, finer, walk, beyond, bound, next, error)
       if (allocated(error)) return

@@ -21,7 +21,6 @@ module nocdyn_orbit_guess
   public :: find_steady_guess, find_settled_guess
 
   real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)   ! [rad]
-  integer, parameter :: periods = 300          ! in which a run settles
   integer, parameter :: harmonics = 15         ! of its last period
   integer, parameter :: samples = 64
 
@@ -46,7 +45,8 @@ contains
 
     call start_machine(input, settings, steady)
     associate (machine => equations%machine%formulation%machine, f => equations%machine%freedoms)
-      guess%value = settings%from
+      guess%value = settings%at
+      if (allocated(guess%series)) deallocate (guess%series)
       allocate (guess%series(1, equations%machine%states - f), source=0.0_wp)
       guess%speed = steady%start_speed(1, machine%coordinates%body(equations%free))
       do c = 1, f
@@ -69,7 +69,7 @@ contains
     character(len=:), allocatable :: message
 
     changed = with_start(input, 'equilibrium')
-    if (size(settings%targets) > 0) call set_targets(changed, settings%targets, [settings%from], message)
+    if (size(settings%targets) > 0) call set_targets(changed, settings%targets, [settings%at], message)
     call assemble_machine(changed, machine, error)
     if (.not. allocated(error)) return
     deallocate (error)
@@ -77,12 +77,13 @@ contains
   end subroutine start_machine
 
   !> The last period of a run from the steady state, after many periods.
-  subroutine find_settled_guess(input, settings, equations, guess, error)
+  subroutine find_settled_guess(input, settings, equations, guess, error, push)
     type(input_t), intent(in) :: input
     type(orbit_settings_t), intent(in) :: settings
     type(orbit_equations_t), intent(in) :: equations
     type(orbit_t), intent(inout) :: guess              !! in the steady state, with its rate; then the settled motion
     type(error_t), allocatable, intent(out) :: error   !! the integration fails
+    real(wp), intent(in), optional :: push(:)          !! added to the state of the start, [states]
     class(formulation_t), allocatable :: formulation
     type(machine_t) :: machine
     real(wp), allocatable :: last(:, :), y(:, :)
@@ -92,8 +93,9 @@ contains
     call start_machine(input, settings, machine)
     call new_formulation('reduced', machine, formulation, with_energy_balance=.false.)
     allocate (y, source=formulation%start())
+    if (present(push)) y(1, :) = y(1, :) + push
     period = turn / guess%rate
-    begin = periods * period
+    begin = settings%periods * period
     call advance(formulation, [0.0_wp, 0.5_wp * begin, begin], y, last, error)
     if (allocated(error)) return
     associate (f => equations%freedoms, m => equations%period%motion)

@@ -11,8 +11,8 @@ module nocdyn_orbit_points
   implicit none (type, external)
   private
 
-  public :: adapt_harmonics, add_multipliers, complete_point, find_fault, least_harmonics, more_harmonics, settle_at, span, &
-    take_step
+  public :: adapt_harmonics, add_multipliers, complete_point, distance_between, find_fault, interpolated, least_harmonics, &
+    more_harmonics, settle_at, span, take_step
 
   character(len=*), parameter, public :: fold = 'fold', doubling = 'period_doubling', neimark_sacker = 'neimark_sacker', &
     branch_point = 'branch_point', torque_fold = 'torque_fold'
@@ -22,6 +22,7 @@ module nocdyn_orbit_points
     real(wp) :: direction = 0.0_wp                 !! change of the parameter along the branch, as a share of its range
     real(wp) :: error = 0.0_wp                     !! estimated, as a share of the motion
     integer :: harmonics = 0
+    integer :: branch = 1
     integer :: crossed = 0                         !! a switch whose branches the motion changes, 0: none
     complex(wp), allocatable :: multipliers(:)     !! by descending modulus
     character(len=:), allocatable :: kind          !! of a special point, else ''
@@ -32,6 +33,7 @@ module nocdyn_orbit_points
   type, public :: branch_t
     type(orbit_point_t), allocatable :: points(:)  !! along the branch
     integer :: count = 0
+    logical :: is_closed = .false.                 !! whether it comes back to its first point
     logical :: has_begun = .false.                 !! whether Newton's method has found the first point
     character(len=:), allocatable :: ending        !! why it ends where it does not leave the range, else ''
   contains
@@ -321,5 +323,25 @@ contains
     along%speed = equations%floating_speed
     along%series = padded_series(series, equations%basis%length)
   end subroutine spread_tangent
+
+  !> The series between two motions at the value of another one, with as many harmonics as this.
+  pure function interpolated(orbit, before, after) result(series)
+    type(orbit_t), intent(in) :: orbit, before, after
+    real(wp) :: series(size(orbit%series, 1), size(orbit%series, 2))
+    real(wp) :: share
+
+    share = (orbit%value - before%value) / (after%value - before%value)
+    series = (1.0_wp - share) * padded_series(before%series, size(series, 1)) + &
+             share * padded_series(after%series, size(series, 1))
+  end function interpolated
+
+  !> The distance of the oscillation of a motion from those between two others at its value, as a share of it.
+  pure real(wp) function distance_between(orbit, before, after) result(distance)
+    type(orbit_t), intent(in) :: orbit, before, after
+    real(wp) :: series(size(orbit%series, 1), size(orbit%series, 2))
+
+    series = interpolated(orbit, before, after)
+    distance = norm2(series(2:, :) - orbit%series(2:, :)) / max(norm2(orbit%series(2:, :)), tiny(distance))
+  end function distance_between
 
 end module nocdyn_orbit_points

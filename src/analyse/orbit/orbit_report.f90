@@ -61,6 +61,7 @@ contains
       call json%open_list('parts')
       do i = 1, size(parts)
         call json%open()
+        call json%put('branch', points(parts(i)%first)%branch)
         call json%put('from', points(parts(i)%first)%orbit%value)
         call json%put('to', points(parts(i)%last)%orbit%value)
         if (analysis%settings%has_stability) call json%put('stable', parts(i)%is_stable)
@@ -69,6 +70,13 @@ contains
       call json%close_list()
     end associate
     call put_peaks(json, analysis)
+    if (analysis%settings%starts > 0) then
+      call json%open('starts')
+      call json%put('tried', analysis%found%tried)
+      call json%put('periodic', analysis%found%periodic)
+      call json%put('isolated_branches', analysis%found%branches)
+      call json%close()
+    end if
     call json%put('notes', analysis%notes)
     call json%close()
   end subroutine put_orbit
@@ -81,6 +89,7 @@ contains
 
     associate (point => analysis%branch%points(number))
       call json%open()
+      call json%put('branch', point%branch)
       call json%put('kind', point%kind)
       call json%put('value', point%orbit%value)
       call json%put('point', number)
@@ -147,7 +156,8 @@ contains
     call write_header(file, labels)
     do i = 1, analysis%branch%count
       associate (point => analysis%branch%points(i))
-        row = [1.0_wp, point%orbit%value, point%orbit%rate, number_of(point), real(point%harmonics, wp), point%error]
+        row = [real(point%branch, wp), point%orbit%value, point%orbit%rate, number_of(point), real(point%harmonics, wp), &
+               point%error]
         if (analysis%settings%has_stability) row = [row, merge(1.0_wp, 0.0_wp, point%is_stable())]
         if (analysis%body_name /= '') row = [row, point%orbit%torque]
         row = [row, (real(point%multipliers(k), wp), aimag(point%multipliers(k)), k=1, shown)]
@@ -196,11 +206,16 @@ contains
     if (size(points) == 0) return
     parts = [part_t(1, 1, points(1)%is_stable())]
     do i = 2, size(points)
+      if (points(i)%branch /= points(i - 1)%branch) then
+        parts = [parts, part_t(i, i, points(i)%is_stable())]
+        cycle
+      end if
       associate (last => parts(size(parts)))
         last%last = i
         if (last%last - last%first == 1 .and. points(last%first)%kind /= '') last%is_stable = points(i)%is_stable()
       end associate
-      if (points(i)%kind /= '' .and. i < size(points)) parts = [parts, part_t(i, i, points(i + 1)%is_stable())]
+      if (points(i)%kind == '' .or. i == size(points)) cycle
+      if (points(i + 1)%branch == points(i)%branch) parts = [parts, part_t(i, i, points(i + 1)%is_stable())]
     end do
   end subroutine find_parts
 
@@ -227,6 +242,7 @@ contains
                                 rounded_text(analysis%settings%tolerance, 2))
       end if
       if (analysis%branch%ending /= '') call report%append_line('  the branch ends ' // analysis%branch%ending)
+      if (analysis%settings%starts > 0) call append_starts(analysis, points, report)
       call append_jumps(analysis, points, report)
       call append_parts(analysis, points, report)
     end associate
@@ -245,6 +261,25 @@ contains
     if (present(figures)) text = rounded_text(value, figures)
     if (analysis%unit /= '') text = text // ' ' // analysis%unit
   end function shown
+
+  !> What scattered starts have found.
+  subroutine append_starts(analysis, points, report)
+    type(orbit_analysis_t), intent(in) :: analysis
+    type(orbit_point_t), intent(in) :: points(:)
+    type(text_buffer_t), intent(inout) :: report
+    integer :: k
+
+    associate (found => analysis%found)
+      call report%append_line('  ' // counted(found%tried, 'scattered start', 'scattered starts') // ', ' // &
+                              to_text(found%periodic) // ' led to periodic motions, ' // &
+                              counted(found%branches, 'isolated branch', 'isolated branches'))
+      do k = 2, found%branches + 1
+        call report%append_line('  branch ' // to_text(k) // ' is isolated: from ' // &
+          shown(analysis, minval(points%orbit%value, mask=points%branch == k), exact) // ' to ' // &
+          shown(analysis, maxval(points%orbit%value, mask=points%branch == k), exact))
+      end do
+    end associate
+  end subroutine append_starts
 
   !> Special points, one a line: what a slow change of the parameter meets there.
   subroutine append_jumps(analysis, points, report)
@@ -275,6 +310,7 @@ contains
       case default
         cycle
       end select
+      if (points(i)%branch > 1) words = words // ' (branch ' // to_text(points(i)%branch) // ')'
       call report%append_line('  at ' // shown(analysis, points(i)%orbit%value, exact) // ': ' // words)
     end do
   end subroutine append_jumps

@@ -15,11 +15,17 @@ module nocdyn_orbit_settings
 
   character(len=*), parameter :: no_machine = ' case run load_case output response orbit limit fatigue transit sweep vary record '
 
+  integer, parameter, public :: usual_periods = 300
+
   type, public :: orbit_settings_t
     integer :: group = 0                       !! &orbit in the input
     type(target_t), allocatable :: targets(:)  !! the number over which it goes, none if it is a speed
     integer :: body = 0                        !! whose mean speed it goes over, 0: none
     real(wp) :: from = 0.0_wp, to = 0.0_wp     !! in the unit of the target, or [rad/s]
+    real(wp) :: at = 0.0_wp                    !! where a branch begins
+    real(wp) :: ahead = 1.0_wp                 !! whether it begins towards rising (1) or falling values (-1)
+    integer :: periods = usual_periods         !! after which a run has settled
+    integer :: starts = 0                      !! scattered starts of runs that look for other branches
     integer :: harmonics = 0                   !! by error if it is 0
     integer :: subharmonic = 1
     integer :: count = 0                       !! points at even distances, beside others
@@ -59,9 +65,9 @@ contains
       end if
       if (allocated(error)) return
       settings%settles = group%text('start') == 'settled_run'
-      if (settings%settles .and. settings%body > 0) then
-        call raise(error, exit_input, input%location(groups(1), 'start') // ": start = 'settled_run': a run does not hold " // &
-                   "the mean speed of a body; allowed: start = 'low', or over in place of body")
+      if ((settings%settles .or. group%has_value('starts')) .and. settings%body > 0) then
+        call raise(error, exit_input, input%location(groups(1), trim(merge('start ', 'starts', settings%settles))) // &
+                   ': a run does not hold the mean speed of a body; allowed: over in place of body')
         return
       end if
       if (.not. abs(range(2) - range(1)) > 0) then
@@ -71,6 +77,9 @@ contains
       end if
       settings%from = range(1)
       settings%to = range(2)
+      settings%at = range(1)
+      settings%ahead = sign(1.0_wp, range(2) - range(1))
+      if (group%has_value('starts')) settings%starts = group%whole_number('starts')
       if (group%has_value('harmonics')) settings%harmonics = group%whole_number('harmonics')
       if (group%has_value('count')) settings%count = group%whole_number('count')
       settings%subharmonic = group%whole_number('subharmonic')

@@ -156,6 +156,8 @@ module nocdyn_schema_response
     key_rule_t('orbit', 'speed', a_number, 2, 'rad/s', unset, not_zero, 'its first and its last mean speed'), &
     key_rule_t('orbit', 'start', a_word, 1, '', "'low'", orbit_starts, &
       'the first motion: the one near the steady state, or the one on which a run from there settles'), &
+    key_rule_t('orbit', 'starts', an_integer, 1, '', unset, from_1, &
+      'number of runs from scattered states that look for isolated branches'), &
     key_rule_t('orbit', 'subharmonic', an_integer, 1, '', '1', subharmonics, &
       'periods of the excitation in a period of the motion'), &
     key_rule_t('orbit', 'harmonics', an_integer, 1, '', unset, harmonic_counts, &
