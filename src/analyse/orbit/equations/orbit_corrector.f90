@@ -54,7 +54,7 @@ contains
         has_converged = .true.
         return
       end if
-      if (length > 2 * former) growths = growths + 1
+      if (0.5_wp * length > former) growths = growths + 1
       if (.not. length < huge(length) .or. growths > most_growths) return
       former = length
     end do
