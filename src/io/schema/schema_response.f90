@@ -155,7 +155,7 @@ module nocdyn_schema_response
       'in place of a number: the body whose mean speed a mean torque on it holds'), &
     key_rule_t('orbit', 'speed', a_number, 2, 'rad/s', unset, not_zero, 'its first and its last mean speed'), &
     key_rule_t('orbit', 'start', a_word, 1, '', "'low'", orbit_starts, &
-      'the first motion: the one near the steady state, or the one on which a run from there settles'), &
+      'the first motion: near the steady state, or the one on which a run from there settles'), &
     key_rule_t('orbit', 'starts', an_integer, 1, '', unset, from_1, &
       'number of runs from scattered states that look for isolated branches'), &
     key_rule_t('orbit', 'subharmonic', an_integer, 1, '', '1', subharmonics, &
@@ -165,7 +165,7 @@ module nocdyn_schema_response
     key_rule_t('orbit', 'tolerance', a_number, 1, '', '1e-8', shares, &
       'error of a point, as a share of its motion, that decides the number of harmonics'), &
     key_rule_t('orbit', 'count', an_integer, 1, '', unset, speed_counts, &
-      'number of values at even distances at which there are points, beside those that the branch needs'), &
+      'number of values at even distances that have points, beside those that the branch needs'), &
     key_rule_t('orbit', 'stability', a_flag, 1, '', unset, anything, &
       'whether multipliers are computed; if not given, for machines of up to 100 states'), &
     key_rule_t('orbit', 'most_points', an_integer, 1, '', '2000', speed_counts, 'points of a branch at most'), &
