@@ -1,6 +1,6 @@
 """Dynamics of drivetrains: the commands of nocdyn as functions, and machines that run step by step in this process."""
 
-from nocdyn._analyses import campbell, equilibrium, modes, response, run, sweep, transit
+from nocdyn._analyses import campbell, equilibrium, modes, orbit, response, run, sweep, transit
 from nocdyn._errors import InputError, Mistake, NocdynError
 from nocdyn._fmu import fmu
 from nocdyn._input import Group, Input
@@ -20,6 +20,7 @@ __all__ = [
     "equilibrium",
     "fmu",
     "modes",
+    "orbit",
     "response",
     "run",
     "sweep",

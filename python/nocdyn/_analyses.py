@@ -18,6 +18,7 @@ _FILES = {  # the report of each command, and its tables
     "modes": ("modes.json", ("modes", "holzer")),
     "campbell": ("campbell.json", ("campbell",)),
     "response": ("response.json", ("response", "response_orders")),
+    "orbit": ("orbit.json", ("orbit",)),
     "transit": ("transit.json", ("transit",)),
 }
 _DONE = re.compile(rb"(\d+) of (\d+) variants")
@@ -50,6 +51,11 @@ def campbell(given, set=None, case=None, out=None):  # noqa: A002
 def response(given, set=None, case=None, out=None):  # noqa: A002
     """The forced response over the speed; the table `response_orders` has its orders."""
     return _compute("response", given, set, case, out)
+
+
+def orbit(given, set=None, case=None, out=None):  # noqa: A002
+    """Periodic motions of a nonlinear machine; the table has a row for each."""
+    return _compute("orbit", given, set, case, out)
 
 
 def transit(given, set=None, case=None, out=None):  # noqa: A002

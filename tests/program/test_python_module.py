@@ -220,6 +220,11 @@ def test_passages_have_a_table(nocdyn):
     assert all(len(result.table) > 0 for result in results.values()) and results
 
 
+def test_periodic_motions_have_a_table():
+    result = package.orbit(SOURCE / "docs/tutorial/hardening.nml", set={"orbit.speed_rpm": [600, 700]})
+    assert result.table["mean_speed_engine"].iloc[-1] == pytest.approx(700 * np.pi / 30)
+
+
 @needs_sweeps
 def test_a_sweep_is_the_dataset_of_its_file_with_a_bar_for_its_progress(monkeypatch):
     bars = []

@@ -42,7 +42,7 @@ contains
         signals(q) = quantities(q)%signal_t
       end do
       signals(size(quantities) + 1:) = angles
-      call choose_signals(input, signals, chosen, notes, error)
+      call choose_signals(input, 'response', signals, chosen, notes, error)
       if (allocated(error)) return
       shown = pack(chosen, chosen <= size(quantities))
       shown_angles = pack(chosen, chosen > size(quantities)) - size(quantities)

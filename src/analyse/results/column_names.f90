@@ -39,9 +39,10 @@ contains
     allocate (chosen, source=places(is_chosen))
   end subroutine choose_columns
 
-  !> The signals of a response that its key `signals` asks for; all without it.
-  subroutine choose_signals(input, signals, chosen, notes, error)
+  !> The signals that the key `signals` of &response or &orbit asks for; all without it.
+  subroutine choose_signals(input, kind, signals, chosen, notes, error)
     type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: kind                     !! of the group
     type(signal_t), intent(in) :: signals(:)
     integer, allocatable, intent(out) :: chosen(:)           !! ascending
     type(string_t), allocatable, intent(inout) :: notes(:)   !! on former names
@@ -49,8 +50,8 @@ contains
     logical :: is_chosen(size(signals))
 
     is_chosen = .true.
-    if (input%groups(input%position('response'))%has_value('signals')) then
-      call match_patterns(input, input%position('response'), 'signals', signals, is_chosen, notes, error)
+    if (input%groups(input%position(kind))%has_value('signals')) then
+      call match_patterns(input, input%position(kind), 'signals', signals, is_chosen, notes, error)
     end if
     allocate (chosen, source=places(is_chosen))
   end subroutine choose_signals
@@ -67,7 +68,7 @@ contains
   subroutine match_patterns(input, group, key, signals, is_chosen, notes, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: group              !! of the input
-    character(len=*), intent(in) :: key       !! 'columns' of &output, or 'signals' of &response
+    character(len=*), intent(in) :: key       !! 'columns' of &output, or 'signals' of &response or &orbit
     type(signal_t), intent(in) :: signals(:)  !! of a run the time first
     logical, intent(out) :: is_chosen(:)         !! [signals]
     type(string_t), allocatable, intent(inout) :: notes(:)
@@ -78,9 +79,10 @@ contains
     logical :: is_found, is_former, is_response
     integer :: c, i
 
-    is_response = key == 'signals'
+    is_response = input%groups(group)%kind == 'response'
     file = 'trajectory.csv'
     if (is_response) file = 'response_orders.csv'
+    if (input%groups(group)%kind == 'orbit') file = 'orbit.csv'
     call label_signals(signals, labels)
     allocate (patterns, source=input%groups(group)%texts(key))
     is_chosen = .false.
@@ -101,7 +103,7 @@ contains
         is_found = .true.
       end do
       if (is_found) cycle
-      call find_hint(pattern, signals(merge(1, 2, is_response):), labels, hint)
+      call find_hint(pattern, signals(merge(2, 1, key == 'columns'):), labels, hint)
       call input%report(group, key, key // '(' // to_text(i) // ') = ' // quoted(pattern) // ' matches no column of ' // file // &
                         hint, diagnostics)
     end do

@@ -28,7 +28,7 @@ module nocdyn_schema
   type(allowed_t), parameter :: complements = allowed_t(words='natural scaled negated')
   type(allowed_t), parameter :: output_units = allowed_t(words='rpm Hz deg')
   type(allowed_t), parameter :: formats = allowed_t(words='csv netcdf')
-  type(allowed_t), parameter :: analyses = allowed_t(words='run response campbell modes equilibrium transit')
+  type(allowed_t), parameter :: analyses = allowed_t(words='run response campbell modes equilibrium transit orbit')
   type(allowed_t), parameter :: starts = allowed_t(words='given projected equilibrium')
 
   type(group_rule_t), parameter, public :: group_rules(*) = [ &
@@ -93,7 +93,7 @@ module nocdyn_schema
     key_rule_t('load_case', 'without', a_text, any_number, '', unset, anything, &
       'names of elements that it leaves out', fewest=1), &
     key_rule_t('load_case', 'analyses', a_word, any_number, '', unset, analyses, &
-      'commands that compute it: run, response, campbell, modes, equilibrium, transit; default: all', fewest=1), &
+      'commands of it: run, response, campbell, modes, equilibrium, transit, orbit; default: all', fewest=1), &
     key_rule_t('output', 'interval', a_number, 1, 's', unset, positive, 'time from row to row'), &
     key_rule_t('output', 'points', an_integer, 1, '', '1001', from_2, &
       'number of rows; with neither interval nor points more where an excitation is fast'), &

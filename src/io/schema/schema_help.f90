@@ -104,6 +104,8 @@ contains
     type(key_rule_t), intent(in) :: rule
     character(len=*), intent(in) :: prefix   !! of the lines
     character(len=:), allocatable :: text
+    integer, parameter :: widest = 70        ! of a terminal's 100 columns, beside the name and a prefix
+    integer :: cut
 
     select case (rule%value_type)
     case (a_number, an_integer)
@@ -119,6 +121,10 @@ contains
       text = type_text(rule)
     end select
     text = ' ' // text
+    if (len(text) > widest) then   ! a long list of words goes on in a line of its own
+      cut = index(text(:widest), ' ', back=.true.)
+      text = text(:cut - 1) // new_line('a') // prefix // repeat(' ', 5 + len(rule%name)) // text(cut + 1:)
+    end if
     if (len(text) > longest) then
       text = text // new_line('a') // prefix // repeat(' ', 5 + len(rule%name) + column)
     else

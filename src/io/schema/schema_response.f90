@@ -1,7 +1,8 @@
-!> Rows of the schema: the forced response and what is judged by it, &response, &limit, &fatigue and &transit.
+!> Rows of the schema: the forced response and what is judged by it, &response, &limit, &fatigue and &transit;
+!> the nonlinear one, &orbit.
 module nocdyn_schema_response
   use nocdyn_kinds, only: wp
-  use nocdyn_schema_rules, only: a_body, a_file, a_line_file, a_name, a_number, a_text, a_word, allowed_t, an_integer, &
+  use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_line_file, a_name, a_number, a_text, a_word, allowed_t, an_integer, &
     any_number, any_times, anything, at_most_once, at_most_one, equal_lengths, exactly_one, example_t, extrapolations, from_1, &
     group_rule_t, in_torsional, key_rule_t, linear, not_negative, not_zero, positive, relation_rule_t, required, requires, unset
   implicit none (type, external)
@@ -13,6 +14,10 @@ module nocdyn_schema_response
   type(allowed_t), parameter :: formats = allowed_t(words='csv netcdf')
   type(allowed_t), parameter :: factors = allowed_t(low=0.1_wp, high=1.5_wp)
   type(allowed_t), parameter :: margins = allowed_t(low=0.0_wp, high=0.9_wp)
+  type(allowed_t), parameter :: orbit_starts = allowed_t(words='low settled_run')
+  type(allowed_t), parameter :: subharmonics = allowed_t(low=1.0_wp, high=12.0_wp)
+  type(allowed_t), parameter :: harmonic_counts = allowed_t(low=1.0_wp, high=400.0_wp)
+  type(allowed_t), parameter :: shares = allowed_t(low=1.0e-12_wp, high=0.01_wp)
   type(allowed_t), parameter :: directions = allowed_t(words='any up down both')
   type(allowed_t), parameter :: mean_stresses = allowed_t(words='none goodman gerber soderberg')
 
@@ -22,6 +27,8 @@ module nocdyn_schema_response
                  'Limits of moments, stresses and forces of a coupling, a shaft or a mesh.'), &
     group_rule_t('fatigue', in_torsional, any_times, 'fatigue', &
                  'Cycles and damage of a coupling, shaft, mesh or gear, in runs and responses.'), &
+    group_rule_t('orbit', in_torsional, at_most_once, '', &
+                 "Periodic motions over a number of the input or a speed, for 'nocdyn orbit'."), &
     group_rule_t('transit', in_torsional, at_most_once, '', &
                  "A range of speeds that the run passes, for 'nocdyn transit'; &run says how.")]
 
@@ -140,6 +147,30 @@ module nocdyn_schema_response
       'speeds of the body of &response, for the damage that its oscillations do', fewest=1), &
     key_rule_t('fatigue', 'profile_hours', a_number, any_number, 'h', unset, positive, &
       'how long the machine runs at each of these speeds', fewest=1), &
+    key_rule_t('orbit', 'over', a_text, 1, '', unset, anything, &
+      "path of the number that changes, e.g. 'excitation.shaker.frequency_hz'"), &
+    key_rule_t('orbit', 'range', a_number, 2, '', unset, anything, &
+      'its first and its last value, in the unit of its path: the branch begins at the first one'), &
+    key_rule_t('orbit', 'body', a_body, 1, '', unset, anything, &
+      'in place of a number: the body whose mean speed a mean torque on it holds'), &
+    key_rule_t('orbit', 'speed', a_number, 2, 'rad/s', unset, not_zero, 'its first and its last mean speed'), &
+    key_rule_t('orbit', 'start', a_word, 1, '', "'low'", orbit_starts, &
+      'the first motion: near the steady state, or the one on which a run from there settles'), &
+    key_rule_t('orbit', 'starts', an_integer, 1, '', unset, from_1, &
+      'number of runs from scattered states that look for isolated branches'), &
+    key_rule_t('orbit', 'subharmonic', an_integer, 1, '', '1', subharmonics, &
+      'periods of the excitation in a period of the motion'), &
+    key_rule_t('orbit', 'harmonics', an_integer, 1, '', unset, harmonic_counts, &
+      'harmonics of the period of the motion; found by the error if not given'), &
+    key_rule_t('orbit', 'tolerance', a_number, 1, '', '1e-8', shares, &
+      'error of a point, as a share of its motion, that decides the number of harmonics'), &
+    key_rule_t('orbit', 'count', an_integer, 1, '', unset, speed_counts, &
+      'number of values at even distances that have points, beside those that the branch needs'), &
+    key_rule_t('orbit', 'stability', a_flag, 1, '', unset, anything, &
+      'whether multipliers are computed; if not given, for up to 100 states without very stiff parts'), &
+    key_rule_t('orbit', 'most_points', an_integer, 1, '', '2000', speed_counts, 'points of a branch at most'), &
+    key_rule_t('orbit', 'signals', a_text, any_number, '', unset, anything, &
+      "columns of orbit.csv: names, or patterns with *, e.g. 'phi_*'; all if not given", fewest=1), &
     key_rule_t('transit', 'body', a_body, 1, '', required, anything, 'the body whose speed counts'), &
     key_rule_t('transit', 'range', a_number, 2, 'rad/s', unset, not_zero, &
       'the range of its speed; those that &limit bars in the response if not given'), &
@@ -213,6 +244,11 @@ module nocdyn_schema_response
     relation_rule_t('fatigue', requires, 'reference_force table_force force_file', 'mesh gear'), &
     relation_rule_t('fatigue', at_most_one, 'ultimate_stress', 'yield_stress'), &
     relation_rule_t('fatigue', equal_lengths, 'profile_speeds profile_hours', ''), &
+    relation_rule_t('orbit', exactly_one, 'over', 'body'), &
+    relation_rule_t('orbit', requires, 'over', 'range'), &
+    relation_rule_t('orbit', requires, 'range', 'over'), &
+    relation_rule_t('orbit', requires, 'body', 'speed'), &
+    relation_rule_t('orbit', requires, 'speed', 'body'), &
     relation_rule_t('transit', equal_lengths, 'ramp_times ramp_speeds', '')]
 
   type(example_t), parameter, public :: response_examples(*) = [ &
@@ -220,6 +256,7 @@ module nocdyn_schema_response
     example_t('limit', "coupling = 'coupling'  vibratory_moment = 40.0  moment = 200.0", .false.), &
     example_t('fatigue', "name = 'life'  coupling = 'coupling'|" // &
                          'reference_moment = 150.0  reference_cycles = 2.0e6  slope = 5.0', .false.), &
+    example_t('orbit', "over = 'excitation.pulse.frequency_hz'  range = 5.0, 20.0  count = 31", .false.), &
     example_t('transit', "body = 'motor'  range_rpm = 350, 450  time_limit = 5.0  passages = 20000", .false.)]
 
 end module nocdyn_schema_response

@@ -61,7 +61,7 @@ module nocdyn_schema_rules
     real(wp) :: high = huge(1.0_wp)
     logical :: excludes_low = .false.
     logical :: excludes_zero = .false.
-    character(len=48) :: words = ''   !! separated by blanks, for `a_word`
+    character(len=64) :: words = ''   !! separated by blanks, for `a_word`
   end type allowed_t
 
   !> One group.

@@ -1,0 +1,217 @@
+!> Newton's method on the equations of a periodic motion and one more row, which fixes the parameter or the place along a branch.
+!>
+!> Sizes of changes are measured by weights: coordinates by the largest oscillation of all, internal states by their own, mean
+!> speeds by themselves, the parameter by its range.
+module nocdyn_orbit_corrector
+  use nocdyn_errors, only: error_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_orbit_equations, only: orbit_equations_t, orbit_t
+  implicit none (type, external)
+  private
+
+  public :: correct, estimate_error, find_tangent, measured, oscillation, set_least_oscillation, weights_of
+
+  integer, parameter :: most_iterations = 14
+  integer, parameter :: most_growths = 3
+  real(wp), parameter :: converged_change = 1.0e-8_wp   ! the next change is about its square
+  real(wp), parameter :: difference = 1.0e-6_wp         ! steps of the central differences, in weighted size
+  real(wp), parameter :: silent = 1.0e-30_wp            ! a machine that does not oscillate yet
+
+contains
+
+  !> Solves the equations with row x = target for x, the unknowns and the parameter.
+  subroutine correct(equations, range, row, target, x, iterations, has_converged, error)
+    type(orbit_equations_t), intent(inout) :: equations
+    real(wp), intent(in) :: range             !! width of the range of the parameter
+    real(wp), intent(in) :: row(:)            !! [unknowns + 1]
+    real(wp), intent(in) :: target
+    real(wp), intent(inout) :: x(:)           !! [unknowns + 1], a guess, on return the solution
+    integer, intent(out) :: iterations
+    logical, intent(out) :: has_converged
+    type(error_t), allocatable, intent(out) :: error
+    type(orbit_t) :: orbit
+    real(wp), dimension(size(x)) :: change
+    real(wp) :: former, length
+    integer :: growths
+
+    has_converged = .false.
+    former = huge(former)
+    growths = 0
+    allocate (orbit%speed, source=equations%floating_speed)
+    do iterations = 1, most_iterations
+      call equations%take_apart(x, orbit)
+      call equations%residual(orbit, change(:size(x) - 1), error)
+      if (allocated(error)) return
+      change(size(x)) = dot_product(row, x) - target
+      call factor_about(equations, range, row, x, orbit, has_converged, error)
+      if (allocated(error) .or. .not. has_converged) return
+      has_converged = .false.
+      change = -change
+      call equations%system%solve(change)
+      x = x + change
+      length = measured(change, weights_of(equations, x, range))
+      if (length <= converged_change) then
+        has_converged = .true.
+        return
+      end if
+      if (0.5_wp * length > former) growths = growths + 1
+      if (.not. length < huge(length) .or. growths > most_growths) return
+      former = length
+    end do
+  end subroutine correct
+
+  !> Factors the matrix about an orbit.
+  subroutine factor_about(equations, range, row, x, orbit, is_regular, error)
+    type(orbit_equations_t), intent(inout) :: equations
+    real(wp), intent(in) :: range
+    real(wp), intent(in) :: row(:), x(:)
+    type(orbit_t), intent(in) :: orbit
+    logical, intent(out) :: is_regular
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: steps(size(equations%border) + 1), weights(size(x))
+    logical :: singular
+
+    is_regular = .false.
+    associate (inner => equations%system%inner, border => equations%system%border)
+      weights = weights_of(equations, x, range)
+      steps = difference / weights(inner + 1:)
+      call equations%fill_system(orbit, steps, error)
+      if (allocated(error)) return
+      equations%system%below(border, :) = row(:inner)
+      equations%system%right(inner + border, :) = row(inner + 1:)
+    end associate
+    call equations%system%factor(singular)
+    is_regular = .not. singular
+  end subroutine factor_about
+
+  !> The tangent of the branch at a solution that `correct` has found, with row tangent > 0 and weighted length 1.
+  subroutine find_tangent(equations, weights, tangent)
+    type(orbit_equations_t), intent(inout) :: equations
+    real(wp), intent(in) :: weights(:)
+    real(wp), contiguous, intent(out) :: tangent(:)
+
+    tangent = 0.0_wp
+    tangent(size(tangent)) = 1.0_wp
+    call equations%system%solve(tangent)
+    tangent = tangent / measured(tangent, weights)
+  end subroutine find_tangent
+
+  !> The size of a change.
+  pure real(wp) function measured(change, weights)
+    real(wp), intent(in) :: change(:), weights(:)
+
+    measured = norm2(weights * change)
+  end function measured
+
+  !> The largest harmonic of the coordinates, or what counts as the least [rad].
+  pure real(wp) function oscillation(equations, x)
+    type(orbit_equations_t), intent(in) :: equations
+    real(wp), intent(in) :: x(:)
+    integer :: i, n
+
+    oscillation = max(silent, equations%least_oscillation)
+    do n = 1, equations%freedoms
+      i = equations%first_unknown(n)
+      oscillation = max(oscillation, maxval(abs(x(i + 1:i + equations%basis%length - 1))))
+    end do
+  end function oscillation
+
+  !> Where nothing oscillates at the first value, the least oscillation is a part of what would be at the last one if the machine
+  !> were linear; 0 if nothing would.
+  subroutine set_least_oscillation(equations, x, range)
+    type(orbit_equations_t), intent(inout) :: equations   !! just corrected
+    real(wp), intent(in) :: x(:)
+    real(wp), intent(in) :: range
+    real(wp), parameter :: part = 0.01_wp
+    real(wp) :: tangent(size(x)), weights(size(x))
+
+    equations%least_oscillation = 0.0_wp
+    if (oscillation(equations, x) > silent) return
+    weights = 0.0_wp
+    weights(size(x)) = 1.0_wp / range
+    call find_tangent(equations, weights, tangent)
+    equations%least_oscillation = part * oscillation(equations, tangent)
+    if (equations%least_oscillation <= part * silent) equations%least_oscillation = 0.0_wp
+  end subroutine set_least_oscillation
+
+  !> The weights of the unknowns and of the parameter.
+  pure function weights_of(equations, x, range) result(weights)
+    type(orbit_equations_t), intent(in) :: equations
+    real(wp), intent(in) :: x(:)
+    real(wp), intent(in) :: range
+    real(wp) :: weights(size(x))
+    real(wp) :: largest, response, scale
+    integer :: i, k, n
+
+    largest = oscillation(equations, x)
+    associate (length => equations%basis%length, machine => equations%machine%formulation%machine, last => size(x))
+      do n = 1, equations%nodes
+        i = equations%first_unknown(n)
+        scale = largest
+        if (n > equations%freedoms) scale = max(maxval(abs(x(i:i + length - 1))), silent)
+        weights(i:i + length - 1) = 1.0_wp / (scale * sqrt(real(equations%nodes, wp)))
+      end do
+      do k = 1, size(equations%border)
+        i = equations%nodes * length + k
+        scale = abs(x(i))
+        if (equations%border(k) == equations%held_motion) then
+          response = maxval(abs(machine%coordinates%response(1, machine%coordinates%first(equations%held): &
+                                                             machine%coordinates%first(equations%held + 1) - 1)))
+          scale = max(scale, largest * x(last)**2 / response)
+        end if
+        weights(i) = 1.0_wp / max(scale, sqrt(epsilon(scale)))
+      end do
+      weights(last) = 1.0_wp / range
+    end associate
+  end function weights_of
+
+  !> The change of the motion, as a share of its largest harmonic, that harmonics up to twice as many ask for in equations with
+  !> twice the samples. The harmonics left out are estimated by their accelerations, the others by the factors of the last
+  !> correction.
+  subroutine estimate_error(equations, finer, x, orbit, share, error)
+    type(orbit_equations_t), intent(inout) :: equations   !! just corrected
+    type(orbit_equations_t), intent(inout) :: finer       !! of twice the harmonics
+    real(wp), intent(in) :: x(:)                          !! unknowns and the parameter
+    type(orbit_t), intent(inout) :: orbit                 !! the motion of these
+    real(wp), intent(out) :: share
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: r(:)
+    real(wp) :: change(size(x)), largest
+    integer :: first, h, i, n
+
+    share = huge(share)
+    if (finer%basis%harmonics /= 2 * equations%basis%harmonics) then
+      call finer%set_harmonics(2 * equations%basis%harmonics, error)
+      if (allocated(error)) return
+    end if
+    allocate (r(finer%unknowns()))
+    call finer%residual(orbit, r, error)
+    if (allocated(error)) return
+    change = 0.0_wp
+    share = 0.0_wp
+    largest = oscillation(equations, x)
+    associate (length => equations%basis%length, inner => equations%system%inner)
+      do n = 1, equations%nodes
+        i = equations%first_unknown(n)
+        first = finer%first_unknown(n)
+        change(i:i + length - 1) = -r(first:first + length - 1)
+        do h = equations%basis%harmonics + 1, 2 * equations%basis%harmonics
+          associate (rest => norm2(r(first + 2 * h - 1:first + 2 * h)))
+            if (n <= equations%freedoms) then
+              share = max(share, rest / h**2 / largest)
+            else
+              share = max(share, rest / h / max(maxval(abs(x(i:i + length - 1))), tiny(largest)))
+            end if
+          end associate
+        end do
+      end do
+      change(inner + 1:size(x) - 1) = -r(finer%system%inner + 1:)
+      call equations%system%solve(change)
+      do n = 1, equations%freedoms
+        i = equations%first_unknown(n)
+        share = max(share, maxval(abs(change(i + 1:i + length - 1))) / largest)
+      end do
+    end associate
+  end subroutine estimate_error
+
+end module nocdyn_orbit_corrector

@@ -1,0 +1,410 @@
+!> The equations of a periodic motion in harmonics.
+!>
+!> The coordinates are q = r Omega t + series, the internal states series in tau = w t. The harmonics of w^2 q'' = f and w z' = g
+!> vanish, with f and g of all samples of a period at once. A rigid motion r turns with a mean speed Omega, an unknown; its mean
+!> angle is zero. In place of this angle the series of its coordinate begin with a mean acceleration that balances its mean
+!> torque, divided by w^2, which must vanish. Where the speed of a body is given, the mean torque that holds it is the unknown.
+module nocdyn_orbit_equations
+  use nocdyn_bordered_system, only: bordered_system_t, new_bordered_system
+  use nocdyn_errors, only: error_t
+  use nocdyn_harmonic_basis, only: differentiated, harmonic_basis_t, new_harmonic_basis, padded_series, product_matrix
+  use nocdyn_kinds, only: wp
+  use nocdyn_orbit_period, only: follow_period, orbit_period_t
+  use nocdyn_ordering, only: reverse_cuthill_mckee
+  use nocdyn_sampled_machine, only: sampled_machine_t
+  implicit none (type, external)
+  private
+
+  public :: samples_of, body_turning
+
+  !> A periodic motion.
+  type, public :: orbit_t
+    real(wp) :: value = 0.0_wp                  !! of the parameter, in its unit; of a held speed [rad/s]
+    real(wp) :: rate = 0.0_wp                   !! w [rad/s]
+    real(wp), allocatable :: series(:, :)       !! of q [rad] and z, [length, nodes]
+    real(wp), allocatable :: speed(:)           !! Omega of the rigid motions [rad/s]
+    real(wp) :: torque = 0.0_wp                 !! mean torque that holds the speed of a body [N m]
+  end type orbit_t
+
+  type, public :: orbit_equations_t
+    type(sampled_machine_t) :: machine
+    type(harmonic_basis_t) :: basis
+    type(orbit_period_t) :: period
+    integer :: subharmonic = 1
+    real(wp) :: least_oscillation = 0.0_wp           !! from which sizes of changes are measured [rad]
+    real(wp) :: bounds(2) = 0.0_wp                   !! lowest and highest value of the parameter
+    integer :: held = 0                              !! body whose mean speed is the parameter; 0: none
+    integer :: freedoms = 0                          !! coordinates; the first nodes
+    integer :: nodes = 0                             !! coordinates and internal states
+    integer, allocatable :: free(:)                  !! coordinate of each rigid motion
+    real(wp), allocatable :: rigid(:, :)             !! r, [coordinates, motions]
+    real(wp), allocatable :: turning(:, :)           !! speeds of the bodies by the rigid motions, [bodies, motions]
+    real(wp), allocatable :: floating_speed(:)       !! speeds of the rigid motions that no torque acts on, else any [rad/s]
+    integer, allocatable :: border(:)                !! rigid motions whose speed, or holding torque, is unknown
+    integer :: held_motion = 0                       !! the one whose speed the held body gives
+    integer, allocatable :: place(:)                 !! of each node in the order of the unknowns
+    integer, allocatable, private :: row_node(:), column_node(:)   !! of each position of the Jacobian; row 0: none
+    logical, allocatable, private :: is_speed(:)     !! whether its column is a speed
+    type(bordered_system_t) :: system
+    real(wp), allocatable, private :: t(:), y(:, :), rates(:, :), slopes(:, :)
+  contains
+    procedure :: prepare, set_harmonics, set_value, residual, fill_system, unknowns, first_unknown, put_together, take_apart
+    procedure :: sample, repeats
+    procedure, private :: add_slopes, add_inertia
+  end type orbit_equations_t
+
+contains
+
+  !> Samples that series up to a harmonic need, with room for those of laws.
+  pure integer function samples_of(harmonics)
+    integer, intent(in) :: harmonics
+
+    samples_of = 8 * ((4 * harmonics + 2 + 7) / 8)
+  end function samples_of
+
+  !> Speeds of the bodies by the rigid motions, [bodies, motions].
+  pure function body_turning(machine, rigid) result(turning)
+    type(sampled_machine_t), intent(in) :: machine
+    real(wp), intent(in) :: rigid(:, :)   !! [coordinates, motions]
+    real(wp) :: turning(machine%formulation%machine%bodies, size(rigid, 2))
+    integer :: b, k
+
+    turning = 0.0_wp
+    associate (coordinates => machine%formulation%machine%coordinates)
+      do b = 1, size(turning, 1)
+        do k = coordinates%first(b), coordinates%first(b + 1) - 1
+          turning(b, :) = turning(b, :) + coordinates%ratio(1, k) * rigid(coordinates%coordinate(k), :)
+        end do
+      end do
+    end associate
+  end function body_turning
+
+  !> Orders the unknowns; `machine`, `period`, `rigid`, `free`, `turning`, `border` are set.
+  subroutine prepare(self)
+    class(orbit_equations_t), intent(inout) :: self
+    integer, allocatable :: order(:)
+    integer :: i, k
+    logical, allocatable :: is_kept(:)
+
+    self%freedoms = self%machine%freedoms
+    self%nodes = self%machine%states - self%freedoms
+    associate (f => self%freedoms, pattern => self%machine%pattern)
+      allocate (self%row_node, source=merge(pattern%row, pattern%row - f, pattern%row <= f))
+      where (pattern%row > f .and. pattern%row <= 2 * f) self%row_node = 0
+      allocate (self%is_speed, source=pattern%column <= f)
+      allocate (self%column_node, source=merge(pattern%column, pattern%column - f, pattern%column <= f))
+    end associate
+    is_kept = self%row_node > 0
+    do k = 2, size(is_kept)   ! each pair of nodes once
+      is_kept(k) = is_kept(k) .and. .not. any(self%row_node(:k - 1) == self%row_node(k) .and. &
+                                              self%column_node(:k - 1) == self%column_node(k))
+    end do
+    allocate (order, source=reverse_cuthill_mckee(self%nodes, pack(self%row_node, is_kept), pack(self%column_node, is_kept)))
+    allocate (self%place(self%nodes))
+    self%place(order) = [(i, i=1, self%nodes)]
+  end subroutine prepare
+
+  !> Changes the number of harmonics; `samples`, if present, is another number of samples.
+  subroutine set_harmonics(self, harmonics, error, samples)
+    class(orbit_equations_t), intent(inout) :: self
+    integer, intent(in) :: harmonics
+    type(error_t), allocatable, intent(out) :: error
+    integer, intent(in), optional :: samples
+    integer :: k, n, width
+
+    n = samples_of(harmonics)
+    if (present(samples)) n = samples
+    if (self%basis%harmonics == harmonics .and. self%basis%samples == n) return
+    call self%machine%set_samples(n, error)
+    if (allocated(error)) return
+    self%basis = new_harmonic_basis(harmonics, n)
+    if (allocated(self%t)) deallocate (self%t, self%y, self%rates, self%slopes)
+    allocate (self%t(n), self%y(n, self%machine%states), self%rates(n, self%machine%states), &
+              self%slopes(n, size(self%machine%pattern%row)), source=0.0_wp)
+    width = 0
+    do k = 1, size(self%row_node)
+      if (self%row_node(k) > 0) width = max(width, abs(self%place(self%row_node(k)) - self%place(self%column_node(k))))
+    end do
+    associate (length => self%basis%length)
+      self%system = new_bordered_system(self%nodes * length, size(self%border) + 1, (width + 1) * length - 1)
+    end associate
+  end subroutine set_harmonics
+
+  !> The number of unknowns without the parameter.
+  pure integer function unknowns(self)
+    class(orbit_equations_t), intent(in) :: self
+
+    unknowns = self%nodes * self%basis%length + size(self%border)
+  end function unknowns
+
+  !> The place of the mean value of a node among the unknowns; its harmonics follow.
+  pure integer function first_unknown(self, node)
+    class(orbit_equations_t), intent(in) :: self
+    integer, intent(in) :: node
+
+    first_unknown = (self%place(node) - 1) * self%basis%length + 1
+  end function first_unknown
+
+  !> The unknowns of an orbit, and its parameter.
+  function put_together(self, orbit) result(x)
+    class(orbit_equations_t), intent(in) :: self
+    type(orbit_t), intent(in) :: orbit
+    real(wp) :: x(self%unknowns() + 1)
+    integer :: i, n
+
+    do n = 1, self%nodes
+      i = self%first_unknown(n)
+      x(i:i + self%basis%length - 1) = orbit%series(:, n)
+    end do
+    do n = 1, size(self%border)
+      i = self%nodes * self%basis%length + n
+      x(i) = orbit%speed(self%border(n))
+      if (self%border(n) == self%held_motion) x(i) = orbit%torque
+    end do
+    x(size(x)) = orbit%value
+  end function put_together
+
+  !> The orbit of unknowns.
+  subroutine take_apart(self, x, orbit)
+    class(orbit_equations_t), intent(in) :: self
+    real(wp), intent(in) :: x(:)
+    type(orbit_t), intent(inout) :: orbit   !! with speeds
+    integer :: i, n
+
+    if (allocated(orbit%series)) deallocate (orbit%series)
+    allocate (orbit%series(self%basis%length, self%nodes))
+    do n = 1, self%nodes
+      i = self%first_unknown(n)
+      orbit%series(:, n) = x(i:i + self%basis%length - 1)
+    end do
+    do n = 1, size(self%border)
+      i = self%nodes * self%basis%length + n
+      if (self%border(n) == self%held_motion) then
+        orbit%torque = x(i)
+      else
+        orbit%speed(self%border(n)) = x(i)
+      end if
+    end do
+    orbit%value = x(size(x))
+    if (self%held_motion > 0) then
+      associate (turning => self%turning(self%held, :), m => self%held_motion)
+        orbit%speed(m) = 0.0_wp
+        orbit%speed(m) = (orbit%value - dot_product(turning, orbit%speed)) / turning(m)
+      end associate
+    end if
+    call find_rate(self, orbit)
+  end subroutine take_apart
+
+  !> w of an orbit.
+  subroutine find_rate(self, orbit)
+    class(orbit_equations_t), intent(in) :: self
+    type(orbit_t), intent(inout) :: orbit
+
+    orbit%rate = self%period%rate / self%subharmonic
+    if (self%period%motion > 0) orbit%rate = orbit%rate * abs(orbit%speed(self%period%motion))
+  end subroutine find_rate
+
+  !> Gives the parameter the value of an orbit, and this its w.
+  subroutine set_value(self, orbit, error)
+    class(orbit_equations_t), intent(inout) :: self
+    type(orbit_t), intent(inout) :: orbit
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: before
+
+    before = self%machine%value
+    call self%machine%set_value(orbit%value, error)
+    if (allocated(error)) return
+    associate (machine => self%machine%formulation%machine)
+      if (abs(self%machine%value - before) > 0) call follow_period(machine, self%turning, self%period, error)
+    end associate
+    if (.not. allocated(error)) call find_rate(self, orbit)
+  end subroutine set_value
+
+  !> Times and states of an orbit at the samples of some basis, all of `turns` periods later.
+  pure subroutine sample(self, orbit, basis, t, y, turns)
+    class(orbit_equations_t), intent(in) :: self
+    type(orbit_t), intent(in) :: orbit
+    type(harmonic_basis_t), intent(in) :: basis
+    real(wp), intent(out) :: t(:), y(:, :)       !! [samples], [samples, states]
+    integer, intent(in), optional :: turns       !! 0 if absent
+    real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)
+    real(wp) :: series(basis%length, self%nodes), steady(self%freedoms)
+    integer :: c, i
+
+    t = [(turn * i / basis%samples, i=0, basis%samples - 1)] / orbit%rate
+    if (present(turns)) t = t + turns * turn / orbit%rate
+    series = padded_series(orbit%series, basis%length)
+    series(1, self%free) = 0.0_wp
+    steady = matmul(self%rigid, orbit%speed)
+    associate (f => self%freedoms)
+      y(:, :f) = matmul(basis%values, orbit%rate * differentiated(series(:, :f)))
+      y(:, f + 1:) = matmul(basis%values, series)
+      do c = 1, f
+        if (.not. abs(steady(c)) > 0) cycle
+        y(:, c) = y(:, c) + steady(c)
+        y(:, f + c) = y(:, f + c) + steady(c) * t
+      end do
+    end associate
+  end subroutine sample
+
+  !> The harmonics of the equations, in the order of the unknowns, and the mean accelerations that must vanish.
+  subroutine residual(self, orbit, r, error)
+    class(orbit_equations_t), intent(inout) :: self
+    type(orbit_t), intent(inout) :: orbit
+    real(wp), intent(out) :: r(:)   !! [unknowns]
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: harmonics(self%basis%length, self%nodes), series(self%basis%length, self%nodes)
+    integer :: i, k, n
+
+    call self%set_value(orbit, error)
+    if (allocated(error)) return
+    call self%sample(orbit, self%basis, self%t, self%y)
+    call self%machine%rates(self%t, self%y, self%rates, error)
+    if (allocated(error)) return
+    series = padded_series(orbit%series, self%basis%length)
+    associate (f => self%freedoms, free => self%free, w => orbit%rate)
+      harmonics(:, :f) = -matmul(self%basis%projection, self%rates(:, :f)) / w**2
+      harmonics(:, f + 1:) = -matmul(self%basis%projection, self%rates(:, 2 * f + 1:)) / w
+      harmonics(:, :f) = harmonics(:, :f) + differentiated(differentiated(series(:, :f)))
+      harmonics(:, f + 1:) = harmonics(:, f + 1:) + differentiated(series(:, f + 1:))
+      harmonics(1, free) = harmonics(1, free) + series(1, free)
+    end associate
+    if (self%held > 0) then
+      associate (coordinates => self%machine%formulation%machine%coordinates)
+        do k = coordinates%first(self%held), coordinates%first(self%held + 1) - 1
+          associate (mean => harmonics(1, coordinates%coordinate(k)))
+            mean = mean - coordinates%response(1, k) * orbit%torque / orbit%rate**2
+          end associate
+        end do
+      end associate
+    end if
+    do n = 1, self%nodes
+      i = self%first_unknown(n)
+      r(i:i + self%basis%length - 1) = harmonics(:, n)
+    end do
+    r(self%nodes * self%basis%length + 1:) = series(1, self%free(self%border))
+  end subroutine residual
+
+  !> Fills the matrix of the equations about an orbit, with the last row for the parameter left to the caller. The columns of mean
+  !> speeds, of the holding torque and of the parameter are central differences; those of the parameter do not leave its range.
+  subroutine fill_system(self, orbit, steps, error)
+    class(orbit_equations_t), intent(inout) :: self
+    type(orbit_t), intent(in) :: orbit
+    real(wp), intent(in) :: steps(:)   !! of the differences, [border + 1]
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), dimension(self%unknowns() + 1) :: x
+    real(wp), dimension(self%unknowns()) :: before, after
+    type(orbit_t) :: other
+    real(wp) :: ends(2)
+    integer :: k, place
+
+    call self%system%clear()
+    other = orbit
+    call self%set_value(other, error)
+    if (allocated(error)) return
+    call self%sample(other, self%basis, self%t, self%y)
+    call self%machine%slopes(self%t, self%y, self%slopes)
+    call self%add_slopes(other%rate)
+    call self%add_inertia()
+    do k = 1, size(steps)
+      place = self%nodes * self%basis%length + k
+      x = self%put_together(orbit)
+      ends = x(place) + [-steps(k), steps(k)]
+      if (place == size(x) .and. ends(1) < self%bounds(1)) ends(1) = x(place)
+      if (place == size(x) .and. ends(2) > self%bounds(2)) ends(2) = x(place)
+      x(place) = ends(1)
+      call self%take_apart(x, other)
+      call self%residual(other, before, error)
+      if (allocated(error)) return
+      x(place) = ends(2)
+      call self%take_apart(x, other)
+      call self%residual(other, after, error)
+      if (allocated(error)) return
+      self%system%right(:size(after), k) = (after - before) / (ends(2) - ends(1))
+    end do
+    do k = 1, size(self%border)
+      self%system%below(k, self%first_unknown(self%free(self%border(k)))) = 1.0_wp
+    end do
+  end subroutine fill_system
+
+  !> Adds what the laws contribute: products of their slopes with the series.
+  subroutine add_slopes(self, w)
+    class(orbit_equations_t), intent(inout) :: self
+    real(wp), intent(in) :: w   !! [rad/s]
+    real(wp), dimension(self%basis%length, self%basis%length) :: block, product
+    real(wp) :: g(4 * self%basis%harmonics + 1)
+    integer :: h, k
+
+    associate (harmonics => self%basis%harmonics)
+      do k = 1, size(self%row_node)
+        if (self%row_node(k) == 0) cycle
+        if (.not. any(abs(self%slopes(:, k)) > 0)) cycle
+        g = matmul(self%basis%wide, self%slopes(:, k))
+        if (.not. any(abs(self%slopes(:, k) - self%slopes(1, k)) > 0)) g(2:) = 0.0_wp   ! exactly, as of linear laws
+        call product_matrix(harmonics, g, product)
+        block = product
+        if (self%is_speed(k)) then
+          block(:, 1) = 0.0_wp
+          do h = 1, harmonics
+            block(:, 2 * h) = -(w * h) * product(:, 2 * h + 1)
+            block(:, 2 * h + 1) = (w * h) * product(:, 2 * h)
+          end do
+        end if
+        block = block * (-1.0_wp / merge(w**2, w, self%row_node(k) <= self%freedoms))
+        if (any(self%column_node(k) == self%free)) block(:, 1) = 0.0_wp
+        call self%system%add_block(self%first_unknown(self%row_node(k)), self%first_unknown(self%column_node(k)), block)
+      end do
+    end associate
+  end subroutine add_slopes
+
+  !> Adds second derivatives of the coordinates, first ones of the internal states, and the mean accelerations.
+  subroutine add_inertia(self)
+    class(orbit_equations_t), intent(inout) :: self
+    real(wp) :: pair(2, 2)
+    integer :: h, i, n
+
+    do n = 1, self%nodes
+      i = self%first_unknown(n)
+      if (any(n == self%free)) call self%system%add_block(i, i, reshape([1.0_wp], [1, 1]))
+      do h = 1, self%basis%harmonics
+        pair = 0.0_wp
+        if (n <= self%freedoms) then
+          pair(1, 1) = -real(h, wp)**2
+          pair(2, 2) = pair(1, 1)
+        else
+          pair(1, 2) = h
+          pair(2, 1) = -h
+        end if
+        call self%system%add_block(i + 2 * h - 1, i + 2 * h - 1, pair)
+      end do
+    end do
+  end subroutine add_inertia
+
+  !> Whether the laws repeat themselves some periods later, at the same motion.
+  subroutine repeats(self, orbit, turns, is_periodic, error)
+    class(orbit_equations_t), intent(inout) :: self
+    type(orbit_t), intent(inout) :: orbit
+    integer, intent(in) :: turns
+    logical, intent(out) :: is_periodic
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: noise = 1.0e-7_wp
+    real(wp), allocatable :: first(:, :)
+
+    is_periodic = .false.
+    call self%set_value(orbit, error)
+    if (allocated(error)) return
+    call self%sample(orbit, self%basis, self%t, self%y)
+    call self%machine%rates(self%t, self%y, self%rates, error)
+    if (allocated(error)) return
+    first = self%rates
+    call self%sample(orbit, self%basis, self%t, self%y, turns)
+    call self%machine%rates(self%t, self%y, self%rates, error)
+    if (allocated(error)) return
+    associate (f => self%freedoms)
+      first(:, f + 1:2 * f) = self%rates(:, f + 1:2 * f)
+      is_periodic = all(abs(first - self%rates) <= noise * spread(maxval(abs(first), dim=1) + maxval(abs(first(:, :f))), 1, &
+                                                                  size(first, 1)))
+    end associate
+  end subroutine repeats
+
+end module nocdyn_orbit_equations

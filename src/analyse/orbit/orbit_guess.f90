@@ -1,0 +1,188 @@
+!> Guesses of the first motion of a branch: the steady state by the mean torques, or the motion on which a run settles.
+module nocdyn_orbit_guess
+  use nocdyn_assembly, only: assemble_machine, new_formulation
+  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_harmonic_basis, only: harmonic_basis_t, new_harmonic_basis
+  use nocdyn_input, only: input_t
+  use nocdyn_integration, only: integrate
+  use nocdyn_integration_settings, only: integration_settings_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_observer, only: observer_t
+  use nocdyn_orbit_equations, only: orbit_equations_t, orbit_t
+  use nocdyn_orbit_settings, only: orbit_settings_t
+  use nocdyn_sampled_machine, only: with_start
+  use nocdyn_solver_status, only: failure_message, integration_done, solver_status_t
+  use nocdyn_targets, only: set_targets
+  implicit none (type, external)
+  private
+
+  public :: find_steady_guess, find_settled_guess
+
+  real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)   ! [rad]
+  integer, parameter :: harmonics = 15         ! of its last period
+  integer, parameter :: samples = 64
+
+  !> Keeps the states of all times that are asked for.
+  type, extends(observer_t) :: kept_states_t
+    real(wp), allocatable :: y(:, :)   !! [states, times]
+    integer :: count = 0
+  contains
+    procedure :: on_output
+  end type kept_states_t
+
+contains
+
+  !> A motion without oscillation: in the steady state of the machine, if there is one, else at its start.
+  subroutine find_steady_guess(input, settings, equations, guess)
+    type(input_t), intent(in) :: input
+    type(orbit_settings_t), intent(in) :: settings
+    type(orbit_equations_t), intent(inout) :: equations
+    type(orbit_t), intent(inout) :: guess
+    type(machine_t) :: steady
+    integer :: c
+
+    call start_machine(input, settings, steady)
+    associate (machine => equations%machine%formulation%machine, f => equations%machine%freedoms)
+      guess%value = settings%at
+      if (allocated(guess%series)) deallocate (guess%series)
+      allocate (guess%series(1, equations%machine%states - f), source=0.0_wp)
+      guess%speed = steady%start_speed(1, machine%coordinates%body(equations%free))
+      do c = 1, f
+        associate (b => machine%coordinates%body(c))
+          guess%series(1, c) = steady%start_angle(1, b) - machine%start_angle(1, b)
+        end associate
+      end do
+      guess%series(1, :f) = guess%series(1, :f) - matmul(equations%rigid, guess%series(1, equations%free))
+      guess%series(:, f + 1:) = steady%start_internal()
+    end associate
+  end subroutine find_steady_guess
+
+  !> The machine with the first value of the parameter, in its steady state if there is one.
+  subroutine start_machine(input, settings, machine)
+    type(input_t), intent(in) :: input
+    type(orbit_settings_t), intent(in) :: settings
+    type(machine_t), intent(out) :: machine   !! of one lane
+    type(input_t) :: changed
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: message
+
+    changed = with_start(input, 'equilibrium')
+    if (size(settings%targets) > 0) call set_targets(changed, settings%targets, [settings%at], message)
+    call assemble_machine(changed, machine, error)
+    if (.not. allocated(error)) return
+    deallocate (error)
+    call assemble_machine(with_start(changed, 'given'), machine, error)   ! as the samples, which have been assembled
+  end subroutine start_machine
+
+  !> The last period of a run from the steady state, after many periods.
+  subroutine find_settled_guess(input, settings, equations, guess, error, push)
+    type(input_t), intent(in) :: input
+    type(orbit_settings_t), intent(in) :: settings
+    type(orbit_equations_t), intent(in) :: equations
+    type(orbit_t), intent(inout) :: guess              !! in the steady state, with its rate; then the settled motion
+    type(error_t), allocatable, intent(out) :: error   !! the integration fails
+    real(wp), intent(in), optional :: push(:)          !! added to the state of the start, [states]
+    class(formulation_t), allocatable :: formulation
+    type(machine_t) :: machine
+    real(wp), allocatable :: last(:, :), y(:, :)
+    real(wp) :: begin, period
+    integer :: i
+
+    call start_machine(input, settings, machine)
+    call new_formulation('reduced', machine, formulation, with_energy_balance=.false.)
+    allocate (y, source=formulation%start())
+    if (present(push)) y(1, :) = y(1, :) + push
+    period = turn / guess%rate
+    begin = settings%periods * period
+    call advance(formulation, [0.0_wp, 0.5_wp * begin, begin], y, last, error)
+    if (allocated(error)) return
+    associate (f => equations%freedoms, m => equations%period%motion)
+      if (m > 0) period = abs((last(f + equations%free(m), 3) - last(f + equations%free(m), 2)) / (0.5_wp * begin))
+      if (m > 0) period = turn * equations%subharmonic / (equations%period%rate * period)
+      call advance(formulation, begin + [(period * i / samples, i=0, samples)], y, last, error)
+      if (allocated(error)) return
+      last(f + 1:2 * f, :) = last(f + 1:2 * f, :) + spread(formulation_angles(machine, equations), 2, samples + 1)
+      call find_series(equations, last(f + 1:, :), period, guess)
+    end associate
+  end subroutine find_settled_guess
+
+  !> Angles of the coordinates at the start, from those of the samples [rad], [coordinates].
+  pure function formulation_angles(machine, equations) result(angles)
+    type(machine_t), intent(in) :: machine
+    type(orbit_equations_t), intent(in) :: equations
+    real(wp) :: angles(equations%freedoms)
+
+    associate (b => machine%coordinates%body)
+      angles = machine%start_angle(1, b) - equations%machine%formulation%machine%start_angle(1, b)
+    end associate
+  end function formulation_angles
+
+  !> Integrates through some times and keeps the states.
+  subroutine advance(formulation, times, y, states, error)
+    class(formulation_t), intent(inout) :: formulation
+    real(wp), contiguous, intent(in) :: times(:)      !! [s]
+    real(wp), contiguous, intent(inout) :: y(:, :)    !! state at the first time, then at the last one
+    real(wp), allocatable, intent(out) :: states(:, :)
+    type(error_t), allocatable, intent(out) :: error
+    type(kept_states_t) :: observer
+    type(integration_settings_t) :: settings
+    type(solver_status_t) :: status
+
+    settings%rtol = 1.0e-8_wp
+    settings%atol = 1.0e-10_wp
+    settings%max_steps = 100000000
+    allocate (observer%y(size(y, 2), size(times)), source=0.0_wp)
+    call integrate(formulation, settings, times, y, observer, status, error)
+    if (allocated(error)) return
+    if (status%code(1) /= integration_done) then
+      call raise(error, exit_failed, 'the run that should settle: ' // &
+                 failure_message(status, 1, formulation, settings%rtol, settings%atol))
+    end if
+    call move_alloc(observer%y, states)
+  end subroutine advance
+
+  subroutine on_output(self, lane, t, y)
+    class(kept_states_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)
+
+    self%count = self%count + 1
+    self%y(:, self%count) = y
+  end subroutine on_output
+
+  !> The series of a period. Where orders excite, the time is counted from where the mean angle is zero.
+  subroutine find_series(equations, states, period, guess)
+    type(orbit_equations_t), intent(in) :: equations
+    real(wp), intent(in) :: states(:, :)        !! coordinates and internal states, [nodes, samples + 1]
+    real(wp), intent(in) :: period              !! [s]
+    type(orbit_t), intent(inout) :: guess
+    type(harmonic_basis_t) :: basis
+    real(wp) :: beside(samples, size(states, 1)), mean(size(equations%free)), phase, series(2 * harmonics + 1, size(states, 1))
+    integer :: i, k
+
+    guess%speed = (states(equations%free, samples + 1) - states(equations%free, 1)) / period
+    beside = transpose(states(:, :samples))
+    associate (f => equations%freedoms, steady => matmul(equations%rigid, guess%speed))
+      do i = 1, samples
+        beside(i, :f) = beside(i, :f) - steady * (period * (i - 1) / samples)
+      end do
+    end associate
+    basis = new_harmonic_basis(harmonics, samples)
+    series = matmul(basis%projection, beside)
+    mean = series(1, equations%free)
+    associate (f => equations%freedoms, m => equations%period%motion)
+      series(1, :f) = series(1, :f) - matmul(equations%rigid, mean)
+      phase = 0.0_wp
+      if (m > 0) phase = turn / period * mean(m) / guess%speed(m)
+      guess%series = series
+      do k = 1, harmonics
+        guess%series(2 * k, :) = cos(k * phase) * series(2 * k, :) - sin(k * phase) * series(2 * k + 1, :)
+        guess%series(2 * k + 1, :) = sin(k * phase) * series(2 * k, :) + cos(k * phase) * series(2 * k + 1, :)
+      end do
+    end associate
+  end subroutine find_series
+
+end module nocdyn_orbit_guess

@@ -1,0 +1,65 @@
+!> Periodic motions over a number of the input, as an analysis: orbit.csv and orbit.json.
+module nocdyn_orbit_results
+  use nocdyn_analyses, only: analysis_options_t, analysis_t
+  use nocdyn_errors, only: error_t
+  use nocdyn_input, only: input_t
+  use nocdyn_json, only: json_t
+  use nocdyn_machine, only: machine_t
+  use nocdyn_orbit_analysis, only: analyse_orbits, orbit_analysis_t
+  use nocdyn_orbit_report, only: orbit_text, put_orbit, put_orbit_csv
+  use nocdyn_output_file, only: output_file_t
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  type, extends(analysis_t), public :: orbit_results_t
+    type(orbit_analysis_t), private :: analysis
+  contains
+    procedure :: solve, list_tables, put_table, put_report, text => printed
+  end type orbit_results_t
+
+contains
+
+  subroutine solve(self, input, machine, options, error)
+    class(orbit_results_t), intent(inout) :: self
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    type(analysis_options_t), intent(in) :: options
+    type(error_t), allocatable, intent(out) :: error
+
+    call analyse_orbits(input, machine, self%analysis, error)
+  end subroutine solve
+
+  subroutine list_tables(self, names)
+    class(orbit_results_t), intent(in) :: self
+    type(string_t), allocatable, intent(out) :: names(:)
+
+    names = [string_t('orbit.csv')]
+  end subroutine list_tables
+
+  subroutine put_table(self, input, name, file)
+    class(orbit_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: name
+    type(output_file_t), intent(inout) :: file
+
+    call put_orbit_csv(input, self%analysis, file)
+  end subroutine put_table
+
+  subroutine put_report(self, input, json)
+    class(orbit_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    type(json_t), intent(inout) :: json
+
+    call put_orbit(json, input, self%analysis)
+  end subroutine put_report
+
+  subroutine printed(self, input, text)
+    class(orbit_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    character(len=:), allocatable, intent(out) :: text
+
+    text = orbit_text(input, self%analysis)
+  end subroutine printed
+
+end module nocdyn_orbit_results

@@ -1,0 +1,116 @@
+!> What &orbit asks for.
+module nocdyn_orbit_settings
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_input, only: input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_targets, only: find_target, target_t
+  use nocdyn_text, only: quoted
+  implicit none (type, external)
+  private
+
+  public :: read_orbit_settings
+
+  integer, parameter :: most_states = 100      ! for which multipliers are computed unasked: they take the cube of it
+
+  character(len=*), parameter :: no_machine = ' case run load_case output response orbit limit fatigue transit sweep vary record '
+
+  integer, parameter, public :: usual_periods = 300
+
+  type, public :: orbit_settings_t
+    integer :: group = 0                       !! &orbit in the input
+    type(target_t), allocatable :: targets(:)  !! the number over which it goes, none if it is a speed
+    integer :: body = 0                        !! whose mean speed it goes over, 0: none
+    real(wp) :: from = 0.0_wp, to = 0.0_wp     !! in the unit of the target, or [rad/s]
+    real(wp) :: at = 0.0_wp                    !! where a branch begins
+    real(wp) :: ahead = 1.0_wp                 !! whether it begins towards rising (1) or falling values (-1)
+    integer :: periods = usual_periods         !! after which a run has settled
+    integer :: starts = 0                      !! scattered starts of runs that look for other branches
+    integer :: harmonics = 0                   !! by error if it is 0
+    integer :: subharmonic = 1
+    integer :: count = 0                       !! points at even distances, beside others
+    integer :: most_points = 0
+    logical :: settles = .false.               !! whether a run settles on the first motion
+    logical :: has_stability = .true.          !! whether multipliers are computed
+    logical :: asks_stability = .false.        !! whether the input says so
+    real(wp) :: tolerance = 0.0_wp             !! error of a point as a share of its motion
+  end type orbit_settings_t
+
+contains
+
+  !> Reads &orbit.
+  subroutine read_orbit_settings(input, machine, settings, error)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    type(orbit_settings_t), intent(out) :: settings
+    type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: groups(:)
+    real(wp) :: range(2)
+    integer :: i
+
+    allocate (groups, source=input%groups_named('orbit'))
+    if (size(groups) == 0) then
+      call raise(error, exit_input, input%shown_case() // ': there is no group &orbit; required: for instance ' // &
+                 "&orbit over = 'excitation.shaker.frequency_hz' range = 5, 20 /")
+      return
+    end if
+    settings%group = groups(1)
+    associate (group => input%groups(groups(1)))
+      if (group%has_value('over')) then
+        call find_number(input, group%text('over'), settings, error)
+        range = group%numbers('range')
+      else
+        allocate (settings%targets(0))
+        settings%body = findloc([(machine%names(i)%text == group%text('body'), i=1, machine%bodies)], .true., dim=1)
+        range = group%numbers('speed')
+      end if
+      if (allocated(error)) return
+      settings%settles = group%text('start') == 'settled_run'
+      if ((settings%settles .or. group%has_value('starts')) .and. settings%body > 0) then
+        call raise(error, exit_input, input%location(groups(1), trim(merge('start ', 'starts', settings%settles))) // &
+                   ': a run does not hold the mean speed of a body; allowed: over in place of body')
+        return
+      end if
+      if (.not. abs(range(2) - range(1)) > 0) then
+        call raise(error, exit_input, input%location(groups(1), trim(merge('speed', 'range', settings%body > 0))) // &
+                   ': the two numbers are the same; required: a range')
+        return
+      end if
+      settings%from = range(1)
+      settings%to = range(2)
+      settings%at = range(1)
+      settings%ahead = sign(1.0_wp, range(2) - range(1))
+      if (group%has_value('starts')) settings%starts = group%whole_number('starts')
+      if (group%has_value('harmonics')) settings%harmonics = group%whole_number('harmonics')
+      if (group%has_value('count')) settings%count = group%whole_number('count')
+      settings%subharmonic = group%whole_number('subharmonic')
+      settings%most_points = group%whole_number('most_points')
+      settings%tolerance = group%number('tolerance')
+      settings%has_stability = 2 * machine%coordinates%freedoms + machine%elements%internal%count <= most_states
+      settings%asks_stability = group%has_value('stability')
+      if (settings%asks_stability) settings%has_stability = group%flag('stability')
+    end associate
+  end subroutine read_orbit_settings
+
+  !> Finds the number over which the branch goes.
+  subroutine find_number(input, path, settings, error)
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: path
+    type(orbit_settings_t), intent(inout) :: settings
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: message
+
+    allocate (settings%targets(1))
+    call find_target(input, path, settings%targets(1), message)
+    if (message /= '') then
+      call raise(error, exit_input, input%location(settings%group, 'over') // ': over = ' // quoted(path) // ': ' // message)
+    else if (index(no_machine, ' ' // input%groups(settings%targets(1)%group)%kind // ' ') > 0) then
+      call raise(error, exit_input, input%location(settings%group, 'over') // ': over = ' // quoted(path) // &
+                 ' is no number of the machine; allowed: numbers of bodies and elements')
+    else if (settings%targets(1)%is_integer) then
+      call raise(error, exit_input, input%location(settings%group, 'over') // ': over = ' // quoted(path) // &
+                 ' is a whole number, which does not change continuously; allowed: other numbers')
+    end if
+  end subroutine find_number
+
+end module nocdyn_orbit_settings

@@ -1,0 +1,177 @@
+!> What lies between two points of a branch: special points, and points at even distances of the parameter.
+!>
+!> Special points are where a function changes its sign from one point to the other; they are found in planes across the tangent
+!> of the first one.
+module nocdyn_orbit_specials
+  use nocdyn_brackets, only: bracket_t, new_bracket
+  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_kinds, only: wp
+  use nocdyn_orbit_corrector, only: correct
+  use nocdyn_orbit_equations, only: orbit_equations_t
+  use nocdyn_orbit_points, only: add_multipliers, branch_point, branch_t, complete_point, doubling, fold, neimark_sacker, &
+    settle_at, span, torque_fold, walk_t
+  use nocdyn_text, only: rounded_text
+  implicit none (type, external)
+  private
+
+  public :: add_between
+
+contains
+
+  !> Special points and points at even distances between two points.
+  subroutine add_between(equations, finer, walk, next, branch, error)
+    type(orbit_equations_t), intent(inout) :: equations, finer
+    type(walk_t), intent(in) :: walk, next
+    type(branch_t), intent(inout) :: branch
+    type(error_t), allocatable, intent(out) :: error
+    type(branch_t) :: found
+    type(walk_t) :: at
+    real(wp), allocatable :: places(:)
+    integer :: k, least, most
+    logical :: has_fold
+
+    allocate (found%points(0), places(0))
+    associate (last => size(walk%x), length => span(walk, next))
+      has_fold = walk%tangent(last) * next%tangent(last) < 0
+      if (has_fold) then
+        call locate(equations, finer, walk, next, length, 0, at, error)
+        if (allocated(error)) return
+        call note(fold)
+      end if
+      least = min(walk%point%unstable(), next%point%unstable())
+      most = max(walk%point%unstable(), next%point%unstable())
+      k = least + 1
+      do while (k <= most)
+        call locate(equations, finer, walk, next, length, k, at, error)
+        if (allocated(error)) return
+        associate (multiplier => at%point%multipliers(k))
+          if (abs(multiplier%im) > 1.0e-6_wp) then
+            call note(neimark_sacker)
+            k = k + 1
+          else if (multiplier%re < 0) then
+            call note(doubling)
+          else if (equations%held > 0) then
+            call note(torque_fold)   ! multipliers are those at a constant torque
+          else if (.not. has_fold) then
+            call note(branch_point)
+          end if
+        end associate
+        k = k + 1
+      end do
+    end associate
+    call add_even(equations, finer, walk, next, found, places, branch, error)
+
+  contains
+
+    subroutine note(kind)
+      character(len=*), intent(in) :: kind
+
+      at%point%kind = kind
+      call found%add(at%point)
+      places = [places, span(walk, at)]
+    end subroutine note
+
+  end subroutine add_between
+
+  !> Adds points found between two others in their order along the branch, and points at even distances between all of these.
+  subroutine add_even(equations, finer, walk, next, found, places, branch, error)
+    type(orbit_equations_t), intent(inout) :: equations, finer
+    type(walk_t), intent(in) :: walk, next
+    type(branch_t), intent(in) :: found
+    real(wp), intent(in) :: places(:)   !! of these along the tangent
+    type(branch_t), intent(inout) :: branch
+    type(error_t), allocatable, intent(out) :: error
+    type(walk_t) :: begin, end
+    integer :: i, k
+    logical :: is_left(size(places))
+
+    is_left = .true.
+    begin = walk
+    do i = 1, size(places) + 1
+      end = next
+      if (i <= size(places)) then
+        k = minloc(places, dim=1, mask=is_left)
+        is_left(k) = .false.
+        end%point = found%points(k)
+        end%x = equations%put_together(end%point%orbit)
+      end if
+      if (walk%settings%count > 0) call add_grid(equations, finer, begin, end, branch, error)
+      if (allocated(error)) return
+      if (i <= size(places)) call branch%add(end%point)
+      begin = end
+    end do
+  end subroutine add_even
+
+  !> Points at even distances between two points.
+  subroutine add_grid(equations, finer, begin, end, branch, error)
+    type(orbit_equations_t), intent(inout) :: equations, finer
+    type(walk_t), intent(in) :: begin, end
+    type(branch_t), intent(inout) :: branch
+    type(error_t), allocatable, intent(out) :: error
+    type(walk_t) :: middle
+    real(wp) :: value
+    integer :: i, k
+
+    associate (settings => begin%settings, first => begin%x(size(begin%x)), second => end%x(size(end%x)))
+      do i = 2, settings%count - 1
+        k = i
+        if ((second - first) * (settings%to - settings%from) < 0) k = settings%count + 1 - i
+        value = settings%from + (settings%to - settings%from) * (k - 1) / (settings%count - 1)
+        if ((value - first) * (value - second) >= 0) cycle
+        call settle_at(equations, finer, begin, end, value, middle, error)
+        if (allocated(error)) return
+        call add_multipliers(equations, middle%settings, middle%point, error)
+        if (allocated(error)) return
+        call branch%add(middle%point)
+      end do
+    end associate
+  end subroutine add_grid
+
+  !> Finds where the parameter turns back (`number` 0), or where the multiplier of a number has the modulus 1, between two points.
+  subroutine locate(equations, finer, walk, next, length, number, at, error)
+    type(orbit_equations_t), intent(inout) :: equations, finer
+    type(walk_t), intent(in) :: walk, next
+    real(wp), intent(in) :: length         !! distance of the points along the tangent
+    integer, intent(in) :: number
+    type(walk_t), intent(inout) :: at
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: most = 60            ! evaluations
+    real(wp), parameter :: exact = 1.0e-11_wp
+    type(bracket_t) :: bracket
+    real(wp) :: place, row(size(walk%x))
+    integer :: i, iterations
+    logical :: has_converged
+
+    bracket = new_bracket([0.0_wp, length], [test_value(walk), test_value(next)])
+    row = walk%weights**2 * walk%tangent
+    at%settings = walk%settings
+    at%range = walk%range
+    do i = 1, most
+      place = bracket%next()
+      at%x = walk%x + (place / length) * (next%x - walk%x)
+      call correct(equations, walk%range, row, dot_product(row, walk%x) + place, at%x, iterations, has_converged, error)
+      if (allocated(error)) return
+      if (.not. has_converged) call raise(error, exit_failed, 'no convergence at a special point of the branch near ' // &
+                                          rounded_text(walk%x(size(walk%x)), 8))
+      if (.not. allocated(error)) call complete_point(equations, finer, at, error)
+      if (.not. allocated(error)) call add_multipliers(equations, at%settings, at%point, error)
+      if (allocated(error)) return
+      call bracket%narrow(place, test_value(at))
+      if (abs(test_value(at)) <= exact .or. abs(bracket%x(2) - bracket%x(1)) <= exact * length) return
+    end do
+
+  contains
+
+    pure real(wp) function test_value(there)
+      type(walk_t), intent(in) :: there
+
+      if (number == 0) then
+        test_value = there%tangent(size(there%tangent)) / there%range
+      else
+        test_value = log(max(abs(there%point%multipliers(number)), tiny(1.0_wp)))
+      end if
+    end function test_value
+
+  end subroutine locate
+
+end module nocdyn_orbit_specials
