@@ -331,7 +331,18 @@ PAGES_WITH_SESSIONS = [
     SOURCE / "README.md",
     *(
         PAGES / f"{name}.md"
-        for name in ("tutorial", "modelling", "input", "editors", "signs", "equilibrium-and-modes", "orbits", "report", "results", "sweeps")
+        for name in (
+            "tutorial",
+            "modelling",
+            "input",
+            "editors",
+            "signs",
+            "equilibrium-and-modes",
+            "orbits",
+            "report",
+            "results",
+            "sweeps",
+        )
     ),
 ]
 
