@@ -13,7 +13,7 @@ import pandas as pd
 from .columns import COLUMNS, Column, read_column_list
 from .failure import ChoiceError, ResultsError
 from .json_files import with_case
-from .trajectory_files import labels_of, read_columns
+from .trajectory_files import labels_of, need_folder, read_columns
 
 TIME = "t [s]"
 FILES = ("trajectory.csv", "trajectory.nc", "trajectory.partial.csv", "trajectory.partial.nc")
@@ -124,8 +124,7 @@ def bodies_of(machine: f90nml.Namelist, column: Column) -> list[str]:
 
 def read_results(folder: Path, choose: Callable[[Header], Iterable[str]] | None = None, rpm: bool = False) -> Results:
     """The results in a folder; of a run that failed, what it has. `choose` gives the labels that are needed besides the time."""
-    if not folder.is_dir():
-        raise ResultsError(f"{folder}: there is no such results folder")
+    need_folder(folder)
     file = trajectory_in(folder)
     if file is None:
         raise ResultsError(f"{folder}: no trajectory.csv here; {_elsewhere(folder)}")

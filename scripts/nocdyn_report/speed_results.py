@@ -13,7 +13,7 @@ from .failure import ResultsError
 from .json_files import read_json, with_case
 from .report.result_files import case_of
 from .results import RPM
-from .trajectory_files import labels_of, read_columns
+from .trajectory_files import labels_of, need_folder, read_columns
 
 SPEED = re.compile(r"omega_(?P<body>.+) \[(?P<unit>rad/s|rpm|Hz)\]")
 SHAKEN = "frequency [Hz]"
@@ -298,8 +298,7 @@ def read_campbell(folder: Path) -> Campbell:
 
 def _read_report(folder: Path, command: str, tables: tuple[str, ...], keys: tuple[str, ...]) -> dict:
     """COMMAND.json, if all files of the command are there."""
-    if not folder.is_dir():
-        raise ResultsError(f"{folder}: there is no such results folder")
+    need_folder(folder)
     for name in (*tables, f"{command}.json"):
         if not (folder / name).is_file():
             raise ResultsError(f"{folder}: no {name} here; 'nocdyn {command} FILE --out {folder}' writes it")

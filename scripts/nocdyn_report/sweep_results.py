@@ -11,7 +11,7 @@ import pandas as pd
 
 from .columns import Column, read_column_list
 from .failure import ResultsError
-from .trajectory_files import text_of
+from .trajectory_files import need_folder, text_of
 
 DONE, REFUSED, FAILED = 0, 1, 2
 STATUS_WORDS = {"done": DONE, "refused": REFUSED, "failed": FAILED}
@@ -86,10 +86,7 @@ class Sweep:
 
 
 def read_sweep(folder: Path) -> Sweep:
-    if folder.is_file():
-        raise ResultsError(f"{folder}: is a file; the folder that it is in is what is drawn")
-    if not folder.is_dir():
-        raise ResultsError(f"{folder}: there is no such results folder")
+    need_folder(folder)
     if (folder / "sweep.nc").is_file():
         sweep = _read_netcdf(folder / "sweep.nc")
     elif (folder / "sweep.csv").is_file():

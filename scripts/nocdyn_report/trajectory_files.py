@@ -9,6 +9,14 @@ import pandas as pd
 from .failure import ResultsError
 
 
+def need_folder(folder: Path) -> None:
+    """Refuses what is no folder, as that of results."""
+    if folder.is_file():
+        raise ResultsError(f"{folder}: is a file; the folder that it is in is what is drawn")
+    if not folder.is_dir():
+        raise ResultsError(f"{folder}: there is no such results folder")
+
+
 def labels_of(file: Path) -> list[str]:
     """The columns, as 'omega_motor [rad/s]'."""
     return list(_variables_of(file)) if file.suffix == ".nc" else list(_read_csv(file, nrows=0))

@@ -11,7 +11,7 @@ from .failure import ResultsError
 from .json_files import read_json, with_case
 from .results import RPM, TIME
 from .speed_results import SPEED, rpm
-from .trajectory_files import labels_of, read_columns
+from .trajectory_files import labels_of, need_folder, read_columns
 
 REPORT, TABLE = "transit.json", "transit.csv"
 PASSAGE = "passage"
@@ -125,8 +125,7 @@ class Transit:
 
 
 def read_transit(folder: Path) -> Transit:
-    if not folder.is_dir():
-        raise ResultsError(f"{folder}: there is no such results folder")
+    need_folder(folder)
     for name in (REPORT, TABLE):
         if not (folder / name).is_file():
             raise ResultsError(f"{folder}: no {name} here; 'nocdyn transit FILE --out {folder}' writes it")

@@ -393,3 +393,4 @@ def test_results_that_cannot_be_read_and_choices_of_nothing_have_exit_codes_of_t
         assert plot.main([str(word) for word in words]) == code, words
         said = capsys.readouterr().err
         assert said.count("\n") == 1 and said.startswith("nocdyn plot run: ")
+        assert ("the folder that it is in is what is drawn" in said) == (words[0] == results / "trajectory.csv")

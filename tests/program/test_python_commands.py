@@ -167,7 +167,7 @@ def test_options_of_the_only_kind_need_no_kind(nocdyn):
 
 def test_plot_of_a_folder_without_results_says_what_is_missing(nocdyn):
     outcome = nocdyn("plot", "none", env=PYTHON)
-    assert outcome.returncode == 1
+    assert outcome.returncode == 3
     assert outcome.stderr.startswith("nocdyn plot run: none: ")
 
 
