@@ -297,6 +297,19 @@ def test_a_chain_of_two_hundred_bodies_goes_through_the_banded_equations(nocdyn)
     assert "stable" in small.by_name()
 
 
+def test_stiff_parts_have_no_multipliers_unasked(nocdyn):
+    text = DUFFING + OVER.format(0.8, 0.81, "{}")
+    stiff = text.replace(
+        "&run",
+        "&body name = 'tip' inertia = 1e-6 /\n"
+        "&coupling name = 'tip' bodies = 'mass', 'tip' stiffness = 1e4 damping = 1.0 /\n&run",
+    )
+    soft, _ = branch(nocdyn, text.format(""))
+    values, _ = branch(nocdyn, stiff.format(""))
+    assert "stable" in soft.by_name() and "stable" not in values.by_name()
+    assert values["largest_phi_mass"][0] == pytest.approx(soft["largest_phi_mass"][0], rel=1e-4)
+
+
 def test_load_cases_have_branches_of_their_own(nocdyn):
     cases = (
         "&load_case name = 'weak' set = 'excitation.shaker.amplitude=0.05' /\n&load_case name = 'strong' analyses = 'orbit' /\n"

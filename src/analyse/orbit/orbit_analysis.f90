@@ -9,6 +9,7 @@ module nocdyn_orbit_analysis
   use nocdyn_orbit_branch, only: follow_branch
   use nocdyn_orbit_equations, only: body_turning, orbit_equations_t, orbit_t, samples_of
   use nocdyn_orbit_guess, only: find_settled_guess, find_steady_guess
+  use nocdyn_orbit_multipliers, only: steps_of
   use nocdyn_orbit_period, only: find_period
   use nocdyn_orbit_points, only: branch_t
   use nocdyn_orbit_scatter, only: find_isolated, scatter_t
@@ -24,6 +25,7 @@ module nocdyn_orbit_analysis
   public :: analyse_orbits
 
   integer, parameter :: first_harmonics = 5          ! of the equations before the branch chooses its own
+  integer, parameter :: most_steps = 5000            ! over a period, for multipliers that are not asked for
 
   type, public :: orbit_analysis_t
     type(orbit_settings_t) :: settings
@@ -113,7 +115,7 @@ contains
   !> The equations, and a guess of the first motion: the steady state by the mean torques.
   subroutine state_equations(input, settings, equations, guess, error)
     type(input_t), intent(in) :: input
-    type(orbit_settings_t), intent(in) :: settings
+    type(orbit_settings_t), intent(inout) :: settings   !! is told if multipliers take too long
     type(orbit_equations_t), intent(inout) :: equations
     type(orbit_t), intent(inout) :: guess
     type(error_t), allocatable, intent(out) :: error
@@ -139,6 +141,8 @@ contains
     call equations%prepare()
     call equations%set_harmonics(first_harmonics, error)
     if (.not. allocated(error)) call check_period(input, equations, guess, error)
+    if (allocated(error) .or. settings%asks_stability) return
+    if (steps_of(equations, padded(guess, equations)) > most_steps) settings%has_stability = .false.
   end subroutine state_equations
 
   !> The free rotations of the machine.

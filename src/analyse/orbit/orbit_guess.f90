@@ -122,7 +122,7 @@ contains
   !> Integrates through some times and keeps the states.
   subroutine advance(formulation, times, y, states, error)
     class(formulation_t), intent(inout) :: formulation
-    real(wp), intent(in) :: times(:)                  !! [s]
+    real(wp), contiguous, intent(in) :: times(:)      !! [s]
     real(wp), contiguous, intent(inout) :: y(:, :)    !! state at the first time, then at the last one
     real(wp), allocatable, intent(out) :: states(:, :)
     type(error_t), allocatable, intent(out) :: error

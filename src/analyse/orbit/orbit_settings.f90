@@ -32,6 +32,7 @@ module nocdyn_orbit_settings
     integer :: most_points = 0
     logical :: settles = .false.               !! whether a run settles on the first motion
     logical :: has_stability = .true.          !! whether multipliers are computed
+    logical :: asks_stability = .false.        !! whether the input says so
     real(wp) :: tolerance = 0.0_wp             !! error of a point as a share of its motion
   end type orbit_settings_t
 
@@ -86,7 +87,8 @@ contains
       settings%most_points = group%whole_number('most_points')
       settings%tolerance = group%number('tolerance')
       settings%has_stability = 2 * machine%coordinates%freedoms + machine%elements%internal%count <= most_states
-      if (group%has_value('stability')) settings%has_stability = group%flag('stability')
+      settings%asks_stability = group%has_value('stability')
+      if (settings%asks_stability) settings%has_stability = group%flag('stability')
     end associate
   end subroutine read_orbit_settings
 

@@ -41,7 +41,7 @@ contains
     type(signal_values_t) :: values
     type(signal_source_t), allocatable :: sources(:)
     type(harmonic_basis_t) :: all
-    real(wp) :: row(size(signals)), y(equations%machine%samples, equations%machine%states)
+    real(wp) :: row(size(signals)), state(equations%machine%states), y(equations%machine%samples, equations%machine%states)
     real(wp) :: t(equations%machine%samples), samples(equations%machine%samples, size(signals))
     integer :: i, l
 
@@ -52,7 +52,8 @@ contains
     values = new_signal_values(equations%machine%formulation, sources)
     call values%observe(t, y)
     do l = 1, size(t)
-      call values%fill_row(l, t(l), y(l, :), row)
+      state = y(l, :)
+      call values%fill_row(l, t(l), state, row)
       samples(l, :) = row
     end do
     all = new_harmonic_basis((size(t) - 1) / 4, size(t))

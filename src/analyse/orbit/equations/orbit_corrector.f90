@@ -88,7 +88,7 @@ contains
   subroutine find_tangent(equations, weights, tangent)
     type(orbit_equations_t), intent(inout) :: equations
     real(wp), intent(in) :: weights(:)
-    real(wp), intent(out) :: tangent(:)
+    real(wp), contiguous, intent(out) :: tangent(:)
 
     tangent = 0.0_wp
     tangent(size(tangent)) = 1.0_wp

@@ -13,7 +13,7 @@ module nocdyn_orbit_multipliers
   implicit none (type, external)
   private
 
-  public :: find_multipliers, find_monodromy
+  public :: find_multipliers, find_monodromy, steps_of
 
   integer, parameter :: stages = 12            ! of DOP853 without its dense output
   real(wp), parameter :: longest = 0.5_wp      ! step times a bound of the eigenvalues of the Jacobian
@@ -97,7 +97,7 @@ contains
     end do
   end subroutine find_monodromy
 
-  !> The number of steps over a period.
+  !> The number of steps over a period: many where a machine has stiff parts, as they are explicit.
   integer function steps_of(equations, orbit) result(steps)
     type(orbit_equations_t), intent(inout) :: equations
     type(orbit_t), intent(in) :: orbit
