@@ -65,6 +65,12 @@ def test_a_hardening_spring_has_the_known_folds_and_amplitudes(nocdyn):
     assert report["largest_error"] < report["tolerance"]
 
 
+def test_a_jump_is_told_alike_where_points_are_next_to_the_fold(nocdyn):
+    more = "count = 5001 most_points = 20000 harmonics = 5 stability = .true."
+    outcome = nocdyn.done(DUFFING + OVER.format(1.2, 1.1, more), command="orbit")
+    assert "at 1.115700252 rad/s: fold; a falling value jumps there" in outcome.stdout
+
+
 def test_the_motion_between_the_folds_is_unstable_and_the_report_says_where_it_jumps(nocdyn):
     outcome = nocdyn.done(DUFFING + OVER.format(0.8, 1.6, ""), command="orbit")
     assert "at 1.269601956 rad/s: fold; a rising value jumps there" in outcome.stdout

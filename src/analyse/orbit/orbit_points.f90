@@ -205,13 +205,13 @@ contains
     real(wp), intent(in) :: value
     type(walk_t), intent(inout) :: middle
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: row(size(walk%x)), share, tangent(size(walk%x))
+    real(wp) :: ahead, row(size(walk%x)), share
     integer :: iterations
     logical :: has_converged
 
     associate (last => size(walk%x))
-      share = (value - walk%x(last)) / (next%x(last) - walk%x(last))
-      tangent = next%tangent
+      ahead = next%x(last) - walk%x(last)
+      share = (value - walk%x(last)) / ahead
       row = 0.0_wp
       row(last) = 1.0_wp
       middle%settings = walk%settings
@@ -224,8 +224,7 @@ contains
         return
       end if
       call complete_point(equations, finer, middle, error)
-      if (tangent(last) * middle%tangent(last) < 0) middle%tangent = -middle%tangent
-      middle%point%direction = middle%tangent(last) / middle%range
+      if (ahead * middle%tangent(last) < 0) call middle%turn()
     end associate
   end subroutine settle_at
 
