@@ -178,7 +178,7 @@ def reference():
 def keys_of_help(text):
     """Group -> {(key, default)} as `nocdyn help input all` prints them."""
     groups = {}
-    one_line_each = re.sub(r"\n {40,}(?=default |optional)", " ", text.split("\nExample")[0])
+    one_line_each = re.sub(r"\n {20,}", " ", text.split("\nExample")[0])
     for line in one_line_each.splitlines():
         if group := re.match(r"&(\w+), ", line):
             keys = groups.setdefault(group[1], set())
