@@ -136,6 +136,8 @@ ELEMENTS = {
     "any passage": "&transit body = 'a' range = 1, 2 direction = 'any' /",
     "both passages": "&transit body = 'a' range = 1, 2 direction = 'both' ramp_times = 0, 1, 2 ramp_speeds = 0.5, 3, 0.5 /",
     "passage up": "&transit body = 'a' range_rpm = 10, 20 direction = 'up' passages = 9 time_limit = 3 /",
+    "low orbit": "&orbit over = 'body.a.inertia' range = 1, 2 start = 'low' starts = 4 harmonics = 9 stability = .true. /",
+    "settled orbit": "&orbit body = 'a' speed_rpm = 10, 20 start = 'settled_run' subharmonic = 2 signals = 'phi_*' count = 5 /",
     "passage down": "&transit body = 'a' range = -1, -2 direction = 'down' order = 3 turns = 2 /",
 }
 RUN_WORDS = {
