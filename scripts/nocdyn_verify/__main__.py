@@ -2,10 +2,11 @@
 
 import argparse
 import os
-import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+
+from nocdyn_report.executable import find_executable
 
 from .cases import RELEASED, chosen, read_cases, read_released, write_released
 from .failure import FAILED, VerificationError
@@ -13,8 +14,7 @@ from .outcomes import Installation, Outcome, installation, verify, write_json
 from .page import verdict, write_page
 from .paper import write_paper
 
-HERE = Path(__file__).resolve().parent
-CASES = HERE.parents[1] / "verification"  # of the sources, or of what is installed
+CASES = Path(__file__).resolve().parents[2] / "verification"  # of the sources, or of what is installed
 NAME = "verification"
 
 
@@ -35,11 +35,11 @@ def read_arguments(words: Sequence[str]) -> argparse.Namespace:
 
 
 def find_program() -> Path:
-    """The one of the environment variable NOCDYN, which `nocdyn verify` sets, else that in the PATH."""
-    for candidate in (os.environ.get("NOCDYN"), shutil.which("nocdyn"), HERE.parents[1] / "build/release/bin/nocdyn"):
-        if candidate and Path(candidate).is_file():
-            return Path(candidate).resolve()
-    raise VerificationError("there is no program nocdyn in the PATH")
+    """The program that is verified."""
+    found = find_executable()
+    if found is None:
+        raise VerificationError("there is no program nocdyn in the PATH")
+    return found
 
 
 def find_cases(wanted: Path | None) -> Path:

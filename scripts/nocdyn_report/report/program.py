@@ -1,16 +1,14 @@
 """The program nocdyn: where it is, and what a command of it answers."""
 
-import os
-import shutil
 import subprocess
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..executable import find_executable
 from .failure import FILES, ReportError
 
-BUILT = Path(__file__).resolve().parents[3] / "build/release/bin/nocdyn"
 PREFIX = "nocdyn: "  # of its messages
 
 
@@ -51,13 +49,13 @@ class Program:
 
 
 def find_program() -> Program:
-    """That of the environment variable NOCDYN, else that in the PATH, else the one built here."""
-    for candidate in (os.environ.get("NOCDYN"), shutil.which("nocdyn"), BUILT):
-        if candidate and Path(candidate).is_file():
-            return Program(Path(candidate).resolve())
-    raise ReportError(
-        "there is no program nocdyn in the PATH, and none in build/release/bin; README.md tells how to build it", FILES
-    )
+    """The program that computes what a report needs."""
+    found = find_executable()
+    if found is None:
+        raise ReportError(
+            "there is no program nocdyn in the PATH, and none in build/release/bin; README.md tells how to build it", FILES
+        )
+    return Program(found)
 
 
 def option_words(overrides: Sequence[str]) -> list[str]:

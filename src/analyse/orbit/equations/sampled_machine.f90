@@ -95,7 +95,6 @@ contains
     type(input_t) :: changed
     type(machine_t) :: machine
     character(len=:), allocatable :: message
-    real(wp) :: y(self%samples, 0)
     integer :: l
 
     changed = self%input
@@ -115,7 +114,6 @@ contains
     self%pattern = self%formulation%jacobian_pattern()
     self%place = new_direct_parameters(self%input, self%targets, self%formulation%machine)
     if (size(self%targets) > 0) call self%place%accept([self%value])
-    y = 0.0_wp
     do l = 1, self%samples
       call self%formulation%refresh_lane(l)
     end do
