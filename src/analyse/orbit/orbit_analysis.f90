@@ -127,6 +127,11 @@ contains
     equations%bounds = [min(settings%from, settings%to), max(settings%from, settings%to)]
     call find_period(equations%machine%formulation%machine, equations%turning, equations%period, error)
     if (allocated(error)) return
+    if (size(equations%period%multiples) == 0) then
+      call raise(error, exit_failed, 'nothing excites the machine periodically; required: an excitation with a frequency or ' // &
+                 'orders. Oscillations that excite themselves are not computed')
+      return
+    end if
     equations%held = settings%body
     if (equations%held > 0) then
       equations%held_motion = maxloc(abs(equations%turning(equations%held, :)), dim=1)

@@ -96,7 +96,7 @@ contains
   pure integer function least_harmonics(equations)
     type(orbit_equations_t), intent(in) :: equations
 
-    least_harmonics = max(first_harmonics, (maxval(equations%period%multiples) + 1) * equations%subharmonic)
+    least_harmonics = max(first_harmonics, (maxval([0, equations%period%multiples]) + 1) * equations%subharmonic)
   end function least_harmonics
 
   !> A larger number of harmonics, unless it is the largest already.
@@ -292,9 +292,9 @@ contains
     walk%x = equations%put_together(orbit)
     call spread_tangent(equations, former, along)
     row = equations%put_together(along)
-    if (size(equations%border) > 0) row(size(row) - size(equations%border):size(row) - 1) = &
-      former%tangent(size(former%tangent) - size(equations%border):size(former%tangent) - 1)
-    row(size(row)) = former%tangent(size(former%tangent))
+    associate (scalars => equations%scalars())
+      row(size(row) - scalars:) = former%tangent(size(former%tangent) - scalars:)
+    end associate
     row = weights_of(equations, walk%x, walk%range)**2 * row
     call correct(equations, walk%range, row, dot_product(row, walk%x), walk%x, iterations, has_converged, error)
     if (allocated(error)) return

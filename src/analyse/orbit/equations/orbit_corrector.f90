@@ -1,7 +1,7 @@
 !> Newton's method on the equations of a periodic motion and one more row, which fixes the parameter or the place along a branch.
 !>
 !> Sizes of changes are measured by weights: coordinates by the largest oscillation of all, internal states by their own, mean
-!> speeds by themselves, the parameter by its range.
+!> speeds and an unknown rate by themselves, the parameter by its range.
 module nocdyn_orbit_corrector
   use nocdyn_errors, only: error_t
   use nocdyn_kinds, only: wp
@@ -68,7 +68,7 @@ contains
     type(orbit_t), intent(in) :: orbit
     logical, intent(out) :: is_regular
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: steps(size(equations%border) + 1), weights(size(x))
+    real(wp) :: steps(equations%scalars() + 1), weights(size(x))
     logical :: singular
 
     is_regular = .false.
@@ -161,6 +161,7 @@ contains
         end if
         weights(i) = 1.0_wp / max(scale, sqrt(epsilon(scale)))
       end do
+      if (equations%rate_is_unknown) weights(last - 1) = 1.0_wp / abs(x(last - 1))
       weights(last) = 1.0_wp / range
     end associate
   end function weights_of

@@ -4,6 +4,8 @@
 !> vanish, with f and g of all samples of a period at once. A rigid motion r turns with a mean speed Omega, an unknown; its mean
 !> angle is zero. In place of this angle the series of its coordinate begin with a mean acceleration that balances its mean
 !> torque, divided by w^2, which must vanish. Where the speed of a body is given, the mean torque that holds it is the unknown.
+!> Where nothing prescribes the period, w is unknown too, and the motion is in phase with another one:
+!> the integral of q times the rate of this vanishes over a period.
 module nocdyn_orbit_equations
   use nocdyn_bordered_system, only: bordered_system_t, new_bordered_system
   use nocdyn_errors, only: error_t
@@ -30,6 +32,8 @@ module nocdyn_orbit_equations
     type(sampled_machine_t) :: machine
     type(harmonic_basis_t) :: basis
     type(orbit_period_t) :: period
+    logical :: rate_is_unknown = .false.             !! whether the machine itself finds w; then `anchor` fixes the phase
+    real(wp), allocatable, private :: phase(:, :)    !! rates of the motion whose phase holds, of norm 1, [length, nodes]
     integer :: subharmonic = 1
     real(wp) :: least_oscillation = 0.0_wp           !! from which sizes of changes are measured [rad]
     real(wp) :: bounds(2) = 0.0_wp                   !! lowest and highest value of the parameter
@@ -49,7 +53,7 @@ module nocdyn_orbit_equations
     real(wp), allocatable, private :: t(:), y(:, :), rates(:, :), slopes(:, :)
   contains
     procedure :: prepare, set_harmonics, set_value, residual, fill_system, unknowns, first_unknown, put_together, take_apart
-    procedure :: sample, repeats
+    procedure :: sample, repeats, scalars, anchor
     procedure, private :: add_slopes, add_inertia
   end type orbit_equations_t
 
@@ -126,7 +130,7 @@ contains
       if (self%row_node(k) > 0) width = max(width, abs(self%place(self%row_node(k)) - self%place(self%column_node(k))))
     end do
     associate (length => self%basis%length)
-      self%system = new_bordered_system(self%nodes * length, size(self%border) + 1, (width + 1) * length - 1)
+      self%system = new_bordered_system(self%nodes * length, self%scalars() + 1, (width + 1) * length - 1)
     end associate
   end subroutine set_harmonics
 
@@ -134,8 +138,25 @@ contains
   pure integer function unknowns(self)
     class(orbit_equations_t), intent(in) :: self
 
-    unknowns = self%nodes * self%basis%length + size(self%border)
+    unknowns = self%nodes * self%basis%length + self%scalars()
   end function unknowns
+
+  !> The number of unknowns beside the series, which follow them: mean speeds or a torque, and w if it is unknown.
+  pure integer function scalars(self)
+    class(orbit_equations_t), intent(in) :: self
+
+    scalars = size(self%border) + merge(1, 0, self%rate_is_unknown)
+  end function scalars
+
+  !> Motions are in phase with an orbit from now on.
+  subroutine anchor(self, orbit)
+    class(orbit_equations_t), intent(inout) :: self
+    type(orbit_t), intent(in) :: orbit   !! it oscillates
+
+    self%phase = differentiated(orbit%series)
+    self%phase(:, self%freedoms + 1:) = 0.0_wp
+    self%phase = self%phase / norm2(self%phase)
+  end subroutine anchor
 
   !> The place of the mean value of a node among the unknowns; its harmonics follow.
   pure integer function first_unknown(self, node)
@@ -161,6 +182,7 @@ contains
       x(i) = orbit%speed(self%border(n))
       if (self%border(n) == self%held_motion) x(i) = orbit%torque
     end do
+    if (self%rate_is_unknown) x(size(x) - 1) = orbit%rate
     x(size(x)) = orbit%value
   end function put_together
 
@@ -192,14 +214,16 @@ contains
         orbit%speed(m) = (orbit%value - dot_product(turning, orbit%speed)) / turning(m)
       end associate
     end if
+    if (self%rate_is_unknown) orbit%rate = x(size(x) - 1)
     call find_rate(self, orbit)
   end subroutine take_apart
 
-  !> w of an orbit.
+  !> w of an orbit, if it is prescribed.
   subroutine find_rate(self, orbit)
     class(orbit_equations_t), intent(in) :: self
     type(orbit_t), intent(inout) :: orbit
 
+    if (self%rate_is_unknown) return
     orbit%rate = self%period%rate / self%subharmonic
     if (self%period%motion > 0) orbit%rate = orbit%rate * abs(orbit%speed(self%period%motion))
   end subroutine find_rate
@@ -254,7 +278,7 @@ contains
     real(wp), intent(out) :: r(:)   !! [unknowns]
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: harmonics(self%basis%length, self%nodes), series(self%basis%length, self%nodes)
-    integer :: i, k, n
+    integer :: i, k, n, shared
 
     call self%set_value(orbit, error)
     if (allocated(error)) return
@@ -282,21 +306,26 @@ contains
       i = self%first_unknown(n)
       r(i:i + self%basis%length - 1) = harmonics(:, n)
     end do
-    r(self%nodes * self%basis%length + 1:) = series(1, self%free(self%border))
+    i = self%nodes * self%basis%length
+    r(i + 1:i + size(self%border)) = series(1, self%free(self%border))
+    if (self%rate_is_unknown) then
+      shared = min(size(self%phase, 1), self%basis%length)
+      r(size(r)) = sum(self%phase(:shared, :) * series(:shared, :))
+    end if
   end subroutine residual
 
   !> Fills the matrix of the equations about an orbit, with the last row for the parameter left to the caller. The columns of mean
-  !> speeds, of the holding torque and of the parameter are central differences; those of the parameter do not leave its range.
+  !> speeds, the holding torque, w and the parameter are central differences; those of the parameter do not leave its range.
   subroutine fill_system(self, orbit, steps, error)
     class(orbit_equations_t), intent(inout) :: self
     type(orbit_t), intent(in) :: orbit
-    real(wp), intent(in) :: steps(:)   !! of the differences, [border + 1]
+    real(wp), intent(in) :: steps(:)   !! of the differences, [scalars + 1]
     type(error_t), allocatable, intent(out) :: error
     real(wp), dimension(self%unknowns() + 1) :: x
     real(wp), dimension(self%unknowns()) :: before, after
     type(orbit_t) :: other
     real(wp) :: ends(2)
-    integer :: k, place
+    integer :: k, n, place, shared
 
     call self%system%clear()
     other = orbit
@@ -324,6 +353,12 @@ contains
     end do
     do k = 1, size(self%border)
       self%system%below(k, self%first_unknown(self%free(self%border(k)))) = 1.0_wp
+    end do
+    if (.not. self%rate_is_unknown) return
+    shared = min(size(self%phase, 1), self%basis%length)
+    do n = 1, self%nodes
+      k = self%first_unknown(n)
+      self%system%below(self%scalars(), k:k + shared - 1) = self%phase(:shared, n)
     end do
   end subroutine fill_system
 

@@ -2,7 +2,7 @@
 !> motion give over one period.
 !>
 !> Multipliers that are 1 whatever the machine does are taken out: a shift of all angles of a free rotation, or of the time where
-!> only orders excite it. The equations are integrated by DOP853 with even steps.
+!> only orders or nothing excite it. The equations are integrated by DOP853 with even steps.
 module nocdyn_orbit_multipliers
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_explicit_tables, only: dormand_prince_8, explicit_table_t
@@ -207,9 +207,9 @@ contains
     integer :: floating, m, n
 
     floating = size(equations%free) - size(equations%border)
-    allocate (known(equations%machine%states, size(equations%free) + floating), source=0.0_wp)
-    t = 0.0_wp
     n = size(equations%free)
+    allocate (known(equations%machine%states, n + floating + merge(1, 0, equations%rate_is_unknown)), source=0.0_wp)
+    t = 0.0_wp
     do m = 1, size(equations%free)
       associate (f => equations%freedoms)
         if (m == equations%period%motion) then
@@ -226,6 +226,15 @@ contains
         known(:f, n) = equations%rigid(:, m)
       end associate
     end do
+    if (.not. equations%rate_is_unknown) return
+    call states_at(equations, orbit, t, y)
+    call equations%machine%rates(t, y, rates, error)
+    if (allocated(error)) return
+    associate (f => equations%freedoms)
+      rates(1, f + 1:2 * f) = rates(1, f + 1:2 * f) - matmul(equations%rigid, orbit%speed)
+    end associate
+    known(:, n + 1) = rates(1, :)
+    call add_torque(equations, orbit%torque, known(:equations%freedoms, n + 1))
   end subroutine known_vectors
 
   !> Divides speeds by a frequency that makes them as large as angles: else reflections mix numbers of very different sizes.

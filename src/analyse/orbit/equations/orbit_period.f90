@@ -26,7 +26,7 @@ module nocdyn_orbit_period
 
 contains
 
-  !> Finds it for a machine.
+  !> Finds it for a machine; without any excitation there are no multiples, and no frequency.
   subroutine find_period(machine, turning, period, error)
     type(machine_t), intent(in) :: machine
     real(wp), intent(in) :: turning(:, :)     !! speeds of the bodies by rigid motions, [bodies, motions]
@@ -37,8 +37,7 @@ contains
     call list_rates(machine, turning, period, error)
     if (allocated(error)) return
     if (size(period%rates) == 0) then
-      call raise(error, exit_failed, 'nothing excites the machine periodically; required: an excitation with a frequency or ' // &
-                 'orders. Oscillations that excite themselves are not computed')
+      allocate (period%multiples(0))
       return
     end if
     period%rate = period%rates(1)
@@ -70,6 +69,7 @@ contains
       call raise(error, exit_failed, 'the machine has other excitations at another value of the parameter')
       return
     end if
+    if (size(present%rates) == 0) return
     largest = maxloc(present%rates, dim=1)
     period%rate = present%rates(largest) / period%multiples(largest)
     do i = 1, size(present%rates)
