@@ -6,6 +6,7 @@ module nocdyn_orbit_settings
   use nocdyn_machine, only: machine_t
   use nocdyn_targets, only: find_target, target_t
   use nocdyn_text, only: quoted
+  use nocdyn_written_values, only: unit_of
   implicit none (type, external)
   private
 
@@ -21,6 +22,7 @@ module nocdyn_orbit_settings
     integer :: group = 0                       !! &orbit in the input
     type(target_t), allocatable :: targets(:)  !! the number over which it goes, none if it is a speed
     integer :: body = 0                        !! whose mean speed it goes over, 0: none
+    integer :: speed_unit = 0                  !! in which the input has speeds: index of `units`, 0: rad/s
     real(wp) :: from = 0.0_wp, to = 0.0_wp     !! in the unit of the target, or [rad/s]
     real(wp) :: at = 0.0_wp                    !! where a branch begins
     real(wp) :: ahead = 1.0_wp                 !! whether it begins towards rising (1) or falling values (-1)
@@ -63,6 +65,7 @@ contains
         allocate (settings%targets(0))
         settings%body = findloc([(machine%names(i)%text == group%text('body'), i=1, machine%bodies)], .true., dim=1)
         range = group%numbers('speed')
+        settings%speed_unit = unit_of(group, 'speed')
       end if
       if (allocated(error)) return
       settings%settles = group%text('start') == 'settled_run'

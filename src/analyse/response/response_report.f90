@@ -1,5 +1,6 @@
 !> The printed report of a forced response: critical speeds, the largest synthesis of every coupling, barred ranges.
 module nocdyn_response_report
+  use nocdyn_column_names, only: with_unit
   use nocdyn_kinds, only: wp
   use nocdyn_margins, only: margin_text, mode_text
   use nocdyn_response_analysis, only: response_analysis_t
@@ -184,7 +185,7 @@ contains
     associate (quantities => analysis%response%quantities)
       shown = min(size(analysis%shown), most_quantities)
       if (shown == 0) return
-      width = maxval([(text_width(quantities(analysis%shown(q))%name // ' [' // quantities(analysis%shown(q))%unit // ']'), &
+      width = maxval([(text_width(with_unit(quantities(analysis%shown(q))%name, quantities(analysis%shown(q))%unit)), &
                        q=1, shown)])
       line = '  ' // padded('largest', width) // cell('half range') // cell(at_heading(analysis)) // cell('peak') // &
              cell(at_heading(analysis))
@@ -209,7 +210,7 @@ contains
     character(len=:), allocatable :: line
 
     associate (largest => summary%largest(q), points => analysis%response%points, one => analysis%response%quantities(q))
-      line = '  ' // padded(one%name // ' [' // one%unit // ']', width) // &
+      line = '  ' // padded(with_unit(one%name, one%unit), width) // &
              cell(rounded_text(largest%half_range, 5)) // cell(shown(analysis, points(largest%half_point)%state%speed)) // &
              cell(rounded_text(largest%peak, 5)) // cell(shown(analysis, points(largest%peak_point)%state%speed))
       if (largest%ratio_point > 0) then

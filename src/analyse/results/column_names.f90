@@ -12,7 +12,7 @@ module nocdyn_column_names
   implicit none (type, external)
   private
 
-  public :: choose_columns, choose_signals, count_columns, explain_no_signal, note_former_name
+  public :: choose_columns, choose_signals, count_columns, explain_no_signal, note_former_name, with_unit
 
   integer, parameter :: most_names = 16   ! in a message
 
@@ -165,6 +165,15 @@ contains
     if (text == '' .and. index(pattern, '[') > 0) text = near_match(pattern, labels)
     if (text == '') text = '; allowed: ' // joined(of_quantities, ', ', most_names)
   end subroutine find_hint
+
+  !> The label of a column: the name and, unless it is '', the unit in brackets.
+  pure function with_unit(name, unit) result(label)
+    character(len=*), intent(in) :: name, unit
+    character(len=:), allocatable :: label
+
+    label = name
+    if (unit /= '') label = name // ' [' // unit // ']'
+  end function with_unit
 
   !> Appends a text that is not yet in a list.
   pure subroutine append_new(list, text)

@@ -1,6 +1,7 @@
 !> The table over load cases: as printed, for cases.json and for cases.csv.
 module nocdyn_load_case_report
   use nocdyn_case_results, only: case_result_t, combine_verdicts, is_complete, put_cases, status_done
+  use nocdyn_column_names, only: with_unit
   use nocdyn_csv, only: text_cell, write_header
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
@@ -151,7 +152,7 @@ contains
     call find_peaks(runs, peaks)
     allocate (labels(size(peaks)))
     do i = 1, size(peaks)
-      labels(i)%text = peaks(i)%signal%name // ' [' // peaks(i)%signal%unit // ']'
+      labels(i)%text = with_unit(peaks(i)%signal%name, peaks(i)%signal%unit)
     end do
     ranks = peaks%signal%rank
     allocate (shown, source=columns_to_show(ranks, [(i, i=1, size(peaks))], abs(peaks%largest), most_lines))

@@ -1,5 +1,6 @@
 !> The results of passages: for transit.json, as transit.csv, and as printed.
 module nocdyn_transit_report
+  use nocdyn_column_names, only: with_unit
   use nocdyn_csv, only: write_header, write_row
   use nocdyn_energy_balance, only: put_energy_balance
   use nocdyn_input, only: input_t
@@ -153,13 +154,13 @@ contains
     speed = unit_for('rad/s', output_units(input))
     unit = 'rad/s'
     if (speed > 0) unit = trim(units(speed)%name)
-    labels = [string_t('passage'), string_t('t [s]'), string_t('mean_' // analysis%names(2)%text // ' [' // unit // ']'), &
-              string_t(analysis%names(2)%text // ' [' // unit // ']')]
+    labels = [string_t('passage'), string_t('t [s]'), string_t(with_unit('mean_' // analysis%names(2)%text, unit)), &
+              string_t(with_unit(analysis%names(2)%text, unit))]
     do i = 3, size(analysis%names)
       do q = 1, size(analysis%quantities)
         if (analysis%quantities(q)%name == analysis%names(i)%text) exit
       end do
-      call append(labels, analysis%names(i)%text // ' [' // analysis%quantities(q)%unit // ']')
+      call append(labels, with_unit(analysis%names(i)%text, analysis%quantities(q)%unit))
     end do
     call write_header(file, labels)
     do k = 1, size(analysis%passages)
@@ -227,7 +228,7 @@ contains
 
     if (size(analysis%limits) == 0) return
     associate (peaks => analysis%passages(1)%peaks)
-      width = maxval([(text_width(peaks(i)%signal%name // ' [' // peaks(i)%signal%unit // ']'), i=1, size(peaks))])
+      width = maxval([(text_width(with_unit(peaks(i)%signal%name, peaks(i)%signal%unit)), i=1, size(peaks))])
     end associate
     call report%append_line('  passage  ' // padded('', width) // cell('largest') // cell('at t [s]') // cell('at [rpm]') // &
                             cell('half range') // cell('at [rpm]'))
@@ -235,7 +236,7 @@ contains
       do i = 1, size(analysis%passages(k)%peaks)
         associate (peak => analysis%passages(k)%peaks(i))
           call report%append_line('  ' // padded(to_text(k), len('passage')) // '  ' // &
-                                  padded(peak%signal%name // ' [' // peak%signal%unit // ']', width) // cell(peak%largest) // &
+                                  padded(with_unit(peak%signal%name, peak%signal%unit), width) // cell(peak%largest) // &
                                   cell(rounded_text(peak%largest_time, digits)) // rpm(peak%largest_speed) // &
                                   cell(peak%half_range) // rpm(peak%half_range_speed))
         end associate

@@ -6,7 +6,8 @@ module nocdyn_orbit_results
   use nocdyn_json, only: json_t
   use nocdyn_machine, only: machine_t
   use nocdyn_orbit_analysis, only: analyse_orbits, orbit_analysis_t
-  use nocdyn_orbit_report, only: orbit_text, put_orbit, put_orbit_csv
+  use nocdyn_orbit_report, only: put_orbit, put_orbit_csv
+  use nocdyn_orbit_words, only: orbit_text
   use nocdyn_output_file, only: output_file_t
   use nocdyn_text, only: string_t
   implicit none (type, external)

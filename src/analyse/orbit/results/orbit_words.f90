@@ -1,0 +1,182 @@
+!> A branch of periodic motions as printed: special points in words, unstable ranges, the largest half ranges.
+module nocdyn_orbit_words
+  use nocdyn_column_names, only: with_unit
+  use nocdyn_input, only: input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_orbit_analysis, only: orbit_analysis_t
+  use nocdyn_orbit_parts, only: part_t, unstable_stretches
+  use nocdyn_orbit_points, only: branch_point, doubling, fold, neimark_sacker, orbit_point_t, torque_fold
+  use nocdyn_quantities, only: rank_moment
+  use nocdyn_table_text, only: cell, padded, text_width
+  use nocdyn_text, only: counted, rounded_text, to_text
+  use nocdyn_text_buffer, only: text_buffer_t
+  use nocdyn_written_values, only: speed_text
+  implicit none (type, external)
+  private
+
+  public :: orbit_text
+
+  integer, parameter :: most_peaks = 12        ! lines of largest half ranges
+  integer, parameter :: digits = 6             ! of printed numbers
+  integer, parameter :: exact = 10             ! of special values
+
+contains
+
+  !> The printed report.
+  function orbit_text(input, analysis) result(text)
+    type(input_t), intent(in) :: input
+    type(orbit_analysis_t), intent(in) :: analysis
+    character(len=:), allocatable :: text
+    type(text_buffer_t) :: report
+    integer :: i
+
+    do i = 1, size(analysis%notes)
+      call report%append_line(input%shown_case() // ': note: ' // analysis%notes(i)%text)
+    end do
+    associate (points => analysis%branch%points(:analysis%branch%count))
+      text = input%shown_case() // ': ' // counted(size(points), 'periodic motion', 'periodic motions') // ' over ' // &
+             analysis%parameter // ' from ' // shown(analysis, analysis%settings%from) // ' to ' // &
+             shown(analysis, analysis%settings%to) // ', ' // to_text(minval(points%harmonics))
+      if (maxval(points%harmonics) > minval(points%harmonics)) text = text // ' to ' // to_text(maxval(points%harmonics))
+      call report%append_line(text // ' harmonics, largest error ' // rounded_text(maxval(points%error), 2) // ' of the motion')
+      if (maxval(points%error) > analysis%settings%tolerance) then
+        i = count(points%error > analysis%settings%tolerance)
+        call report%append_line('  ' // counted(i, 'point has', 'points have') // ' an error above the tolerance, ' // &
+                                rounded_text(analysis%settings%tolerance, 2))
+      end if
+      if (analysis%branch%ending /= '') call report%append_line('  the branch ends ' // analysis%branch%ending)
+      if (analysis%settings%starts > 0) call append_starts(analysis, points, report)
+      call append_jumps(analysis, points, report)
+      call append_parts(analysis, points, report)
+    end associate
+    call append_peaks(analysis, report)
+    text = report%text()
+  end function orbit_text
+
+  !> A value of the parameter with its unit; a speed also in the unit of the input.
+  function shown(analysis, value, figures) result(text)
+    type(orbit_analysis_t), intent(in) :: analysis
+    real(wp), intent(in) :: value
+    integer, intent(in), optional :: figures
+    character(len=:), allocatable :: text
+    integer :: all_figures
+
+    all_figures = digits
+    if (present(figures)) all_figures = figures
+    text = rounded_text(value, all_figures)
+    if (analysis%unit /= '') text = text // ' ' // analysis%unit
+    if (analysis%settings%speed_unit > 0) text = text // ' (' // &
+      speed_text(value, analysis%settings%speed_unit, all_figures) // ')'
+  end function shown
+
+  !> What scattered starts have found.
+  subroutine append_starts(analysis, points, report)
+    type(orbit_analysis_t), intent(in) :: analysis
+    type(orbit_point_t), intent(in) :: points(:)
+    type(text_buffer_t), intent(inout) :: report
+    integer :: k
+
+    associate (found => analysis%found)
+      call report%append_line('  ' // counted(found%tried, 'scattered start', 'scattered starts') // ', ' // &
+                              to_text(found%periodic) // ' led to periodic motions, ' // &
+                              counted(found%branches, 'isolated branch', 'isolated branches'))
+      do k = 2, found%branches + 1
+        call report%append_line('  branch ' // to_text(k) // ' is isolated: from ' // &
+          shown(analysis, minval(points%orbit%value, mask=points%branch == k), exact) // ' to ' // &
+          shown(analysis, maxval(points%orbit%value, mask=points%branch == k), exact))
+      end do
+    end associate
+  end subroutine append_starts
+
+  !> Special points, one a line: what a slow change of the parameter meets there.
+  subroutine append_jumps(analysis, points, report)
+    type(orbit_analysis_t), intent(in) :: analysis
+    type(orbit_point_t), intent(in) :: points(:)
+    type(text_buffer_t), intent(inout) :: report
+    character(len=:), allocatable :: words
+    integer :: i
+
+    do i = 2, size(points) - 1
+      select case (points(i)%kind)
+      case (fold)
+        words = 'fold'
+        if (analysis%settings%has_stability) words = 'fold; the motions on both sides of it are unstable'
+        if (points(i - 1)%is_stable() .and. points(i - 1)%direction > 0) words = 'fold; a rising value jumps there'
+        if (points(i - 1)%is_stable() .and. points(i - 1)%direction < 0) words = 'fold; a falling value jumps there'
+        if (points(i + 1)%is_stable() .and. points(i + 1)%direction > 0) words = 'fold; a falling value jumps there'
+        if (points(i + 1)%is_stable() .and. points(i + 1)%direction < 0) words = 'fold; a rising value jumps there'
+        if (analysis%body_name /= '') words = 'fold; the mean speed turns back there'
+      case (torque_fold)
+        words = 'the holding torque turns back there'
+      case (doubling)
+        words = 'period doubling; a motion of twice the period branches off'
+      case (neimark_sacker)
+        words = 'Neimark-Sacker point; oscillations of another frequency begin or end'
+      case (branch_point)
+        words = 'branch point; another motion of the same period branches off'
+      case default
+        cycle
+      end select
+      if (points(i)%branch > 1) words = words // ' (branch ' // to_text(points(i)%branch) // ')'
+      call report%append_line('  at ' // shown(analysis, points(i)%orbit%value, exact) // ': ' // words)
+    end do
+  end subroutine append_jumps
+
+  !> The ranges in which the motion is unstable.
+  subroutine append_parts(analysis, points, report)
+    type(orbit_analysis_t), intent(in) :: analysis
+    type(orbit_point_t), intent(in) :: points(:)
+    type(text_buffer_t), intent(inout) :: report
+    type(part_t), allocatable :: stretches(:)
+    character(len=:), allocatable :: line
+    real(wp) :: ends(2)
+    integer :: i
+
+    if (.not. analysis%settings%has_stability) then
+      call report%append_line('  the stability is not determined; stability = .true. in &orbit does so')
+      return
+    end if
+    call unstable_stretches(points, stretches)
+    if (analysis%body_name /= '') call report%append_line('  stability with a constant holding torque:')
+    if (size(stretches) == 0) call report%append_line('  all motions are stable')
+    do i = 1, size(stretches)
+      associate (along => points(stretches(i)%first:stretches(i)%last)%orbit%value)
+        ends = [minval(along), maxval(along)]
+        if (along(size(along)) < along(1)) ends = [maxval(along), minval(along)]
+        line = '  unstable from ' // shown(analysis, ends(1), exact) // ' to ' // shown(analysis, ends(2), exact)
+      end associate
+      associate (branch => points(stretches(i)%first)%branch)
+        if (branch > 1) line = line // ' (branch ' // to_text(branch) // ')'
+      end associate
+      call report%append_line(line)
+    end do
+  end subroutine append_parts
+
+  !> The largest half ranges: of the moments, or of all signals if there are none.
+  subroutine append_peaks(analysis, report)
+    type(orbit_analysis_t), intent(in) :: analysis
+    type(text_buffer_t), intent(inout) :: report
+    integer, allocatable :: listed(:)
+    integer :: at, i, width
+
+    listed = pack([(i, i=1, size(analysis%signals))], analysis%signals%rank == rank_moment .and. &
+                  .not. analysis%signals%is_inner())
+    if (size(listed) == 0) listed = [(i, i=1, size(analysis%signals))]
+    listed = listed(:min(size(listed), most_peaks))
+    width = 0
+    do i = 1, size(listed)
+      width = max(width, text_width(with_unit(analysis%signals(listed(i))%name, analysis%signals(listed(i))%unit)))
+    end do
+    call report%append_line('  ' // padded('', width) // cell('half range') // cell('mean') // cell('at') // &
+                            '  (largest half range)')
+    do i = 1, size(listed)
+      at = maxloc(analysis%ranges(listed(i), :)%half_range, dim=1)
+      associate (signal => analysis%signals(listed(i)), point => analysis%branch%points(at))
+        call report%append_line('  ' // padded(with_unit(signal%name, signal%unit), width) // &
+          cell(analysis%ranges(listed(i), at)%half_range) // cell(analysis%ranges(listed(i), at)%mean) // &
+          cell(rounded_text(point%orbit%value, digits)) // trim(merge('            ', '  (unstable)', point%is_stable())))
+      end associate
+    end do
+  end subroutine append_peaks
+
+end module nocdyn_orbit_words
