@@ -3,14 +3,13 @@
 !> Pseudo-arclength continuation: from a point along the tangent, then back to the branch in the plane across it.
 module nocdyn_orbit_branch
   use nocdyn_errors, only: error_t, exit_failed, raise
-  use nocdyn_harmonic_basis, only: padded_series
   use nocdyn_kinds, only: wp
-  use nocdyn_orbit_corrector, only: correct, measured, oscillation, set_least_oscillation
-  use nocdyn_orbit_equations, only: orbit_equations_t, orbit_t
-  use nocdyn_orbit_points, only: adapt_harmonics, add_multipliers, branch_t, complete_point, distance_between, find_fault, &
-    least_harmonics, more_harmonics, orbit_point_t, settle_at, take_step, walk_t
+  use nocdyn_orbit_points, only: adapt_resolution, add_multipliers, branch_t, complete_point, distance_between, settle_at, &
+    take_step, walk_t
+  use nocdyn_orbit_problem, only: measured, orbit_point_t, orbit_problem_t
   use nocdyn_orbit_settings, only: orbit_settings_t
   use nocdyn_orbit_specials, only: add_between
+  use nocdyn_periodic_machine, only: orbit_t
   use nocdyn_text, only: rounded_text, to_text
   implicit none (type, external)
   private
@@ -25,8 +24,8 @@ module nocdyn_orbit_branch
 contains
 
   !> Follows the branch of a guess from the first value of the parameter until it leaves the range.
-  subroutine follow_branch(equations, finer, settings, guess, branch, error)
-    type(orbit_equations_t), intent(inout) :: equations, finer   !! the same machine; harmonics are set here
+  subroutine follow_branch(problem, settings, guess, branch, error)
+    class(orbit_problem_t), intent(inout) :: problem
     type(orbit_settings_t), intent(in) :: settings
     type(orbit_t), intent(in) :: guess
     type(branch_t), intent(out) :: branch
@@ -39,7 +38,7 @@ contains
 
     allocate (branch%points(0))
     branch%ending = ''
-    call start_walk(equations, finer, settings, guess, walk, branch%has_begun, error)
+    call start_walk(problem, settings, guess, walk, branch%has_begun, error)
     if (allocated(error)) return
     call branch%add(walk%point)
     step = first_step
@@ -49,22 +48,20 @@ contains
         branch%ending = 'after most_points = ' // to_text(settings%most_points) // ' points'
         exit
       end if
-      call take_step(equations, walk, step, next, iterations, is_good, error)
+      call take_step(problem, walk, step, next, iterations, is_good, error)
       if (.not. is_good) then
         step = step / 2
         if (step > shortest_step) cycle
-        call end_branch(walk, 'no convergence with ' // to_text(equations%basis%harmonics) // ' harmonics', branch, error)
+        call end_branch(walk, 'no convergence with ' // problem%resolution(), branch, error)
         exit
       end if
-      call complete_point(equations, finer, next, error)
+      call complete_point(problem, next, error)
       if (dot_product(walk%weights**2 * walk%tangent, next%tangent) < 0) call next%turn()
-      if (.not. allocated(error) .and. next%settings%harmonics == 0) then
-        call adapt_harmonics(equations, finer, walk, next, error)
-      end if
+      if (.not. allocated(error)) call adapt_resolution(problem, walk, next, error)
       fault = ''
-      if (.not. allocated(error)) call find_fault(equations, next%point, fault)
+      if (.not. allocated(error)) call problem%find_fault(next%point, fault)
       if (.not. allocated(error) .and. fault == '') then
-        call conclude_step(equations, finer, walk, next, branch, is_done, error)
+        call conclude_step(problem, walk, next, branch, is_done, error)
       end if
       if (allocated(error) .or. fault /= '') then
         call end_branch(walk, fault, branch, error)
@@ -100,73 +97,63 @@ contains
     deallocate (error)
   end subroutine end_branch
 
-  !> The first point, with as many harmonics as it needs, and the direction into the range.
-  subroutine start_walk(equations, finer, settings, guess, walk, has_begun, error)
-    type(orbit_equations_t), intent(inout) :: equations, finer
+  !> The first point, in the resolution that it needs, and the direction into the range.
+  subroutine start_walk(problem, settings, guess, walk, has_begun, error)
+    class(orbit_problem_t), intent(inout) :: problem
     type(orbit_settings_t), intent(in) :: settings
     type(orbit_t), intent(in) :: guess
     type(walk_t), intent(inout) :: walk
-    logical, intent(out) :: has_begun   !! whether there is a point, with however many harmonics
+    logical, intent(out) :: has_begun   !! whether there is a point, in however fine a resolution
     type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: none = 1.0e-20_wp   ! [rad]
     type(orbit_t) :: start
     character(len=:), allocatable :: fault
     real(wp), allocatable :: row(:)
-    integer :: harmonics, iterations
-    logical :: has_converged
+    integer :: iterations
+    logical :: has_changed, has_converged
 
     walk%settings = settings
-    walk%range = abs(settings%to - settings%from)
-    harmonics = least_harmonics(equations)
-    if (settings%harmonics > 0) harmonics = settings%harmonics
+    walk%range = problem%range()
     start = guess
     has_begun = .false.
+    call problem%begin(error)
+    if (allocated(error)) return
     do
-      call equations%set_harmonics(harmonics, error)
-      if (allocated(error)) return
-      start%series = padded_series(start%series, equations%basis%length)
-      walk%x = equations%put_together(start)
+      walk%x = problem%put_together(start)
       if (allocated(row)) deallocate (row)
       allocate (row(size(walk%x)), source=0.0_wp)
       row(size(row)) = 1.0_wp
-      call correct(equations, walk%range, row, settings%at, walk%x, iterations, has_converged, error)
+      call problem%correct(row, settings%at, walk%x, iterations, has_converged, error)
       if (allocated(error)) return
       if (.not. has_converged) then
         call raise(error, exit_failed, 'no convergence at the first value, ' // rounded_text(settings%at, 8) // ', with ' // &
-                   to_text(harmonics) // ' harmonics; what helps: a range that begins far from resonances')
+                   problem%resolution() // '; what helps: a range that begins far from resonances')
         return
       end if
       has_begun = .true.
-      call set_least_oscillation(equations, walk%x, walk%range)
-      if (.not. oscillates(equations, walk)) then
+      call problem%set_scale(walk%x)
+      if (.not. problem%oscillation(walk%x) > none) then
         call raise(error, exit_failed, 'nothing oscillates at the first value, ' // rounded_text(settings%at, 8) // &
                    ', nor near it; required: an excitation with an amplitude')
         return
       end if
-      call complete_point(equations, finer, walk, error)
+      call complete_point(problem, walk, error)
       if (allocated(error)) return
-      if (settings%harmonics > 0 .or. walk%point%error <= settings%tolerance) exit
-      if (harmonics >= more_harmonics(harmonics, walk%point%crossed)) exit
-      harmonics = more_harmonics(harmonics, walk%point%crossed)
+      if (walk%point%error <= problem%tolerance) exit
+      call problem%adapt(walk%point, has_changed, error)
+      if (allocated(error)) return
+      if (.not. has_changed) exit
       start = walk%point%orbit
     end do
-    call find_fault(equations, walk%point, fault)
+    call problem%find_fault(walk%point, fault)
     if (fault /= '') then
       call raise(error, exit_failed, 'at the first value, ' // rounded_text(settings%at, 8) // ', ' // fault)
       return
     end if
     if (settings%ahead * walk%tangent(size(row)) < 0) walk%tangent = -walk%tangent
     walk%point%direction = walk%tangent(size(row)) / walk%range
-    call add_multipliers(equations, walk%settings, walk%point, error)
+    call add_multipliers(problem, walk%settings, walk%point, error)
   end subroutine start_walk
-
-  !> Whether a machine oscillates, or begins to.
-  pure logical function oscillates(equations, walk)
-    type(orbit_equations_t), intent(in) :: equations
-    type(walk_t), intent(in) :: walk
-    real(wp), parameter :: none = 1.0e-20_wp   ! [rad]
-
-    oscillates = oscillation(equations, walk%x) > none
-  end function oscillates
 
   !> Longer steps where the branch is straight and Newton's method fast.
   subroutine adapt_step(iterations, walk, next, step)
@@ -183,8 +170,8 @@ contains
   end subroutine adapt_step
 
   !> Adds what lies between two points, and the second one, or the end of the range.
-  subroutine conclude_step(equations, finer, walk, next, branch, is_done, error)
-    type(orbit_equations_t), intent(inout) :: equations, finer
+  subroutine conclude_step(problem, walk, next, branch, is_done, error)
+    class(orbit_problem_t), intent(inout) :: problem
     type(walk_t), intent(in) :: walk
     type(walk_t), intent(inout) :: next
     type(branch_t), intent(inout) :: branch
@@ -194,16 +181,16 @@ contains
     real(wp) :: bound, value
 
     value = next%x(size(next%x))
-    is_done = value >= equations%bounds(2) .or. value <= equations%bounds(1)
-    if (value > equations%bounds(2) .or. value < equations%bounds(1)) then
-      bound = merge(equations%bounds(2), equations%bounds(1), value > equations%bounds(2))
+    is_done = value >= problem%periodic%bounds(2) .or. value <= problem%periodic%bounds(1)
+    if (value > problem%periodic%bounds(2) .or. value < problem%periodic%bounds(1)) then
+      bound = merge(problem%periodic%bounds(2), problem%periodic%bounds(1), value > problem%periodic%bounds(2))
       beyond = next
-      call settle_at(equations, finer, walk, beyond, bound, next, error)
+      call settle_at(problem, walk, beyond, bound, next, error)
       if (allocated(error)) return
     end if
-    call add_multipliers(equations, next%settings, next%point, error)
+    call add_multipliers(problem, next%settings, next%point, error)
     if (allocated(error)) return
-    call add_between(equations, finer, walk, next, branch, error)
+    call add_between(problem, walk, next, branch, error)
     if (.not. allocated(error)) call branch%add(next%point)
   end subroutine conclude_step
 

@@ -10,8 +10,8 @@ module nocdyn_orbit_guess
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_observer, only: observer_t
-  use nocdyn_orbit_equations, only: orbit_equations_t, orbit_t
   use nocdyn_orbit_settings, only: orbit_settings_t
+  use nocdyn_periodic_machine, only: orbit_t, periodic_machine_t
   use nocdyn_sampled_machine, only: with_start
   use nocdyn_solver_status, only: failure_message, integration_done, solver_status_t
   use nocdyn_targets, only: set_targets
@@ -35,26 +35,26 @@ module nocdyn_orbit_guess
 contains
 
   !> A motion without oscillation: in the steady state of the machine, if there is one, else at its start.
-  subroutine find_steady_guess(input, settings, equations, guess)
+  subroutine find_steady_guess(input, settings, periodic, guess)
     type(input_t), intent(in) :: input
     type(orbit_settings_t), intent(in) :: settings
-    type(orbit_equations_t), intent(inout) :: equations
+    type(periodic_machine_t), intent(inout) :: periodic
     type(orbit_t), intent(inout) :: guess
     type(machine_t) :: steady
     integer :: c
 
     call start_machine(input, settings, steady)
-    associate (machine => equations%machine%formulation%machine, f => equations%machine%freedoms)
+    associate (machine => periodic%machine%formulation%machine, f => periodic%machine%freedoms)
       guess%value = settings%at
       if (allocated(guess%series)) deallocate (guess%series)
-      allocate (guess%series(1, equations%machine%states - f), source=0.0_wp)
-      guess%speed = steady%start_speed(1, machine%coordinates%body(equations%free))
+      allocate (guess%series(1, periodic%machine%states - f), source=0.0_wp)
+      guess%speed = steady%start_speed(1, machine%coordinates%body(periodic%free))
       do c = 1, f
         associate (b => machine%coordinates%body(c))
           guess%series(1, c) = steady%start_angle(1, b) - machine%start_angle(1, b)
         end associate
       end do
-      guess%series(1, :f) = guess%series(1, :f) - matmul(equations%rigid, guess%series(1, equations%free))
+      guess%series(1, :f) = guess%series(1, :f) - matmul(periodic%rigid, guess%series(1, periodic%free))
       guess%series(:, f + 1:) = steady%start_internal()
     end associate
   end subroutine find_steady_guess
@@ -77,10 +77,10 @@ contains
   end subroutine start_machine
 
   !> The last period of a run from the steady state, after many periods.
-  subroutine find_settled_guess(input, settings, equations, guess, error, push)
+  subroutine find_settled_guess(input, settings, periodic, guess, error, push)
     type(input_t), intent(in) :: input
     type(orbit_settings_t), intent(in) :: settings
-    type(orbit_equations_t), intent(in) :: equations
+    type(periodic_machine_t), intent(in) :: periodic
     type(orbit_t), intent(inout) :: guess              !! in the steady state, with its rate; then the settled motion
     type(error_t), allocatable, intent(out) :: error   !! the integration fails
     real(wp), intent(in), optional :: push(:)          !! added to the state of the start, [states]
@@ -98,24 +98,24 @@ contains
     begin = settings%periods * period
     call advance(formulation, [0.0_wp, 0.5_wp * begin, begin], y, last, error)
     if (allocated(error)) return
-    associate (f => equations%freedoms, m => equations%period%motion)
-      if (m > 0) period = abs((last(f + equations%free(m), 3) - last(f + equations%free(m), 2)) / (0.5_wp * begin))
-      if (m > 0) period = turn * equations%subharmonic / (equations%period%rate * period)
+    associate (f => periodic%machine%freedoms, m => periodic%period%motion)
+      if (m > 0) period = abs((last(f + periodic%free(m), 3) - last(f + periodic%free(m), 2)) / (0.5_wp * begin))
+      if (m > 0) period = turn * periodic%subharmonic / (periodic%period%rate * period)
       call advance(formulation, begin + [(period * i / samples, i=0, samples)], y, last, error)
       if (allocated(error)) return
-      last(f + 1:2 * f, :) = last(f + 1:2 * f, :) + spread(formulation_angles(machine, equations), 2, samples + 1)
-      call find_series(equations, last(f + 1:, :), period, guess)
+      last(f + 1:2 * f, :) = last(f + 1:2 * f, :) + spread(formulation_angles(machine, periodic), 2, samples + 1)
+      call find_series(periodic, last(f + 1:, :), period, guess)
     end associate
   end subroutine find_settled_guess
 
   !> Angles of the coordinates at the start, from those of the samples [rad], [coordinates].
-  pure function formulation_angles(machine, equations) result(angles)
+  pure function formulation_angles(machine, periodic) result(angles)
     type(machine_t), intent(in) :: machine
-    type(orbit_equations_t), intent(in) :: equations
-    real(wp) :: angles(equations%freedoms)
+    type(periodic_machine_t), intent(in) :: periodic
+    real(wp) :: angles(periodic%machine%freedoms)
 
     associate (b => machine%coordinates%body)
-      angles = machine%start_angle(1, b) - equations%machine%formulation%machine%start_angle(1, b)
+      angles = machine%start_angle(1, b) - periodic%machine%formulation%machine%start_angle(1, b)
     end associate
   end function formulation_angles
 
@@ -154,27 +154,27 @@ contains
   end subroutine on_output
 
   !> The series of a period. Where orders excite, the time is counted from where the mean angle is zero.
-  subroutine find_series(equations, states, period, guess)
-    type(orbit_equations_t), intent(in) :: equations
+  subroutine find_series(periodic, states, period, guess)
+    type(periodic_machine_t), intent(in) :: periodic
     real(wp), intent(in) :: states(:, :)        !! coordinates and internal states, [nodes, samples + 1]
     real(wp), intent(in) :: period              !! [s]
     type(orbit_t), intent(inout) :: guess
     type(harmonic_basis_t) :: basis
-    real(wp) :: beside(samples, size(states, 1)), mean(size(equations%free)), phase, series(2 * harmonics + 1, size(states, 1))
+    real(wp) :: beside(samples, size(states, 1)), mean(size(periodic%free)), phase, series(2 * harmonics + 1, size(states, 1))
     integer :: i, k
 
-    guess%speed = (states(equations%free, samples + 1) - states(equations%free, 1)) / period
+    guess%speed = (states(periodic%free, samples + 1) - states(periodic%free, 1)) / period
     beside = transpose(states(:, :samples))
-    associate (f => equations%freedoms, steady => matmul(equations%rigid, guess%speed))
+    associate (f => periodic%machine%freedoms, steady => matmul(periodic%rigid, guess%speed))
       do i = 1, samples
         beside(i, :f) = beside(i, :f) - steady * (period * (i - 1) / samples)
       end do
     end associate
     basis = new_harmonic_basis(harmonics, samples)
     series = matmul(basis%projection, beside)
-    mean = series(1, equations%free)
-    associate (f => equations%freedoms, m => equations%period%motion)
-      series(1, :f) = series(1, :f) - matmul(equations%rigid, mean)
+    mean = series(1, periodic%free)
+    associate (f => periodic%machine%freedoms, m => periodic%period%motion)
+      series(1, :f) = series(1, :f) - matmul(periodic%rigid, mean)
       phase = 0.0_wp
       if (m > 0) phase = turn / period * mean(m) / guess%speed(m)
       guess%series = series

@@ -3,32 +3,17 @@ module nocdyn_orbit_points
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_harmonic_basis, only: padded_series
   use nocdyn_kinds, only: wp
-  use nocdyn_orbit_corrector, only: correct, estimate_error, find_tangent, measured, weights_of
-  use nocdyn_orbit_equations, only: orbit_equations_t, orbit_t
-  use nocdyn_orbit_multipliers, only: find_multipliers
+  use nocdyn_orbit_problem, only: measured, orbit_point_t, orbit_problem_t
   use nocdyn_orbit_settings, only: orbit_settings_t
-  use nocdyn_text, only: rounded_text, to_text
+  use nocdyn_periodic_machine, only: orbit_t
+  use nocdyn_text, only: rounded_text
   implicit none (type, external)
   private
 
-  public :: adapt_harmonics, add_multipliers, complete_point, distance_between, find_fault, interpolated, least_harmonics, &
-    more_harmonics, settle_at, span, take_step
+  public :: adapt_resolution, add_multipliers, complete_point, distance_between, interpolated, settle_at, span, take_step
 
   character(len=*), parameter, public :: fold = 'fold', doubling = 'period_doubling', neimark_sacker = 'neimark_sacker', &
     branch_point = 'branch_point', torque_fold = 'torque_fold'
-
-  type, public :: orbit_point_t
-    type(orbit_t) :: orbit
-    real(wp) :: direction = 0.0_wp                 !! change of the parameter along the branch, as a share of its range
-    real(wp) :: error = 0.0_wp                     !! estimated, as a share of the motion
-    integer :: harmonics = 0
-    integer :: branch = 1
-    integer :: crossed = 0                         !! a switch whose branches the motion changes, 0: none
-    complex(wp), allocatable :: multipliers(:)     !! by descending modulus
-    character(len=:), allocatable :: kind          !! of a special point, else ''
-  contains
-    procedure :: is_stable, unstable
-  end type orbit_point_t
 
   type, public :: branch_t
     type(orbit_point_t), allocatable :: points(:)  !! along the branch
@@ -50,29 +35,9 @@ module nocdyn_orbit_points
     procedure :: turn
   end type walk_t
 
-  integer, parameter :: first_harmonics = 5
-  integer, parameter :: most_harmonics = 200
-  integer, parameter :: most_of_kinks = 60       ! where laws have kinks, more are of little use
-  real(wp), parameter :: kinked = 1.0e-6_wp      ! error above which a motion across kinks is none
-  real(wp), parameter :: unresolved = 1.0e-3_wp  ! error above which any motion is none
   real(wp), parameter :: straight = 0.97_wp      ! cosine between the tangents at both ends of a step
-  real(wp), parameter :: neutral = 1.0e-8_wp     ! of a modulus above 1 by rounding
 
 contains
-
-  !> The number of multipliers outside the unit circle.
-  pure integer function unstable(self)
-    class(orbit_point_t), intent(in) :: self
-
-    unstable = count(abs(self%multipliers) > 1.0_wp + neutral)
-  end function unstable
-
-  !> Whether disturbances decay.
-  pure logical function is_stable(self)
-    class(orbit_point_t), intent(in) :: self
-
-    is_stable = self%unstable() == 0
-  end function is_stable
 
   !> Adds a point at the end.
   subroutine add(self, point)
@@ -92,68 +57,30 @@ contains
     self%points(self%count) = point
   end subroutine add
 
-  !> The harmonics with which a branch begins: those of the excitation and one more.
-  pure integer function least_harmonics(equations)
-    type(orbit_equations_t), intent(in) :: equations
-
-    least_harmonics = max(first_harmonics, (maxval([0, equations%period%multiples]) + 1) * equations%subharmonic)
-  end function least_harmonics
-
-  !> A larger number of harmonics, unless it is the largest already.
-  pure integer function more_harmonics(harmonics, crossed)
-    integer, intent(in) :: harmonics
-    integer, intent(in) :: crossed   !! as of a point
-
-    more_harmonics = max(harmonics, min(merge(most_of_kinks, most_harmonics, crossed > 0), harmonics + max(2, harmonics / 3)))
-  end function more_harmonics
-
-  !> Why a point is not good enough, '' if it is.
-  subroutine find_fault(equations, point, fault)
-    type(orbit_equations_t), intent(in) :: equations
-    type(orbit_point_t), intent(in) :: point
-    character(len=:), allocatable, intent(out) :: fault
-
-    fault = ''
-    if (point%crossed > 0 .and. point%error > kinked) then
-      fault = 'the motion crosses the ' // equations%machine%formulation%switch_name(point%crossed) // ', a kink or jump of ' // &
-              'its law that ' // to_text(point%harmonics) // ' harmonics do not describe (error ' // &
-              rounded_text(point%error, 2) // ' of the motion)'
-    else if (point%error > unresolved) then
-      fault = to_text(point%harmonics) // ' harmonics do not describe the motion (error ' // rounded_text(point%error, 2) // &
-              ' of it)'
-    end if
-  end subroutine find_fault
-
   !> Tangent, weights, orbit and error of a point that has just been corrected.
-  subroutine complete_point(equations, finer, walk, error)
-    type(orbit_equations_t), intent(inout) :: equations, finer
+  subroutine complete_point(problem, walk, error)
+    class(orbit_problem_t), intent(inout) :: problem
     type(walk_t), intent(inout) :: walk
     type(error_t), allocatable, intent(out) :: error
 
-    walk%weights = weights_of(equations, walk%x, walk%range)
+    walk%weights = problem%weights_of(walk%x)
     if (allocated(walk%tangent)) deallocate (walk%tangent)
     allocate (walk%tangent(size(walk%x)))
-    call find_tangent(equations, walk%weights, walk%tangent)
-    walk%point%orbit%speed = equations%floating_speed
-    call equations%take_apart(walk%x, walk%point%orbit)
-    call equations%set_value(walk%point%orbit, error)
-    if (allocated(error)) return
+    call problem%find_tangent(walk%weights, walk%tangent)
+    call problem%complete(walk%x, walk%point, error)
     walk%point%direction = walk%tangent(size(walk%x)) / walk%range
-    walk%point%harmonics = equations%basis%harmonics
     walk%point%kind = ''
-    call estimate_error(equations, finer, walk%x, walk%point%orbit, walk%point%error, error)
-    walk%point%crossed = finer%machine%crossed_switch()
   end subroutine complete_point
 
   !> The multipliers of a point, none without stability.
-  subroutine add_multipliers(equations, settings, point, error)
-    type(orbit_equations_t), intent(inout) :: equations
+  subroutine add_multipliers(problem, settings, point, error)
+    class(orbit_problem_t), intent(inout) :: problem
     type(orbit_settings_t), intent(in) :: settings
     type(orbit_point_t), intent(inout) :: point
     type(error_t), allocatable, intent(out) :: error
 
     if (settings%has_stability) then
-      call find_multipliers(equations, point%orbit, point%multipliers, error)
+      call problem%find_multipliers(point%orbit, point%multipliers, error)
     else
       point%multipliers = [complex(wp) ::]
     end if
@@ -168,8 +95,8 @@ contains
   end subroutine turn
 
   !> A point at a distance along the tangent, or at the end of the range if this is nearer.
-  subroutine take_step(equations, walk, step, next, iterations, is_good, error)
-    type(orbit_equations_t), intent(inout) :: equations
+  subroutine take_step(problem, walk, step, next, iterations, is_good, error)
+    class(orbit_problem_t), intent(inout) :: problem
     type(walk_t), intent(in) :: walk
     real(wp), intent(in) :: step
     type(walk_t), intent(inout) :: next
@@ -183,7 +110,7 @@ contains
     along = walk%weights**2 * walk%tangent
     next%x = walk%x + step * walk%tangent
     row = along
-    associate (last => size(row), bounds => equations%bounds)
+    associate (last => size(row), bounds => problem%periodic%bounds)
       value = min(max(next%x(last), bounds(1)), bounds(2))
       if (abs(value - next%x(last)) > 0) then
         next%x = walk%x + (value - walk%x(last)) / walk%tangent(last) * walk%tangent
@@ -192,15 +119,15 @@ contains
         row(last) = 1.0_wp
       end if
     end associate
-    call correct(equations, walk%range, row, dot_product(row, next%x), next%x, iterations, is_good, error)
+    call problem%correct(row, dot_product(row, next%x), next%x, iterations, is_good, error)
     if (allocated(error) .or. .not. is_good) return
-    call find_tangent(equations, walk%weights, tangent)
+    call problem%find_tangent(walk%weights, tangent)
     is_good = abs(dot_product(along, tangent)) >= straight .and. measured(next%x - walk%x, walk%weights) < 2 * step
   end subroutine take_step
 
   !> A point between two others at a value of the parameter.
-  subroutine settle_at(equations, finer, walk, next, value, middle, error)
-    type(orbit_equations_t), intent(inout) :: equations, finer
+  subroutine settle_at(problem, walk, next, value, middle, error)
+    class(orbit_problem_t), intent(inout) :: problem
     type(walk_t), intent(in) :: walk, next
     real(wp), intent(in) :: value
     type(walk_t), intent(inout) :: middle
@@ -217,13 +144,13 @@ contains
       middle%settings = walk%settings
       middle%range = walk%range
       middle%x = walk%x + share * (next%x - walk%x)
-      call correct(equations, walk%range, row, value, middle%x, iterations, has_converged, error)
+      call problem%correct(row, value, middle%x, iterations, has_converged, error)
       if (allocated(error)) return
       if (.not. has_converged) then
         call raise(error, exit_failed, 'no convergence at ' // rounded_text(value, 8) // ' between two points of the branch')
         return
       end if
-      call complete_point(equations, finer, middle, error)
+      call complete_point(problem, middle, error)
       if (ahead * middle%tangent(last) < 0) call middle%turn()
     end associate
   end subroutine settle_at
@@ -235,93 +162,49 @@ contains
     span = dot_product(walk%weights**2 * walk%tangent, next%x - walk%x)
   end function span
 
-  !> Gives a point more harmonics if its error is too large, and fewer if it is very small; the point before keeps step.
-  subroutine adapt_harmonics(equations, finer, walk, next, error)
-    type(orbit_equations_t), intent(inout) :: equations, finer
-    type(walk_t), intent(inout) :: walk, next
-    type(error_t), allocatable, intent(out) :: error
-    real(wp), parameter :: spare = 1.0e-4_wp   ! of the tolerance
-    integer :: harmonics, least
-
-    least = least_harmonics(equations)
-    do
-      harmonics = equations%basis%harmonics
-      if (next%point%error > walk%settings%tolerance) then
-        harmonics = more_harmonics(harmonics, next%point%crossed)
-      else if (next%point%error < spare * walk%settings%tolerance) then
-        harmonics = max(least, harmonics - max(1, harmonics / 6))
-      end if
-      if (harmonics == equations%basis%harmonics) return
-      call change_harmonics(equations, finer, harmonics, walk, next, error)
-      if (allocated(error)) return
-      if (next%point%error <= walk%settings%tolerance) return
-    end do
-  end subroutine adapt_harmonics
-
-  !> Corrects a point, and the one before, with other harmonics, each at its place of the branch.
-  subroutine change_harmonics(equations, finer, harmonics, walk, next, error)
-    type(orbit_equations_t), intent(inout) :: equations, finer
-    integer, intent(in) :: harmonics
+  !> Gives a point the resolution that its error asks for; the point before keeps step.
+  subroutine adapt_resolution(problem, walk, next, error)
+    class(orbit_problem_t), intent(inout) :: problem
     type(walk_t), intent(inout) :: walk, next
     type(error_t), allocatable, intent(out) :: error
     type(walk_t) :: former, latter
+    logical :: has_changed
 
-    former = walk
-    latter = next
-    call equations%set_harmonics(harmonics, error)
-    if (allocated(error)) return
-    call resettle(equations, finer, former, walk, error)
-    if (allocated(error)) return
-    walk%point%multipliers = former%point%multipliers
-    call resettle(equations, finer, latter, next, error)
-  end subroutine change_harmonics
+    do
+      call problem%adapt(next%point, has_changed, error)
+      if (allocated(error) .or. .not. has_changed) return
+      former = walk
+      latter = next
+      call resettle(problem, former, walk, error)
+      if (allocated(error)) return
+      walk%point%multipliers = former%point%multipliers
+      call resettle(problem, latter, next, error)
+      if (allocated(error)) return
+      if (next%point%error <= problem%tolerance) return
+    end do
+  end subroutine adapt_resolution
 
-  !> Corrects a point with the present harmonics across its former tangent, which keeps its direction.
-  subroutine resettle(equations, finer, former, walk, error)
-    type(orbit_equations_t), intent(inout) :: equations, finer
+  !> Corrects a point in the present resolution across its former tangent, which keeps its direction.
+  subroutine resettle(problem, former, walk, error)
+    class(orbit_problem_t), intent(inout) :: problem
     type(walk_t), intent(in) :: former
     type(walk_t), intent(inout) :: walk
     type(error_t), allocatable, intent(out) :: error
-    type(orbit_t) :: along, orbit
     real(wp), allocatable :: row(:)
     integer :: iterations
     logical :: has_converged
 
-    orbit = former%point%orbit
-    orbit%series = padded_series(orbit%series, equations%basis%length)
-    walk%x = equations%put_together(orbit)
-    call spread_tangent(equations, former, along)
-    row = equations%put_together(along)
-    associate (scalars => equations%scalars())
-      row(size(row) - scalars:) = former%tangent(size(former%tangent) - scalars:)
-    end associate
-    row = weights_of(equations, walk%x, walk%range)**2 * row
-    call correct(equations, walk%range, row, dot_product(row, walk%x), walk%x, iterations, has_converged, error)
+    walk%x = problem%put_together(former%point%orbit)
+    row = problem%weights_of(walk%x)**2 * problem%recast(former%point, former%tangent)
+    call problem%correct(row, dot_product(row, walk%x), walk%x, iterations, has_converged, error)
     if (allocated(error)) return
     if (.not. has_converged) then
       call raise(error, exit_failed, 'no convergence at ' // rounded_text(former%x(size(former%x)), 8) // ' with ' // &
-                 to_text(equations%basis%harmonics) // ' harmonics in place of ' // to_text(former%point%harmonics) // &
-                 '; what helps: a larger tolerance, or a number of harmonics')
+                 problem%resolution() // '; what helps: a larger tolerance, or a number of harmonics')
       return
     end if
-    call complete_point(equations, finer, walk, error)
+    call complete_point(problem, walk, error)
   end subroutine resettle
-
-  !> The tangent of a point of other harmonics as series.
-  subroutine spread_tangent(equations, former, along)
-    type(orbit_equations_t), intent(in) :: equations
-    type(walk_t), intent(in) :: former
-    type(orbit_t), intent(inout) :: along
-    real(wp) :: series(2 * former%point%harmonics + 1, equations%nodes)
-    integer :: i, n
-
-    do n = 1, equations%nodes
-      i = (equations%place(n) - 1) * size(series, 1)
-      series(:, n) = former%tangent(i + 1:i + size(series, 1))
-    end do
-    along%speed = equations%floating_speed
-    along%series = padded_series(series, equations%basis%length)
-  end subroutine spread_tangent
 
   !> The series between two motions at the value of another one, with as many harmonics as this.
   pure function interpolated(orbit, before, after) result(series)

@@ -8,11 +8,11 @@ module nocdyn_orbit_scatter
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_orbit_branch, only: follow_branch, start_walk
-  use nocdyn_orbit_corrector, only: correct, measured
-  use nocdyn_orbit_equations, only: orbit_equations_t, orbit_t
   use nocdyn_orbit_guess, only: find_settled_guess, find_steady_guess
   use nocdyn_orbit_points, only: branch_t, distance_between, interpolated, walk_t
+  use nocdyn_orbit_problem, only: measured, orbit_problem_t
   use nocdyn_orbit_settings, only: orbit_settings_t, usual_periods
+  use nocdyn_periodic_machine, only: orbit_t, periodic_machine_t
   use nocdyn_sobol_points, only: max_dimensions, sobol_points, sobol_points_t
   implicit none (type, external)
   private
@@ -34,21 +34,21 @@ module nocdyn_orbit_scatter
 contains
 
   !> Tries the starts and adds the branches that they find. Starts that fail do not count.
-  subroutine find_isolated(input, settings, equations, finer, branch, found)
+  subroutine find_isolated(input, settings, problem, branch, found)
     type(input_t), intent(in) :: input
     type(orbit_settings_t), intent(in) :: settings
-    type(orbit_equations_t), intent(inout) :: equations, finer
+    class(orbit_problem_t), intent(inout) :: problem
     type(branch_t), intent(inout) :: branch            !! with the points of the first branch; the others are added
     type(scatter_t), intent(out) :: found
     type(sobol_points_t) :: points
     type(orbit_settings_t) :: here
     type(walk_t) :: walk
-    real(wp) :: largest(equations%machine%states), push(equations%machine%states)
+    real(wp) :: largest(problem%periodic%machine%states), push(problem%periodic%machine%states)
     integer :: i, k
     logical :: is_periodic
 
     points = sobol_points(min(max_dimensions, size(push) + 1), 0)
-    largest = largest_states(equations, branch)
+    largest = largest_states(problem%periodic, branch)
     here = settings
     do i = 1, settings%starts
       here%at = settings%from + points%coordinate(i, 1) * (settings%to - settings%from)
@@ -58,27 +58,27 @@ contains
       end do
       here%periods = usual_periods / 2**modulo(i, shorter)
       found%tried = found%tried + 1
-      call settle_from(input, here, equations, finer, push, walk, is_periodic)
+      call settle_from(input, here, problem, push, walk, is_periodic)
       if (.not. is_periodic) cycle
       found%periodic = found%periodic + 1
-      if (is_known(equations, walk, branch)) cycle
+      if (is_known(problem, walk, branch)) cycle
       found%branches = found%branches + 1
-      call follow_both_ways(equations, finer, here, walk%point%orbit, found%branches + 1, branch)
+      call follow_both_ways(problem, here, walk%point%orbit, found%branches + 1, branch)
     end do
   end subroutine find_isolated
 
   !> The largest oscillation of each state on known motions, [states].
-  pure function largest_states(equations, branch) result(largest)
-    type(orbit_equations_t), intent(in) :: equations
+  pure function largest_states(periodic, branch) result(largest)
+    type(periodic_machine_t), intent(in) :: periodic
     type(branch_t), intent(in) :: branch
-    real(wp) :: largest(equations%machine%states)
+    real(wp) :: largest(periodic%machine%states)
     integer :: c, i
 
     largest = 0.0_wp
-    associate (f => equations%freedoms)
+    associate (f => periodic%machine%freedoms)
       do i = 1, branch%count
         associate (orbit => branch%points(i)%orbit)
-          do c = 1, equations%nodes
+          do c = 1, size(orbit%series, 2)
             largest(f + c) = max(largest(f + c), maxval(abs(orbit%series(2:, c))))
             if (c <= f) largest(c) = max(largest(c), orbit%rate * maxval(abs(orbit%series(2:, c))))
           end do
@@ -88,10 +88,10 @@ contains
   end function largest_states
 
   !> The motion on which a run settles, if it is periodic.
-  subroutine settle_from(input, settings, equations, finer, push, walk, is_periodic)
+  subroutine settle_from(input, settings, problem, push, walk, is_periodic)
     type(input_t), intent(in) :: input
     type(orbit_settings_t), intent(in) :: settings
-    type(orbit_equations_t), intent(inout) :: equations, finer
+    class(orbit_problem_t), intent(inout) :: problem
     real(wp), intent(in) :: push(:)
     type(walk_t), intent(out) :: walk
     logical, intent(out) :: is_periodic
@@ -100,17 +100,19 @@ contains
     logical :: has_begun
 
     is_periodic = .false.
-    guess%speed = equations%floating_speed
-    call find_steady_guess(input, settings, equations, guess)
-    call equations%set_value(guess, error)
-    if (.not. allocated(error)) call find_settled_guess(input, settings, equations, guess, error, push)
-    if (.not. allocated(error)) call start_walk(equations, finer, settings, guess, walk, has_begun, error)
+    associate (periodic => problem%periodic)
+      guess%speed = periodic%floating_speed
+      call find_steady_guess(input, settings, periodic, guess)
+      call periodic%set_value(guess, error)
+      if (.not. allocated(error)) call find_settled_guess(input, settings, periodic, guess, error, push)
+    end associate
+    if (.not. allocated(error)) call start_walk(problem, settings, guess, walk, has_begun, error)
     is_periodic = .not. allocated(error)
   end subroutine settle_from
 
   !> Whether a motion is on a known branch: Newton's method from between two of its points finds it.
-  logical function is_known(equations, walk, branch)
-    type(orbit_equations_t), intent(inout) :: equations
+  logical function is_known(problem, walk, branch)
+    class(orbit_problem_t), intent(inout) :: problem
     type(walk_t), intent(in) :: walk
     type(branch_t), intent(in) :: branch
     type(error_t), allocatable :: error
@@ -130,8 +132,8 @@ contains
         if (distance_between(orbit, points(i - 1)%orbit, points(i)%orbit) > near) cycle
         other = orbit
         other%series = interpolated(orbit, points(i - 1)%orbit, points(i)%orbit)
-        x = equations%put_together(other)
-        call correct(equations, walk%range, row, orbit%value, x, iterations, has_converged, error)
+        x = problem%put_together(other)
+        call problem%correct(row, orbit%value, x, iterations, has_converged, error)
         if (allocated(error) .or. .not. has_converged) cycle
         is_known = measured(x - walk%x, walk%weights) < same
         if (is_known) return
@@ -140,8 +142,8 @@ contains
   end function is_known
 
   !> Follows a branch from a motion on it in both directions.
-  subroutine follow_both_ways(equations, finer, settings, start, number, branch)
-    type(orbit_equations_t), intent(inout) :: equations, finer
+  subroutine follow_both_ways(problem, settings, start, number, branch)
+    class(orbit_problem_t), intent(inout) :: problem
     type(orbit_settings_t), intent(in) :: settings
     type(orbit_t), intent(in) :: start
     integer, intent(in) :: number              !! of the branch
@@ -152,10 +154,10 @@ contains
     integer :: i
 
     other = settings
-    call follow_branch(equations, finer, other, start, ahead, error)
+    call follow_branch(problem, other, start, ahead, error)
     if (.not. ahead%is_closed) then
       other%ahead = -settings%ahead
-      call follow_branch(equations, finer, other, start, back, error)
+      call follow_branch(problem, other, start, back, error)
       do i = back%count, 2, -1
         back%points(i)%direction = -back%points(i)%direction
         back%points(i)%branch = number

@@ -3,7 +3,9 @@ module nocdyn_orbit_signals
   use nocdyn_errors, only: error_t
   use nocdyn_harmonic_basis, only: differentiated, harmonic_basis_t, new_harmonic_basis
   use nocdyn_kinds, only: wp
-  use nocdyn_orbit_equations, only: orbit_equations_t, orbit_t, samples_of
+  use nocdyn_orbit_equations, only: orbit_equations_t
+  use nocdyn_orbit_problem, only: signal_range_t
+  use nocdyn_periodic_machine, only: orbit_t, periodic_machine_t
   use nocdyn_signal_values, only: new_signal_values, signal_values_t
   use nocdyn_signals, only: list_signals, signal_angle, signal_kinetic, signal_source_t, signal_t, signal_time
   implicit none (type, external)
@@ -11,23 +13,19 @@ module nocdyn_orbit_signals
 
   public :: list_orbit_signals, measure_signals
 
-  type, public :: signal_range_t
-    real(wp) :: half_range = 0.0_wp, largest = 0.0_wp, mean = 0.0_wp   !! in SI units
-  end type signal_range_t
-
   integer, parameter :: iterations = 6        ! of Newton's method at an extreme
   real(wp), parameter :: near = 0.1_wp        ! samples so near to the extreme, as a share of the range, may be beside it
 
 contains
 
   !> The signals that repeat themselves with the motion: all but the time, energies and works.
-  subroutine list_orbit_signals(equations, signals)
-    type(orbit_equations_t), intent(in) :: equations
+  subroutine list_orbit_signals(periodic, signals)
+    type(periodic_machine_t), intent(in) :: periodic
     type(signal_t), allocatable, intent(out) :: signals(:)
     type(signal_t), allocatable :: all(:)
     integer :: i
 
-    call list_signals(equations%machine%formulation%machine, all)
+    call list_signals(periodic%machine%formulation%machine, all)
     signals = all(pack([(i, i=1, size(all))], all%source%kind /= signal_time .and. all%source%kind < signal_kinetic))
   end subroutine list_orbit_signals
 

@@ -6,10 +6,9 @@ module nocdyn_orbit_specials
   use nocdyn_brackets, only: bracket_t, new_bracket
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_kinds, only: wp
-  use nocdyn_orbit_corrector, only: correct
-  use nocdyn_orbit_equations, only: orbit_equations_t
   use nocdyn_orbit_points, only: add_multipliers, branch_point, branch_t, complete_point, doubling, fold, neimark_sacker, &
     settle_at, span, torque_fold, walk_t
+  use nocdyn_orbit_problem, only: orbit_problem_t
   use nocdyn_text, only: rounded_text
   implicit none (type, external)
   private
@@ -19,8 +18,8 @@ module nocdyn_orbit_specials
 contains
 
   !> Special points and points at even distances between two points.
-  subroutine add_between(equations, finer, walk, next, branch, error)
-    type(orbit_equations_t), intent(inout) :: equations, finer
+  subroutine add_between(problem, walk, next, branch, error)
+    class(orbit_problem_t), intent(inout) :: problem
     type(walk_t), intent(in) :: walk, next
     type(branch_t), intent(inout) :: branch
     type(error_t), allocatable, intent(out) :: error
@@ -34,7 +33,7 @@ contains
     associate (last => size(walk%x), length => span(walk, next))
       has_fold = walk%tangent(last) * next%tangent(last) < 0
       if (has_fold) then
-        call locate(equations, finer, walk, next, length, 0, at, error)
+        call locate(problem, walk, next, length, 0, at, error)
         if (allocated(error)) return
         call note(fold)
       end if
@@ -42,7 +41,7 @@ contains
       most = max(walk%point%unstable(), next%point%unstable())
       k = least + 1
       do while (k <= most)
-        call locate(equations, finer, walk, next, length, k, at, error)
+        call locate(problem, walk, next, length, k, at, error)
         if (allocated(error)) return
         associate (multiplier => at%point%multipliers(k))
           if (abs(multiplier%im) > 1.0e-6_wp) then
@@ -50,7 +49,7 @@ contains
             k = k + 1
           else if (multiplier%re < 0) then
             call note(doubling)
-          else if (equations%held > 0) then
+          else if (problem%periodic%held > 0) then
             call note(torque_fold)   ! multipliers are those at a constant torque
           else if (.not. has_fold) then
             call note(branch_point)
@@ -59,7 +58,7 @@ contains
         k = k + 1
       end do
     end associate
-    call add_even(equations, finer, walk, next, found, places, branch, error)
+    call add_even(problem, walk, next, found, places, branch, error)
 
   contains
 
@@ -74,8 +73,8 @@ contains
   end subroutine add_between
 
   !> Adds points found between two others in their order along the branch, and points at even distances between all of these.
-  subroutine add_even(equations, finer, walk, next, found, places, branch, error)
-    type(orbit_equations_t), intent(inout) :: equations, finer
+  subroutine add_even(problem, walk, next, found, places, branch, error)
+    class(orbit_problem_t), intent(inout) :: problem
     type(walk_t), intent(in) :: walk, next
     type(branch_t), intent(in) :: found
     real(wp), intent(in) :: places(:)   !! of these along the tangent
@@ -93,9 +92,9 @@ contains
         k = minloc(places, dim=1, mask=is_left)
         is_left(k) = .false.
         end%point = found%points(k)
-        end%x = equations%put_together(end%point%orbit)
+        end%x = problem%put_together(end%point%orbit)
       end if
-      if (walk%settings%count > 0) call add_grid(equations, finer, begin, end, branch, error)
+      if (walk%settings%count > 0) call add_grid(problem, begin, end, branch, error)
       if (allocated(error)) return
       if (i <= size(places)) call branch%add(end%point)
       begin = end
@@ -103,8 +102,8 @@ contains
   end subroutine add_even
 
   !> Points at even distances between two points.
-  subroutine add_grid(equations, finer, begin, end, branch, error)
-    type(orbit_equations_t), intent(inout) :: equations, finer
+  subroutine add_grid(problem, begin, end, branch, error)
+    class(orbit_problem_t), intent(inout) :: problem
     type(walk_t), intent(in) :: begin, end
     type(branch_t), intent(inout) :: branch
     type(error_t), allocatable, intent(out) :: error
@@ -118,9 +117,9 @@ contains
         if ((second - first) * (settings%to - settings%from) < 0) k = settings%count + 1 - i
         value = settings%from + (settings%to - settings%from) * (k - 1) / (settings%count - 1)
         if ((value - first) * (value - second) >= 0) cycle
-        call settle_at(equations, finer, begin, end, value, middle, error)
+        call settle_at(problem, begin, end, value, middle, error)
         if (allocated(error)) return
-        call add_multipliers(equations, middle%settings, middle%point, error)
+        call add_multipliers(problem, middle%settings, middle%point, error)
         if (allocated(error)) return
         call branch%add(middle%point)
       end do
@@ -128,8 +127,8 @@ contains
   end subroutine add_grid
 
   !> Finds where the parameter turns back (`number` 0), or where the multiplier of a number has the modulus 1, between two points.
-  subroutine locate(equations, finer, walk, next, length, number, at, error)
-    type(orbit_equations_t), intent(inout) :: equations, finer
+  subroutine locate(problem, walk, next, length, number, at, error)
+    class(orbit_problem_t), intent(inout) :: problem
     type(walk_t), intent(in) :: walk, next
     real(wp), intent(in) :: length         !! distance of the points along the tangent
     integer, intent(in) :: number
@@ -149,12 +148,12 @@ contains
     do i = 1, most
       place = bracket%next()
       at%x = walk%x + (place / length) * (next%x - walk%x)
-      call correct(equations, walk%range, row, dot_product(row, walk%x) + place, at%x, iterations, has_converged, error)
+      call problem%correct(row, dot_product(row, walk%x) + place, at%x, iterations, has_converged, error)
       if (allocated(error)) return
       if (.not. has_converged) call raise(error, exit_failed, 'no convergence at a special point of the branch near ' // &
                                           rounded_text(walk%x(size(walk%x)), 8))
-      if (.not. allocated(error)) call complete_point(equations, finer, at, error)
-      if (.not. allocated(error)) call add_multipliers(equations, at%settings, at%point, error)
+      if (.not. allocated(error)) call complete_point(problem, at, error)
+      if (.not. allocated(error)) call add_multipliers(problem, at%settings, at%point, error)
       if (allocated(error)) return
       call bracket%narrow(place, test_value(at))
       if (abs(test_value(at)) <= exact .or. abs(bracket%x(2) - bracket%x(1)) <= exact * length) return

@@ -5,7 +5,8 @@
 module nocdyn_orbit_corrector
   use nocdyn_errors, only: error_t
   use nocdyn_kinds, only: wp
-  use nocdyn_orbit_equations, only: orbit_equations_t, orbit_t
+  use nocdyn_orbit_equations, only: orbit_equations_t
+  use nocdyn_periodic_machine, only: orbit_t
   implicit none (type, external)
   private
 

@@ -1,9 +1,8 @@
 !> The equations of a periodic motion in harmonics.
 !>
 !> The coordinates are q = r Omega t + series, the internal states series in tau = w t. The harmonics of w^2 q'' = f and w z' = g
-!> vanish, with f and g of all samples of a period at once. A rigid motion r turns with a mean speed Omega, an unknown; its mean
-!> angle is zero. In place of this angle the series of its coordinate begin with a mean acceleration that balances its mean
-!> torque, divided by w^2, which must vanish. Where the speed of a body is given, the mean torque that holds it is the unknown.
+!> vanish, with f and g of all samples of a period at once. In place of the mean angle of a rigid motion the series of its
+!> coordinate begin with a mean acceleration that balances its mean torque, divided by w^2, which must vanish.
 !> Where nothing prescribes the period, w is unknown too, and the motion is in phase with another one:
 !> the integral of q times the rate of this vanishes over a period.
 module nocdyn_orbit_equations
@@ -11,49 +10,27 @@ module nocdyn_orbit_equations
   use nocdyn_errors, only: error_t
   use nocdyn_harmonic_basis, only: differentiated, harmonic_basis_t, new_harmonic_basis, padded_series, product_matrix
   use nocdyn_kinds, only: wp
-  use nocdyn_orbit_period, only: follow_period, orbit_period_t
   use nocdyn_ordering, only: reverse_cuthill_mckee
-  use nocdyn_sampled_machine, only: sampled_machine_t
+  use nocdyn_periodic_machine, only: orbit_t, periodic_machine_t
   implicit none (type, external)
   private
 
-  public :: samples_of, body_turning
+  public :: samples_of
 
-  !> A periodic motion.
-  type, public :: orbit_t
-    real(wp) :: value = 0.0_wp                  !! of the parameter, in its unit; of a held speed [rad/s]
-    real(wp) :: rate = 0.0_wp                   !! w [rad/s]
-    real(wp), allocatable :: series(:, :)       !! of q [rad] and z, [length, nodes]
-    real(wp), allocatable :: speed(:)           !! Omega of the rigid motions [rad/s]
-    real(wp) :: torque = 0.0_wp                 !! mean torque that holds the speed of a body [N m]
-  end type orbit_t
-
-  type, public :: orbit_equations_t
-    type(sampled_machine_t) :: machine
+  type, extends(periodic_machine_t), public :: orbit_equations_t
     type(harmonic_basis_t) :: basis
-    type(orbit_period_t) :: period
-    logical :: rate_is_unknown = .false.             !! whether the machine itself finds w; then `anchor` fixes the phase
     real(wp), allocatable, private :: phase(:, :)    !! rates of the motion whose phase holds, of norm 1, [length, nodes]
-    integer :: subharmonic = 1
     real(wp) :: least_oscillation = 0.0_wp           !! from which sizes of changes are measured [rad]
-    real(wp) :: bounds(2) = 0.0_wp                   !! lowest and highest value of the parameter
-    integer :: held = 0                              !! body whose mean speed is the parameter; 0: none
     integer :: freedoms = 0                          !! coordinates; the first nodes
     integer :: nodes = 0                             !! coordinates and internal states
-    integer, allocatable :: free(:)                  !! coordinate of each rigid motion
-    real(wp), allocatable :: rigid(:, :)             !! r, [coordinates, motions]
-    real(wp), allocatable :: turning(:, :)           !! speeds of the bodies by the rigid motions, [bodies, motions]
-    real(wp), allocatable :: floating_speed(:)       !! speeds of the rigid motions that no torque acts on, else any [rad/s]
-    integer, allocatable :: border(:)                !! rigid motions whose speed, or holding torque, is unknown
-    integer :: held_motion = 0                       !! the one whose speed the held body gives
     integer, allocatable :: place(:)                 !! of each node in the order of the unknowns
     integer, allocatable, private :: row_node(:), column_node(:)   !! of each position of the Jacobian; row 0: none
     logical, allocatable, private :: is_speed(:)     !! whether its column is a speed
     type(bordered_system_t) :: system
     real(wp), allocatable, private :: t(:), y(:, :), rates(:, :), slopes(:, :)
   contains
-    procedure :: prepare, set_harmonics, set_value, residual, fill_system, unknowns, first_unknown, put_together, take_apart
-    procedure :: sample, repeats, scalars, anchor
+    procedure :: prepare, set_harmonics, residual, fill_system, unknowns, first_unknown, put_together, take_apart
+    procedure :: sample, scalars, anchor
     procedure, private :: add_slopes, add_inertia
   end type orbit_equations_t
 
@@ -66,24 +43,7 @@ contains
     samples_of = 8 * ((4 * harmonics + 2 + 7) / 8)
   end function samples_of
 
-  !> Speeds of the bodies by the rigid motions, [bodies, motions].
-  pure function body_turning(machine, rigid) result(turning)
-    type(sampled_machine_t), intent(in) :: machine
-    real(wp), intent(in) :: rigid(:, :)   !! [coordinates, motions]
-    real(wp) :: turning(machine%formulation%machine%bodies, size(rigid, 2))
-    integer :: b, k
-
-    turning = 0.0_wp
-    associate (coordinates => machine%formulation%machine%coordinates)
-      do b = 1, size(turning, 1)
-        do k = coordinates%first(b), coordinates%first(b + 1) - 1
-          turning(b, :) = turning(b, :) + coordinates%ratio(1, k) * rigid(coordinates%coordinate(k), :)
-        end do
-      end do
-    end associate
-  end function body_turning
-
-  !> Orders the unknowns; `machine`, `period`, `rigid`, `free`, `turning`, `border` are set.
+  !> Orders the unknowns of the machine.
   subroutine prepare(self)
     class(orbit_equations_t), intent(inout) :: self
     integer, allocatable :: order(:)
@@ -177,11 +137,8 @@ contains
       i = self%first_unknown(n)
       x(i:i + self%basis%length - 1) = orbit%series(:, n)
     end do
-    do n = 1, size(self%border)
-      i = self%nodes * self%basis%length + n
-      x(i) = orbit%speed(self%border(n))
-      if (self%border(n) == self%held_motion) x(i) = orbit%torque
-    end do
+    i = self%nodes * self%basis%length
+    x(i + 1:i + size(self%border)) = self%put_border(orbit)
     if (self%rate_is_unknown) x(size(x) - 1) = orbit%rate
     x(size(x)) = orbit%value
   end function put_together
@@ -199,64 +156,22 @@ contains
       i = self%first_unknown(n)
       orbit%series(:, n) = x(i:i + self%basis%length - 1)
     end do
-    do n = 1, size(self%border)
-      i = self%nodes * self%basis%length + n
-      if (self%border(n) == self%held_motion) then
-        orbit%torque = x(i)
-      else
-        orbit%speed(self%border(n)) = x(i)
-      end if
-    end do
-    orbit%value = x(size(x))
-    if (self%held_motion > 0) then
-      associate (turning => self%turning(self%held, :), m => self%held_motion)
-        orbit%speed(m) = 0.0_wp
-        orbit%speed(m) = (orbit%value - dot_product(turning, orbit%speed)) / turning(m)
-      end associate
-    end if
+    i = self%nodes * self%basis%length
     if (self%rate_is_unknown) orbit%rate = x(size(x) - 1)
-    call find_rate(self, orbit)
+    call self%take_border(x(i + 1:i + size(self%border)), x(size(x)), orbit)
   end subroutine take_apart
 
-  !> w of an orbit, if it is prescribed.
-  subroutine find_rate(self, orbit)
-    class(orbit_equations_t), intent(in) :: self
-    type(orbit_t), intent(inout) :: orbit
-
-    if (self%rate_is_unknown) return
-    orbit%rate = self%period%rate / self%subharmonic
-    if (self%period%motion > 0) orbit%rate = orbit%rate * abs(orbit%speed(self%period%motion))
-  end subroutine find_rate
-
-  !> Gives the parameter the value of an orbit, and this its w.
-  subroutine set_value(self, orbit, error)
-    class(orbit_equations_t), intent(inout) :: self
-    type(orbit_t), intent(inout) :: orbit
-    type(error_t), allocatable, intent(out) :: error
-    real(wp) :: before
-
-    before = self%machine%value
-    call self%machine%set_value(orbit%value, error)
-    if (allocated(error)) return
-    associate (machine => self%machine%formulation%machine)
-      if (abs(self%machine%value - before) > 0) call follow_period(machine, self%turning, self%period, error)
-    end associate
-    if (.not. allocated(error)) call find_rate(self, orbit)
-  end subroutine set_value
-
-  !> Times and states of an orbit at the samples of some basis, all of `turns` periods later.
-  pure subroutine sample(self, orbit, basis, t, y, turns)
+  !> Times and states of an orbit at the samples of some basis.
+  pure subroutine sample(self, orbit, basis, t, y)
     class(orbit_equations_t), intent(in) :: self
     type(orbit_t), intent(in) :: orbit
     type(harmonic_basis_t), intent(in) :: basis
     real(wp), intent(out) :: t(:), y(:, :)       !! [samples], [samples, states]
-    integer, intent(in), optional :: turns       !! 0 if absent
     real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)
     real(wp) :: series(basis%length, self%nodes), steady(self%freedoms)
     integer :: c, i
 
     t = [(turn * i / basis%samples, i=0, basis%samples - 1)] / orbit%rate
-    if (present(turns)) t = t + turns * turn / orbit%rate
     series = padded_series(orbit%series, basis%length)
     series(1, self%free) = 0.0_wp
     steady = matmul(self%rigid, orbit%speed)
@@ -278,7 +193,7 @@ contains
     real(wp), intent(out) :: r(:)   !! [unknowns]
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: harmonics(self%basis%length, self%nodes), series(self%basis%length, self%nodes)
-    integer :: i, k, n, shared
+    integer :: i, n, shared
 
     call self%set_value(orbit, error)
     if (allocated(error)) return
@@ -293,15 +208,7 @@ contains
       harmonics(:, f + 1:) = harmonics(:, f + 1:) + differentiated(series(:, f + 1:))
       harmonics(1, free) = harmonics(1, free) + series(1, free)
     end associate
-    if (self%held > 0) then
-      associate (coordinates => self%machine%formulation%machine%coordinates)
-        do k = coordinates%first(self%held), coordinates%first(self%held + 1) - 1
-          associate (mean => harmonics(1, coordinates%coordinate(k)))
-            mean = mean - coordinates%response(1, k) * orbit%torque / orbit%rate**2
-          end associate
-        end do
-      end associate
-    end if
+    harmonics(1, :self%freedoms) = harmonics(1, :self%freedoms) - self%holding_acceleration(orbit%torque) / orbit%rate**2
     do n = 1, self%nodes
       i = self%first_unknown(n)
       r(i:i + self%basis%length - 1) = harmonics(:, n)
@@ -414,32 +321,5 @@ contains
       end do
     end do
   end subroutine add_inertia
-
-  !> Whether the laws repeat themselves some periods later, at the same motion.
-  subroutine repeats(self, orbit, turns, is_periodic, error)
-    class(orbit_equations_t), intent(inout) :: self
-    type(orbit_t), intent(inout) :: orbit
-    integer, intent(in) :: turns
-    logical, intent(out) :: is_periodic
-    type(error_t), allocatable, intent(out) :: error
-    real(wp), parameter :: noise = 1.0e-7_wp
-    real(wp), allocatable :: first(:, :)
-
-    is_periodic = .false.
-    call self%set_value(orbit, error)
-    if (allocated(error)) return
-    call self%sample(orbit, self%basis, self%t, self%y)
-    call self%machine%rates(self%t, self%y, self%rates, error)
-    if (allocated(error)) return
-    first = self%rates
-    call self%sample(orbit, self%basis, self%t, self%y, turns)
-    call self%machine%rates(self%t, self%y, self%rates, error)
-    if (allocated(error)) return
-    associate (f => self%freedoms)
-      first(:, f + 1:2 * f) = self%rates(:, f + 1:2 * f)
-      is_periodic = all(abs(first - self%rates) <= noise * spread(maxval(abs(first), dim=1) + maxval(abs(first(:, :f))), 1, &
-                                                                  size(first, 1)))
-    end associate
-  end subroutine repeats
 
 end module nocdyn_orbit_equations

@@ -7,9 +7,10 @@ module nocdyn_orbit_multipliers
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_explicit_tables, only: dormand_prince_8, explicit_table_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lapack_eigen, only: eigenvectors
-  use nocdyn_orbit_equations, only: orbit_equations_t, orbit_t
   use nocdyn_harmonic_basis, only: differentiated
+  use nocdyn_lapack_eigen, only: eigenvectors
+  use nocdyn_orbit_equations, only: orbit_equations_t
+  use nocdyn_periodic_machine, only: orbit_t
   implicit none (type, external)
   private
 
@@ -217,7 +218,7 @@ contains
           call equations%machine%rates(t, y, rates, error)
           if (allocated(error)) return
           known(:, m) = rates(1, :)
-          call add_torque(equations, orbit%torque, known(:f, m))
+          known(:f, m) = known(:f, m) + equations%holding_acceleration(orbit%torque)
         else
           known(f + 1:2 * f, m) = equations%rigid(:, m)
         end if
@@ -234,7 +235,9 @@ contains
       rates(1, f + 1:2 * f) = rates(1, f + 1:2 * f) - matmul(equations%rigid, orbit%speed)
     end associate
     known(:, n + 1) = rates(1, :)
-    call add_torque(equations, orbit%torque, known(:equations%freedoms, n + 1))
+    associate (f => equations%freedoms)
+      known(:f, n + 1) = known(:f, n + 1) + equations%holding_acceleration(orbit%torque)
+    end associate
   end subroutine known_vectors
 
   !> Divides speeds by a frequency that makes them as large as angles: else reflections mix numbers of very different sizes.
@@ -249,23 +252,6 @@ contains
     matrix(:, :f) = matrix(:, :f) * scale
     known(:f, :) = known(:f, :) / scale
   end subroutine scale_speeds
-
-  !> Adds the accelerations by the torque that holds a speed.
-  subroutine add_torque(equations, torque, acceleration)
-    type(orbit_equations_t), intent(in) :: equations
-    real(wp), intent(in) :: torque   !! [N m]
-    real(wp), intent(inout) :: acceleration(:)
-    integer :: k
-
-    if (equations%held == 0) return
-    associate (coordinates => equations%machine%formulation%machine%coordinates, b => equations%held)
-      do k = coordinates%first(b), coordinates%first(b + 1) - 1
-        associate (one => acceleration(coordinates%coordinate(k)))
-          one = one + coordinates%response(1, k) * torque
-        end associate
-      end do
-    end associate
-  end subroutine add_torque
 
   !> Takes an eigenvector out of a matrix and out of other vectors, by a reflection that turns it to the first axis.
   subroutine deflate(matrix, known)

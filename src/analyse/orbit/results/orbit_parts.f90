@@ -1,6 +1,6 @@
 !> Parts of the branches of an orbit analysis: between special points the stability does not change, nor does the direction.
 module nocdyn_orbit_parts
-  use nocdyn_orbit_points, only: orbit_point_t
+  use nocdyn_orbit_problem, only: orbit_point_t
   implicit none (type, external)
   private
 

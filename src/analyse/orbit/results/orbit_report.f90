@@ -7,7 +7,8 @@ module nocdyn_orbit_report
   use nocdyn_kinds, only: wp
   use nocdyn_orbit_analysis, only: orbit_analysis_t
   use nocdyn_orbit_parts, only: find_parts, part_t
-  use nocdyn_orbit_points, only: branch_point, doubling, fold, neimark_sacker, orbit_point_t, torque_fold
+  use nocdyn_orbit_points, only: branch_point, doubling, fold, neimark_sacker, torque_fold
+  use nocdyn_orbit_problem, only: orbit_point_t
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: output_units, turn_units
   use nocdyn_signals, only: signal_t

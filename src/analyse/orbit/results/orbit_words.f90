@@ -5,7 +5,8 @@ module nocdyn_orbit_words
   use nocdyn_kinds, only: wp
   use nocdyn_orbit_analysis, only: orbit_analysis_t
   use nocdyn_orbit_parts, only: part_t, unstable_stretches
-  use nocdyn_orbit_points, only: branch_point, doubling, fold, neimark_sacker, orbit_point_t, torque_fold
+  use nocdyn_orbit_points, only: branch_point, doubling, fold, neimark_sacker, torque_fold
+  use nocdyn_orbit_problem, only: orbit_point_t
   use nocdyn_quantities, only: rank_moment
   use nocdyn_table_text, only: cell, padded, text_width
   use nocdyn_text, only: counted, rounded_text, to_text

@@ -1,0 +1,189 @@
+!> A machine that is excited periodically: the period, its free rotations, and the parameter over which its motions are followed.
+!>
+!> A rigid motion r turns with a mean speed Omega, an unknown; its mean angle is zero. Where the speed of a body is given, the
+!> mean torque that holds it is the unknown.
+module nocdyn_periodic_machine
+  use nocdyn_errors, only: error_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_orbit_period, only: follow_period, orbit_period_t
+  use nocdyn_sampled_machine, only: sampled_machine_t
+  implicit none (type, external)
+  private
+
+  public :: body_turning
+
+  !> A periodic motion.
+  type, public :: orbit_t
+    real(wp) :: value = 0.0_wp                  !! of the parameter, in its unit; of a held speed [rad/s]
+    real(wp) :: rate = 0.0_wp                   !! w [rad/s]
+    real(wp), allocatable :: series(:, :)       !! of q [rad] and z, [length, nodes]
+    real(wp), allocatable :: speed(:)           !! Omega of the rigid motions [rad/s]
+    real(wp) :: torque = 0.0_wp                 !! mean torque that holds the speed of a body [N m]
+  end type orbit_t
+
+  type, public :: periodic_machine_t
+    type(sampled_machine_t) :: machine
+    type(orbit_period_t) :: period
+    logical :: rate_is_unknown = .false.             !! whether the machine itself finds w
+    integer :: subharmonic = 1
+    real(wp) :: bounds(2) = 0.0_wp                   !! lowest and highest value of the parameter
+    integer :: held = 0                              !! body whose mean speed is the parameter; 0: none
+    integer :: held_motion = 0                       !! the rigid motion whose speed the held body gives
+    integer, allocatable :: free(:)                  !! coordinate of each rigid motion
+    real(wp), allocatable :: rigid(:, :)             !! r, [coordinates, motions]
+    real(wp), allocatable :: turning(:, :)           !! speeds of the bodies by the rigid motions, [bodies, motions]
+    real(wp), allocatable :: floating_speed(:)       !! speeds of the rigid motions that no torque acts on, else any [rad/s]
+    integer, allocatable :: border(:)                !! rigid motions whose speed, or holding torque, is unknown
+  contains
+    procedure :: set_value, find_rate, take_border, put_border, holding_acceleration, repeats
+  end type periodic_machine_t
+
+contains
+
+  !> Speeds of the bodies by the rigid motions, [bodies, motions].
+  pure function body_turning(machine, rigid) result(turning)
+    type(sampled_machine_t), intent(in) :: machine
+    real(wp), intent(in) :: rigid(:, :)   !! [coordinates, motions]
+    real(wp) :: turning(machine%formulation%machine%bodies, size(rigid, 2))
+    integer :: b, k
+
+    turning = 0.0_wp
+    associate (coordinates => machine%formulation%machine%coordinates)
+      do b = 1, size(turning, 1)
+        do k = coordinates%first(b), coordinates%first(b + 1) - 1
+          turning(b, :) = turning(b, :) + coordinates%ratio(1, k) * rigid(coordinates%coordinate(k), :)
+        end do
+      end do
+    end associate
+  end function body_turning
+
+  !> Gives an orbit its value, its unknown speeds and the holding torque.
+  subroutine take_border(self, unknowns, value, orbit)
+    class(periodic_machine_t), intent(in) :: self
+    real(wp), intent(in) :: unknowns(:)     !! [border]
+    real(wp), intent(in) :: value           !! of the parameter
+    type(orbit_t), intent(inout) :: orbit   !! with speeds
+    integer :: n
+
+    do n = 1, size(self%border)
+      if (self%border(n) == self%held_motion) then
+        orbit%torque = unknowns(n)
+      else
+        orbit%speed(self%border(n)) = unknowns(n)
+      end if
+    end do
+    orbit%value = value
+    if (self%held_motion > 0) then
+      associate (turning => self%turning(self%held, :), m => self%held_motion)
+        orbit%speed(m) = 0.0_wp
+        orbit%speed(m) = (orbit%value - dot_product(turning, orbit%speed)) / turning(m)
+      end associate
+    end if
+    call self%find_rate(orbit)
+  end subroutine take_border
+
+  !> The unknown speeds and the holding torque of an orbit, [border].
+  pure function put_border(self, orbit) result(unknowns)
+    class(periodic_machine_t), intent(in) :: self
+    type(orbit_t), intent(in) :: orbit
+    real(wp) :: unknowns(size(self%border))
+    integer :: n
+
+    do n = 1, size(self%border)
+      unknowns(n) = orbit%speed(self%border(n))
+      if (self%border(n) == self%held_motion) unknowns(n) = orbit%torque
+    end do
+  end function put_border
+
+  !> w of an orbit, if it is prescribed.
+  subroutine find_rate(self, orbit)
+    class(periodic_machine_t), intent(in) :: self
+    type(orbit_t), intent(inout) :: orbit
+
+    if (self%rate_is_unknown) return
+    orbit%rate = self%period%rate / self%subharmonic
+    if (self%period%motion > 0) orbit%rate = orbit%rate * abs(orbit%speed(self%period%motion))
+  end subroutine find_rate
+
+  !> Gives the parameter the value of an orbit, and this its w.
+  subroutine set_value(self, orbit, error)
+    class(periodic_machine_t), intent(inout) :: self
+    type(orbit_t), intent(inout) :: orbit
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: before
+
+    before = self%machine%value
+    call self%machine%set_value(orbit%value, error)
+    if (allocated(error)) return
+    associate (machine => self%machine%formulation%machine)
+      if (abs(self%machine%value - before) > 0) call follow_period(machine, self%turning, self%period, error)
+    end associate
+    if (.not. allocated(error)) call self%find_rate(orbit)
+  end subroutine set_value
+
+  !> Accelerations of the coordinates by a torque on the held body [rad/s2], zeros if none is held.
+  pure function holding_acceleration(self, torque) result(acceleration)
+    class(periodic_machine_t), intent(in) :: self
+    real(wp), intent(in) :: torque   !! [N m]
+    real(wp) :: acceleration(self%machine%freedoms)
+    integer :: k
+
+    acceleration = 0.0_wp
+    if (self%held == 0) return
+    associate (coordinates => self%machine%formulation%machine%coordinates)
+      do k = coordinates%first(self%held), coordinates%first(self%held + 1) - 1
+        associate (one => acceleration(coordinates%coordinate(k)))
+          one = one + coordinates%response(1, k) * torque
+        end associate
+      end do
+    end associate
+  end function holding_acceleration
+
+  !> Whether the laws repeat themselves some periods later, at the same motion.
+  subroutine repeats(self, motion, turns, is_periodic, error)
+    class(periodic_machine_t), intent(inout) :: self
+    type(orbit_t), intent(inout) :: motion   !! of which the mean values and speeds count
+    integer, intent(in) :: turns
+    logical, intent(out) :: is_periodic
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: noise = 1.0e-7_wp
+    real(wp), dimension(self%machine%samples, self%machine%states) :: first, second
+
+    is_periodic = .false.
+    call self%set_value(motion, error)
+    if (.not. allocated(error)) call find_rates(self, motion, 0, first, error)
+    if (.not. allocated(error)) call find_rates(self, motion, turns, second, error)
+    if (allocated(error)) return
+    associate (f => self%machine%freedoms)
+      first(:, f + 1:2 * f) = second(:, f + 1:2 * f)
+      is_periodic = all(abs(first - second) <= noise * spread(maxval(abs(first), dim=1) + maxval(abs(first(:, :f))), 1, &
+                                                              size(first, 1)))
+    end associate
+  end subroutine repeats
+
+  !> The rates of a motion without oscillation at all samples of a period, some periods later.
+  subroutine find_rates(self, motion, turns, rates, error)
+    class(periodic_machine_t), intent(inout) :: self
+    type(orbit_t), intent(in) :: motion
+    integer, intent(in) :: turns
+    real(wp), intent(out) :: rates(:, :)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)
+    real(wp) :: steady(self%machine%freedoms), t(self%machine%samples), y(self%machine%samples, self%machine%states)
+    integer :: c, i
+
+    rates = 0.0_wp
+    t = [(turn * i / size(t), i=0, size(t) - 1)] / motion%rate
+    t = t + turns * turn / motion%rate
+    steady = matmul(self%rigid, motion%speed)
+    associate (f => self%machine%freedoms)
+      y(:, :f) = spread(steady, 1, size(t))
+      y(:, f + 1:) = spread(motion%series(1, :), 1, size(t))
+      do c = 1, f
+        y(:, f + c) = y(:, f + c) + steady(c) * t
+      end do
+    end associate
+    call self%machine%rates(t, y, rates, error)
+  end subroutine find_rates
+
+end module nocdyn_periodic_machine
