@@ -11,14 +11,15 @@ module nocdyn_orbit_analysis
   use nocdyn_orbit_period, only: find_period
   use nocdyn_orbit_points, only: branch_t
   use nocdyn_orbit_problem, only: orbit_problem_t, signal_range_t
-  use nocdyn_orbit_scatter, only: find_isolated, scatter_t
+  use nocdyn_orbit_scatter, only: find_high, find_isolated, scatter_t
   use nocdyn_orbit_settings, only: orbit_settings_t, read_orbit_settings
   use nocdyn_orbit_signals, only: list_orbit_signals
+  use nocdyn_orbit_start_file, only: find_file_guess
   use nocdyn_periodic_machine, only: body_turning, orbit_t, periodic_machine_t
   use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
   use nocdyn_sampled_machine, only: new_sampled_machine
   use nocdyn_signals, only: signal_t
-  use nocdyn_text, only: append, quoted, rounded_text, string_t
+  use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
   implicit none (type, external)
   private
 
@@ -91,8 +92,8 @@ contains
     call move_alloc(harmonic, problem)
   end subroutine choose_problem
 
-  !> Follows the branch from the steady state, or from the motion on which a run settles: if this is asked for, or if Newton's
-  !> method does not find a motion from the steady state.
+  !> Follows the branch from the motion that is asked for: the one near the steady state, the largest one, the one of a file or
+  !> the one on which a run settles; from this too if Newton's method does not find a motion from the steady state.
   subroutine follow_from(input, problem, guess, self, error)
     type(input_t), intent(in) :: input
     class(orbit_problem_t), intent(inout) :: problem
@@ -100,7 +101,19 @@ contains
     type(orbit_analysis_t), intent(inout) :: self
     type(error_t), allocatable, intent(out) :: error
     type(error_t), allocatable :: first
+    type(scatter_t) :: high
 
+    if (self%settings%start_file /= '') then
+      call find_file_guess(input, self%settings, problem%periodic, guess, error)
+      if (.not. allocated(error)) call follow_branch(problem, self%settings, guess, self%branch, error)
+      return
+    end if
+    if (self%settings%starts_high) then
+      call find_high(input, self%settings, problem, guess, high)
+      call append(self%notes, 'the first motion is the largest one of ' // to_text(high%tried) // &
+                  ' runs from scattered states, ' // to_text(high%periodic) // ' of which led to periodic motions, and of ' // &
+                  'the one near the steady state')
+    end if
     if (.not. self%settings%settles) then
       call follow_branch(problem, self%settings, guess, self%branch, first)
       if (.not. allocated(first)) return

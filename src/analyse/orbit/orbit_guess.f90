@@ -18,11 +18,11 @@ module nocdyn_orbit_guess
   implicit none (type, external)
   private
 
-  public :: find_steady_guess, find_settled_guess
+  public :: find_steady_guess, find_series, find_settled_guess
 
   real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)   ! [rad]
   integer, parameter :: harmonics = 15         ! of its last period
-  integer, parameter :: samples = 64
+  integer, parameter, public :: guess_samples = 64   !! of a period from which series are found
 
   !> Keeps the states of all times that are asked for.
   type, extends(observer_t) :: kept_states_t
@@ -101,10 +101,10 @@ contains
     associate (f => periodic%machine%freedoms, m => periodic%period%motion)
       if (m > 0) period = abs((last(f + periodic%free(m), 3) - last(f + periodic%free(m), 2)) / (0.5_wp * begin))
       if (m > 0) period = turn * periodic%subharmonic / (periodic%period%rate * period)
-      call advance(formulation, begin + [(period * i / samples, i=0, samples)], y, last, error)
+      call advance(formulation, begin + [(period * i / guess_samples, i=0, guess_samples)], y, last, error)
       if (allocated(error)) return
-      last(f + 1:2 * f, :) = last(f + 1:2 * f, :) + spread(formulation_angles(machine, periodic), 2, samples + 1)
-      call find_series(periodic, last(f + 1:, :), period, guess)
+      last(f + 1:2 * f, :) = last(f + 1:2 * f, :) + spread(formulation_angles(machine, periodic), 2, guess_samples + 1)
+      call find_series(periodic, last(f + 1:, :), 0.0_wp, period, guess)   ! it begins after whole periods
     end associate
   end subroutine find_settled_guess
 
@@ -154,28 +154,30 @@ contains
   end subroutine on_output
 
   !> The series of a period. Where orders excite, the time is counted from where the mean angle is zero.
-  subroutine find_series(periodic, states, period, guess)
+  subroutine find_series(periodic, states, begin, period, guess)
     type(periodic_machine_t), intent(in) :: periodic
-    real(wp), intent(in) :: states(:, :)        !! coordinates and internal states, [nodes, samples + 1]
+    real(wp), intent(in) :: states(:, :)        !! coordinates and internal states, [nodes, guess_samples + 1]
+    real(wp), intent(in) :: begin               !! time of the first sample [s]
     real(wp), intent(in) :: period              !! [s]
     type(orbit_t), intent(inout) :: guess
     type(harmonic_basis_t) :: basis
-    real(wp) :: beside(samples, size(states, 1)), mean(size(periodic%free)), phase, series(2 * harmonics + 1, size(states, 1))
+    real(wp) :: beside(guess_samples, size(states, 1)), series(2 * harmonics + 1, size(states, 1))
+    real(wp) :: mean(size(periodic%free)), phase
     integer :: i, k
 
-    guess%speed = (states(periodic%free, samples + 1) - states(periodic%free, 1)) / period
-    beside = transpose(states(:, :samples))
+    guess%speed = (states(periodic%free, guess_samples + 1) - states(periodic%free, 1)) / period
+    beside = transpose(states(:, :guess_samples))
     associate (f => periodic%machine%freedoms, steady => matmul(periodic%rigid, guess%speed))
-      do i = 1, samples
-        beside(i, :f) = beside(i, :f) - steady * (period * (i - 1) / samples)
+      do i = 1, guess_samples
+        beside(i, :f) = beside(i, :f) - steady * (period * (i - 1) / guess_samples)
       end do
     end associate
-    basis = new_harmonic_basis(harmonics, samples)
+    basis = new_harmonic_basis(harmonics, guess_samples)
     series = matmul(basis%projection, beside)
     mean = series(1, periodic%free)
     associate (f => periodic%machine%freedoms, m => periodic%period%motion)
       series(1, :f) = series(1, :f) - matmul(periodic%rigid, mean)
-      phase = 0.0_wp
+      phase = turn / period * begin
       if (m > 0) phase = turn / period * mean(m) / guess%speed(m)
       guess%series = series
       do k = 1, harmonics

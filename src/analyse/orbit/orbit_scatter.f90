@@ -5,6 +5,7 @@
 !> few runs settle. If the motion that Newton's method finds is on no known branch, its branch is followed in both directions.
 module nocdyn_orbit_scatter
   use nocdyn_errors, only: error_t
+  use nocdyn_harmonic_basis, only: harmonic_basis_t, new_harmonic_basis
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_orbit_branch, only: follow_branch, start_walk
@@ -17,7 +18,7 @@ module nocdyn_orbit_scatter
   implicit none (type, external)
   private
 
-  public :: find_isolated
+  public :: find_high, find_isolated
 
   !> What the starts have found.
   type, public :: scatter_t
@@ -27,6 +28,8 @@ module nocdyn_orbit_scatter
   end type scatter_t
 
   real(wp), parameter :: spread_of_starts = 4.0_wp   ! as a multiple of the largest motion
+  integer, parameter :: high_starts = 32             ! runs that look for the largest motion at one value
+  real(wp), parameter :: high_scales(4) = [2.0_wp, 4.0_wp, 8.0_wp, 16.0_wp]   ! of their states, as multiples of the low motion
   integer, parameter :: shorter = 8                  ! lengths of runs, each half of the one before
   real(wp), parameter :: near = 0.3_wp               ! distance of motions that may be the same, as a share
   real(wp), parameter :: same = 1.0e-5_wp            ! distance of motions that are the same
@@ -66,6 +69,64 @@ contains
       call follow_both_ways(problem, here, walk%point%orbit, found%branches + 1, branch)
     end do
   end subroutine find_isolated
+
+  !> The motion of the largest half range of a coordinate at the first value, of those on which runs from scattered states settle
+  !> and the one near the steady state, if there is one.
+  subroutine find_high(input, settings, problem, guess, found)
+    type(input_t), intent(in) :: input
+    type(orbit_settings_t), intent(in) :: settings
+    class(orbit_problem_t), intent(inout) :: problem
+    type(orbit_t), intent(inout) :: guess              !! in the steady state; then the largest motion
+    type(scatter_t), intent(out) :: found
+    type(sobol_points_t) :: points
+    type(branch_t) :: known
+    type(walk_t) :: walk
+    type(error_t), allocatable :: error
+    real(wp) :: half_range, largest(problem%periodic%machine%states), push(problem%periodic%machine%states)
+    integer :: i, k
+    logical :: has_begun, is_periodic
+
+    allocate (known%points(0))
+    half_range = 0.0_wp
+    call start_walk(problem, settings, guess, walk, has_begun, error)
+    is_periodic = .not. allocated(error)
+    points = sobol_points(min(max_dimensions, size(push)), 0)
+    do i = 0, high_starts
+      push = 0.0_wp
+      if (i > 0) then
+        do k = 1, min(max_dimensions, size(push))
+          push(k) = high_scales(1 + modulo(i, size(high_scales))) * (2.0_wp * points%coordinate(i, k) - 1.0_wp) * largest(k)
+        end do
+        found%tried = found%tried + 1
+      end if
+      if (i > 0 .or. .not. is_periodic) call settle_from(input, settings, problem, push, walk, is_periodic)
+      if (.not. is_periodic .and. i == 0) return
+      if (.not. is_periodic) cycle
+      if (i > 0) found%periodic = found%periodic + 1
+      if (half_range_of(problem%periodic, walk%point%orbit) > half_range) then
+        half_range = half_range_of(problem%periodic, walk%point%orbit)
+        guess = walk%point%orbit
+      end if
+      if (i > 0) cycle
+      call known%add(walk%point)
+      largest = largest_states(problem%periodic, known)
+    end do
+  end subroutine find_high
+
+  !> The largest half range of a coordinate [rad].
+  real(wp) function half_range_of(periodic, orbit) result(half_range)
+    type(periodic_machine_t), intent(in) :: periodic
+    type(orbit_t), intent(in) :: orbit
+    type(harmonic_basis_t) :: basis
+    real(wp), allocatable :: values(:, :)
+    integer :: c
+
+    associate (harmonics => size(orbit%series, 1) / 2, f => periodic%machine%freedoms)
+      basis = new_harmonic_basis(harmonics, 8 * (harmonics + 1))
+      values = matmul(basis%values(:, 2:), orbit%series(2:, :f))
+      half_range = 0.5_wp * maxval([(maxval(values(:, c)) - minval(values(:, c)), c=1, f)])
+    end associate
+  end function half_range_of
 
   !> The largest oscillation of each state on known motions, [states].
   pure function largest_states(periodic, branch) result(largest)

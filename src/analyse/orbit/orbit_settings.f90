@@ -5,7 +5,7 @@ module nocdyn_orbit_settings
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_targets, only: find_target, target_t
-  use nocdyn_text, only: quoted
+  use nocdyn_text, only: lower_case, quoted
   use nocdyn_written_values, only: unit_of
   implicit none (type, external)
   private
@@ -33,6 +33,8 @@ module nocdyn_orbit_settings
     integer :: count = 0                       !! points at even distances, beside others
     integer :: most_points = 0
     logical :: settles = .false.               !! whether a run settles on the first motion
+    logical :: starts_high = .false.           !! whether it is the largest one on which runs settle
+    character(len=:), allocatable :: start_file   !! table of a motion near it, else ''
     logical :: has_stability = .true.          !! whether multipliers are computed
     logical :: asks_stability = .false.        !! whether the input says so
     real(wp) :: tolerance = 0.0_wp             !! error of a point as a share of its motion
@@ -68,9 +70,9 @@ contains
         settings%speed_unit = unit_of(group, 'speed')
       end if
       if (allocated(error)) return
-      settings%settles = group%text('start') == 'settled_run'
-      if ((settings%settles .or. group%has_value('starts')) .and. settings%body > 0) then
-        call raise(error, exit_input, input%location(groups(1), trim(merge('start ', 'starts', settings%settles))) // &
+      call read_start(group%text('start'), settings)
+      if ((settings%settles .or. settings%starts_high .or. group%has_value('starts')) .and. settings%body > 0) then
+        call raise(error, exit_input, input%location(groups(1), trim(merge('starts', 'start ', group%has_value('starts')))) // &
                    ': a run does not hold the mean speed of a body; allowed: over in place of body')
         return
       end if
@@ -94,6 +96,23 @@ contains
       if (settings%asks_stability) settings%has_stability = group%flag('stability')
     end associate
   end subroutine read_orbit_settings
+
+  !> Where the branch begins: a word, in any case, or the name of a file.
+  subroutine read_start(text, settings)
+    character(len=*), intent(in) :: text
+    type(orbit_settings_t), intent(inout) :: settings
+
+    settings%start_file = ''
+    select case (lower_case(text))
+    case ('low')
+    case ('high')
+      settings%starts_high = .true.
+    case ('settled_run')
+      settings%settles = .true.
+    case default
+      settings%start_file = text
+    end select
+  end subroutine read_start
 
   !> Finds the number over which the branch goes.
   subroutine find_number(input, path, settings, error)

@@ -14,7 +14,6 @@ module nocdyn_schema_response
   type(allowed_t), parameter :: formats = allowed_t(words='csv netcdf')
   type(allowed_t), parameter :: factors = allowed_t(low=0.1_wp, high=1.5_wp)
   type(allowed_t), parameter :: margins = allowed_t(low=0.0_wp, high=0.9_wp)
-  type(allowed_t), parameter :: orbit_starts = allowed_t(words='low settled_run')
   type(allowed_t), parameter :: subharmonics = allowed_t(low=1.0_wp, high=12.0_wp)
   type(allowed_t), parameter :: harmonic_counts = allowed_t(low=1.0_wp, high=400.0_wp)
   type(allowed_t), parameter :: shares = allowed_t(low=1.0e-12_wp, high=0.01_wp)
@@ -154,8 +153,8 @@ module nocdyn_schema_response
     key_rule_t('orbit', 'body', a_body, 1, '', unset, anything, &
       'in place of a number: the body whose mean speed a mean torque on it holds'), &
     key_rule_t('orbit', 'speed', a_number, 2, 'rad/s', unset, not_zero, 'its first and its last mean speed'), &
-    key_rule_t('orbit', 'start', a_word, 1, '', "'low'", orbit_starts, &
-      'the first motion: near the steady state, or the one on which a run from there settles'), &
+    key_rule_t('orbit', 'start', a_text, 1, '', "'low'", anything, &
+      "the first motion: 'low' (near the steady state), 'high', 'settled_run', or a table such as trajectory.csv"), &
     key_rule_t('orbit', 'starts', an_integer, 1, '', unset, from_1, &
       'number of runs from scattered states that look for isolated branches'), &
     key_rule_t('orbit', 'subharmonic', an_integer, 1, '', '1', subharmonics, &
