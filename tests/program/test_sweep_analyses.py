@@ -294,7 +294,7 @@ def test_trajectories_of_tied_variants_are_those_of_the_variants(nocdyn):
         (
             "&record path = 'mode.frequency_Hz' /",
             "path = 'mode.frequency_Hz' does not begin with the name of an analysis; allowed: 'equilibrium.', 'modes.', "
-            "'campbell.' or 'response.' and what its report has",
+            "'campbell.', 'response.' or 'orbit.' and what its report has",
         ),
         (
             "&record path = 'modes.modes[2].frequency_hz' /",

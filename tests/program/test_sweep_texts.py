@@ -19,7 +19,7 @@ EMBEDDED = {"nocdyn_live_machine", "nocdyn_c_interface"}  # likewise, of machine
 # Modules that threads could reach, by `use`, and that have such lengths: in procedures that threads do not call at the same time.
 BEFORE_THREADS = {
     *("sweep_plan", "sweep_design", "input_text", "target_consistency", "table_file", "text_file", "posix", "posix_files"),
-    *("recorded_analyses", "target_patterns", "column_names", "output_units", "json", "name_checks"),
+    *("recorded_analyses", "recorded_orbits", "target_patterns", "column_names", "output_units", "json", "name_checks"),
     "namelist_values",
 }
 VALUES_OF_A_VARIANT = {
@@ -36,7 +36,8 @@ REPORTS = {  # of recorded paths, in the critical section
     *(f"{command}_{part}" for command in ("campbell", "response", "modes") for part in ("files", "report", "results")),
     *("equilibrium_report", "equilibrium_results", "response_verdict", "verdicts"),
 }
-ALLOWED = REPORTS | BEFORE_THREADS | VALUES_OF_A_VARIANT | NAMES_IN_FAILURES | PROGRAMS | ANALYSES | {"serial_work"}
+ORBITS = {path.stem for path in (SOURCE / "src/analyse/orbit").rglob("*.f90")}  # in the critical section, with their runs
+ALLOWED = REPORTS | ORBITS | BEFORE_THREADS | VALUES_OF_A_VARIANT | NAMES_IN_FAILURES | PROGRAMS | ANALYSES | {"serial_work"}
 
 LENGTHS = re.compile(r"^(\S+):\S+ [bBdD] slen\.[0-9.]+$", re.MULTILINE)
 

@@ -136,7 +136,7 @@ contains
     type(signal_t), allocatable :: signals(:)
     integer, allocatable :: chosen(:)
 
-    call list_orbit_signals(periodic, signals)
+    call list_orbit_signals(periodic%machine%formulation%machine, signals)
     call choose_signals(input, 'orbit', signals, chosen, self%notes, error)
     if (.not. allocated(error)) self%signals = signals(chosen)
   end subroutine choose_orbit_signals

@@ -3,6 +3,7 @@ module nocdyn_orbit_signals
   use nocdyn_errors, only: error_t
   use nocdyn_harmonic_basis, only: differentiated, harmonic_basis_t, new_harmonic_basis
   use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
   use nocdyn_orbit_equations, only: orbit_equations_t
   use nocdyn_orbit_problem, only: signal_range_t
   use nocdyn_periodic_machine, only: orbit_t, periodic_machine_t
@@ -19,13 +20,13 @@ module nocdyn_orbit_signals
 contains
 
   !> The signals that repeat themselves with the motion: all but the time, energies and works.
-  subroutine list_orbit_signals(periodic, signals)
-    type(periodic_machine_t), intent(in) :: periodic
+  subroutine list_orbit_signals(machine, signals)
+    type(machine_t), intent(in) :: machine
     type(signal_t), allocatable, intent(out) :: signals(:)
     type(signal_t), allocatable :: all(:)
     integer :: i
 
-    call list_signals(periodic%machine%formulation%machine, all)
+    call list_signals(machine, all)
     signals = all(pack([(i, i=1, size(all))], all%source%kind /= signal_time .and. all%source%kind < signal_kinetic))
   end subroutine list_orbit_signals
 

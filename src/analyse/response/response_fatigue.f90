@@ -3,7 +3,6 @@
 !> At each speed the cycles of the synthesis of all lines with the mean are counted. Lines with whole ratios repeat after a
 !> period, which has whole cycles only. Others are counted over many periods of the slowest one.
 module nocdyn_response_fatigue
-  use nocdyn_column_names, only: with_unit
   use nocdyn_critical_speeds, only: keep_new
   use nocdyn_damage_counters, only: damage_counter_t
   use nocdyn_errors, only: error_t
@@ -82,7 +81,7 @@ contains
       end do
       if (size(fatigue(i)%quantities) == 0) error stop 'nocdyn_response_fatigue: a checked group has a quantity'
       associate (first => response%quantities(fatigue(i)%quantities(1)))
-        fatigue(i)%quantity = with_unit(first%name, first%unit)
+        fatigue(i)%quantity = first%name // ' [' // first%unit // ']'   ! threads come here: no function
       end associate
       speeds = [speeds, fatigue(i)%speeds]
     end do

@@ -43,6 +43,7 @@ module nocdyn_analyses
     procedure :: put_grid
     procedure :: put_report
     procedure :: judge
+    procedure :: find_recorded
     procedure(text_interface), deferred :: text
   end type analysis_t
 
@@ -130,5 +131,17 @@ contains
 
     error stop 'nocdyn_analyses: an analysis with a report overrides put_report'
   end subroutine put_report
+
+  !> A number of a solved analysis that sweeps record by a word of their own, in SI units or in the one of the parameter.
+  subroutine find_recorded(self, quantity, statistic, number, value, obstacle)
+    class(analysis_t), intent(in) :: self
+    character(len=*), intent(in) :: quantity    !! what it belongs to
+    character(len=*), intent(in) :: statistic   !! the word
+    integer, intent(in) :: number               !! which one of several
+    real(wp), intent(out) :: value
+    character(len=:), allocatable, intent(out) :: obstacle   !! why there is none, else ''
+
+    error stop 'nocdyn_analyses: an analysis with such numbers overrides find_recorded'
+  end subroutine find_recorded
 
 end module nocdyn_analyses

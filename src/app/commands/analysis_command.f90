@@ -25,7 +25,6 @@ module nocdyn_analysis_command
   use nocdyn_sweep_plan, only: add_plan_diagnostics, has_sweep, make_plan, sweep_plan_t
   use nocdyn_text, only: append, counted, listed, shown_path, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
-  use nocdyn_orbit_results, only: orbit_results_t
   use nocdyn_transit_results, only: transit_results_t
   use nocdyn_verdicts, only: verdict_t
   implicit none (type, external)
@@ -71,8 +70,6 @@ contains
       call analyse_files(arguments, check_results_t(is_steady=.false., locks_joints=.false., takes_joints=.true.), code)
     case ('matrices')
       call analyse_files(arguments, matrices_results_t(is_steady=.false., locks_joints=.false., has_report=.false.), code)
-    case ('orbit')
-      call analyse_files(arguments, orbit_results_t(is_steady=.false., locks_joints=.false., always_writes=.true.), code)
     case ('transit')
       call analyse_files(arguments, transit_results_t(is_steady=.false., locks_joints=.false., takes_joints=.true., &
                                                       always_writes=.true.), code)

@@ -41,11 +41,18 @@ module nocdyn_schema_sweep
     kind_rule_t('record', 'damping_ratio', 'of mode'), &
     kind_rule_t('record', 'crossing',      'of mode: speed at which order meets it, in the speeds of &response'), &
     kind_rule_t('record', 'crossing_margin', 'of mode: distance of that speed to operation, as a share'), &
-    kind_rule_t('record', 'peak',          'of response: largest amplitude of the order, or half range of all orders'), &
+    kind_rule_t('record', 'peak', &
+      'of response: largest amplitude of the order, or half range of all orders; of orbit: largest half range'), &
     kind_rule_t('record', 'peak_speed',    'of response: where the peak is'), &
     kind_rule_t('record', 'peak_frequency', 'of response over the frequency of a shaker: where the peak is'), &
     kind_rule_t('record', 'margin',        'of response: distance of the peak to the speeds in operation, as a share'), &
-    kind_rule_t('record', 'ratio',         'of response: largest ratio to the limits of &limit over the speed')]
+    kind_rule_t('record', 'ratio',         'of response: largest ratio to the limits of &limit over the speed'), &
+    kind_rule_t('record', 'peak_value',    'of a signal of orbit: where its peak is'), &
+    kind_rule_t('record', 'fold',          'of orbit = ''branch'': value of a fold, as orbit.json lists them'), &
+    kind_rule_t('record', 'jump_up',       'of orbit = ''branch'': value of a fold at which a rising value jumps'), &
+    kind_rule_t('record', 'jump_down',     'of orbit = ''branch'': at which a falling value jumps'), &
+    kind_rule_t('record', 'folds',         'of orbit = ''branch'': their number'), &
+    kind_rule_t('record', 'unstable_ranges', 'of orbit = ''branch'': number of ranges of unstable motions')]
 
   type(key_rule_t), parameter, public :: sweep_keys(*) = [ &
     key_rule_t('sweep', 'design', a_selector, 1, '', required, anything, 'how the variants are chosen'), &
@@ -79,6 +86,10 @@ module nocdyn_schema_sweep
       'coupling, shaft or mesh, or a column of response.csv, in the forced response by &response'), &
     key_rule_t('record', 'order', a_number, 1, '', unset, positive, &
       'order of the response, all together if not given; or that meets a mode'), &
+    key_rule_t('record', 'orbit', a_text, 1, '', unset, anything, &
+      'signal of orbit.csv, in the periodic motions by &orbit; or ''branch'': their folds and jumps'), &
+    key_rule_t('record', 'number', an_integer, 1, '', unset, from_1, &
+      'which one of several folds or jumps, in the order of orbit.csv; 1 if not given'), &
     key_rule_t('record', 'path', a_text, any_number, '', unset, anything, &
                "numbers of reports: a command and what its report has, such as 'modes.modes[2].frequency_Hz'"), &
     key_rule_t('record', 'from', a_number, 1, 's', unset, anything, &
@@ -91,12 +102,14 @@ module nocdyn_schema_sweep
       'tolerance band of the settling time; 0.02 if not given', 'settling_time')]
 
   type(relation_rule_t), parameter, public :: sweep_relations(*) = [ &
-    relation_rule_t('record', at_most_one, 'quantity', 'fatigue mode response path'), &
-    relation_rule_t('record', at_most_one, 'fatigue', 'mode response path'), &
-    relation_rule_t('record', at_most_one, 'mode', 'response path'), &
-    relation_rule_t('record', at_most_one, 'response', 'path'), &
-    relation_rule_t('record', requires, 'quantity fatigue mode response', 'statistic'), &
-    relation_rule_t('record', requires, 'statistic', 'quantity fatigue mode response'), &
+    relation_rule_t('record', at_most_one, 'quantity', 'fatigue mode response orbit path'), &
+    relation_rule_t('record', at_most_one, 'fatigue', 'mode response orbit path'), &
+    relation_rule_t('record', at_most_one, 'mode', 'response orbit path'), &
+    relation_rule_t('record', at_most_one, 'response', 'orbit path'), &
+    relation_rule_t('record', at_most_one, 'orbit', 'path'), &
+    relation_rule_t('record', requires, 'quantity fatigue mode response orbit', 'statistic'), &
+    relation_rule_t('record', requires, 'statistic', 'quantity fatigue mode response orbit'), &
+    relation_rule_t('record', requires, 'number', 'orbit'), &
     relation_rule_t('record', requires, 'from', 'quantity'), &
     relation_rule_t('record', requires, 'order', 'response mode'), &
     relation_rule_t('vary', less_than, 'low', 'high', 'count')]
@@ -124,6 +137,7 @@ module nocdyn_schema_sweep
     example_t('record', "fatigue = 'life' statistic = 'damage', 'cycles'", .false.), &
     example_t('record', "mode = 2 statistic = 'frequency', 'damping_ratio'", .false.), &
     example_t('record', "response = 'coupling' order = 6 statistic = 'peak', 'peak_speed'", .false.), &
+    example_t('record', "orbit = 'branch' statistic = 'jump_up', 'jump_down'", .false.), &
     example_t('record', "path = 'campbell.crossings[1].speed_rad_s'", .false.), &
     example_t('record', 'trajectories = 1, 17, 90', .false.)]
 

@@ -1,10 +1,11 @@
 !> Parts of the branches of an orbit analysis: between special points the stability does not change, nor does the direction.
 module nocdyn_orbit_parts
+  use nocdyn_kinds, only: wp
   use nocdyn_orbit_problem, only: orbit_point_t
   implicit none (type, external)
   private
 
-  public :: find_parts, unstable_stretches
+  public :: find_parts, jump_direction, unstable_stretches
 
   !> A part of a branch without a change of its stability, nor of its direction.
   type, public :: part_t
@@ -55,5 +56,18 @@ contains
       if (.not. goes_on) stretches = [stretches, parts(i)]
     end do
   end subroutine unstable_stretches
+
+  !> Where a slow change of the parameter leaves the motions at a fold: 1 a rising value does, -1 a falling one, 0 neither, as the
+  !> motions on both sides of the fold are unstable.
+  pure integer function jump_direction(points, number) result(direction)
+    type(orbit_point_t), intent(in) :: points(:)   !! of branches
+    integer, intent(in) :: number                  !! of the fold, between two other points of its branch
+
+    direction = 0
+    associate (before => points(number - 1), after => points(number + 1))
+      if (before%is_stable()) direction = nint(sign(1.0_wp, before%direction))
+      if (after%is_stable()) direction = -nint(sign(1.0_wp, after%direction))
+    end associate
+  end function jump_direction
 
 end module nocdyn_orbit_parts

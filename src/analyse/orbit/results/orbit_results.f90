@@ -4,8 +4,10 @@ module nocdyn_orbit_results
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
+  use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_orbit_analysis, only: analyse_orbits, orbit_analysis_t
+  use nocdyn_orbit_records, only: find_orbit_number
   use nocdyn_orbit_report, only: put_orbit, put_orbit_csv
   use nocdyn_orbit_words, only: orbit_text
   use nocdyn_output_file, only: output_file_t
@@ -16,7 +18,7 @@ module nocdyn_orbit_results
   type, extends(analysis_t), public :: orbit_results_t
     type(orbit_analysis_t), private :: analysis
   contains
-    procedure :: solve, list_tables, put_table, put_report, text => printed
+    procedure :: solve, list_tables, put_table, put_report, find_recorded, text => printed
   end type orbit_results_t
 
 contains
@@ -54,6 +56,16 @@ contains
 
     call put_orbit(json, input, self%analysis)
   end subroutine put_report
+
+  subroutine find_recorded(self, quantity, statistic, number, value, obstacle)
+    class(orbit_results_t), intent(in) :: self
+    character(len=*), intent(in) :: quantity, statistic
+    integer, intent(in) :: number
+    real(wp), intent(out) :: value
+    character(len=:), allocatable, intent(out) :: obstacle
+
+    call find_orbit_number(self%analysis, quantity, statistic, number, value, obstacle)
+  end subroutine find_recorded
 
   subroutine printed(self, input, text)
     class(orbit_results_t), intent(in) :: self

@@ -4,7 +4,7 @@ module nocdyn_orbit_words
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_orbit_analysis, only: orbit_analysis_t
-  use nocdyn_orbit_parts, only: part_t, unstable_stretches
+  use nocdyn_orbit_parts, only: jump_direction, part_t, unstable_stretches
   use nocdyn_orbit_points, only: branch_point, doubling, fold, neimark_sacker, torque_fold
   use nocdyn_orbit_problem, only: orbit_point_t
   use nocdyn_quantities, only: rank_moment
@@ -102,10 +102,8 @@ contains
       case (fold)
         words = 'fold'
         if (analysis%settings%has_stability) words = 'fold; the motions on both sides of it are unstable'
-        if (points(i - 1)%is_stable() .and. points(i - 1)%direction > 0) words = 'fold; a rising value jumps there'
-        if (points(i - 1)%is_stable() .and. points(i - 1)%direction < 0) words = 'fold; a falling value jumps there'
-        if (points(i + 1)%is_stable() .and. points(i + 1)%direction > 0) words = 'fold; a falling value jumps there'
-        if (points(i + 1)%is_stable() .and. points(i + 1)%direction < 0) words = 'fold; a rising value jumps there'
+        if (jump_direction(points, i) > 0) words = 'fold; a rising value jumps there'
+        if (jump_direction(points, i) < 0) words = 'fold; a falling value jumps there'
         if (analysis%body_name /= '') words = 'fold; the mean speed turns back there'
       case (torque_fold)
         words = 'the holding torque turns back there'

@@ -7,7 +7,8 @@
 module nocdyn_serial_work
   use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_code_text, only: code_text_t
-  use nocdyn_errors, only: error_t
+  use nocdyn_analysis_results, only: analysis_result_t, of_path
+  use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
   use nocdyn_integration_settings, only: integration_settings_t
@@ -18,10 +19,11 @@ module nocdyn_serial_work
   use nocdyn_reduced, only: reduced_t
   use nocdyn_solver_status, only: failure_message, solver_status_t
   use nocdyn_targets, only: set_targets, target_t
+  use nocdyn_units, only: from_si
   implicit none (type, external)
   private
 
-  public :: analyse_for_report, check_values, explain_failure, write_code
+  public :: check_values, explain_failure, find_reported, write_code
 
 contains
 
@@ -63,16 +65,16 @@ contains
     !$omp end critical (texts)
   end subroutine write_code
 
-  !> The report of an analysis of the machine of an input, with its numbers.
-  subroutine analyse_for_report(word, input, report, error)
-    character(len=*), intent(in) :: word   !! of `analysis_words`
+  !> The numbers that results ask for of one analysis of the machine of an input.
+  subroutine find_reported(word, input, wanted, values, error)
+    character(len=*), intent(in) :: word                    !! of `analysis_words`
     type(input_t), intent(in) :: input
-    type(json_t), intent(out) :: report
+    type(analysis_result_t), intent(in) :: wanted(:)        !! those of other analyses are left out
+    real(wp), intent(inout) :: values(:)                    !! [results]
     type(error_t), allocatable, intent(out) :: error
     class(analysis_t), allocatable :: analysis
     type(machine_t) :: machine
 
-    report%keeps_numbers = .true.
     call new_analysis(word, analysis)
     call assemble_analysed(word, analysis, input, machine, error)
     if (.not. allocated(error) .and. analysis%is_for_threads) then
@@ -84,9 +86,41 @@ contains
     end if
     if (.not. allocated(error)) then
       call analysis%judge(input)
-      call analysis%put_report(input, report)
+      call take_numbers(word, input, analysis, wanted, values, error)
     end if
     !$omp end critical (texts)
-  end subroutine analyse_for_report
+  end subroutine find_reported
+
+  !> The numbers of a solved analysis: of its report by their paths, and others by words.
+  subroutine take_numbers(word, input, analysis, wanted, values, error)
+    character(len=*), intent(in) :: word
+    type(input_t), intent(in) :: input
+    class(analysis_t), intent(in) :: analysis
+    type(analysis_result_t), intent(in) :: wanted(:)
+    real(wp), intent(inout) :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: obstacle
+    type(json_t) :: report
+    integer :: found, i
+
+    report%keeps_numbers = .true.
+    if (any(wanted%mode == of_path)) call analysis%put_report(input, report)
+    do i = 1, size(wanted)
+      if (.not. wanted(i)%is_reported()) cycle
+      if (wanted(i)%command /= word) cycle
+      if (wanted(i)%mode == of_path) then
+        found = report%find(wanted(i)%path)
+        if (found > 0) values(i) = report%numbers(found)
+        obstacle = ''
+        if (found == 0) obstacle = word // '.json of this variant has no number ' // wanted(i)%path
+      else
+        call analysis%find_recorded(wanted(i)%quantity, wanted(i)%word, wanted(i)%number, values(i), obstacle)
+        values(i) = from_si(values(i), wanted(i)%in_unit)
+      end if
+      if (obstacle == '') cycle
+      call raise(error, exit_failed, obstacle)
+      return
+    end do
+  end subroutine take_numbers
 
 end module nocdyn_serial_work

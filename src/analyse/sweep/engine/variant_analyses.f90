@@ -1,15 +1,14 @@
-!> Modes and forced responses of the variants of a sweep.
+!> Modes, forced responses and other analyses of the variants of a sweep.
 module nocdyn_variant_analyses
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
-  use nocdyn_analysis_results, only: analysis_result_t, of_path
-  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_analysis_results, only: analysis_result_t
+  use nocdyn_errors, only: error_t, exit_failed
   use nocdyn_finite, only: is_finite
   use nocdyn_input, only: input_t
-  use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_named_analyses, only: analysis_words
   use nocdyn_scheduler, only: scheduler_t
-  use nocdyn_serial_work, only: analyse_for_report
+  use nocdyn_serial_work, only: find_reported
   use nocdyn_sweep_chunk, only: chunk_t, status_done, status_failed, status_refused
   use nocdyn_sweep_plan, only: sweep_plan_t
   use nocdyn_variant_analysis, only: analyse_variant
@@ -74,34 +73,22 @@ contains
     chunk%results(:, index) = ieee_value(0.0_wp, ieee_quiet_nan)
   end subroutine analyse_one
 
-  !> The numbers of reports that are recorded by their paths.
+  !> The numbers that are taken from the reports of analyses.
   subroutine find_numbers(input, wanted, values, error)
     type(input_t), intent(in) :: input
     type(analysis_result_t), intent(in) :: wanted(:)
     real(wp), intent(inout) :: values(:)   !! [results]
     type(error_t), allocatable, intent(out) :: error
-    type(json_t) :: report
-    integer :: found, i, k
-    logical :: is_known
+    integer :: i, k
 
     do k = 1, size(analysis_words)
-      is_known = .false.
       do i = 1, size(wanted)
-        if (wanted(i)%mode /= of_path) cycle
-        if (wanted(i)%command /= analysis_words(k)) cycle
-        if (.not. is_known) then
-          call analyse_for_report(trim(analysis_words(k)), input, report, error)
-          if (allocated(error)) return
-          is_known = .true.
-        end if
-        found = report%find(wanted(i)%path)
-        if (found > 0) then
-          values(i) = report%numbers(found)
-        else
-          call raise(error, exit_failed, wanted(i)%command // '.json of this variant has no number ' // wanted(i)%path)
-          return
-        end if
+        if (.not. wanted(i)%is_reported()) cycle
+        if (wanted(i)%command == analysis_words(k)) exit
       end do
+      if (i > size(wanted)) cycle
+      call find_reported(trim(analysis_words(k)), input, wanted, values, error)
+      if (allocated(error)) return
     end do
   end subroutine find_numbers
 

@@ -1,4 +1,4 @@
-!> Results of a variant that need no motion: of its modes and of its forced response.
+!> Results of a variant that need no motion from its start: of its modes, its forced response, its reports.
 module nocdyn_analysis_results
   use nocdyn_kinds, only: wp
   use nocdyn_signals, only: signal_t
@@ -6,7 +6,7 @@ module nocdyn_analysis_results
   implicit none (type, external)
   private
 
-  public :: new_mode_result, new_path_result, new_response_result
+  public :: new_mode_result, new_orbit_result, new_path_result, new_response_result
 
   integer, parameter, public :: analysis_frequency = 1       !! of the damped oscillation, as nocdyn modes has it
   integer, parameter, public :: analysis_damping_ratio = 2
@@ -25,15 +25,22 @@ module nocdyn_analysis_results
   character(len=*), parameter, public :: analysis_owners(9) = [character(len=8) :: 'mode', 'mode', 'response', 'response', &
     'response', 'response', 'mode', 'mode', 'response']   !! the key of &record that each belongs to
 
-  integer, parameter, public :: of_path = -1
+  integer, parameter, public :: of_path = -1, of_orbit = -2   !! in place of a mode: results that a report has
+
+  character(len=*), parameter, public :: of_branch = 'branch'   !! what special points belong to, in place of a signal
+  character(len=*), parameter, public :: signal_words(2) = [character(len=10) :: 'peak', 'peak_value']
+  character(len=*), parameter, public :: branch_words(5) = [character(len=15) :: 'fold', 'jump_up', 'jump_down', 'folds', &
+    'unstable_ranges']
 
   !> One result.
   type, public :: analysis_result_t
     integer :: result = 0                           !! its number among the results of a variant
     integer :: statistic = analysis_frequency       !! analysis_...
-    integer :: mode = 0                             !! number of an oscillating mode; 0: of the response; or `of_path`
+    integer :: mode = 0                             !! number of an oscillating mode; 0: of the response; or `of_path`, `of_orbit`
     logical :: is_crossing = .false.                !! whether an order meets the mode
     character(len=:), allocatable :: command, path  !! of a number of a report: the command and the path in its report
+    character(len=:), allocatable :: word           !! of an orbit: of `signal_words` or `branch_words`
+    integer :: number = 1                           !! which one of several folds or jumps
     type(signal_t) :: signal                        !! of the response
     character(len=:), allocatable :: quantity       !! element, or column of response.csv without its unit
     real(wp) :: order = 0.0_wp                      !! 0 stands for all orders together
@@ -41,9 +48,18 @@ module nocdyn_analysis_results
     character(len=:), allocatable :: unit           !! e.g. 'N m'
     integer :: in_unit = 0                          !! this unit as index of `units`, 0: SI
     character(len=:), allocatable :: long_name      !! a description
+  contains
+    procedure :: is_reported
   end type analysis_result_t
 
 contains
+
+  !> Whether the report of an analysis has the number.
+  elemental logical function is_reported(self)
+    class(analysis_result_t), intent(in) :: self
+
+    is_reported = self%mode < 0
+  end function is_reported
 
   !> Of an oscillating mode.
   subroutine new_mode_result(mode, order, statistic, self)
@@ -90,6 +106,43 @@ contains
     self%unit = ''
     self%long_name = self%path // ' in ' // self%command // '.json'
   end subroutine new_path_result
+
+  !> Of periodic motions.
+  subroutine new_orbit_result(quantity, word, number, unit, self)
+    character(len=*), intent(in) :: quantity   !! signal, or `of_branch`
+    character(len=*), intent(in) :: word       !! of `signal_words` or `branch_words`
+    integer, intent(in) :: number              !! which one of several folds or jumps
+    character(len=*), intent(in) :: unit       !! of the signal if it is a peak, else of what changes along the branch
+    type(analysis_result_t), intent(out) :: self
+
+    self%mode = of_orbit
+    self%statistic = 0
+    self%command = 'orbit'
+    self%path = ''
+    self%quantity = quantity
+    self%word = word
+    self%number = number
+    self%unit = unit
+    self%label = quantity // '_orbit_' // word
+    if (quantity == of_branch) self%label = 'orbit_' // word
+    select case (word)
+    case ('peak')
+      self%long_name = quantity // ': largest half range of the periodic motions'
+    case ('peak_value')
+      self%long_name = quantity // ': where the half range of the periodic motions is largest'
+    case ('folds')
+      self%unit = ''
+      self%long_name = 'number of folds of the periodic motions'
+    case ('unstable_ranges')
+      self%unit = ''
+      self%long_name = 'number of ranges of unstable periodic motions'
+    case default   ! fold, jump_up, jump_down
+      self%label = self%label // '_' // to_text(number)
+      self%long_name = 'where the periodic motions have fold ' // to_text(number)
+      if (word == 'jump_up') self%long_name = 'where a rising value jumps, number ' // to_text(number)
+      if (word == 'jump_down') self%long_name = 'where a falling value jumps, number ' // to_text(number)
+    end select
+  end subroutine new_orbit_result
 
   !> Of a quantity of the forced response.
   subroutine new_response_result(quantity, column, unit, order, statistic, self)

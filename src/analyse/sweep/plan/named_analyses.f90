@@ -1,4 +1,4 @@
-!> The analyses of steady machines by the names of their commands, which sweeps can record: each of the machine that it looks at.
+!> The analyses by the names of their commands that sweeps can record: each of the machine that it looks at.
 module nocdyn_named_analyses
   use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_assembly, only: assemble_machine, assemble_steady_machine
@@ -9,13 +9,15 @@ module nocdyn_named_analyses
   use nocdyn_joint_simplifications, only: refuse_joints
   use nocdyn_machine, only: machine_t
   use nocdyn_modes_results, only: modes_results_t
+  use nocdyn_orbit_results, only: orbit_results_t
   use nocdyn_response_results, only: response_results_t
   implicit none (type, external)
   private
 
   public :: assemble_analysed, new_analysis, solve_named
 
-  character(len=*), parameter, public :: analysis_words(4) = [character(len=11) :: 'equilibrium', 'modes', 'campbell', 'response']
+  character(len=*), parameter, public :: analysis_words(5) = [character(len=11) :: 'equilibrium', 'modes', 'campbell', 'response', &
+    'orbit']
 
 contains
 
@@ -33,6 +35,8 @@ contains
       allocate (analysis, source=campbell_results_t(sets_speed=.true., always_writes=.true., is_for_threads=.true.))
     case ('response')
       allocate (analysis, source=response_results_t(sets_speed=.true., always_writes=.true., is_for_threads=.true.))
+    case ('orbit')
+      allocate (analysis, source=orbit_results_t(is_steady=.false., locks_joints=.false., always_writes=.true.))
     case default
       error stop 'nocdyn_named_analyses: there is no analysis of this name'
     end select

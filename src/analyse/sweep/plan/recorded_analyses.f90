@@ -15,6 +15,7 @@ module nocdyn_recorded_analyses
   use nocdyn_modes, only: mode_t
   use nocdyn_named_analyses, only: analysis_words, solve_named
   use nocdyn_output_units, only: output_units
+  use nocdyn_recorded_orbits, only: new_orbit_reader, orbit_reader_t
   use nocdyn_response_analysis, only: list_orders
   use nocdyn_response_limits, only: read_limits, response_limit_t
   use nocdyn_moment_forms, only: list_moment_forms, kind_moment, moment_form_t
@@ -36,10 +37,11 @@ module nocdyn_recorded_analyses
     type(response_limit_t), allocatable :: limits(:)
     type(forced_response_t), allocatable :: response   !! with its lines, if the base machine has steady states
     integer :: oscillations = huge(1)                   !! number of its modes; unknown if it has no steady state
+    type(orbit_reader_t) :: orbit
     type(json_t) :: reports(size(analysis_words))       !! with their numbers, as far as paths ask for them
   contains
     procedure :: add_results
-    procedure, private :: add_paths, check_mode, check_response, check_statistic
+    procedure, private :: add_orbit, add_paths, check_mode, check_response, check_statistic
   end type analysis_reader_t
 
 contains
@@ -61,7 +63,8 @@ contains
       if (.not. allocated(failure)) self%oscillations = size(modes)
     end if
     if (asks_for(input, 'path')) call read_reports(input, self%reports)
-    if (.not. asks_for(input, 'response')) return
+    if (asks_for(input, 'orbit')) call new_orbit_reader(input, machine, self%orbit, error)
+    if (allocated(error) .or. .not. asks_for(input, 'response')) return
     call read_response_settings(input, machine, self%settings, error)
     if (allocated(error)) return
     call list_moment_forms(machine, self%settings%body, self%quantities)
@@ -142,7 +145,8 @@ contains
         k = findloc(analysis_words == one%command, .true., dim=1)
         if (k == 0) then
           call input%report(record, 'path', 'path = ' // quoted(text) // ' does not begin with the name of an analysis; ' // &
-                            "allowed: 'equilibrium.', 'modes.', 'campbell.' or 'response.' and what its report has", diagnostics)
+                            "allowed: 'equilibrium.', 'modes.', 'campbell.', 'response.' or 'orbit.' and what its report has", &
+                            diagnostics)
           cycle
         end if
         if (self%reports(k)%count > 0 .and. self%reports(k)%find(one%path) == 0) then
@@ -156,7 +160,7 @@ contains
     end do
   end subroutine add_paths
 
-  !> Adds the results of a &record with a mode, a response or paths.
+  !> Adds the results of a &record with a mode, a response, an orbit or paths.
   subroutine add_results(self, input, record, others, results, diagnostics)
     class(analysis_reader_t), intent(in) :: self
     type(input_t), intent(in) :: input
@@ -171,6 +175,10 @@ contains
 
     if (input%groups(record)%has_value('path')) then
       call self%add_paths(input, record, others, results, diagnostics)
+      return
+    end if
+    if (input%groups(record)%has_value('orbit')) then
+      call self%add_orbit(input, record, others, results, diagnostics)
       return
     end if
     owner = 'mode'
@@ -203,6 +211,25 @@ contains
       call append_new(input, record, 'statistic', others, one, results, diagnostics)
     end do
   end subroutine add_results
+
+  !> Adds the numbers of periodic motions that a &record names.
+  subroutine add_orbit(self, input, record, others, results, diagnostics)
+    class(analysis_reader_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record, others   !! as in `add_results`
+    type(analysis_result_t), allocatable, intent(inout) :: results(:)
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(analysis_result_t) :: one
+    integer :: before, i
+
+    associate (words => input%groups(record)%texts('statistic'))
+      do i = 1, size(words)
+        before = diagnostics%count
+        call self%orbit%read_result(input, record, words(i)%text, one, diagnostics)
+        if (diagnostics%count == before) call append_new(input, record, 'statistic', others, one, results, diagnostics)
+      end do
+    end associate
+  end subroutine add_orbit
 
   !> "'peak', 'peak_speed'".
   function statistics_of(owner) result(text)

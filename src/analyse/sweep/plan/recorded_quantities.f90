@@ -47,11 +47,12 @@ contains
             call add_statistics(input, records(i), signals, span, size(analyses), statistics, diagnostics)
           else if (group%has_value('fatigue')) then
             call add_fatigue(input, records(i), span, size(analyses), statistics, diagnostics)
-          else if (any([group%has_value('mode'), group%has_value('response'), group%has_value('path')])) then
+          else if (any([group%has_value('mode'), group%has_value('response'), group%has_value('orbit'), &
+                        group%has_value('path')])) then
             call reader%add_results(input, records(i), size(statistics), analyses, diagnostics)
           else if (.not. group%has_value('trajectories')) then
             call diagnostics%add(group%line, records(i), 'there is nothing to record; needed: quantity, fatigue, mode, ' // &
-                                 'response, path or trajectories')
+                                 'response, orbit, path or trajectories')
           end if
           if (group%has_value('trajectories')) call check_trajectories(input, records(i), variants, diagnostics)
         end associate

@@ -1,7 +1,7 @@
 !> The plan of a sweep: targets, design and recorded quantities, as its input describes them. All errors in the groups of the
 !> sweep are reported at once.
 module nocdyn_sweep_plan
-  use nocdyn_analysis_results, only: analysis_names, analysis_result_t, of_path
+  use nocdyn_analysis_results, only: analysis_names, analysis_result_t, of_branch, of_orbit, of_path
   use nocdyn_assembly, only: assemble_machine
   use nocdyn_column_names, only: count_columns
   use nocdyn_designs, only: design_t
@@ -84,7 +84,7 @@ contains
       allocate (plan%notes(0))
       call note_former_records(input, reader, signals, plan%notes)
       if (plan%results() == 0 .and. diagnostics%count == 0) call input%report(sweeps(1), 'design', &
-        'no number of the variants is kept; needed: a &record with quantity, fatigue, mode, response or path', diagnostics)
+        'no number of the variants is kept; needed: a &record with quantity, fatigue, mode, response, orbit or path', diagnostics)
       if (size(plan%trajectories) > 0) call check_output_times(input, diagnostics)
       if (.not. allocated(failure)) call count_columns(input, plan%machine, plan%columns, plan%notes, failure)
     end if
@@ -231,6 +231,11 @@ contains
           header%results(one%result)%facts(1)%text = 'path'
           header%results(one%result)%facts(3)%text = one%command
           header%results(one%result)%facts(6)%text = one%path
+        else if (one%mode == of_orbit .and. one%quantity == of_branch) then
+          header%results(one%result)%facts(1)%text = 'orbit'
+          header%results(one%result)%facts(2)%text = one%word
+        else if (one%mode == of_orbit) then
+          call set_facts(one%signal, 'orbit_' // one%word, header%results(one%result))
         else if (one%mode == 0) then
           call set_facts(one%signal, trim(analysis_names(one%statistic)), header%results(one%result))
         else
