@@ -1,11 +1,13 @@
 !> Periodic motions of a machine over a number of its input or over a speed: from the input to the branch.
 module nocdyn_orbit_analysis
+  use nocdyn_backbone_start, only: start_backbone
   use nocdyn_column_names, only: choose_signals
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_harmonic_problem, only: harmonic_problem_t, new_harmonic_problem
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_orbit_backbone, only: backbone_t, find_quasi_linear, note_left_out
   use nocdyn_orbit_branch, only: follow_branch
   use nocdyn_orbit_guess, only: find_settled_guess, find_steady_guess
   use nocdyn_orbit_period, only: find_period
@@ -34,6 +36,7 @@ module nocdyn_orbit_analysis
     type(signal_t), allocatable :: signals(:)          !! in SI units
     type(branch_t) :: branch                           !! with the points of all branches
     type(scatter_t) :: found                           !! what scattered starts have found
+    type(backbone_t) :: backbone                       !! frequencies of a mode
     type(signal_range_t), allocatable :: ranges(:, :)  !! [signals, points]
     type(string_t), allocatable :: notes(:)
   end type orbit_analysis_t
@@ -58,14 +61,21 @@ contains
       self%body_name = machine%names(self%settings%body)%text
       self%parameter = 'mean_speed_' // self%body_name
       self%unit = 'rad/s'
+    else if (self%settings%mode > 0) then
+      self%unit = 'rad'
     else
       self%parameter = self%settings%targets(1)%path
       self%unit = self%settings%targets(1)%unit
     end if
-    call study_machine(input, self%settings, periodic, guess, error)
+    if (self%settings%mode > 0) then
+      call study_mode(input, machine, periodic, guess, self, error)
+    else
+      call study_machine(input, self%settings, periodic, guess, error)
+    end if
     if (.not. allocated(error)) call choose_orbit_signals(input, periodic, self, error)
     if (.not. allocated(error)) call choose_problem(periodic, guess, self%settings, problem, error)
     if (.not. allocated(error)) call follow_from(input, problem, guess, self, error)
+    if (.not. allocated(error) .and. self%settings%mode > 0) call find_quasi_linear(problem, self%branch, self%backbone)
     if (.not. allocated(error) .and. self%settings%starts > 0) then
       call find_isolated(input, self%settings, problem, self%branch, self%found)
     end if
@@ -86,7 +96,10 @@ contains
     allocate (harmonic)
     call new_harmonic_problem(periodic, settings%harmonics, settings%tolerance, harmonic, error)
     if (allocated(error)) return
-    if (.not. settings%asks_stability) then
+    if (settings%mode > 0) then
+      call harmonic%equations%anchor(guess)
+      call harmonic%finer%anchor(guess)
+    else if (.not. settings%asks_stability) then
       if (harmonic%has_short_steps(guess)) settings%has_stability = .false.
     end if
     call move_alloc(harmonic, problem)
@@ -103,6 +116,10 @@ contains
     type(error_t), allocatable :: first
     type(scatter_t) :: high
 
+    if (self%settings%mode > 0) then
+      call follow_branch(problem, self%settings, guess, self%branch, error)
+      return
+    end if
     if (self%settings%start_file /= '') then
       call find_file_guess(input, self%settings, problem%periodic, guess, error)
       if (.not. allocated(error)) call follow_branch(problem, self%settings, guess, self%branch, error)
@@ -174,6 +191,30 @@ contains
     call find_floating(periodic)
     call check_period(input, periodic, guess, error)
   end subroutine study_machine
+
+  !> The conservative machine, and its linear motion in the mode as a guess.
+  subroutine study_mode(input, machine, periodic, guess, self, error)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine   !! the whole one
+    type(periodic_machine_t), intent(inout) :: periodic
+    type(orbit_t), intent(inout) :: guess
+    type(orbit_analysis_t), intent(inout) :: self
+    type(error_t), allocatable, intent(out) :: error
+    integer :: body
+
+    associate (settings => self%settings)
+      call new_sampled_machine(input, settings%targets, settings%from, few_samples, periodic%machine, error, &
+                               is_conservative=.true.)
+      if (allocated(error)) return
+      call find_rigid(periodic)
+      periodic%bounds = [min(settings%from, settings%to), max(settings%from, settings%to)]
+      call find_steady_guess(input, settings, periodic, guess)
+      call start_backbone(settings%mode, periodic, guess, body, self%backbone%linear_rate, error)
+      if (allocated(error)) return
+      self%parameter = 'amplitude_phi_' // machine%names(body)%text
+      call note_left_out(machine, self%notes)
+    end associate
+  end subroutine study_mode
 
   !> The free rotations of the machine.
   subroutine find_rigid(periodic)

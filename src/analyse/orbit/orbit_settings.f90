@@ -22,6 +22,7 @@ module nocdyn_orbit_settings
     integer :: group = 0                       !! &orbit in the input
     type(target_t), allocatable :: targets(:)  !! the number over which it goes, none if it is a speed
     integer :: body = 0                        !! whose mean speed it goes over, 0: none
+    integer :: mode = 0                        !! nonlinear normal mode over whose amplitude it goes, 0: none
     integer :: speed_unit = 0                  !! in which the input has speeds: index of `units`, 0: rad/s
     real(wp) :: from = 0.0_wp, to = 0.0_wp     !! in the unit of the target, or [rad/s]
     real(wp) :: at = 0.0_wp                    !! where a branch begins
@@ -63,6 +64,10 @@ contains
       if (group%has_value('over')) then
         call find_number(input, group%text('over'), settings, error)
         range = group%numbers('range')
+      else if (group%has_value('mode')) then
+        allocate (settings%targets(0))
+        settings%mode = group%whole_number('mode')
+        range = group%numbers('amplitude')
       else
         allocate (settings%targets(0))
         settings%body = findloc([(machine%names(i)%text == group%text('body'), i=1, machine%bodies)], .true., dim=1)
@@ -70,14 +75,15 @@ contains
         settings%speed_unit = unit_of(group, 'speed')
       end if
       if (allocated(error)) return
-      call read_start(group%text('start'), settings)
+      settings%start_file = ''
+      if (group%has_value('start')) call read_start(group%text('start'), settings)
       if ((settings%settles .or. settings%starts_high .or. group%has_value('starts')) .and. settings%body > 0) then
         call raise(error, exit_input, input%location(groups(1), trim(merge('starts', 'start ', group%has_value('starts')))) // &
                    ': a run does not hold the mean speed of a body; allowed: over in place of body')
         return
       end if
       if (.not. abs(range(2) - range(1)) > 0) then
-        call raise(error, exit_input, input%location(groups(1), trim(merge('speed', 'range', settings%body > 0))) // &
+        call raise(error, exit_input, input%location(groups(1), range_key(settings)) // &
                    ': the two numbers are the same; required: a range')
         return
       end if
@@ -88,21 +94,31 @@ contains
       if (group%has_value('starts')) settings%starts = group%whole_number('starts')
       if (group%has_value('harmonics')) settings%harmonics = group%whole_number('harmonics')
       if (group%has_value('count')) settings%count = group%whole_number('count')
-      settings%subharmonic = group%whole_number('subharmonic')
+      if (group%has_value('subharmonic')) settings%subharmonic = group%whole_number('subharmonic')
       settings%most_points = group%whole_number('most_points')
       settings%tolerance = group%number('tolerance')
       settings%has_stability = 2 * machine%coordinates%freedoms + machine%elements%internal%count <= most_states
       settings%asks_stability = group%has_value('stability')
       if (settings%asks_stability) settings%has_stability = group%flag('stability')
+      if (settings%mode > 0) settings%has_stability = .false.
     end associate
   end subroutine read_orbit_settings
+
+  !> The key of the first and last value.
+  pure function range_key(settings) result(key)
+    type(orbit_settings_t), intent(in) :: settings
+    character(len=:), allocatable :: key
+
+    key = 'range'
+    if (settings%body > 0) key = 'speed'
+    if (settings%mode > 0) key = 'amplitude'
+  end function range_key
 
   !> Where the branch begins: a word, in any case, or the name of a file.
   subroutine read_start(text, settings)
     character(len=*), intent(in) :: text
     type(orbit_settings_t), intent(inout) :: settings
 
-    settings%start_file = ''
     select case (lower_case(text))
     case ('low')
     case ('high')

@@ -153,6 +153,10 @@ module nocdyn_schema_response
     key_rule_t('orbit', 'body', a_body, 1, '', unset, anything, &
       'in place of a number: the body whose mean speed a mean torque on it holds'), &
     key_rule_t('orbit', 'speed', a_number, 2, 'rad/s', unset, not_zero, 'its first and its last mean speed'), &
+    key_rule_t('orbit', 'mode', an_integer, 1, '', unset, from_1, &
+      'in place of both: the mode of the machine without damping and excitation whose backbone curve is found'), &
+    key_rule_t('orbit', 'amplitude', a_number, 2, 'rad', unset, positive, &
+      'first and last amplitude of its backbone, of the body that moves most in the mode'), &
     key_rule_t('orbit', 'start', a_text, 1, '', "'low'", anything, &
       "the first motion: 'low' (near the steady state), 'high', 'settled_run', or a table such as trajectory.csv"), &
     key_rule_t('orbit', 'starts', an_integer, 1, '', unset, from_1, &
@@ -243,7 +247,11 @@ module nocdyn_schema_response
     relation_rule_t('fatigue', requires, 'reference_force table_force force_file', 'mesh gear'), &
     relation_rule_t('fatigue', at_most_one, 'ultimate_stress', 'yield_stress'), &
     relation_rule_t('fatigue', equal_lengths, 'profile_speeds profile_hours', ''), &
-    relation_rule_t('orbit', exactly_one, 'over', 'body'), &
+    relation_rule_t('orbit', exactly_one, 'over', 'body mode'), &
+    relation_rule_t('orbit', at_most_one, 'body', 'mode'), &
+    relation_rule_t('orbit', at_most_one, 'mode', 'start starts subharmonic stability'), &
+    relation_rule_t('orbit', requires, 'mode', 'amplitude'), &
+    relation_rule_t('orbit', requires, 'amplitude', 'mode'), &
     relation_rule_t('orbit', requires, 'over', 'range'), &
     relation_rule_t('orbit', requires, 'range', 'over'), &
     relation_rule_t('orbit', requires, 'body', 'speed'), &

@@ -162,6 +162,7 @@ contains
         end if
         weights(i) = 1.0_wp / max(scale, sqrt(epsilon(scale)))
       end do
+      if (allocated(equations%travel)) weights(last - 2) = 1.0_wp
       if (equations%rate_is_unknown) weights(last - 1) = 1.0_wp / abs(x(last - 1))
       weights(last) = 1.0_wp / range
     end associate

@@ -5,6 +5,11 @@
 !> coordinate begin with a mean acceleration that balances its mean torque, divided by w^2, which must vanish.
 !> Where nothing prescribes the period, w is unknown too, and the motion is in phase with another one:
 !> the integral of q times the rate of this vanishes over a period.
+!>
+!> The parameter of a conservative machine is an amplitude: half the difference of an angle between the begin and the middle of
+!> the period, where the motion turns back. Its motions form families, so that one more unknown belongs to this equation: a
+!> damping w d q', which comes out as zero (F. J. Munoz-Almaraz, E. Freire, J. Galan, E. Doedel, A. Vanderbauwhede, Continuation
+!> of periodic orbits in conservative and Hamiltonian systems, Physica D 181 (2003) 1-38).
 module nocdyn_orbit_equations
   use nocdyn_bordered_system, only: bordered_system_t, new_bordered_system
   use nocdyn_errors, only: error_t
@@ -101,11 +106,12 @@ contains
     unknowns = self%nodes * self%basis%length + self%scalars()
   end function unknowns
 
-  !> The number of unknowns beside the series, which follow them: mean speeds or a torque, and w if it is unknown.
+  !> The number of unknowns beside the series, which follow them: mean speeds or a torque, the damping of a conservative machine,
+  !> and w if it is unknown.
   pure integer function scalars(self)
     class(orbit_equations_t), intent(in) :: self
 
-    scalars = size(self%border) + merge(1, 0, self%rate_is_unknown)
+    scalars = size(self%border) + merge(1, 0, allocated(self%travel)) + merge(1, 0, self%rate_is_unknown)
   end function scalars
 
   !> Motions are in phase with an orbit from now on.
@@ -139,6 +145,7 @@ contains
     end do
     i = self%nodes * self%basis%length
     x(i + 1:i + size(self%border)) = self%put_border(orbit)
+    if (allocated(self%travel)) x(size(x) - 2) = orbit%damping
     if (self%rate_is_unknown) x(size(x) - 1) = orbit%rate
     x(size(x)) = orbit%value
   end function put_together
@@ -157,6 +164,7 @@ contains
       orbit%series(:, n) = x(i:i + self%basis%length - 1)
     end do
     i = self%nodes * self%basis%length
+    if (allocated(self%travel)) orbit%damping = x(size(x) - 2)
     if (self%rate_is_unknown) orbit%rate = x(size(x) - 1)
     call self%take_border(x(i + 1:i + size(self%border)), x(size(x)), orbit)
   end subroutine take_apart
@@ -205,6 +213,7 @@ contains
       harmonics(:, :f) = -matmul(self%basis%projection, self%rates(:, :f)) / w**2
       harmonics(:, f + 1:) = -matmul(self%basis%projection, self%rates(:, 2 * f + 1:)) / w
       harmonics(:, :f) = harmonics(:, :f) + differentiated(differentiated(series(:, :f)))
+      if (abs(orbit%damping) > 0) harmonics(:, :f) = harmonics(:, :f) + orbit%damping * differentiated(series(:, :f))
       harmonics(:, f + 1:) = harmonics(:, f + 1:) + differentiated(series(:, f + 1:))
       harmonics(1, free) = harmonics(1, free) + series(1, free)
     end associate
@@ -215,6 +224,7 @@ contains
     end do
     i = self%nodes * self%basis%length
     r(i + 1:i + size(self%border)) = series(1, self%free(self%border))
+    if (allocated(self%travel)) r(size(r) - 1) = amplitude(self%travel, series(:, :self%freedoms)) - orbit%value
     if (self%rate_is_unknown) then
       shared = min(size(self%phase, 1), self%basis%length)
       r(size(r)) = sum(self%phase(:shared, :) * series(:shared, :))
@@ -241,7 +251,7 @@ contains
     call self%sample(other, self%basis, self%t, self%y)
     call self%machine%slopes(self%t, self%y, self%slopes)
     call self%add_slopes(other%rate)
-    call self%add_inertia()
+    call self%add_inertia(other%damping)
     do k = 1, size(steps)
       place = self%nodes * self%basis%length + k
       x = self%put_together(orbit)
@@ -261,6 +271,13 @@ contains
     do k = 1, size(self%border)
       self%system%below(k, self%first_unknown(self%free(self%border(k)))) = 1.0_wp
     end do
+    if (allocated(self%travel)) then
+      do n = 1, self%freedoms
+        do k = 1, self%basis%harmonics, 2
+          self%system%below(self%scalars() - 1, self%first_unknown(n) + 2 * k - 1) = self%travel(n)
+        end do
+      end do
+    end if
     if (.not. self%rate_is_unknown) return
     shared = min(size(self%phase, 1), self%basis%length)
     do n = 1, self%nodes
@@ -268,6 +285,14 @@ contains
       self%system%below(self%scalars(), k:k + shared - 1) = self%phase(:shared, n)
     end do
   end subroutine fill_system
+
+  !> Half the travel of an angle from the begin to the middle of the period: its cosines of odd harmonics.
+  pure real(wp) function amplitude(travel, series)
+    real(wp), intent(in) :: travel(:)      !! the angle by the coordinates, [coordinates]
+    real(wp), intent(in) :: series(:, :)   !! [length, coordinates]
+
+    amplitude = dot_product(travel, sum(series(2::4, :), dim=1))
+  end function amplitude
 
   !> Adds what the laws contribute: products of their slopes with the series.
   subroutine add_slopes(self, w)
@@ -300,8 +325,9 @@ contains
   end subroutine add_slopes
 
   !> Adds second derivatives of the coordinates, first ones of the internal states, and the mean accelerations.
-  subroutine add_inertia(self)
+  subroutine add_inertia(self, damping)
     class(orbit_equations_t), intent(inout) :: self
+    real(wp), intent(in) :: damping   !! of an orbit
     real(wp) :: pair(2, 2)
     integer :: h, i, n
 
@@ -313,6 +339,8 @@ contains
         if (n <= self%freedoms) then
           pair(1, 1) = -real(h, wp)**2
           pair(2, 2) = pair(1, 1)
+          pair(1, 2) = damping * h
+          pair(2, 1) = -damping * h
         else
           pair(1, 2) = h
           pair(2, 1) = -h

@@ -19,12 +19,15 @@ module nocdyn_periodic_machine
     real(wp), allocatable :: series(:, :)       !! of q [rad] and z, [length, nodes]
     real(wp), allocatable :: speed(:)           !! Omega of the rigid motions [rad/s]
     real(wp) :: torque = 0.0_wp                 !! mean torque that holds the speed of a body [N m]
+    real(wp) :: damping = 0.0_wp                !! by which a conservative machine would have to be damped, in w
   end type orbit_t
 
   type, public :: periodic_machine_t
     type(sampled_machine_t) :: machine
     type(orbit_period_t) :: period
     logical :: rate_is_unknown = .false.             !! whether the machine itself finds w
+    real(wp), allocatable :: travel(:)               !! of a conservative machine, where an amplitude is the parameter: the angle
+                                                     !! that has it, by the coordinates; not allocated: none
     integer :: subharmonic = 1
     real(wp) :: bounds(2) = 0.0_wp                   !! lowest and highest value of the parameter
     integer :: held = 0                              !! body whose mean speed is the parameter; 0: none

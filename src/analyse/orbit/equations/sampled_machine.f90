@@ -1,7 +1,11 @@
 !> A machine at many times of one motion at once: each lane of a block is a sample of the motion. One number of its input can be
 !> changed from evaluation to evaluation.
+!>
+!> Of the conservative machine only inertias and the restoring moments of couplings act, with their means over what changes with
+!> the time or a turn; constant torques balance them at given angles.
 module nocdyn_sampled_machine
   use nocdyn_assembly, only: assemble_machine
+  use nocdyn_bank, only: append_bank, bank_slot_t, role_coupling, role_phase
   use nocdyn_direct_parameters, only: direct_parameters_t, new_direct_parameters
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_input, only: input_t, value_t
@@ -23,25 +27,29 @@ module nocdyn_sampled_machine
     integer :: freedoms = 0                              !! coordinates
     integer :: states = 0                                !! q', q and the internal states
     real(wp) :: value = 0.0_wp                           !! of the target, in its unit
+    logical :: is_conservative = .false.
+    real(wp), allocatable, private :: balance(:)         !! accelerations by the constant torques [rad/s2], [coordinates]
     type(input_t), private :: input
     type(target_t), allocatable, private :: targets(:)   !! the number that changes, or none
     type(direct_parameters_t), private :: place          !! where it stands in the block
   contains
-    procedure :: set_samples, set_value, rates, slopes, crossed_switch
+    procedure :: set_samples, set_value, rates, slopes, crossed_switch, balance_at
     procedure, private :: assemble, write_value, choose_branches
   end type sampled_machine_t
 
 contains
 
   !> The machine of an input, of the reduced formulation, from its given start angles.
-  subroutine new_sampled_machine(input, targets, value, samples, self, error)
+  subroutine new_sampled_machine(input, targets, value, samples, self, error, is_conservative)
     type(input_t), intent(in) :: input
     type(target_t), intent(in) :: targets(:)   !! one number of it, or none
     real(wp), intent(in) :: value              !! of the target
     integer, intent(in) :: samples
     type(sampled_machine_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: is_conservative   !! absent: it is not
 
+    if (present(is_conservative)) self%is_conservative = is_conservative
     self%input = with_start(input, 'given')
     allocate (self%targets, source=targets)
     self%samples = samples
@@ -107,6 +115,7 @@ contains
     end if
     call assemble_machine(changed, machine, error, self%samples)
     if (allocated(error)) return
+    if (self%is_conservative) call keep_couplings(machine)
     self%formulation%machine = machine
     call self%formulation%formulate(.false.)
     self%freedoms = machine%coordinates%freedoms
@@ -118,6 +127,40 @@ contains
       call self%formulation%refresh_lane(l)
     end do
   end subroutine assemble
+
+  !> Takes all elements but couplings out of a machine.
+  subroutine keep_couplings(machine)
+    type(machine_t), intent(inout) :: machine
+    type(bank_slot_t), allocatable :: kept(:)
+    integer :: i
+
+    allocate (kept(0))
+    do i = 1, size(machine%banks)
+      associate (bank => machine%banks(i)%bank)
+        if (bank%role == role_coupling .or. bank%role == role_phase) call append_bank(kept, bank)
+      end associate
+    end do
+    call move_alloc(kept, machine%banks)
+    call machine%to_mean_torque()
+  end subroutine keep_couplings
+
+  !> Balances the conservative machine at some angles by constant torques.
+  subroutine balance_at(self, angles, error)
+    class(sampled_machine_t), intent(inout) :: self
+    real(wp), intent(in) :: angles(:)                    !! of the coordinates [rad]
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: t(self%samples)
+    real(wp), dimension(self%samples, self%states) :: rates, y
+
+    t = 0.0_wp
+    y = 0.0_wp
+    y(:, self%freedoms + 1:) = spread(angles, 1, self%samples)
+    if (allocated(self%balance)) deallocate (self%balance)
+    allocate (self%balance(self%freedoms), source=0.0_wp)
+    rates = 0.0_wp
+    call self%rates(t, y, rates, error)
+    self%balance = -rates(1, :self%freedoms)
+  end subroutine balance_at
 
   !> Writes the present value into all lanes.
   subroutine write_value(self, is_set)
@@ -141,11 +184,21 @@ contains
     real(wp), contiguous, intent(in) :: y(:, :)          !! states, [samples, states]
     real(wp), contiguous, intent(inout) :: dydt(:, :)
     type(error_t), allocatable, intent(out) :: error     !! laws that have no values there
+    real(wp), allocatable :: resting(:, :)
     integer :: status(self%samples)
 
     status = evaluation_ok
-    call self%choose_branches(t, y)
-    call self%formulation%derivative(t, y, dydt, status)
+    if (self%is_conservative) then
+      resting = y
+      resting(:, :self%freedoms) = 0.0_wp
+      call self%choose_branches(0.0_wp * t, resting)
+      call self%formulation%derivative(0.0_wp * t, resting, dydt, status)
+      dydt(:, :self%freedoms) = dydt(:, :self%freedoms) + spread(self%balance, 1, self%samples)
+      dydt(:, self%freedoms + 1:2 * self%freedoms) = y(:, :self%freedoms)
+    else
+      call self%choose_branches(t, y)
+      call self%formulation%derivative(t, y, dydt, status)
+    end if
     if (any(status /= evaluation_ok)) call raise(error, exit_failed, 'the laws of the machine have no values on the orbit')
   end subroutine rates
 
@@ -155,12 +208,23 @@ contains
     real(wp), contiguous, intent(in) :: t(:)             !! [s], [samples]
     real(wp), contiguous, intent(in) :: y(:, :)          !! states, [samples, states]
     real(wp), contiguous, intent(inout) :: dfdy(:, :)    !! [samples, positions]
+    real(wp), allocatable :: resting(:, :)
     real(wp) :: dfdt(self%samples, self%states)
-    integer :: status(self%samples)
+    integer :: k, status(self%samples)
 
     status = evaluation_ok
-    call self%choose_branches(t, y)
-    call self%formulation%jacobian(t, y, dfdy, dfdt, status)
+    if (self%is_conservative) then
+      resting = y
+      resting(:, :self%freedoms) = 0.0_wp
+      call self%choose_branches(0.0_wp * t, resting)
+      call self%formulation%jacobian(0.0_wp * t, resting, dfdy, dfdt, status)
+      do k = 1, size(self%pattern%column)
+        if (self%pattern%column(k) <= self%freedoms .and. self%pattern%row(k) <= self%freedoms) dfdy(:, k) = 0.0_wp
+      end do
+    else
+      call self%choose_branches(t, y)
+      call self%formulation%jacobian(t, y, dfdy, dfdt, status)
+    end if
   end subroutine slopes
 
   !> Each sample is on the branch of every law to which its state belongs.

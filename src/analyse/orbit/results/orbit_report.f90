@@ -20,6 +20,7 @@ module nocdyn_orbit_report
   public :: put_orbit, put_orbit_csv
 
   integer, parameter :: most_multipliers = 6   ! in the files
+  real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)   ! [rad]
 
 contains
 
@@ -61,6 +62,7 @@ contains
       call json%close_list()
     end associate
     call put_peaks(json, analysis)
+    if (analysis%settings%mode > 0) call put_backbone(json, analysis)
     if (analysis%settings%starts > 0) then
       call json%open('starts')
       call json%put('tried', analysis%found%tried)
@@ -93,6 +95,23 @@ contains
       call json%close()
     end associate
   end subroutine put_point
+
+  !> The frequencies of a mode over its amplitude.
+  subroutine put_backbone(json, analysis)
+    type(json_t), intent(inout) :: json
+    type(orbit_analysis_t), intent(in) :: analysis
+
+    associate (orbits => analysis%branch%points(:analysis%branch%count)%orbit)
+      call json%open('backbone')
+      call json%put('mode', analysis%settings%mode)
+      call json%put('linear_frequency_hz', analysis%backbone%linear_rate / turn)
+      call json%put('amplitude', orbits%value)
+      call json%put('frequency_hz', orbits%rate / turn)
+      call json%put('quasi_linear_frequency_hz', analysis%backbone%quasi_linear_rate / turn)
+      call json%put('largest_damping', maxval(abs(orbits%damping)))
+      call json%close()
+    end associate
+  end subroutine put_backbone
 
   !> The largest half range of each signal.
   subroutine put_peaks(json, analysis)
@@ -133,6 +152,8 @@ contains
     labels = [string_t('branch')]
     call append(labels, with_unit(analysis%parameter, analysis%unit))
     labels = [labels, strings([character(len=12) :: 'rate [rad/s]', 'special', 'harmonics', 'error'])]
+    if (analysis%settings%mode > 0) labels = [labels, strings([character(len=27) :: 'frequency [Hz]', &
+                                                              'quasi_linear_frequency [Hz]'])]
     if (analysis%settings%has_stability) call append(labels, 'stable')
     if (analysis%body_name /= '') call append(labels, 'torque_' // analysis%body_name // ' [N m]')
     do k = 1, shown
@@ -149,6 +170,7 @@ contains
       associate (point => analysis%branch%points(i))
         row = [real(point%branch, wp), point%orbit%value, point%orbit%rate, number_of(point), real(point%harmonics, wp), &
                point%error]
+        if (analysis%settings%mode > 0) row = [row, point%orbit%rate / turn, analysis%backbone%quasi_linear_rate(i) / turn]
         if (analysis%settings%has_stability) row = [row, merge(1.0_wp, 0.0_wp, point%is_stable())]
         if (analysis%body_name /= '') row = [row, point%orbit%torque]
         row = [row, (real(point%multipliers(k), wp), aimag(point%multipliers(k)), k=1, shown)]

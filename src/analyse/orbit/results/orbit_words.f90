@@ -4,6 +4,7 @@ module nocdyn_orbit_words
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_orbit_analysis, only: orbit_analysis_t
+  use nocdyn_orbit_backbone_words, only: append_backbone
   use nocdyn_orbit_parts, only: jump_direction, part_t, unstable_stretches
   use nocdyn_orbit_points, only: branch_point, doubling, fold, neimark_sacker, torque_fold
   use nocdyn_orbit_problem, only: orbit_point_t
@@ -48,7 +49,11 @@ contains
       if (analysis%branch%ending /= '') call report%append_line('  the branch ends ' // analysis%branch%ending)
       if (analysis%settings%starts > 0) call append_starts(analysis, points, report)
       call append_jumps(analysis, points, report)
-      call append_parts(analysis, points, report)
+      if (analysis%settings%mode > 0) then
+        call append_backbone(analysis, report)
+      else
+        call append_parts(analysis, points, report)
+      end if
     end associate
     call append_peaks(analysis, report)
     text = report%text()
