@@ -94,8 +94,10 @@ contains
       y(:, f + 1:) = spread(angles, 1, size(t))
       call periodic%machine%slopes(t, y, slopes)
       do k = 1, size(pattern%row)
-        if (pattern%row(k) <= f .and. pattern%column(k) > f) &
-          matrix(pattern%row(k), pattern%column(k) - f) = matrix(pattern%row(k), pattern%column(k) - f) + slopes(1, k)
+        if (pattern%row(k) > f .or. pattern%column(k) <= f) cycle
+        associate (element => matrix(pattern%row(k), pattern%column(k) - f))
+          element = element + slopes(1, k)
+        end associate
       end do
     end associate
     call eigenvectors(-matrix, values, vectors, has_failed)

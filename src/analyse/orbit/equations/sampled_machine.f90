@@ -47,7 +47,7 @@ contains
     integer, intent(in) :: samples
     type(sampled_machine_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
-    logical, intent(in), optional :: is_conservative   !! absent: it is not
+    logical, intent(in), optional :: is_conservative   !! false if absent
 
     if (present(is_conservative)) self%is_conservative = is_conservative
     self%input = with_start(input, 'given')
