@@ -15,6 +15,7 @@ KINDS = {
     "modes": ("mode_figures", "modes.json"),
     "campbell": ("campbell_figures", "campbell.json"),
     "response": ("response_figures", "response.json"),
+    "orbit": ("orbit_figures", "orbit.json"),
     "transit": ("transit_figures", "transit.json"),
     "sweep": ("sweep_figures", "sweep.nc"),
 }

@@ -5,11 +5,12 @@ module nocdyn_harmonic_problem
   use nocdyn_kinds, only: wp
   use nocdyn_orbit_corrector, only: correct_harmonics => correct, estimate_error, find_harmonic_tangent => find_tangent, &
     harmonic_weights => weights_of, largest_harmonic => oscillation, set_least_oscillation
-  use nocdyn_orbit_equations, only: orbit_equations_t
+  use nocdyn_orbit_equations, only: orbit_equations_t, samples_of
   use nocdyn_orbit_multipliers, only: harmonic_multipliers => find_multipliers, steps_of
   use nocdyn_orbit_problem, only: orbit_point_t, orbit_problem_t, signal_range_t
-  use nocdyn_orbit_signals, only: measure_signals
+  use nocdyn_orbit_signals, only: measure_signals, sample_signals
   use nocdyn_periodic_machine, only: orbit_t, periodic_machine_t
+  use nocdyn_signal_samples, only: signal_samples_t
   use nocdyn_signals, only: signal_t
   use nocdyn_text, only: rounded_text, to_text
   implicit none (type, external)
@@ -23,7 +24,7 @@ module nocdyn_harmonic_problem
     integer :: harmonics = 0                     !! by error if it is 0
   contains
     procedure :: begin, put_together, correct, find_tangent, weights_of, oscillation, set_scale, complete, find_multipliers
-    procedure :: find_fault, measure, resolution, adapt, recast, has_short_steps
+    procedure :: find_fault, measure, sample, resolution, adapt, resume, recast, has_short_steps
     procedure, private :: least_harmonics
   end type harmonic_problem_t
 
@@ -184,6 +185,18 @@ contains
     if (.not. allocated(error)) call measure_signals(self%finer, point%orbit, signals, ranges, error)
   end subroutine measure
 
+  subroutine sample(self, point, signals, least_samples, samples, error)
+    class(harmonic_problem_t), target, intent(inout) :: self
+    type(orbit_point_t), intent(inout) :: point
+    type(signal_t), intent(in) :: signals(:)
+    integer, intent(in) :: least_samples
+    type(signal_samples_t), intent(out) :: samples
+    type(error_t), allocatable, intent(out) :: error
+
+    call self%finer%set_harmonics(2 * point%harmonics, error, max(samples_of(2 * point%harmonics), least_samples))
+    if (.not. allocated(error)) call sample_signals(self%finer, point%orbit, signals, samples, error)
+  end subroutine sample
+
   function resolution(self) result(words)
     class(harmonic_problem_t), intent(in) :: self
     character(len=:), allocatable :: words
@@ -212,6 +225,14 @@ contains
     has_changed = harmonics /= self%equations%basis%harmonics
     if (has_changed) call self%equations%set_harmonics(harmonics, error)
   end subroutine adapt
+
+  subroutine resume(self, point, error)
+    class(harmonic_problem_t), intent(inout) :: self
+    type(orbit_point_t), intent(in) :: point
+    type(error_t), allocatable, intent(out) :: error
+
+    call self%equations%set_harmonics(point%harmonics, error)
+  end subroutine resume
 
   function recast(self, point, tangent) result(other)
     class(harmonic_problem_t), intent(inout) :: self

@@ -1,7 +1,6 @@
 !> Periodic motions of a machine over a number of its input or over a speed: from the input to the branch.
 module nocdyn_orbit_analysis
   use nocdyn_backbone_start, only: start_backbone
-  use nocdyn_column_names, only: choose_signals
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_harmonic_problem, only: harmonic_problem_t, new_harmonic_problem
   use nocdyn_input, only: input_t
@@ -12,15 +11,13 @@ module nocdyn_orbit_analysis
   use nocdyn_orbit_guess, only: find_settled_guess, find_steady_guess
   use nocdyn_orbit_period, only: find_period
   use nocdyn_orbit_points, only: branch_t
-  use nocdyn_orbit_problem, only: orbit_problem_t, signal_range_t
+  use nocdyn_orbit_problem, only: orbit_problem_t
   use nocdyn_orbit_scatter, only: find_high, find_isolated, scatter_t
   use nocdyn_orbit_settings, only: orbit_settings_t, read_orbit_settings
-  use nocdyn_orbit_signals, only: list_orbit_signals
   use nocdyn_orbit_start_file, only: find_file_guess
   use nocdyn_periodic_machine, only: body_turning, orbit_t, periodic_machine_t
   use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
   use nocdyn_sampled_machine, only: new_sampled_machine
-  use nocdyn_signals, only: signal_t
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
   implicit none (type, external)
   private
@@ -33,11 +30,10 @@ module nocdyn_orbit_analysis
     type(orbit_settings_t) :: settings
     character(len=:), allocatable :: parameter, unit   !! what changes
     character(len=:), allocatable :: body_name         !! whose speed is held, ''
-    type(signal_t), allocatable :: signals(:)          !! in SI units
     type(branch_t) :: branch                           !! with the points of all branches
     type(scatter_t) :: found                           !! what scattered starts have found
     type(backbone_t) :: backbone                       !! frequencies of a mode
-    type(signal_range_t), allocatable :: ranges(:, :)  !! [signals, points]
+    class(orbit_problem_t), allocatable :: problem     !! whose motions they are
     type(string_t), allocatable :: notes(:)
   end type orbit_analysis_t
 
@@ -72,15 +68,16 @@ contains
     else
       call study_machine(input, self%settings, periodic, guess, error)
     end if
-    if (.not. allocated(error)) call choose_orbit_signals(input, periodic, self, error)
     if (.not. allocated(error)) call choose_problem(periodic, guess, self%settings, problem, error)
     if (.not. allocated(error)) call follow_from(input, problem, guess, self, error)
     if (.not. allocated(error) .and. self%settings%mode > 0) call find_quasi_linear(problem, self%branch, self%backbone)
     if (.not. allocated(error) .and. self%settings%starts > 0) then
       call find_isolated(input, self%settings, problem, self%branch, self%found)
     end if
-    if (.not. allocated(error)) call measure_points(problem, self, error)
-    if (.not. allocated(error)) return
+    if (.not. allocated(error)) then
+      call move_alloc(problem, self%problem)
+      return
+    end if
     if (index(error%message, input%shown_case()) /= 1) error%message = input%shown_case() // ': ' // error%message
   end subroutine analyse_orbits
 
@@ -143,20 +140,6 @@ contains
     call find_settled_guess(input, self%settings, problem%periodic, guess, error)
     if (.not. allocated(error)) call follow_branch(problem, self%settings, guess, self%branch, error)
   end subroutine follow_from
-
-  !> Chooses the columns.
-  subroutine choose_orbit_signals(input, periodic, self, error)
-    type(input_t), intent(in) :: input
-    type(periodic_machine_t), intent(in) :: periodic
-    type(orbit_analysis_t), intent(inout) :: self
-    type(error_t), allocatable, intent(out) :: error
-    type(signal_t), allocatable :: signals(:)
-    integer, allocatable :: chosen(:)
-
-    call list_orbit_signals(periodic%machine%formulation%machine, signals)
-    call choose_signals(input, 'orbit', signals, chosen, self%notes, error)
-    if (.not. allocated(error)) self%signals = signals(chosen)
-  end subroutine choose_orbit_signals
 
   !> The machine and its period, and a guess of the first motion: the steady state by the mean torques.
   subroutine study_machine(input, settings, periodic, guess, error)
@@ -310,19 +293,5 @@ contains
     call raise(error, exit_failed, 'the torques do not repeat themselves with the period of the excitations, ' // &
                rounded_text(turn / motion%rate, 6) // ' s: some follow the time in another way')
   end subroutine check_period
-
-  !> The signals of all points.
-  subroutine measure_points(problem, self, error)
-    class(orbit_problem_t), target, intent(inout) :: problem
-    type(orbit_analysis_t), intent(inout) :: self
-    type(error_t), allocatable, intent(out) :: error
-    integer :: i
-
-    allocate (self%ranges(size(self%signals), self%branch%count))
-    do i = 1, self%branch%count
-      call problem%measure(self%branch%points(i), self%signals, self%ranges(:, i), error)
-      if (allocated(error)) return
-    end do
-  end subroutine measure_points
 
 end module nocdyn_orbit_analysis

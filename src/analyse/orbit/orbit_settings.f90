@@ -6,7 +6,7 @@ module nocdyn_orbit_settings
   use nocdyn_machine, only: machine_t
   use nocdyn_targets, only: find_target, target_t
   use nocdyn_text, only: lower_case, quoted
-  use nocdyn_written_values, only: unit_of
+  use nocdyn_written_values, only: unit_of, written_element, written_number, written_unit
   implicit none (type, external)
   private
 
@@ -39,6 +39,8 @@ module nocdyn_orbit_settings
     logical :: has_stability = .true.          !! whether multipliers are computed
     logical :: asks_stability = .false.        !! whether the input says so
     real(wp) :: tolerance = 0.0_wp             !! error of a point as a share of its motion
+    real(wp), allocatable :: motions(:)        !! values at which motions are written
+    logical :: has_spectrum = .false.          !! whether the harmonics of the points are written
   end type orbit_settings_t
 
 contains
@@ -101,7 +103,9 @@ contains
       settings%asks_stability = group%has_value('stability')
       if (settings%asks_stability) settings%has_stability = group%flag('stability')
       if (settings%mode > 0) settings%has_stability = .false.
+      settings%has_spectrum = group%flag('spectrum')
     end associate
+    call read_motions(input, settings, error)
   end subroutine read_orbit_settings
 
   !> The key of the first and last value.
@@ -129,6 +133,34 @@ contains
       settings%start_file = text
     end select
   end subroutine read_start
+
+  !> The values at which motions are written.
+  subroutine read_motions(input, settings, error)
+    type(input_t), intent(in) :: input
+    type(orbit_settings_t), intent(inout) :: settings
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: key, unit
+    integer :: i
+
+    key = trim(merge('motion_speeds', 'motions      ', settings%body > 0))
+    associate (group => input%groups(settings%group))
+      settings%motions = group%numbers(key)
+      do i = 1, size(settings%motions)
+        if ((settings%motions(i) - settings%from) * (settings%motions(i) - settings%to) <= 0) cycle
+        if (settings%body > 0) then
+          unit = ' [' // written_unit(group, key) // ']'
+          call raise(error, exit_input, input%location(settings%group, key) // ': ' // written_element(group, key, i) // &
+                     ' is outside of the speeds; allowed: ' // written_number(group, key, settings%from) // ' to ' // &
+                     written_number(group, key, settings%to) // unit)
+        else
+          call raise(error, exit_input, input%location(settings%group, key) // ': ' // written_element(group, key, i) // &
+                     ' is outside of the range; allowed: ' // written_number(group, 'range', settings%from) // ' to ' // &
+                     written_number(group, 'range', settings%to))
+        end if
+        return
+      end do
+    end associate
+  end subroutine read_motions
 
   !> Finds the number over which the branch goes.
   subroutine find_number(input, path, settings, error)

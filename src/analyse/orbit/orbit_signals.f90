@@ -1,21 +1,19 @@
-!> The signals of a machine along a periodic motion: half range, largest magnitude and mean.
+!> The signals of a machine along a periodic motion of harmonic balance.
 module nocdyn_orbit_signals
   use nocdyn_errors, only: error_t
-  use nocdyn_harmonic_basis, only: differentiated, harmonic_basis_t, new_harmonic_basis
+  use nocdyn_harmonic_basis, only: harmonic_basis_t, new_harmonic_basis
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_orbit_equations, only: orbit_equations_t
   use nocdyn_orbit_problem, only: signal_range_t
-  use nocdyn_periodic_machine, only: orbit_t, periodic_machine_t
+  use nocdyn_periodic_machine, only: orbit_t
+  use nocdyn_signal_samples, only: signal_samples_t
   use nocdyn_signal_values, only: new_signal_values, signal_values_t
-  use nocdyn_signals, only: list_signals, signal_angle, signal_kinetic, signal_source_t, signal_t, signal_time
+  use nocdyn_signals, only: list_signals, signal_angle, signal_kinetic, signal_t, signal_time
   implicit none (type, external)
   private
 
-  public :: list_orbit_signals, measure_signals
-
-  integer, parameter :: iterations = 6        ! of Newton's method at an extreme
-  real(wp), parameter :: near = 0.1_wp        ! samples so near to the extreme, as a share of the range, may be beside it
+  public :: list_orbit_signals, measure_signals, sample_signals
 
 contains
 
@@ -37,83 +35,49 @@ contains
     type(signal_t), intent(in) :: signals(:)
     type(signal_range_t), intent(out) :: ranges(:)
     type(error_t), allocatable, intent(out) :: error
+    type(signal_samples_t) :: samples
+    real(wp) :: highest, lowest
+    integer :: i
+
+    call sample_signals(equations, orbit, signals, samples, error)
+    if (allocated(error)) return
+    do i = 1, size(signals)
+      call samples%find_extremes(i, lowest, highest)
+      ranges(i) = signal_range_t(0.5_wp * (highest - lowest), max(abs(highest), abs(lowest)), samples%series(1, i))
+    end do
+  end subroutine measure_signals
+
+  !> Samples of a motion. Angles lose their mean rotation.
+  subroutine sample_signals(equations, orbit, signals, samples, error)
+    type(orbit_equations_t), target, intent(inout) :: equations   !! with more harmonics than the motion, for those of the laws
+    type(orbit_t), intent(inout) :: orbit
+    type(signal_t), intent(in) :: signals(:)
+    type(signal_samples_t), intent(out) :: samples
+    type(error_t), allocatable, intent(out) :: error
     type(signal_values_t) :: values
-    type(signal_source_t), allocatable :: sources(:)
     type(harmonic_basis_t) :: all
-    real(wp) :: row(size(signals)), state(equations%machine%states), y(equations%machine%samples, equations%machine%states)
-    real(wp) :: t(equations%machine%samples), samples(equations%machine%samples, size(signals))
+    real(wp) :: row(size(signals)), state(equations%machine%states)
+    real(wp) :: y(equations%machine%samples, equations%machine%states)
     integer :: i, l
 
     call equations%set_value(orbit, error)
     if (allocated(error)) return
-    call equations%sample(orbit, equations%basis, t, y)
-    sources = signals%source
-    values = new_signal_values(equations%machine%formulation, sources)
-    call values%observe(t, y)
-    do l = 1, size(t)
+    allocate (samples%t(size(y, 1)), samples%values(size(y, 1), size(row)), samples%rotation(size(row)), source=0.0_wp)
+    call equations%sample(orbit, equations%basis, samples%t, y)
+    values = new_signal_values(equations%machine%formulation, signals%source)
+    call values%observe(samples%t, y)
+    do l = 1, size(samples%t)
       state = y(l, :)
-      call values%fill_row(l, t(l), state, row)
-      samples(l, :) = row
+      call values%fill_row(l, samples%t(l), state, row)
+      samples%values(l, :) = row
     end do
-    all = new_harmonic_basis((size(t) - 1) / 4, size(t))
-    do i = 1, size(signals)
-      if (signals(i)%source%kind == signal_angle) samples(:, i) = samples(:, i) - &
-        dot_product(equations%turning(signals(i)%source%index, :), orbit%speed) * t
-      call find_range(all, samples(:, i), ranges(i))
+    do i = 1, size(row)
+      if (signals(i)%source%kind /= signal_angle) cycle
+      samples%rotation(i) = dot_product(equations%turning(signals(i)%source%index, :), orbit%speed)
+      samples%values(:, i) = samples%values(:, i) - samples%rotation(i) * samples%t
     end do
-  end subroutine measure_signals
-
-  !> The range of the trigonometric polynomial through samples.
-  subroutine find_range(basis, samples, range)
-    type(harmonic_basis_t), intent(in) :: basis
-    real(wp), intent(in) :: samples(:)
-    type(signal_range_t), intent(out) :: range
-    real(wp) :: highest, lowest, series(size(basis%wide, 1))
-
-    series = matmul(basis%wide, samples)
-    range%mean = series(1)
-    highest = highest_of(samples, series)
-    lowest = -highest_of(-samples, -series)
-    range%half_range = 0.5_wp * (highest - lowest)
-    range%largest = max(abs(highest), abs(lowest))
-  end subroutine find_range
-
-  !> The highest value: samples near to the highest one are followed to the maximum beside them.
-  pure real(wp) function highest_of(samples, series) result(highest)
-    real(wp), intent(in) :: samples(:), series(:)
-    real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)
-    real(wp) :: first(size(series), 1), second(size(series), 1), slope, step, tau
-    integer :: i, k, n
-
-    n = size(samples)
-    highest = maxval(samples)
-    if (.not. highest > minval(samples)) return
-    first = differentiated(reshape(series, [size(series), 1]))
-    second = differentiated(first)
-    associate (bound => highest - near * (highest - minval(samples)))
-      do i = 1, n
-        if (samples(i) < bound .or. samples(i) < samples(modulo(i, n) + 1) .or. samples(i) < samples(modulo(i - 2, n) + 1)) cycle
-        tau = turn * (i - 1) / n
-        do k = 1, iterations
-          slope = value_of(second(:, 1), tau)
-          if (.not. slope < 0) exit
-          step = -value_of(first(:, 1), tau) / slope
-          tau = tau + min(max(step, -turn / n), turn / n)
-        end do
-        highest = max(highest, value_of(series, tau))
-      end do
-    end associate
-  end function highest_of
-
-  !> The value of a series.
-  pure real(wp) function value_of(series, tau) result(value)
-    real(wp), intent(in) :: series(:), tau
-    integer :: k
-
-    value = series(1)
-    do k = 1, size(series) / 2
-      value = value + series(2 * k) * cos(k * tau) + series(2 * k + 1) * sin(k * tau)
-    end do
-  end function value_of
+    all = new_harmonic_basis((size(samples%t) - 1) / 4, size(samples%t))
+    samples%series = matmul(all%wide, samples%values)
+  end subroutine sample_signals
 
 end module nocdyn_orbit_signals

@@ -4,6 +4,7 @@ module nocdyn_orbit_problem
   use nocdyn_errors, only: error_t
   use nocdyn_kinds, only: wp
   use nocdyn_periodic_machine, only: orbit_t, periodic_machine_t
+  use nocdyn_signal_samples, only: signal_samples_t
   use nocdyn_signals, only: signal_t
   implicit none (type, external)
   private
@@ -43,7 +44,7 @@ module nocdyn_orbit_problem
     procedure(find_fault), deferred :: find_fault
     procedure(measure), deferred :: measure
     procedure(resolution), deferred :: resolution
-    procedure :: adapt, recast, range
+    procedure :: adapt, recast, range, resume, sample
   end type orbit_problem_t
 
   abstract interface
@@ -172,6 +173,13 @@ contains
     has_changed = .false.
   end subroutine adapt
 
+  !> Goes back to the resolution of a point. By default there is one resolution only.
+  subroutine resume(self, point, error)
+    class(orbit_problem_t), intent(inout) :: self
+    type(orbit_point_t), intent(in) :: point
+    type(error_t), allocatable, intent(out) :: error
+  end subroutine resume
+
   !> A tangent in the present resolution. By default there is one resolution only.
   function recast(self, point, tangent) result(other)
     class(orbit_problem_t), intent(inout) :: self
@@ -181,6 +189,16 @@ contains
 
     allocate (other, source=tangent)
   end function recast
+
+  !> Samples of signals over one period, at least so many. By default there are none.
+  subroutine sample(self, point, signals, least_samples, samples, error)
+    class(orbit_problem_t), target, intent(inout) :: self
+    type(orbit_point_t), intent(inout) :: point
+    type(signal_t), intent(in) :: signals(:)
+    integer, intent(in) :: least_samples
+    type(signal_samples_t), intent(out) :: samples
+    type(error_t), allocatable, intent(out) :: error
+  end subroutine sample
 
   !> The width of the range of the parameter.
   pure real(wp) function range(self)
