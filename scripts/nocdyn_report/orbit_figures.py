@@ -68,7 +68,7 @@ def draw_half_ranges(orbits: Orbits, page: Sequence[Column], settled: Settled | 
     for axes in grid.flat[max(len(page) - across, 0) : len(page)]:
         axes.set_xlabel(plain(orbits.axis_label))
     add_legend(figure, handles=_legend(orbits, settled), ncols=3 if across == 1 else 4, fontsize=8.5)
-    add_title(figure, orbits.title, f"periodic motions: half range over {orbits.axis_label.rpartition(' [')[0] or orbits.axis_label}")
+    add_title(figure, orbits.title, f"periodic motions: half range over {orbits.axis_name}")
     return figure
 
 
@@ -77,7 +77,12 @@ def _draw_branches(axes: Axes, orbits: Orbits, column: Column, factor: float) ->
     for one in orbits.stretches:
         style = "-" if one.is_stable else UNSTABLE
         axes.plot(
-            orbits.value[one.rows], values[one.rows], color=colour_of(orbits, one.branch), linestyle=style, linewidth=1.5, zorder=3
+            orbits.value[one.rows],
+            values[one.rows],
+            color=colour_of(orbits, one.branch),
+            linestyle=style,
+            linewidth=1.5,
+            zorder=3,
         )
     if len(values) == 1:
         axes.plot(orbits.value, values, "o", color=colour_of(orbits, orbits.branches[0]))
@@ -153,7 +158,7 @@ def draw_planes(orbits: Orbits, motions: Sequence[Motion], columns: Sequence[Col
     ]
     handles.append(Line2D([], [], color="0.3", marker="o", markersize=4, linestyle="", label="begin of the period"))
     add_legend(figure, handles=handles, ncols=2, fontsize=8.5)
-    at = f"{orbits.axis_label.rpartition(' [')[0] or orbits.axis_label} {motions[0].value:.6g}\N{NO-BREAK SPACE}{orbits.unit}".strip()
+    at = f"{orbits.axis_name} {motions[0].value:.6g}\N{NO-BREAK SPACE}{orbits.unit}".strip()
     add_title(figure, orbits.title, f"phase planes, without the mean rotation, at {at}")
     return figure
 

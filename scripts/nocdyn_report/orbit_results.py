@@ -13,7 +13,7 @@ from .columns import LOADS, Column, read_column_list
 from .failure import ChoiceError, ResultsError
 from .json_files import read_json, with_case
 from .results import RPM, TIME
-from .trajectory_files import labels_of, need_folder, read_columns
+from .trajectory_files import labels_of, need_folder, need_whole, read_columns
 
 REPORT, TABLE, COLUMNS, HARMONICS = "orbit.json", "orbit.csv", "orbit_columns.json", "orbit_harmonics.csv"
 HALF_RANGE = "half_range"
@@ -114,9 +114,12 @@ class Orbits:
         return self.report["parameter"]
 
     @property
+    def axis_name(self) -> str:
+        return f"mean speed of {self.parameter.removeprefix('mean_speed_')}" if self.is_speed else self.parameter
+
+    @property
     def axis_label(self) -> str:
-        named = f"mean speed of {self.parameter.removeprefix('mean_speed_')}" if self.is_speed else self.parameter
-        return f"{named} [{self.unit}]" if self.unit else named
+        return f"{self.axis_name} [{self.unit}]" if self.unit else self.axis_name
 
     @property
     def window(self) -> tuple[float, float]:
@@ -186,6 +189,7 @@ class Orbits:
             file = self.folder / entry["file"]
             if not file.is_file():
                 raise ResultsError(f"{self.folder}: no {entry['file']} here, which {REPORT} has; compute the results again")
+            need_whole(file)
             table = read_columns(file, labels_of(file))
             if TIME not in table or len(table) < 3:
                 raise ResultsError(f"{file}: is no complete motion: compute the results again")
@@ -196,6 +200,7 @@ class Orbits:
         file = self.folder / HARMONICS
         if not file.is_file():
             return None
+        need_whole(file)
         table = read_columns(file, labels_of(file))
         if not {"point", "branch", "harmonic"} <= set(table) or table["point"].max() != len(self.table):
             raise ResultsError(f"{file}: its points are not those of {TABLE}; both must be of the same analysis")
@@ -214,6 +219,7 @@ def read_orbits(folder: Path) -> Orbits:
             raise ResultsError(f"{folder}: no {name} here; 'nocdyn orbit FILE --out {folder}' writes it")
     report = read_json(folder / REPORT, KEYS)
     columns = [one for one in read_column_list(folder, COLUMNS) if one.statistic == HALF_RANGE]
+    need_whole(folder / TABLE)
     table = read_columns(folder / TABLE, labels_of(folder / TABLE))
     found = Orbits(folder, report, table, columns)
     try:

@@ -32,8 +32,8 @@ def orbit_section(sources: Sources) -> Section | None:
 def parameter_of(sources: Sources, orbits: Orbits) -> tuple[str, str, float]:
     """What changes, its unit, and the factor from the axis of `orbits` to that."""
     if orbits.is_speed:
-        return f"mean speed of {orbits.parameter.removeprefix('mean_speed_')}", sources.speed_unit, sources.of_rpm(1.0)
-    return orbits.parameter, orbits.unit, 1.0
+        return orbits.axis_name, sources.speed_unit, sources.of_rpm(1.0)
+    return orbits.axis_name, orbits.unit, 1.0
 
 
 def unstable_ranges(orbits: Orbits) -> list[tuple[int, float, float]]:
@@ -45,7 +45,7 @@ def unstable_ranges(orbits: Orbits) -> list[tuple[int, float, float]]:
             continue
         low, high = orbits.value[one.rows].min(), orbits.value[one.rows].max()
         if last is not None and last.branch == one.branch and last.rows[-1] == one.rows[0]:
-            branch, former_low, former_high = found.pop()
+            _, former_low, former_high = found.pop()
             low, high = min(low, former_low), max(high, former_high)
         found.append((one.branch, float(low), float(high)))
         last = one
@@ -56,7 +56,8 @@ def _of_case(sources: Sources, orbits: Orbits) -> list[Block]:
     named, unit, factor = parameter_of(sources, orbits)
     ends = [number_text(factor * orbits.factor * one, 6) for one in orbits.report["range"]]
     told = f"{orbits.report['points']} periodic motions are computed over {named} from {ends[0]} to {ends[1]} {unit}".rstrip()
-    blocks: list[Block] = [Paragraph(f"{told}; the largest error is {number_text(orbits.report['largest_error'], 2)} of a motion.")]
+    error = number_text(orbits.report["largest_error"], 2)
+    blocks: list[Block] = [Paragraph(f"{told}; the largest error is {error} of a motion.")]
     if ending := orbits.report.get("ends"):
         blocks.append(Paragraph(f"The branch ends {ending}.", "warn"))
     blocks.append(_stability(orbits, named, unit, factor))
@@ -171,5 +172,6 @@ def _panel(sources: Sources, orbits: Orbits, column: Column, named: str, unit: s
         "bands": [],
         "name": named,
     }
-    told = f"Half range of {name_of(column)}, {column.caption}, over the {named}: largest {_amount(sources, values.max(), column)}."
+    largest = _amount(sources, values.max(), column)
+    told = f"Half range of {name_of(column)}, {column.caption}, over the {named}: largest {largest}."
     return Panel(f"{name_of(column)}: {column.caption}", told, spec)
