@@ -40,6 +40,7 @@ OTHER = {"marker": "*", "markerfacecolor": "black"}
 MARK = {"color": "black", "linestyle": "", "markersize": 5, "zorder": 5}
 SETTLED = {"color": "black", "marker": ".", "markersize": 4, "linestyle": "", "zorder": 4}
 JUMP = {"arrowstyle": "-|>", "color": "0.35", "linewidth": 0.9, "linestyle": (0, (2, 1.5)), "shrinkA": 3, "shrinkB": 1}
+FREQUENCY, QUASI_LINEAR = "frequency [Hz]", "quasi_linear_frequency [Hz]"  # of a nonlinear mode
 LARGEST_RATIO = 1e-6  # of amplitudes that a map of harmonics shows
 
 
@@ -209,6 +210,25 @@ def draw_harmonics(orbits: Orbits, column: Column) -> Figure:
     return figure
 
 
+def draw_backbone(orbits: Orbits) -> Figure:
+    """The frequency of a nonlinear mode over its amplitude, with that of describing functions and that of the linear mode."""
+    figure, axes = pyplot.subplots(figsize=(WIDTH, 4.8))
+    axes.plot(orbits.value, orbits.table[FREQUENCY], color=COLOURS[0], linewidth=1.8, label="nonlinear mode")
+    if QUASI_LINEAR in orbits.table:
+        axes.plot(orbits.value, orbits.table[QUASI_LINEAR], color=COLOURS[1], linestyle=UNSTABLE, label="describing functions")
+    linear = orbits.report.get("backbone", {}).get("linear_frequency_hz")
+    if linear is not None:
+        axes.axhline(linear, color="0.35", linestyle=(0, (1, 1.5)), label="linear mode")
+    axes.set_xlim(orbits.window)
+    axes.set_xlabel(plain(orbits.axis_label))
+    axes.set_ylabel("frequency [Hz]")
+    axes.ticklabel_format(axis="y", useOffset=False)
+    add_legend(figure, *axes.get_legend_handles_labels(), ncols=3, fontsize=8.5)
+    mode = orbits.report.get("backbone", {}).get("mode", "")
+    add_title(figure, orbits.title, f"backbone of mode {mode}: frequency over amplitude")
+    return figure
+
+
 def chosen(orbits: Orbits, patterns: Sequence[str] | None) -> list[Column]:
     """The signals that patterns name, loads without any."""
     if not patterns:
@@ -227,6 +247,8 @@ def figures_of(folder: Path, arguments: argparse.Namespace) -> Figures:
     orbits = read_orbits(folder)
     settled = read_settled(arguments.runs, orbits) if arguments.runs else None
     columns = chosen(orbits, arguments.columns)
+    if FREQUENCY in orbits.table:
+        yield "orbit_backbone", draw_backbone(orbits)
     pages: dict[str, int] = {}
     for members in by_sort(columns):
         for first in range(0, len(members), MOST_PANELS):
