@@ -23,7 +23,7 @@ module nocdyn_harmonic_problem
     integer :: harmonics = 0                     !! by error if it is 0
   contains
     procedure :: begin, put_together, correct, find_tangent, weights_of, oscillation, set_scale, complete, find_multipliers
-    procedure :: find_fault, measure, resolution, adapt, recast, has_short_steps
+    procedure :: find_fault, measure, resolution, adapt, least_size, recast, restore, has_short_steps
     procedure, private :: least_harmonics
   end type harmonic_problem_t
 
@@ -132,6 +132,22 @@ contains
 
     call set_least_oscillation(self%equations, x, self%range())
   end subroutine set_scale
+
+  real(wp) function least_size(self)
+    class(harmonic_problem_t), intent(in) :: self
+
+    least_size = self%equations%least_oscillation
+  end function least_size
+
+  subroutine restore(self, point, least, error)
+    class(harmonic_problem_t), intent(inout) :: self
+    type(orbit_point_t), intent(in) :: point
+    real(wp), intent(in) :: least   !! as of `least_size`
+    type(error_t), allocatable, intent(out) :: error
+
+    self%equations%least_oscillation = least
+    call self%equations%set_harmonics(point%harmonics, error)
+  end subroutine restore
 
   subroutine complete(self, x, point, error)
     class(harmonic_problem_t), intent(inout) :: self

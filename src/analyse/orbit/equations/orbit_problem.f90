@@ -43,7 +43,7 @@ module nocdyn_orbit_problem
     procedure(find_fault), deferred :: find_fault
     procedure(measure), deferred :: measure
     procedure(resolution), deferred :: resolution
-    procedure :: adapt, recast, range
+    procedure :: adapt, least_size, recast, range, restore
   end type orbit_problem_t
 
   abstract interface
@@ -181,6 +181,21 @@ contains
 
     allocate (other, source=tangent)
   end function recast
+
+  !> What `set_scale` has found, 0 if nothing.
+  real(wp) function least_size(self)
+    class(orbit_problem_t), intent(in) :: self
+
+    least_size = 0.0_wp
+  end function least_size
+
+  !> Goes back to the resolution of a point. By default there is one resolution only.
+  subroutine restore(self, point, least, error)
+    class(orbit_problem_t), intent(inout) :: self
+    type(orbit_point_t), intent(in) :: point
+    real(wp), intent(in) :: least   !! as of `least_size`
+    type(error_t), allocatable, intent(out) :: error
+  end subroutine restore
 
   !> The width of the range of the parameter.
   pure real(wp) function range(self)

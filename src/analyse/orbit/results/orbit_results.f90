@@ -7,6 +7,7 @@ module nocdyn_orbit_results
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_orbit_analysis, only: analyse_orbits, orbit_analysis_t
+  use nocdyn_orbit_log, only: journal_name, orbit_log_t
   use nocdyn_orbit_records, only: find_orbit_number
   use nocdyn_orbit_report, only: put_orbit, put_orbit_csv
   use nocdyn_orbit_words, only: orbit_text
@@ -15,10 +16,13 @@ module nocdyn_orbit_results
   implicit none (type, external)
   private
 
+  character(len=*), parameter :: partial = 'orbit.partial.csv'
+
   type, extends(analysis_t), public :: orbit_results_t
     type(orbit_analysis_t), private :: analysis
+    type(orbit_log_t), pointer, private :: log => null()   !! its journal
   contains
-    procedure :: solve, list_tables, put_table, put_report, find_recorded, text => printed
+    procedure :: solve, list_tables, other_names, put_table, put_report, find_recorded, text => printed
   end type orbit_results_t
 
 contains
@@ -30,7 +34,14 @@ contains
     type(analysis_options_t), intent(in) :: options
     type(error_t), allocatable, intent(out) :: error
 
-    call analyse_orbits(input, machine, self%analysis, error)
+    if (.not. allocated(options%journal)) then
+      call analyse_orbits(input, machine, self%analysis, error)
+      return
+    end if
+    allocate (self%log)
+    call self%log%open(input, options%journal, options%resumes, error)
+    if (.not. allocated(error)) call analyse_orbits(input, machine, self%analysis, error, self%log)
+    if (.not. allocated(error)) self%is_unfinished = self%analysis%is_unfinished
   end subroutine solve
 
   subroutine list_tables(self, names)
@@ -38,7 +49,18 @@ contains
     type(string_t), allocatable, intent(out) :: names(:)
 
     names = [string_t('orbit.csv')]
+    if (self%is_unfinished) names = [string_t(partial)]
   end subroutine list_tables
+
+  !> What an interrupted analysis has left; of one that is interrupted, those of an earlier one.
+  function other_names(self, input) result(names)
+    class(orbit_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    type(string_t), allocatable :: names(:)
+
+    names = [string_t(partial), string_t(journal_name)]
+    if (self%is_unfinished) names = [string_t('orbit.json'), string_t('orbit.csv')]
+  end function other_names
 
   subroutine put_table(self, input, name, file)
     class(orbit_results_t), intent(in) :: self
