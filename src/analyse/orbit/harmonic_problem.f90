@@ -24,7 +24,7 @@ module nocdyn_harmonic_problem
     integer :: harmonics = 0                     !! by error if it is 0
   contains
     procedure :: begin, put_together, correct, find_tangent, weights_of, oscillation, set_scale, complete, find_multipliers
-    procedure :: find_fault, measure, sample, resolution, adapt, resume, recast, has_short_steps
+    procedure :: find_fault, measure, sample, resolution, adapt, least_size, recast, restore, has_short_steps
     procedure, private :: least_harmonics
   end type harmonic_problem_t
 
@@ -134,6 +134,22 @@ contains
     call set_least_oscillation(self%equations, x, self%range())
   end subroutine set_scale
 
+  real(wp) function least_size(self)
+    class(harmonic_problem_t), intent(in) :: self
+
+    least_size = self%equations%least_oscillation
+  end function least_size
+
+  subroutine restore(self, point, least, error)
+    class(harmonic_problem_t), intent(inout) :: self
+    type(orbit_point_t), intent(in) :: point
+    real(wp), intent(in) :: least   !! as of `least_size`
+    type(error_t), allocatable, intent(out) :: error
+
+    self%equations%least_oscillation = least
+    call self%equations%set_harmonics(point%harmonics, error)
+  end subroutine restore
+
   subroutine complete(self, x, point, error)
     class(harmonic_problem_t), intent(inout) :: self
     real(wp), intent(in) :: x(:)
@@ -225,14 +241,6 @@ contains
     has_changed = harmonics /= self%equations%basis%harmonics
     if (has_changed) call self%equations%set_harmonics(harmonics, error)
   end subroutine adapt
-
-  subroutine resume(self, point, error)
-    class(harmonic_problem_t), intent(inout) :: self
-    type(orbit_point_t), intent(in) :: point
-    type(error_t), allocatable, intent(out) :: error
-
-    call self%equations%set_harmonics(point%harmonics, error)
-  end subroutine resume
 
   function recast(self, point, tangent) result(other)
     class(harmonic_problem_t), intent(inout) :: self

@@ -9,6 +9,7 @@ module nocdyn_orbit_analysis
   use nocdyn_orbit_backbone, only: backbone_t, find_quasi_linear, note_left_out
   use nocdyn_orbit_branch, only: follow_branch
   use nocdyn_orbit_guess, only: find_settled_guess, find_steady_guess
+  use nocdyn_orbit_log, only: orbit_log_t
   use nocdyn_orbit_period, only: find_period
   use nocdyn_orbit_points, only: branch_t
   use nocdyn_orbit_problem, only: orbit_problem_t
@@ -35,16 +36,18 @@ module nocdyn_orbit_analysis
     type(backbone_t) :: backbone                       !! frequencies of a mode
     class(orbit_problem_t), allocatable :: problem     !! whose motions they are
     type(string_t), allocatable :: notes(:)
+    logical :: is_unfinished = .false.                 !! whether the user has interrupted it; there are points
   end type orbit_analysis_t
 
 contains
 
   !> Follows the branch of an input.
-  subroutine analyse_orbits(input, machine, self, error)
+  subroutine analyse_orbits(input, machine, self, error, log)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine   !! one lane
     type(orbit_analysis_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
+    type(orbit_log_t), target, intent(inout), optional :: log   !! journal, which must live as long as `self`
     type(periodic_machine_t) :: periodic
     class(orbit_problem_t), allocatable :: problem
     type(orbit_t) :: guess
@@ -52,6 +55,7 @@ contains
     allocate (self%notes(0))
     call read_orbit_settings(input, machine, self%settings, error)
     if (allocated(error)) return
+    if (present(log)) self%settings%log => log
     self%body_name = ''
     if (self%settings%body > 0) then
       self%body_name = machine%names(self%settings%body)%text
@@ -75,6 +79,7 @@ contains
       call find_isolated(input, self%settings, problem, self%branch, self%found)
     end if
     if (.not. allocated(error)) then
+      self%is_unfinished = self%settings%is_stopped()
       call move_alloc(problem, self%problem)
       return
     end if

@@ -4,6 +4,7 @@
 module nocdyn_orbit_branch
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_kinds, only: wp
+  use nocdyn_orbit_checkpoints, only: keep_end, keep_step, recall_branch
   use nocdyn_orbit_points, only: adapt_resolution, add_multipliers, branch_t, complete_point, distance_between, settle_at, &
     take_step, walk_t
   use nocdyn_orbit_problem, only: measured, orbit_point_t, orbit_problem_t
@@ -33,17 +34,23 @@ contains
     type(walk_t) :: walk, next
     character(len=:), allocatable :: fault
     real(wp) :: step
-    integer :: iterations
-    logical :: is_done, is_good
+    integer :: iterations, kept
+    logical :: is_done, is_good, is_whole
 
     allocate (branch%points(0))
     branch%ending = ''
-    call start_walk(problem, settings, guess, walk, branch%has_begun, error)
-    if (allocated(error)) return
-    call branch%add(walk%point)
     step = first_step
+    call recall_branch(settings, problem, branch, walk, step, is_whole, error)
+    if (allocated(error) .or. is_whole) return
+    kept = branch%count
+    if (kept == 0) then
+      call start_walk(problem, settings, guess, walk, branch%has_begun, error)
+      if (allocated(error)) return
+      call branch%add(walk%point)
+    end if
     is_done = .false.
     do while (.not. is_done)
+      if (settings%is_stopped()) return
       if (branch%count >= settings%most_points) then
         branch%ending = 'after most_points = ' // to_text(settings%most_points) // ' points'
         exit
@@ -71,7 +78,10 @@ contains
       if (is_done .or. branch%is_closed) exit
       call adapt_step(iterations, walk, next, step)
       walk = next
+      call keep_step(problem, branch, walk, step, kept, error)
+      if (allocated(error)) return
     end do
+    call keep_end(settings, branch, kept, error)
   end subroutine follow_branch
 
   !> Whether a branch passes its first point again between two others, in the same direction.

@@ -4,6 +4,7 @@ module nocdyn_orbit_settings
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_orbit_log, only: orbit_log_t
   use nocdyn_targets, only: find_target, target_t
   use nocdyn_text, only: lower_case, quoted
   use nocdyn_written_values, only: unit_of, written_element, written_number, written_unit
@@ -41,9 +42,20 @@ module nocdyn_orbit_settings
     real(wp) :: tolerance = 0.0_wp             !! error of a point as a share of its motion
     real(wp), allocatable :: motions(:)        !! values at which motions are written
     logical :: has_spectrum = .false.          !! whether the harmonics of the points are written
+    type(orbit_log_t), pointer :: log => null()   !! journal of the analysis, if it has one
+  contains
+    procedure :: is_stopped
   end type orbit_settings_t
 
 contains
+
+  !> Whether an analysis with a journal has been interrupted.
+  logical function is_stopped(self)
+    class(orbit_settings_t), intent(in) :: self
+
+    is_stopped = .false.
+    if (associated(self%log)) is_stopped = self%log%is_stopped()
+  end function is_stopped
 
   !> Reads &orbit.
   subroutine read_orbit_settings(input, machine, settings, error)

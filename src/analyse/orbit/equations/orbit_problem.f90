@@ -44,7 +44,7 @@ module nocdyn_orbit_problem
     procedure(find_fault), deferred :: find_fault
     procedure(measure), deferred :: measure
     procedure(resolution), deferred :: resolution
-    procedure :: adapt, recast, range, resume, sample
+    procedure :: adapt, least_size, recast, range, restore, sample
   end type orbit_problem_t
 
   abstract interface
@@ -173,13 +173,6 @@ contains
     has_changed = .false.
   end subroutine adapt
 
-  !> Goes back to the resolution of a point. By default there is one resolution only.
-  subroutine resume(self, point, error)
-    class(orbit_problem_t), intent(inout) :: self
-    type(orbit_point_t), intent(in) :: point
-    type(error_t), allocatable, intent(out) :: error
-  end subroutine resume
-
   !> A tangent in the present resolution. By default there is one resolution only.
   function recast(self, point, tangent) result(other)
     class(orbit_problem_t), intent(inout) :: self
@@ -199,6 +192,20 @@ contains
     type(signal_samples_t), intent(out) :: samples
     type(error_t), allocatable, intent(out) :: error
   end subroutine sample
+  !> What `set_scale` has found, 0 if nothing.
+  real(wp) function least_size(self)
+    class(orbit_problem_t), intent(in) :: self
+
+    least_size = 0.0_wp
+  end function least_size
+
+  !> Goes back to the resolution of a point. By default there is one resolution only.
+  subroutine restore(self, point, least, error)
+    class(orbit_problem_t), intent(inout) :: self
+    type(orbit_point_t), intent(in) :: point
+    real(wp), intent(in) :: least   !! as of `least_size`
+    type(error_t), allocatable, intent(out) :: error
+  end subroutine restore
 
   !> The width of the range of the parameter.
   pure real(wp) function range(self)

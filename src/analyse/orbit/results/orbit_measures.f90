@@ -8,6 +8,7 @@ module nocdyn_orbit_measures
   use nocdyn_moment_forms, only: moment_form_t
   use nocdyn_orbit_analysis, only: analyse_orbits, orbit_analysis_t
   use nocdyn_orbit_damages, only: orbit_damage_t, read_damages
+  use nocdyn_orbit_log, only: orbit_log_t
   use nocdyn_orbit_motions, only: find_motions, motion_t
   use nocdyn_orbit_parts, only: find_parts, part_t
   use nocdyn_orbit_points, only: fold
@@ -60,11 +61,12 @@ module nocdyn_orbit_measures
 contains
 
   !> Follows the branches of an input and measures their points.
-  subroutine measure_orbits(input, machine, self, error)
+  subroutine measure_orbits(input, machine, self, error, log)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine   !! one lane
     type(measured_orbits_t), intent(inout) :: self
     type(error_t), allocatable, intent(out) :: error
+    type(orbit_log_t), target, intent(inout), optional :: log   !! journal, which must live as long as `self`
     type(string_t), allocatable :: notes(:)
     integer :: i
     logical :: is_mode
@@ -75,7 +77,7 @@ contains
       is_mode = input%groups(input%position('orbit'))%has_value('mode')
       if (.not. is_mode) call choose_measured(input, machine, self, notes, error)
     end if
-    if (.not. allocated(error)) call analyse_orbits(input, machine, self%orbit_analysis_t, error)
+    if (.not. allocated(error)) call analyse_orbits(input, machine, self%orbit_analysis_t, error, log)
     if (.not. allocated(error) .and. is_mode) then   ! whose machine has fewer elements
       call choose_measured(input, self%problem%periodic%machine%formulation%machine, self, notes, error)
     end if
