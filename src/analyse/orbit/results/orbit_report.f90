@@ -7,7 +7,7 @@ module nocdyn_orbit_report
   use nocdyn_kinds, only: wp
   use nocdyn_orbit_analysis, only: orbit_analysis_t
   use nocdyn_orbit_parts, only: find_parts, part_t
-  use nocdyn_orbit_points, only: branch_point, doubling, fold, neimark_sacker, torque_fold
+  use nocdyn_orbit_problem, only: branch_point, doubling, fold, hopf, neimark_sacker, torque_fold
   use nocdyn_orbit_problem, only: orbit_point_t
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: output_units, turn_units
@@ -87,6 +87,12 @@ contains
       call json%put('value', point%orbit%value)
       call json%put('point', number)
       call json%put('period', 2 * acos(-1.0_wp) / point%orbit%rate)
+      if (point%kind == hopf) then
+        call json%put('frequency_hz', point%orbit%rate / (2 * acos(-1.0_wp)))
+        if (point%leads_to > 0) call json%put('supercritical', point%is_supercritical)
+      end if
+      if (point%orbit%subharmonic > 1) call json%put('subharmonic', point%orbit%subharmonic)
+      if (point%leads_to > 0) call json%put('leads_to', point%leads_to)
       associate (shown => point%multipliers(:min(most_multipliers, size(point%multipliers))))
         call json%put('multipliers_real', real(shown, wp))
         call json%put('multipliers_imaginary', aimag(shown))
@@ -148,7 +154,7 @@ contains
 
     allocate (signals, source=analysis%signals)
     call turn_units(signals, output_units(input), unit)
-    shown = min(most_multipliers, size(analysis%branch%points(1)%multipliers))
+    shown = min(most_multipliers, minval([(size(analysis%branch%points(i)%multipliers), i=1, analysis%branch%count)]))
     labels = [string_t('branch')]
     call append(labels, with_unit(analysis%parameter, analysis%unit))
     labels = [labels, strings([character(len=12) :: 'rate [rad/s]', 'special', 'harmonics', 'error'])]
@@ -196,6 +202,8 @@ contains
       number_of = 4.0_wp
     case (torque_fold)
       number_of = 5.0_wp
+    case (hopf)
+      number_of = 6.0_wp
     case default
       number_of = 0.0_wp
     end select
