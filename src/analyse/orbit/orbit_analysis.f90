@@ -1,7 +1,8 @@
 !> Periodic motions of a machine over a number of its input or over a speed: from the input to the branch.
 module nocdyn_orbit_analysis
   use nocdyn_backbone_start, only: start_backbone
-  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_branch_switching, only: follow_switches
+  use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_harmonic_problem, only: harmonic_problem_t, new_harmonic_problem
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
@@ -19,6 +20,7 @@ module nocdyn_orbit_analysis
   use nocdyn_periodic_machine, only: body_turning, orbit_t, periodic_machine_t
   use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
   use nocdyn_sampled_machine, only: new_sampled_machine
+  use nocdyn_self_excited, only: follow_self_excited
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
   implicit none (type, external)
   private
@@ -29,6 +31,7 @@ module nocdyn_orbit_analysis
 
   type, public :: orbit_analysis_t
     type(orbit_settings_t) :: settings
+    logical :: is_self_excited = .false.               !! whether nothing excites the machine periodically
     character(len=:), allocatable :: parameter, unit   !! what changes
     character(len=:), allocatable :: body_name         !! whose speed is held, ''
     type(branch_t) :: branch                           !! with the points of all branches
@@ -71,12 +74,20 @@ contains
       call study_mode(input, machine, periodic, guess, self, error)
     else
       call study_machine(input, self%settings, periodic, guess, error)
+      self%is_self_excited = periodic%rate_is_unknown
+      if (self%is_self_excited .and. .not. allocated(error)) call refuse_keys(input, self%settings, error)
     end if
     if (.not. allocated(error)) call choose_problem(periodic, guess, self%settings, problem, error)
     if (.not. allocated(error)) call follow_from(input, problem, guess, self, error)
     if (.not. allocated(error) .and. self%settings%mode > 0) call find_quasi_linear(problem, self%branch, self%backbone)
     if (.not. allocated(error) .and. self%settings%starts > 0) then
       call find_isolated(input, self%settings, problem, self%branch, self%found)
+    end if
+    if (.not. allocated(error) .and. self%settings%switches) then
+      select type (problem)
+      class is (harmonic_problem_t)
+        call follow_switches(problem, self%settings, self%branch)
+      end select
     end if
     if (.not. allocated(error)) then
       self%is_unfinished = self%settings%is_stopped()
@@ -85,6 +96,22 @@ contains
     end if
     if (index(error%message, input%shown_case()) /= 1) error%message = input%shown_case() // ': ' // error%message
   end subroutine analyse_orbits
+
+  !> Refuses what has no meaning for a machine that nothing excites.
+  subroutine refuse_keys(input, settings, error)
+    type(input_t), intent(in) :: input
+    type(orbit_settings_t), intent(in) :: settings
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: key
+
+    key = ''
+    if (settings%subharmonic > 1) key = 'subharmonic'
+    if (settings%starts > 0) key = 'starts'
+    if (settings%starts_high .or. settings%start_file /= '') key = 'start'
+    if (key == '') return
+    call raise(error, exit_input, input%location(settings%group, key) // ': ' // key // ': nothing excites this machine ' // &
+               "periodically; allowed: the limit cycles that begin at its steady state, or start = 'settled_run'")
+  end subroutine refuse_keys
 
   !> The method.
   subroutine choose_problem(periodic, guess, settings, problem, error)
@@ -101,6 +128,8 @@ contains
     if (settings%mode > 0) then
       call harmonic%equations%anchor(guess)
       call harmonic%finer%anchor(guess)
+    else if (periodic%rate_is_unknown) then
+      settings%has_stability = .true.   ! which steady states lose
     else if (.not. settings%asks_stability) then
       if (harmonic%has_short_steps(guess)) settings%has_stability = .false.
     end if
@@ -120,6 +149,12 @@ contains
 
     if (self%settings%mode > 0) then
       call follow_branch(problem, self%settings, guess, self%branch, error)
+      return
+    else if (self%is_self_excited) then
+      select type (problem)
+      class is (harmonic_problem_t)
+        call follow_self_excited(input, problem, self%settings, guess, self%branch, self%notes, error)
+      end select
       return
     end if
     if (self%settings%start_file /= '') then
@@ -161,11 +196,7 @@ contains
     periodic%bounds = [min(settings%from, settings%to), max(settings%from, settings%to)]
     call find_period(periodic%machine%formulation%machine, periodic%turning, periodic%period, error)
     if (allocated(error)) return
-    if (size(periodic%period%multiples) == 0) then
-      call raise(error, exit_failed, 'nothing excites the machine periodically; required: an excitation with a frequency or ' // &
-                 'orders. Oscillations that excite themselves are not computed')
-      return
-    end if
+    periodic%rate_is_unknown = size(periodic%period%multiples) == 0
     periodic%held = settings%body
     if (periodic%held > 0) then
       periodic%held_motion = maxloc(abs(periodic%turning(periodic%held, :)), dim=1)
@@ -281,6 +312,7 @@ contains
     integer :: turns
 
     motion = guess
+    if (periodic%rate_is_unknown) motion%rate = turn / input%groups(input%position('run'))%number('t_end')
     call periodic%take_border(periodic%put_border(guess), guess%value, motion)
     call periodic%set_value(motion, error)
     if (allocated(error)) return

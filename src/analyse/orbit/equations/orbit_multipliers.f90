@@ -14,7 +14,7 @@ module nocdyn_orbit_multipliers
   implicit none (type, external)
   private
 
-  public :: find_multipliers, find_monodromy, steps_of
+  public :: deflate, find_multipliers, find_monodromy, scale_speeds, steps_of
 
   integer, parameter :: stages = 12            ! of DOP853 without its dense output
   real(wp), parameter :: longest = 0.5_wp      ! step times a bound of the eigenvalues of the Jacobian

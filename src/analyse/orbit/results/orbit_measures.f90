@@ -11,8 +11,7 @@ module nocdyn_orbit_measures
   use nocdyn_orbit_log, only: orbit_log_t
   use nocdyn_orbit_motions, only: find_motions, motion_t
   use nocdyn_orbit_parts, only: find_parts, part_t
-  use nocdyn_orbit_points, only: fold
-  use nocdyn_orbit_problem, only: orbit_point_t, signal_range_t
+  use nocdyn_orbit_problem, only: fold, orbit_point_t, signal_range_t
   use nocdyn_orbit_signals, only: list_orbit_signals
   use nocdyn_response_limits, only: no_limit, read_limits, response_limit_t
   use nocdyn_signal_columns, only: new_signal_columns, signal_columns_t

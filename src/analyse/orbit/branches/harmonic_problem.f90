@@ -22,11 +22,16 @@ module nocdyn_harmonic_problem
     type(orbit_equations_t) :: equations
     type(orbit_equations_t) :: finer             !! of twice the harmonics, for errors and signals
     integer :: harmonics = 0                     !! by error if it is 0
+    integer :: vanishing = 0                     !! harmonics that vanish where the branch meets the one that it has left; 0: none
   contains
     procedure :: begin, put_together, correct, find_tangent, weights_of, oscillation, set_scale, complete, find_multipliers
     procedure :: find_fault, measure, sample, resolution, adapt, least_size, recast, restore, has_short_steps
-    procedure, private :: least_harmonics
+    procedure :: keep_phase, meets_other, set_subharmonic, keep_vanishing
+    procedure, private :: least_harmonics, vanishes
   end type harmonic_problem_t
+
+  !> Harmonics that vanish: of limit cycles in a steady state, of motions of twice the period, of motions that are not symmetric.
+  integer, parameter, public :: all_harmonics = 1, odd_harmonics = 2, even_harmonics = 3
 
   integer, parameter :: first_harmonics = 5
   integer, parameter :: most_harmonics = 200
@@ -264,5 +269,70 @@ contains
       end associate
     end associate
   end function recast
+
+  subroutine keep_phase(self, orbit)
+    class(harmonic_problem_t), intent(inout) :: self
+    type(orbit_t), intent(in) :: orbit
+
+    if (.not. self%equations%rate_is_unknown .or. allocated(self%equations%travel)) return
+    call self%equations%anchor(orbit)
+    call self%finer%anchor(orbit)
+  end subroutine keep_phase
+
+  !> The harmonics that vanish on the other branch change their sign there.
+  logical function meets_other(self, before, after)
+    class(harmonic_problem_t), intent(in) :: self
+    type(orbit_t), intent(in) :: before, after
+    real(wp) :: common
+    integer :: k
+
+    meets_other = .false.
+    if (self%vanishing == 0) return
+    common = 0.0_wp
+    associate (f => self%equations%freedoms)
+      do k = 1, min(size(before%series, 1), size(after%series, 1)) / 2
+        if (.not. self%vanishes(k)) cycle
+        common = common + sum(before%series(2 * k:2 * k + 1, :f) * after%series(2 * k:2 * k + 1, :f))
+      end do
+    end associate
+    meets_other = common < 0
+  end function meets_other
+
+  !> Whether a harmonic vanishes on the other branch.
+  pure logical function vanishes(self, harmonic)
+    class(harmonic_problem_t), intent(in) :: self
+    integer, intent(in) :: harmonic
+
+    vanishes = self%vanishing == all_harmonics .or. self%vanishing == odd_harmonics .and. modulo(harmonic, 2) == 1 .or. &
+               self%vanishing == even_harmonics .and. modulo(harmonic, 2) == 0
+  end function vanishes
+
+  !> Takes out of a direction all but the harmonics that vanish on the other branch.
+  subroutine keep_vanishing(self, direction)
+    class(harmonic_problem_t), intent(in) :: self
+    real(wp), intent(inout) :: direction(:)   !! [unknowns + 1]
+    integer :: i, k, n
+
+    associate (equations => self%equations)
+      do n = 1, equations%nodes
+        i = equations%first_unknown(n)
+        direction(i) = 0.0_wp
+        do k = 1, equations%basis%harmonics
+          if (.not. self%vanishes(k)) direction(i + 2 * k - 1:i + 2 * k) = 0.0_wp
+        end do
+      end do
+      direction(equations%system%inner + 1:) = 0.0_wp
+    end associate
+  end subroutine keep_vanishing
+
+  !> Looks for motions with another number of periods of the excitation in theirs.
+  subroutine set_subharmonic(self, subharmonic)
+    class(harmonic_problem_t), intent(inout) :: self
+    integer, intent(in) :: subharmonic
+
+    self%periodic%subharmonic = subharmonic
+    self%equations%subharmonic = subharmonic
+    self%finer%subharmonic = subharmonic
+  end subroutine set_subharmonic
 
 end module nocdyn_harmonic_problem

@@ -37,6 +37,7 @@ module nocdyn_orbit_settings
     logical :: settles = .false.               !! whether a run settles on the first motion
     logical :: starts_high = .false.           !! whether it is the largest one on which runs settle
     character(len=:), allocatable :: start_file   !! table of a motion near it, else ''
+    logical :: switches = .false.              !! whether branches that leave the first one are followed
     logical :: has_stability = .true.          !! whether multipliers are computed
     logical :: asks_stability = .false.        !! whether the input says so
     real(wp) :: tolerance = 0.0_wp             !! error of a point as a share of its motion
@@ -105,6 +106,7 @@ contains
       settings%to = range(2)
       settings%at = range(1)
       settings%ahead = sign(1.0_wp, range(2) - range(1))
+      settings%switches = group%flag('switch_branches')
       if (group%has_value('starts')) settings%starts = group%whole_number('starts')
       if (group%has_value('harmonics')) settings%harmonics = group%whole_number('harmonics')
       if (group%has_value('count')) settings%count = group%whole_number('count')
