@@ -35,6 +35,7 @@ module nocdyn_shooting_problem
     real(wp), allocatable, private :: factors(:, :)
     integer, allocatable, private :: pivots(:)
     integer, private :: grazed = 0                          !! a switch whose edge is touched, 0: none
+    real(wp), private :: gained = 0.0_wp                    !! speed in a period, as a share of the oscillation
   contains
     procedure :: begin, put_together, correct, find_tangent, weights_of, oscillation, set_scale, complete, find_multipliers
     procedure :: find_fault, measure, resolution
@@ -51,6 +52,7 @@ module nocdyn_shooting_problem
   real(wp), parameter :: difference = 1.0e-5_wp  ! steps of the central differences, in weighted size
   real(wp), parameter :: silent = 1.0e-30_wp     ! a machine that does not oscillate yet
   real(wp), parameter :: grazing = 1.0e-3_wp     ! rate of an indicator, as a share of the usual ones
+  real(wp), parameter :: kept = 1.0e-6_wp        ! gain of speed that is none
   real(wp), parameter :: unresolved = 1.0e-3_wp  ! error above which a motion is none
 
 contains
@@ -202,12 +204,13 @@ contains
     logical, intent(in) :: with_variations
     class(flow_observer_t), intent(inout) :: observer
     type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: unknown = 1.0e-20_wp, usual = 1.0e-3_wp   ! sizes of states before the first motion
     real(wp) :: y(self%states)
 
     select type (machine => self%periodic%machine%formulation)
     class is (varied_machine_t)
       machine%scale = self%scales(orbit%rate)
-      where (.not. machine%scale > sqrt(tiny(1.0_wp))) machine%scale = 1.0_wp
+      where (.not. machine%scale > unknown) machine%scale = usual
       machine%duration = times(size(times))
       machine%outside = self%periodic%holding_acceleration(orbit%torque)
       y = orbit%state
@@ -355,11 +358,11 @@ contains
     type(error_t), allocatable :: error
     logical :: is_regular
 
-    call self%fill_differences(self%x, error)
     tangent = 0.0_wp
     tangent(size(tangent)) = 1.0_wp
-    if (.not. allocated(error)) call self%factor(is_regular)
-    call lu_solve(self%factors, self%pivots, tangent)
+    call self%fill_differences(self%x, error)
+    call self%factor(is_regular)
+    if (is_regular) call lu_solve(self%factors, self%pivots, tangent)
     tangent = tangent / measured(tangent, weights)
   end subroutine find_tangent
 
@@ -394,10 +397,10 @@ contains
   real(wp) function oscillation(self, x)
     class(shooting_problem_t), intent(in) :: self
     real(wp), intent(in) :: x(:)
-    real(wp) :: scale(self%states)
 
-    scale = self%scales(huge(1.0_wp))
-    oscillation = scale(self%periodic%machine%freedoms + 1)
+    associate (f => self%periodic%machine%freedoms)
+      oscillation = max(silent, self%least_oscillation, maxval(self%half_range(f + 1:2 * f)))
+    end associate
   end function oscillation
 
   subroutine set_scale(self, x)
@@ -440,6 +443,8 @@ contains
     point%harmonics = 0
     point%crossed = 0
     scale = self%scales(point%orbit%rate)
+    self%gained = 0.0_wp
+    if (size(self%periodic%free) > 0) self%gained = maxval(abs(x(self%free_places()))) / scale(1)
     point%error = maxval(abs(rough%samples(:, samples + 1) - fine%samples(:, samples + 1)) / scale)
     associate (f => self%periodic%machine%freedoms)
       call find_series(self%periodic, fine%samples(f + 1:, :), 0.0_wp, times(samples + 1), point%orbit)
@@ -486,6 +491,8 @@ contains
     character(len=:), allocatable, intent(out) :: fault
 
     fault = ''
+    if (self%gained > kept) fault = 'the machine gains speed in each period: the mean torques do not balance, and none depends ' // &
+      'on the mean speed'
     if (.not. point%error <= unresolved) fault = 'the integration over a period is not exact enough (error ' // &
       rounded_text(point%error, 2) // ' of the motion)'
   end subroutine find_fault

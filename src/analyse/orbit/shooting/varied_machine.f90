@@ -150,8 +150,9 @@ contains
     call self%rates_at(t, y, before)
     fall = dot_product(gradient, before) + rate
     terms = sum(abs(gradient) * self%scale) + abs(rate) * self%duration
-    if (abs(fall) * self%duration < self%slowest * terms) then
-      self%slowest = abs(fall) * self%duration / max(terms, tiny(terms))
+    terms = abs(fall) * self%duration / max(terms, tiny(terms))
+    if (terms < self%slowest) then
+      self%slowest = terms
       self%grazed = which
     end if
     y_before = y
