@@ -405,9 +405,9 @@ REFUSED = [
         + OVER.format(0.8, 1.6, ""),
         "do not repeat themselves",
     ),
-    (PLAY + OVER.format(6.4, 14.0, ""), "the motion crosses the edge of the gap of coupling 'play'"),
+    (PLAY + OVER.format(6.4, 14.0, "method = 'harmonic_balance'"), "the motion crosses the edge of the gap of coupling 'play'"),
     (
-        DUFFING.replace("inertia = 1.0", "inertia = 1.0 bearing_friction = 0.1") + OVER.format(0.8, 1.6, ""),
+        DUFFING.replace("inertia = 1.0", "inertia = 1.0 bearing_friction = 0.1") + OVER.format(0.8, 1.6, "method = 'harmonic_balance'"),
         "does not know whether bearings slip",
     ),
 ]
@@ -419,7 +419,7 @@ def test_what_has_no_branch_is_refused(nocdyn, text, message):
 
 
 def test_a_branch_ends_where_its_motion_reaches_a_kink(nocdyn):
-    outcome = nocdyn.done(PLAY + OVER.format(5.0, 14.0, ""), command="orbit")
+    outcome = nocdyn.done(PLAY + OVER.format(5.0, 14.0, "method = 'harmonic_balance'"), command="orbit")
     assert "the branch ends at 6.1" in outcome.stdout
     assert "the motion crosses the edge of the gap of coupling 'play'" in outcome.stdout
     values = nocdyn.values("out", "orbit.csv")

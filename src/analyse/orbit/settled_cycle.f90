@@ -6,7 +6,8 @@ module nocdyn_settled_cycle
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_orbit_guess, only: advance, find_series, formulation_angles, guess_samples, start_machine
+  use nocdyn_orbit_guess, only: advance, formulation_angles, guess_samples, start_machine
+  use nocdyn_orbit_series, only: find_series
   use nocdyn_orbit_settings, only: orbit_settings_t
   use nocdyn_periodic_machine, only: orbit_t, periodic_machine_t
   implicit none (type, external)

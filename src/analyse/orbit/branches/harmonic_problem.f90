@@ -23,6 +23,7 @@ module nocdyn_harmonic_problem
     type(orbit_equations_t) :: finer             !! of twice the harmonics, for errors and signals
     integer :: harmonics = 0                     !! by error if it is 0
     integer :: vanishing = 0                     !! harmonics that vanish where the branch meets the one that it has left; 0: none
+    integer :: kink = 0                          !! the switch at which a motion has failed, 0: none
   contains
     procedure :: begin, put_together, correct, find_tangent, weights_of, oscillation, set_scale, complete, find_multipliers
     procedure :: find_fault, measure, sample, resolution, adapt, least_size, recast, restore, has_short_steps
@@ -180,12 +181,13 @@ contains
   end subroutine find_multipliers
 
   subroutine find_fault(self, point, fault)
-    class(harmonic_problem_t), intent(in) :: self
+    class(harmonic_problem_t), intent(inout) :: self
     type(orbit_point_t), intent(in) :: point
     character(len=:), allocatable, intent(out) :: fault
 
     fault = ''
     if (point%crossed > 0 .and. point%error > kinked) then
+      self%kink = point%crossed
       fault = 'the motion crosses the ' // self%equations%machine%formulation%switch_name(point%crossed) // ', a kink or ' // &
               'jump of its law that ' // to_text(point%harmonics) // ' harmonics do not describe (error ' // &
               rounded_text(point%error, 2) // ' of the motion)'

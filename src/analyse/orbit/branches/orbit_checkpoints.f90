@@ -137,18 +137,22 @@ contains
     character(len=:), allocatable, intent(inout) :: bytes
     integer, intent(inout) :: used
     real(wp) :: parts(2, size(point%multipliers))
+    integer :: states
 
     associate (orbit => point%orbit)
+      states = 0
+      if (allocated(orbit%state)) states = size(orbit%state)
       parts(1, :) = real(point%multipliers, wp)
       parts(2, :) = aimag(point%multipliers)
       call put_integers(bytes, used, [shape(orbit%series), size(orbit%speed), size(point%multipliers), point%harmonics, &
                                       point%branch, point%crossed, orbit%subharmonic, point%leads_to, &
-                                      merge(1, 0, point%is_supercritical)])
+                                      merge(1, 0, point%is_supercritical), states])
       call put_reals(bytes, used, reshape([orbit%value, orbit%rate, orbit%torque, orbit%damping, point%direction, &
                                                 point%error], [6, 1]))
       call put_reals(bytes, used, orbit%series)
       call put_reals(bytes, used, reshape(orbit%speed, [size(orbit%speed), 1]))
       call put_reals(bytes, used, parts)
+      if (states > 0) call put_reals(bytes, used, reshape(orbit%state, [states, 1]))
       call put_text(bytes, used, point%kind)
     end associate
   end subroutine pack_point
@@ -157,9 +161,9 @@ contains
     character(len=*), intent(in) :: bytes
     type(byte_reader_t), intent(inout) :: reader
     type(orbit_point_t), intent(inout) :: point
-    real(wp), allocatable :: parts(:, :), speed(:, :)
+    real(wp), allocatable :: parts(:, :), speed(:, :), state(:, :)
     real(wp) :: numbers(6, 1)
-    integer :: sizes(10)
+    integer :: sizes(11)
 
     call reader%take_integers(bytes, sizes)
     call reader%take_reals(bytes, numbers)
@@ -175,6 +179,12 @@ contains
       call reader%take_reals(bytes, orbit%series)
       call reader%take_reals(bytes, speed)
       call reader%take_reals(bytes, parts)
+      if (allocated(orbit%state)) deallocate (orbit%state)
+      if (sizes(11) > 0) then
+        allocate (state(sizes(11), 1))
+        call reader%take_reals(bytes, state)
+        orbit%state = state(:, 1)
+      end if
       call reader%take_text(bytes, point%kind)
       orbit%speed = speed(:, 1)
     end associate

@@ -19,6 +19,8 @@ module nocdyn_orbit_settings
 
   integer, parameter, public :: usual_periods = 300
 
+  integer, parameter, public :: any_method = 0, harmonic_balance = 1, shooting = 2
+
   type, public :: orbit_settings_t
     integer :: group = 0                       !! &orbit in the input
     type(target_t), allocatable :: targets(:)  !! the number over which it goes, none if it is a speed
@@ -30,6 +32,7 @@ module nocdyn_orbit_settings
     real(wp) :: ahead = 1.0_wp                 !! whether it begins towards rising (1) or falling values (-1)
     integer :: periods = usual_periods         !! after which a run has settled
     integer :: starts = 0                      !! scattered starts of runs that look for other branches
+    integer :: method = any_method
     integer :: harmonics = 0                   !! by error if it is 0
     integer :: subharmonic = 1
     integer :: count = 0                       !! points at even distances, beside others
@@ -108,6 +111,7 @@ contains
       settings%ahead = sign(1.0_wp, range(2) - range(1))
       settings%switches = group%flag('switch_branches')
       if (group%has_value('starts')) settings%starts = group%whole_number('starts')
+      if (group%has_value('method')) settings%method = merge(shooting, harmonic_balance, group%text('method') == 'shooting')
       if (group%has_value('harmonics')) settings%harmonics = group%whole_number('harmonics')
       if (group%has_value('count')) settings%count = group%whole_number('count')
       if (group%has_value('subharmonic')) settings%subharmonic = group%whole_number('subharmonic')

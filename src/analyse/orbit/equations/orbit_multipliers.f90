@@ -14,7 +14,7 @@ module nocdyn_orbit_multipliers
   implicit none (type, external)
   private
 
-  public :: deflate, find_multipliers, find_monodromy, scale_speeds, steps_of
+  public :: deflate, find_monodromy, find_multipliers, multipliers_of, scale_speeds, steps_of
 
   integer, parameter :: stages = 12            ! of DOP853 without its dense output
   real(wp), parameter :: longest = 0.5_wp      ! step times a bound of the eigenvalues of the Jacobian
@@ -29,16 +29,26 @@ contains
     complex(wp), allocatable, intent(out) :: multipliers(:)
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: matrix(:, :), known(:, :)
+
+    call find_monodromy(equations, orbit, matrix, error)
+    if (allocated(error)) return
+    call known_vectors(equations, orbit, known, error)
+    if (.not. allocated(error)) call multipliers_of(equations%freedoms, matrix, known, multipliers, error)
+  end subroutine find_multipliers
+
+  !> The eigenvalues of a monodromy matrix by descending modulus, without those of known eigenvectors, which are 1.
+  subroutine multipliers_of(freedoms, matrix, known, multipliers, error)
+    integer, intent(in) :: freedoms                         !! coordinates
+    real(wp), allocatable, intent(inout) :: matrix(:, :)    !! [states, states], on return without these
+    real(wp), allocatable, intent(inout) :: known(:, :)     !! [states, vectors], on return none
+    complex(wp), allocatable, intent(out) :: multipliers(:)
+    type(error_t), allocatable, intent(out) :: error
     complex(wp), allocatable :: values(:), vectors(:, :)
     integer :: k, largest
     logical :: has_failed
     logical, allocatable :: is_left(:)
 
-    call find_monodromy(equations, orbit, matrix, error)
-    if (allocated(error)) return
-    call known_vectors(equations, orbit, known, error)
-    if (allocated(error)) return
-    call scale_speeds(equations%freedoms, matrix, known)
+    call scale_speeds(freedoms, matrix, known)
     do k = 1, size(known, 2)
       call deflate(matrix, known)
     end do
@@ -56,7 +66,7 @@ contains
       is_left(largest) = .false.
       multipliers(k) = values(largest)
     end do
-  end subroutine find_multipliers
+  end subroutine multipliers_of
 
   !> Derivatives of the state after one period by the state at its begin, [states, states].
   subroutine find_monodromy(equations, orbit, matrix, error)

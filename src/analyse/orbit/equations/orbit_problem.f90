@@ -141,7 +141,7 @@ module nocdyn_orbit_problem
     subroutine find_fault(self, point, fault)
       import :: orbit_point_t, orbit_problem_t
       implicit none (type, external)
-      class(orbit_problem_t), intent(in) :: self
+      class(orbit_problem_t), intent(inout) :: self
       type(orbit_point_t), intent(in) :: point
       character(len=:), allocatable, intent(out) :: fault
     end subroutine find_fault

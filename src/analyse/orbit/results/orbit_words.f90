@@ -42,9 +42,8 @@ contains
       if (analysis%is_self_excited) text = counted(size(points), 'steady state or limit cycle', 'steady states and limit cycles')
       text = input%shown_case() // ': ' // text // ' over ' // &
              analysis%parameter // ' from ' // shown(analysis, analysis%settings%from) // ' to ' // &
-             shown(analysis, analysis%settings%to) // ', ' // to_text(minval(points%harmonics))
-      if (maxval(points%harmonics) > minval(points%harmonics)) text = text // ' to ' // to_text(maxval(points%harmonics))
-      call report%append_line(text // ' harmonics, largest error ' // rounded_text(maxval(points%error), 2) // ' of the motion')
+             shown(analysis, analysis%settings%to) // ', ' // method_of(points)
+      call report%append_line(text // ', largest error ' // rounded_text(maxval(points%error), 2) // ' of the motion')
       if (maxval(points%error) > analysis%settings%tolerance) then
         i = count(points%error > analysis%settings%tolerance)
         call report%append_line('  ' // counted(i, 'point has', 'points have') // ' an error above the tolerance, ' // &
@@ -63,6 +62,18 @@ contains
     call append_damages(analysis, report)
     text = report%text()
   end function orbit_text
+
+  !> How the points were found: 'by shooting', or '5 to 9 harmonics'.
+  function method_of(points) result(text)
+    type(orbit_point_t), intent(in) :: points(:)
+    character(len=:), allocatable :: text
+
+    text = 'by shooting'
+    if (maxval(points%harmonics) == 0) return
+    text = to_text(minval(points%harmonics))
+    if (maxval(points%harmonics) > minval(points%harmonics)) text = text // ' to ' // to_text(maxval(points%harmonics))
+    text = text // ' harmonics'
+  end function method_of
 
   !> A value of the parameter with its unit; a speed also in the unit of the input.
   function shown(analysis, value, figures) result(text)
