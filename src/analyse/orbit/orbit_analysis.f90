@@ -86,8 +86,8 @@ contains
     allocate (harmonic)
     call new_harmonic_problem(periodic, settings%harmonics, settings%tolerance, harmonic, error)
     if (allocated(error)) return
-    if (.not. settings%asks_stability) then
-      if (harmonic%has_short_steps(guess)) settings%has_stability = .false.
+    if (settings%has_stability .and. .not. settings%asks_stability) then
+      if (harmonic%takes_long(guess)) settings%has_stability = .false.
     end if
     call move_alloc(harmonic, problem)
   end subroutine choose_problem
