@@ -179,8 +179,8 @@ contains
       call harmonic%finer%anchor(guess)
     else if (periodic%rate_is_unknown) then
       self%settings%has_stability = .true.   ! which steady states lose
-    else if (.not. self%settings%asks_stability) then
-      if (harmonic%has_short_steps(guess)) self%settings%has_stability = .false.
+    else if (self%settings%has_stability .and. .not. self%settings%asks_stability) then
+      if (harmonic%takes_long(guess)) self%settings%has_stability = .false.
     end if
     allocate (notes, source=self%notes)
     call follow_from(input, harmonic, guess, self, error)

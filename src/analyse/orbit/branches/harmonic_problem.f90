@@ -6,9 +6,10 @@ module nocdyn_harmonic_problem
   use nocdyn_orbit_corrector, only: correct_harmonics => correct, estimate_error, find_harmonic_tangent => find_tangent, &
     harmonic_weights => weights_of, largest_harmonic => oscillation, set_least_oscillation
   use nocdyn_orbit_equations, only: orbit_equations_t, samples_of
-  use nocdyn_orbit_multipliers, only: harmonic_multipliers => find_multipliers, steps_of
+  use nocdyn_orbit_multipliers, only: harmonic_multipliers => find_multipliers
   use nocdyn_orbit_problem, only: orbit_point_t, orbit_problem_t, signal_range_t
   use nocdyn_orbit_signals, only: measure_signals, sample_signals
+  use nocdyn_orbit_variations, only: steps_of
   use nocdyn_periodic_machine, only: orbit_t, periodic_machine_t
   use nocdyn_signal_samples, only: signal_samples_t
   use nocdyn_signals, only: signal_t
@@ -26,7 +27,7 @@ module nocdyn_harmonic_problem
     integer :: kink = 0                          !! the switch at which a motion has failed, 0: none
   contains
     procedure :: begin, put_together, correct, find_tangent, weights_of, oscillation, set_scale, complete, find_multipliers
-    procedure :: find_fault, measure, sample, resolution, adapt, least_size, recast, restore, has_short_steps
+    procedure :: find_fault, measure, sample, resolution, adapt, least_size, recast, restore, takes_long
     procedure :: keep_phase, meets_other, set_subharmonic, keep_vanishing
     procedure, private :: least_harmonics, vanishes
   end type harmonic_problem_t
@@ -37,7 +38,7 @@ module nocdyn_harmonic_problem
   integer, parameter :: first_harmonics = 5
   integer, parameter :: most_harmonics = 200
   integer, parameter :: most_of_kinks = 60       ! where laws have kinks, more are of little use
-  integer, parameter :: most_steps = 5000        ! over a period, for multipliers that are not asked for
+  real(wp), parameter :: most_work = 2.0e6_wp    ! of multipliers that are not asked for: steps times squared states
   real(wp), parameter :: kinked = 1.0e-6_wp      ! error above which a motion across kinks is none
   real(wp), parameter :: unresolved = 1.0e-3_wp  ! error above which any motion is none
 
@@ -60,16 +61,16 @@ contains
     if (.not. allocated(error)) self%finer = self%equations
   end subroutine new_harmonic_problem
 
-  !> Whether the multipliers of a motion take many steps.
-  logical function has_short_steps(self, guess)
+  !> Whether the multipliers of a motion take long.
+  logical function takes_long(self, guess)
     class(harmonic_problem_t), intent(inout) :: self
     type(orbit_t), intent(in) :: guess
     type(orbit_t) :: motion
 
     motion = guess
     motion%series = padded_series(guess%series, self%equations%basis%length)
-    has_short_steps = steps_of(self%equations, motion) > most_steps
-  end function has_short_steps
+    takes_long = steps_of(self%equations, motion) * real(self%equations%machine%states, wp)**2 > most_work
+  end function takes_long
 
   !> The harmonics with which a branch begins: those of the excitation and one more.
   pure integer function least_harmonics(self)

@@ -13,7 +13,7 @@ module nocdyn_orbit_settings
 
   public :: read_orbit_settings
 
-  integer, parameter :: most_states = 100      ! for which multipliers are computed unasked: they take the cube of it
+  integer, parameter :: most_states = 200      ! for which multipliers are computed unasked: they take the cube of it
 
   character(len=*), parameter :: no_machine = ' case run load_case output response orbit limit fatigue transit sweep vary record '
 
