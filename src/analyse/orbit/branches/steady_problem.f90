@@ -95,7 +95,7 @@ contains
 
   !> Every steady state is good enough.
   subroutine find_fault(self, point, fault)
-    class(steady_problem_t), intent(in) :: self
+    class(steady_problem_t), intent(inout) :: self
     type(orbit_point_t), intent(in) :: point
     character(len=:), allocatable, intent(out) :: fault
 
