@@ -1,4 +1,4 @@
-"""Limit cycles of machines that nothing excites: Hopf points by closed forms, cycles by averaging, integration and settled runs."""
+"""Limit cycles of machines that nothing excites: Hopf points by closed forms, cycles by averaging, integration and runs."""
 
 import json
 
@@ -36,20 +36,23 @@ def refused(nocdyn, text):
     return outcome.stderr
 
 
-def cycle(rates, start, section, periods):
-    """Period and extremes of the limit cycle on which an integration settles; the section is a state that passes 0 upwards."""
+def cycle(rates, start, section, time):
+    """Period and extremes of the limit cycle on which an integration settles; a function of the state passes 0 upwards once."""
     integrate = pytest.importorskip("scipy.integrate")
-    passes = lambda t, y: y[section]  # noqa: E731
+    passes = lambda t, y: section(y)  # noqa: E731
     passes.direction = 1
-    settled = integrate.solve_ivp(rates, (0, periods), start, method="DOP853", rtol=1e-12, atol=1e-13, events=passes)
+    settled = integrate.solve_ivp(rates, (0, time), start, method="DOP853", rtol=1e-12, atol=1e-13, events=passes)
+    period = settled.t_events[0][-1] - settled.t_events[0][-2]
     begin = settled.y_events[0][-1]
-    times = []
-    for _ in range(2):
-        once = integrate.solve_ivp(rates, (0, periods), begin, method="DOP853", rtol=1e-12, atol=1e-13, events=passes)
-        times.append([t for t in once.t_events[0] if t > 1e-6][0])
-    dense = integrate.solve_ivp(rates, (0, times[0]), begin, method="DOP853", rtol=1e-12, atol=1e-13, dense_output=True)
-    states = dense.sol(np.linspace(0, times[0], 20001))
-    return times[0], states.min(axis=1), states.max(axis=1)
+    dense = integrate.solve_ivp(rates, (0, period), begin, method="DOP853", rtol=1e-12, atol=1e-13, dense_output=True)
+    states = dense.sol(np.linspace(0, period, 20001))
+    return period, states.min(axis=1), states.max(axis=1)
+
+
+def settling_time(values, row):
+    """After which a disturbance of a cycle is 1e-11 of itself."""
+    largest = abs(values["multiplier_1_real"][row] + 1j * values["multiplier_1_imaginary"][row])
+    return float((np.log(1e-11) / np.log(largest) + 5) * 2 * np.pi / values["rate"][row])
 
 
 def test_a_hopf_point_is_where_damping_vanishes_and_the_cycle_is_found_by_averaging(nocdyn):
@@ -63,30 +66,28 @@ def test_a_hopf_point_is_where_damping_vanishes_and_the_cycle_is_found_by_averag
     assert (values["stable"][rows] == 1).all()
     negative = -values["motor.push.b"][rows][0] - DAMPING  # small: the power of the damping vanishes over a period
     expected = 3 * np.pi * negative / (8 * QUADRATIC * np.sqrt(STIFFNESS / INERTIA))
-    assert values["half_range_phi_mass"][rows][0] == pytest.approx(expected, rel=1e-6)
+    assert values["half_range_phi_mass"][rows][0] == pytest.approx(expected, rel=1e-4)
     steady = values["branch"] == 1
     assert (values["stable"][steady] == (values["motor.push.b"][steady] > -DAMPING)).sum() >= np.count_nonzero(steady) - 1
     assert (values["half_range_phi_mass"][steady] == 0).all()
 
 
 def test_a_limit_cycle_is_the_one_of_an_integration(nocdyn):
-    values, _ = branches(nocdyn, MASS.format(f"quadratic = {QUADRATIC}", 0.0, -2.0, "tolerance = 1e-9"))
+    values, _ = branches(nocdyn, MASS.format(f"quadratic = {QUADRATIC}", 0.0, -1.0, "tolerance = 1e-9"))
     push = -values["motor.push.b"][-1]
-    assert push == 2.0
+    assert push == 1.0
 
     def rates(_, y):
         return [y[1], (-STIFFNESS * y[0] + (push - DAMPING) * y[1] - QUADRATIC * abs(y[1]) * y[1]) / INERTIA]
 
-    period, low, high = cycle(rates, [0.1, 0.0], 1, 30.0)
+    period, low, high = cycle(rates, [0.5, 0.0], lambda y: y[1], settling_time(values, -1))
     assert values["rate"][-1] == pytest.approx(2 * np.pi / period, rel=SETTLED)
     assert values["half_range_phi_mass"][-1] == pytest.approx((high[0] - low[0]) / 2, rel=SETTLED)
     assert values["half_range_omega_mass"][-1] == pytest.approx((high[1] - low[1]) / 2, rel=SETTLED)
 
 
 def test_falling_friction_begins_unstable_cycles_that_grow_without_bound(nocdyn):
-    values, report = branches(
-        nocdyn, MASS.format(f"constant = {FRICTION} constant_speed = {FRICTION_SPEED}", -0.4, -1.0, "")
-    )
+    values, report = branches(nocdyn, MASS.format(f"constant = {FRICTION} constant_speed = {FRICTION_SPEED}", -0.4, -1.0, ""))
     (point,) = hopf_points(report)
     begin = DAMPING + FRICTION / FRICTION_SPEED
     assert point["value"] == pytest.approx(-begin, abs=0.6 * LOCATED)
@@ -153,22 +154,22 @@ def test_a_drill_string_loses_its_stability_where_its_friction_falls(nocdyn):
 
 
 def test_stable_cycles_of_a_turning_machine_are_those_of_settled_runs(nocdyn):
-    values, report = branches(nocdyn, DRILLING.format(40000.0, 10000.0, "tolerance = 1e-9"))
+    values, _ = branches(nocdyn, DRILLING.format(40000.0, 10000.0, "tolerance = 1e-9"))
     rows = np.flatnonzero((values["branch"] == 2) & (values["stable"] == 1))
-    row = rows[len(rows) // 2]
+    row = rows[np.argmax(values["half_range_twist_string"][rows])]
+    end = settling_time(values, row)
     torque = float(values["motor.top.a"][row])
-    period, low, high = cycle(drill(torque), [1.0, torque / 4000.0, 5.0], 0, 2000.0)
+    period, low, high = cycle(drill(torque), [1.0, torque / 4000.0, 5.0], lambda y: y[1] - y[2], end)
     assert values["rate"][row] == pytest.approx(2 * np.pi / period, rel=SETTLED)
     half = (high - low) / 2
     for label, expected in zip(("twist_string", "omega_table", "omega_bit"), half, strict=True):
         assert values[f"half_range_{label}"][row] == pytest.approx(expected, abs=SETTLED * expected), label
-    end = 3000.0
     nocdyn.done(
         DRILL.replace("a = 40000.0", f"a = {torque!r}")
-        + f"&run t_end = {end} method = 'rk853' rtol = 1e-12 atol = 1e-13 max_steps = 10000000 /\n"
-        + f"&output extremes_from = {end - 1.02 * period!r} points = 11 /\n"
+        + f"&run t_end = {end!r} method = 'rk853' rtol = 1e-12 atol = 1e-13 max_steps = 10000000 /\n"
+        + f"&output extremes_from = {float(end - 1.02 * period)!r} points = 11 /\n"
     )
-    columns = nocdyn.summary("out")["columns"]
+    columns = {label.split(" [")[0]: extremes for label, extremes in nocdyn.summary("out")["columns"].items()}
     for label in ("twist_string", "omega_bit", "total_moment_string"):
         half_range = values[f"half_range_{label}"][row]
         found = (columns[label]["max"] - columns[label]["min"]) / 2

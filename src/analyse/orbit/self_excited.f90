@@ -131,6 +131,7 @@ contains
     if (allocated(error)) return
     call problem%keep_phase(guess)
     call follow_branch(problem, settings, guess, cycles, error)
+    if (allocated(error)) return
     do i = 1, cycles%count
       cycles%points(i)%branch = 2
       call branch%add(cycles%points(i))

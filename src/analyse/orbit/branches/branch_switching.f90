@@ -35,13 +35,10 @@ contains
     i = 1
     do while (i < branch%count - 1)   ! the count grows
       i = i + 1
-      select case (branch%points(i)%kind)
-      case (doubling)
-        if (2 * branch%points(i)%orbit%subharmonic > most_doublings * problem%periodic%subharmonic) cycle
-        call double_period(problem, settings, i, branch)
-      case (branch_point)
-        call leave_branch(problem, settings, i, branch)
-      end select
+      if (branch%points(i)%kind == branch_point) call leave_branch(problem, settings, i, branch)
+      if (branch%points(i)%kind /= doubling) cycle
+      if (2 * branch%points(i)%orbit%subharmonic > most_doublings * problem%periodic%subharmonic) cycle
+      call double_period(problem, settings, i, branch)
     end do
   end subroutine follow_switches
 
