@@ -195,6 +195,7 @@ contains
         if (distance_between(orbit, points(i - 1)%orbit, points(i)%orbit) > near) cycle
         other = orbit
         other%series = interpolated(orbit, points(i - 1)%orbit, points(i)%orbit)
+        if (allocated(other%state)) deallocate (other%state)
         x = problem%put_together(other)
         call problem%correct(row, orbit%value, x, iterations, has_converged, error)
         if (allocated(error) .or. .not. has_converged) cycle

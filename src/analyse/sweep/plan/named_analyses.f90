@@ -36,8 +36,8 @@ contains
     case ('response')
       allocate (analysis, source=response_results_t(sets_speed=.true., always_writes=.true., is_for_threads=.true.))
     case ('orbit')
-      allocate (analysis, source=orbit_results_t(is_steady=.false., locks_joints=.false., always_writes=.true., &
-                                                keeps_journal=.true.))
+      allocate (analysis, source=orbit_results_t(is_steady=.false., locks_joints=.false., takes_joints=.true., &
+                                                 always_writes=.true., keeps_journal=.true.))
     case default
       error stop 'nocdyn_named_analyses: there is no analysis of this name'
     end select

@@ -51,17 +51,16 @@ contains
     allocate (character(len=4096) :: bytes)
     used = 0
     call pack_points(settings%log, branch, kept, bytes, used)
-    call put_integers(bytes, used, [1, merge(1, 0, branch%is_closed)])
+    call put_integers(bytes, used, [1, merge(1, 0, branch%is_closed) + merge(2, 0, branch%is_back)])
     call put_text(bytes, used, branch%ending)
     call settings%log%put(bytes(:used), error)
   end subroutine keep_end
 
   !> Recalls the branch that begins now: as far as the journal has it.
-  subroutine recall_branch(settings, problem, branch, walk, step, is_whole, error)
-    type(orbit_settings_t), intent(in) :: settings
+  subroutine recall_branch(problem, branch, walk, step, is_whole, error)
     class(orbit_problem_t), intent(inout) :: problem
     type(branch_t), intent(inout) :: branch    !! has points if the journal has some
-    type(walk_t), intent(inout) :: walk
+    type(walk_t), intent(inout) :: walk        !! the first motion; where it stands if the journal has points
     real(wp), intent(inout) :: step
     logical, intent(out) :: is_whole           !! whether it has ended
     type(error_t), allocatable, intent(out) :: error
@@ -71,20 +70,21 @@ contains
     integer :: head(2)
 
     is_whole = .false.
-    if (.not. associated(settings%log)) return
-    settings%log%walks = settings%log%walks + 1
+    if (.not. associated(walk%settings%log)) return
+    walk%settings%log%walks = walk%settings%log%walks + 1
     do while (.not. is_whole)
-      call settings%log%read_next(bytes, goes_on=.false.)
+      call walk%settings%log%read_next(bytes, goes_on=.false.)
       if (bytes == '') exit
       reader = byte_reader_t()
       call reader%take_integers(bytes, head)
-      if (head(1) /= settings%log%walks) exit
-      call settings%log%read_next(bytes, goes_on=.true.)
+      if (head(1) /= walk%settings%log%walks) exit
+      call walk%settings%log%read_next(bytes, goes_on=.true.)
       call unpack_points(head(2), bytes, reader, branch)
       call reader%take_integers(bytes, head)
       is_whole = head(1) == 1
       if (is_whole) then
-        branch%is_closed = head(2) == 1
+        branch%is_closed = modulo(head(2), 2) == 1
+        branch%is_back = head(2) >= 2
         call reader%take_text(bytes, branch%ending)
       else
         call unpack_point(bytes, reader, walk%point)
@@ -93,10 +93,7 @@ contains
         call reader%take_reals(bytes, numbers)
       end if
     end do
-    branch%has_begun = branch%count > 0
-    if (is_whole .or. .not. branch%has_begun) return
-    walk%settings = settings
-    walk%range = problem%range()
+    if (is_whole .or. branch%count == 0) return
     associate (n => size(numbers, 1) / 3)
       walk%x = numbers(:n, 1)
       walk%tangent = numbers(n + 1:2 * n, 1)
@@ -140,17 +137,22 @@ contains
     character(len=:), allocatable, intent(inout) :: bytes
     integer, intent(inout) :: used
     real(wp) :: parts(2, size(point%multipliers))
+    integer :: states
 
     associate (orbit => point%orbit)
+      states = 0
+      if (allocated(orbit%state)) states = size(orbit%state)
       parts(1, :) = real(point%multipliers, wp)
       parts(2, :) = aimag(point%multipliers)
       call put_integers(bytes, used, [shape(orbit%series), size(orbit%speed), size(point%multipliers), point%harmonics, &
-                                      point%branch, point%crossed])
+                                      point%branch, point%crossed, orbit%subharmonic, point%leads_to, &
+                                      merge(1, 0, point%is_supercritical), states])
       call put_reals(bytes, used, reshape([orbit%value, orbit%rate, orbit%torque, orbit%damping, point%direction, &
                                                 point%error], [6, 1]))
       call put_reals(bytes, used, orbit%series)
       call put_reals(bytes, used, reshape(orbit%speed, [size(orbit%speed), 1]))
       call put_reals(bytes, used, parts)
+      if (states > 0) call put_reals(bytes, used, reshape(orbit%state, [states, 1]))
       call put_text(bytes, used, point%kind)
     end associate
   end subroutine pack_point
@@ -159,9 +161,9 @@ contains
     character(len=*), intent(in) :: bytes
     type(byte_reader_t), intent(inout) :: reader
     type(orbit_point_t), intent(inout) :: point
-    real(wp), allocatable :: parts(:, :), speed(:, :)
+    real(wp), allocatable :: parts(:, :), speed(:, :), state(:, :)
     real(wp) :: numbers(6, 1)
-    integer :: sizes(7)
+    integer :: sizes(11)
 
     call reader%take_integers(bytes, sizes)
     call reader%take_reals(bytes, numbers)
@@ -177,6 +179,12 @@ contains
       call reader%take_reals(bytes, orbit%series)
       call reader%take_reals(bytes, speed)
       call reader%take_reals(bytes, parts)
+      if (allocated(orbit%state)) deallocate (orbit%state)
+      if (sizes(11) > 0) then
+        allocate (state(sizes(11), 1))
+        call reader%take_reals(bytes, state)
+        orbit%state = state(:, 1)
+      end if
       call reader%take_text(bytes, point%kind)
       orbit%speed = speed(:, 1)
     end associate
@@ -184,6 +192,9 @@ contains
     point%harmonics = sizes(5)
     point%branch = sizes(6)
     point%crossed = sizes(7)
+    point%orbit%subharmonic = sizes(8)
+    point%leads_to = sizes(9)
+    point%is_supercritical = sizes(10) == 1
   end subroutine unpack_point
 
 end module nocdyn_orbit_checkpoints
