@@ -16,6 +16,7 @@ TABLES = {  # of several the first one that has the column
     "modes": ("modes.csv",),
     "campbell": ("campbell.csv",),
     "response": ("response.csv", "response_orders.csv"),
+    "orbit": ("orbit.csv",),
     "sweep": ("sweep.csv",),
 }
 EXTREMES = {"maximum": "max", "minimum": "min", "end": "last"}

@@ -29,6 +29,7 @@ FEATURES = (
     "modes",
     "campbell",
     "response",
+    "orbit",
     "transit",
     "fatigue",
     "sweeps",

@@ -6,8 +6,8 @@ import random
 import numpy as np
 import pytest
 from conftest import SOURCE, Values, all_if_fast
+from verified import known
 
-# Numbers of an independent program for m 1, c 0.05, k 1, k3 0.1, P 0.18.
 DUFFING = """\
 &body name = 'mass' inertia = 1.0 /
 &coupling name = 'spring' bodies = 'ground', 'mass' stiffness = 1.0 cubic_stiffness = 0.1 damping = 0.05 /
@@ -15,8 +15,12 @@ DUFFING = """\
 &run t_end = 10.0 /
 """
 OVER = "&orbit over = 'excitation.shaker.frequency' range = {}, {} {} /\n"
-FOLDS = (1.2696019555, 1.1157002518)
-LARGEST = {0.8: [0.475438776], 1.0: [1.312562602], 1.2: [2.545576701, 0.417672949]}  # of stable motions
+FOLDS = (known("orbit.fold_up"), known("orbit.fold_down"))
+LARGEST = {  # of stable motions
+    0.8: [known("orbit.before")],
+    1.0: [known("orbit.on_the_way")],
+    1.2: [known("orbit.upper"), known("orbit.lower")],
+}
 PRINTED = 6e-10  # half of the last digit of these numbers, and a little
 
 # m 1, 0.05; k 1, 0.0453; c 0.002, 0.013; k3 1, 0.0042
@@ -28,7 +32,7 @@ TWO_MASSES = """\
 &excitation name = 'shaker' body = 'a' amplitude = 0.11 frequency = 0.8 /
 &run t_end = 10.0 /
 """
-NEIMARK_SACKER = (1.1127, 1.1957)
+NEIMARK_SACKER = (known("orbit.second_frequency_begins"), known("orbit.second_frequency_ends"))
 
 SPECIAL = {"fold": 1, "period_doubling": 2, "neimark_sacker": 3, "branch_point": 4, "torque_fold": 5}
 
