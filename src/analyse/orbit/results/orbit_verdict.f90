@@ -19,8 +19,8 @@ module nocdyn_orbit_verdict
 
   public :: find_orbit_verdict
 
-  character(len=*), parameter :: names(comparisons) = [character(len=33) :: 'continuous', 'largest', &
-                                                                           'of one harmonic over the frequency']
+  character(len=*), parameter :: names(comparisons) = [character(len=34) :: 'continuous', 'largest', &
+                                                                         'of one harmonic over the frequency']
   real(wp), parameter :: narrow = 1.0e-9_wp   ! width of ranges that are none, as a share of the whole one
 
 contains
