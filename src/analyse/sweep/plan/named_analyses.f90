@@ -16,8 +16,8 @@ module nocdyn_named_analyses
 
   public :: assemble_analysed, new_analysis, solve_named
 
-  character(len=*), parameter, public :: analysis_words(5) = [character(len=11) :: 'equilibrium', 'modes', 'campbell', 'response', &
-    'orbit']
+  character(len=*), parameter, public :: analysis_words(5) = &
+    [character(len=11) :: 'equilibrium', 'modes', 'campbell', 'response', 'orbit']
 
 contains
 
