@@ -303,17 +303,21 @@ def test_a_chain_of_two_hundred_bodies_goes_through_the_banded_equations(nocdyn)
     assert "stable" in small.by_name()
 
 
-def test_stiff_parts_have_no_multipliers_unasked(nocdyn):
-    text = DUFFING + OVER.format(0.8, 0.81, "{}")
+def test_stiff_parts_change_no_multipliers(nocdyn):
+    text = DUFFING + OVER.format(0.8, 0.81, "count = 2")
     stiff = text.replace(
         "&run",
         "&body name = 'tip' inertia = 1e-6 /\n"
-        "&coupling name = 'tip' bodies = 'mass', 'tip' stiffness = 1e4 damping = 1.0 /\n&run",
+        "&coupling name = 'tip' bodies = 'mass', 'tip' stiffness = 1e4 damping = {} /\n&run",
     )
-    soft, _ = branch(nocdyn, text.format(""))
-    values, _ = branch(nocdyn, stiff.format(""))
-    assert "stable" in soft.by_name() and "stable" not in values.by_name()
+    soft, _ = branch(nocdyn, text)
+    values, _ = branch(nocdyn, stiff.format(1.0))
     assert values["largest_phi_mass"][0] == pytest.approx(soft["largest_phi_mass"][0], rel=1e-4)
+    for label in ("multiplier_1_real", "multiplier_1_imaginary", "multiplier_2_real", "multiplier_2_imaginary"):
+        assert values[label][0] == pytest.approx(soft[label][0], abs=1e-4)
+    assert max(abs(values["multiplier_3_real"])) < 1e-6
+    undamped, _ = branch(nocdyn, stiff.format(1e-7).replace("1e4", "1e9"))  # of many oscillations in a period
+    assert "stable" in values.by_name() and "stable" not in undamped.by_name()
 
 
 def test_load_cases_have_branches_of_their_own(nocdyn):
@@ -405,9 +409,9 @@ REFUSED = [
         + OVER.format(0.8, 1.6, ""),
         "do not repeat themselves",
     ),
-    (PLAY + OVER.format(6.4, 14.0, ""), "the motion crosses the edge of the gap of coupling 'play'"),
+    (PLAY + OVER.format(6.4, 14.0, "method = 'harmonic_balance'"), "the motion crosses the edge of the gap of coupling 'play'"),
     (
-        DUFFING.replace("inertia = 1.0", "inertia = 1.0 bearing_friction = 0.1") + OVER.format(0.8, 1.6, ""),
+        DUFFING.replace("inertia = 1.0", "inertia = 1.0 bearing_friction = 0.1") + OVER.format(0.8, 1.6, "method = 'harmonic_balance'"),
         "does not know whether bearings slip",
     ),
 ]
@@ -419,7 +423,7 @@ def test_what_has_no_branch_is_refused(nocdyn, text, message):
 
 
 def test_a_branch_ends_where_its_motion_reaches_a_kink(nocdyn):
-    outcome = nocdyn.done(PLAY + OVER.format(5.0, 14.0, ""), command="orbit")
+    outcome = nocdyn.done(PLAY + OVER.format(5.0, 14.0, "method = 'harmonic_balance'"), command="orbit")
     assert "the branch ends at 6.1" in outcome.stdout
     assert "the motion crosses the edge of the gap of coupling 'play'" in outcome.stdout
     values = nocdyn.values("out", "orbit.csv")

@@ -1,23 +1,28 @@
 !> Periodic motions of a machine over a number of its input or over a speed: from the input to the branch.
 module nocdyn_orbit_analysis
   use nocdyn_backbone_start, only: start_backbone
-  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_branch_switching, only: follow_switches
+  use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_harmonic_problem, only: harmonic_problem_t, new_harmonic_problem
   use nocdyn_input, only: input_t
+  use nocdyn_joint_simplifications, only: has_joint_that_locks, refuse_joints
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_orbit_backbone, only: backbone_t, find_quasi_linear, note_left_out
   use nocdyn_orbit_branch, only: follow_branch
   use nocdyn_orbit_guess, only: find_settled_guess, find_steady_guess
+  use nocdyn_orbit_log, only: orbit_log_t
   use nocdyn_orbit_period, only: find_period
   use nocdyn_orbit_points, only: branch_t
   use nocdyn_orbit_problem, only: orbit_problem_t
   use nocdyn_orbit_scatter, only: find_high, find_isolated, scatter_t
-  use nocdyn_orbit_settings, only: orbit_settings_t, read_orbit_settings
+  use nocdyn_orbit_settings, only: harmonic_balance, orbit_settings_t, read_orbit_settings, shooting
   use nocdyn_orbit_start_file, only: find_file_guess
   use nocdyn_periodic_machine, only: body_turning, orbit_t, periodic_machine_t
   use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
   use nocdyn_sampled_machine, only: new_sampled_machine
+  use nocdyn_self_excited, only: follow_self_excited
+  use nocdyn_shooting_problem, only: new_shooting_problem, shooting_problem_t
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
   implicit none (type, external)
   private
@@ -28,6 +33,7 @@ module nocdyn_orbit_analysis
 
   type, public :: orbit_analysis_t
     type(orbit_settings_t) :: settings
+    logical :: is_self_excited = .false.               !! whether nothing excites the machine periodically
     character(len=:), allocatable :: parameter, unit   !! what changes
     character(len=:), allocatable :: body_name         !! whose speed is held, ''
     type(branch_t) :: branch                           !! with the points of all branches
@@ -35,23 +41,27 @@ module nocdyn_orbit_analysis
     type(backbone_t) :: backbone                       !! frequencies of a mode
     class(orbit_problem_t), allocatable :: problem     !! whose motions they are
     type(string_t), allocatable :: notes(:)
+    logical :: is_unfinished = .false.                 !! whether the user has interrupted it; there are points
   end type orbit_analysis_t
 
 contains
 
   !> Follows the branch of an input.
-  subroutine analyse_orbits(input, machine, self, error)
+  subroutine analyse_orbits(input, machine, self, error, log)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine   !! one lane
     type(orbit_analysis_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
+    type(orbit_log_t), target, intent(inout), optional :: log   !! journal, which must live as long as `self`
     type(periodic_machine_t) :: periodic
     class(orbit_problem_t), allocatable :: problem
     type(orbit_t) :: guess
+    logical :: has_joints
 
     allocate (self%notes(0))
     call read_orbit_settings(input, machine, self%settings, error)
     if (allocated(error)) return
+    if (present(log)) self%settings%log => log
     self%body_name = ''
     if (self%settings%body > 0) then
       self%body_name = machine%names(self%settings%body)%text
@@ -63,58 +73,173 @@ contains
       self%parameter = self%settings%targets(1)%path
       self%unit = self%settings%targets(1)%unit
     end if
+    has_joints = has_joint_that_locks(input)
+    call refuse_moving_rows(input, self%settings, error)
+    if (allocated(error)) return
     if (self%settings%mode > 0) then
       call study_mode(input, machine, periodic, guess, self, error)
     else
-      call study_machine(input, self%settings, periodic, guess, error)
+      call study_machine(input, self%settings, merge(1, few_samples, has_joints), periodic, guess, error)
+      self%is_self_excited = periodic%rate_is_unknown
+      if (self%is_self_excited .and. .not. allocated(error)) call refuse_keys(input, self%settings, has_joints, error)
     end if
-    if (.not. allocated(error)) call choose_problem(periodic, guess, self%settings, problem, error)
-    if (.not. allocated(error)) call follow_from(input, problem, guess, self, error)
+    if (.not. allocated(error)) then
+      if (has_joints .or. self%settings%method == shooting) then
+        call follow_by_shooting(input, periodic, guess, self, problem, error)
+      else
+        call follow_by_harmonics(input, periodic, guess, self, problem, error)
+      end if
+    end if
     if (.not. allocated(error) .and. self%settings%mode > 0) call find_quasi_linear(problem, self%branch, self%backbone)
     if (.not. allocated(error) .and. self%settings%starts > 0) then
       call find_isolated(input, self%settings, problem, self%branch, self%found)
     end if
+    if (.not. allocated(error) .and. self%settings%switches) then
+      select type (problem)
+      class is (harmonic_problem_t)
+        call follow_switches(problem, self%settings, self%branch)
+      end select
+    end if
     if (.not. allocated(error)) then
+      self%is_unfinished = self%settings%is_stopped()
       call move_alloc(problem, self%problem)
       return
     end if
     if (index(error%message, input%shown_case()) /= 1) error%message = input%shown_case() // ': ' // error%message
   end subroutine analyse_orbits
 
-  !> The method.
-  subroutine choose_problem(periodic, guess, settings, problem, error)
+  !> Refuses what has no meaning for a machine that nothing excites.
+  subroutine refuse_keys(input, settings, has_joints, error)
+    type(input_t), intent(in) :: input
+    type(orbit_settings_t), intent(in) :: settings
+    logical, intent(in) :: has_joints
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: key
+
+    key = ''
+    if (settings%method == shooting) key = 'method'
+    if (settings%subharmonic > 1) key = 'subharmonic'
+    if (settings%starts > 0) key = 'starts'
+    if (settings%starts_high .or. settings%start_file /= '') key = 'start'
+    if (key == '' .and. has_joints) then
+      call raise(error, exit_input, input%location(settings%group) // ': nothing excites this machine periodically, and ' // &
+                 'its joints lock; allowed: machines without such joints, whose limit cycles are followed')
+    end if
+    if (key == '') return
+    call raise(error, exit_input, input%location(settings%group, key) // ': ' // key // ': nothing excites this machine ' // &
+               "periodically; allowed: the limit cycles that begin at its steady state, or start = 'settled_run'")
+  end subroutine refuse_keys
+
+  !> Refuses rows that move, and harmonic balance for joints that lock.
+  subroutine refuse_moving_rows(input, settings, error)
+    type(input_t), intent(in) :: input
+    type(orbit_settings_t), intent(in) :: settings
+    type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: drives(:)
+
+    if (settings%mode > 0) then
+      call refuse_joints(input, .false., 'a backbone curve', error)
+      if (.not. allocated(error) .and. settings%method == shooting) call raise(error, exit_input, &
+        input%location(settings%group, 'method') // ": method = 'shooting': a backbone curve is found by harmonic balance; " // &
+        "allowed: 'harmonic_balance'")
+      return
+    end if
+    call refuse_joints(input, .false., 'nocdyn orbit', error, knows_locks=.true.)
+    if (allocated(error)) return
+    allocate (drives, source=input%groups_named('drive'))
+    if (size(drives) > 0) call raise(error, exit_input, input%location(drives(1)) // ': nocdyn orbit takes no prescribed ' // &
+                                     'motions; allowed: motors and excitations')
+    if (allocated(error) .or. settings%method /= harmonic_balance .or. .not. has_joint_that_locks(input)) return
+    call refuse_joints(input, .false., "method = 'harmonic_balance'", error)
+    if (allocated(error)) return
+    call raise(error, exit_input, input%location(settings%group, 'method') // ": method = 'harmonic_balance' " // &
+               "does not follow teeth with losses; allowed: 'shooting'")
+  end subroutine refuse_moving_rows
+
+  !> By harmonic balance; by shooting if motions cross kinks of laws, unless the method is given.
+  subroutine follow_by_harmonics(input, periodic, guess, self, problem, error)
+    type(input_t), intent(in) :: input
     type(periodic_machine_t), intent(in) :: periodic
     type(orbit_t), intent(in) :: guess
-    type(orbit_settings_t), intent(inout) :: settings   !! is told if multipliers take too long
+    type(orbit_analysis_t), intent(inout) :: self
     class(orbit_problem_t), allocatable, intent(out) :: problem
     type(error_t), allocatable, intent(out) :: error
+    class(orbit_problem_t), allocatable :: other
     type(harmonic_problem_t), allocatable :: harmonic
+    type(branch_t) :: branch
+    type(error_t), allocatable :: other_error
+    type(string_t), allocatable :: notes(:)
+    integer :: kink
 
     allocate (harmonic)
-    call new_harmonic_problem(periodic, settings%harmonics, settings%tolerance, harmonic, error)
+    call new_harmonic_problem(periodic, self%settings%harmonics, self%settings%tolerance, harmonic, error)
     if (allocated(error)) return
-    if (settings%mode > 0) then
+    if (self%settings%mode > 0) then
       call harmonic%equations%anchor(guess)
       call harmonic%finer%anchor(guess)
-    else if (.not. settings%asks_stability) then
-      if (harmonic%has_short_steps(guess)) settings%has_stability = .false.
+    else if (periodic%rate_is_unknown) then
+      self%settings%has_stability = .true.   ! which steady states lose
+    else if (self%settings%has_stability .and. .not. self%settings%asks_stability) then
+      if (harmonic%takes_long(guess)) self%settings%has_stability = .false.
     end if
+    allocate (notes, source=self%notes)
+    call follow_from(input, harmonic, guess, self, error)
+    kink = harmonic%kink
     call move_alloc(harmonic, problem)
-  end subroutine choose_problem
+    if (kink == 0 .or. self%settings%method == harmonic_balance .or. self%settings%mode > 0) return
+    if (.not. allocated(error)) branch = self%branch
+    self%notes = notes
+    call append(self%notes, 'method = shooting, as motions cross the ' // periodic%machine%formulation%switch_name(kink))
+    call follow_by_shooting(input, periodic, guess, self, other, other_error)
+    if (.not. allocated(other_error)) then
+      call move_alloc(other, problem)
+      if (allocated(error)) deallocate (error)
+    else if (allocated(error)) then
+      error%message = error%message // '; by shooting: ' // other_error%message
+    else
+      self%branch = branch
+      call move_alloc(notes, self%notes)
+    end if
+  end subroutine follow_by_harmonics
+
+  !> By shooting.
+  subroutine follow_by_shooting(input, periodic, guess, self, problem, error)
+    type(input_t), intent(in) :: input
+    type(periodic_machine_t), intent(in) :: periodic
+    type(orbit_t), intent(in) :: guess
+    type(orbit_analysis_t), intent(inout) :: self
+    class(orbit_problem_t), allocatable, intent(out) :: problem
+    type(error_t), allocatable, intent(out) :: error
+    type(shooting_problem_t), allocatable :: shot
+
+    allocate (shot)
+    call new_shooting_problem(input, self%settings%targets, periodic, self%settings%tolerance, shot, error)
+    if (allocated(error)) return
+    call follow_from(input, shot, guess, self, error)
+    call move_alloc(shot, problem)
+  end subroutine follow_by_shooting
 
   !> Follows the branch from the motion that is asked for: the one near the steady state, the largest one, the one of a file or
   !> the one on which a run settles; from this too if Newton's method does not find a motion from the steady state.
-  subroutine follow_from(input, problem, guess, self, error)
+  subroutine follow_from(input, problem, steady, self, error)
     type(input_t), intent(in) :: input
     class(orbit_problem_t), intent(inout) :: problem
-    type(orbit_t), intent(inout) :: guess
+    type(orbit_t), intent(in) :: steady
     type(orbit_analysis_t), intent(inout) :: self
     type(error_t), allocatable, intent(out) :: error
     type(error_t), allocatable :: first
     type(scatter_t) :: high
+    type(orbit_t) :: guess
 
+    guess = steady
     if (self%settings%mode > 0) then
       call follow_branch(problem, self%settings, guess, self%branch, error)
+      return
+    else if (self%is_self_excited) then
+      select type (problem)
+      class is (harmonic_problem_t)
+        call follow_self_excited(input, problem, self%settings, guess, self%branch, self%notes, error)
+      end select
       return
     end if
     if (self%settings%start_file /= '') then
@@ -142,25 +267,22 @@ contains
   end subroutine follow_from
 
   !> The machine and its period, and a guess of the first motion: the steady state by the mean torques.
-  subroutine study_machine(input, settings, periodic, guess, error)
+  subroutine study_machine(input, settings, samples, periodic, guess, error)
     type(input_t), intent(in) :: input
     type(orbit_settings_t), intent(in) :: settings
+    integer, intent(in) :: samples
     type(periodic_machine_t), intent(inout) :: periodic
     type(orbit_t), intent(inout) :: guess
     type(error_t), allocatable, intent(out) :: error
 
-    call new_sampled_machine(input, settings%targets, settings%from, few_samples, periodic%machine, error)
+    call new_sampled_machine(input, settings%targets, settings%from, samples, periodic%machine, error)
     if (allocated(error)) return
     call find_rigid(periodic)
     periodic%subharmonic = settings%subharmonic
     periodic%bounds = [min(settings%from, settings%to), max(settings%from, settings%to)]
     call find_period(periodic%machine%formulation%machine, periodic%turning, periodic%period, error)
     if (allocated(error)) return
-    if (size(periodic%period%multiples) == 0) then
-      call raise(error, exit_failed, 'nothing excites the machine periodically; required: an excitation with a frequency or ' // &
-                 'orders. Oscillations that excite themselves are not computed')
-      return
-    end if
+    periodic%rate_is_unknown = size(periodic%period%multiples) == 0
     periodic%held = settings%body
     if (periodic%held > 0) then
       periodic%held_motion = maxloc(abs(periodic%turning(periodic%held, :)), dim=1)
@@ -239,9 +361,23 @@ contains
         call periodic%machine%rates(t, y, rates, error)
         torques(i) = mean_torque(periodic, m, rates(1, :periodic%machine%freedoms))
       end do
-      if (m /= periodic%held_motion .and. abs(torques(2) - torques(1)) <= none * maxval(abs(torques))) cycle
+      if (m /= periodic%held_motion .and. .not. is_rubbed(m) .and. &
+          abs(torques(2) - torques(1)) <= none * maxval(abs(torques))) cycle
       periodic%border = [periodic%border, m]
     end do
+
+  contains
+
+    !> Whether the motion makes a joint slip.
+    logical function is_rubbed(motion)
+      integer, intent(in) :: motion
+      integer :: j
+
+      associate (formulation => periodic%machine%formulation)
+        is_rubbed = any([(abs(formulation%joint_rate(j, periodic%rigid(:, motion))) > none, j=1, formulation%joints%count)])
+      end associate
+    end function is_rubbed
+
   end subroutine find_floating
 
   !> The rate of the momentum along a rigid motion [N m].
@@ -276,6 +412,7 @@ contains
     integer :: turns
 
     motion = guess
+    if (periodic%rate_is_unknown) motion%rate = turn / input%groups(input%position('run'))%number('t_end')
     call periodic%take_border(periodic%put_border(guess), guess%value, motion)
     call periodic%set_value(motion, error)
     if (allocated(error)) return

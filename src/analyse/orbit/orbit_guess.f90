@@ -3,13 +3,13 @@ module nocdyn_orbit_guess
   use nocdyn_assembly, only: assemble_machine, new_formulation
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_harmonic_basis, only: harmonic_basis_t, new_harmonic_basis
   use nocdyn_input, only: input_t
   use nocdyn_integration, only: integrate
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_observer, only: observer_t
+  use nocdyn_orbit_series, only: find_series
   use nocdyn_orbit_settings, only: orbit_settings_t
   use nocdyn_periodic_machine, only: orbit_t, periodic_machine_t
   use nocdyn_sampled_machine, only: with_start
@@ -18,10 +18,9 @@ module nocdyn_orbit_guess
   implicit none (type, external)
   private
 
-  public :: find_steady_guess, find_series, find_settled_guess
+  public :: advance, find_settled_guess, find_steady_guess, formulation_angles, start_machine
 
   real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)   ! [rad]
-  integer, parameter :: harmonics = 15         ! of its last period
   integer, parameter, public :: guess_samples = 64   !! of a period from which series are found
 
   !> Keeps the states of all times that are asked for.
@@ -46,6 +45,8 @@ contains
     call start_machine(input, settings, steady)
     associate (machine => periodic%machine%formulation%machine, f => periodic%machine%freedoms)
       guess%value = settings%at
+      guess%subharmonic = periodic%subharmonic
+      if (allocated(guess%state)) deallocate (guess%state)
       if (allocated(guess%series)) deallocate (guess%series)
       allocate (guess%series(1, periodic%machine%states - f), source=0.0_wp)
       guess%speed = steady%start_speed(1, machine%coordinates%body(periodic%free))
@@ -105,6 +106,7 @@ contains
       if (allocated(error)) return
       last(f + 1:2 * f, :) = last(f + 1:2 * f, :) + spread(formulation_angles(machine, periodic), 2, guess_samples + 1)
       call find_series(periodic, last(f + 1:, :), 0.0_wp, period, guess)   ! it begins after whole periods
+      if (m == 0) guess%state = last(:, 1)                                 ! else the time is counted from elsewhere
     end associate
   end subroutine find_settled_guess
 
@@ -152,39 +154,5 @@ contains
     self%count = self%count + 1
     self%y(:, self%count) = y
   end subroutine on_output
-
-  !> The series of a period. Where orders excite, the time is counted from where the mean angle is zero.
-  subroutine find_series(periodic, states, begin, period, guess)
-    type(periodic_machine_t), intent(in) :: periodic
-    real(wp), intent(in) :: states(:, :)        !! coordinates and internal states, [nodes, guess_samples + 1]
-    real(wp), intent(in) :: begin               !! time of the first sample [s]
-    real(wp), intent(in) :: period              !! [s]
-    type(orbit_t), intent(inout) :: guess
-    type(harmonic_basis_t) :: basis
-    real(wp) :: beside(guess_samples, size(states, 1)), series(2 * harmonics + 1, size(states, 1))
-    real(wp) :: mean(size(periodic%free)), phase
-    integer :: i, k
-
-    guess%speed = (states(periodic%free, guess_samples + 1) - states(periodic%free, 1)) / period
-    beside = transpose(states(:, :guess_samples))
-    associate (f => periodic%machine%freedoms, steady => matmul(periodic%rigid, guess%speed))
-      do i = 1, guess_samples
-        beside(i, :f) = beside(i, :f) - steady * (period * (i - 1) / guess_samples)
-      end do
-    end associate
-    basis = new_harmonic_basis(harmonics, guess_samples)
-    series = matmul(basis%projection, beside)
-    mean = series(1, periodic%free)
-    associate (f => periodic%machine%freedoms, m => periodic%period%motion)
-      series(1, :f) = series(1, :f) - matmul(periodic%rigid, mean)
-      phase = turn / period * begin
-      if (m > 0) phase = turn / period * mean(m) / guess%speed(m)
-      guess%series = series
-      do k = 1, harmonics
-        guess%series(2 * k, :) = cos(k * phase) * series(2 * k, :) - sin(k * phase) * series(2 * k + 1, :)
-        guess%series(2 * k + 1, :) = sin(k * phase) * series(2 * k, :) + cos(k * phase) * series(2 * k + 1, :)
-      end do
-    end associate
-  end subroutine find_series
 
 end module nocdyn_orbit_guess

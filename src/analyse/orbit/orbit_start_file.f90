@@ -3,7 +3,8 @@ module nocdyn_orbit_start_file
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_orbit_guess, only: find_series, guess_samples
+  use nocdyn_orbit_guess, only: guess_samples
+  use nocdyn_orbit_series, only: find_series
   use nocdyn_orbit_settings, only: orbit_settings_t
   use nocdyn_output_units, only: match_signal
   use nocdyn_periodic_machine, only: orbit_t, periodic_machine_t

@@ -115,7 +115,7 @@ contains
       '                     machine with more than 600 degrees of freedom 100' // nl // &
       '  --range_hz LOW,HIGH  only the modes in this range of frequencies at the first speed [Hz]' // nl // &
       '  --quiet            print nothing but errors', analysis_command)
-    call add_command(commands, 'orbit', 'FILE...', '--out --set --case --strict --quiet', &
+    call add_command(commands, 'orbit', 'FILE...', '--out --set --case --strict --resume --quiet', &
       'periodic motions of nonlinear machines: folds, jumps, stability', &
       'Follows by &orbit the periodic motions of a machine over a number of its input or over the mean speed of a' // nl // &
       'body, by harmonic balance, through folds: where motions jump, where they are unstable, and the half ranges' // nl // &
@@ -125,6 +125,7 @@ contains
       '  --set PATH=VALUE   override a key: orbit.count=101' // nl // &
       case_help // nl // &
       '  --strict           exit code 1 if a limit is exceeded' // nl // &
+      '  --resume           continue an interrupted analysis' // nl // &
       '  --quiet            print nothing but errors', analysis_command)
     call add_command(commands, 'transit', 'FILE...', '--out --set --case --strict --quiet', &
       'run through barred ranges of speed: time, peaks, damage of a passage', &

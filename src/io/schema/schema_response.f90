@@ -14,6 +14,7 @@ module nocdyn_schema_response
   type(allowed_t), parameter :: formats = allowed_t(words='csv netcdf')
   type(allowed_t), parameter :: factors = allowed_t(low=0.1_wp, high=1.5_wp)
   type(allowed_t), parameter :: margins = allowed_t(low=0.0_wp, high=0.9_wp)
+  type(allowed_t), parameter :: orbit_methods = allowed_t(words='harmonic_balance shooting')
   type(allowed_t), parameter :: subharmonics = allowed_t(low=1.0_wp, high=12.0_wp)
   type(allowed_t), parameter :: harmonic_counts = allowed_t(low=1.0_wp, high=400.0_wp)
   type(allowed_t), parameter :: shares = allowed_t(low=1.0e-12_wp, high=0.01_wp)
@@ -157,6 +158,9 @@ module nocdyn_schema_response
       'in place of both: the mode of the machine without damping and excitation whose backbone curve is found'), &
     key_rule_t('orbit', 'amplitude', a_number, 2, 'rad', unset, positive, &
       'first and last amplitude of its backbone, of the body that moves most in the mode'), &
+    key_rule_t('orbit', 'method', a_word, 1, '', unset, orbit_methods, &
+      'harmonic_balance: in harmonics, for smooth laws; shooting: by integration over a period, with events; ' // &
+      'found by the machine if not given'), &
     key_rule_t('orbit', 'start', a_text, 1, '', "'low'", anything, &
       "the first motion: 'low' (near the steady state), 'high', 'settled_run', or a table such as trajectory.csv"), &
     key_rule_t('orbit', 'starts', an_integer, 1, '', unset, from_1, &
@@ -170,7 +174,9 @@ module nocdyn_schema_response
     key_rule_t('orbit', 'count', an_integer, 1, '', unset, speed_counts, &
       'number of values at even distances that have points, beside those that the branch needs'), &
     key_rule_t('orbit', 'stability', a_flag, 1, '', unset, anything, &
-      'whether multipliers are computed; if not given, of up to 100 states without stiff parts'), &
+      'whether multipliers are computed; if not given, of up to 200 states without stiff undamped parts'), &
+    key_rule_t('orbit', 'switch_branches', a_flag, 1, '', '.false.', anything, &
+      'whether branches that begin at period doublings and branch points are followed too'), &
     key_rule_t('orbit', 'most_points', an_integer, 1, '', '2000', speed_counts, 'points of a branch at most'), &
     key_rule_t('orbit', 'signals', a_text, any_number, '', unset, anything, &
       "columns of orbit.csv: names, or patterns with *, e.g. 'phi_*'; all if not given", fewest=1), &

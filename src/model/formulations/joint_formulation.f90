@@ -9,7 +9,7 @@ module nocdyn_joint_formulation
   implicit none (type, external)
   private
 
-  public :: observe_with_joints   ! for extensions that add to it
+  public :: change_with_joints, observe_with_joints   ! for extensions that add to them
 
   integer, parameter :: by_state = 0   ! no joint
 

@@ -26,6 +26,7 @@ module nocdyn_reduced
   private
 
   public :: new_reduced
+  public :: derivative   ! for extensions that add to it
 
   type, extends(coordinate_formulation_t), public :: reduced_t
     type(held_lanes_t) :: held                              !! joints that hold, with series or of a block

@@ -11,6 +11,9 @@ module nocdyn_orbit_problem
 
   public :: measured
 
+  character(len=*), parameter, public :: fold = 'fold', doubling = 'period_doubling', neimark_sacker = 'neimark_sacker', &
+    branch_point = 'branch_point', torque_fold = 'torque_fold', hopf = 'hopf'
+
   type, public :: orbit_point_t
     type(orbit_t) :: orbit
     real(wp) :: direction = 0.0_wp                 !! change of the parameter along the branch, as a share of its range
@@ -20,6 +23,8 @@ module nocdyn_orbit_problem
     integer :: crossed = 0                         !! a switch whose branches the motion changes, 0: none
     complex(wp), allocatable :: multipliers(:)     !! by descending modulus
     character(len=:), allocatable :: kind          !! of a special point, else ''
+    integer :: leads_to = 0                        !! branch that begins or ends there, 0: none is known
+    logical :: is_supercritical = .false.          !! whether limit cycles begin where the steady state is unstable
   contains
     procedure :: is_stable, unstable
   end type orbit_point_t
@@ -44,7 +49,7 @@ module nocdyn_orbit_problem
     procedure(find_fault), deferred :: find_fault
     procedure(measure), deferred :: measure
     procedure(resolution), deferred :: resolution
-    procedure :: adapt, recast, range, resume, sample
+    procedure :: adapt, least_size, recast, range, restore, sample, kind_of, keep_phase, meets_other
   end type orbit_problem_t
 
   abstract interface
@@ -136,7 +141,7 @@ module nocdyn_orbit_problem
     subroutine find_fault(self, point, fault)
       import :: orbit_point_t, orbit_problem_t
       implicit none (type, external)
-      class(orbit_problem_t), intent(in) :: self
+      class(orbit_problem_t), intent(inout) :: self
       type(orbit_point_t), intent(in) :: point
       character(len=:), allocatable, intent(out) :: fault
     end subroutine find_fault
@@ -173,13 +178,6 @@ contains
     has_changed = .false.
   end subroutine adapt
 
-  !> Goes back to the resolution of a point. By default there is one resolution only.
-  subroutine resume(self, point, error)
-    class(orbit_problem_t), intent(inout) :: self
-    type(orbit_point_t), intent(in) :: point
-    type(error_t), allocatable, intent(out) :: error
-  end subroutine resume
-
   !> A tangent in the present resolution. By default there is one resolution only.
   function recast(self, point, tangent) result(other)
     class(orbit_problem_t), intent(inout) :: self
@@ -199,6 +197,56 @@ contains
     type(signal_samples_t), intent(out) :: samples
     type(error_t), allocatable, intent(out) :: error
   end subroutine sample
+
+  !> What `set_scale` has found, 0 if nothing.
+  real(wp) function least_size(self)
+    class(orbit_problem_t), intent(in) :: self
+
+    least_size = 0.0_wp
+  end function least_size
+
+  !> Goes back to the resolution of a point. By default there is one resolution only.
+  subroutine restore(self, point, least, error)
+    class(orbit_problem_t), intent(inout) :: self
+    type(orbit_point_t), intent(in) :: point
+    real(wp), intent(in) :: least   !! as of `least_size`
+    type(error_t), allocatable, intent(out) :: error
+  end subroutine restore
+
+  !> The kind of a special point where the multiplier of a number passes the unit circle.
+  function kind_of(self, point, number) result(kind)
+    class(orbit_problem_t), intent(in) :: self
+    type(orbit_point_t), intent(in) :: point   !! the last one that was completed
+    integer, intent(in) :: number
+    character(len=:), allocatable :: kind
+    real(wp), parameter :: none = 1.0e-6_wp    ! imaginary part of a real multiplier
+
+    associate (multiplier => point%multipliers(number))
+      if (abs(multiplier%im) > none) then
+        kind = neimark_sacker
+      else if (multiplier%re < 0) then
+        kind = doubling
+      else if (self%periodic%held > 0) then
+        kind = torque_fold   ! multipliers are those at a constant torque
+      else
+        kind = branch_point
+      end if
+    end associate
+  end function kind_of
+
+  !> Motions are in phase with an orbit from now on. By default the excitation keeps the phase.
+  subroutine keep_phase(self, orbit)
+    class(orbit_problem_t), intent(inout) :: self
+    type(orbit_t), intent(in) :: orbit
+  end subroutine keep_phase
+
+  !> Whether the branch passes the one that it has left between two motions. By default it has left none.
+  logical function meets_other(self, before, after)
+    class(orbit_problem_t), intent(in) :: self
+    type(orbit_t), intent(in) :: before, after
+
+    meets_other = .false.
+  end function meets_other
 
   !> The width of the range of the parameter.
   pure real(wp) function range(self)

@@ -16,10 +16,12 @@ module nocdyn_periodic_machine
   type, public :: orbit_t
     real(wp) :: value = 0.0_wp                  !! of the parameter, in its unit; of a held speed [rad/s]
     real(wp) :: rate = 0.0_wp                   !! w [rad/s]
+    integer :: subharmonic = 1                  !! periods of the excitation in its period
     real(wp), allocatable :: series(:, :)       !! of q [rad] and z, [length, nodes]
     real(wp), allocatable :: speed(:)           !! Omega of the rigid motions [rad/s]
     real(wp) :: torque = 0.0_wp                 !! mean torque that holds the speed of a body [N m]
     real(wp) :: damping = 0.0_wp                !! by which a conservative machine would have to be damped, in w
+    real(wp), allocatable :: state(:)           !! at the begin of a period, if it is known, [states]
   end type orbit_t
 
   type, public :: periodic_machine_t
@@ -76,6 +78,7 @@ contains
       end if
     end do
     orbit%value = value
+    orbit%subharmonic = self%subharmonic
     if (self%held_motion > 0) then
       associate (turning => self%turning(self%held, :), m => self%held_motion)
         orbit%speed(m) = 0.0_wp
@@ -104,7 +107,7 @@ contains
     type(orbit_t), intent(inout) :: orbit
 
     if (self%rate_is_unknown) return
-    orbit%rate = self%period%rate / self%subharmonic
+    orbit%rate = self%period%rate / orbit%subharmonic
     if (self%period%motion > 0) orbit%rate = orbit%rate * abs(orbit%speed(self%period%motion))
   end subroutine find_rate
 
@@ -150,7 +153,8 @@ contains
     logical, intent(out) :: is_periodic
     type(error_t), allocatable, intent(out) :: error
     real(wp), parameter :: noise = 1.0e-7_wp
-    real(wp), dimension(self%machine%samples, self%machine%states) :: first, second
+    integer, parameter :: times = 24   ! of a period, a multiple of the samples
+    real(wp), dimension(times, self%machine%states) :: first, second
 
     is_periodic = .false.
     call self%set_value(motion, error)
@@ -164,29 +168,36 @@ contains
     end associate
   end subroutine repeats
 
-  !> The rates of a motion without oscillation at all samples of a period, some periods later.
+  !> The rates of a motion without oscillation at even times of a period, some periods later.
   subroutine find_rates(self, motion, turns, rates, error)
     class(periodic_machine_t), intent(inout) :: self
     type(orbit_t), intent(in) :: motion
     integer, intent(in) :: turns
     real(wp), intent(out) :: rates(:, :)
     type(error_t), allocatable, intent(out) :: error
-    real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)
+    real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp), faster = 1.1_wp
     real(wp) :: steady(self%machine%freedoms), t(self%machine%samples), y(self%machine%samples, self%machine%states)
-    integer :: c, i
+    real(wp) :: dydt(self%machine%samples, self%machine%states)
+    integer :: c, first, i, n
 
     rates = 0.0_wp
-    t = [(turn * i / size(t), i=0, size(t) - 1)] / motion%rate
-    t = t + turns * turn / motion%rate
     steady = matmul(self%rigid, motion%speed)
-    associate (f => self%machine%freedoms)
-      y(:, :f) = spread(steady, 1, size(t))
-      y(:, f + 1:) = spread(motion%series(1, :), 1, size(t))
-      do c = 1, f
-        y(:, f + c) = y(:, f + c) + steady(c) * t
-      end do
-    end associate
-    call self%machine%rates(t, y, rates, error)
+    if (self%rate_is_unknown) steady = faster * steady   ! a steady state has no accelerations with which to compare
+    n = self%machine%samples
+    do first = 0, size(rates, 1) - n, n
+      t = (turns + [(first + i, i=0, n - 1)] / real(size(rates, 1), wp)) * turn / motion%rate
+      associate (f => self%machine%freedoms)
+        y(:, :f) = spread(steady, 1, n)
+        y(:, f + 1:) = spread(motion%series(1, :), 1, n)
+        do c = 1, f
+          y(:, f + c) = y(:, f + c) + steady(c) * t
+        end do
+      end associate
+      dydt = 0.0_wp
+      call self%machine%rates(t, y, dydt, error)
+      if (allocated(error)) return
+      rates(first + 1:first + n, :) = dydt
+    end do
   end subroutine find_rates
 
 end module nocdyn_periodic_machine

@@ -21,7 +21,7 @@ module nocdyn_sampled_machine
   public :: new_sampled_machine, with_start
 
   type, public :: sampled_machine_t
-    type(reduced_t) :: formulation                       !! of `samples` lanes
+    class(reduced_t), allocatable :: formulation         !! of `samples` lanes
     type(pattern_t) :: pattern                           !! positions of its Jacobian
     integer :: samples = 0
     integer :: freedoms = 0                              !! coordinates
@@ -40,7 +40,7 @@ module nocdyn_sampled_machine
 contains
 
   !> The machine of an input, of the reduced formulation, from its given start angles.
-  subroutine new_sampled_machine(input, targets, value, samples, self, error, is_conservative)
+  subroutine new_sampled_machine(input, targets, value, samples, self, error, is_conservative, mold)
     type(input_t), intent(in) :: input
     type(target_t), intent(in) :: targets(:)   !! one number of it, or none
     real(wp), intent(in) :: value              !! of the target
@@ -48,8 +48,14 @@ contains
     type(sampled_machine_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
     logical, intent(in), optional :: is_conservative   !! false if absent
+    class(reduced_t), intent(in), optional :: mold     !! of the type of the formulation; absent: `reduced_t`
 
     if (present(is_conservative)) self%is_conservative = is_conservative
+    if (present(mold)) then
+      allocate (self%formulation, mold=mold)
+    else
+      allocate (self%formulation)
+    end if
     self%input = with_start(input, 'given')
     allocate (self%targets, source=targets)
     self%samples = samples

@@ -8,10 +8,10 @@ module nocdyn_orbit_measures
   use nocdyn_moment_forms, only: moment_form_t
   use nocdyn_orbit_analysis, only: analyse_orbits, orbit_analysis_t
   use nocdyn_orbit_damages, only: orbit_damage_t, read_damages
+  use nocdyn_orbit_log, only: orbit_log_t
   use nocdyn_orbit_motions, only: find_motions, motion_t
   use nocdyn_orbit_parts, only: find_parts, part_t
-  use nocdyn_orbit_points, only: fold
-  use nocdyn_orbit_problem, only: orbit_point_t, signal_range_t
+  use nocdyn_orbit_problem, only: fold, orbit_point_t, signal_range_t
   use nocdyn_orbit_signals, only: list_orbit_signals
   use nocdyn_response_limits, only: no_limit, read_limits, response_limit_t
   use nocdyn_signal_columns, only: new_signal_columns, signal_columns_t
@@ -60,11 +60,12 @@ module nocdyn_orbit_measures
 contains
 
   !> Follows the branches of an input and measures their points.
-  subroutine measure_orbits(input, machine, self, error)
+  subroutine measure_orbits(input, machine, self, error, log)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine   !! one lane
     type(measured_orbits_t), intent(inout) :: self
     type(error_t), allocatable, intent(out) :: error
+    type(orbit_log_t), target, intent(inout), optional :: log   !! journal, which must live as long as `self`
     type(string_t), allocatable :: notes(:)
     integer :: i
     logical :: is_mode
@@ -75,13 +76,14 @@ contains
       is_mode = input%groups(input%position('orbit'))%has_value('mode')
       if (.not. is_mode) call choose_measured(input, machine, self, notes, error)
     end if
-    if (.not. allocated(error)) call analyse_orbits(input, machine, self%orbit_analysis_t, error)
+    if (.not. allocated(error)) call analyse_orbits(input, machine, self%orbit_analysis_t, error, log)
     if (.not. allocated(error) .and. is_mode) then   ! whose machine has fewer elements
       call choose_measured(input, self%problem%periodic%machine%formulation%machine, self, notes, error)
     end if
     if (allocated(error)) return
     self%notes = [notes, self%notes]
     call find_reference(input, machine, self)
+    call leave_out_samples(self)
     allocate (self%measures(self%branch%count))
     do i = 1, size(self%measures)
       call self%measure(self%branch%points(i), self%measures(i), error)
@@ -90,6 +92,23 @@ contains
     call find_chosen(self, error)
     if (.not. allocated(error)) call find_landings(self, error)
   end subroutine measure_orbits
+
+  !> Leaves out what needs samples where the method has none.
+  subroutine leave_out_samples(self)
+    type(measured_orbits_t), intent(inout) :: self
+    type(signal_samples_t) :: samples
+    type(error_t), allocatable :: error
+
+    if (self%branch%count == 0 .or. .not. self%needs_samples .and. size(self%settings%motions) == 0) return
+    call self%problem%sample(self%branch%points(1), self%columns%columns, 0, samples, error)
+    if (allocated(error) .or. allocated(samples%series)) return
+    call append(self%notes, 'motions, spectrum, damage and limits over the frequency are found by harmonic balance only: ' // &
+                'they are left out')
+    deallocate (self%damages, self%settings%motions)
+    allocate (self%damages(0), self%settings%motions(0))
+    self%settings%has_spectrum = .false.
+    self%needs_samples = .false.
+  end subroutine leave_out_samples
 
   !> The motions that the input asks for.
   subroutine find_chosen(self, error)

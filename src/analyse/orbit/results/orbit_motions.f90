@@ -68,8 +68,8 @@ contains
     type(walk_t) :: before, next, middle
 
     associate (first => analysis%branch%points(number), second => analysis%branch%points(number + 1))
-      if (first%harmonics >= second%harmonics) call analysis%problem%resume(first, error)
-      if (first%harmonics < second%harmonics) call analysis%problem%resume(second, error)
+      if (first%harmonics >= second%harmonics) call analysis%problem%restore(first, analysis%problem%least_size(), error)
+      if (first%harmonics < second%harmonics) call analysis%problem%restore(second, analysis%problem%least_size(), error)
       if (allocated(error)) return
       before = walk_at(first)
       next = walk_at(second)

@@ -3,7 +3,7 @@ module nocdyn_orbit_records
   use nocdyn_kinds, only: wp
   use nocdyn_orbit_measures, only: measured_orbits_t
   use nocdyn_orbit_parts, only: jump_direction, part_t, unstable_stretches
-  use nocdyn_orbit_points, only: fold
+  use nocdyn_orbit_problem, only: fold
   use nocdyn_text, only: counted, quoted, to_text
   implicit none (type, external)
   private

@@ -5,7 +5,7 @@ module nocdyn_orbit_report
   use nocdyn_kinds, only: wp
   use nocdyn_orbit_measures, only: measured_orbits_t, orbit_measure_t
   use nocdyn_orbit_parts, only: find_parts, part_t
-  use nocdyn_orbit_problem, only: orbit_point_t
+  use nocdyn_orbit_problem, only: hopf, orbit_point_t
   use nocdyn_orbit_tables, only: most_multipliers
   use nocdyn_text, only: to_text
   use nocdyn_verdicts, only: verdict_t
@@ -85,6 +85,12 @@ contains
       call json%put('kind', point%kind)
       call json%put('value', point%orbit%value)
       call json%put('point', number)
+      if (point%kind == hopf) then
+        call json%put('frequency_hz', point%orbit%rate / turn)
+        if (point%leads_to > 0) call json%put('supercritical', point%is_supercritical)
+      end if
+      if (point%orbit%subharmonic > 1) call json%put('subharmonic', point%orbit%subharmonic)
+      if (point%leads_to > 0) call json%put('leads_to', point%leads_to)
       call put_orbit_of(json, point)
       if (any(analysis%jump == number)) then
         call json%open_list('lands_on')

@@ -6,6 +6,7 @@ module nocdyn_orbit_results
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_orbit_log, only: journal_name, orbit_log_t
   use nocdyn_orbit_measures, only: measure_orbits, measured_orbits_t
   use nocdyn_orbit_records, only: find_orbit_number
   use nocdyn_orbit_report, only: motion_name, put_orbit
@@ -20,11 +21,12 @@ module nocdyn_orbit_results
   private
 
   character(len=*), parameter :: columns_name = 'orbit_columns.json', harmonics_table = 'orbit_harmonics.csv', &
-    motion_harmonics = 'motion_harmonics.csv'
+    motion_harmonics = 'motion_harmonics.csv', partial = 'orbit.partial.csv'
   integer, parameter :: most_motions = 999   ! of an earlier analysis whose files are removed
 
   type, extends(analysis_t), public :: orbit_results_t
     type(measured_orbits_t), private :: analysis
+    type(orbit_log_t), pointer, private :: log => null()   !! its journal
   contains
     procedure :: solve, list_tables, other_names, put_table, judge, put_report, find_recorded, text => printed
   end type orbit_results_t
@@ -38,7 +40,14 @@ contains
     type(analysis_options_t), intent(in) :: options
     type(error_t), allocatable, intent(out) :: error
 
-    call measure_orbits(input, machine, self%analysis, error)
+    if (.not. allocated(options%journal)) then
+      call measure_orbits(input, machine, self%analysis, error)
+      return
+    end if
+    allocate (self%log)
+    call self%log%open(input, options%journal, options%resumes, error)
+    if (.not. allocated(error)) call measure_orbits(input, machine, self%analysis, error, self%log)
+    if (.not. allocated(error)) self%is_unfinished = self%analysis%is_unfinished
   end subroutine solve
 
   subroutine list_tables(self, names)
@@ -46,6 +55,8 @@ contains
     type(string_t), allocatable, intent(out) :: names(:)
     integer :: i
 
+    names = [string_t(partial)]
+    if (self%is_unfinished) return
     names = [string_t(orbit_table), string_t(columns_name)]
     if (self%analysis%settings%has_spectrum) call append(names, harmonics_table)
     do i = 1, size(self%analysis%motions)
@@ -54,16 +65,20 @@ contains
     if (size(self%analysis%motions) > 0) call append(names, motion_harmonics)
   end subroutine list_tables
 
+  !> What an earlier or an interrupted analysis has left; of one that is interrupted, all of an earlier one.
   function other_names(self, input) result(names)
     class(orbit_results_t), intent(in) :: self
     type(input_t), intent(in) :: input
     type(string_t), allocatable :: names(:)
-    integer :: i
+    integer :: i, kept
 
-    allocate (names(0))
-    if (.not. self%analysis%settings%has_spectrum) call append(names, harmonics_table)
-    if (size(self%analysis%motions) == 0) call append(names, motion_harmonics)
-    do i = size(self%analysis%motions) + 1, most_motions
+    names = [string_t(partial), string_t(journal_name)]
+    if (self%is_unfinished) names = [string_t('orbit.json'), string_t(orbit_table), string_t(columns_name)]
+    if (self%is_unfinished .or. .not. self%analysis%settings%has_spectrum) call append(names, harmonics_table)
+    kept = 0
+    if (.not. self%is_unfinished) kept = size(self%analysis%motions)
+    if (kept == 0) call append(names, motion_harmonics)
+    do i = kept + 1, most_motions
       call append(names, motion_name(i))
     end do
   end function other_names
@@ -77,7 +92,7 @@ contains
 
     associate (analysis => self%analysis, wanted => output_units(input))
       select case (name)
-      case (orbit_table)
+      case (orbit_table, partial)
         call put_orbit_csv(analysis, wanted, file)
       case (columns_name)
         call file%put(orbit_columns_json(analysis, wanted))

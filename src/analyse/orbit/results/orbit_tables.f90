@@ -7,8 +7,7 @@ module nocdyn_orbit_tables
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_orbit_measures, only: measured_motion_t, measured_orbits_t
-  use nocdyn_orbit_points, only: branch_point, doubling, fold, neimark_sacker, torque_fold
-  use nocdyn_orbit_problem, only: orbit_point_t
+  use nocdyn_orbit_problem, only: branch_point, doubling, fold, hopf, neimark_sacker, orbit_point_t, torque_fold
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: turn_units
   use nocdyn_signals, only: signal_t
@@ -74,7 +73,7 @@ contains
 
     call list_columns(analysis, wanted, list)
     call list%list_columns(of_signals, unit)
-    shown = min(most_multipliers, size(analysis%branch%points(1)%multipliers))
+    shown = min(most_multipliers, minval([(size(analysis%branch%points(i)%multipliers), i=1, analysis%branch%count)]))
     labels = [string_t('branch')]
     call append(labels, with_unit(analysis%parameter, analysis%unit))
     labels = [labels, strings([character(len=12) :: 'rate [rad/s]', 'special', 'harmonics', 'error'])]
@@ -116,6 +115,8 @@ contains
       number_of = 4.0_wp
     case (torque_fold)
       number_of = 5.0_wp
+    case (hopf)
+      number_of = 6.0_wp
     case default
       number_of = 0.0_wp
     end select

@@ -6,7 +6,7 @@ module nocdyn_orbit_words
   use nocdyn_orbit_backbone_words, only: append_backbone
   use nocdyn_orbit_measures, only: measured_orbits_t
   use nocdyn_orbit_parts, only: jump_direction, part_t, unstable_stretches
-  use nocdyn_orbit_points, only: branch_point, doubling, fold, neimark_sacker, torque_fold
+  use nocdyn_orbit_problem, only: branch_point, doubling, fold, hopf, neimark_sacker, torque_fold
   use nocdyn_orbit_problem, only: orbit_point_t
   use nocdyn_quantities, only: rank_moment
   use nocdyn_table_text, only: cell, padded, text_width
@@ -38,11 +38,12 @@ contains
       call report%append_line(input%shown_case() // ': note: ' // analysis%notes(i)%text)
     end do
     associate (points => analysis%branch%points(:analysis%branch%count))
-      text = input%shown_case() // ': ' // counted(size(points), 'periodic motion', 'periodic motions') // ' over ' // &
+      text = counted(size(points), 'periodic motion', 'periodic motions')
+      if (analysis%is_self_excited) text = counted(size(points), 'steady state or limit cycle', 'steady states and limit cycles')
+      text = input%shown_case() // ': ' // text // ' over ' // &
              analysis%parameter // ' from ' // shown(analysis, analysis%settings%from) // ' to ' // &
-             shown(analysis, analysis%settings%to) // ', ' // to_text(minval(points%harmonics))
-      if (maxval(points%harmonics) > minval(points%harmonics)) text = text // ' to ' // to_text(maxval(points%harmonics))
-      call report%append_line(text // ' harmonics, largest error ' // rounded_text(maxval(points%error), 2) // ' of the motion')
+             shown(analysis, analysis%settings%to) // ', ' // method_of(points)
+      call report%append_line(text // ', largest error ' // rounded_text(maxval(points%error), 2) // ' of the motion')
       if (maxval(points%error) > analysis%settings%tolerance) then
         i = count(points%error > analysis%settings%tolerance)
         call report%append_line('  ' // counted(i, 'point has', 'points have') // ' an error above the tolerance, ' // &
@@ -61,6 +62,18 @@ contains
     call append_damages(analysis, report)
     text = report%text()
   end function orbit_text
+
+  !> How the points were found: 'by shooting', or '5 to 9 harmonics'.
+  function method_of(points) result(text)
+    type(orbit_point_t), intent(in) :: points(:)
+    character(len=:), allocatable :: text
+
+    text = 'by shooting'
+    if (maxval(points%harmonics) == 0) return
+    text = to_text(minval(points%harmonics))
+    if (maxval(points%harmonics) > minval(points%harmonics)) text = text // ' to ' // to_text(maxval(points%harmonics))
+    text = text // ' harmonics'
+  end function method_of
 
   !> A value of the parameter with its unit; a speed also in the unit of the input.
   function shown(analysis, value, figures) result(text)
@@ -117,11 +130,16 @@ contains
       case (torque_fold)
         words = 'the holding torque turns back there'
       case (doubling)
-        words = 'period doubling; a motion of twice the period branches off'
+        words = 'period doubling; a motion of twice the period branches off' // led_to(points(i))
       case (neimark_sacker)
         words = 'Neimark-Sacker point; oscillations of another frequency begin or end'
       case (branch_point)
-        words = 'branch point; another motion of the same period branches off'
+        words = 'branch point; another motion of the same period branches off' // led_to(points(i))
+      case (hopf)
+        words = 'Hopf point, ' // rounded_text(points(i)%orbit%rate / (2 * acos(-1.0_wp)), digits) // ' Hz'
+        if (points(i)%leads_to > 0) words = words // trim(merge(', supercritical', ', subcritical  ', &
+                                                                points(i)%is_supercritical))
+        words = words // '; limit cycles branch off' // led_to(points(i))
       case default
         cycle
       end select
@@ -153,6 +171,15 @@ contains
     end associate
   end function landing_words
 
+  !> The branch that begins at a special point, if it is known.
+  function led_to(point) result(words)
+    type(orbit_point_t), intent(in) :: point
+    character(len=:), allocatable :: words
+
+    words = ''
+    if (point%leads_to > 0) words = ': branch ' // to_text(point%leads_to)
+  end function led_to
+
   !> The ranges in which the motion is unstable.
   subroutine append_parts(analysis, points, report)
     type(measured_orbits_t), intent(in) :: analysis
@@ -174,7 +201,9 @@ contains
       associate (along => points(stretches(i)%first:stretches(i)%last)%orbit%value)
         ends = [minval(along), maxval(along)]
         if (along(size(along)) < along(1)) ends = [maxval(along), minval(along)]
-        line = '  unstable from ' // shown(analysis, ends(1), exact) // ' to ' // shown(analysis, ends(2), exact)
+        line = '  unstable from '
+        if (analysis%is_self_excited .and. points(stretches(i)%first)%branch == 1) line = '  steady state unstable from '
+        line = line // shown(analysis, ends(1), exact) // ' to ' // shown(analysis, ends(2), exact)
       end associate
       associate (branch => points(stretches(i)%first)%branch)
         if (branch > 1) line = line // ' (branch ' // to_text(branch) // ')'

@@ -4,6 +4,7 @@ module nocdyn_orbit_settings
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_orbit_log, only: orbit_log_t
   use nocdyn_targets, only: find_target, target_t
   use nocdyn_text, only: lower_case, quoted
   use nocdyn_written_values, only: unit_of, written_element, written_number, written_unit
@@ -12,11 +13,13 @@ module nocdyn_orbit_settings
 
   public :: read_orbit_settings
 
-  integer, parameter :: most_states = 100      ! for which multipliers are computed unasked: they take the cube of it
+  integer, parameter :: most_states = 200      ! for which multipliers are computed unasked: they take the cube of it
 
   character(len=*), parameter :: no_machine = ' case run load_case output response orbit limit fatigue transit sweep vary record '
 
   integer, parameter, public :: usual_periods = 300
+
+  integer, parameter, public :: any_method = 0, harmonic_balance = 1, shooting = 2
 
   type, public :: orbit_settings_t
     integer :: group = 0                       !! &orbit in the input
@@ -29,6 +32,7 @@ module nocdyn_orbit_settings
     real(wp) :: ahead = 1.0_wp                 !! whether it begins towards rising (1) or falling values (-1)
     integer :: periods = usual_periods         !! after which a run has settled
     integer :: starts = 0                      !! scattered starts of runs that look for other branches
+    integer :: method = any_method
     integer :: harmonics = 0                   !! by error if it is 0
     integer :: subharmonic = 1
     integer :: count = 0                       !! points at even distances, beside others
@@ -36,14 +40,26 @@ module nocdyn_orbit_settings
     logical :: settles = .false.               !! whether a run settles on the first motion
     logical :: starts_high = .false.           !! whether it is the largest one on which runs settle
     character(len=:), allocatable :: start_file   !! table of a motion near it, else ''
+    logical :: switches = .false.              !! whether branches that leave the first one are followed
     logical :: has_stability = .true.          !! whether multipliers are computed
     logical :: asks_stability = .false.        !! whether the input says so
     real(wp) :: tolerance = 0.0_wp             !! error of a point as a share of its motion
     real(wp), allocatable :: motions(:)        !! values at which motions are written
     logical :: has_spectrum = .false.          !! whether the harmonics of the points are written
+    type(orbit_log_t), pointer :: log => null()   !! journal of the analysis, if it has one
+  contains
+    procedure :: is_stopped
   end type orbit_settings_t
 
 contains
+
+  !> Whether an analysis with a journal has been interrupted.
+  logical function is_stopped(self)
+    class(orbit_settings_t), intent(in) :: self
+
+    is_stopped = .false.
+    if (associated(self%log)) is_stopped = self%log%is_stopped()
+  end function is_stopped
 
   !> Reads &orbit.
   subroutine read_orbit_settings(input, machine, settings, error)
@@ -93,7 +109,9 @@ contains
       settings%to = range(2)
       settings%at = range(1)
       settings%ahead = sign(1.0_wp, range(2) - range(1))
+      settings%switches = group%flag('switch_branches')
       if (group%has_value('starts')) settings%starts = group%whole_number('starts')
+      if (group%has_value('method')) settings%method = merge(shooting, harmonic_balance, group%text('method') == 'shooting')
       if (group%has_value('harmonics')) settings%harmonics = group%whole_number('harmonics')
       if (group%has_value('count')) settings%count = group%whole_number('count')
       if (group%has_value('subharmonic')) settings%subharmonic = group%whole_number('subharmonic')

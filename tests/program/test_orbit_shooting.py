@@ -1,0 +1,211 @@
+"""Periodic motions by shooting: with gaps and friction, whose events are located, against independent integrations."""
+
+import json
+
+import numpy as np
+import pytest
+from conftest import Values
+
+OVER = "&orbit over = 'excitation.shaker.frequency' range = {}, {} {} /\n"
+DUFFING = """\
+&body name = 'mass' inertia = 1.0 /
+&coupling name = 'spring' bodies = 'ground', 'mass' stiffness = 1.0 cubic_stiffness = 0.1 damping = 0.05 /
+&excitation name = 'shaker' body = 'mass' amplitude = 0.18 frequency = 0.8 /
+&run t_end = 10.0 /
+"""
+FOLDS = (1.2696019555, 1.1157002518)
+
+# A gear pair with play: x'' + 2 zeta x' + f(x) = F_m + F_ah w^2 sin w t, f = 0 for |x| < 1, else x -+ 1; zeta 0.05, F_m 0.1,
+# F_ah 0.05: A. Kahraman, R. Singh, Non-linear dynamics of a spur gear pair, J. Sound Vib. 142 (1990), pages 49 to 75.
+ZETA, MEAN, EXCITATION = 0.05, 0.1, 0.05
+PLAY = """\
+&body name = 'x' inertia = 1.0 angle = 1.1 /
+&coupling name = 'mesh' bodies = 'ground', 'x' stiffness = 1.0 gap = 2.0 /
+&load name = 'damper' body = 'x' viscous = {} /
+&motor name = 'mean' body = 'x' kind = 'constant' torque = {} /
+&excitation name = 'shaker' body = 'x' amplitude = {!r} frequency = {!r} /
+&run t_end = 10.0 /
+"""
+ASKED = 1e-6  # of the half range, and of multipliers
+
+BRAKE = """\
+&body name = 'mass' inertia = 1.0 /
+&coupling name = 'spring' bodies = 'ground', 'mass' stiffness = 1.0 /
+&clutch name = 'brake' bodies = 'mass', 'ground' capacity = {!r} /
+&excitation name = 'shaker' body = 'mass' amplitude = 1.0 frequency = 0.5 /
+&run t_end = 10.0 /
+"""
+
+
+def branch(nocdyn, text):
+    """The columns of orbit.csv, the report and what is printed."""
+    outcome = nocdyn.done(text, command="orbit")
+    report = json.loads((nocdyn.folder / "out/orbit.json").read_text())
+    return nocdyn.values("out", "orbit.csv"), report, outcome.stdout
+
+
+def at(values, parameter, value):
+    """The rows at a value of the parameter."""
+    rows = np.abs(values[parameter] - value) < 1e-12
+    return Values({label: column[rows] for label, column in values.items()})
+
+
+def specials(report, kind):
+    return [point["value"] for point in report["special_points"] if point["kind"] == kind]
+
+
+def in_order(multipliers):
+    return np.array(sorted(multipliers, key=lambda value: (round(value.real, 5), value.imag)))
+
+
+def multipliers(values, row):
+    count = sum(label.startswith("multiplier") for label in values) // 2
+    found = [values[f"multiplier_{i}_real"][row] + 1j * values[f"multiplier_{i}_imaginary"][row] for i in range(1, count + 1)]
+    return in_order(found)
+
+
+def test_a_smooth_machine_has_the_same_branch_by_both_methods(nocdyn):
+    by_shooting, report, printed = branch(nocdyn, DUFFING + OVER.format(0.8, 1.6, "count = 5 method = 'shooting'"))
+    assert "by shooting" in printed
+    assert specials(report, "fold") == pytest.approx(FOLDS, abs=1e-8)
+    by_harmonics, _, _ = branch(nocdyn, DUFFING + OVER.format(0.8, 1.6, "count = 5 tolerance = 1e-10"))
+    for frequency in (0.8, 1.0, 1.2, 1.4):
+        one, other = (at(values, "excitation.shaker.frequency", frequency) for values in (by_shooting, by_harmonics))
+        for label in ("half_range_phi_mass", "largest_total_moment_spring"):
+            assert one[label] == pytest.approx(other[label], rel=1e-9)
+        for row in range(len(one["stable"])):
+            assert multipliers(one, row) == pytest.approx(multipliers(other, row), abs=ASKED)
+
+
+def play_over(t_end, start, amplitude, rate):
+    """The end of a motion with play, and its least and largest x, integrated from edge to edge."""
+    integrate = pytest.importorskip("scipy.integrate")
+    t, y, least, largest = 0.0, np.array(start), np.inf, -np.inf
+    while t < t_end:
+        x = y[0] + 1e-9 * np.sign(y[1])
+        edge = np.sign(x) if abs(x) > 1.0 else 0.0
+
+        def rates(t, y, edge=edge):
+            force = y[0] - edge if edge else 0.0
+            return [y[1], MEAN + amplitude * np.sin(rate * t) - 2 * ZETA * y[1] - force]
+
+        def leaves(t, y, edge=edge):
+            return 1.0 - abs(y[0]) if not edge else edge * y[0] - 1.0
+
+        def turns(t, y):
+            return y[1]
+
+        leaves.terminal, leaves.direction = True, -1
+        motion = integrate.solve_ivp(rates, (t, t_end), y, method="DOP853", rtol=1e-12, atol=1e-13, events=(leaves, turns))
+        places = np.concatenate([motion.y[0], [p[0] for p in motion.y_events[1]]])
+        least, largest = min(least, places.min()), max(largest, places.max())
+        t, y = motion.t[-1], motion.y[:, -1]
+    return y, least, largest
+
+
+def settled_play(amplitude, rate, turns):
+    """Half range and multipliers of the motion on which one with play settles, by Newton's method with differences."""
+    period = 2 * np.pi / rate
+    start = play_over(turns * period, (1.1, 0.0), amplitude, rate)[0]
+    for _ in range(6):
+        end, least, largest = play_over(period, start, amplitude, rate)
+        matrix = np.empty((2, 2))
+        for i in range(2):
+            step = 1e-5 * np.eye(2)[i]
+            ends = [play_over(period, start + sign * step, amplitude, rate)[0] for sign in (-1, 1)]
+            matrix[:, i] = (ends[1] - ends[0]) / 2e-5
+        change = np.linalg.solve(matrix - np.eye(2), start - end)
+        start = start + change
+        if np.abs(change).max() < 1e-10:
+            break
+    return 0.5 * (largest - least), in_order(np.linalg.eigvals(matrix))
+
+
+@pytest.mark.parametrize("rate", [0.9, 1.1])
+def test_play_between_wheels_has_the_motion_and_the_multipliers_of_an_integration(nocdyn, rate):
+    amplitude = EXCITATION * rate**2
+    text = PLAY.format(2 * ZETA, MEAN, amplitude, rate)
+    text += f"&orbit over = 'excitation.shaker.amplitude' range = {amplitude!r}, {1.01 * amplitude!r} start = 'settled_run' /\n"
+    values, _, _ = branch(nocdyn, text)
+    half_range, expected = settled_play(amplitude, rate, 40)
+    assert values["half_range_phi_x"][0] == pytest.approx(half_range, rel=ASKED)
+    assert multipliers(values, 0) == pytest.approx(expected, abs=ASKED)
+
+
+def test_play_softens_and_jumps_and_the_report_says_which_method_found_it(nocdyn):
+    values, report, printed = branch(nocdyn, PLAY.format(2 * ZETA, MEAN, 0.05, 0.4) + OVER.format(0.4, 1.3, ""))
+    assert "note: method = shooting, as motions cross the edge of the gap of coupling 'mesh'" in printed
+    up, down = specials(report, "fold")
+    assert down < up < 1.0  # contact alone has its resonance at 1 rad/s
+    assert (values["harmonics"] == 0).all()
+    assert report["largest_error"] < 1e-8
+
+
+def test_a_motion_with_play_of_twice_the_period_is_that_of_an_integration(nocdyn):
+    rate = 1.7
+    amplitude = EXCITATION * rate**2
+    text = PLAY.format(2 * ZETA, MEAN, amplitude, rate).replace("angle = 1.1", "angle = 1.1 speed = 0.3")
+    text += "&output interval = 0.02 /\n"
+    nocdyn.done(text.replace("t_end = 10.0", f"t_end = {200 * np.pi / rate!r} rtol = 1e-9 atol = 1e-11"))
+    (nocdyn.folder / "out/trajectory.csv").rename(nocdyn.folder / "motion.csv")
+    text += f"&orbit over = 'excitation.shaker.amplitude' range = {amplitude!r}, {1.01 * amplitude!r} subharmonic = 2"
+    values, _, _ = branch(nocdyn, text + " method = 'shooting' start = 'motion.csv' /\n")
+    half_range, expected = settled_twice(amplitude, rate)
+    assert values["half_range_phi_x"][0] == pytest.approx(half_range, rel=ASKED)
+    assert multipliers(values, 0) == pytest.approx(expected, abs=ASKED)
+
+
+def settled_twice(amplitude, rate):
+    period = 4 * np.pi / rate
+    start = play_over(60 * period, (1.1, 0.3), amplitude, rate)[0]
+    end, least, largest = play_over(period, start, amplitude, rate)
+    assert np.abs(play_over(0.5 * period, start, amplitude, rate)[0] - start).max() > 0.01  # not of one period
+    matrix = np.empty((2, 2))
+    for i in range(2):
+        step = 1e-5 * np.eye(2)[i]
+        ends = [play_over(period, start + sign * step, amplitude, rate)[0] for sign in (-1, 1)]
+        matrix[:, i] = (ends[1] - ends[0]) / 2e-5
+    return 0.5 * (largest - least), in_order(np.linalg.eigvals(matrix))
+
+
+def den_hartog(friction, ratio):
+    """The largest deflection of a mass with dry friction and no stops, for a static one of 1: J. P. Den Hartog, Forced Vibrations
+    with Combined Coulomb and Viscous Friction, Trans. ASME 53 (1931), pages 107 to 115."""
+    gain = 1.0 / (1.0 - ratio**2)
+    drag = np.sin(np.pi / ratio) / (ratio * (1.0 + np.cos(np.pi / ratio)))
+    return np.sqrt(gain**2 - (friction * drag) ** 2)
+
+
+@pytest.mark.parametrize("ratio", [0.6, 0.7, 0.8])
+def test_dry_friction_has_the_amplitude_of_den_hartog(nocdyn, ratio):
+    friction = 0.2
+    values, _, _ = branch(nocdyn, BRAKE.format(friction) + OVER.format(0.55, 0.85, "count = 7"))
+    rows = at(values, "excitation.shaker.frequency", ratio)
+    assert rows["half_range_phi_mass"] == pytest.approx(den_hartog(friction, ratio), rel=1e-9)
+
+
+def test_a_brake_that_sticks_has_the_motion_of_a_settled_run(nocdyn):
+    text = BRAKE.format(0.8)  # it sticks twice a period
+    values, _, _ = branch(nocdyn, text + OVER.format(0.5, 0.55, ""))
+    assert abs(multipliers(values, 0)).min() < 1e-9  # what was before a stop is forgotten
+    period = 4 * np.pi
+    run = text.replace("t_end = 10.0", f"t_end = {20 * period!r} rtol = 1e-11 atol = 1e-13")
+    nocdyn.done(run + f"&output interval = {period / 2000!r} /\n")
+    phi = nocdyn.values("out", "trajectory.csv")["phi_mass"][-2001:]
+    assert values["half_range_phi_mass"][0] == pytest.approx(0.5 * (phi.max() - phi.min()), rel=1e-6)
+
+
+REFUSED = [
+    (BRAKE.format(0.8) + OVER.format(0.5, 0.55, "method = 'harmonic_balance'"), "does not know which joints are locked"),
+    (
+        BRAKE.format(0.8) + "&drive name = 'd' body = 'mass' speed = 1.0 /\n" + OVER.format(0.5, 0.55, ""),
+        "takes no prescribed motions",
+    ),
+]
+
+
+@pytest.mark.parametrize(("text", "message"), REFUSED, ids=[message for _, message in REFUSED])
+def test_what_neither_method_follows_is_refused(nocdyn, text, message):
+    outcome = nocdyn("orbit", nocdyn.write("machine.nml", text))
+    assert outcome.returncode == 2, outcome.stdout + outcome.stderr
+    assert message in outcome.stderr
