@@ -87,17 +87,20 @@ def _stability(orbits: Orbits, named: str, unit: str, factor: float) -> Paragrap
 
 def _specials(sources: Sources, orbits: Orbits, unit: str, factor: float) -> Table:
     loads = orbits.loads()[:1]
+    jumps = any(one.lands_on for one in orbits.specials)
     rows = []
     for one in orbits.specials:
         before = [orbits.half_range(column)[one.row] for column in loads]
         after = [", ".join(_amount(sources, value, column) for value in orbits.landings(one, column)) for column in loads]
         cells = [text(one.name), number(factor * one.value, DIGITS), number(int(orbits.table["branch"].iloc[one.row]))]
         cells += [Cell(_amount(sources, value, column), value, "", "", True) for value, column in zip(before, loads)]
-        rows.append([*cells, *texts(after)])
+        rows.append([*cells, *(texts(after) if jumps else [])])
     of = [f"{name_of(column)}: {column.caption}" for column in loads]
     heads = ["point", f"at [{unit}]" if unit else "at", "branch", *(f"half range of {one}" for one in of)]
-    note = "At a fold the parameter turns back: where a stable motion ends, the machine jumps to another one."
-    return cut(Table("Special points", [*heads, *("after a jump" for _ in of)], rows, note), MOST_ROWS, "orbit.json")
+    heads += ["after a jump"] * len(of) if jumps else []
+    note = "At a fold the parameter turns back"
+    note += ": where a stable motion ends, the machine jumps to another one." if jumps else "."
+    return cut(Table("Special points", heads, rows, note), MOST_ROWS, "orbit.json")
 
 
 def _amount(sources: Sources, value: float, column: Column) -> str:

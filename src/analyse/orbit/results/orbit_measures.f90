@@ -83,6 +83,7 @@ contains
     if (allocated(error)) return
     self%notes = [notes, self%notes]
     call find_reference(input, machine, self)
+    call leave_out_samples(self)
     allocate (self%measures(self%branch%count))
     do i = 1, size(self%measures)
       call self%measure(self%branch%points(i), self%measures(i), error)
@@ -91,6 +92,23 @@ contains
     call find_chosen(self, error)
     if (.not. allocated(error)) call find_landings(self, error)
   end subroutine measure_orbits
+
+  !> Leaves out what needs samples where the method has none.
+  subroutine leave_out_samples(self)
+    type(measured_orbits_t), intent(inout) :: self
+    type(signal_samples_t) :: samples
+    type(error_t), allocatable :: error
+
+    if (self%branch%count == 0 .or. .not. self%needs_samples .and. size(self%settings%motions) == 0) return
+    call self%problem%sample(self%branch%points(1), self%columns%columns, 0, samples, error)
+    if (allocated(error) .or. allocated(samples%series)) return
+    call append(self%notes, 'motions, spectrum, damage and limits over the frequency are found by harmonic balance only: ' // &
+                'they are left out')
+    deallocate (self%damages, self%settings%motions)
+    allocate (self%damages(0), self%settings%motions(0))
+    self%settings%has_spectrum = .false.
+    self%needs_samples = .false.
+  end subroutine leave_out_samples
 
   !> The motions that the input asks for.
   subroutine find_chosen(self, error)

@@ -19,8 +19,8 @@ module nocdyn_orbit_verdict
 
   public :: find_orbit_verdict
 
-  character(len=*), parameter :: names(comparisons) = [character(len=33) :: 'continuous', 'largest', &
-                                                                           'of one harmonic over the frequency']
+  character(len=*), parameter :: names(comparisons) = [character(len=34) :: 'continuous', 'largest', &
+                                                                         'of one harmonic over the frequency']
   real(wp), parameter :: narrow = 1.0e-9_wp   ! width of ranges that are none, as a share of the whole one
 
 contains
@@ -261,6 +261,12 @@ contains
     integer :: i, k
 
     possible = analysis%are_possible()
+    if (size(analysis%damages) == 0 .and. size(input%groups_named('fatigue')) > 0) then
+      line = new_verdict_line('orbit', 'machine', '', 'damage', '')
+      line%finding = is_not_assessed
+      line%reason = 'found by harmonic balance only'
+      call verdict%add(line)
+    end if
     do k = 1, size(analysis%damages)
       associate (one => analysis%damages(k))
         if (any([(analysis%measures(i)%exceeds_strength(k) .and. possible(i), i=1, size(possible))])) then
