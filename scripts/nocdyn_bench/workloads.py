@@ -13,6 +13,7 @@ from .example_runs import example_runs
 from .example_sweeps import example_sweeps, with_springs
 from .fatigue import fatigue_costs
 from .nocdyn_sweep import sweepers
+from .orbit_costs import orbit_costs
 from .peers import heyoka, heyoka_sweep, numbalsoda, numbalsoda_sweep, scipy, scipy_sweep
 from .problems import Case2, Chain
 from .programs import Programs
@@ -314,6 +315,10 @@ def report(bench: Bench) -> Costs:
     return Costs("report", "Report", lambda rounds: report_costs(ROOT, bench.scratch, rounds))
 
 
+def orbits(bench: Bench) -> Costs:
+    return Costs("orbit_costs", "Periodic motions", lambda rounds: orbit_costs(bench.nocdyn, bench.scratch, rounds))
+
+
 WORKLOADS: dict[str, Callable[[Bench], Workload]] = {
     "start_up": start_up,
     "case2": case2,
@@ -330,6 +335,7 @@ WORKLOADS: dict[str, Callable[[Bench], Workload]] = {
     "example_sweeps": examples,
     "opentorsion": opentorsion,
     "fatigue": fatigue,
+    "orbit_costs": orbits,
     "report": report,
     "step_costs": steps,
     "chunk_costs": chunks,

@@ -12,6 +12,7 @@ from conftest import SOURCE
 sys.path.insert(0, str(SOURCE / "scripts"))
 from nocdyn_bench import costs, example_runs, example_sweeps, rounds, torsional_machines, torsional_results, variants
 from nocdyn_bench.contestant import Contestant, ContestantError, Run
+from nocdyn_bench.harmonic_balance import HarmonicBalance
 from nocdyn_bench.nocdyn_sweep import random_design, write_input
 from nocdyn_bench.shipped import Shipped
 
@@ -322,3 +323,9 @@ print("a complaint", file=sys.stderr)
     outcome = subprocess.run(command, cwd=SOURCE / "scripts", capture_output=True, text=True, check=True)
     assert (outcome.stdout, outcome.stderr) == ("a table\n", "a complaint\n")
     assert (tmp_path / "out" / "peers.log").read_text(encoding="utf-8") == "the problem seems to become stiff\n"
+
+
+def test_the_harmonic_balance_beside_nocdyn_finds_the_folds_of_a_hardening_spring():
+    one = HarmonicBalance(1, 1.0, 0.1, 0.05, 0.18, 5)
+    one.follow(0.8, 1.6, 2.5, 0.02)
+    assert one.folds() == pytest.approx([1.2696019555, 1.1157002518], abs=1e-4)
