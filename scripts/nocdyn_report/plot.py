@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from .failure import USAGE, ChoiceError, ResultsError
+from .failure import FILES, USAGE, ChoiceError, ResultsError
 from .report.result_files import MAIN_FILES, ResultFiles
 
 # Kind of results -> the module that draws it, the names of its files.
@@ -15,6 +15,7 @@ KINDS = {
     "modes": ("mode_figures", "modes.json"),
     "campbell": ("campbell_figures", "campbell.json"),
     "response": ("response_figures", "response.json"),
+    "orbit": ("orbit_figures", "orbit.json"),
     "transit": ("transit_figures", "transit.json"),
     "sweep": ("sweep_figures", "sweep.nc"),
 }
@@ -36,6 +37,14 @@ def main(words: Sequence[str]) -> int:
     except ResultsError as error:
         print(f"{sys.argv[0]}: {error}", file=sys.stderr)
         return error.code
+    except (AttributeError, IndexError, KeyError, TypeError) as error:  # of files of JSON that lack what is inside
+        place = error.__traceback__
+        while place.tb_next:
+            place = place.tb_next
+        where = f"{Path(place.tb_frame.f_code.co_filename).name}:{place.tb_lineno}"
+        what = f"what was read lacks {error}" if isinstance(error, KeyError) else f"{type(error).__name__}: {error}"
+        print(f"{sys.argv[0]}: these results cannot be drawn ({what}, {where}); compute them again", file=sys.stderr)
+        return FILES
 
 
 def _plot(words: Sequence[str]) -> int:

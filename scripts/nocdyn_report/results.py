@@ -13,7 +13,7 @@ import pandas as pd
 from .columns import COLUMNS, Column, read_column_list
 from .failure import ChoiceError, ResultsError
 from .json_files import with_case
-from .trajectory_files import labels_of, need_folder, read_columns
+from .trajectory_files import labels_of, need_folder, need_whole, read_columns
 
 TIME = "t [s]"
 FILES = ("trajectory.csv", "trajectory.nc", "trajectory.partial.csv", "trajectory.partial.nc")
@@ -128,6 +128,7 @@ def read_results(folder: Path, choose: Callable[[Header], Iterable[str]] | None 
     file = trajectory_in(folder)
     if file is None:
         raise ResultsError(f"{folder}: no trajectory.csv here; {_elsewhere(folder)}")
+    need_whole(file)
     labels = labels_of(file)
     if TIME not in labels:
         raise ResultsError(f"{file}: not a trajectory of nocdyn: there is no column '{TIME}'")

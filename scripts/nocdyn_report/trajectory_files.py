@@ -22,6 +22,17 @@ def labels_of(file: Path) -> list[str]:
     return list(_variables_of(file)) if file.suffix == ".nc" else list(_read_csv(file, nrows=0))
 
 
+def need_whole(file: Path) -> None:
+    """Refuses a table that is cut inside its last row, which another program or a full disk has left."""
+    if file.suffix == ".nc":
+        return
+    with file.open("rb") as content:
+        content.seek(0, 2)
+        content.seek(max(0, content.tell() - 1))
+        if content.read() not in (b"\n", b""):
+            raise ResultsError(f"{file}: is cut inside its last row; compute the results again")
+
+
 def read_columns(file: Path, labels: Collection[str]) -> pd.DataFrame:
     """Some of them: to read a column of trajectory.csv takes ten times as long as to skip it."""
     if file.suffix == ".nc":

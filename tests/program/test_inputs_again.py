@@ -136,8 +136,10 @@ ELEMENTS = {
     "any passage": "&transit body = 'a' range = 1, 2 direction = 'any' /",
     "both passages": "&transit body = 'a' range = 1, 2 direction = 'both' ramp_times = 0, 1, 2 ramp_speeds = 0.5, 3, 0.5 /",
     "passage up": "&transit body = 'a' range_rpm = 10, 20 direction = 'up' passages = 9 time_limit = 3 /",
-    "low orbit": "&orbit over = 'body.a.inertia' range = 1, 2 start = 'low' starts = 4 harmonics = 9 stability = .true. /",
-    "settled orbit": "&orbit body = 'a' speed_rpm = 10, 20 start = 'settled_run' subharmonic = 2 signals = 'phi_*' count = 5 /",
+    "low orbit": "&orbit over = 'body.a.inertia' range = 1, 2 start = 'low' starts = 4 harmonics = 9 stability = .true. "
+    "motions = 1.2, 1.5 spectrum = .true. /",
+    "settled orbit": "&orbit body = 'a' speed_rpm = 10, 20 start = 'settled_run' subharmonic = 2 signals = 'phi_*' count = 5 "
+    "motion_speeds_rpm = 15 /",
     "orbits in harmonics": "&orbit over = 'body.a.inertia' range = 1, 2 method = 'harmonic_balance' /",
     "orbits by shooting": "&orbit over = 'body.a.inertia' range = 1, 2 method = 'shooting' /",
     "orbits": "&coupling name = 'k' bodies = 'a', 'b' stiffness = 100 /\n&orbit over = 'body.a.inertia' range = 1, 2 /\n"

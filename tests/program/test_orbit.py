@@ -303,17 +303,21 @@ def test_a_chain_of_two_hundred_bodies_goes_through_the_banded_equations(nocdyn)
     assert "stable" in small.by_name()
 
 
-def test_stiff_parts_have_no_multipliers_unasked(nocdyn):
-    text = DUFFING + OVER.format(0.8, 0.81, "{}")
+def test_stiff_parts_change_no_multipliers(nocdyn):
+    text = DUFFING + OVER.format(0.8, 0.81, "count = 2")
     stiff = text.replace(
         "&run",
         "&body name = 'tip' inertia = 1e-6 /\n"
-        "&coupling name = 'tip' bodies = 'mass', 'tip' stiffness = 1e4 damping = 1.0 /\n&run",
+        "&coupling name = 'tip' bodies = 'mass', 'tip' stiffness = 1e4 damping = {} /\n&run",
     )
-    soft, _ = branch(nocdyn, text.format(""))
-    values, _ = branch(nocdyn, stiff.format(""))
-    assert "stable" in soft.by_name() and "stable" not in values.by_name()
+    soft, _ = branch(nocdyn, text)
+    values, _ = branch(nocdyn, stiff.format(1.0))
     assert values["largest_phi_mass"][0] == pytest.approx(soft["largest_phi_mass"][0], rel=1e-4)
+    for label in ("multiplier_1_real", "multiplier_1_imaginary", "multiplier_2_real", "multiplier_2_imaginary"):
+        assert values[label][0] == pytest.approx(soft[label][0], abs=1e-4)
+    assert max(abs(values["multiplier_3_real"])) < 1e-6
+    undamped, _ = branch(nocdyn, stiff.format(1e-7).replace("1e4", "1e9"))  # of many oscillations in a period
+    assert "stable" in values.by_name() and "stable" not in undamped.by_name()
 
 
 def test_load_cases_have_branches_of_their_own(nocdyn):

@@ -1,5 +1,7 @@
 """nocdyn plot: of a folder with load cases, the figures of each are drawn beside its results, and bear its name."""
 
+import json
+import shutil
 import subprocess
 
 import pytest
@@ -48,10 +50,34 @@ def test_one_kind_of_all_load_cases_is_drawn(results, kind, capsys):
     assert out.count(" are in ") == 2 and f"{results / 'rough/figures'}" in out
 
 
+@pytest.mark.parametrize("command", COMMANDS[1:])
+def test_a_report_names_its_load_case(results, command):
+    for case in ("calm", "rough"):
+        assert json.loads((results / case / f"{command}.json").read_text())["load_case"] == case
+
+
+@pytest.mark.parametrize(
+    ("kind", "file", "change", "message"),
+    [
+        ("run", "trajectory.csv", lambda text: text[:-7], "is cut inside its last row"),
+        ("modes", "modes.json", lambda text: text.replace('"frequency_Hz"', '"other"'), "compute them again"),
+        ("response", "response.json", lambda text: text.replace('"mode"', '"other"'), "compute them again"),
+    ],
+)
+def test_a_file_that_is_cut_or_lacks_what_is_inside_is_refused_in_one_line(
+    results, tmp_path, capsys, kind, file, change, message
+):
+    folder = shutil.copytree(results / "calm", tmp_path / "r")
+    (folder / file).write_text(change((folder / file).read_text()))
+    assert plot.main([kind, str(folder)]) == 3
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"nocdyn plot {kind}") and message in line
+
+
 def test_a_word_that_is_no_kind_is_told_with_the_kinds(results, capsys):
     assert plot.main(["foo", str(results)]) == 2
     assert capsys.readouterr().err == (
-        "nocdyn plot: 'foo' is no kind of results; there are: run, modes, campbell, response, transit, sweep, paper\n"
+        "nocdyn plot: 'foo' is no kind of results; there are: run, modes, campbell, response, orbit, transit, sweep, paper\n"
     )
 
 

@@ -36,7 +36,10 @@ REPORTS = {  # of recorded paths, in the critical section
     *(f"{command}_{part}" for command in ("campbell", "response", "modes") for part in ("files", "report", "results")),
     *("equilibrium_report", "equilibrium_results", "response_verdict", "verdicts"),
 }
-ORBITS = {path.stem for path in (SOURCE / "src/analyse/orbit").rglob("*.f90")}  # in the critical section, with their runs
+ORBITS = {  # in the critical section, with their runs; without a journal
+    "log_file",
+    *(path.stem for path in (SOURCE / "src/analyse/orbit").rglob("*.f90")),
+}
 ALLOWED = REPORTS | ORBITS | BEFORE_THREADS | VALUES_OF_A_VARIANT | NAMES_IN_FAILURES | PROGRAMS | ANALYSES | {"serial_work"}
 
 LENGTHS = re.compile(r"^(\S+):\S+ [bBdD] slen\.[0-9.]+$", re.MULTILINE)

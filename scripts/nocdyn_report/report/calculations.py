@@ -21,6 +21,7 @@ FILES = {
     "response": ["response.json", "response.csv", "response_orders.csv"],
     "campbell": ["campbell.json", "campbell.csv"],
     "transit": ["transit.json", "transit.csv"],
+    "orbit": ["orbit.json", "orbit.csv", "orbit_columns.json"],
 }
 HOLZER = ["holzer.csv"]
 RUN = ["summary.json", "input.nml", "columns.json", "trajectory.csv", "trajectory.nc", "cycles.csv"]  # those that are there
@@ -93,6 +94,8 @@ def calculate(
         results.of["transit"] = _analyse(program, "transit", words, stamps)
     else:
         results.of["transit"] = Calculation("transit", "left out", "the input has no &transit")
+    if "\n&orbit\n" in check["complete_input"]:
+        results.of["orbit"] = _analyse(program, "orbit", words, stamps)
     results.of["run"] = _run(program, results, words, stamps)
     for calculation in results.of.values():
         tell(_line(calculation))

@@ -23,6 +23,7 @@ from .sections.fatigue import fatigue_section
 from .sections.machine import data_section, machine_section
 from .sections.modes import modes_section
 from .sections.motion import motion_section
+from .sections.orbit import orbit_section
 from .sections.remarks import notes_section, remarks_section
 from .sections.response import response_section
 from .sections.scope import scope_section
@@ -97,7 +98,8 @@ def _text(file: str) -> str:
 
 def _sections(sources: Sources, arguments: argparse.Namespace) -> list[Section]:
     made = [make(sources) for make in (machine_section, steady_section, data_section, modes_section, campbell_section)]
-    made += [make(sources) for make in (response_section, transit_section, motion_section, energy_section, fatigue_section)]
+    made += [make(sources) for make in (response_section, transit_section, orbit_section, motion_section)]
+    made += [make(sources) for make in (energy_section, fatigue_section)]
     there = [section for section in made if section is not None]
     folder = Folder(Path(arguments.file).parent, arguments.allow_outside)
     remarks = remarks_section(_notes(sources, arguments.file, folder))

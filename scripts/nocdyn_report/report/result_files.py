@@ -12,9 +12,10 @@ MAIN_FILES = {  # what a command reports, of the machine or of one load case
     "response": "response.json",
     "run": "summary.json",
     "transit": "transit.json",
+    "orbit": "orbit.json",
 }
 CASES = {"run": "cases.json"} | {
-    name: f"{name}_cases.json" for name in ("equilibrium", "modes", "campbell", "response", "transit")
+    name: f"{name}_cases.json" for name in ("equilibrium", "modes", "campbell", "response", "transit", "orbit")
 }
 DONE = "done"
 

@@ -12,6 +12,7 @@ import pandas as pd
 from ..columns import DETAIL, Column, columns_of, read_column_list
 from ..failure import ResultsError
 from ..modes_results import Modes, read_modes
+from ..orbit_results import Orbits, read_orbits
 from ..results import RPM, groups_of, ranges_of, trajectory_in
 from ..speed_results import Axis, Campbell, Critical, Response, read_campbell, read_response, rpm
 from ..trajectory_files import labels_of, read_columns
@@ -137,6 +138,11 @@ class Sources:
     def transits(self) -> list[Transit]:
         """Of all load cases."""
         return [_told(read_transit, case.folder) for case in self.cases_of("transit")]
+
+    @cached_property
+    def orbits(self) -> list[Orbits]:
+        """Of all load cases."""
+        return [_told(read_orbits, case.folder) for case in self.cases_of("orbit")]
 
     @cached_property
     def cases(self) -> dict:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from .result_files import ResultFiles
 
-ANALYSES = ("response", "campbell", "run", "transit")  # that compare with limits; of equal lines the first one's stays
+ANALYSES = ("response", "campbell", "run", "transit", "orbit")  # that compare with limits; of equal lines the first one's stays
 FINDINGS = ("exceeded", "not assessed", "restricted", "kept")  # the worst first
 OPEN = "not assessed"
 STEADY = ("steady", "continuous", "transient")  # words of criteria on steady oscillations; others are on largest values

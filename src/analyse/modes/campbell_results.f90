@@ -169,6 +169,7 @@ contains
     integer :: i
 
     call json%open_report(input%file, input%title())
+    if (allocated(input%load_case)) call json%put('load_case', input%load_case%name)
     call verdict%put(json)
     call json%put('notes', self%notes)
     if (size(self%unstable) > 0) then

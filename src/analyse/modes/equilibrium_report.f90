@@ -203,6 +203,7 @@ contains
     integer :: k
 
     call json%open_report(input%file, input%title())
+    if (allocated(input%load_case)) call json%put('load_case', input%load_case%name)
     call json%put('independent', self%coordinates)
     call json%put('notes', self%notes)
     call json%open_list('columns')

@@ -90,6 +90,7 @@ contains
     integer :: i
 
     call json%open_report(input%file, input%title())
+    if (allocated(input%load_case)) call json%put('load_case', input%load_case%name)
     call json%put('about', self%point)
     if (self%t < t_infinity) call json%put('time_s', self%t)
     call json%put('notes', self%notes)

@@ -1,7 +1,7 @@
 !> Periodic motions of a machine over a number of its input or over a speed: from the input to the branch.
 module nocdyn_orbit_analysis
   use nocdyn_backbone_start, only: start_backbone
-  use nocdyn_column_names, only: choose_signals
+  use nocdyn_branch_switching, only: follow_switches
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_harmonic_problem, only: harmonic_problem_t, new_harmonic_problem
   use nocdyn_input, only: input_t
@@ -11,18 +11,18 @@ module nocdyn_orbit_analysis
   use nocdyn_orbit_backbone, only: backbone_t, find_quasi_linear, note_left_out
   use nocdyn_orbit_branch, only: follow_branch
   use nocdyn_orbit_guess, only: find_settled_guess, find_steady_guess
+  use nocdyn_orbit_log, only: orbit_log_t
   use nocdyn_orbit_period, only: find_period
   use nocdyn_orbit_points, only: branch_t
-  use nocdyn_orbit_problem, only: orbit_problem_t, signal_range_t
+  use nocdyn_orbit_problem, only: orbit_problem_t
   use nocdyn_orbit_scatter, only: find_high, find_isolated, scatter_t
   use nocdyn_orbit_settings, only: harmonic_balance, orbit_settings_t, read_orbit_settings, shooting
-  use nocdyn_orbit_signals, only: list_orbit_signals
   use nocdyn_orbit_start_file, only: find_file_guess
   use nocdyn_periodic_machine, only: body_turning, orbit_t, periodic_machine_t
   use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
   use nocdyn_sampled_machine, only: new_sampled_machine
+  use nocdyn_self_excited, only: follow_self_excited
   use nocdyn_shooting_problem, only: new_shooting_problem, shooting_problem_t
-  use nocdyn_signals, only: signal_t
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
   implicit none (type, external)
   private
@@ -33,24 +33,26 @@ module nocdyn_orbit_analysis
 
   type, public :: orbit_analysis_t
     type(orbit_settings_t) :: settings
+    logical :: is_self_excited = .false.               !! whether nothing excites the machine periodically
     character(len=:), allocatable :: parameter, unit   !! what changes
     character(len=:), allocatable :: body_name         !! whose speed is held, ''
-    type(signal_t), allocatable :: signals(:)          !! in SI units
     type(branch_t) :: branch                           !! with the points of all branches
     type(scatter_t) :: found                           !! what scattered starts have found
     type(backbone_t) :: backbone                       !! frequencies of a mode
-    type(signal_range_t), allocatable :: ranges(:, :)  !! [signals, points]
+    class(orbit_problem_t), allocatable :: problem     !! whose motions they are
     type(string_t), allocatable :: notes(:)
+    logical :: is_unfinished = .false.                 !! whether the user has interrupted it; there are points
   end type orbit_analysis_t
 
 contains
 
   !> Follows the branch of an input.
-  subroutine analyse_orbits(input, machine, self, error)
+  subroutine analyse_orbits(input, machine, self, error, log)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine   !! one lane
     type(orbit_analysis_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
+    type(orbit_log_t), target, intent(inout), optional :: log   !! journal, which must live as long as `self`
     type(periodic_machine_t) :: periodic
     class(orbit_problem_t), allocatable :: problem
     type(orbit_t) :: guess
@@ -59,6 +61,7 @@ contains
     allocate (self%notes(0))
     call read_orbit_settings(input, machine, self%settings, error)
     if (allocated(error)) return
+    if (present(log)) self%settings%log => log
     self%body_name = ''
     if (self%settings%body > 0) then
       self%body_name = machine%names(self%settings%body)%text
@@ -77,8 +80,9 @@ contains
       call study_mode(input, machine, periodic, guess, self, error)
     else
       call study_machine(input, self%settings, merge(1, few_samples, has_joints), periodic, guess, error)
+      self%is_self_excited = periodic%rate_is_unknown
+      if (self%is_self_excited .and. .not. allocated(error)) call refuse_keys(input, self%settings, has_joints, error)
     end if
-    if (.not. allocated(error)) call choose_orbit_signals(input, periodic, self, error)
     if (.not. allocated(error)) then
       if (has_joints .or. self%settings%method == shooting) then
         call follow_by_shooting(input, periodic, guess, self, problem, error)
@@ -90,10 +94,41 @@ contains
     if (.not. allocated(error) .and. self%settings%starts > 0) then
       call find_isolated(input, self%settings, problem, self%branch, self%found)
     end if
-    if (.not. allocated(error)) call measure_points(problem, self, error)
-    if (.not. allocated(error)) return
+    if (.not. allocated(error) .and. self%settings%switches) then
+      select type (problem)
+      class is (harmonic_problem_t)
+        call follow_switches(problem, self%settings, self%branch)
+      end select
+    end if
+    if (.not. allocated(error)) then
+      self%is_unfinished = self%settings%is_stopped()
+      call move_alloc(problem, self%problem)
+      return
+    end if
     if (index(error%message, input%shown_case()) /= 1) error%message = input%shown_case() // ': ' // error%message
   end subroutine analyse_orbits
+
+  !> Refuses what has no meaning for a machine that nothing excites.
+  subroutine refuse_keys(input, settings, has_joints, error)
+    type(input_t), intent(in) :: input
+    type(orbit_settings_t), intent(in) :: settings
+    logical, intent(in) :: has_joints
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: key
+
+    key = ''
+    if (settings%method == shooting) key = 'method'
+    if (settings%subharmonic > 1) key = 'subharmonic'
+    if (settings%starts > 0) key = 'starts'
+    if (settings%starts_high .or. settings%start_file /= '') key = 'start'
+    if (key == '' .and. has_joints) then
+      call raise(error, exit_input, input%location(settings%group) // ': nothing excites this machine periodically, and ' // &
+                 'its joints lock; allowed: machines without such joints, whose limit cycles are followed')
+    end if
+    if (key == '') return
+    call raise(error, exit_input, input%location(settings%group, key) // ': ' // key // ': nothing excites this machine ' // &
+               "periodically; allowed: the limit cycles that begin at its steady state, or start = 'settled_run'")
+  end subroutine refuse_keys
 
   !> Refuses rows that move, and harmonic balance for joints that lock.
   subroutine refuse_moving_rows(input, settings, error)
@@ -142,8 +177,10 @@ contains
     if (self%settings%mode > 0) then
       call harmonic%equations%anchor(guess)
       call harmonic%finer%anchor(guess)
-    else if (.not. self%settings%asks_stability) then
-      if (harmonic%has_short_steps(guess)) self%settings%has_stability = .false.
+    else if (periodic%rate_is_unknown) then
+      self%settings%has_stability = .true.   ! which steady states lose
+    else if (self%settings%has_stability .and. .not. self%settings%asks_stability) then
+      if (harmonic%takes_long(guess)) self%settings%has_stability = .false.
     end if
     allocate (notes, source=self%notes)
     call follow_from(input, harmonic, guess, self, error)
@@ -198,6 +235,12 @@ contains
     if (self%settings%mode > 0) then
       call follow_branch(problem, self%settings, guess, self%branch, error)
       return
+    else if (self%is_self_excited) then
+      select type (problem)
+      class is (harmonic_problem_t)
+        call follow_self_excited(input, problem, self%settings, guess, self%branch, self%notes, error)
+      end select
+      return
     end if
     if (self%settings%start_file /= '') then
       call find_file_guess(input, self%settings, problem%periodic, guess, error)
@@ -223,20 +266,6 @@ contains
     if (.not. allocated(error)) call follow_branch(problem, self%settings, guess, self%branch, error)
   end subroutine follow_from
 
-  !> Chooses the columns.
-  subroutine choose_orbit_signals(input, periodic, self, error)
-    type(input_t), intent(in) :: input
-    type(periodic_machine_t), intent(in) :: periodic
-    type(orbit_analysis_t), intent(inout) :: self
-    type(error_t), allocatable, intent(out) :: error
-    type(signal_t), allocatable :: signals(:)
-    integer, allocatable :: chosen(:)
-
-    call list_orbit_signals(periodic%machine%formulation%machine, signals)
-    call choose_signals(input, 'orbit', signals, chosen, self%notes, error)
-    if (.not. allocated(error)) self%signals = signals(chosen)
-  end subroutine choose_orbit_signals
-
   !> The machine and its period, and a guess of the first motion: the steady state by the mean torques.
   subroutine study_machine(input, settings, samples, periodic, guess, error)
     type(input_t), intent(in) :: input
@@ -253,11 +282,7 @@ contains
     periodic%bounds = [min(settings%from, settings%to), max(settings%from, settings%to)]
     call find_period(periodic%machine%formulation%machine, periodic%turning, periodic%period, error)
     if (allocated(error)) return
-    if (size(periodic%period%multiples) == 0) then
-      call raise(error, exit_failed, 'nothing excites the machine periodically; required: an excitation with a frequency or ' // &
-                 'orders. Oscillations that excite themselves are not computed')
-      return
-    end if
+    periodic%rate_is_unknown = size(periodic%period%multiples) == 0
     periodic%held = settings%body
     if (periodic%held > 0) then
       periodic%held_motion = maxloc(abs(periodic%turning(periodic%held, :)), dim=1)
@@ -389,6 +414,7 @@ contains
     integer :: turns
 
     motion = guess
+    if (periodic%rate_is_unknown) motion%rate = turn / input%groups(input%position('run'))%number('t_end')
     call periodic%take_border(periodic%put_border(guess), guess%value, motion)
     call periodic%set_value(motion, error)
     if (allocated(error)) return
@@ -406,19 +432,5 @@ contains
     call raise(error, exit_failed, 'the torques do not repeat themselves with the period of the excitations, ' // &
                rounded_text(turn / motion%rate, 6) // ' s: some follow the time in another way')
   end subroutine check_period
-
-  !> The signals of all points.
-  subroutine measure_points(problem, self, error)
-    class(orbit_problem_t), target, intent(inout) :: problem
-    type(orbit_analysis_t), intent(inout) :: self
-    type(error_t), allocatable, intent(out) :: error
-    integer :: i
-
-    allocate (self%ranges(size(self%signals), self%branch%count))
-    do i = 1, self%branch%count
-      call problem%measure(self%branch%points(i), self%signals, self%ranges(:, i), error)
-      if (allocated(error)) return
-    end do
-  end subroutine measure_points
 
 end module nocdyn_orbit_analysis

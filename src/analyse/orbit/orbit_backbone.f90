@@ -61,7 +61,8 @@ contains
     type(string_t), allocatable :: names(:)
     integer :: b, e
 
-    names = [string_t('damping')]
+    allocate (names(1))
+    names(1) = string_t('damping')
     do b = 1, size(machine%banks)
       associate (bank => machine%banks(b)%bank)
         if (bank%role == role_coupling .or. bank%role == role_phase) cycle

@@ -18,7 +18,7 @@ module nocdyn_orbit_guess
   implicit none (type, external)
   private
 
-  public :: find_steady_guess, find_settled_guess
+  public :: advance, find_settled_guess, find_steady_guess, formulation_angles, start_machine
 
   real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)   ! [rad]
   integer, parameter, public :: guess_samples = 64   !! of a period from which series are found
@@ -45,6 +45,7 @@ contains
     call start_machine(input, settings, steady)
     associate (machine => periodic%machine%formulation%machine, f => periodic%machine%freedoms)
       guess%value = settings%at
+      guess%subharmonic = periodic%subharmonic
       if (allocated(guess%state)) deallocate (guess%state)
       if (allocated(guess%series)) deallocate (guess%series)
       allocate (guess%series(1, periodic%machine%states - f), source=0.0_wp)

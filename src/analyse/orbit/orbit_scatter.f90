@@ -54,6 +54,7 @@ contains
     largest = largest_states(problem%periodic, branch)
     here = settings
     do i = 1, settings%starts
+      if (settings%is_stopped()) return
       here%at = settings%from + points%coordinate(i, 1) * (settings%to - settings%from)
       push = 0.0_wp
       do k = 1, min(max_dimensions - 1, size(push))
@@ -92,6 +93,7 @@ contains
     is_periodic = .not. allocated(error)
     points = sobol_points(min(max_dimensions, size(push)), 0)
     do i = 0, high_starts
+      if (settings%is_stopped()) return
       push = 0.0_wp
       if (i > 0) then
         do k = 1, min(max_dimensions, size(push))

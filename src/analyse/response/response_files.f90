@@ -339,6 +339,7 @@ contains
 
     axis = analysis%settings%axis
     call json%open_report(input%file, input%title())
+    if (allocated(input%load_case)) call json%put('load_case', input%load_case%name)
     call verdict%put(json)
     call json%put('wall_time_s', analysis%wall_time)
     call json%put('notes', analysis%notes)

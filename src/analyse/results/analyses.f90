@@ -23,6 +23,8 @@ module nocdyn_analyses
     logical :: has_code = .false.             !! whether a program in C is wanted instead of matrices
     logical :: writes_files = .false.         !! whether files are written
     character(len=:), allocatable :: folder   !! of the results of a run of the input
+    character(len=:), allocatable :: journal  !! folder in which a journal may be kept, if there is one
+    logical :: resumes = .false.              !! whether a journal that is there is gone on with
   end type analysis_options_t
 
   type, abstract, public :: analysis_t
@@ -33,6 +35,8 @@ module nocdyn_analyses
     logical :: always_writes = .false.  !! whether it writes files without --out too
     logical :: has_report = .true.      !! whether it has a report in JSON
     logical :: is_for_threads = .false. !! whether threads may call `solve` at the same time
+    logical :: keeps_journal = .false.  !! whether it keeps a journal, and then looks for interruptions itself
+    logical :: is_unfinished = .false.  !! after `solve`: interrupted; its tables say so by their names
     type(verdict_t) :: verdict          !! after `judge`: what it says of limits
     type(error_t), allocatable :: refusal   !! after `solve`: an error beside a report that can be printed, without files
   contains

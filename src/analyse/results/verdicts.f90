@@ -38,6 +38,7 @@ module nocdyn_verdicts
     integer :: speeds = 0                           !! number of the speeds that follow: at one, or from one to another
     real(wp) :: speed(2) = 0.0_wp                   !! [rad/s]
     logical :: are_frequencies = .false.            !! whether they are frequencies of a shaker
+    character(len=:), allocatable :: axis, axis_unit   !! of what they are values in place of speeds, and its unit; '': of a speed
     logical :: has_time = .false.
     real(wp) :: time = 0.0_wp                       !! [s]
   contains
@@ -78,6 +79,8 @@ contains
     self%unit = ''
     self%detail = ''
     self%reason = ''
+    self%axis = ''
+    self%axis_unit = ''
   end function new_verdict_line
 
   !> A line on the damage of a &fatigue, of which 1 is allowed.
@@ -217,7 +220,12 @@ contains
       call json%put('unit', line%unit)
     end if
     if (line%has_ratio) call json%put('ratio', line%ratio)
-    if (line%are_frequencies) then
+    if (line%axis /= '' .and. line%speeds > 0) then
+      call json%put('parameter', line%axis)
+      if (line%axis_unit /= '') call json%put('parameter_unit', line%axis_unit)
+      if (line%speeds == 1) call json%put('parameter_value', line%speed(1))
+      if (line%speeds == 2) call json%put('parameter_values', line%speed)
+    else if (line%are_frequencies) then
       if (line%speeds == 1) call json%put('frequency_Hz', from_si(line%speed(1), unit_hz))
       if (line%speeds == 2) call json%put('frequencies_Hz', from_si(line%speed, unit_hz))
     else
@@ -368,20 +376,23 @@ contains
     if (self%reason /= '') text = text // ': ' // self%reason
   end subroutine write_assessment
 
-  !> "106.8 to 107.1 rpm, lambda 0.84"; '' for a line of no place.
+  !> "106.8 to 107.1 rpm, lambda 0.84", "212 N m of motor.mean.torque"; '' for a line of no place.
   subroutine write_place(self, text)
     class(verdict_line_t), intent(in) :: self
     character(len=:), allocatable, intent(out) :: text
-    real(wp) :: speed(2)   ! [rpm] or [Hz]
+    real(wp) :: speed(2)   ! [rpm], [Hz] or of the axis
     integer :: all_digits
 
     text = ''
     speed = from_si(self%speed, merge(unit_hz, unit_rpm, self%are_frequencies))
+    if (self%axis /= '') speed = self%speed
     all_digits = digits
     if (self%speeds == 2 .and. rounded_text(speed(1), digits) == rounded_text(speed(2), digits)) all_digits = more_digits
     if (self%speeds > 0) text = rounded_text(speed(1), all_digits)
     if (self%speeds > 1) text = text // ' to ' // rounded_text(speed(2), all_digits)
-    if (self%speeds > 0) text = text // trim(merge(' Hz ', ' rpm', self%are_frequencies))
+    if (self%speeds > 0 .and. self%axis == '') text = text // trim(merge(' Hz ', ' rpm', self%are_frequencies))
+    if (self%speeds > 0 .and. self%axis_unit /= '') text = text // ' ' // self%axis_unit
+    if (self%speeds > 0 .and. self%axis /= '') text = text // ' of ' // self%axis
     if (self%has_time) text = 't = ' // rounded_text(self%time, digits) // ' s'
     if (self%detail == '') return
     if (text /= '') text = text // ', '

@@ -18,7 +18,7 @@ module nocdyn_analysis_command
   use nocdyn_machine_parts, only: check_input, refuse_mistakes
   use nocdyn_matrices_results, only: matrices_results_t
   use nocdyn_named_analyses, only: assemble_analysed, new_analysis
-  use nocdyn_posix, only: is_interrupted, remove_file, stop_at_interrupts
+  use nocdyn_posix, only: catch_interrupts, is_interrupted, remove_file, stop_at_interrupts
   use nocdyn_result_files, only: result_files_t
   use nocdyn_result_folders, only: out_folder, refuse_shared_folders, result_folder
   use nocdyn_strictness, only: be_strict
@@ -134,7 +134,11 @@ contains
     integer :: k
 
     words = shown_path(arguments%operands(number)%text) // ': interrupted, without results'
-    call stop_at_interrupts('nocdyn: ' // words // new_line('a'))
+    if (kind%keeps_journal) then
+      call catch_interrupts()
+    else
+      call stop_at_interrupts('nocdyn: ' // words // new_line('a'))
+    end if
     if (allocated(reading%error)) then
       if (arguments%command == 'check') call check_load_cases(kind, reading)
       call report_error(reading%error, code)
@@ -157,7 +161,7 @@ contains
           call analyse_job(arguments, kind, job, reading%load_cases(job%load_case), results(k), reading%error, netcdf)
         end if
       end associate
-      if (is_interrupted() .and. allocated(reading%error)) reading%error%message = words
+      if (is_interrupted() .and. allocated(reading%error) .and. .not. kind%keeps_journal) reading%error%message = words
       if (.not. allocated(reading%error)) cycle
       call report_error(reading%error, code)
       deallocate (reading%error)
@@ -283,6 +287,8 @@ contains
     options%has_holzer = arguments%is_given('--holzer')
     options%writes_files = job%folder /= ''
     options%folder = result_folder(arguments, input)
+    options%resumes = arguments%is_given('--resume')
+    if (kind%keeps_journal) options%journal = job%folder
     allocate (analysis, source=kind)
     call analysis%solve(input, machine, options, error)
     if (allocated(error)) return
@@ -290,6 +296,10 @@ contains
       call analysis%text(input, text)
       call print_text(text)
       error = analysis%refusal
+      return
+    end if
+    if (analysis%is_unfinished) then
+      call write_unfinished(analysis, input, job%folder, error)
       return
     end if
     call analysis%judge(input)
@@ -307,6 +317,31 @@ contains
     if (analysis%always_writes) call print_text(input%shown_case() // ': ' // shown_path(job%folder) // ' has ' // &
                                                 listed(names, ' and '))
   end subroutine analyse_one
+
+  !> Writes the tables of an interrupted analysis in place of those of an earlier one.
+  subroutine write_unfinished(analysis, input, folder, error)
+    class(analysis_t), intent(in) :: analysis
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: folder
+    type(error_t), allocatable, intent(out) :: error
+    type(result_files_t), target :: files
+    type(string_t), allocatable :: former(:), names(:)
+    integer :: i
+
+    call analysis%list_tables(names)
+    call files%open(folder, names)
+    do i = 1, size(names)
+      call analysis%put_table(input, names(i)%text, files%files(i))
+    end do
+    call files%finish(error)
+    if (allocated(error)) return
+    allocate (former, source=analysis%other_names(input))
+    do i = 1, size(former)
+      call remove_file(folder // '/' // former(i)%text)
+    end do
+    call raise(error, exit_failed, input%shown_case() // ': interrupted; ' // shown_path(folder) // ' has ' // &
+               listed(names, ' and ') // '; repeat the command with --resume to continue')
+  end subroutine write_unfinished
 
   !> Writes the tables and the report; removes tables of an earlier analysis that are in another form.
   subroutine write_files(command, analysis, input, folder, names, error, netcdf)

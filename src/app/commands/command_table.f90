@@ -115,7 +115,7 @@ contains
       '                     machine with more than 600 degrees of freedom 100' // nl // &
       '  --range_hz LOW,HIGH  only the modes in this range of frequencies at the first speed [Hz]' // nl // &
       '  --quiet            print nothing but errors', analysis_command)
-    call add_command(commands, 'orbit', 'FILE...', '--out --set --case --quiet', &
+    call add_command(commands, 'orbit', 'FILE...', '--out --set --case --strict --resume --quiet', &
       'periodic motions of nonlinear machines: folds, jumps, stability', &
       'Follows by &orbit the periodic motions of a machine over a number of its input or over the mean speed of a' // nl // &
       'body, by harmonic balance, through folds: where motions jump, where they are unstable, and the half ranges' // nl // &
@@ -124,6 +124,8 @@ contains
       '                     default: &output directory, else results/<name of the file>' // nl // &
       '  --set PATH=VALUE   override a key: orbit.count=101' // nl // &
       case_help // nl // &
+      '  --strict           exit code 1 if a limit is exceeded' // nl // &
+      '  --resume           continue an interrupted analysis' // nl // &
       '  --quiet            print nothing but errors', analysis_command)
     call add_command(commands, 'transit', 'FILE...', '--out --set --case --strict --quiet', &
       'run through barred ranges of speed: time, peaks, damage of a passage', &
@@ -171,9 +173,9 @@ contains
       'names, else one beside nocdyn, else python3 in the PATH.'
 
     call add_command(commands, 'plot', '[KIND] DIR', passed_on, 'draw results', &
-      'Draws the results of run, modes, campbell, response or sweep in DIR, to DIR/figures.' // nl // nl // &
+      'Draws the results of run, modes, campbell, response, orbit or sweep in DIR, to DIR/figures.' // nl // nl // &
       '  nocdyn plot DIR           all that DIR holds' // nl // &
-      '  nocdyn plot KIND DIR      results of one KIND: run, modes, campbell, response, transit, sweep' // nl // &
+      '  nocdyn plot KIND DIR      results of one KIND: run, modes, campbell, response, orbit, transit, sweep' // nl // &
       '  nocdyn plot KIND --help   the options of a KIND' // nl // &
       '  nocdyn plot paper         compute the two cases of the paper and draw its figures 2 to 5' // on_python, python_command)
     call add_command(commands, 'report', 'FILE', passed_on, 'a report on a machine, HTML and PDF', &

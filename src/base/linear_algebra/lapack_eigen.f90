@@ -5,8 +5,8 @@ module nocdyn_lapack_eigen
   implicit none (type, external)
   private
 
-  public :: cholesky_factor, solve_triangular, singular_vectors, symmetric_eigenvectors, eigenvectors, &
-    tridiagonal_eigenvectors
+  public :: cholesky_factor, solve_triangular, singular_vectors, symmetric_eigenvectors, eigenvalues, &
+    eigenvectors, tridiagonal_eigenvectors
 
   interface
     subroutine dpotrf(uplo, n, a, lda, info)
@@ -150,6 +150,28 @@ contains
     call dstev('V', n, values, off, vectors, n, work, info)
     has_failed = info /= 0
   end subroutine tridiagonal_eigenvectors
+
+  !> Eigenvalues of a real matrix (DGEEV); conjugate pairs follow each other.
+  subroutine eigenvalues(matrix, values, has_failed)
+    real(wp), intent(in) :: matrix(:, :)     !! [n, n]
+    complex(wp), intent(out) :: values(:)    !! [n]
+    logical, intent(out) :: has_failed       !! LAPACK does not converge, or an element is not finite
+    real(wp), allocatable :: a(:, :), imaginary(:), real_part(:), work(:)
+    real(wp) :: none(1, 1), room(1)
+    integer :: info, n
+
+    n = size(matrix, 1)
+    values = 0.0_wp
+    has_failed = .not. all(is_finite(matrix))
+    if (has_failed .or. n == 0) return
+    allocate (a, source=matrix)
+    allocate (real_part(n), imaginary(n), source=0.0_wp)
+    call dgeev('N', 'N', n, a, n, real_part, imaginary, none, 1, none, 1, room, -1, info)
+    allocate (work(int(room(1))))
+    call dgeev('N', 'N', n, a, n, real_part, imaginary, none, 1, none, 1, work, size(work), info)
+    has_failed = info /= 0
+    values = cmplx(real_part, imaginary, wp)
+  end subroutine eigenvalues
 
   !> Eigenvalues of a real matrix and right eigenvectors; conjugate pairs follow each other (DGEEV).
   subroutine eigenvectors(matrix, values, vectors, has_failed, left_vectors)

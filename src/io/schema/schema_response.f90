@@ -174,10 +174,18 @@ module nocdyn_schema_response
     key_rule_t('orbit', 'count', an_integer, 1, '', unset, speed_counts, &
       'number of values at even distances that have points, beside those that the branch needs'), &
     key_rule_t('orbit', 'stability', a_flag, 1, '', unset, anything, &
-      'whether multipliers are computed; if not given, of up to 100 states without stiff parts'), &
+      'whether multipliers are computed; if not given, of up to 200 states without stiff undamped parts'), &
+    key_rule_t('orbit', 'switch_branches', a_flag, 1, '', '.false.', anything, &
+      'whether branches that begin at period doublings and branch points are followed too'), &
     key_rule_t('orbit', 'most_points', an_integer, 1, '', '2000', speed_counts, 'points of a branch at most'), &
     key_rule_t('orbit', 'signals', a_text, any_number, '', unset, anything, &
       "columns of orbit.csv: names, or patterns with *, e.g. 'phi_*'; all if not given", fewest=1), &
+    key_rule_t('orbit', 'motions', a_number, any_number, '', unset, anything, &
+      'values in the range at which the motions of all branches are written, motion_1.csv, ...', fewest=1), &
+    key_rule_t('orbit', 'motion_speeds', a_number, any_number, 'rad/s', unset, not_zero, &
+      'mean speeds of the body at which they are written', fewest=1), &
+    key_rule_t('orbit', 'spectrum', a_flag, 1, '', '.false.', anything, &
+      'whether the amplitudes of all harmonics at all points are written, orbit_harmonics.csv'), &
     key_rule_t('transit', 'body', a_body, 1, '', required, anything, 'the body whose speed counts'), &
     key_rule_t('transit', 'range', a_number, 2, 'rad/s', unset, not_zero, &
       'the range of its speed; those that &limit bars in the response if not given'), &
@@ -260,6 +268,8 @@ module nocdyn_schema_response
     relation_rule_t('orbit', requires, 'range', 'over'), &
     relation_rule_t('orbit', requires, 'body', 'speed'), &
     relation_rule_t('orbit', requires, 'speed', 'body'), &
+    relation_rule_t('orbit', requires, 'motions', 'over'), &
+    relation_rule_t('orbit', requires, 'motion_speeds', 'body'), &
     relation_rule_t('transit', equal_lengths, 'ramp_times ramp_speeds', '')]
 
   type(example_t), parameter, public :: response_examples(*) = [ &

@@ -15,9 +15,9 @@ module nocdyn_log_file
   implicit none (type, external)
   private
 
-  character(len=*), parameter :: first_line = 'nocdyn sweep journal   ' // new_line('a')
+  character(len=*), parameter :: line_begin = 'nocdyn ', line_end = ' journal   ' // new_line('a')
   integer(int32), parameter :: format_version = 2, byte_order = int(z'01020304', int32)
-  integer, parameter :: start_bytes = len(first_line) + 2 * integer_bytes
+  integer, parameter :: line_bytes = len(line_begin) + 5 + len(line_end), start_bytes = line_bytes + 2 * integer_bytes
   integer, parameter :: initial_buffer = 65536
   real, parameter :: flush_interval = 5.0   ! [s]
 
@@ -25,6 +25,7 @@ module nocdyn_log_file
 
   type, public :: log_file_t
     character(len=:), allocatable :: path
+    character(len=5) :: kind = 'sweep'             !! of the work that it is the journal of
     integer(int64) :: end = 0                      !! bytes up to the end of the last whole entry
     character(len=:), allocatable :: buffer        !! the entry that `read` found; its bytes follow the ones of the frame
     type(checksum_table_t), allocatable, private :: table
@@ -116,7 +117,8 @@ contains
     logical :: is_done
 
     call lock_file(self%descriptor, is_done)
-    if (.not. is_done) call raise(error, exit_input, shown_path(self%path) // ': another process is at work on this sweep')
+    if (.not. is_done) call raise(error, exit_input, shown_path(self%path) // ': another process is at work on this ' // &
+                                  self%kind)
   end subroutine lock
 
   !> Reads and checks what precedes the entries.
@@ -130,11 +132,11 @@ contains
 
     start = ''
     call read_at(self%descriptor, 0_int64, start, is_done)
-    if (start(:len(first_line)) /= first_line .or. .not. is_done) then
-      call raise(error, exit_input, shown_path(self%path) // ': is no journal of a sweep, or its beginning is lost')
+    if (start(:line_bytes) /= line_begin // self%kind // line_end .or. .not. is_done) then
+      call raise(error, exit_input, shown_path(self%path) // ': is no journal of a ' // self%kind // ', or its beginning is lost')
       return
     end if
-    reader%next = len(first_line) + 1
+    reader%next = line_bytes + 1
     call reader%take_integers(start, numbers)
     if (numbers(2) /= byte_order) then
       call raise(error, exit_input, shown_path(self%path) // ': was written on a machine with another order of bytes')
@@ -158,8 +160,8 @@ contains
     call widen(self%buffer, start_bytes + frame_bytes + len(bytes))
     used = 0
     if (self%end == 0) then
-      self%buffer(:len(first_line)) = first_line
-      used = len(first_line)
+      self%buffer(:line_bytes) = line_begin // self%kind // line_end
+      used = line_bytes
       call put_integers(self%buffer, used, [format_version, byte_order])
     end if
     begins = used

@@ -23,6 +23,10 @@ ASSUMED = {  # what each calculation takes for granted, as the documentation say
     "transit": [
         "Passage of barred ranges: nonlinear, over the time; the mean speed, over whole turns, says when it is in the range.",
     ],
+    "orbit": [
+        "Periodic motions: nonlinear, with the period of the excitation or a multiple of it; other motions are not looked for.",
+        "Limits and damage apply to stable motions; between them the machine jumps.",
+    ],
     "run": ["Motion over the time: nonlinear, as the input describes the elements."],
 }
 
@@ -34,7 +38,7 @@ def remarks_section(html: str) -> Section | None:
 def notes_section(sources: Sources) -> Section:
     section = Section("notes", "Assumptions and notes", is_appendix=True)
     assumed = list(ASSUMED["all"])
-    for command in ("equilibrium", "modes", "campbell", "response", "transit", "run"):
+    for command in ("equilibrium", "modes", "campbell", "response", "transit", "orbit", "run"):
         kind = "shaker" if command == "response" and sources.has(command) and sources.response.axis.is_frequency else command
         assumed += ASSUMED[kind] if sources.has(command) else []
     section.add(Items(assumed))
@@ -55,6 +59,8 @@ def program_notes(sources: Sources) -> list[tuple[str, str]]:
     given += [("response", sources.response_report["notes"])] if sources.has("response") else []
     if sources.has("transit"):
         given += [(f"transit {one.case}".strip(), one.report["notes"]) for one in sources.transits]
+    if sources.has("orbit"):
+        given += [(f"orbit {one.case}".strip(), one.report["notes"]) for one in sources.orbits]
     given += [(f"run {run.name}".strip(), run.summary.get("machine", {}).get("notes", [])) for run in sources.runs]
     origins: dict[str, list[str]] = {}
     for origin, notes in given:

@@ -11,6 +11,7 @@ TITLES = {
     "campbell": ("Campbell diagram", "campbell", "campbell.json, campbell.csv"),
     "response": ("Forced response", "response", "response.json, response.csv, response_orders.csv"),
     "transit": ("Passage of barred ranges", "transit", "transit.json, transit.csv"),
+    "orbit": ("Periodic motions", "orbit", "orbit.json, orbit.csv"),
     "run": ("Motion over the time", "motion", "trajectory.csv, summary.json"),
 }
 
@@ -20,6 +21,8 @@ def scope_section(sources: Sources, sections: list[Section]) -> Section:
     there = {one.id for one in sections}
     rows: list[list[Cell]] = []
     for command, (title, target, files) in TITLES.items():
+        if command not in sources.results.of:  # periodic motions, which few inputs ask for
+            continue
         calculation = sources.results.of[command]
         link = f"#{target}" if target in there or (command == "holzer" and "modes" in there) else ""
         if reason := sources.missing(command):

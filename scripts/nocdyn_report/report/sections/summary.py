@@ -7,6 +7,7 @@ from ..numbers import number_text, percent
 from ..readable import texts
 from ..sources import Sources
 from ..verdict import Line, one_for_each_criterion, sentence
+from .orbit import parameter_of, unstable_ranges
 from .steady import ordered_states, stability_text
 
 MOST_NAMED = 6  # of one sort
@@ -21,7 +22,7 @@ def summary_section(sources: Sources) -> Section:
     if sources.verdict:
         section.add(*_verdict(sources))
     rows: list[list[Cell]] = []
-    for make in (_failures, _steady, _frequencies, _criticals, _passages, _peaks):
+    for make in (_failures, _steady, _frequencies, _criticals, _passages, _jumps, _peaks):
         rows += make(sources)
     return section.add(Table("Key results", ["subject", "finding", "assessment"], rows, is_sorted=False))
 
@@ -74,9 +75,10 @@ def _failures(sources: Sources) -> list[list[Cell]]:
         ("response", "Forced response"),
         ("campbell", "Campbell diagram"),
         ("transit", "Passage"),
+        ("orbit", "Periodic motions"),
     ):
-        one = sources.results.of[command]
-        if one.state in ("failed", "refused"):
+        one = sources.results.of.get(command)
+        if one and one.state in ("failed", "refused"):
             rows.append(_row(subject, "scope", one.message, one.state, "bad"))
     return rows
 
@@ -140,6 +142,22 @@ def _passages(sources: Sources) -> list[list[Cell]]:
                     *(("passed", "") if told and passes else ("not passed", "warn")),
                 )
             )
+    return rows
+
+
+def _jumps(sources: Sources) -> list[list[Cell]]:
+    """Folds at which a stable motion ends, and unstable motions."""
+    rows = []
+    for orbits in sources.orbits if sources.has("orbit") else []:
+        named, unit, factor = parameter_of(sources, orbits)
+        at = [number_text(factor * one.value, 5) for one in orbits.specials if one.kind == "fold"]
+        which = f", {orbits.case}" if orbits.case else ""
+        finding = f"folds at {named} {_listed(at)} {unit}".rstrip() if at else "no folds"
+        if not orbits.has_stability:
+            assessment = "stability not determined", "warn"
+        else:
+            assessment = ("some unstable", "warn") if unstable_ranges(orbits) else ("stable", "good")
+        rows.append(_row("Periodic motions", "orbit", f"{finding}{which}", *assessment))
     return rows
 
 

@@ -3,14 +3,14 @@
 !> Sizes of changes are measured by weights: coordinates by the largest oscillation of all, internal states by their own, mean
 !> speeds and an unknown rate by themselves, the parameter by its range.
 module nocdyn_orbit_corrector
-  use nocdyn_errors, only: error_t
+  use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_kinds, only: wp
   use nocdyn_orbit_equations, only: orbit_equations_t
   use nocdyn_periodic_machine, only: orbit_t
   implicit none (type, external)
   private
 
-  public :: correct, estimate_error, find_tangent, measured, oscillation, set_least_oscillation, weights_of
+  public :: correct, estimate_error, find_null_direction, find_tangent, measured, oscillation, set_least_oscillation, weights_of
 
   integer, parameter :: most_iterations = 14
   integer, parameter :: most_growths = 3
@@ -96,6 +96,37 @@ contains
     call equations%system%solve(tangent)
     tangent = tangent / measured(tangent, weights)
   end subroutine find_tangent
+
+  !> The direction that the matrix about a singular solution takes to zero, by inverse iteration; it vanishes in the row.
+  subroutine find_null_direction(equations, range, row, x, direction, error)
+    type(orbit_equations_t), intent(inout) :: equations
+    real(wp), intent(in) :: range           !! width of the range of the parameter
+    real(wp), intent(in) :: row(:), x(:)    !! [unknowns + 1]
+    real(wp), contiguous, intent(out) :: direction(:)   !! of weighted length 1
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: iterations = 3
+    type(orbit_t) :: orbit
+    real(wp) :: weights(size(x))
+    integer :: i
+    logical :: is_regular
+
+    direction = 0.0_wp
+    allocate (orbit%speed, source=equations%floating_speed)
+    call equations%take_apart(x, orbit)
+    call factor_about(equations, range, row, x, orbit, is_regular, error)
+    if (allocated(error)) return
+    if (.not. is_regular) then
+      call raise(error, exit_failed, 'the matrix of the equations is exactly singular')
+      return
+    end if
+    weights = weights_of(equations, x, range)
+    direction = [(sin(real(i, wp)), i=1, size(x))] / weights   ! any that has a share of all
+    do i = 1, iterations
+      direction(size(x)) = 0.0_wp
+      call equations%system%solve(direction)
+      direction = direction / measured(direction, weights)
+    end do
+  end subroutine find_null_direction
 
   !> The size of a change.
   pure real(wp) function measured(change, weights)

@@ -29,8 +29,8 @@ module nocdyn_orbit_equations
     integer :: freedoms = 0                          !! coordinates; the first nodes
     integer :: nodes = 0                             !! coordinates and internal states
     integer, allocatable :: place(:)                 !! of each node in the order of the unknowns
-    integer, allocatable, private :: row_node(:), column_node(:)   !! of each position of the Jacobian; row 0: none
-    logical, allocatable, private :: is_speed(:)     !! whether its column is a speed
+    integer, allocatable :: row_node(:), column_node(:)   !! of each position of the Jacobian; row 0: none
+    logical, allocatable :: is_speed(:)     !! whether its column is a speed
     type(bordered_system_t) :: system
     real(wp), allocatable, private :: t(:), y(:, :), rates(:, :), slopes(:, :)
   contains

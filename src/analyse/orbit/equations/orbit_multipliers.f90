@@ -2,23 +2,18 @@
 !> motion give over one period.
 !>
 !> Multipliers that are 1 whatever the machine does are taken out: a shift of all angles of a free rotation, or of the time where
-!> only orders or nothing excite it. The equations are integrated by DOP853 with even steps.
+!> only orders or nothing excite it.
 module nocdyn_orbit_multipliers
   use nocdyn_errors, only: error_t, exit_failed, raise
-  use nocdyn_explicit_tables, only: dormand_prince_8, explicit_table_t
   use nocdyn_kinds, only: wp
-  use nocdyn_harmonic_basis, only: differentiated
-  use nocdyn_lapack_eigen, only: eigenvectors
+  use nocdyn_lapack_eigen, only: eigenvalues
   use nocdyn_orbit_equations, only: orbit_equations_t
+  use nocdyn_orbit_variations, only: find_monodromy, states_at
   use nocdyn_periodic_machine, only: orbit_t
   implicit none (type, external)
   private
 
-  public :: find_multipliers, find_monodromy, multipliers_of, steps_of
-
-  integer, parameter :: stages = 12            ! of DOP853 without its dense output
-  real(wp), parameter :: longest = 0.5_wp      ! step times a bound of the eigenvalues of the Jacobian
-  integer, parameter :: fewest = 4             ! steps for each harmonic
+  public :: deflate, find_multipliers, multipliers_of, scale_speeds
 
 contains
 
@@ -43,7 +38,7 @@ contains
     real(wp), allocatable, intent(inout) :: known(:, :)     !! [states, vectors], on return none
     complex(wp), allocatable, intent(out) :: multipliers(:)
     type(error_t), allocatable, intent(out) :: error
-    complex(wp), allocatable :: values(:), vectors(:, :)
+    complex(wp), allocatable :: values(:)
     integer :: k, largest
     logical :: has_failed
     logical, allocatable :: is_left(:)
@@ -53,8 +48,8 @@ contains
       call deflate(matrix, known)
     end do
     associate (n => size(matrix, 1))
-      allocate (values(n), vectors(n, n), multipliers(n))
-      call eigenvectors(matrix, values, vectors, has_failed)
+      allocate (values(n), multipliers(n))
+      call eigenvalues(matrix, values, has_failed)
     end associate
     if (has_failed) then
       call raise(error, exit_failed, 'the multipliers of the orbit were not found')
@@ -67,145 +62,6 @@ contains
       multipliers(k) = values(largest)
     end do
   end subroutine multipliers_of
-
-  !> Derivatives of the state after one period by the state at its begin, [states, states].
-  subroutine find_monodromy(equations, orbit, matrix, error)
-    type(orbit_equations_t), intent(inout) :: equations
-    type(orbit_t), intent(inout) :: orbit
-    real(wp), allocatable, intent(out) :: matrix(:, :)
-    type(error_t), allocatable, intent(out) :: error
-    real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)
-    type(explicit_table_t) :: table
-    real(wp), allocatable :: slopes(:, :), k(:, :, :), y(:, :)
-    real(wp) :: h
-    integer :: first, i, j, n, s, steps, together
-
-    call equations%set_value(orbit, error)
-    if (allocated(error)) return
-    table = dormand_prince_8()
-    n = equations%machine%states
-    steps = steps_of(equations, orbit)
-    h = turn / orbit%rate / steps
-    together = max(1, equations%machine%samples / stages)
-    allocate (matrix(n, n), source=0.0_wp)
-    do i = 1, n
-      matrix(i, i) = 1.0_wp
-    end do
-    allocate (k(n, n, stages), y(n, n))
-    do i = 0, steps - 1
-      first = modulo(i, together)
-      if (first == 0) call slopes_along(equations, orbit, table%c(:stages), i, min(together, steps - i), h, slopes)
-      do s = 1, stages
-        y = matrix
-        do j = 1, s - 1
-          if (abs(table%a(s, j)) > 0) y = y + (h * table%a(s, j)) * k(:, :, j)
-        end do
-        call vary(equations, slopes(first * stages + s, :), y, k(:, :, s))
-      end do
-      do s = 1, stages
-        if (abs(table%b(s)) > 0) matrix = matrix + (h * table%b(s)) * k(:, :, s)
-      end do
-    end do
-  end subroutine find_monodromy
-
-  !> The number of steps over a period: many where a machine has stiff parts, as they are explicit.
-  integer function steps_of(equations, orbit) result(steps)
-    type(orbit_equations_t), intent(inout) :: equations
-    type(orbit_t), intent(in) :: orbit
-    real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)
-    real(wp), allocatable :: slopes(:, :)
-    real(wp) :: angles(equations%freedoms), speeds(equations%freedoms), internal(equations%machine%states), bound
-    integer :: k
-
-    call slopes_along(equations, orbit, [0.0_wp], 0, equations%machine%samples, &
-                      turn / orbit%rate / equations%machine%samples, slopes)
-    angles = 0.0_wp
-    speeds = 0.0_wp
-    internal = 0.0_wp
-    associate (f => equations%freedoms, pattern => equations%machine%pattern)
-      do k = 1, size(pattern%row)
-        if (pattern%row(k) > 2 * f) then
-          internal(pattern%row(k)) = internal(pattern%row(k)) + &
-                                     merge(maxval(abs(slopes(:, k))), 0.0_wp, pattern%column(k) > 2 * f)
-        else if (pattern%row(k) <= f .and. pattern%column(k) <= f) then
-          speeds(pattern%row(k)) = speeds(pattern%row(k)) + maxval(abs(slopes(:, k)))
-        else if (pattern%row(k) <= f .and. pattern%column(k) <= 2 * f) then
-          angles(pattern%row(k)) = angles(pattern%row(k)) + maxval(abs(slopes(:, k)))
-        end if
-      end do
-    end associate
-    bound = max(sqrt(maxval(angles)), maxval(speeds), maxval(internal))
-    steps = max(fewest * equations%basis%harmonics, ceiling(turn / orbit%rate * bound / longest))
-  end function steps_of
-
-  !> The Jacobian at the stages of some steps, [steps times stages, positions].
-  subroutine slopes_along(equations, orbit, c, first, steps, h, slopes)
-    type(orbit_equations_t), intent(inout) :: equations
-    type(orbit_t), intent(in) :: orbit
-    real(wp), intent(in) :: c(:)                 !! parts of a step, of the stages
-    integer, intent(in) :: first, steps          !! steps before the first one; their number
-    real(wp), intent(in) :: h                    !! [s]
-    real(wp), allocatable, intent(out) :: slopes(:, :)
-    real(wp) :: t(equations%machine%samples), y(equations%machine%samples, equations%machine%states)
-    integer :: i, s
-
-    t = 0.0_wp
-    do i = 0, steps - 1
-      do s = 1, size(c)
-        t(i * size(c) + s) = (first + i + c(s)) * h
-      end do
-    end do
-    call states_at(equations, orbit, t, y)
-    allocate (slopes(size(t), size(equations%machine%pattern%row)))
-    call equations%machine%slopes(t, y, slopes)
-  end subroutine slopes_along
-
-  !> States of an orbit at some times.
-  subroutine states_at(equations, orbit, t, y)
-    type(orbit_equations_t), intent(in) :: equations
-    type(orbit_t), intent(in) :: orbit
-    real(wp), intent(in) :: t(:)              !! [s]
-    real(wp), intent(out) :: y(:, :)          !! [times, states]
-    real(wp) :: values(size(t), size(orbit%series, 1)), series(size(orbit%series, 1), equations%nodes)
-    real(wp) :: steady(equations%freedoms)
-    integer :: c, k
-
-    values(:, 1) = 1.0_wp
-    do k = 1, size(values, 2) / 2
-      values(:, 2 * k) = cos(k * (orbit%rate * t))
-      values(:, 2 * k + 1) = sin(k * (orbit%rate * t))
-    end do
-    series = orbit%series
-    series(1, equations%free) = 0.0_wp
-    steady = matmul(equations%rigid, orbit%speed)
-    associate (f => equations%freedoms)
-      y(:, :f) = matmul(values, orbit%rate * differentiated(series(:, :f)))
-      y(:, f + 1:) = matmul(values, series)
-      do c = 1, f
-        y(:, c) = y(:, c) + steady(c)
-        y(:, f + c) = y(:, f + c) + steady(c) * t
-      end do
-    end associate
-  end subroutine states_at
-
-  !> The rates of variations of the state, the columns of a matrix.
-  pure subroutine vary(equations, slopes, y, rates)
-    type(orbit_equations_t), intent(in) :: equations
-    real(wp), intent(in) :: slopes(:)    !! [positions]
-    real(wp), intent(in) :: y(:, :)
-    real(wp), intent(out) :: rates(:, :)
-    integer :: j, k
-
-    associate (f => equations%freedoms, row => equations%machine%pattern%row, column => equations%machine%pattern%column)
-      do j = 1, size(y, 2)
-        rates(:, j) = 0.0_wp
-        do k = 1, size(row)
-          rates(row(k), j) = rates(row(k), j) + slopes(k) * y(column(k), j)
-        end do
-        rates(f + 1:2 * f, j) = y(:f, j)
-      end do
-    end associate
-  end subroutine vary
 
   !> Variations that return as they are: of the time or of the angles of a free rotation, and of a speed that nothing brakes.
   subroutine known_vectors(equations, orbit, known, error)

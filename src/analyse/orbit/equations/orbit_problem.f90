@@ -4,11 +4,15 @@ module nocdyn_orbit_problem
   use nocdyn_errors, only: error_t
   use nocdyn_kinds, only: wp
   use nocdyn_periodic_machine, only: orbit_t, periodic_machine_t
+  use nocdyn_signal_samples, only: signal_samples_t
   use nocdyn_signals, only: signal_t
   implicit none (type, external)
   private
 
   public :: measured
+
+  character(len=*), parameter, public :: fold = 'fold', doubling = 'period_doubling', neimark_sacker = 'neimark_sacker', &
+    branch_point = 'branch_point', torque_fold = 'torque_fold', hopf = 'hopf'
 
   type, public :: orbit_point_t
     type(orbit_t) :: orbit
@@ -19,6 +23,8 @@ module nocdyn_orbit_problem
     integer :: crossed = 0                         !! a switch whose branches the motion changes, 0: none
     complex(wp), allocatable :: multipliers(:)     !! by descending modulus
     character(len=:), allocatable :: kind          !! of a special point, else ''
+    integer :: leads_to = 0                        !! branch that begins or ends there, 0: none is known
+    logical :: is_supercritical = .false.          !! whether limit cycles begin where the steady state is unstable
   contains
     procedure :: is_stable, unstable
   end type orbit_point_t
@@ -43,7 +49,7 @@ module nocdyn_orbit_problem
     procedure(find_fault), deferred :: find_fault
     procedure(measure), deferred :: measure
     procedure(resolution), deferred :: resolution
-    procedure :: adapt, recast, range
+    procedure :: adapt, least_size, recast, range, restore, sample, kind_of, keep_phase, meets_other
   end type orbit_problem_t
 
   abstract interface
@@ -181,6 +187,66 @@ contains
 
     allocate (other, source=tangent)
   end function recast
+
+  !> Samples of signals over one period, at least so many. By default there are none.
+  subroutine sample(self, point, signals, least_samples, samples, error)
+    class(orbit_problem_t), target, intent(inout) :: self
+    type(orbit_point_t), intent(inout) :: point
+    type(signal_t), intent(in) :: signals(:)
+    integer, intent(in) :: least_samples
+    type(signal_samples_t), intent(out) :: samples
+    type(error_t), allocatable, intent(out) :: error
+  end subroutine sample
+
+  !> What `set_scale` has found, 0 if nothing.
+  real(wp) function least_size(self)
+    class(orbit_problem_t), intent(in) :: self
+
+    least_size = 0.0_wp
+  end function least_size
+
+  !> Goes back to the resolution of a point. By default there is one resolution only.
+  subroutine restore(self, point, least, error)
+    class(orbit_problem_t), intent(inout) :: self
+    type(orbit_point_t), intent(in) :: point
+    real(wp), intent(in) :: least   !! as of `least_size`
+    type(error_t), allocatable, intent(out) :: error
+  end subroutine restore
+
+  !> The kind of a special point where the multiplier of a number passes the unit circle.
+  function kind_of(self, point, number) result(kind)
+    class(orbit_problem_t), intent(in) :: self
+    type(orbit_point_t), intent(in) :: point   !! the last one that was completed
+    integer, intent(in) :: number
+    character(len=:), allocatable :: kind
+    real(wp), parameter :: none = 1.0e-6_wp    ! imaginary part of a real multiplier
+
+    associate (multiplier => point%multipliers(number))
+      if (abs(multiplier%im) > none) then
+        kind = neimark_sacker
+      else if (multiplier%re < 0) then
+        kind = doubling
+      else if (self%periodic%held > 0) then
+        kind = torque_fold   ! multipliers are those at a constant torque
+      else
+        kind = branch_point
+      end if
+    end associate
+  end function kind_of
+
+  !> Motions are in phase with an orbit from now on. By default the excitation keeps the phase.
+  subroutine keep_phase(self, orbit)
+    class(orbit_problem_t), intent(inout) :: self
+    type(orbit_t), intent(in) :: orbit
+  end subroutine keep_phase
+
+  !> Whether the branch passes the one that it has left between two motions. By default it has left none.
+  logical function meets_other(self, before, after)
+    class(orbit_problem_t), intent(in) :: self
+    type(orbit_t), intent(in) :: before, after
+
+    meets_other = .false.
+  end function meets_other
 
   !> The width of the range of the parameter.
   pure real(wp) function range(self)

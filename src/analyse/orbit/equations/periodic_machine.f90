@@ -16,6 +16,7 @@ module nocdyn_periodic_machine
   type, public :: orbit_t
     real(wp) :: value = 0.0_wp                  !! of the parameter, in its unit; of a held speed [rad/s]
     real(wp) :: rate = 0.0_wp                   !! w [rad/s]
+    integer :: subharmonic = 1                  !! periods of the excitation in its period
     real(wp), allocatable :: series(:, :)       !! of q [rad] and z, [length, nodes]
     real(wp), allocatable :: speed(:)           !! Omega of the rigid motions [rad/s]
     real(wp) :: torque = 0.0_wp                 !! mean torque that holds the speed of a body [N m]
@@ -77,6 +78,7 @@ contains
       end if
     end do
     orbit%value = value
+    orbit%subharmonic = self%subharmonic
     if (self%held_motion > 0) then
       associate (turning => self%turning(self%held, :), m => self%held_motion)
         orbit%speed(m) = 0.0_wp
@@ -105,7 +107,7 @@ contains
     type(orbit_t), intent(inout) :: orbit
 
     if (self%rate_is_unknown) return
-    orbit%rate = self%period%rate / self%subharmonic
+    orbit%rate = self%period%rate / orbit%subharmonic
     if (self%period%motion > 0) orbit%rate = orbit%rate * abs(orbit%speed(self%period%motion))
   end subroutine find_rate
 
@@ -173,13 +175,14 @@ contains
     integer, intent(in) :: turns
     real(wp), intent(out) :: rates(:, :)
     type(error_t), allocatable, intent(out) :: error
-    real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)
+    real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp), faster = 1.1_wp
     real(wp) :: steady(self%machine%freedoms), t(self%machine%samples), y(self%machine%samples, self%machine%states)
     real(wp) :: dydt(self%machine%samples, self%machine%states)
     integer :: c, first, i, n
 
     rates = 0.0_wp
     steady = matmul(self%rigid, motion%speed)
+    if (self%rate_is_unknown) steady = faster * steady   ! a steady state has no accelerations with which to compare
     n = self%machine%samples
     do first = 0, size(rates, 1) - n, n
       t = (turns + [(first + i, i=0, n - 1)] / real(size(rates, 1), wp)) * turn / motion%rate

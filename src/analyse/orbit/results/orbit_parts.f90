@@ -16,7 +16,7 @@ module nocdyn_orbit_parts
 contains
 
   !> The parts of the branch.
-  subroutine find_parts(points, parts)
+  pure subroutine find_parts(points, parts)
     type(orbit_point_t), intent(in) :: points(:)
     type(part_t), allocatable, intent(out) :: parts(:)
     integer :: i

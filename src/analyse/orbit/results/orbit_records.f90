@@ -1,9 +1,9 @@
 !> Numbers of periodic motions that sweeps record: peaks of signals, folds, jumps, unstable ranges.
 module nocdyn_orbit_records
   use nocdyn_kinds, only: wp
-  use nocdyn_orbit_analysis, only: orbit_analysis_t
+  use nocdyn_orbit_measures, only: measured_orbits_t
   use nocdyn_orbit_parts, only: jump_direction, part_t, unstable_stretches
-  use nocdyn_orbit_points, only: fold
+  use nocdyn_orbit_problem, only: fold
   use nocdyn_text, only: counted, quoted, to_text
   implicit none (type, external)
   private
@@ -14,7 +14,7 @@ contains
 
   !> Finds a number of an analysis. Folds and jumps are counted along the branches, as in orbit.csv.
   subroutine find_orbit_number(analysis, quantity, word, number, value, obstacle)
-    type(orbit_analysis_t), intent(in) :: analysis
+    type(measured_orbits_t), intent(in) :: analysis
     character(len=*), intent(in) :: quantity   !! signal, or 'branch'
     character(len=*), intent(in) :: word       !! peak, peak_value; fold, jump_up, jump_down, folds, unstable_ranges
     integer, intent(in) :: number              !! which one of several folds or jumps
@@ -38,9 +38,9 @@ contains
           obstacle = 'orbit.csv of this variant has no signal ' // quoted(quantity)
           return
         end if
-        i = maxloc(analysis%ranges(signal, :)%half_range, dim=1)
+        i = analysis%peak(signal)
         value = points(i)%orbit%value
-        if (word == 'peak') value = analysis%ranges(signal, i)%half_range
+        if (word == 'peak') value = analysis%measures(i)%ranges(signal)%half_range
       case ('folds')
         value = count([(points(i)%kind == fold, i=1, size(points))])
       case ('unstable_ranges')

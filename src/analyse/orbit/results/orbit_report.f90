@@ -1,39 +1,35 @@
-!> The results of a branch of periodic motions: for orbit.json and as orbit.csv.
+!> The report of an orbit analysis, orbit.json.
 module nocdyn_orbit_report
-  use nocdyn_column_names, only: with_unit
-  use nocdyn_csv, only: write_header, write_row
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
-  use nocdyn_orbit_analysis, only: orbit_analysis_t
+  use nocdyn_orbit_measures, only: measured_orbits_t, orbit_measure_t
   use nocdyn_orbit_parts, only: find_parts, part_t
-  use nocdyn_orbit_points, only: branch_point, doubling, fold, neimark_sacker, torque_fold
-  use nocdyn_orbit_problem, only: orbit_point_t
-  use nocdyn_output_file, only: output_file_t
-  use nocdyn_output_units, only: output_units, turn_units
-  use nocdyn_signals, only: signal_t
-  use nocdyn_text, only: append, string_t, strings, to_text
-  use nocdyn_units, only: from_si
+  use nocdyn_orbit_problem, only: hopf, orbit_point_t
+  use nocdyn_orbit_tables, only: most_multipliers
+  use nocdyn_text, only: to_text
+  use nocdyn_verdicts, only: verdict_t
   implicit none (type, external)
   private
 
-  public :: put_orbit, put_orbit_csv
+  public :: motion_name, put_orbit
 
-  integer, parameter :: most_multipliers = 6   ! in the files
   real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)   ! [rad]
 
 contains
 
   !> Fills orbit.json.
-  subroutine put_orbit(json, input, analysis)
+  subroutine put_orbit(json, input, analysis, verdict)
     type(json_t), intent(inout) :: json
     type(input_t), intent(in) :: input
-    type(orbit_analysis_t), intent(in) :: analysis
+    type(measured_orbits_t), intent(in) :: analysis
+    type(verdict_t), intent(in) :: verdict
     type(part_t), allocatable :: parts(:)
     integer :: i
 
     call json%open_report(input%file, input%title())
     if (allocated(input%load_case)) call json%put('load_case', input%load_case%name)
+    call verdict%put(json)
     call json%put('parameter', analysis%parameter)
     call json%put('unit', analysis%unit)
     call json%put('range', [analysis%settings%from, analysis%settings%to])
@@ -63,6 +59,8 @@ contains
     end associate
     call put_peaks(json, analysis)
     if (analysis%settings%mode > 0) call put_backbone(json, analysis)
+    call put_damages(json, analysis)
+    call put_motions(json, analysis)
     if (analysis%settings%starts > 0) then
       call json%open('starts')
       call json%put('tried', analysis%found%tried)
@@ -74,11 +72,12 @@ contains
     call json%close()
   end subroutine put_orbit
 
-  !> A special point, with its multipliers.
+  !> A special point, with its multipliers and the stable motions on which a jump from it can end.
   subroutine put_point(json, analysis, number)
     type(json_t), intent(inout) :: json
-    type(orbit_analysis_t), intent(in) :: analysis
+    type(measured_orbits_t), intent(in) :: analysis
     integer, intent(in) :: number   !! of the point
+    integer :: k
 
     associate (point => analysis%branch%points(number))
       call json%open()
@@ -86,12 +85,25 @@ contains
       call json%put('kind', point%kind)
       call json%put('value', point%orbit%value)
       call json%put('point', number)
-      call json%put('period', 2 * acos(-1.0_wp) / point%orbit%rate)
-      associate (shown => point%multipliers(:min(most_multipliers, size(point%multipliers))))
-        call json%put('multipliers_real', real(shown, wp))
-        call json%put('multipliers_imaginary', aimag(shown))
-      end associate
-      call json%put('error', point%error)
+      if (point%kind == hopf) then
+        call json%put('frequency_hz', point%orbit%rate / turn)
+        if (point%leads_to > 0) call json%put('supercritical', point%is_supercritical)
+      end if
+      if (point%orbit%subharmonic > 1) call json%put('subharmonic', point%orbit%subharmonic)
+      if (point%leads_to > 0) call json%put('leads_to', point%leads_to)
+      call put_orbit_of(json, point)
+      if (any(analysis%jump == number)) then
+        call json%open_list('lands_on')
+        do k = 1, size(analysis%jump)
+          if (analysis%jump(k) /= number) cycle
+          call json%open()
+          call json%put('branch', analysis%landings(k)%point%branch)
+          call put_ranges(json, analysis, analysis%landings(k)%measure)
+          call json%close()
+        end do
+        call json%close_list()
+        call put_ranges(json, analysis, analysis%measures(number))
+      end if
       call json%close()
     end associate
   end subroutine put_point
@@ -99,7 +111,7 @@ contains
   !> The frequencies of a mode over its amplitude.
   subroutine put_backbone(json, analysis)
     type(json_t), intent(inout) :: json
-    type(orbit_analysis_t), intent(in) :: analysis
+    type(measured_orbits_t), intent(in) :: analysis
 
     associate (orbits => analysis%branch%points(:analysis%branch%count)%orbit)
       call json%open('backbone')
@@ -113,21 +125,50 @@ contains
     end associate
   end subroutine put_backbone
 
+  !> Period, multipliers and error.
+  subroutine put_orbit_of(json, point)
+    type(json_t), intent(inout) :: json
+    type(orbit_point_t), intent(in) :: point
+
+    call json%put('period', turn / point%orbit%rate)
+    associate (shown => point%multipliers(:min(most_multipliers, size(point%multipliers))))
+      call json%put('multipliers_real', real(shown, wp))
+      call json%put('multipliers_imaginary', aimag(shown))
+    end associate
+    call json%put('error', point%error)
+  end subroutine put_orbit_of
+
+  !> Half ranges of all signals.
+  subroutine put_ranges(json, analysis, measure)
+    type(json_t), intent(inout) :: json
+    type(measured_orbits_t), intent(in) :: analysis
+    type(orbit_measure_t), intent(in) :: measure
+    integer :: i
+
+    call json%open('half_ranges')
+    do i = 1, size(analysis%signals)
+      call json%put(analysis%signals(i)%name, measure%ranges(i)%half_range)
+    end do
+    call json%close()
+  end subroutine put_ranges
+
   !> The largest half range of each signal.
   subroutine put_peaks(json, analysis)
     type(json_t), intent(inout) :: json
-    type(orbit_analysis_t), intent(in) :: analysis
+    type(measured_orbits_t), intent(in) :: analysis
     integer :: at, i
 
     call json%open_list('peaks')
     do i = 1, size(analysis%signals)
-      at = maxloc(analysis%ranges(i, :)%half_range, dim=1)
+      at = analysis%peak(i)
       call json%open()
       call json%put('quantity', analysis%signals(i)%name)
       call json%put('unit', analysis%signals(i)%unit)
-      call json%put('half_range', analysis%ranges(i, at)%half_range)
-      call json%put('largest', analysis%ranges(i, at)%largest)
-      call json%put('mean', analysis%ranges(i, at)%mean)
+      associate (range => analysis%measures(at)%ranges(i))
+        call json%put('half_range', range%half_range)
+        call json%put('largest', range%largest)
+        call json%put('mean', range%mean)
+      end associate
       call json%put('value', analysis%branch%points(at)%orbit%value)
       if (analysis%settings%has_stability) call json%put('stable', analysis%branch%points(at)%is_stable())
       call json%close()
@@ -135,70 +176,60 @@ contains
     call json%close_list()
   end subroutine put_peaks
 
-  !> Writes orbit.csv: a row for each point, in the order of the branch.
-  subroutine put_orbit_csv(input, analysis, file)
-    type(input_t), intent(in) :: input
-    type(orbit_analysis_t), intent(in) :: analysis
-    type(output_file_t), intent(inout) :: file
-    type(string_t), allocatable :: labels(:)
-    type(signal_t), allocatable :: signals(:)
-    integer, allocatable :: unit(:)
-    real(wp), allocatable :: row(:)
-    integer :: i, k, shown
+  !> The largest damage per hour by each &fatigue, of motions on which the machine can stay.
+  subroutine put_damages(json, analysis)
+    type(json_t), intent(inout) :: json
+    type(measured_orbits_t), intent(in) :: analysis
+    integer :: at, i
 
-    allocate (signals, source=analysis%signals)
-    call turn_units(signals, output_units(input), unit)
-    shown = min(most_multipliers, size(analysis%branch%points(1)%multipliers))
-    labels = [string_t('branch')]
-    call append(labels, with_unit(analysis%parameter, analysis%unit))
-    labels = [labels, strings([character(len=12) :: 'rate [rad/s]', 'special', 'harmonics', 'error'])]
-    if (analysis%settings%mode > 0) labels = [labels, strings([character(len=27) :: 'frequency [Hz]', &
-                                                              'quasi_linear_frequency [Hz]'])]
-    if (analysis%settings%has_stability) call append(labels, 'stable')
-    if (analysis%body_name /= '') call append(labels, 'torque_' // analysis%body_name // ' [N m]')
-    do k = 1, shown
-      call append(labels, 'multiplier_' // to_text(k) // '_real')
-      call append(labels, 'multiplier_' // to_text(k) // '_imaginary')
+    if (size(analysis%damages) == 0) return
+    call json%open_list('fatigue')
+    do i = 1, size(analysis%damages)
+      call json%open()
+      call json%put('name', analysis%damages(i)%name)
+      call json%put('element', analysis%damages(i)%element)
+      at = analysis%worst_damage(i)
+      if (at > 0) then
+        call json%put('largest_damage_per_hour', analysis%measures(at)%damage(i))
+        call json%put('value', analysis%branch%points(at)%orbit%value)
+        call json%put('mean_exceeds_strength', analysis%measures(at)%exceeds_strength(i))
+      end if
+      call json%close()
     end do
-    do k = 1, size(signals)
-      call append(labels, with_unit('half_range_' // signals(k)%name, signals(k)%unit))
-      call append(labels, with_unit('largest_' // signals(k)%name, signals(k)%unit))
-      call append(labels, with_unit('mean_' // signals(k)%name, signals(k)%unit))
-    end do
-    call write_header(file, labels)
-    do i = 1, analysis%branch%count
-      associate (point => analysis%branch%points(i))
-        row = [real(point%branch, wp), point%orbit%value, point%orbit%rate, number_of(point), real(point%harmonics, wp), &
-               point%error]
-        if (analysis%settings%mode > 0) row = [row, point%orbit%rate / turn, analysis%backbone%quasi_linear_rate(i) / turn]
-        if (analysis%settings%has_stability) row = [row, merge(1.0_wp, 0.0_wp, point%is_stable())]
-        if (analysis%body_name /= '') row = [row, point%orbit%torque]
-        row = [row, (real(point%multipliers(k), wp), aimag(point%multipliers(k)), k=1, shown)]
-        row = [row, (from_si(analysis%ranges(k, i)%half_range, unit(k)), from_si(analysis%ranges(k, i)%largest, unit(k)), &
-                     from_si(analysis%ranges(k, i)%mean, unit(k)), k=1, size(signals))]
+    call json%close_list()
+  end subroutine put_damages
+
+  !> The motions that the input asks for, and their files.
+  subroutine put_motions(json, analysis)
+    type(json_t), intent(inout) :: json
+    type(measured_orbits_t), intent(in) :: analysis
+    integer :: i
+
+    if (size(analysis%settings%motions) == 0) return
+    call json%open_list('motions')
+    do i = 1, size(analysis%motions)
+      associate (point => analysis%motions(i)%point)
+        call json%open()
+        call json%put('motion', i)
+        call json%put('file', motion_name(i))
+        call json%put('branch', point%branch)
+        call json%put('value', point%orbit%value)
+        if (analysis%settings%has_stability) call json%put('stable', point%is_stable())
+        if (analysis%body_name /= '') call json%put('torque', point%orbit%torque)
+        call json%put('harmonics', point%harmonics)
+        call put_orbit_of(json, point)
+        call json%close()
       end associate
-      call write_row(file, row)
     end do
-  end subroutine put_orbit_csv
+    call json%close_list()
+  end subroutine put_motions
 
-  !> What `special` says in orbit.csv: 0, or the kind of a special point in their order in the pages.
-  pure real(wp) function number_of(point)
-    type(orbit_point_t), intent(in) :: point
+  !> The file of a motion.
+  pure function motion_name(number) result(name)
+    integer, intent(in) :: number
+    character(len=:), allocatable :: name
 
-    select case (point%kind)
-    case (fold)
-      number_of = 1.0_wp
-    case (doubling)
-      number_of = 2.0_wp
-    case (neimark_sacker)
-      number_of = 3.0_wp
-    case (branch_point)
-      number_of = 4.0_wp
-    case (torque_fold)
-      number_of = 5.0_wp
-    case default
-      number_of = 0.0_wp
-    end select
-  end function number_of
+    name = 'motion_' // to_text(number) // '.csv'
+  end function motion_name
 
 end module nocdyn_orbit_report

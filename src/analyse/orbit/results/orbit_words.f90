@@ -3,14 +3,14 @@ module nocdyn_orbit_words
   use nocdyn_column_names, only: with_unit
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_orbit_analysis, only: orbit_analysis_t
   use nocdyn_orbit_backbone_words, only: append_backbone
+  use nocdyn_orbit_measures, only: measured_orbits_t
   use nocdyn_orbit_parts, only: jump_direction, part_t, unstable_stretches
-  use nocdyn_orbit_points, only: branch_point, doubling, fold, neimark_sacker, torque_fold
+  use nocdyn_orbit_problem, only: branch_point, doubling, fold, hopf, neimark_sacker, torque_fold
   use nocdyn_orbit_problem, only: orbit_point_t
   use nocdyn_quantities, only: rank_moment
   use nocdyn_table_text, only: cell, padded, text_width
-  use nocdyn_text, only: counted, rounded_text, to_text
+  use nocdyn_text, only: counted, quoted, rounded_text, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_written_values, only: speed_text
   implicit none (type, external)
@@ -21,13 +21,15 @@ module nocdyn_orbit_words
   integer, parameter :: most_peaks = 12        ! lines of largest half ranges
   integer, parameter :: digits = 6             ! of printed numbers
   integer, parameter :: exact = 10             ! of special values
+  integer, parameter :: damage_digits = 4
+  real(wp), parameter :: rounding = 1.0e-12_wp ! of a mean, as a share of the half range
 
 contains
 
   !> The printed report.
   function orbit_text(input, analysis) result(text)
     type(input_t), intent(in) :: input
-    type(orbit_analysis_t), intent(in) :: analysis
+    type(measured_orbits_t), intent(in) :: analysis
     character(len=:), allocatable :: text
     type(text_buffer_t) :: report
     integer :: i
@@ -36,7 +38,9 @@ contains
       call report%append_line(input%shown_case() // ': note: ' // analysis%notes(i)%text)
     end do
     associate (points => analysis%branch%points(:analysis%branch%count))
-      text = input%shown_case() // ': ' // counted(size(points), 'periodic motion', 'periodic motions') // ' over ' // &
+      text = counted(size(points), 'periodic motion', 'periodic motions')
+      if (analysis%is_self_excited) text = counted(size(points), 'steady state or limit cycle', 'steady states and limit cycles')
+      text = input%shown_case() // ': ' // text // ' over ' // &
              analysis%parameter // ' from ' // shown(analysis, analysis%settings%from) // ' to ' // &
              shown(analysis, analysis%settings%to) // ', ' // method_of(points)
       call report%append_line(text // ', largest error ' // rounded_text(maxval(points%error), 2) // ' of the motion')
@@ -49,12 +53,13 @@ contains
       if (analysis%settings%starts > 0) call append_starts(analysis, points, report)
       call append_jumps(analysis, points, report)
       if (analysis%settings%mode > 0) then
-        call append_backbone(analysis, report)
+        call append_backbone(analysis%orbit_analysis_t, report)
       else
         call append_parts(analysis, points, report)
       end if
     end associate
     call append_peaks(analysis, report)
+    call append_damages(analysis, report)
     text = report%text()
   end function orbit_text
 
@@ -72,7 +77,7 @@ contains
 
   !> A value of the parameter with its unit; a speed also in the unit of the input.
   function shown(analysis, value, figures) result(text)
-    type(orbit_analysis_t), intent(in) :: analysis
+    type(measured_orbits_t), intent(in) :: analysis
     real(wp), intent(in) :: value
     integer, intent(in), optional :: figures
     character(len=:), allocatable :: text
@@ -88,7 +93,7 @@ contains
 
   !> What scattered starts have found.
   subroutine append_starts(analysis, points, report)
-    type(orbit_analysis_t), intent(in) :: analysis
+    type(measured_orbits_t), intent(in) :: analysis
     type(orbit_point_t), intent(in) :: points(:)
     type(text_buffer_t), intent(inout) :: report
     integer :: k
@@ -107,7 +112,7 @@ contains
 
   !> Special points, one a line: what a slow change of the parameter meets there.
   subroutine append_jumps(analysis, points, report)
-    type(orbit_analysis_t), intent(in) :: analysis
+    type(measured_orbits_t), intent(in) :: analysis
     type(orbit_point_t), intent(in) :: points(:)
     type(text_buffer_t), intent(inout) :: report
     character(len=:), allocatable :: words
@@ -121,14 +126,20 @@ contains
         if (jump_direction(points, i) > 0) words = 'fold; a rising value jumps there'
         if (jump_direction(points, i) < 0) words = 'fold; a falling value jumps there'
         if (analysis%body_name /= '') words = 'fold; the mean speed turns back there'
+        words = words // landing_words(analysis, i)
       case (torque_fold)
         words = 'the holding torque turns back there'
       case (doubling)
-        words = 'period doubling; a motion of twice the period branches off'
+        words = 'period doubling; a motion of twice the period branches off' // led_to(points(i))
       case (neimark_sacker)
         words = 'Neimark-Sacker point; oscillations of another frequency begin or end'
       case (branch_point)
-        words = 'branch point; another motion of the same period branches off'
+        words = 'branch point; another motion of the same period branches off' // led_to(points(i))
+      case (hopf)
+        words = 'Hopf point, ' // rounded_text(points(i)%orbit%rate / (2 * acos(-1.0_wp)), digits) // ' Hz'
+        if (points(i)%leads_to > 0) words = words // trim(merge(', supercritical', ', subcritical  ', &
+                                                                points(i)%is_supercritical))
+        words = words // '; limit cycles branch off' // led_to(points(i))
       case default
         cycle
       end select
@@ -137,9 +148,41 @@ contains
     end do
   end subroutine append_jumps
 
+  !> What a jump does to the half range of the first signal that is told; '' if there is no jump, or nowhere to end.
+  function landing_words(analysis, number) result(words)
+    type(measured_orbits_t), intent(in) :: analysis
+    integer, intent(in) :: number   !! of the point
+    character(len=:), allocatable :: words
+    integer :: i
+    integer, allocatable :: told(:)
+
+    words = ''
+    told = told_signals(analysis)
+    if (.not. any(analysis%jump == number) .or. size(told) == 0) return
+    associate (signal => analysis%signals(told(1)))
+      words = ', half range of ' // signal%name // ' from ' // &
+              rounded_text(analysis%measures(number)%ranges(told(1))%half_range, digits)
+      do i = 1, size(analysis%jump)
+        if (analysis%jump(i) /= number) cycle
+        words = words // ' to ' // rounded_text(analysis%landings(i)%measure%ranges(told(1))%half_range, digits)
+        if (any(analysis%jump(i + 1:) == number)) words = words // ' or'
+      end do
+      if (signal%unit /= '') words = words // ' ' // signal%unit
+    end associate
+  end function landing_words
+
+  !> The branch that begins at a special point, if it is known.
+  function led_to(point) result(words)
+    type(orbit_point_t), intent(in) :: point
+    character(len=:), allocatable :: words
+
+    words = ''
+    if (point%leads_to > 0) words = ': branch ' // to_text(point%leads_to)
+  end function led_to
+
   !> The ranges in which the motion is unstable.
   subroutine append_parts(analysis, points, report)
-    type(orbit_analysis_t), intent(in) :: analysis
+    type(measured_orbits_t), intent(in) :: analysis
     type(orbit_point_t), intent(in) :: points(:)
     type(text_buffer_t), intent(inout) :: report
     type(part_t), allocatable :: stretches(:)
@@ -158,7 +201,9 @@ contains
       associate (along => points(stretches(i)%first:stretches(i)%last)%orbit%value)
         ends = [minval(along), maxval(along)]
         if (along(size(along)) < along(1)) ends = [maxval(along), minval(along)]
-        line = '  unstable from ' // shown(analysis, ends(1), exact) // ' to ' // shown(analysis, ends(2), exact)
+        line = '  unstable from '
+        if (analysis%is_self_excited .and. points(stretches(i)%first)%branch == 1) line = '  steady state unstable from '
+        line = line // shown(analysis, ends(1), exact) // ' to ' // shown(analysis, ends(2), exact)
       end associate
       associate (branch => points(stretches(i)%first)%branch)
         if (branch > 1) line = line // ' (branch ' // to_text(branch) // ')'
@@ -167,31 +212,57 @@ contains
     end do
   end subroutine append_parts
 
-  !> The largest half ranges: of the moments, or of all signals if there are none.
+  !> The signals whose half ranges are told: the moments, or all if there are none.
+  pure function told_signals(analysis) result(told)
+    type(measured_orbits_t), intent(in) :: analysis
+    integer, allocatable :: told(:)
+    integer :: i
+
+    told = pack([(i, i=1, size(analysis%signals))], analysis%signals%rank == rank_moment .and. &
+                .not. analysis%signals%is_inner())
+    if (size(told) == 0) told = [(i, i=1, size(analysis%signals))]
+    told = told(:min(size(told), most_peaks))
+  end function told_signals
+
+  !> The largest half ranges.
   subroutine append_peaks(analysis, report)
-    type(orbit_analysis_t), intent(in) :: analysis
+    type(measured_orbits_t), intent(in) :: analysis
     type(text_buffer_t), intent(inout) :: report
-    integer, allocatable :: listed(:)
+    integer, allocatable :: told(:)
     integer :: at, i, width
 
-    listed = pack([(i, i=1, size(analysis%signals))], analysis%signals%rank == rank_moment .and. &
-                  .not. analysis%signals%is_inner())
-    if (size(listed) == 0) listed = [(i, i=1, size(analysis%signals))]
-    listed = listed(:min(size(listed), most_peaks))
+    told = told_signals(analysis)
     width = 0
-    do i = 1, size(listed)
-      width = max(width, text_width(with_unit(analysis%signals(listed(i))%name, analysis%signals(listed(i))%unit)))
+    do i = 1, size(told)
+      width = max(width, text_width(with_unit(analysis%signals(told(i))%name, analysis%signals(told(i))%unit)))
     end do
     call report%append_line('  ' // padded('', width) // cell('half range') // cell('mean') // cell('at') // &
                             '  (largest half range)')
-    do i = 1, size(listed)
-      at = maxloc(analysis%ranges(listed(i), :)%half_range, dim=1)
-      associate (signal => analysis%signals(listed(i)), point => analysis%branch%points(at))
+    do i = 1, size(told)
+      at = analysis%peak(told(i))
+      associate (signal => analysis%signals(told(i)), point => analysis%branch%points(at), &
+                 range => analysis%measures(at)%ranges(told(i)))
         call report%append_line('  ' // padded(with_unit(signal%name, signal%unit), width) // &
-          cell(analysis%ranges(listed(i), at)%half_range) // cell(analysis%ranges(listed(i), at)%mean) // &
+          cell(range%half_range) // &
+          cell(merge(range%mean, 0.0_wp, abs(range%mean) > rounding * range%half_range)) // &
           cell(rounded_text(point%orbit%value, digits)) // trim(merge('            ', '  (unstable)', point%is_stable())))
       end associate
     end do
   end subroutine append_peaks
+
+  !> The largest damages of motions on which the machine can stay.
+  subroutine append_damages(analysis, report)
+    type(measured_orbits_t), intent(in) :: analysis
+    type(text_buffer_t), intent(inout) :: report
+    integer :: at, i
+
+    do i = 1, size(analysis%damages)
+      at = analysis%worst_damage(i)
+      if (at == 0) cycle
+      call report%append_line('  fatigue ' // quoted(analysis%damages(i)%name) // ': damage up to ' // &
+                              rounded_text(analysis%measures(at)%damage(i), damage_digits) // ' per hour, at ' // &
+                              shown(analysis, analysis%branch%points(at)%orbit%value))
+    end do
+  end subroutine append_damages
 
 end module nocdyn_orbit_words

@@ -198,12 +198,14 @@ contains
     type(flow_observer_t), intent(in) :: observer
     real(wp), intent(out) :: r(:)
     integer :: places(size(self%periodic%free))
+    real(wp) :: free(size(self%periodic%free))
 
     places = self%free_places()
+    free = x(places)
     associate (n => self%states, f => self%periodic%machine%freedoms, last => size(observer%samples, 2))
       r(:n) = observer%samples(:, last) - orbit%state
       r(f + 1:2 * f) = r(f + 1:2 * f) - observer%mean_rate(f + 1:2 * f) * (turn / orbit%rate)
-      r(:f) = r(:f) - matmul(self%periodic%rigid, x(places))
+      r(:f) = r(:f) - matmul(self%periodic%rigid, free)
       r(n + 1:) = x(places(self%periodic%border))
     end associate
   end subroutine leave

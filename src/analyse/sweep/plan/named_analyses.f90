@@ -16,8 +16,8 @@ module nocdyn_named_analyses
 
   public :: assemble_analysed, new_analysis, solve_named
 
-  character(len=*), parameter, public :: analysis_words(5) = [character(len=11) :: 'equilibrium', 'modes', 'campbell', 'response', &
-    'orbit']
+  character(len=*), parameter, public :: analysis_words(5) = [character(len=11) :: 'equilibrium', 'modes', 'campbell', &
+    'response', 'orbit']
 
 contains
 
@@ -37,7 +37,7 @@ contains
       allocate (analysis, source=response_results_t(sets_speed=.true., always_writes=.true., is_for_threads=.true.))
     case ('orbit')
       allocate (analysis, source=orbit_results_t(is_steady=.false., locks_joints=.false., takes_joints=.true., &
-                                                 always_writes=.true.))
+                                                 always_writes=.true., keeps_journal=.true.))
     case default
       error stop 'nocdyn_named_analyses: there is no analysis of this name'
     end select

@@ -44,7 +44,8 @@ contains
     if (allocated(error)) return
     self%holds_speed = settings%body > 0
     self%unit = 'rad/s'
-    if (.not. self%holds_speed) self%unit = settings%targets(1)%unit
+    if (settings%mode > 0) self%unit = 'rad'
+    if (size(settings%targets) > 0) self%unit = settings%targets(1)%unit
     allocate (notes(0))
     allocate (self%wanted_units, source=output_units(input))
     call list_orbit_signals(machine, signals)

@@ -6,9 +6,8 @@ module nocdyn_orbit_specials
   use nocdyn_brackets, only: bracket_t, new_bracket
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_kinds, only: wp
-  use nocdyn_orbit_points, only: add_multipliers, branch_point, branch_t, complete_point, doubling, fold, neimark_sacker, &
-    settle_at, span, torque_fold, walk_t
-  use nocdyn_orbit_problem, only: orbit_problem_t
+  use nocdyn_orbit_points, only: add_multipliers, branch_t, complete_point, settle_at, span, walk_t
+  use nocdyn_orbit_problem, only: branch_point, fold, hopf, neimark_sacker, orbit_problem_t
   use nocdyn_text, only: rounded_text
   implicit none (type, external)
   private
@@ -26,6 +25,7 @@ contains
     type(branch_t) :: found
     type(walk_t) :: at
     real(wp), allocatable :: places(:)
+    character(len=:), allocatable :: crossing
     integer :: k, least, most
     logical :: has_fold
 
@@ -43,19 +43,9 @@ contains
       do while (k <= most)
         call locate(problem, walk, next, length, k, at, error)
         if (allocated(error)) return
-        associate (multiplier => at%point%multipliers(k))
-          if (abs(multiplier%im) > 1.0e-6_wp) then
-            call note(neimark_sacker)
-            k = k + 1
-          else if (multiplier%re < 0) then
-            call note(doubling)
-          else if (problem%periodic%held > 0) then
-            call note(torque_fold)   ! multipliers are those at a constant torque
-          else if (.not. has_fold) then
-            call note(branch_point)
-          end if
-        end associate
-        k = k + 1
+        crossing = problem%kind_of(at%point, k)
+        if (crossing /= branch_point .or. .not. has_fold) call note(crossing)
+        k = k + merge(2, 1, crossing == neimark_sacker .or. crossing == hopf)
       end do
     end associate
     call add_even(problem, walk, next, found, places, branch, error)
@@ -135,7 +125,8 @@ contains
     type(walk_t), intent(inout) :: at
     type(error_t), allocatable, intent(out) :: error
     integer, parameter :: most = 60            ! evaluations
-    real(wp), parameter :: exact = 1.0e-11_wp
+    real(wp), parameter :: exact = 1.0e-11_wp, near = 1.0e-5_wp
+    type(walk_t) :: nearest
     type(bracket_t) :: bracket
     real(wp) :: place, row(size(walk%x))
     integer :: i, iterations
@@ -145,17 +136,23 @@ contains
     row = walk%weights**2 * walk%tangent
     at%settings = walk%settings
     at%range = walk%range
+    nearest = walk
     do i = 1, most
       place = bracket%next()
       at%x = walk%x + (place / length) * (next%x - walk%x)
       call problem%correct(row, dot_product(row, walk%x) + place, at%x, iterations, has_converged, error)
       if (allocated(error)) return
-      if (.not. has_converged) call raise(error, exit_failed, 'no convergence at a special point of the branch near ' // &
-                                          rounded_text(walk%x(size(walk%x)), 8))
-      if (.not. allocated(error)) call complete_point(problem, at, error)
+      if (.not. has_converged) then
+        at = nearest   ! the equations are singular where other branches of the same period begin
+        if (abs(test_value(nearest)) > near) call raise(error, exit_failed, 'no convergence at a special point of the ' // &
+                                                        'branch near ' // rounded_text(walk%x(size(walk%x)), 8))
+        return
+      end if
+      call complete_point(problem, at, error)
       if (.not. allocated(error)) call add_multipliers(problem, at%settings, at%point, error)
       if (allocated(error)) return
       call bracket%narrow(place, test_value(at))
+      if (abs(test_value(at)) < abs(test_value(nearest))) nearest = at
       if (abs(test_value(at)) <= exact .or. abs(bracket%x(2) - bracket%x(1)) <= exact * length) return
     end do
 

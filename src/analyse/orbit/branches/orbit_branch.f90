@@ -4,6 +4,7 @@
 module nocdyn_orbit_branch
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_kinds, only: wp
+  use nocdyn_orbit_checkpoints, only: keep_end, keep_step, recall_branch
   use nocdyn_orbit_points, only: adapt_resolution, add_multipliers, branch_t, complete_point, distance_between, settle_at, &
     take_step, walk_t
   use nocdyn_orbit_problem, only: measured, orbit_point_t, orbit_problem_t
@@ -14,7 +15,7 @@ module nocdyn_orbit_branch
   implicit none (type, external)
   private
 
-  public :: follow_branch, start_walk
+  public :: follow_branch, follow_walk, start_walk
 
   real(wp), parameter :: first_step = 0.01_wp, longest_step = 0.06_wp, shortest_step = 1.0e-7_wp
   real(wp), parameter :: very_straight = 0.997_wp   ! cosine between tangents
@@ -30,22 +31,44 @@ contains
     type(orbit_t), intent(in) :: guess
     type(branch_t), intent(out) :: branch
     type(error_t), allocatable, intent(out) :: error
-    type(walk_t) :: walk, next
+    type(walk_t) :: walk
+    logical :: has_begun
+
+    call start_walk(problem, settings, guess, walk, has_begun, error)
+    if (.not. allocated(error)) call follow_walk(problem, walk, branch, error)
+    branch%has_begun = has_begun
+  end subroutine follow_branch
+
+  !> Follows a branch from a motion on it along its tangent until it leaves the range.
+  subroutine follow_walk(problem, walk, branch, error)
+    class(orbit_problem_t), intent(inout) :: problem
+    type(walk_t), intent(inout) :: walk   !! the first motion, then the last one
+    type(branch_t), intent(out) :: branch
+    type(error_t), allocatable, intent(out) :: error
+    type(walk_t) :: next
     character(len=:), allocatable :: fault
     real(wp) :: step
-    integer :: iterations
-    logical :: is_done, is_good
+    integer :: iterations, kept, steps
+    logical :: is_done, is_good, is_whole
 
     allocate (branch%points(0))
     branch%ending = ''
-    call start_walk(problem, settings, guess, walk, branch%has_begun, error)
-    if (allocated(error)) return
-    call branch%add(walk%point)
     step = first_step
+    call recall_branch(problem, branch, walk, step, is_whole, error)
+    branch%has_begun = .true.
+    if (allocated(error) .or. is_whole) return
+    kept = branch%count
+    if (kept == 0) then
+      call branch%add(walk%point)
+    else
+      call problem%keep_phase(walk%point%orbit)
+    end if
+    steps = kept
     is_done = .false.
     do while (.not. is_done)
-      if (branch%count >= settings%most_points) then
-        branch%ending = 'after most_points = ' // to_text(settings%most_points) // ' points'
+      if (walk%settings%is_stopped()) return
+      if (branch%count >= walk%settings%most_points) then
+        branch%ending = 'after most_points = ' // to_text(walk%settings%most_points) // ' points'
         exit
       end if
       call take_step(problem, walk, step, next, iterations, is_good, error)
@@ -58,6 +81,9 @@ contains
       call complete_point(problem, next, error)
       if (dot_product(walk%weights**2 * walk%tangent, next%tangent) < 0) call next%turn()
       if (.not. allocated(error)) call adapt_resolution(problem, walk, next, error)
+      if (.not. allocated(error)) branch%is_back = problem%meets_other(walk%point%orbit, next%point%orbit)
+      if (branch%is_back) exit
+      steps = steps + 1
       fault = ''
       if (.not. allocated(error)) call problem%find_fault(next%point, fault)
       if (.not. allocated(error) .and. fault == '') then
@@ -67,12 +93,16 @@ contains
         call end_branch(walk, fault, branch, error)
         exit
       end if
-      branch%is_closed = comes_back(branch%points(1), walk%point, next%point)
+      if (steps > 1) branch%is_closed = comes_back(branch%points(1), walk%point, next%point)
       if (is_done .or. branch%is_closed) exit
       call adapt_step(iterations, walk, next, step)
       walk = next
+      call problem%keep_phase(walk%point%orbit)
+      call keep_step(problem, branch, walk, step, kept, error)
+      if (allocated(error)) return
     end do
-  end subroutine follow_branch
+    call keep_end(walk%settings, branch, kept, error)
+  end subroutine follow_walk
 
   !> Whether a branch passes its first point again between two others, in the same direction.
   pure logical function comes_back(first, walk, next)

@@ -4,15 +4,16 @@ module nocdyn_orbit_settings
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_orbit_log, only: orbit_log_t
   use nocdyn_targets, only: find_target, target_t
   use nocdyn_text, only: lower_case, quoted
-  use nocdyn_written_values, only: unit_of
+  use nocdyn_written_values, only: unit_of, written_element, written_number, written_unit
   implicit none (type, external)
   private
 
   public :: read_orbit_settings
 
-  integer, parameter :: most_states = 100      ! for which multipliers are computed unasked: they take the cube of it
+  integer, parameter :: most_states = 200      ! for which multipliers are computed unasked: they take the cube of it
 
   character(len=*), parameter :: no_machine = ' case run load_case output response orbit limit fatigue transit sweep vary record '
 
@@ -39,12 +40,26 @@ module nocdyn_orbit_settings
     logical :: settles = .false.               !! whether a run settles on the first motion
     logical :: starts_high = .false.           !! whether it is the largest one on which runs settle
     character(len=:), allocatable :: start_file   !! table of a motion near it, else ''
+    logical :: switches = .false.              !! whether branches that leave the first one are followed
     logical :: has_stability = .true.          !! whether multipliers are computed
     logical :: asks_stability = .false.        !! whether the input says so
     real(wp) :: tolerance = 0.0_wp             !! error of a point as a share of its motion
+    real(wp), allocatable :: motions(:)        !! values at which motions are written
+    logical :: has_spectrum = .false.          !! whether the harmonics of the points are written
+    type(orbit_log_t), pointer :: log => null()   !! journal of the analysis, if it has one
+  contains
+    procedure :: is_stopped
   end type orbit_settings_t
 
 contains
+
+  !> Whether an analysis with a journal has been interrupted.
+  logical function is_stopped(self)
+    class(orbit_settings_t), intent(in) :: self
+
+    is_stopped = .false.
+    if (associated(self%log)) is_stopped = self%log%is_stopped()
+  end function is_stopped
 
   !> Reads &orbit.
   subroutine read_orbit_settings(input, machine, settings, error)
@@ -94,6 +109,7 @@ contains
       settings%to = range(2)
       settings%at = range(1)
       settings%ahead = sign(1.0_wp, range(2) - range(1))
+      settings%switches = group%flag('switch_branches')
       if (group%has_value('starts')) settings%starts = group%whole_number('starts')
       if (group%has_value('method')) settings%method = merge(shooting, harmonic_balance, group%text('method') == 'shooting')
       if (group%has_value('harmonics')) settings%harmonics = group%whole_number('harmonics')
@@ -105,7 +121,9 @@ contains
       settings%asks_stability = group%has_value('stability')
       if (settings%asks_stability) settings%has_stability = group%flag('stability')
       if (settings%mode > 0) settings%has_stability = .false.
+      settings%has_spectrum = group%flag('spectrum')
     end associate
+    call read_motions(input, settings, error)
   end subroutine read_orbit_settings
 
   !> The key of the first and last value.
@@ -133,6 +151,34 @@ contains
       settings%start_file = text
     end select
   end subroutine read_start
+
+  !> The values at which motions are written.
+  subroutine read_motions(input, settings, error)
+    type(input_t), intent(in) :: input
+    type(orbit_settings_t), intent(inout) :: settings
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: key, unit
+    integer :: i
+
+    key = trim(merge('motion_speeds', 'motions      ', settings%body > 0))
+    associate (group => input%groups(settings%group))
+      settings%motions = group%numbers(key)
+      do i = 1, size(settings%motions)
+        if ((settings%motions(i) - settings%from) * (settings%motions(i) - settings%to) <= 0) cycle
+        if (settings%body > 0) then
+          unit = ' [' // written_unit(group, key) // ']'
+          call raise(error, exit_input, input%location(settings%group, key) // ': ' // written_element(group, key, i) // &
+                     ' is outside of the speeds; allowed: ' // written_number(group, key, settings%from) // ' to ' // &
+                     written_number(group, key, settings%to) // unit)
+        else
+          call raise(error, exit_input, input%location(settings%group, key) // ': ' // written_element(group, key, i) // &
+                     ' is outside of the range; allowed: ' // written_number(group, 'range', settings%from) // ' to ' // &
+                     written_number(group, 'range', settings%to))
+        end if
+        return
+      end do
+    end associate
+  end subroutine read_motions
 
   !> Finds the number over which the branch goes.
   subroutine find_number(input, path, settings, error)

@@ -12,14 +12,12 @@ module nocdyn_orbit_points
 
   public :: adapt_resolution, add_multipliers, complete_point, distance_between, interpolated, settle_at, span, take_step
 
-  character(len=*), parameter, public :: fold = 'fold', doubling = 'period_doubling', neimark_sacker = 'neimark_sacker', &
-    branch_point = 'branch_point', torque_fold = 'torque_fold'
-
   type, public :: branch_t
     type(orbit_point_t), allocatable :: points(:)  !! along the branch
     integer :: count = 0
     logical :: is_closed = .false.                 !! whether it comes back to its first point
     logical :: has_begun = .false.                 !! whether Newton's method has found the first point
+    logical :: is_back = .false.                   !! whether it ends where it meets the branch that it has left
     character(len=:), allocatable :: ending        !! why it ends where it does not leave the range, else ''
   contains
     procedure :: add

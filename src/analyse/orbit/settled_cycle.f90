@@ -1,0 +1,106 @@
+!> The limit cycle on which a run settles, with the period that it shows.
+module nocdyn_settled_cycle
+  use nocdyn_assembly, only: new_formulation
+  use nocdyn_errors, only: error_t
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_input, only: input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_orbit_guess, only: advance, formulation_angles, guess_samples, start_machine
+  use nocdyn_orbit_series, only: find_series
+  use nocdyn_orbit_settings, only: orbit_settings_t
+  use nocdyn_periodic_machine, only: orbit_t, periodic_machine_t
+  implicit none (type, external)
+  private
+
+  public :: find_settled_cycle
+
+  real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)   ! [rad]
+  integer, parameter :: windows = 8                      ! periods of the small oscillation that are looked at first
+  integer, parameter :: longer = 3                       ! times that they are lengthened
+  integer, parameter :: most_crossings = 16              ! of its mean by the main oscillation in a period
+
+contains
+
+  !> Runs from the steady state and a push, and finds the last period of it, if it is periodic.
+  subroutine find_settled_cycle(input, settings, periodic, push, guess, is_cycle, error)
+    type(input_t), intent(in) :: input
+    type(orbit_settings_t), intent(in) :: settings
+    type(periodic_machine_t), intent(in) :: periodic
+    real(wp), intent(in) :: push(:)           !! added to the state of the start, [states]
+    type(orbit_t), intent(inout) :: guess     !! the steady state, with the rate of its least stable oscillation; then the cycle
+    logical, intent(out) :: is_cycle
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: decayed = 1.0e-3_wp   ! of the push
+    class(formulation_t), allocatable :: formulation
+    type(machine_t) :: machine
+    real(wp), allocatable :: states(:, :), y(:, :)
+    real(wp) :: now, period, width
+    integer :: i, k
+
+    is_cycle = .false.
+    call start_machine(input, settings, machine)
+    call new_formulation('reduced', machine, formulation, with_energy_balance=.false.)
+    allocate (y, source=formulation%start())
+    y(1, :) = y(1, :) + push
+    width = windows * turn / guess%rate
+    now = settings%periods * turn / guess%rate
+    call advance(formulation, [0.0_wp, now], y, states, error)
+    if (allocated(error)) return
+    associate (f => periodic%machine%freedoms)
+      do k = 1, longer
+        call advance(formulation, now + [(width * i / (guess_samples * windows), i=0, guess_samples * windows)], y, states, error)
+        if (allocated(error)) return
+        now = now + width
+        if (maxval(abs(beside_mean(states(:f, :)))) < decayed * guess%rate * maxval(abs(push(f + 1:2 * f)))) return
+        call find_period(states, f, width, period)
+        is_cycle = period > 0
+        if (is_cycle) exit
+        width = 4 * width
+      end do
+      if (.not. is_cycle) return
+      call advance(formulation, now + [(period * i / guess_samples, i=0, guess_samples)], y, states, error)
+      if (allocated(error)) return
+      states(f + 1:2 * f, :) = states(f + 1:2 * f, :) + spread(formulation_angles(machine, periodic), 2, size(states, 2))
+      guess%rate = turn / period
+      call find_series(periodic, states(f + 1:, :), 0.0_wp, period, guess)
+    end associate
+  end subroutine find_settled_cycle
+
+  !> The time after which the speeds return, by the upward passages of the one that oscillates most through its mean; 0: none.
+  pure subroutine find_period(states, freedoms, width, period)
+    real(wp), intent(in) :: states(:, :)   !! at even distances of time, [states, times]
+    integer, intent(in) :: freedoms        !! the first states are their speeds
+    real(wp), intent(in) :: width          !! of all times [s]
+    real(wp), intent(out) :: period        !! [s]
+    real(wp), parameter :: returned = 0.05_wp   ! distance of speeds that are the same, as a share of their oscillation
+    real(wp) :: beside(freedoms, size(states, 2)), times(size(states, 2)), speeds(freedoms, size(states, 2)), share
+    integer :: i, main, n
+
+    period = 0.0_wp
+    beside = beside_mean(states(:freedoms, :))
+    main = maxloc(maxval(abs(beside), dim=2), dim=1)
+    n = 0
+    do i = 1, size(states, 2) - 1
+      if (.not. (beside(main, i) < 0 .and. beside(main, i + 1) >= 0)) cycle
+      n = n + 1
+      share = beside(main, i) / (beside(main, i) - beside(main, i + 1))
+      times(n) = width * (i - 1 + share) / (size(states, 2) - 1)
+      speeds(:, n) = beside(:, i) + share * (beside(:, i + 1) - beside(:, i))
+    end do
+    do i = 1, min(n - 1, most_crossings)
+      if (maxval(abs(speeds(:, n) - speeds(:, n - i))) > returned * maxval(abs(beside))) cycle
+      period = times(n) - times(n - i)
+      return
+    end do
+  end subroutine find_period
+
+  !> Values without their means over time.
+  pure function beside_mean(values) result(beside)
+    real(wp), intent(in) :: values(:, :)   !! [quantities, times]
+    real(wp) :: beside(size(values, 1), size(values, 2))
+
+    beside = values - spread(sum(values, dim=2) / size(values, 2), 2, size(values, 2))
+  end function beside_mean
+
+end module nocdyn_settled_cycle
