@@ -140,6 +140,8 @@ ELEMENTS = {
     "motions = 1.2, 1.5 spectrum = .true. /",
     "settled orbit": "&orbit body = 'a' speed_rpm = 10, 20 start = 'settled_run' subharmonic = 2 signals = 'phi_*' count = 5 "
     "motion_speeds_rpm = 15 /",
+    "orbits in harmonics": "&orbit over = 'body.a.inertia' range = 1, 2 method = 'harmonic_balance' /",
+    "orbits by shooting": "&orbit over = 'body.a.inertia' range = 1, 2 method = 'shooting' /",
     "orbits": "&coupling name = 'k' bodies = 'a', 'b' stiffness = 100 /\n&orbit over = 'body.a.inertia' range = 1, 2 /\n"
     f"&sweep design = 'grid' /\n{VARY} count = 3 /\n&record orbit = 'phi_a' statistic = 'peak', 'peak_value' /\n"
     "&record orbit = 'branch' number = 2 statistic = 'fold', 'jump_up', 'jump_down', 'folds', 'unstable_ranges' /",

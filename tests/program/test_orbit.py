@@ -415,7 +415,8 @@ REFUSED = [
     ),
     (PLAY + OVER.format(6.4, 14.0, "method = 'harmonic_balance'"), "the motion crosses the edge of the gap of coupling 'play'"),
     (
-        DUFFING.replace("inertia = 1.0", "inertia = 1.0 bearing_friction = 0.1") + OVER.format(0.8, 1.6, "method = 'harmonic_balance'"),
+        DUFFING.replace("inertia = 1.0", "inertia = 1.0 bearing_friction = 0.1")
+        + OVER.format(0.8, 1.6, "method = 'harmonic_balance'"),
         "does not know whether bearings slip",
     ),
 ]

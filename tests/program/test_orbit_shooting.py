@@ -103,22 +103,27 @@ def play_over(t_end, start, amplitude, rate):
     return y, least, largest
 
 
-def settled_play(amplitude, rate, turns):
-    """Half range and multipliers of the motion on which one with play settles, by Newton's method with differences."""
-    period = 2 * np.pi / rate
-    start = play_over(turns * period, (1.1, 0.0), amplitude, rate)[0]
+def monodromy(start, period, amplitude, rate):
+    """Derivatives of the end of a period by its begin, by central differences."""
+    matrix = np.empty((2, 2))
+    for i in range(2):
+        step = 1e-5 * np.eye(2)[i]
+        ends = [play_over(period, start + sign * step, amplitude, rate)[0] for sign in (-1, 1)]
+        matrix[:, i] = (ends[1] - ends[0]) / 2e-5
+    return matrix
+
+
+def settled_play(start, period, amplitude, rate):
+    """Half range and multipliers of the periodic motion on which one with play settles, at last by Newton's method."""
+    start = play_over(40 * period, start, amplitude, rate)[0]
     for _ in range(6):
         end, least, largest = play_over(period, start, amplitude, rate)
-        matrix = np.empty((2, 2))
-        for i in range(2):
-            step = 1e-5 * np.eye(2)[i]
-            ends = [play_over(period, start + sign * step, amplitude, rate)[0] for sign in (-1, 1)]
-            matrix[:, i] = (ends[1] - ends[0]) / 2e-5
+        matrix = monodromy(start, period, amplitude, rate)
         change = np.linalg.solve(matrix - np.eye(2), start - end)
         start = start + change
         if np.abs(change).max() < 1e-10:
             break
-    return 0.5 * (largest - least), in_order(np.linalg.eigvals(matrix))
+    return start, 0.5 * (largest - least), in_order(np.linalg.eigvals(matrix))
 
 
 @pytest.mark.parametrize("rate", [0.9, 1.1])
@@ -127,7 +132,7 @@ def test_play_between_wheels_has_the_motion_and_the_multipliers_of_an_integratio
     text = PLAY.format(2 * ZETA, MEAN, amplitude, rate)
     text += f"&orbit over = 'excitation.shaker.amplitude' range = {amplitude!r}, {1.01 * amplitude!r} start = 'settled_run' /\n"
     values, _, _ = branch(nocdyn, text)
-    half_range, expected = settled_play(amplitude, rate, 40)
+    _, half_range, expected = settled_play((1.1, 0.0), 2 * np.pi / rate, amplitude, rate)
     assert values["half_range_phi_x"][0] == pytest.approx(half_range, rel=ASKED)
     assert multipliers(values, 0) == pytest.approx(expected, abs=ASKED)
 
@@ -150,22 +155,10 @@ def test_a_motion_with_play_of_twice_the_period_is_that_of_an_integration(nocdyn
     (nocdyn.folder / "out/trajectory.csv").rename(nocdyn.folder / "motion.csv")
     text += f"&orbit over = 'excitation.shaker.amplitude' range = {amplitude!r}, {1.01 * amplitude!r} subharmonic = 2"
     values, _, _ = branch(nocdyn, text + " method = 'shooting' start = 'motion.csv' /\n")
-    half_range, expected = settled_twice(amplitude, rate)
+    start, half_range, expected = settled_play((1.1, 0.3), 4 * np.pi / rate, amplitude, rate)
+    assert np.abs(play_over(2 * np.pi / rate, start, amplitude, rate)[0] - start).max() > 0.01  # not of one period
     assert values["half_range_phi_x"][0] == pytest.approx(half_range, rel=ASKED)
     assert multipliers(values, 0) == pytest.approx(expected, abs=ASKED)
-
-
-def settled_twice(amplitude, rate):
-    period = 4 * np.pi / rate
-    start = play_over(60 * period, (1.1, 0.3), amplitude, rate)[0]
-    end, least, largest = play_over(period, start, amplitude, rate)
-    assert np.abs(play_over(0.5 * period, start, amplitude, rate)[0] - start).max() > 0.01  # not of one period
-    matrix = np.empty((2, 2))
-    for i in range(2):
-        step = 1e-5 * np.eye(2)[i]
-        ends = [play_over(period, start + sign * step, amplitude, rate)[0] for sign in (-1, 1)]
-        matrix[:, i] = (ends[1] - ends[0]) / 2e-5
-    return 0.5 * (largest - least), in_order(np.linalg.eigvals(matrix))
 
 
 def den_hartog(friction, ratio):

@@ -348,6 +348,7 @@ contains
     real(wp), dimension(periodic%machine%samples, periodic%machine%states) :: rates, y
     type(error_t), allocatable :: error
     integer :: i, m
+    logical :: rubs
 
     periodic%floating_speed = periodic%machine%formulation%machine%start_speed(1, &
       periodic%machine%formulation%machine%coordinates%body(periodic%free))
@@ -361,7 +362,8 @@ contains
         call periodic%machine%rates(t, y, rates, error)
         torques(i) = mean_torque(periodic, m, rates(1, :periodic%machine%freedoms))
       end do
-      if (m /= periodic%held_motion .and. .not. is_rubbed(m) .and. &
+      rubs = is_rubbed(m)
+      if (m /= periodic%held_motion .and. .not. rubs .and. &
           abs(torques(2) - torques(1)) <= none * maxval(abs(torques))) cycle
       periodic%border = [periodic%border, m]
     end do

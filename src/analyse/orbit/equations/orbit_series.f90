@@ -1,4 +1,4 @@
-!> A periodic motion as series, from its states at even times.
+!> A periodic motion as series, from its states at even times, and its state from series.
 module nocdyn_orbit_series
   use nocdyn_harmonic_basis, only: harmonic_basis_t, new_harmonic_basis
   use nocdyn_kinds, only: wp
@@ -6,7 +6,7 @@ module nocdyn_orbit_series
   implicit none (type, external)
   private
 
-  public :: find_series
+  public :: find_series, state_of_series
 
   real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)   ! [rad]
   integer, parameter :: harmonics = 15
@@ -47,5 +47,44 @@ contains
       end do
     end associate
   end subroutine find_series
+
+  !> The state of series where the angles of the free rotations are zero; where orders excite, it comes at another time.
+  subroutine state_of_series(periodic, orbit, state)
+    type(periodic_machine_t), intent(in) :: periodic
+    type(orbit_t), intent(in) :: orbit
+    real(wp), intent(out) :: state(:)
+    integer, parameter :: corrections = 20
+    real(wp) :: angle, phase, steady(periodic%machine%freedoms)
+    integer :: i, k
+
+    associate (f => periodic%machine%freedoms, m => periodic%period%motion)
+      steady = matmul(periodic%rigid, orbit%speed)
+      phase = 0.0_wp
+      do i = 1, merge(corrections, 0, m > 0)
+        call values_at(phase)
+        angle = state(f + periodic%free(m)) + orbit%speed(m) * phase / orbit%rate
+        phase = phase - angle * orbit%rate / orbit%speed(m)
+      end do
+      call values_at(phase)
+      state(:f) = state(:f) + steady
+    end associate
+
+  contains
+
+    subroutine values_at(tau)
+      real(wp), intent(in) :: tau
+
+      associate (f => periodic%machine%freedoms, series => orbit%series)
+        state(:f) = 0.0_wp
+        state(f + 1:) = series(1, :)
+        state(f + periodic%free) = 0.0_wp
+        do k = 1, size(series, 1) / 2
+          state(f + 1:) = state(f + 1:) + series(2 * k, :) * cos(k * tau) + series(2 * k + 1, :) * sin(k * tau)
+          state(:f) = state(:f) + (k * orbit%rate) * (series(2 * k + 1, :f) * cos(k * tau) - series(2 * k, :f) * sin(k * tau))
+        end do
+      end associate
+    end subroutine values_at
+
+  end subroutine state_of_series
 
 end module nocdyn_orbit_series

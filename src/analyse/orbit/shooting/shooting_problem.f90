@@ -10,7 +10,7 @@ module nocdyn_shooting_problem
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_orbit_multipliers, only: multipliers_of
   use nocdyn_orbit_problem, only: measured, orbit_point_t, orbit_problem_t, signal_range_t
-  use nocdyn_orbit_series, only: find_series
+  use nocdyn_orbit_series, only: find_series, state_of_series
   use nocdyn_period_flow, only: flow_observer_t, flow_over
   use nocdyn_period_signals, only: measure_period
   use nocdyn_periodic_machine, only: orbit_t, periodic_machine_t
@@ -108,45 +108,6 @@ contains
     x(self%states + 1:size(x) - 1) = self%periodic%put_border(orbit)
     x(size(x)) = orbit%value
   end function put_together
-
-  !> The state of series where the angles of the free rotations are zero; where orders excite, it comes at another time.
-  subroutine state_of_series(periodic, orbit, state)
-    type(periodic_machine_t), intent(in) :: periodic
-    type(orbit_t), intent(in) :: orbit
-    real(wp), intent(out) :: state(:)
-    integer, parameter :: corrections = 20
-    real(wp) :: angle, phase, steady(periodic%machine%freedoms)
-    integer :: i, k
-
-    associate (f => periodic%machine%freedoms, m => periodic%period%motion)
-      steady = matmul(periodic%rigid, orbit%speed)
-      phase = 0.0_wp
-      do i = 1, merge(corrections, 0, m > 0)
-        call values_at(phase)
-        angle = state(f + periodic%free(m)) + orbit%speed(m) * phase / orbit%rate
-        phase = phase - angle * orbit%rate / orbit%speed(m)
-      end do
-      call values_at(phase)
-      state(:f) = state(:f) + steady
-    end associate
-
-  contains
-
-    subroutine values_at(tau)
-      real(wp), intent(in) :: tau
-
-      associate (f => periodic%machine%freedoms, series => orbit%series)
-        state(:f) = 0.0_wp
-        state(f + 1:) = series(1, :)
-        state(f + periodic%free) = 0.0_wp
-        do k = 1, size(series, 1) / 2
-          state(f + 1:) = state(f + 1:) + series(2 * k, :) * cos(k * tau) + series(2 * k + 1, :) * sin(k * tau)
-          state(:f) = state(:f) + (k * orbit%rate) * (series(2 * k + 1, :f) * cos(k * tau) - series(2 * k, :f) * sin(k * tau))
-        end do
-      end associate
-    end subroutine values_at
-
-  end subroutine state_of_series
 
   !> The orbit of unknowns, with its state.
   subroutine take_apart(self, x, orbit)
