@@ -63,6 +63,7 @@ contains
       self%unit = 'rad/s'
     else if (self%settings%mode > 0) then
       self%unit = 'rad'
+      if (self%settings%is_over_energy) self%unit = 'J'
     else
       self%parameter = self%settings%targets(1)%path
       self%unit = self%settings%targets(1)%unit
@@ -208,10 +209,12 @@ contains
       if (allocated(error)) return
       call find_rigid(periodic)
       periodic%bounds = [min(settings%from, settings%to), max(settings%from, settings%to)]
+      periodic%is_over_energy = settings%is_over_energy
       call find_steady_guess(input, settings, periodic, guess)
       call start_backbone(settings%mode, periodic, guess, body, self%backbone%linear_rate, error)
       if (allocated(error)) return
       self%parameter = 'amplitude_phi_' // machine%names(body)%text
+      if (settings%is_over_energy) self%parameter = 'energy'
       call note_left_out(machine, self%notes)
     end associate
   end subroutine study_mode

@@ -157,6 +157,8 @@ module nocdyn_schema_response
       'in place of both: the mode of the machine without damping and excitation whose backbone curve is found'), &
     key_rule_t('orbit', 'amplitude', a_number, 2, 'rad', unset, positive, &
       'first and last amplitude of its backbone, of the body that moves most in the mode'), &
+    key_rule_t('orbit', 'energy', a_number, 2, 'J', unset, positive, &
+      'in place of the amplitude: first and last energy, above the one in balance'), &
     key_rule_t('orbit', 'start', a_text, 1, '', "'low'", anything, &
       "the first motion: 'low' (near the steady state), 'high', 'settled_run', or a table such as trajectory.csv"), &
     key_rule_t('orbit', 'starts', an_integer, 1, '', unset, from_1, &
@@ -250,8 +252,9 @@ module nocdyn_schema_response
     relation_rule_t('orbit', exactly_one, 'over', 'body mode'), &
     relation_rule_t('orbit', at_most_one, 'body', 'mode'), &
     relation_rule_t('orbit', at_most_one, 'mode', 'start starts subharmonic stability'), &
-    relation_rule_t('orbit', requires, 'mode', 'amplitude'), &
-    relation_rule_t('orbit', requires, 'amplitude', 'mode'), &
+    relation_rule_t('orbit', requires, 'mode', 'amplitude energy'), &
+    relation_rule_t('orbit', requires, 'amplitude energy', 'mode'), &
+    relation_rule_t('orbit', at_most_one, 'amplitude', 'energy'), &
     relation_rule_t('orbit', requires, 'over', 'range'), &
     relation_rule_t('orbit', requires, 'range', 'over'), &
     relation_rule_t('orbit', requires, 'body', 'speed'), &
