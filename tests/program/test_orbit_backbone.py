@@ -151,3 +151,26 @@ def test_the_energy_of_a_train_is_above_the_one_of_its_steady_twist(nocdyn):
     for twist in (largest, largest - 2 * half_range):  # both turning points
         above = 5e3 * (twist**2 - steady**2) + 1.25e6 * (twist**4 - steady**4) - 150.0 * (twist - steady)
         assert values["energy"] == pytest.approx(above, rel=1e-6)
+
+
+def test_a_coupling_has_its_describing_function_along_a_forced_branch(nocdyn):
+    over = "&orbit over = 'excitation.shaker.frequency' range = 0.8, 1.6 harmonics = {} /\n"
+    values, report, _ = backbone(nocdyn, DUFFING.format(0.05, 0.18) + over.format(1))
+    (coupling,) = report["couplings"]
+    twist = np.array(coupling["twist"])
+    assert coupling["coupling"] == "spring"
+    assert twist == pytest.approx(values["half_range_twist_spring"], rel=1e-9)
+    assert coupling["equivalent_stiffness"] == pytest.approx(STIFFNESS + 0.75 * CUBIC * twist**2, rel=1e-9)
+    assert coupling["equivalent_damping"] == pytest.approx(np.full(twist.size, 0.05), rel=1e-9)
+    # With all harmonics: the balance of the first one, P = (k - w^2 J + i w c) u.
+    values, report, _ = backbone(nocdyn, DUFFING.format(0.05, 0.18) + over.format(15))
+    (coupling,) = report["couplings"]
+    rate = values["rate"]
+    impedance = np.array(coupling["equivalent_stiffness"]) - rate**2 + 1j * rate * np.array(coupling["equivalent_damping"])
+    assert np.abs(impedance) * coupling["twist"] == pytest.approx(np.full(rate.size, 0.18), rel=1e-9)
+
+
+def test_linear_couplings_have_no_describing_functions(nocdyn):
+    over = "&orbit over = 'excitation.shaker.frequency' range = 0.8, 1.6 /\n"
+    linear = DUFFING.format(0.05, 0.18).replace("cubic_stiffness = 0.1", "")
+    assert backbone(nocdyn, linear + over)[1]["couplings"] == []

@@ -9,6 +9,7 @@ module nocdyn_orbit_analysis
   use nocdyn_machine, only: machine_t
   use nocdyn_orbit_backbone, only: backbone_t, find_quasi_linear, note_left_out
   use nocdyn_orbit_branch, only: follow_branch
+  use nocdyn_orbit_couplings, only: describe_point, list_couplings, orbit_couplings_t
   use nocdyn_orbit_guess, only: find_settled_guess, find_steady_guess
   use nocdyn_orbit_period, only: find_period
   use nocdyn_orbit_points, only: branch_t
@@ -36,6 +37,7 @@ module nocdyn_orbit_analysis
     type(signal_t), allocatable :: signals(:)          !! in SI units
     type(branch_t) :: branch                           !! with the points of all branches
     type(scatter_t) :: found                           !! what scattered starts have found
+    type(orbit_couplings_t) :: couplings               !! their describing functions
     type(backbone_t) :: backbone                       !! frequencies of a mode
     type(signal_range_t), allocatable :: ranges(:, :)  !! [signals, points]
     type(string_t), allocatable :: notes(:)
@@ -322,8 +324,10 @@ contains
     integer :: i
 
     allocate (self%ranges(size(self%signals), self%branch%count))
+    call list_couplings(problem%periodic%machine%formulation%machine, self%branch%count, self%couplings)
     do i = 1, self%branch%count
       call problem%measure(self%branch%points(i), self%signals, self%ranges(:, i), error)
+      if (.not. allocated(error)) call describe_point(problem, self%branch%points(i), i, self%couplings, error)
       if (allocated(error)) return
     end do
   end subroutine measure_points

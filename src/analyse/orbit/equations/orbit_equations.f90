@@ -41,11 +41,11 @@ module nocdyn_orbit_equations
 
 contains
 
-  !> Samples that series up to a harmonic need, with room for those of laws.
+  !> Samples that series up to a harmonic need, with room for those of laws and for the stages of a step of the multipliers.
   pure integer function samples_of(harmonics)
     integer, intent(in) :: harmonics
 
-    samples_of = 8 * ((4 * harmonics + 2 + 7) / 8)
+    samples_of = max(16, 8 * ((4 * harmonics + 2 + 7) / 8))
   end function samples_of
 
   !> Orders the unknowns of the machine.

@@ -62,6 +62,7 @@ contains
       call json%close_list()
     end associate
     call put_peaks(json, analysis)
+    call put_couplings(json, analysis)
     if (analysis%settings%mode > 0) call put_backbone(json, analysis)
     if (analysis%settings%starts > 0) then
       call json%open('starts')
@@ -95,6 +96,27 @@ contains
       call json%close()
     end associate
   end subroutine put_point
+
+  !> The describing functions of the couplings whose stiffness changes along the branches, at each point.
+  subroutine put_couplings(json, analysis)
+    type(json_t), intent(inout) :: json
+    type(orbit_analysis_t), intent(in) :: analysis
+    integer :: i
+
+    call json%open_list('couplings')
+    do i = 1, size(analysis%couplings%names)
+      if (.not. analysis%couplings%changes(i)) cycle
+      associate (equivalents => analysis%couplings%equivalents(i, :))
+        call json%open()
+        call json%put('coupling', analysis%couplings%names(i)%text)
+        call json%put('twist', equivalents%twist)
+        call json%put('equivalent_stiffness', equivalents%stiffness)
+        call json%put('equivalent_damping', equivalents%damping)
+        call json%close()
+      end associate
+    end do
+    call json%close_list()
+  end subroutine put_couplings
 
   !> The frequencies of a mode over its amplitude.
   subroutine put_backbone(json, analysis)
