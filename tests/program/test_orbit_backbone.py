@@ -125,3 +125,52 @@ def test_a_mode_that_is_not_there_is_refused(nocdyn, text, code, message):
     outcome = nocdyn("orbit", nocdyn.write("machine.nml", text))
     assert outcome.returncode == code, outcome.stdout + outcome.stderr
     assert message in outcome.stderr
+
+
+def test_an_energy_in_place_of_the_amplitude_gives_the_same_backbone(nocdyn):
+    values, _, _ = backbone(nocdyn, DUFFING.format(0.05, 0.18) + MODE.format(1, 0.1, 3.0, "count = 3"))
+    amplitude = values["amplitude_phi_mass"]
+    expected = 0.5 * STIFFNESS * amplitude**2 + 0.25 * CUBIC * amplitude**4
+    assert values["energy"] == pytest.approx(expected, rel=1e-10)
+    over_energy = "&orbit mode = 1 energy = 0.01, 5.0 tolerance = 1e-10 /\n"
+    values, _, printed = backbone(nocdyn, DUFFING.format(0.05, 0.18) + over_energy)
+    amplitude = values["half_range_phi_mass"]
+    assert values["energy"] == pytest.approx(0.5 * STIFFNESS * amplitude**2 + 0.25 * CUBIC * amplitude**4, rel=1e-9)
+    assert values["rate"] == pytest.approx(duffing_rate(amplitude), rel=1e-9)
+    assert "Hz at 0.01 J, " in printed
+
+
+def test_the_energy_of_a_train_is_above_the_one_of_its_steady_twist(nocdyn):
+    values, _, _ = backbone(nocdyn, TRAIN + MODE.format(1, 0.001, 0.05, ""))
+    ends = [float(energy) for energy in values["energy"][[0, -1]]]
+    over_energy, _, _ = backbone(nocdyn, TRAIN + f"&orbit mode = 1 energy = {ends[0]!r}, {ends[1]!r} /\n")
+    assert over_energy["rate"][[0, -1]] == pytest.approx(values["rate"][[0, -1]], rel=1e-7)
+    largest, half_range = values["largest_twist_rubber"], values["half_range_twist_rubber"]
+    steady = np.roots([5e6, 0.0, 1e4, -150.0])
+    steady = steady[np.abs(steady.imag) < 1e-9][0].real
+    for twist in (largest, largest - 2 * half_range):  # both turning points
+        above = 5e3 * (twist**2 - steady**2) + 1.25e6 * (twist**4 - steady**4) - 150.0 * (twist - steady)
+        assert values["energy"] == pytest.approx(above, rel=1e-6)
+
+
+def test_a_coupling_has_its_describing_function_along_a_forced_branch(nocdyn):
+    over = "&orbit over = 'excitation.shaker.frequency' range = 0.8, 1.6 harmonics = {} /\n"
+    values, report, _ = backbone(nocdyn, DUFFING.format(0.05, 0.18) + over.format(1))
+    (coupling,) = report["couplings"]
+    twist = np.array(coupling["twist"])
+    assert coupling["coupling"] == "spring"
+    assert twist == pytest.approx(values["half_range_twist_spring"], rel=1e-9)
+    assert coupling["equivalent_stiffness"] == pytest.approx(STIFFNESS + 0.75 * CUBIC * twist**2, rel=1e-9)
+    assert coupling["equivalent_damping"] == pytest.approx(np.full(twist.size, 0.05), rel=1e-9)
+    # With all harmonics: the balance of the first one, P = (k - w^2 J + i w c) u.
+    values, report, _ = backbone(nocdyn, DUFFING.format(0.05, 0.18) + over.format(15))
+    (coupling,) = report["couplings"]
+    rate = values["rate"]
+    impedance = np.array(coupling["equivalent_stiffness"]) - rate**2 + 1j * rate * np.array(coupling["equivalent_damping"])
+    assert np.abs(impedance) * coupling["twist"] == pytest.approx(np.full(rate.size, 0.18), rel=1e-9)
+
+
+def test_linear_couplings_have_no_describing_functions(nocdyn):
+    over = "&orbit over = 'excitation.shaker.frequency' range = 0.8, 1.6 /\n"
+    linear = DUFFING.format(0.05, 0.18).replace("cubic_stiffness = 0.1", "")
+    assert backbone(nocdyn, linear + over)[1]["couplings"] == []

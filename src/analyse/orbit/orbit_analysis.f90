@@ -10,6 +10,7 @@ module nocdyn_orbit_analysis
   use nocdyn_machine, only: machine_t
   use nocdyn_orbit_backbone, only: backbone_t, find_quasi_linear, note_left_out
   use nocdyn_orbit_branch, only: follow_branch
+  use nocdyn_orbit_couplings, only: orbit_couplings_t
   use nocdyn_orbit_guess, only: find_settled_guess, find_steady_guess
   use nocdyn_orbit_log, only: orbit_log_t
   use nocdyn_orbit_period, only: find_period
@@ -38,6 +39,7 @@ module nocdyn_orbit_analysis
     character(len=:), allocatable :: body_name         !! whose speed is held, ''
     type(branch_t) :: branch                           !! with the points of all branches
     type(scatter_t) :: found                           !! what scattered starts have found
+    type(orbit_couplings_t) :: couplings               !! their describing functions
     type(backbone_t) :: backbone                       !! frequencies of a mode
     class(orbit_problem_t), allocatable :: problem     !! whose motions they are
     type(string_t), allocatable :: notes(:)
@@ -69,6 +71,7 @@ contains
       self%unit = 'rad/s'
     else if (self%settings%mode > 0) then
       self%unit = 'rad'
+      if (self%settings%is_over_energy) self%unit = 'J'
     else
       self%parameter = self%settings%targets(1)%path
       self%unit = self%settings%targets(1)%unit
@@ -313,10 +316,12 @@ contains
       if (allocated(error)) return
       call find_rigid(periodic)
       periodic%bounds = [min(settings%from, settings%to), max(settings%from, settings%to)]
+      periodic%is_over_energy = settings%is_over_energy
       call find_steady_guess(input, settings, periodic, guess)
       call start_backbone(settings%mode, periodic, guess, body, self%backbone%linear_rate, error)
       if (allocated(error)) return
       self%parameter = 'amplitude_phi_' // machine%names(body)%text
+      if (settings%is_over_energy) self%parameter = 'energy'
       call note_left_out(machine, self%notes)
     end associate
   end subroutine study_mode

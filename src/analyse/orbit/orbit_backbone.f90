@@ -9,6 +9,7 @@ module nocdyn_orbit_backbone
   use nocdyn_harmonic_problem, only: harmonic_problem_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_orbit_equations, only: begin_of
   use nocdyn_orbit_points, only: branch_t
   use nocdyn_orbit_problem, only: orbit_problem_t
   use nocdyn_text, only: append, listed, quoted, string_t
@@ -20,6 +21,7 @@ module nocdyn_orbit_backbone
   type, public :: backbone_t
     real(wp) :: linear_rate = 0.0_wp                !! of the mode at small amplitudes [rad/s]
     real(wp), allocatable :: quasi_linear_rate(:)   !! at the amplitudes of the points [rad/s], 0 where it is not found
+    real(wp), allocatable :: energy(:)              !! of each point, above the one in balance [J]
   end type backbone_t
 
   integer, parameter :: samples = 128   ! of a period, for the first harmonic of moments
@@ -37,7 +39,7 @@ contains
     integer :: i, iterations
     logical :: has_converged
 
-    allocate (backbone%quasi_linear_rate(branch%count), source=0.0_wp)
+    allocate (backbone%quasi_linear_rate(branch%count), backbone%energy(branch%count), source=0.0_wp)
     select type (problem)
     type is (harmonic_problem_t)
       allocate (one, source=problem)
@@ -50,6 +52,11 @@ contains
       row(size(row)) = 1.0_wp
       call one%correct(row, branch%points(i)%orbit%value, x, iterations, has_converged, error)
       if (.not. allocated(error) .and. has_converged) backbone%quasi_linear_rate(i) = x(size(x) - 1)
+      if (allocated(error)) deallocate (error)
+      associate (series => branch%points(i)%orbit%series)
+        call one%equations%conservative_energy(one%equations%origin, begin_of(series, one%equations%free), &
+                                               backbone%energy(i), error)
+      end associate
       if (allocated(error)) deallocate (error)
     end do
   end subroutine find_quasi_linear

@@ -158,6 +158,8 @@ module nocdyn_schema_response
       'in place of both: the mode of the machine without damping and excitation whose backbone curve is found'), &
     key_rule_t('orbit', 'amplitude', a_number, 2, 'rad', unset, positive, &
       'first and last amplitude of its backbone, of the body that moves most in the mode'), &
+    key_rule_t('orbit', 'energy', a_number, 2, 'J', unset, positive, &
+      'in place of the amplitude: first and last energy, above the one in balance'), &
     key_rule_t('orbit', 'method', a_word, 1, '', unset, orbit_methods, &
       'harmonic_balance: in harmonics, for smooth laws; shooting: by integration over a period, with events; ' // &
       'found by the machine if not given'), &
@@ -262,8 +264,9 @@ module nocdyn_schema_response
     relation_rule_t('orbit', exactly_one, 'over', 'body mode'), &
     relation_rule_t('orbit', at_most_one, 'body', 'mode'), &
     relation_rule_t('orbit', at_most_one, 'mode', 'start starts subharmonic stability'), &
-    relation_rule_t('orbit', requires, 'mode', 'amplitude'), &
-    relation_rule_t('orbit', requires, 'amplitude', 'mode'), &
+    relation_rule_t('orbit', requires, 'mode', 'amplitude energy'), &
+    relation_rule_t('orbit', requires, 'amplitude energy', 'mode'), &
+    relation_rule_t('orbit', at_most_one, 'amplitude', 'energy'), &
     relation_rule_t('orbit', requires, 'over', 'range'), &
     relation_rule_t('orbit', requires, 'range', 'over'), &
     relation_rule_t('orbit', requires, 'body', 'speed'), &

@@ -26,6 +26,7 @@ module nocdyn_orbit_settings
     type(target_t), allocatable :: targets(:)  !! the number over which it goes, none if it is a speed
     integer :: body = 0                        !! whose mean speed it goes over, 0: none
     integer :: mode = 0                        !! nonlinear normal mode over whose amplitude it goes, 0: none
+    logical :: is_over_energy = .false.        !! or over whose energy
     integer :: speed_unit = 0                  !! in which the input has speeds: index of `units`, 0: rad/s
     real(wp) :: from = 0.0_wp, to = 0.0_wp     !! in the unit of the target, or [rad/s]
     real(wp) :: at = 0.0_wp                    !! where a branch begins
@@ -85,7 +86,12 @@ contains
       else if (group%has_value('mode')) then
         allocate (settings%targets(0))
         settings%mode = group%whole_number('mode')
-        range = group%numbers('amplitude')
+        settings%is_over_energy = group%has_value('energy')
+        if (settings%is_over_energy) then
+          range = group%numbers('energy')
+        else
+          range = group%numbers('amplitude')
+        end if
       else
         allocate (settings%targets(0))
         settings%body = findloc([(machine%names(i)%text == group%text('body'), i=1, machine%bodies)], .true., dim=1)
@@ -134,6 +140,7 @@ contains
     key = 'range'
     if (settings%body > 0) key = 'speed'
     if (settings%mode > 0) key = 'amplitude'
+    if (settings%is_over_energy) key = 'energy'
   end function range_key
 
   !> Where the branch begins: a word, in any case, or the name of a file.

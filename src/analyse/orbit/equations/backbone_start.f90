@@ -19,12 +19,13 @@ contains
   subroutine start_backbone(mode, periodic, guess, body, linear_rate, error)
     integer, intent(in) :: mode                     !! 1 is the lowest one that oscillates
     type(periodic_machine_t), intent(inout) :: periodic   !! conservative, with its rigid motions
-    type(orbit_t), intent(inout) :: guess           !! the steady state and the first amplitude [rad]; then the linear motion
+    type(orbit_t), intent(inout) :: guess           !! the steady state and the first amplitude [rad] or energy [J]; then the
+                                                    !! linear motion
     integer, intent(out) :: body                    !! that moves most in the mode, whose amplitude is meant
     real(wp), intent(out) :: linear_rate            !! frequency of the mode [rad/s]
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: shape(:)
-    real(wp) :: angle, largest
+    real(wp) :: amplitude, angle, largest
     integer :: b, k
 
     if (periodic%machine%states > 2 * periodic%machine%freedoms) then
@@ -36,6 +37,7 @@ contains
     allocate (periodic%period%multiples(0), periodic%border(0))
     allocate (periodic%floating_speed(size(periodic%free)), source=0.0_wp)
     guess%speed = periodic%floating_speed
+    periodic%origin = guess%series(1, :)
     call periodic%machine%balance_at(guess%series(1, :), error)
     if (.not. allocated(error)) call find_mode(periodic, guess%series(1, :), mode, shape, linear_rate, error)
     if (allocated(error)) return
@@ -53,7 +55,14 @@ contains
       end do
     end associate
     guess%rate = linear_rate
-    guess%series = reshape([guess%series(1, :), guess%value / largest * shape, 0.0_wp * shape], [3, size(shape)], order=[2, 1])
+    shape = shape / largest
+    amplitude = guess%value
+    if (periodic%is_over_energy) then
+      associate (slopes => -periodic%energy_slopes(shape))   ! inertias times the shape
+        amplitude = sqrt(2.0_wp * guess%value / (linear_rate**2 * dot_product(shape, slopes)))
+      end associate
+    end if
+    guess%series = reshape([guess%series(1, :), amplitude * shape, 0.0_wp * shape], [3, size(shape)], order=[2, 1])
   end subroutine start_backbone
 
   !> The angle of a body by the ones of the coordinates [rad].

@@ -7,9 +7,9 @@
 !> the integral of q times the rate of this vanishes over a period.
 !>
 !> The parameter of a conservative machine is an amplitude: half the difference of an angle between the begin and the middle of
-!> the period, where the motion turns back. Its motions form families, so that one more unknown belongs to this equation: a
-!> damping w d q', which comes out as zero (F. J. Munoz-Almaraz, E. Freire, J. Galan, E. Doedel, A. Vanderbauwhede, Continuation
-!> of periodic orbits in conservative and Hamiltonian systems, Physica D 181 (2003) 1-38).
+!> the period, where the motion turns back; or the energy there. Its motions form families, so that one more unknown belongs to
+!> this equation: a damping w d q', which comes out as zero (F. J. Munoz-Almaraz, E. Freire, J. Galan, E. Doedel,
+!> A. Vanderbauwhede, Continuation of periodic orbits in conservative and Hamiltonian systems, Physica D 181 (2003) 1-38).
 module nocdyn_orbit_equations
   use nocdyn_bordered_system, only: bordered_system_t, new_bordered_system
   use nocdyn_errors, only: error_t
@@ -20,7 +20,7 @@ module nocdyn_orbit_equations
   implicit none (type, external)
   private
 
-  public :: samples_of
+  public :: begin_of, samples_of
 
   type, extends(periodic_machine_t), public :: orbit_equations_t
     type(harmonic_basis_t) :: basis
@@ -41,11 +41,11 @@ module nocdyn_orbit_equations
 
 contains
 
-  !> Samples that series up to a harmonic need, with room for those of laws.
+  !> Samples that series up to a harmonic need, with room for those of laws and for the stages of a step of the multipliers.
   pure integer function samples_of(harmonics)
     integer, intent(in) :: harmonics
 
-    samples_of = 8 * ((4 * harmonics + 2 + 7) / 8)
+    samples_of = max(16, 8 * ((4 * harmonics + 2 + 7) / 8))
   end function samples_of
 
   !> Orders the unknowns of the machine.
@@ -201,6 +201,7 @@ contains
     real(wp), intent(out) :: r(:)   !! [unknowns]
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: harmonics(self%basis%length, self%nodes), series(self%basis%length, self%nodes)
+    real(wp) :: energy
     integer :: i, n, shared
 
     call self%set_value(orbit, error)
@@ -224,7 +225,13 @@ contains
     end do
     i = self%nodes * self%basis%length
     r(i + 1:i + size(self%border)) = series(1, self%free(self%border))
-    if (allocated(self%travel)) r(size(r) - 1) = amplitude(self%travel, series(:, :self%freedoms)) - orbit%value
+    if (self%is_over_energy) then
+      call self%conservative_energy(self%origin, begin_of(series(:, :self%freedoms), self%free), energy, error)
+      if (allocated(error)) return
+      r(size(r) - 1) = (energy - orbit%value) / self%bounds(2)
+    else if (allocated(self%travel)) then
+      r(size(r) - 1) = amplitude(self%travel, series(:, :self%freedoms)) - orbit%value
+    end if
     if (self%rate_is_unknown) then
       shared = min(size(self%phase, 1), self%basis%length)
       r(size(r)) = sum(self%phase(:shared, :) * series(:shared, :))
@@ -271,7 +278,19 @@ contains
     do k = 1, size(self%border)
       self%system%below(k, self%first_unknown(self%free(self%border(k)))) = 1.0_wp
     end do
-    if (allocated(self%travel)) then
+    if (self%is_over_energy) then
+      other = orbit
+      call self%sample(other, self%basis, self%t, self%y)
+      call self%machine%rates(self%t, self%y, self%rates, error)
+      if (allocated(error)) return
+      associate (slopes => self%energy_slopes(self%rates(1, :self%freedoms)) / self%bounds(2))
+        do n = 1, self%freedoms
+          k = self%first_unknown(n)
+          if (.not. any(n == self%free)) self%system%below(self%scalars() - 1, k) = slopes(n)
+          self%system%below(self%scalars() - 1, k + 1:k + self%basis%length - 2:2) = slopes(n)
+        end do
+      end associate
+    else if (allocated(self%travel)) then
       do n = 1, self%freedoms
         do k = 1, self%basis%harmonics, 2
           self%system%below(self%scalars() - 1, self%first_unknown(n) + 2 * k - 1) = self%travel(n)
@@ -285,6 +304,17 @@ contains
       self%system%below(self%scalars(), k:k + shared - 1) = self%phase(:shared, n)
     end do
   end subroutine fill_system
+
+  !> Angles of the coordinates at the begin of the period, rigid motions without their mean [rad].
+  pure function begin_of(series, free) result(angles)
+    real(wp), intent(in) :: series(:, :)   !! [length, coordinates]
+    integer, intent(in) :: free(:)         !! coordinate of each rigid motion
+    real(wp) :: angles(size(series, 2))
+
+    angles = series(1, :)
+    angles(free) = 0.0_wp
+    angles = angles + sum(series(2::2, :), dim=1)
+  end function begin_of
 
   !> Half the travel of an angle from the begin to the middle of the period: its cosines of odd harmonics.
   pure real(wp) function amplitude(travel, series)

@@ -30,6 +30,8 @@ module nocdyn_periodic_machine
     logical :: rate_is_unknown = .false.             !! whether the machine itself finds w
     real(wp), allocatable :: travel(:)               !! of a conservative machine, where an amplitude is the parameter: the angle
                                                      !! that has it, by the coordinates; not allocated: none
+    real(wp), allocatable :: origin(:)               !! angles of the coordinates of a conservative machine in balance [rad]
+    logical :: is_over_energy = .false.              !! whether its energy is the parameter, in place of the amplitude
     integer :: subharmonic = 1
     real(wp) :: bounds(2) = 0.0_wp                   !! lowest and highest value of the parameter
     integer :: held = 0                              !! body whose mean speed is the parameter; 0: none
@@ -40,6 +42,7 @@ module nocdyn_periodic_machine
     real(wp), allocatable :: floating_speed(:)       !! speeds of the rigid motions that no torque acts on, else any [rad/s]
     integer, allocatable :: border(:)                !! rigid motions whose speed, or holding torque, is unknown
   contains
+    procedure :: conservative_energy, energy_slopes
     procedure :: set_value, find_rate, take_border, put_border, holding_acceleration, repeats
   end type periodic_machine_t
 
@@ -144,6 +147,70 @@ contains
       end do
     end associate
   end function holding_acceleration
+
+  !> The energy of a conservative machine at rest at some angles, above the one at other angles [J]: the work against its torques
+  !> along a straight line, by Gauss's formula of four points in as many parts as samples allow.
+  subroutine conservative_energy(self, from, angles, energy, error)
+    class(periodic_machine_t), intent(inout) :: self
+    real(wp), intent(in) :: from(:), angles(:)   !! of the coordinates [rad]
+    real(wp), intent(out) :: energy
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: points = 4
+    real(wp), parameter :: near = sqrt(3.0_wp / 7.0_wp - 2.0_wp / 7.0_wp * sqrt(1.2_wp)), &
+                           far = sqrt(3.0_wp / 7.0_wp + 2.0_wp / 7.0_wp * sqrt(1.2_wp))
+    real(wp), parameter :: place(points) = [-far, -near, near, far]
+    real(wp), parameter :: large = (18.0_wp + sqrt(30.0_wp)) / 72.0_wp, small = (18.0_wp - sqrt(30.0_wp)) / 72.0_wp
+    real(wp), parameter :: share(points) = [small, large, large, small]
+    real(wp) :: t(self%machine%samples)
+    real(wp), dimension(self%machine%samples, self%machine%states) :: rates, y
+    integer :: i, k, parts
+
+    t = 0.0_wp
+    y = 0.0_wp
+    rates = 0.0_wp
+    parts = self%machine%samples / points
+    associate (f => self%machine%freedoms)
+      y(:, f + 1:2 * f) = spread(from, 1, size(t))
+      do i = 1, parts
+        do k = 1, points
+          y(points * (i - 1) + k, f + 1:2 * f) = from + (i - 0.5_wp + 0.5_wp * place(k)) / parts * (angles - from)
+        end do
+      end do
+      call self%machine%rates(t, y, rates, error)
+      if (allocated(error)) return
+      energy = 0.0_wp
+      do i = 1, parts
+        do k = 1, points
+          energy = energy + share(k) / parts * &
+                   dot_product(self%energy_slopes(rates(points * (i - 1) + k, :f)), angles - from)
+        end do
+      end do
+    end associate
+  end subroutine conservative_energy
+
+  !> Derivatives of this energy by the angles of the coordinates, from their accelerations [N m].
+  pure function energy_slopes(self, acceleration) result(slopes)
+    class(periodic_machine_t), intent(in) :: self
+    real(wp), intent(in) :: acceleration(:)   !! [rad/s2]
+    real(wp) :: slopes(size(acceleration))
+    real(wp) :: rate
+    integer :: b, k
+
+    slopes = 0.0_wp
+    associate (machine => self%machine%formulation%machine, coordinates => self%machine%formulation%machine%coordinates)
+      do b = 1, machine%bodies
+        rate = 0.0_wp
+        do k = coordinates%first(b), coordinates%first(b + 1) - 1
+          rate = rate + coordinates%ratio(1, k) * acceleration(coordinates%coordinate(k))
+        end do
+        do k = coordinates%first(b), coordinates%first(b + 1) - 1
+          associate (slope => slopes(coordinates%coordinate(k)))
+            slope = slope - coordinates%ratio(1, k) * machine%inertia(1, b) * rate
+          end associate
+        end do
+      end do
+    end associate
+  end function energy_slopes
 
   !> Whether the laws repeat themselves some periods later, at the same motion.
   subroutine repeats(self, motion, turns, is_periodic, error)

@@ -2,6 +2,7 @@
 module nocdyn_orbit_backbone_words
   use nocdyn_kinds, only: wp
   use nocdyn_orbit_analysis, only: orbit_analysis_t
+  use nocdyn_periodic_machine, only: orbit_t
   use nocdyn_table_text, only: cell
   use nocdyn_text, only: rounded_text, to_text
   use nocdyn_text_buffer, only: text_buffer_t
@@ -29,12 +30,11 @@ contains
         associate (change => (last%rate - first%rate) * (last%value - first%value))
           if (abs(last%rate - first%rate) > unchanged * first%rate) word = merge(' (hardening)', ' (softening)', change > 0)
         end associate
-        call report%append_line('  mode ' // to_text(analysis%settings%mode) // ': ' // &
-          rounded_text(first%rate / turn, digits) // ' Hz at ' // rounded_text(first%value, digits) // ' rad, ' // &
-          rounded_text(last%rate / turn, digits) // ' Hz at ' // rounded_text(last%value, digits) // ' rad' // word)
+        call report%append_line('  mode ' // to_text(analysis%settings%mode) // ': ' // at(first) // ', ' // at(last) // word)
       end associate
-      call report%append_line('  ' // cell('amplitude') // cell('backbone') // cell('quasi-linear') // cell('linear'))
-      call report%append_line('  ' // cell('rad') // cell('Hz') // cell('Hz') // cell('Hz'))
+      call report%append_line('  ' // cell(trim(merge('energy   ', 'amplitude', analysis%settings%is_over_energy))) // &
+                              cell('backbone') // cell('quasi-linear') // cell('linear'))
+      call report%append_line('  ' // cell(analysis%unit) // cell('Hz') // cell('Hz') // cell('Hz'))
       rows = min(most_rows, size(points))
       do i = 1, rows
         k = 1 + nint(real((i - 1) * (size(points) - 1), wp) / max(1, rows - 1))
@@ -42,6 +42,16 @@ contains
                                 cell(backbone%quasi_linear_rate(k) / turn) // cell(backbone%linear_rate / turn))
       end do
     end associate
+
+  contains
+
+    function at(orbit) result(text)
+      type(orbit_t), intent(in) :: orbit
+      character(len=:), allocatable :: text
+
+      text = rounded_text(orbit%rate / turn, digits) // ' Hz at ' // rounded_text(orbit%value, digits) // ' ' // analysis%unit
+    end function at
+
   end subroutine append_backbone
 
 end module nocdyn_orbit_backbone_words

@@ -7,6 +7,7 @@ module nocdyn_orbit_measures
   use nocdyn_machine, only: machine_t
   use nocdyn_moment_forms, only: moment_form_t
   use nocdyn_orbit_analysis, only: analyse_orbits, orbit_analysis_t
+  use nocdyn_orbit_couplings, only: describe_point, list_couplings
   use nocdyn_orbit_damages, only: orbit_damage_t, read_damages
   use nocdyn_orbit_log, only: orbit_log_t
   use nocdyn_orbit_motions, only: find_motions, motion_t
@@ -85,8 +86,10 @@ contains
     call find_reference(input, machine, self)
     call leave_out_samples(self)
     allocate (self%measures(self%branch%count))
+    call list_couplings(self%problem%periodic%machine%formulation%machine, self%branch%count, self%couplings)
     do i = 1, size(self%measures)
       call self%measure(self%branch%points(i), self%measures(i), error)
+      if (.not. allocated(error)) call describe_point(self%problem, self%branch%points(i), i, self%couplings, error)
       if (allocated(error)) return
     end do
     call find_chosen(self, error)

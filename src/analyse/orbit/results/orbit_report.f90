@@ -58,6 +58,7 @@ contains
       call json%close_list()
     end associate
     call put_peaks(json, analysis)
+    call put_couplings(json, analysis)
     if (analysis%settings%mode > 0) call put_backbone(json, analysis)
     call put_damages(json, analysis)
     call put_motions(json, analysis)
@@ -108,6 +109,27 @@ contains
     end associate
   end subroutine put_point
 
+  !> The describing functions of the couplings whose stiffness changes along the branches, at each point.
+  subroutine put_couplings(json, analysis)
+    type(json_t), intent(inout) :: json
+    type(measured_orbits_t), intent(in) :: analysis
+    integer :: i
+
+    call json%open_list('couplings')
+    do i = 1, size(analysis%couplings%names)
+      if (.not. analysis%couplings%changes(i)) cycle
+      associate (equivalents => analysis%couplings%equivalents(i, :))
+        call json%open()
+        call json%put('coupling', analysis%couplings%names(i)%text)
+        call json%put('twist', equivalents%twist)
+        call json%put('equivalent_stiffness', equivalents%stiffness)
+        call json%put('equivalent_damping', equivalents%damping)
+        call json%close()
+      end associate
+    end do
+    call json%close_list()
+  end subroutine put_couplings
+
   !> The frequencies of a mode over its amplitude.
   subroutine put_backbone(json, analysis)
     type(json_t), intent(inout) :: json
@@ -117,7 +139,8 @@ contains
       call json%open('backbone')
       call json%put('mode', analysis%settings%mode)
       call json%put('linear_frequency_hz', analysis%backbone%linear_rate / turn)
-      call json%put('amplitude', orbits%value)
+      if (.not. analysis%settings%is_over_energy) call json%put('amplitude', orbits%value)
+      call json%put('energy', analysis%backbone%energy)
       call json%put('frequency_hz', orbits%rate / turn)
       call json%put('quasi_linear_frequency_hz', analysis%backbone%quasi_linear_rate / turn)
       call json%put('largest_damping', maxval(abs(orbits%damping)))

@@ -79,6 +79,7 @@ contains
     labels = [labels, strings([character(len=12) :: 'rate [rad/s]', 'special', 'harmonics', 'error'])]
     if (analysis%settings%mode > 0) labels = [labels, strings([character(len=27) :: 'frequency [Hz]', &
                                                               'quasi_linear_frequency [Hz]'])]
+    if (analysis%settings%mode > 0 .and. .not. analysis%settings%is_over_energy) call append(labels, 'energy [J]')
     if (analysis%settings%has_stability) call append(labels, 'stable')
     if (analysis%body_name /= '') call append(labels, 'torque_' // analysis%body_name // ' [N m]')
     do k = 1, shown
@@ -90,7 +91,10 @@ contains
       associate (point => analysis%branch%points(i), ranges => analysis%measures(i)%ranges(:size(analysis%signals)))
         row = [real(point%branch, wp), point%orbit%value, point%orbit%rate, number_of(point), real(point%harmonics, wp), &
                point%error]
-        if (analysis%settings%mode > 0) row = [row, point%orbit%rate / turn, analysis%backbone%quasi_linear_rate(i) / turn]
+        if (analysis%settings%mode > 0) then
+          row = [row, point%orbit%rate / turn, analysis%backbone%quasi_linear_rate(i) / turn]
+          if (.not. analysis%settings%is_over_energy) row = [row, analysis%backbone%energy(i)]
+        end if
         if (analysis%settings%has_stability) row = [row, merge(1.0_wp, 0.0_wp, point%is_stable())]
         if (analysis%body_name /= '') row = [row, point%orbit%torque]
         row = [row, (real(point%multipliers(k), wp), aimag(point%multipliers(k)), k=1, shown)]
