@@ -311,8 +311,7 @@ def test_stiff_parts_change_no_multipliers(nocdyn):
     text = DUFFING + OVER.format(0.8, 0.81, "count = 2")
     stiff = text.replace(
         "&run",
-        "&body name = 'tip' inertia = 1e-6 /\n"
-        "&coupling name = 'tip' bodies = 'mass', 'tip' stiffness = 1e4 damping = {} /\n&run",
+        "&body name = 'tip' inertia = 1e-6 /\n&coupling name = 'tip' bodies = 'mass', 'tip' stiffness = 1e4 damping = {} /\n&run",
     )
     soft, _ = branch(nocdyn, text)
     values, _ = branch(nocdyn, stiff.format(1.0))

@@ -155,16 +155,15 @@ module nocdyn_schema_response
       'in place of a number: the body whose mean speed a mean torque on it holds'), &
     key_rule_t('orbit', 'speed', a_number, 2, 'rad/s', unset, not_zero, 'its first and its last mean speed'), &
     key_rule_t('orbit', 'mode', an_integer, 1, '', unset, from_1, &
-      'in place of both: the mode of the machine without damping and excitation whose backbone curve is found'), &
+      'in place of both: the mode of the conservative machine whose backbone curve is found'), &
     key_rule_t('orbit', 'amplitude', a_number, 2, 'rad', unset, positive, &
       'first and last amplitude of its backbone, of the body that moves most in the mode'), &
     key_rule_t('orbit', 'energy', a_number, 2, 'J', unset, positive, &
       'in place of the amplitude: first and last energy, above the one in balance'), &
     key_rule_t('orbit', 'method', a_word, 1, '', unset, orbit_methods, &
-      'harmonic_balance: in harmonics, for smooth laws; shooting: by integration over a period, with events; ' // &
-      'found by the machine if not given'), &
+      'in harmonics, for smooth laws, or by integration with events; found by the laws if not given'), &
     key_rule_t('orbit', 'start', a_text, 1, '', "'low'", anything, &
-      "the first motion: 'low' (near the steady state), 'high', 'settled_run', or a table such as trajectory.csv"), &
+      "the first motion: 'low', 'high', 'settled_run', or a table such as trajectory.csv"), &
     key_rule_t('orbit', 'starts', an_integer, 1, '', unset, from_1, &
       'number of runs from scattered states that look for isolated branches'), &
     key_rule_t('orbit', 'subharmonic', an_integer, 1, '', '1', subharmonics, &

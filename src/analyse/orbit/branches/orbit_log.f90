@@ -22,7 +22,7 @@ module nocdyn_orbit_log
     integer(int64), private :: next = 0, held = 0       !! the entry that is read next, and the end of those there [bytes]
   contains
     procedure :: open => open_log
-    procedure :: put, read_next, is_stopped
+    procedure :: put, read_next, is_stopped, remove
   end type orbit_log_t
 
 contains
@@ -105,6 +105,13 @@ contains
     bytes = self%file%buffer(frame_bytes + 1:frame_bytes + length)
     if (goes_on) self%next = self%next + frame_bytes + length
   end subroutine read_next
+
+  !> Removes the journal of an analysis that has failed: it would fail again.
+  subroutine remove(self)
+    class(orbit_log_t), intent(inout) :: self
+
+    call self%file%remove()
+  end subroutine remove
 
   !> Whether the user has interrupted the analysis.
   logical function is_stopped(self)

@@ -49,7 +49,8 @@ module nocdyn_orbit_problem
     procedure(find_fault), deferred :: find_fault
     procedure(measure), deferred :: measure
     procedure(resolution), deferred :: resolution
-    procedure :: adapt, least_size, recast, range, restore, sample, kind_of, keep_phase, meets_other
+    procedure :: adapt, least_size, recast, restore, sample, kind_of, keep_phase, meets_other
+    procedure :: range => parameter_range
   end type orbit_problem_t
 
   abstract interface
@@ -249,11 +250,11 @@ contains
   end function meets_other
 
   !> The width of the range of the parameter.
-  pure real(wp) function range(self)
+  pure real(wp) function parameter_range(self)
     class(orbit_problem_t), intent(in) :: self
 
-    range = self%periodic%bounds(2) - self%periodic%bounds(1)
-  end function range
+    parameter_range = self%periodic%bounds(2) - self%periodic%bounds(1)
+  end function parameter_range
 
   !> The size of a change.
   pure real(wp) function measured(change, weights)

@@ -46,7 +46,9 @@ contains
     end if
     allocate (self%log)
     call self%log%open(input, options%journal, options%resumes, error)
-    if (.not. allocated(error)) call measure_orbits(input, machine, self%analysis, error, self%log)
+    if (allocated(error)) return
+    call measure_orbits(input, machine, self%analysis, error, self%log)
+    if (allocated(error)) call self%log%remove()
     if (.not. allocated(error)) self%is_unfinished = self%analysis%is_unfinished
   end subroutine solve
 

@@ -296,8 +296,9 @@ contains
     call find_parts(analysis%branch%points(:analysis%branch%count), parts)
     parts = pack(parts, parts%is_stable)
     associate (points => analysis%branch%points, settings => analysis%settings)
-      low = [(min(points(parts(i)%first)%orbit%value, points(parts(i)%last)%orbit%value), i=1, size(parts))]
-      high = [(max(points(parts(i)%first)%orbit%value, points(parts(i)%last)%orbit%value), i=1, size(parts))]
+      allocate (low(size(parts)), high(size(parts)))
+      low(:) = [(min(points(parts(i)%first)%orbit%value, points(parts(i)%last)%orbit%value), i=1, size(parts))]
+      high(:) = [(max(points(parts(i)%first)%orbit%value, points(parts(i)%last)%orbit%value), i=1, size(parts))]
       from = min(settings%from, settings%to)
       to = max(settings%from, settings%to)
     end associate

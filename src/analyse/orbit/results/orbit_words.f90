@@ -157,7 +157,7 @@ contains
     integer, allocatable :: told(:)
 
     words = ''
-    told = told_signals(analysis)
+    allocate (told, source=told_signals(analysis))
     if (.not. any(analysis%jump == number) .or. size(told) == 0) return
     associate (signal => analysis%signals(told(1)))
       words = ', half range of ' // signal%name // ' from ' // &
@@ -231,7 +231,7 @@ contains
     integer, allocatable :: told(:)
     integer :: at, i, width
 
-    told = told_signals(analysis)
+    allocate (told, source=told_signals(analysis))
     width = 0
     do i = 1, size(told)
       width = max(width, text_width(with_unit(analysis%signals(told(i))%name, analysis%signals(told(i))%unit)))

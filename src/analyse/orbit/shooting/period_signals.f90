@@ -35,7 +35,7 @@ contains
     type(signal_range_t), intent(out) :: ranges(:)
     type(error_t), allocatable, intent(out) :: error
     type(signal_observer_t) :: observer
-    type(signal_source_t), allocatable :: sources(:)
+    type(signal_source_t) :: sources(size(signals))
     real(wp) :: period, y(periodic%machine%states)
     integer :: i
 
