@@ -157,7 +157,7 @@ contains
     complex(wp), intent(out) :: values(:)    !! [n]
     logical, intent(out) :: has_failed       !! LAPACK does not converge, or an element is not finite
     real(wp), allocatable :: a(:, :), imaginary(:), real_part(:), work(:)
-    real(wp) :: none(1, 1), room(1)
+    real(wp) :: left(1, 1), right(1, 1), room(1)
     integer :: info, n
 
     n = size(matrix, 1)
@@ -166,9 +166,9 @@ contains
     if (has_failed .or. n == 0) return
     allocate (a, source=matrix)
     allocate (real_part(n), imaginary(n), source=0.0_wp)
-    call dgeev('N', 'N', n, a, n, real_part, imaginary, none, 1, none, 1, room, -1, info)
+    call dgeev('N', 'N', n, a, n, real_part, imaginary, left, 1, right, 1, room, -1, info)
     allocate (work(int(room(1))))
-    call dgeev('N', 'N', n, a, n, real_part, imaginary, none, 1, none, 1, work, size(work), info)
+    call dgeev('N', 'N', n, a, n, real_part, imaginary, left, 1, right, 1, work, size(work), info)
     has_failed = info /= 0
     values = cmplx(real_part, imaginary, wp)
   end subroutine eigenvalues
