@@ -77,7 +77,7 @@ contains
     integer, allocatable :: near(:)
     integer :: i, j
 
-    near = pack(list(n)%node(:list(n)%count), is_left(list(n)%node(:list(n)%count)))
+    allocate (near, source=pack(list(n)%node(:list(n)%count), is_left(list(n)%node(:list(n)%count))))
     do j = 1, size(near)
       do i = 1, size(near)
         call join(self, list, near(i), near(j))

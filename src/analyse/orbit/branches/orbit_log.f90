@@ -20,6 +20,7 @@ module nocdyn_orbit_log
     integer :: walks = 0                                !! branches begun so far
     type(log_file_t), private :: file
     integer(int64), private :: next = 0, held = 0       !! the entry that is read next, and the end of those there [bytes]
+    character(len=:), allocatable, private :: folder, head   !! where the file is made with the first entry; its first one
   contains
     procedure :: open => open_log
     procedure :: put, read_next, is_stopped, remove
@@ -27,28 +28,24 @@ module nocdyn_orbit_log
 
 contains
 
-  !> Opens the journal of a folder to go on, or creates it.
+  !> Opens the journal of a folder to go on. A new one is made with its first entry: what fails at once leaves nothing.
   subroutine open_log(self, input, folder, resumes, error)
     class(orbit_log_t), intent(inout) :: self
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: folder             !! made if it does not exist
     logical, intent(in) :: resumes                     !! whether a journal that is there is welcome
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: head
     integer(int64) :: bytes
     logical :: is_there
 
-    head = version // ' ' // compiler_text // new_line('a') // input_text(input)
+    self%folder = folder
+    self%head = version // ' ' // compiler_text // new_line('a') // input_text(input)
     self%file%kind = 'orbit'
     inquire (file=folder // '/' // journal_name, exist=is_there, size=bytes)
-    if (.not. (is_there .and. bytes > 0)) then
-      call self%file%create(folder, journal_name, error)
-      if (.not. allocated(error)) call self%file%write(head_tag, head, error)
-      self%next = self%file%end
-      self%held = self%file%end
-    else if (resumes) then
+    if (.not. (is_there .and. bytes > 0)) return
+    if (resumes) then
       call self%file%open(folder, journal_name, error)
-      if (.not. allocated(error)) call read_entries(self, head, error)
+      if (.not. allocated(error)) call read_entries(self, error)
     else
       call raise(error, exit_input, shown_path(folder // '/' // journal_name) // ' holds the motions of an unfinished ' // &
                  'analysis; continue it with --resume, or remove it')
@@ -56,15 +53,14 @@ contains
   end subroutine open_log
 
   !> Checks the head and finds the end of the whole entries.
-  subroutine read_entries(self, head, error)
+  subroutine read_entries(self, error)
     type(orbit_log_t), intent(inout) :: self
-    character(len=*), intent(in) :: head
     type(error_t), allocatable, intent(out) :: error
     integer :: length
     logical :: is_good, is_there
 
     call self%file%read(self%file%end, head_tag, length, is_there, is_good)
-    if (is_good) is_good = self%file%buffer(frame_bytes + 1:frame_bytes + length) == head
+    if (is_good) is_good = self%file%buffer(frame_bytes + 1:frame_bytes + length) == self%head
     if (.not. is_good) then
       call raise(error, exit_input, shown_path(self%file%path) // ' is of another input or another nocdyn; ' // &
                  'continue with those, or remove it')
@@ -87,6 +83,11 @@ contains
     character(len=*), intent(in) :: bytes
     type(error_t), allocatable, intent(out) :: error
 
+    if (.not. self%file%is_open()) then
+      call self%file%create(self%folder, journal_name, error)
+      if (.not. allocated(error)) call self%file%write(head_tag, self%head, error)
+      if (allocated(error)) return
+    end if
     call self%file%write(entry_tag, bytes, error)
   end subroutine put
 
@@ -110,7 +111,7 @@ contains
   subroutine remove(self)
     class(orbit_log_t), intent(inout) :: self
 
-    call self%file%remove()
+    if (self%file%is_open()) call self%file%remove()
   end subroutine remove
 
   !> Whether the user has interrupted the analysis.
