@@ -118,8 +118,8 @@ contains
     call add_command(commands, 'orbit', 'FILE...', '--out --set --case --strict --resume --quiet', &
       'periodic motions of nonlinear machines: folds, jumps, stability', &
       'Follows by &orbit the periodic motions of a machine over a number of its input or over the mean speed of a' // nl // &
-      'body, by harmonic balance, through folds: where motions jump, where they are unstable, and the half ranges' // nl // &
-      'of all signals. Writes orbit.csv and orbit.json.' // nl // nl // &
+      'body, by harmonic balance or shooting: where motions jump, where they are unstable, the half ranges of all' // nl // &
+      'signals; also limit cycles and backbone curves. Writes orbit.csv and orbit.json.' // nl // nl // &
       '  --out DIR          write to DIR, with several files to DIR/<name of the file>;' // nl // &
       '                     default: &output directory, else results/<name of the file>' // nl // &
       '  --set PATH=VALUE   override a key: orbit.count=101' // nl // &
