@@ -15,7 +15,7 @@ MACHINE = """\
 &run t_end = 10.0 /
 &orbit over = 'excitation.shaker.frequency' range = 0.8, 1.4 count = 401 /
 """
-FILES = ["orbit.csv", "orbit.json"]
+FILES = ["orbit.csv", "orbit.json", "orbit_columns.json"]
 
 
 def whole(nocdyn, text):

@@ -43,7 +43,7 @@ contains
     allocate (self%equivalents(size(self%elements), points))
   end subroutine list_couplings
 
-  !> The equivalents on a motion whose signals have just been measured.
+  !> The equivalents on a motion whose signals have just been measured; none without harmonics.
   subroutine describe_point(problem, point, number, self, error)
     class(orbit_problem_t), intent(inout) :: problem
     type(orbit_point_t), intent(inout) :: point
@@ -51,6 +51,7 @@ contains
     type(orbit_couplings_t), intent(inout) :: self
     type(error_t), allocatable, intent(out) :: error
 
+    if (point%harmonics == 0) return   ! a steady state, or a motion by shooting
     select type (problem)
     type is (harmonic_problem_t)
       call describe_couplings(problem%finer, point%orbit, self%elements, self%equivalents(:, number), error)
