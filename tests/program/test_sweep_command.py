@@ -381,7 +381,7 @@ def test_a_merge_of_no_folder_is_refused_with_code_3(nocdyn, discs, operand, com
             ["sweep", "discs.nml", "--csv", "--shard", "1/2"],
             "--csv and --shard: a part of a sweep has no table; nocdyn merge DIR --csv",
         ),
-        (["run", "discs.nml", "--resume"], "--resume is an option of nocdyn sweep"),
+        (["run", "discs.nml", "--resume"], "--resume is an option of nocdyn orbit and sweep"),
         (["run", "discs.nml", "--csv"], "--csv is an option of nocdyn sweep and merge"),
         (["sweep", "plain.nml"], "plain.nml: there is no &sweep; 'nocdyn help input sweep' shows one"),
         (["sweep", "discs.nml", "--set", "run.formulation=cubist"], "run.formulation"),

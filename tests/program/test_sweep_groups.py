@@ -50,7 +50,7 @@ def test_a_new_input_is_an_ordinary_machine_and_explains_sweeps(nocdyn):
             ["  design = 'latin': ", "    samples                whole number, 1 to 2e+09               required", "'list'"],
         ),
         ("vary", ["    low                    number, any value                      required by 'uniform'", "'lognormal'"]),
-        ("record", ["  statistic = 'settling_time': ", "quantity, fatigue, mode and response need statistic."]),
+        ("record", ["  statistic = 'settling_time': ", "quantity, fatigue, mode, response and orbit need statistic."]),
     ],
 )
 def test_help_explains_the_groups(nocdyn, group, parts):

@@ -26,12 +26,12 @@ def refusal(nocdyn, **groups):
         ({"vary": ""}, "m.nml:5: &sweep: design = 'random' has nothing to vary; needed: a &vary"),
         (
             {"record": ""},
-            "m.nml:5: &sweep: no number of the variants is kept; needed: a &record with quantity, fatigue, mode, response or "
-            "path",
+            "m.nml:5: &sweep: no number of the variants is kept; needed: a &record with quantity, fatigue, mode, response, "
+            "orbit or path",
         ),
         (
             {"record": "&record /"},
-            "m.nml:7: &record: there is nothing to record; needed: quantity, fatigue, mode, response, path or trajectories",
+            "m.nml:7: &record: there is nothing to record; needed: quantity, fatigue, mode, response, orbit, path or trajectories",
         ),
         (
             {"vary": "&vary target = 'load.drag.viscus' low = 0 high = 1 /\n"},
