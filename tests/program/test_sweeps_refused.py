@@ -31,7 +31,8 @@ def refusal(nocdyn, **groups):
         ),
         (
             {"record": "&record /"},
-            "m.nml:7: &record: there is nothing to record; needed: quantity, fatigue, mode, response, orbit, path or trajectories",
+            "m.nml:7: &record: there is nothing to record; needed: quantity, fatigue, mode, response, orbit, path or "
+            "trajectories",
         ),
         (
             {"vary": "&vary target = 'load.drag.viscus' low = 0 high = 1 /\n"},
