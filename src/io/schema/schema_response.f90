@@ -175,7 +175,7 @@ module nocdyn_schema_response
     key_rule_t('orbit', 'count', an_integer, 1, '', unset, speed_counts, &
       'number of values at even distances that have points, beside those that the branch needs'), &
     key_rule_t('orbit', 'stability', a_flag, 1, '', unset, anything, &
-      'whether multipliers are found; if not given, of up to 200 states without stiff undamped parts'), &
+      'whether multipliers are found; default: of up to 200 states without stiff undamped parts'), &
     key_rule_t('orbit', 'switch_branches', a_flag, 1, '', '.false.', anything, &
       'whether branches that begin at period doublings and branch points are followed too'), &
     key_rule_t('orbit', 'most_points', an_integer, 1, '', '2000', speed_counts, 'points of a branch at most'), &

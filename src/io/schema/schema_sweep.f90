@@ -41,7 +41,7 @@ module nocdyn_schema_sweep
     kind_rule_t('record', 'damping_ratio', 'of mode'), &
     kind_rule_t('record', 'crossing',      'of mode: speed at which order meets it, in the speeds of &response'), &
     kind_rule_t('record', 'crossing_margin', 'of mode: distance of that speed to operation, as a share'), &
-    kind_rule_t('record', 'peak', 'of response: amplitude of the order or half range of all; of orbit: half range'), &
+    kind_rule_t('record', 'peak', 'of response: amplitude of the order or half range of all; orbit: half range'), &
     kind_rule_t('record', 'peak_speed',    'of response: where the peak is'), &
     kind_rule_t('record', 'peak_frequency', 'of response over the frequency of a shaker: where the peak is'), &
     kind_rule_t('record', 'margin',        'of response: distance of the peak to the speeds in operation, as a share'), &
