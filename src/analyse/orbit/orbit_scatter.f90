@@ -215,23 +215,15 @@ contains
     type(branch_t) :: ahead, back
     type(orbit_settings_t) :: other
     type(error_t), allocatable :: error
-    integer :: i
 
     other = settings
     call follow_branch(problem, other, start, ahead, error)
     if (.not. ahead%is_closed) then
       other%ahead = -settings%ahead
       call follow_branch(problem, other, start, back, error)
-      do i = back%count, 2, -1
-        back%points(i)%direction = -back%points(i)%direction
-        back%points(i)%branch = number
-        call branch%add(back%points(i))
-      end do
+      call branch%add_reversed(back, 2, number)
     end if
-    do i = 1, ahead%count
-      ahead%points(i)%branch = number
-      call branch%add(ahead%points(i))
-    end do
+    call branch%add_branch(ahead, number)
   end subroutine follow_both_ways
 
 end module nocdyn_orbit_scatter

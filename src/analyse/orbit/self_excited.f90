@@ -61,7 +61,7 @@ contains
     type(branch_t) :: cycles
     type(walk_t) :: walk
     type(error_t), allocatable :: error
-    integer :: i, number
+    integer :: number
 
     number = 0
     call start_at_hopf(problem, steady, settings, branch%points(place), walk, error)
@@ -77,11 +77,8 @@ contains
       return
     end if
     if (number == 0) then
-      number = maxval(branch%points(:branch%count)%branch) + 1
-      do i = 1, cycles%count
-        cycles%points(i)%branch = number
-        call branch%add(cycles%points(i))
-      end do
+      number = branch%next_number()
+      call branch%add_branch(cycles, number)
       if (cycles%ending /= '') call append(notes, 'branch ' // to_text(number) // ' ends ' // cycles%ending)
     end if
     branch%points(place)%leads_to = number
@@ -101,7 +98,7 @@ contains
     complex(wp), allocatable :: values(:)
     real(wp), allocatable :: oscillation(:, :)
     real(wp) :: push(problem%periodic%machine%states), size_of_push
-    integer :: first, i
+    integer :: first
     logical :: is_cycle
 
     guess = branch%points(1)%orbit
@@ -132,10 +129,7 @@ contains
     call problem%keep_phase(guess)
     call follow_branch(problem, settings, guess, cycles, error)
     if (allocated(error)) return
-    do i = 1, cycles%count
-      cycles%points(i)%branch = 2
-      call branch%add(cycles%points(i))
-    end do
+    call branch%add_branch(cycles, 2)
     branch%ending = cycles%ending
   end subroutine follow_settled
 

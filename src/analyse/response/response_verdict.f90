@@ -20,7 +20,7 @@ module nocdyn_response_verdict
   implicit none (type, external)
   private
 
-  public :: find_response_verdict
+  public :: add_other_limits, find_response_verdict
 
 contains
 
@@ -39,7 +39,7 @@ contains
       call add_heat(input, analysis, i, verdict)
       call add_curve(input, analysis, i, verdict)
     end do
-    call add_other_limits(input, analysis, verdict)
+    call add_other_limits(input, 'response', analysis%limits%group, 'a response has no such quantity: nocdyn run has', verdict)
     call add_fatigue(analysis, verdict)
     call add_criticals(analysis, summary, verdict)
     call add_coverage('response', analysis%settings, analysis%unstable, verdict)
@@ -217,10 +217,12 @@ contains
     end associate
   end subroutine add_curve
 
-  !> The limits of quantities that no response has.
-  subroutine add_other_limits(input, analysis, verdict)
+  !> The limits of quantities that an analysis does not have.
+  subroutine add_other_limits(input, analysis, read, reason, verdict)
     type(input_t), intent(in) :: input
-    type(response_analysis_t), intent(in) :: analysis
+    character(len=*), intent(in) :: analysis   !! its name
+    integer, intent(in) :: read(:)             !! the groups &limit that it has read
+    character(len=*), intent(in) :: reason     !! why it does not compare with the others
     type(verdict_t), intent(inout) :: verdict
     type(verdict_line_t) :: line
     integer, allocatable :: groups(:)
@@ -229,14 +231,14 @@ contains
 
     allocate (groups, source=input%groups_named('limit'))
     do i = 1, size(groups)
-      if (any(analysis%limits%group == groups(i))) cycle
+      if (any(read == groups(i))) cycle
       kind = trim(limited_kind(input%groups(groups(i))))
       associate (group => input%groups(groups(i)))
-        line = new_verdict_line('response', kind // ' ' // quoted(group%text(kind)), group%text('quantity'), &
+        line = new_verdict_line(analysis, kind // ' ' // quoted(group%text(kind)), group%text('quantity'), &
                                 in_words(group%text('quantity')), input%place(groups(i), ''))
       end associate
       line%finding = is_not_assessed
-      line%reason = 'a response has no such quantity: nocdyn run has'
+      line%reason = reason
       call verdict%add(line)
     end do
   end subroutine add_other_limits

@@ -53,7 +53,7 @@ contains
     type(branch_t) :: found
     type(walk_t) :: walk
     real(wp), allocatable :: secant(:), x(:)
-    integer :: i, number
+    integer :: number
     logical :: is_found
 
     associate (points => branch%points(place - 1:place + 1))
@@ -78,11 +78,9 @@ contains
     if (.not. is_found) return
     call follow_walk(twice, walk, found, error)
     if (allocated(error)) return
-    number = maxval(branch%points(:branch%count)%branch) + 1
+    number = branch%next_number()
     branch%points(place)%leads_to = number
-    do i = 1, found%count
-      call add_point(found%points(i), number, branch)
-    end do
+    call branch%add_branch(found, number)
   end subroutine double_period
 
   !> Follows the other branch of a branch point to both sides, unless one that is known ends there.
@@ -125,15 +123,10 @@ contains
       if (allocated(error)) return
     end do
     if (sides(1)%count == 0) return
-    number = maxval(branch%points(:branch%count)%branch) + 1
+    number = branch%next_number()
     branch%points(place)%leads_to = number
-    do i = sides(2)%count, 1, -1
-      sides(2)%points(i)%direction = -sides(2)%points(i)%direction
-      call add_point(sides(2)%points(i), number, branch)
-    end do
-    do i = 1, sides(1)%count
-      call add_point(sides(1)%points(i), number, branch)
-    end do
+    call branch%add_reversed(sides(2), 1, number)
+    call branch%add_branch(sides(1), number)
   end subroutine leave_branch
 
   !> A motion a little off a point, along the second direction in which nothing resists, and the walk away from the point.
@@ -229,14 +222,5 @@ contains
       is_symmetric = is_symmetric .and. norm2(orbit%series(2 * k:2 * k + 1, :)) <= none * norm2(orbit%series(2:, :))
     end do
   end function is_symmetric
-
-  subroutine add_point(point, number, branch)
-    type(orbit_point_t), intent(in) :: point
-    integer, intent(in) :: number   !! of its branch
-    type(branch_t), intent(inout) :: branch
-
-    call branch%add(point)
-    branch%points(branch%count)%branch = number
-  end subroutine add_point
 
 end module nocdyn_branch_switching

@@ -20,7 +20,7 @@ module nocdyn_orbit_points
     logical :: is_back = .false.                   !! whether it ends where it meets the branch that it has left
     character(len=:), allocatable :: ending        !! why it ends where it does not leave the range, else ''
   contains
-    procedure :: add
+    procedure :: add, add_branch, add_reversed, next_number
   end type branch_t
 
   !> Where the continuation stands.
@@ -54,6 +54,43 @@ contains
     self%count = self%count + 1
     self%points(self%count) = point
   end subroutine add
+
+  !> Adds the points of another branch.
+  subroutine add_branch(self, other, number)
+    class(branch_t), intent(inout) :: self
+    type(branch_t), intent(in) :: other
+    integer, intent(in) :: number   !! which they get
+    integer :: i
+
+    do i = 1, other%count
+      call self%add(other%points(i))
+      self%points(self%count)%branch = number
+    end do
+  end subroutine add_branch
+
+  !> Adds the points of another branch from its last one back, with the direction in which they are passed then.
+  subroutine add_reversed(self, other, last, number)
+    class(branch_t), intent(inout) :: self
+    type(branch_t), intent(in) :: other
+    integer, intent(in) :: last     !! point of the other branch that is added last
+    integer, intent(in) :: number   !! which they get
+    integer :: i
+
+    do i = other%count, last, -1
+      call self%add(other%points(i))
+      associate (added => self%points(self%count))
+        added%branch = number
+        added%direction = -added%direction
+      end associate
+    end do
+  end subroutine add_reversed
+
+  !> The number of a branch that is not among the points.
+  pure integer function next_number(self)
+    class(branch_t), intent(in) :: self
+
+    next_number = maxval(self%points(:self%count)%branch) + 1
+  end function next_number
 
   !> Tangent, weights, orbit and error of a point that has just been corrected.
   subroutine complete_point(problem, walk, error)

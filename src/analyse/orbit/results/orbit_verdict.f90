@@ -6,12 +6,12 @@ module nocdyn_orbit_verdict
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_limit_groups, only: limited_kind
   use nocdyn_orbit_measures, only: comparisons, measured_orbits_t, of_half_range, of_harmonic, of_largest, orbit_measure_t
   use nocdyn_orbit_motions, only: settle_between
   use nocdyn_orbit_parts, only: find_parts, part_t
   use nocdyn_orbit_problem, only: orbit_point_t
   use nocdyn_response_limits, only: no_limit
+  use nocdyn_response_verdict, only: add_other_limits
   use nocdyn_text, only: quoted, to_text
   use nocdyn_verdicts, only: in_words, is_exceeded, is_not_assessed, new_damage_line, new_verdict_line, verdict_line_t, verdict_t
   implicit none (type, external)
@@ -30,6 +30,7 @@ contains
     type(input_t), intent(in) :: input
     type(measured_orbits_t), intent(inout) :: analysis
     type(verdict_t), intent(out) :: verdict
+    character(len=:), allocatable :: reason
     integer :: compared, i
 
     if (size(input%groups_named('limit')) + size(input%groups_named('fatigue')) == 0) return
@@ -39,7 +40,9 @@ contains
       end do
       call add_left_out(input, analysis, i, verdict)
     end do
-    call add_other_limits(input, analysis, verdict)
+    reason = 'a periodic motion has no such quantity'
+    if (analysis%settings%mode > 0) reason = 'a nonlinear mode is no motion of operation'
+    call add_other_limits(input, 'orbit', analysis%limits%group, reason, verdict)
     if (analysis%settings%mode > 0) return
     call add_damages(input, analysis, verdict)
     call add_gaps(analysis, verdict)
@@ -225,31 +228,6 @@ contains
     end subroutine add
 
   end subroutine add_left_out
-
-  !> The limits of quantities that are no signals of a motion.
-  subroutine add_other_limits(input, analysis, verdict)
-    type(input_t), intent(in) :: input
-    type(measured_orbits_t), intent(in) :: analysis
-    type(verdict_t), intent(inout) :: verdict
-    type(verdict_line_t) :: line
-    integer, allocatable :: groups(:)
-    character(len=:), allocatable :: kind
-    integer :: i
-
-    allocate (groups, source=input%groups_named('limit'))
-    do i = 1, size(groups)
-      if (any(analysis%limits%group == groups(i))) cycle
-      kind = trim(limited_kind(input%groups(groups(i))))
-      associate (group => input%groups(groups(i)))
-        line = new_verdict_line('orbit', kind // ' ' // quoted(group%text(kind)), group%text('quantity'), &
-                                in_words(group%text('quantity')), input%place(groups(i), ''))
-      end associate
-      line%finding = is_not_assessed
-      line%reason = 'a periodic motion has no such quantity'
-      if (analysis%settings%mode > 0) line%reason = 'a nonlinear mode is no motion of operation'
-      call verdict%add(line)
-    end do
-  end subroutine add_other_limits
 
   !> Means that leave no strength, and profiles of hours, which only a response adds up.
   subroutine add_damages(input, analysis, verdict)
