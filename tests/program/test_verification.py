@@ -59,7 +59,7 @@ def test_all_cases_pass(tmp_path):
     assert result["passes"] and len(result["cases"]) >= LEAST
     origins = [case["origin"] for case in result["cases"]]
     assert origins.count("closed form") + origins.count("published") >= LEAST_BY_HAND
-    assert len({case["feature"] for case in result["cases"]}) == 16
+    assert len({case["feature"] for case in result["cases"]}) == 17
     page = (tmp_path / "out/verification.html").read_text()
     assert f"All {len(origins)} cases pass." in page and result["installation"]["program"] in page
     text = page.replace("<wbr>", "")
