@@ -30,16 +30,17 @@ contains
     type(response_analysis_t), intent(in) :: analysis
     type(response_summary_t), intent(in) :: summary
     type(verdict_t), intent(out) :: verdict
-    integer :: i
+    integer :: groups(size(analysis%limits)), i
 
     do i = 1, size(analysis%limits)
+      groups(i) = analysis%limits(i)%group
       call add_continuous(input, analysis, summary, i, verdict)
       call add_transient(input, analysis, i, verdict)
       call add_peak(input, analysis, i, verdict)
       call add_heat(input, analysis, i, verdict)
       call add_curve(input, analysis, i, verdict)
     end do
-    call add_other_limits(input, 'response', analysis%limits%group, 'a response has no such quantity: nocdyn run has', verdict)
+    call add_other_limits(input, 'response', groups, 'a response has no such quantity: nocdyn run has', verdict)
     call add_fatigue(analysis, verdict)
     call add_criticals(analysis, summary, verdict)
     call add_coverage('response', analysis%settings, analysis%unstable, verdict)

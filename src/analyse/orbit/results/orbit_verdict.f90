@@ -32,9 +32,12 @@ contains
     type(verdict_t), intent(out) :: verdict
     character(len=:), allocatable :: reason
     integer :: compared, i
+    integer, allocatable :: groups(:)
 
     if (size(input%groups_named('limit')) + size(input%groups_named('fatigue')) == 0) return
+    allocate (groups(size(analysis%limits)))
     do i = 1, size(analysis%limits)
+      groups(i) = analysis%limits(i)%group
       do compared = 1, comparisons
         call add_limit(input, analysis, i, compared, verdict)
       end do
@@ -42,7 +45,7 @@ contains
     end do
     reason = 'a periodic motion has no such quantity'
     if (analysis%settings%mode > 0) reason = 'a nonlinear mode is no motion of operation'
-    call add_other_limits(input, 'orbit', analysis%limits%group, reason, verdict)
+    call add_other_limits(input, 'orbit', groups, reason, verdict)
     if (analysis%settings%mode > 0) return
     call add_damages(input, analysis, verdict)
     call add_gaps(analysis, verdict)
