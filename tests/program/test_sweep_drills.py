@@ -69,11 +69,16 @@ def assert_reuses(output, variants, note=""):
     assert reused and 0 < int(reused[1]) < variants, output
 
 
+def complaints(errors):
+    """What standard error says besides how far a slow sweep is."""
+    return [line for line in errors.splitlines() if not re.fullmatch(r"discs\.nml: \d+ of \d+ variants, .* left", line)]
+
+
 def finish_on_ranks(nocdyn, discs, whole):
     """Goes on with three ranks; the output."""
     process = start_ranks(nocdyn, "sweep", discs, "--out", "out", "--resume", *LONG)
     output, complaint = process.communicate(timeout=60)
-    assert (process.returncode, complaint) == (0, "")
+    assert (process.returncode, complaints(complaint)) == (0, [])
     assert_ends_as(nocdyn, whole)
     return output
 
@@ -85,7 +90,7 @@ def finish_shards(nocdyn, discs, whole):
     )
     merged = nocdyn("merge", "out")
     for outcome in (first, *others, merged):
-        assert (outcome.returncode, outcome.stderr) == (0, "")
+        assert (outcome.returncode, complaints(outcome.stderr)) == (0, [])
     for number in range(1, SHARDS + 1):
         journal(nocdyn, f"sweep.{number}-of-{SHARDS}.journal").unlink(missing_ok=True)
     assert_ends_as(nocdyn, whole)
@@ -135,7 +140,7 @@ def test_a_full_disk_stops_a_shard_that_can_be_gone_on_with(nocdyn, discs, whole
     outcome = nocdyn("sweep", discs, "--out", "out", *shard_words(1), *LONG, preexec_fn=limited_to(20000))
     assert (outcome.returncode, outcome.stdout) == (3, "")
     remedy = "when it can be written, repeat the command with --resume to continue"
-    assert outcome.stderr == f"nocdyn: cannot write 'out/sweep.1-of-2.journal': File too large; {remedy}\n"
+    assert complaints(outcome.stderr) == [f"nocdyn: cannot write 'out/sweep.1-of-2.journal': File too large; {remedy}"]
     assert nocdyn.files("out") == ["sweep.1-of-2.journal"]
     assert_reuses(finish_shards(nocdyn, discs, whole), SAMPLES // SHARDS)
 
@@ -200,7 +205,7 @@ def test_a_sweep_of_three_ranks_is_gone_on_with_by_any_number(nocdyn, discs, who
     assert journals == "out/sweep.journal and 2 of ranks" and 0 < int(number) < SAMPLES
     words = (discs, "--out", "out", "--resume", *LONG)
     outcome = ranks_outcome(nocdyn, ranks, *words) if ranks else nocdyn("sweep", *words)
-    told = [line for line in outcome.stderr.splitlines() if " per second" not in line]  # a slow machine shows the progress
+    told = complaints(outcome.stderr)
     assert (outcome.returncode, told) == (0, [])
     assert outcome.stdout.startswith(f"{discs}: reusing {number} of {SAMPLES} variants from out/sweep.journal and 2 of ranks\n")
     assert nocdyn.summary("out")["variants_computed"] == SAMPLES - int(number)
