@@ -125,7 +125,7 @@ contains
 
     associate (harmonics => size(orbit%series, 1) / 2, f => periodic%machine%freedoms)
       basis = new_harmonic_basis(harmonics, 8 * (harmonics + 1))
-      values = matmul(basis%values(:, 2:), orbit%series(2:, :f))
+      values = basis%values_of(orbit%series(:, :f))
       half_range = 0.5_wp * maxval([(maxval(values(:, c)) - minval(values(:, c)), c=1, f)])
     end associate
   end function half_range_of

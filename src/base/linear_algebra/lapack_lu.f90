@@ -11,7 +11,7 @@ module nocdyn_lapack_lu
   implicit none (type, external)
   private
 
-  public :: lu_factor, lu_solve, band_factor, band_solve
+  public :: lu_factor, lu_invert, lu_solve, band_factor, band_solve
 
   integer, parameter :: small_order = 64   ! above it blocks pay if an optimised LAPACK is linked
   integer, parameter :: small_band = 16    ! diagonals of U above the main one
@@ -33,6 +33,15 @@ module nocdyn_lapack_lu
       real(wp), intent(inout) :: b(ldb, nrhs)
       integer, intent(out) :: info
     end subroutine dgetrs
+
+    subroutine dgetri(n, a, lda, ipiv, work, lwork, info)
+      import :: wp
+      integer, intent(in) :: n, lda, lwork
+      real(wp), intent(inout) :: a(lda, n)
+      integer, intent(in) :: ipiv(n)
+      real(wp), intent(out) :: work(lwork)
+      integer, intent(out) :: info
+    end subroutine dgetri
 
     subroutine dgbtrf(m, n, kl, ku, ab, ldab, ipiv, info)
       import :: wp
@@ -88,6 +97,20 @@ contains
       if (info /= 0) error stop 'nocdyn_lapack_lu: dgetrs refused an argument'
     end if
   end subroutine lu_solve
+
+  !> The inverse by the factors of `lu_factor`.
+  subroutine lu_invert(factors, pivots)
+    real(wp), contiguous, intent(inout) :: factors(:, :)   !! of `lu_factor`, on return the inverse
+    integer, contiguous, intent(in) :: pivots(:)           !! of `lu_factor`
+    integer, parameter :: columns = 32                     ! that DGETRI takes at once
+    real(wp) :: work(columns * size(pivots))
+    integer :: info
+
+    associate (n => size(pivots))
+      call dgetri(n, factors, n, pivots, work, size(work), info)
+    end associate
+    if (info /= 0) error stop 'nocdyn_lapack_lu: dgetri refused an argument, or a pivot is zero'
+  end subroutine lu_invert
 
   !> Forward and backward substitution, as DGETRS. For so few elements the vector loops of gfortran 12 are slower.
   pure subroutine substitute(n, factors, pivots, x)

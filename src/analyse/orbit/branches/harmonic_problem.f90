@@ -5,7 +5,7 @@ module nocdyn_harmonic_problem
   use nocdyn_kinds, only: wp
   use nocdyn_orbit_corrector, only: correct_harmonics => correct, estimate_error, find_harmonic_tangent => find_tangent, &
     harmonic_weights => weights_of, largest_harmonic => oscillation, set_least_oscillation
-  use nocdyn_orbit_equations, only: orbit_equations_t, samples_of
+  use nocdyn_orbit_equations, only: orbit_equations_t
   use nocdyn_orbit_multipliers, only: harmonic_multipliers => find_multipliers
   use nocdyn_orbit_problem, only: orbit_point_t, orbit_problem_t, signal_range_t
   use nocdyn_orbit_signals, only: measure_signals, sample_signals
@@ -217,7 +217,7 @@ contains
     type(signal_samples_t), intent(out) :: samples
     type(error_t), allocatable, intent(out) :: error
 
-    call self%finer%set_harmonics(2 * point%harmonics, error, max(samples_of(2 * point%harmonics), least_samples))
+    call self%finer%set_harmonics(2 * point%harmonics, error, least_samples)
     if (.not. allocated(error)) call sample_signals(self%finer, point%orbit, signals, samples, error)
   end subroutine sample
 
@@ -261,7 +261,7 @@ contains
 
     associate (equations => self%equations)
       do n = 1, equations%nodes
-        i = (equations%place(n) - 1) * size(series, 1)
+        i = (n - 1) * size(series, 1)
         series(:, n) = tangent(i + 1:i + size(series, 1))
       end do
       along%speed = equations%floating_speed

@@ -4,7 +4,7 @@ module nocdyn_orbit_signals
   use nocdyn_harmonic_basis, only: harmonic_basis_t, new_harmonic_basis
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_orbit_equations, only: orbit_equations_t
+  use nocdyn_orbit_equations, only: orbit_equations_t, samples_of
   use nocdyn_orbit_problem, only: signal_range_t
   use nocdyn_periodic_machine, only: orbit_t
   use nocdyn_signal_samples, only: signal_samples_t
@@ -76,8 +76,12 @@ contains
       samples%rotation(i) = dot_product(equations%turning(signals(i)%source%index, :), orbit%speed)
       samples%values(:, i) = samples%values(:, i) - samples%rotation(i) * samples%t
     end do
-    all = new_harmonic_basis((size(samples%t) - 1) / 4, size(samples%t))
-    samples%series = matmul(all%wide, samples%values)
+    if (size(samples%t) > samples_of(equations%basis%harmonics)) then
+      all = new_harmonic_basis((size(samples%t) - 1) / 4, size(samples%t))
+      samples%series = all%coefficients_of(samples%values, 2 * all%harmonics)
+    else
+      samples%series = equations%basis%coefficients_of(samples%values, 2 * equations%basis%harmonics)
+    end if
   end subroutine sample_signals
 
 end module nocdyn_orbit_signals

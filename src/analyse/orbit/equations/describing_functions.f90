@@ -26,7 +26,7 @@ contains
     type(equivalent_t), intent(out) :: equivalents(:)     !! [elements]
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: t(equations%machine%samples), y(equations%machine%samples, equations%machine%states)
-    real(wp), dimension(equations%basis%length) :: moment, twist
+    real(wp), dimension(equations%basis%length, size(elements)) :: moments, twists
     complex(wp) :: ratio
     integer :: h, i, k
 
@@ -35,18 +35,21 @@ contains
     call equations%sample(orbit, equations%basis, t, y)
     associate (formulation => equations%machine%formulation, values => equations%machine%formulation%state%elements)
       call formulation%evaluate_at(size(t) * equations%freedoms, size(t) * (equations%nodes - equations%freedoms), t, y)
+      twists = equations%basis%coefficients_of(values%angle(:, elements), equations%basis%harmonics)
+      moments = equations%basis%coefficients_of(values%restoring(:, elements) + values%applied(:, elements), &
+                                                equations%basis%harmonics)
       do i = 1, size(elements)
-        twist = matmul(equations%basis%projection, values%angle(:, elements(i)))
-        moment = matmul(equations%basis%projection, values%restoring(:, elements(i)) + values%applied(:, elements(i)))
-        h = 1
-        do k = 2, equations%basis%harmonics
-          if (norm2(twist(2 * k:2 * k + 1)) > norm2(twist(2 * h:2 * h + 1))) h = k
-        end do
-        equivalents(i)%twist = norm2(twist(2 * h:2 * h + 1))
-        if (.not. equivalents(i)%twist > 0) cycle
-        ratio = -cmplx(moment(2 * h), -moment(2 * h + 1), wp) / cmplx(twist(2 * h), -twist(2 * h + 1), wp)
-        equivalents(i)%stiffness = real(ratio, wp)
-        equivalents(i)%damping = aimag(ratio) / (h * orbit%rate)
+        associate (twist => twists(:, i), moment => moments(:, i))
+          h = 1
+          do k = 2, equations%basis%harmonics
+            if (norm2(twist(2 * k:2 * k + 1)) > norm2(twist(2 * h:2 * h + 1))) h = k
+          end do
+          equivalents(i)%twist = norm2(twist(2 * h:2 * h + 1))
+          if (.not. equivalents(i)%twist > 0) cycle
+          ratio = -cmplx(moment(2 * h), -moment(2 * h + 1), wp) / cmplx(twist(2 * h), -twist(2 * h + 1), wp)
+          equivalents(i)%stiffness = real(ratio, wp)
+          equivalents(i)%damping = aimag(ratio) / (h * orbit%rate)
+        end associate
       end do
     end associate
   end subroutine describe_couplings

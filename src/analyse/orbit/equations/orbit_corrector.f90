@@ -12,9 +12,12 @@ module nocdyn_orbit_corrector
 
   public :: correct, estimate_error, find_null_direction, find_tangent, measured, oscillation, set_least_oscillation, weights_of
 
-  integer, parameter :: most_iterations = 14
+  integer, parameter :: most_iterations = 14            ! with new factors
+  integer, parameter :: most_changes = 60
   integer, parameter :: most_growths = 3
   real(wp), parameter :: converged_change = 1.0e-8_wp   ! the next change is about its square
+  real(wp), parameter :: settled = 1.0e-13_wp           ! what is left of a change by former factors
+  real(wp), parameter :: slow = 0.2_wp                  ! a change by former factors, as a share of the one before
   real(wp), parameter :: difference = 1.0e-6_wp         ! steps of the central differences, in weighted size
   real(wp), parameter :: silent = 1.0e-30_wp            ! a machine that does not oscillate yet
 
@@ -27,63 +30,70 @@ contains
     real(wp), intent(in) :: row(:)            !! [unknowns + 1]
     real(wp), intent(in) :: target
     real(wp), intent(inout) :: x(:)           !! [unknowns + 1], a guess, on return the solution
-    integer, intent(out) :: iterations
+    integer, intent(out) :: iterations        !! with new factors, and one more
     logical, intent(out) :: has_converged
     type(error_t), allocatable, intent(out) :: error
     type(orbit_t) :: orbit
     real(wp), dimension(size(x)) :: change
     real(wp) :: former, length
-    integer :: growths
+    integer :: changes, growths
+    logical :: has_factors, is_singular
+    logical :: is_exact   ! whether the factors are those of the matrix about x
 
     has_converged = .false.
-    former = huge(former)
+    has_factors = .false.
+    former = 1.0_wp
     growths = 0
+    iterations = 1
     allocate (orbit%speed, source=equations%floating_speed)
-    do iterations = 1, most_iterations
+    do changes = 1, most_changes
       call equations%take_apart(x, orbit)
       call equations%residual(orbit, change(:size(x) - 1), error)
       if (allocated(error)) return
-      change(size(x)) = dot_product(row, x) - target
-      call factor_about(equations, range, row, x, orbit, has_converged, error)
-      if (allocated(error) .or. .not. has_converged) return
-      has_converged = .false.
-      change = -change
-      call equations%system%solve(change)
+      change(size(x)) = target - dot_product(row, x)
+      change(:size(x) - 1) = -change(:size(x) - 1)
+      is_exact = .not. has_factors
+      if (is_exact) then
+        iterations = iterations + 1
+        call fill_about(equations, range, row, x, orbit, error)
+        if (allocated(error)) return
+        call equations%system%factor(iterations == 2, is_singular)
+        if (is_singular) return
+        is_exact = equations%system%is_whole
+        has_factors = .true.
+      end if
+      call equations%system%substitute(change)
       x = x + change
       length = measured(change, weights_of(equations, x, range))
-      if (length <= converged_change) then
-        has_converged = .true.
-        return
-      end if
-      if (0.5_wp * length > former) growths = growths + 1
-      if (.not. length < huge(length) .or. growths > most_growths) return
+      has_converged = length <= converged_change .and. (is_exact .or. length**2 <= settled * former)
+      if (has_converged) exit
+      if (changes > 1 .and. 0.5_wp * length > former) growths = growths + 1
+      if (.not. length < huge(length) .or. growths > most_growths .or. iterations > most_iterations) return
+      has_factors = length <= slow * former
       former = length
     end do
+    if (.not. has_converged) return
+    call equations%take_apart(x, orbit)
+    call fill_about(equations, range, row, x, orbit, error)
   end subroutine correct
 
-  !> Factors the matrix about an orbit.
-  subroutine factor_about(equations, range, row, x, orbit, is_regular, error)
+  !> Fills the matrix about an orbit.
+  subroutine fill_about(equations, range, row, x, orbit, error)
     type(orbit_equations_t), intent(inout) :: equations
     real(wp), intent(in) :: range
     real(wp), intent(in) :: row(:), x(:)
     type(orbit_t), intent(in) :: orbit
-    logical, intent(out) :: is_regular
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: steps(equations%scalars() + 1), weights(size(x))
-    logical :: singular
 
-    is_regular = .false.
     associate (inner => equations%system%inner, border => equations%system%border)
       weights = weights_of(equations, x, range)
       steps = difference / weights(inner + 1:)
       call equations%fill_system(orbit, steps, error)
-      if (allocated(error)) return
       equations%system%below(border, :) = row(:inner)
       equations%system%right(inner + border, :) = row(inner + 1:)
     end associate
-    call equations%system%factor(singular)
-    is_regular = .not. singular
-  end subroutine factor_about
+  end subroutine fill_about
 
   !> The tangent of the branch at a solution that `correct` has found, with row tangent > 0 and weighted length 1.
   subroutine find_tangent(equations, weights, tangent)
@@ -108,14 +118,15 @@ contains
     type(orbit_t) :: orbit
     real(wp) :: weights(size(x))
     integer :: i
-    logical :: is_regular
+    logical :: is_singular
 
     direction = 0.0_wp
     allocate (orbit%speed, source=equations%floating_speed)
     call equations%take_apart(x, orbit)
-    call factor_about(equations, range, row, x, orbit, is_regular, error)
+    call fill_about(equations, range, row, x, orbit, error)
     if (allocated(error)) return
-    if (.not. is_regular) then
+    call equations%system%factor(.false., is_singular)
+    if (is_singular) then
       call raise(error, exit_failed, 'the matrix of the equations is exactly singular')
       return
     end if
@@ -240,7 +251,7 @@ contains
         end do
       end do
       change(inner + 1:size(x) - 1) = -r(finer%system%inner + 1:)
-      call equations%system%solve(change)
+      call equations%system%substitute(change)
       do n = 1, equations%freedoms
         i = equations%first_unknown(n)
         share = max(share, maxval(abs(change(i + 1:i + length - 1))) / largest)

@@ -12,10 +12,10 @@
 !> A. Vanderbauwhede, Continuation of periodic orbits in conservative and Hamiltonian systems, Physica D 181 (2003) 1-38).
 module nocdyn_orbit_equations
   use nocdyn_bordered_system, only: bordered_system_t, new_bordered_system
+  use nocdyn_elimination, only: new_node_order, node_order_t
   use nocdyn_errors, only: error_t
   use nocdyn_harmonic_basis, only: differentiated, harmonic_basis_t, new_harmonic_basis, padded_series, product_matrix
   use nocdyn_kinds, only: wp
-  use nocdyn_ordering, only: reverse_cuthill_mckee
   use nocdyn_periodic_machine, only: orbit_t, periodic_machine_t
   implicit none (type, external)
   private
@@ -28,15 +28,17 @@ module nocdyn_orbit_equations
     real(wp) :: least_oscillation = 0.0_wp           !! from which sizes of changes are measured [rad]
     integer :: freedoms = 0                          !! coordinates; the first nodes
     integer :: nodes = 0                             !! coordinates and internal states
-    integer, allocatable :: place(:)                 !! of each node in the order of the unknowns
+    type(node_order_t), private :: order             !! of their elimination
+    integer, allocatable, private :: element(:)      !! of this order for each position of the Jacobian, 0: none
     integer, allocatable :: row_node(:), column_node(:)   !! of each position of the Jacobian; row 0: none
     logical, allocatable :: is_speed(:)     !! whether its column is a speed
     type(bordered_system_t) :: system
     real(wp), allocatable, private :: t(:), y(:, :), rates(:, :), slopes(:, :)
+    real(wp), allocatable, private :: swing(:, :), drift(:, :)   !! samples of the series; of their rates by tau, of coordinates
   contains
     procedure :: prepare, set_harmonics, residual, fill_system, unknowns, first_unknown, put_together, take_apart
     procedure :: sample, scalars, anchor
-    procedure, private :: add_slopes, add_inertia
+    procedure, private :: add_slopes, add_inertia, compose_states, residual_at
   end type orbit_equations_t
 
 contains
@@ -51,9 +53,9 @@ contains
   !> Orders the unknowns of the machine.
   subroutine prepare(self)
     class(orbit_equations_t), intent(inout) :: self
-    integer, allocatable :: order(:)
-    integer :: i, k
-    logical, allocatable :: is_kept(:)
+    integer, allocatable :: column(:), row(:)
+    integer :: k
+    logical :: stays(self%machine%states - self%machine%freedoms)
 
     self%freedoms = self%machine%freedoms
     self%nodes = self%machine%states - self%freedoms
@@ -63,40 +65,37 @@ contains
       allocate (self%is_speed, source=pattern%column <= f)
       allocate (self%column_node, source=merge(pattern%column, pattern%column - f, pattern%column <= f))
     end associate
-    is_kept = self%row_node > 0
-    do k = 2, size(is_kept)   ! each pair of nodes once
-      is_kept(k) = is_kept(k) .and. .not. any(self%row_node(:k - 1) == self%row_node(k) .and. &
-                                              self%column_node(:k - 1) == self%column_node(k))
+    allocate (row, source=pack(self%row_node, self%row_node > 0))
+    allocate (column, source=pack(self%column_node, self%row_node > 0))
+    stays = .false.
+    self%order = new_node_order(self%nodes, row, column, stays)
+    stays(self%order%pivot(self%nodes)) = .true.
+    self%order = new_node_order(self%nodes, row, column, stays)
+    allocate (self%element(size(self%row_node)), source=0)
+    do k = 1, size(self%element)
+      if (self%row_node(k) > 0) self%element(k) = self%order%element(self%row_node(k), self%column_node(k))
     end do
-    allocate (order, source=reverse_cuthill_mckee(self%nodes, pack(self%row_node, is_kept), pack(self%column_node, is_kept)))
-    allocate (self%place(self%nodes))
-    self%place(order) = [(i, i=1, self%nodes)]
   end subroutine prepare
 
-  !> Changes the number of harmonics; `samples`, if present, is another number of samples.
+  !> Changes the number of harmonics; `samples`, if present, is a least number of samples.
   subroutine set_harmonics(self, harmonics, error, samples)
     class(orbit_equations_t), intent(inout) :: self
     integer, intent(in) :: harmonics
     type(error_t), allocatable, intent(out) :: error
     integer, intent(in), optional :: samples
-    integer :: k, n, width
+    integer :: n
 
     n = samples_of(harmonics)
-    if (present(samples)) n = samples
+    if (present(samples)) n = max(n, 4 * ((samples + 3) / 4))
     if (self%basis%harmonics == harmonics .and. self%basis%samples == n) return
     call self%machine%set_samples(n, error)
     if (allocated(error)) return
     self%basis = new_harmonic_basis(harmonics, n)
-    if (allocated(self%t)) deallocate (self%t, self%y, self%rates, self%slopes)
+    if (allocated(self%t)) deallocate (self%t, self%y, self%rates, self%slopes, self%swing, self%drift)
     allocate (self%t(n), self%y(n, self%machine%states), self%rates(n, self%machine%states), &
               self%slopes(n, size(self%machine%pattern%row)), source=0.0_wp)
-    width = 0
-    do k = 1, size(self%row_node)
-      if (self%row_node(k) > 0) width = max(width, abs(self%place(self%row_node(k)) - self%place(self%column_node(k))))
-    end do
-    associate (length => self%basis%length)
-      self%system = new_bordered_system(self%nodes * length, self%scalars() + 1, (width + 1) * length - 1)
-    end associate
+    allocate (self%swing(n, self%nodes), self%drift(n, self%freedoms), source=0.0_wp)
+    self%system = new_bordered_system(self%order, harmonics, self%scalars() + 1)
   end subroutine set_harmonics
 
   !> The number of unknowns without the parameter.
@@ -129,7 +128,7 @@ contains
     class(orbit_equations_t), intent(in) :: self
     integer, intent(in) :: node
 
-    first_unknown = (self%place(node) - 1) * self%basis%length + 1
+    first_unknown = (node - 1) * self%basis%length + 1
   end function first_unknown
 
   !> The unknowns of an orbit, and its parameter.
@@ -175,27 +174,63 @@ contains
     type(orbit_t), intent(in) :: orbit
     type(harmonic_basis_t), intent(in) :: basis
     real(wp), intent(out) :: t(:), y(:, :)       !! [samples], [samples, states]
+    real(wp) :: swing(basis%samples, self%nodes), drift(basis%samples, self%freedoms)
+
+    call sample_series(orbit%series, basis, swing, drift)
+    call self%compose_states(orbit, swing, drift, t, y)
+  end subroutine sample
+
+  !> Samples of series, and of the rates by tau of the first ones.
+  pure subroutine sample_series(series, basis, values, rates)
+    real(wp), intent(in) :: series(:, :)
+    type(harmonic_basis_t), intent(in) :: basis
+    real(wp), intent(out) :: values(:, :), rates(:, :)
+    real(wp) :: padded(basis%length, size(series, 2))
+
+    padded = padded_series(series, basis%length)
+    values = basis%values_of(padded)
+    rates = basis%values_of(differentiated(padded(:, :size(rates, 2))))
+  end subroutine sample_series
+
+  !> Times and states of an orbit by samples of its series.
+  pure subroutine compose_states(self, orbit, swing, drift, t, y)
+    class(orbit_equations_t), intent(in) :: self
+    type(orbit_t), intent(in) :: orbit
+    real(wp), intent(in) :: swing(:, :), drift(:, :)   !! as of `sample_series`
+    real(wp), intent(out) :: t(:), y(:, :)             !! [samples], [samples, states]
     real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)
-    real(wp) :: series(basis%length, self%nodes), steady(self%freedoms)
+    real(wp) :: steady(self%freedoms)
     integer :: c, i
 
-    t = [(turn * i / basis%samples, i=0, basis%samples - 1)] / orbit%rate
-    series = padded_series(orbit%series, basis%length)
-    series(1, self%free) = 0.0_wp
+    t = [(turn * i / size(t), i=0, size(t) - 1)] / orbit%rate
     steady = matmul(self%rigid, orbit%speed)
     associate (f => self%freedoms)
-      y(:, :f) = matmul(basis%values, orbit%rate * differentiated(series(:, :f)))
-      y(:, f + 1:) = matmul(basis%values, series)
+      y(:, :f) = orbit%rate * drift
+      y(:, f + 1:) = swing
+      do c = 1, size(self%free)
+        y(:, f + self%free(c)) = y(:, f + self%free(c)) - orbit%series(1, self%free(c))   ! a mean acceleration, no angle
+      end do
       do c = 1, f
         if (.not. abs(steady(c)) > 0) cycle
         y(:, c) = y(:, c) + steady(c)
         y(:, f + c) = y(:, f + c) + steady(c) * t
       end do
     end associate
-  end subroutine sample
+  end subroutine compose_states
 
-  !> The harmonics of the equations, in the order of the unknowns, and the mean accelerations that must vanish.
+  !> The harmonics of the equations and the mean accelerations that must vanish.
   subroutine residual(self, orbit, r, error)
+    class(orbit_equations_t), intent(inout) :: self
+    type(orbit_t), intent(inout) :: orbit
+    real(wp), intent(out) :: r(:)   !! [unknowns]
+    type(error_t), allocatable, intent(out) :: error
+
+    call sample_series(orbit%series, self%basis, self%swing, self%drift)
+    call self%residual_at(orbit, r, error)
+  end subroutine residual
+
+  !> The same of an orbit whose series have been sampled.
+  subroutine residual_at(self, orbit, r, error)
     class(orbit_equations_t), intent(inout) :: self
     type(orbit_t), intent(inout) :: orbit
     real(wp), intent(out) :: r(:)   !! [unknowns]
@@ -206,13 +241,13 @@ contains
 
     call self%set_value(orbit, error)
     if (allocated(error)) return
-    call self%sample(orbit, self%basis, self%t, self%y)
+    call self%compose_states(orbit, self%swing, self%drift, self%t, self%y)
     call self%machine%rates(self%t, self%y, self%rates, error)
     if (allocated(error)) return
     series = padded_series(orbit%series, self%basis%length)
     associate (f => self%freedoms, free => self%free, w => orbit%rate)
-      harmonics(:, :f) = -matmul(self%basis%projection, self%rates(:, :f)) / w**2
-      harmonics(:, f + 1:) = -matmul(self%basis%projection, self%rates(:, 2 * f + 1:)) / w
+      harmonics(:, :f) = self%basis%coefficients_of(self%rates(:, :f), self%basis%harmonics) / (-w**2)
+      harmonics(:, f + 1:) = self%basis%coefficients_of(self%rates(:, 2 * f + 1:), self%basis%harmonics) / (-w)
       harmonics(:, :f) = harmonics(:, :f) + differentiated(differentiated(series(:, :f)))
       if (abs(orbit%damping) > 0) harmonics(:, :f) = harmonics(:, :f) + orbit%damping * differentiated(series(:, :f))
       harmonics(:, f + 1:) = harmonics(:, f + 1:) + differentiated(series(:, f + 1:))
@@ -236,7 +271,7 @@ contains
       shared = min(size(self%phase, 1), self%basis%length)
       r(size(r)) = sum(self%phase(:shared, :) * series(:shared, :))
     end if
-  end subroutine residual
+  end subroutine residual_at
 
   !> Fills the matrix of the equations about an orbit, with the last row for the parameter left to the caller. The columns of mean
   !> speeds, the holding torque, w and the parameter are central differences; those of the parameter do not leave its range.
@@ -255,7 +290,8 @@ contains
     other = orbit
     call self%set_value(other, error)
     if (allocated(error)) return
-    call self%sample(other, self%basis, self%t, self%y)
+    call sample_series(other%series, self%basis, self%swing, self%drift)   ! all differences below have the same
+    call self%compose_states(other, self%swing, self%drift, self%t, self%y)
     call self%machine%slopes(self%t, self%y, self%slopes)
     call self%add_slopes(other%rate)
     call self%add_inertia(other%damping)
@@ -267,11 +303,11 @@ contains
       if (place == size(x) .and. ends(2) > self%bounds(2)) ends(2) = x(place)
       x(place) = ends(1)
       call self%take_apart(x, other)
-      call self%residual(other, before, error)
+      call self%residual_at(other, before, error)
       if (allocated(error)) return
       x(place) = ends(2)
       call self%take_apart(x, other)
-      call self%residual(other, after, error)
+      call self%residual_at(other, after, error)
       if (allocated(error)) return
       self%system%right(:size(after), k) = (after - before) / (ends(2) - ends(1))
     end do
@@ -280,7 +316,7 @@ contains
     end do
     if (self%is_over_energy) then
       other = orbit
-      call self%sample(other, self%basis, self%t, self%y)
+      call self%compose_states(other, self%swing, self%drift, self%t, self%y)
       call self%machine%rates(self%t, self%y, self%rates, error)
       if (allocated(error)) return
       associate (slopes => self%energy_slopes(self%rates(1, :self%freedoms)) / self%bounds(2))
@@ -329,27 +365,39 @@ contains
     class(orbit_equations_t), intent(inout) :: self
     real(wp), intent(in) :: w   !! [rad/s]
     real(wp), dimension(self%basis%length, self%basis%length) :: block, product
-    real(wp) :: g(4 * self%basis%harmonics + 1)
+    complex(wp) :: factor(0:self%basis%harmonics)
+    real(wp) :: g(4 * self%basis%harmonics + 1, 1), scale
+    logical :: is_free
     integer :: h, k
 
     associate (harmonics => self%basis%harmonics)
       do k = 1, size(self%row_node)
         if (self%row_node(k) == 0) cycle
         if (.not. any(abs(self%slopes(:, k)) > 0)) cycle
-        g = matmul(self%basis%wide, self%slopes(:, k))
-        if (.not. any(abs(self%slopes(:, k) - self%slopes(1, k)) > 0)) g(2:) = 0.0_wp   ! exactly, as of linear laws
-        call product_matrix(harmonics, g, product)
-        block = product
-        if (self%is_speed(k)) then
-          block(:, 1) = 0.0_wp
-          do h = 1, harmonics
-            block(:, 2 * h) = -(w * h) * product(:, 2 * h + 1)
-            block(:, 2 * h + 1) = (w * h) * product(:, 2 * h)
-          end do
-        end if
-        block = block * (-1.0_wp / merge(w**2, w, self%row_node(k) <= self%freedoms))
-        if (any(self%column_node(k) == self%free)) block(:, 1) = 0.0_wp
-        call self%system%add_block(self%first_unknown(self%row_node(k)), self%first_unknown(self%column_node(k)), block)
+        scale = -1.0_wp / merge(w**2, w, self%row_node(k) <= self%freedoms)
+        is_free = any(self%column_node(k) == self%free)
+        factor = scale
+        if (self%is_speed(k)) factor = [(cmplx(0.0_wp, scale * w * h, wp), h=0, harmonics)]
+        if (is_free) factor(0) = 0.0_wp
+        associate (own => self%system%blocks(self%element(k)))
+          if (.not. any(abs(self%slopes(:, k) - self%slopes(1, k)) > 0)) then   ! as of linear laws
+            own%constant(:) = own%constant + self%slopes(1, k) * factor
+            cycle
+          end if
+          g = self%basis%coefficients_of(self%slopes(:, k:k), 2 * harmonics)
+          own%constant(:) = own%constant + g(1, 1) * factor
+          g(1, 1) = 0.0_wp
+          call product_matrix(harmonics, g(:, 1), product)
+          block = product
+          if (self%is_speed(k)) then
+            do h = 1, harmonics
+              block(:, 2 * h) = -(w * h) * product(:, 2 * h + 1)
+              block(:, 2 * h + 1) = (w * h) * product(:, 2 * h)
+            end do
+          end if
+          if (self%is_speed(k) .or. is_free) block(:, 1) = 0.0_wp
+          call own%add_full(scale * block)
+        end associate
       end do
     end associate
   end subroutine add_slopes
@@ -358,25 +406,19 @@ contains
   subroutine add_inertia(self, damping)
     class(orbit_equations_t), intent(inout) :: self
     real(wp), intent(in) :: damping   !! of an orbit
-    real(wp) :: pair(2, 2)
-    integer :: h, i, n
+    complex(wp) :: constant(0:self%basis%harmonics)
+    integer :: h, n
 
     do n = 1, self%nodes
-      i = self%first_unknown(n)
-      if (any(n == self%free)) call self%system%add_block(i, i, reshape([1.0_wp], [1, 1]))
-      do h = 1, self%basis%harmonics
-        pair = 0.0_wp
-        if (n <= self%freedoms) then
-          pair(1, 1) = -real(h, wp)**2
-          pair(2, 2) = pair(1, 1)
-          pair(1, 2) = damping * h
-          pair(2, 1) = -damping * h
-        else
-          pair(1, 2) = h
-          pair(2, 1) = -h
-        end if
-        call self%system%add_block(i + 2 * h - 1, i + 2 * h - 1, pair)
-      end do
+      if (n <= self%freedoms) then
+        constant = [(cmplx(-real(h, wp)**2, damping * h, wp), h=0, self%basis%harmonics)]
+      else
+        constant = [(cmplx(0.0_wp, real(h, wp), wp), h=0, self%basis%harmonics)]
+      end if
+      if (any(n == self%free)) constant(0) = 1.0_wp
+      associate (own => self%system%blocks(self%order%diagonal(n)))
+        own%constant(:) = own%constant + constant
+      end associate
     end do
   end subroutine add_inertia
 

@@ -34,7 +34,7 @@ contains
       end do
     end associate
     basis = new_harmonic_basis(harmonics, samples)
-    series = matmul(basis%projection, beside)
+    series = basis%coefficients_of(beside, harmonics)
     mean = series(1, periodic%free)
     associate (f => periodic%machine%freedoms, m => periodic%period%motion)
       series(1, :f) = series(1, :f) - matmul(periodic%rigid, mean)

@@ -21,7 +21,10 @@ module nocdyn_orbit_variations
 
   integer, parameter :: nodes = 16             ! of a panel: the Jacobian is interpolated between them
   integer, parameter :: fewest_panels = 6
-  real(wp), parameter :: longest = 2.0_wp      ! step times an eigenvalue of the Jacobian
+  real(wp), parameter :: longest = 5.0_wp      ! step times an eigenvalue of the Jacobian
+  real(wp), parameter :: longest_gone = 10.0_wp   ! the same of those that are gone after a period: such steps damp 85 % as much
+  real(wp), parameter :: tolerated = 1.0e-8_wp ! error of a multiplier
+  real(wp), parameter :: error_constant = 1.738e-13_wp   ! of a step: 6!^2 / (12! 13!)
   real(wp), parameter :: most_steps = 5.0e4_wp ! of a panel
   real(wp), parameter :: gone = 25.0_wp        ! e^-gone is left after a period
   real(wp), parameter :: stiff = 10.0_wp       ! step times an eigenvalue that Gauss collocation does not damp enough
@@ -168,6 +171,7 @@ contains
     type(course_t), intent(inout) :: course
     real(wp), allocatable :: matrix(:, :)
     complex(wp), allocatable :: values(:)
+    real(wp) :: needed(equations%machine%states)
     logical :: has_failed
     integer :: i
 
@@ -188,8 +192,19 @@ contains
     end associate
     call eigenvalues(matrix, values, has_failed)
     if (has_failed) return
-    associate (largest => maxval(abs(values), mask=values%re * period > -gone))
-      course%steps = max(1, ceiling(min(largest * period / (panels * longest), most_steps)))
+    ! n steps change a multiplier by n times the error of a step, constant (|lambda| period / n)^(2 stages + 1)
+    associate (turns => abs(values) * period, kept => min(max(values%re * period, -gone), 0.0_wp))
+      needed = turns * (turns * (error_constant / tolerated) * exp(kept))**(1.0_wp / (2 * stages))
+      where (values%re * period > -gone)
+        needed = max(needed, turns / longest)
+      elsewhere (abs(values%re) < abs(values%im))
+        needed = turns / longest_gone
+      elsewhere
+        needed = 0.0_wp
+      end where
+      associate (most => maxval(needed))
+        course%steps = max(1, ceiling(min(most / panels, most_steps)))
+      end associate
     end associate
     course%is_stiff = maxval(abs(values)) * period / (panels * course%steps) > stiff
     if (course%is_stiff) course%steps = max(course%steps, damping_steps)
@@ -206,19 +221,32 @@ contains
     real(wp), intent(in) :: slopes(:, :)         !! [stages, positions]
     real(wp), contiguous, intent(inout) :: y(:, :)   !! variations by states, [columns, states]
     real(wp) :: blocks(stages, stages, size(constant, 3)), rates(size(y, 1), stages, equations%nodes)
+    real(wp), dimension(size(y, 1), equations%nodes) :: once, twice   ! what constant slopes make of speeds at the begin
     integer :: i, k, n
 
     blocks = constant
     rates = 0.0_wp
     associate (f => equations%freedoms, row => equations%row_node, column => equations%machine%pattern%column)
+      once = 0.0_wp
+      twice = 0.0_wp
       do k = 1, size(element)
         if (element(k) == 0) cycle
-        if (.not. is_constant(k)) call add_slopes(equations, k, rule, slopes(:, k), blocks(:, :, element(k)))
+        if (is_constant(k)) then
+          once(:, row(k)) = once(:, row(k)) + slopes(1, k) * y(:, column(k))
+          if (column(k) > f .and. column(k) <= 2 * f) twice(:, row(k)) = twice(:, row(k)) + slopes(1, k) * y(:, column(k) - f)
+          cycle
+        end if
+        call add_slopes(equations, k, rule, slopes(:, k), blocks(:, :, element(k)))
         do i = 1, stages
           rates(:, i, row(k)) = rates(:, i, row(k)) + slopes(i, k) * y(:, column(k))
           if (column(k) > f .and. column(k) <= 2 * f) then
             rates(:, i, row(k)) = rates(:, i, row(k)) + (slopes(i, k) * rule%c(i)) * y(:, column(k) - f)
           end if
+        end do
+      end do
+      do n = 1, equations%nodes
+        do i = 1, stages
+          rates(:, i, n) = rates(:, i, n) + once(:, n) + rule%c(i) * twice(:, n)
         end do
       end do
       call eliminate(order, blocks)

@@ -82,28 +82,44 @@ contains
     tau = bracket%root()
   end function turning_place
 
-  !> The highest value: samples near to the highest one are followed to the maximum beside them.
+  !> The highest value: samples near to the highest one are followed to the maximum beside them, if a parabola through them and
+  !> their neighbours is about as high as what has been found.
   pure real(wp) function highest_of(samples, series) result(highest)
     real(wp), intent(in) :: samples(:), series(:)
-    real(wp) :: first(size(series), 1), second(size(series), 1), slope, step, tau
-    integer :: i, k, n
+    real(wp), parameter :: settled = 1.0e-9_wp   ! the next step is about its square [rad]
+    real(wp), parameter :: doubt = 2.0_wp        ! the height above the sample may be so many times that of the parabola
+    real(wp) :: bend, course(0:2), gain, place, slope, step, tau
+    integer :: first, i, k, n, offset
 
     n = size(samples)
-    highest = maxval(samples)
+    first = maxloc(samples, dim=1)
+    highest = samples(first)
     if (.not. highest > minval(samples)) return
-    first = differentiated(reshape(series, [size(series), 1]))
-    second = differentiated(first)
     associate (bound => highest - near * (highest - minval(samples)))
-      do i = 1, n
-        if (samples(i) < bound .or. samples(i) < samples(modulo(i, n) + 1) .or. samples(i) < samples(modulo(i - 2, n) + 1)) cycle
-        tau = turn * (i - 1) / n
+      do offset = 0, n - 1
+        i = modulo(first - 1 + offset, n) + 1
+        if (samples(i) < bound) cycle
+        associate (before => samples(modulo(i - 2, n) + 1), after => samples(modulo(i, n) + 1))
+          if (samples(i) < before .or. samples(i) < after) cycle
+          slope = 0.5_wp * (after - before)
+          bend = 2.0_wp * samples(i) - before - after
+        end associate
+        place = 0.0_wp
+        gain = 0.0_wp
+        if (bend > 0) then
+          place = slope / bend
+          gain = 0.5_wp * slope * place
+        end if
+        if (offset > 0 .and. samples(i) + doubt * gain < highest) cycle
+        tau = turn * (i - 1 + place) / n
         do k = 1, iterations
-          slope = value_of(second(:, 1), tau)
-          if (.not. slope < 0) exit
-          step = -value_of(first(:, 1), tau) / slope
-          tau = tau + min(max(step, -turn / n), turn / n)
+          course = course_of(series, tau)
+          highest = max(highest, course(0))
+          if (.not. course(2) < 0) exit
+          step = min(max(-course(1) / course(2), -turn / n), turn / n)
+          if (abs(step) < settled) exit
+          tau = tau + step
         end do
-        highest = max(highest, value_of(series, tau))
       end do
     end associate
   end function highest_of
@@ -111,12 +127,36 @@ contains
   !> The value of a series.
   pure real(wp) function value_of(series, tau) result(value)
     real(wp), intent(in) :: series(:), tau
+    complex(wp) :: turned, unit
     integer :: k
 
+    unit = cmplx(cos(tau), sin(tau), wp)
+    turned = 1.0_wp
     value = series(1)
     do k = 1, size(series) / 2
-      value = value + series(2 * k) * cos(k * tau) + series(2 * k + 1) * sin(k * tau)
+      turned = turned * unit
+      value = value + series(2 * k) * turned%re + series(2 * k + 1) * turned%im
     end do
   end function value_of
+
+  !> The value, the slope and the curvature of a series.
+  pure function course_of(series, tau) result(course)
+    real(wp), intent(in) :: series(:), tau
+    real(wp) :: course(0:2)
+    complex(wp) :: turned, unit
+    real(wp) :: value
+    integer :: k
+
+    unit = cmplx(cos(tau), sin(tau), wp)
+    turned = 1.0_wp
+    course = [series(1), 0.0_wp, 0.0_wp]
+    do k = 1, size(series) / 2
+      turned = turned * unit
+      value = series(2 * k) * turned%re + series(2 * k + 1) * turned%im
+      course(0) = course(0) + value
+      course(1) = course(1) + k * (series(2 * k + 1) * turned%re - series(2 * k) * turned%im)
+      course(2) = course(2) - k**2 * value
+    end do
+  end function course_of
 
 end module nocdyn_signal_samples
