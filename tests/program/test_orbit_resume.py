@@ -48,7 +48,9 @@ def test_an_analysis_that_is_killed_again_and_again_ends_as_one_that_is_not(nocd
     for _ in range(6):
         process = nocdyn.start("orbit", "machine.nml", "--out", "out", "--resume")
         moment = sizes[-1] + moments.randrange(20000)
-        wait_for(lambda p=process, m=moment: p.poll() is not None or (journal(nocdyn).exists() and journal(nocdyn).stat().st_size > m))
+        wait_for(
+            lambda p=process, m=moment: p.poll() is not None or (journal(nocdyn).exists() and journal(nocdyn).stat().st_size > m)
+        )
         process.kill()
         process.communicate()
         if not journal(nocdyn).exists():

@@ -1,11 +1,12 @@
 !> Linear equations of nodes, each with the coefficients of a series as its unknowns, and of some last rows and columns:
 !> [A B; C D] [x; y] = [r; s].
 !>
-!> A has a block for each pair of nodes that are connected. All nodes but one are eliminated; that one is solved with the last rows
-!> and columns as a whole, because A may be singular, as it is at folds. Rows are interchanged within a node only; refinement against
-!> the matrix makes good what this costs, and pivots that were too small and have been replaced (X. S. Li, J. W. Demmel,
-!> SuperLU_DIST: A scalable distributed-memory sparse direct solver for unsymmetric linear systems, ACM Transactions on Mathematical
-!> Software 29 (2003) 110-140). Full parts of blocks that are small beside the constant ones may be left to refinement too.
+!> A has a block for each pair of nodes that are connected. All nodes but one are eliminated; that one is solved with the last
+!> rows and columns as a whole, because A may be singular, as it is at folds. Rows are interchanged within a node only;
+!> refinement against the matrix makes good what this costs, and pivots that were too small and have been replaced (X. S. Li,
+!> J. W. Demmel, SuperLU_DIST: A scalable distributed-memory sparse direct solver for unsymmetric linear systems, ACM
+!> Transactions on Mathematical Software 29 (2003) 110-140). Full parts of blocks that are small beside the constant ones may be
+!> left to refinement too.
 module nocdyn_bordered_system
   use nocdyn_elimination, only: node_order_t
   use nocdyn_harmonic_blocks, only: harmonic_block_t, new_harmonic_block, subtract_product, swap, take_product
@@ -140,7 +141,8 @@ contains
           call take_product(below, factors(inverse), self%product)
           call swap(below, self%product)
           do b = 1, self%border
-            self%beside(other:other + n - 1, b) = self%beside(other:other + n - 1, b) - below%times(self%beside(own:own + n - 1, b))
+            self%beside(other:other + n - 1, b) = self%beside(other:other + n - 1, b) - &
+                                                  below%times(self%beside(own:own + n - 1, b))
             self%under(other:other + n - 1, b) = self%under(other:other + n - 1, b) - &
                                                  beside%times_transposed(self%under(own:own + n - 1, b))
           end do

@@ -1,7 +1,7 @@
 !> Matrices that take the coefficients of a series [a_0, a_1, b_1, ..., a_H, b_H] to those of another one.
 !>
-!> Linear operators with constant coefficients connect each harmonic with itself only: they multiply a_k - i b_k by a complex number,
-!> a_0 by a real one. Other matrices are the sum of such a one and a full one.
+!> Linear operators with constant coefficients connect each harmonic with itself only: they multiply a_k - i b_k by a complex
+!> number, a_0 by a real one. Other matrices are the sum of such a one and a full one.
 module nocdyn_harmonic_blocks
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor, lu_invert

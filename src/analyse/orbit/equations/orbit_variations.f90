@@ -197,9 +197,9 @@ contains
       needed = turns * (turns * (error_constant / tolerated) * exp(kept))**(1.0_wp / (2 * stages))
       where (values%re * period > -gone)
         needed = max(needed, turns / longest)
-      elsewhere (abs(values%re) < abs(values%im))
+      else where (abs(values%re) < abs(values%im))
         needed = turns / longest_gone
-      elsewhere
+      else where
         needed = 0.0_wp
       end where
       associate (most => maxval(needed))
