@@ -50,6 +50,10 @@ def at(values, parameter, value):
     return Values({label: column[rows] for label, column in values.items()})
 
 
+def life(label):
+    return f"&fatigue name = 'life' coupling = 'spring' reference_moment = {label} reference_cycles = 1.0e6 slope = 5.0 /\n"
+
+
 def specials(report, kind):
     return [point["value"] for point in report["special_points"] if point["kind"] == kind]
 
@@ -124,6 +128,42 @@ def settled_play(start, period, amplitude, rate):
         if np.abs(change).max() < 1e-10:
             break
     return start, 0.5 * (largest - least), in_order(np.linalg.eigvals(matrix))
+
+
+def test_both_methods_find_the_same_harmonics_and_damage(nocdyn):
+    text = DUFFING + life(2.0) + OVER.format(0.8, 1.2, "count = 5 motions = 1.0 spectrum = .true. {}")
+    found = []
+    for method in ("harmonic_balance", "shooting"):
+        values, _, printed = branch(nocdyn, text.format(f"method = '{method}'"))
+        assert "left out" not in printed
+        chosen = at(values, "excitation.shaker.frequency", 1.0)
+        motion, harmonics = (nocdyn.values("out", file) for file in ("motion_1.csv", "motion_harmonics.csv"))
+        own = harmonics["harmonic"] <= 10
+        found.append((chosen["damage_per_hour_life"][0], harmonics["amplitude_phi_mass [rad]"][own], motion))
+    (damage, amplitudes, motion), (other_damage, other_amplitudes, other) = found
+    assert other_damage == pytest.approx(damage, rel=2e-4)  # the highest of samples
+    assert other_amplitudes == pytest.approx(amplitudes, abs=1e-8)
+    phi = np.interp(motion["t [s]"], other["t [s]"], other["phi_mass [rad]"])
+    assert phi == pytest.approx(motion["phi_mass [rad]"], abs=1e-5)
+
+
+def test_motions_that_stick_have_harmonics_and_damage(nocdyn):
+    text = BRAKE.format(0.8) + life(1.0) + OVER.format(0.2, 0.4, "count = 3 motions = 0.3 spectrum = .true.")
+    values, report, _ = branch(nocdyn, text)
+    motion, harmonics = (nocdyn.values("out", file) for file in ("motion_1.csv", "motion_harmonics.csv"))
+    sticks = np.abs(motion["omega_mass [rad/s]"]) < 1e-12
+    assert 0.1 < sticks.mean() < 0.9
+    t = motion["t [s]"]
+    force = np.where(sticks, np.nan, np.gradient(motion["omega_mass [rad/s]"], t, edge_order=2))
+    expected = np.sin(0.3 * t) - motion["phi_mass [rad]"] - 0.8 * np.sign(motion["omega_mass [rad/s]"])
+    inside = np.convolve(sticks, np.ones(5), "same") == 0  # no change of the branch beside it
+    assert force[inside] == pytest.approx(expected[inside], abs=1e-4)
+    (first,) = harmonics["amplitude_phi_mass [rad]"][harmonics["harmonic"] == 1]
+    wave = 2 * np.mean(motion["phi_mass [rad]"][:-1] * np.exp(-0.3j * t[:-1]))
+    assert first == pytest.approx(abs(wave), rel=1e-9)
+    cycles = 1e6 * values["half_range_moment_spring"] ** -5.0
+    assert values["damage_per_hour_life"] == pytest.approx(3600.0 * values["rate"] / (2 * np.pi) / cycles, rel=1e-3)
+    assert report["fatigue"][0]["largest_damage_per_hour"] > 0
 
 
 @pytest.mark.parametrize("rate", [0.9, 1.1])

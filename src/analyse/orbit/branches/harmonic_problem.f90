@@ -219,6 +219,7 @@ contains
 
     call self%finer%set_harmonics(2 * point%harmonics, error, least_samples)
     if (.not. allocated(error)) call sample_signals(self%finer, point%orbit, signals, samples, error)
+    samples%harmonics = 2 * point%harmonics
   end subroutine sample
 
   function resolution(self) result(words)

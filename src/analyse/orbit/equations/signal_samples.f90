@@ -11,6 +11,8 @@ module nocdyn_signal_samples
     real(wp), allocatable :: values(:, :)   !! angles without the mean rotation, [samples, columns], in SI units
     real(wp), allocatable :: rotation(:)    !! mean speed of the columns that are angles, else 0 [rad/s]
     real(wp), allocatable :: series(:, :)   !! coefficients as of `harmonic_basis_t`, [length, columns]
+    integer :: harmonics = 0                !! that are told of; there may be more coefficients
+    logical :: has_kinks = .false.          !! whether columns may have kinks and jumps, which polynomials overshoot
   contains
     procedure :: find_extremes, amplitude, list_turning_values
   end type signal_samples_t
@@ -52,12 +54,20 @@ contains
     integer :: i, n
 
     n = size(self%t)
-    first = differentiated(self%series(:, column:column))
-    slopes(:n - 1) = [(value_of(first(:, 1), turn * i / n), i=0, n - 1)]
-    slopes(n) = slopes(0)
     allocate (turning(0))
+    if (self%has_kinks) then
+      slopes = [self%values(:, column), self%values(1, column)] - [self%values(n, column), self%values(:, column)]
+    else
+      first = differentiated(self%series(:, column:column))
+      slopes(:n - 1) = [(value_of(first(:, 1), turn * i / n), i=0, n - 1)]
+      slopes(n) = slopes(0)
+    end if
     do i = 0, n - 1
       if (slopes(i) * slopes(i + 1) > 0 .or. .not. abs(slopes(i + 1)) > 0) cycle
+      if (self%has_kinks) then
+        turning = [turning, self%values(i + 1, column)]
+        cycle
+      end if
       turning = [turning, value_of(self%series(:, column), turning_place(first(:, 1), turn * i / n, turn / n, slopes(i:i + 1)))]
     end do
     if (size(turning) == 0) turning = [self%series(1, column)]

@@ -96,7 +96,7 @@ contains
     if (.not. allocated(error)) call find_landings(self, error)
   end subroutine measure_orbits
 
-  !> Leaves out what needs samples where the method has none.
+  !> Leaves out what needs samples of a period where there is none, as of steady states.
   subroutine leave_out_samples(self)
     type(measured_orbits_t), intent(inout) :: self
     type(signal_samples_t) :: samples
@@ -105,8 +105,7 @@ contains
     if (self%branch%count == 0 .or. .not. self%needs_samples .and. size(self%settings%motions) == 0) return
     call self%problem%sample(self%branch%points(1), self%columns%columns, 0, samples, error)
     if (allocated(error) .or. allocated(samples%series)) return
-    call append(self%notes, 'motions, spectrum, damage and limits over the frequency are found by harmonic balance only: ' // &
-                'they are left out')
+    call append(self%notes, 'motions, spectrum, damage and limits over the frequency are left out: those found are steady states')
     deallocate (self%damages, self%settings%motions)
     allocate (self%damages(0), self%settings%motions(0))
     self%settings%has_spectrum = .false.
@@ -278,7 +277,7 @@ contains
     allocate (found%amplitude(0, size(self%signals)))
     if (.not. (self%settings%has_spectrum .and. allocated(samples%series))) return
     deallocate (found%amplitude)
-    allocate (found%amplitude(2 * point%harmonics, size(self%signals)))
+    allocate (found%amplitude(samples%harmonics, size(self%signals)))
     do i = 1, size(self%signals)
       k = self%columns%widest(i, samples)
       found%amplitude(:, i) = [(samples%amplitude(k, h), h=1, size(found%amplitude, 1))]
@@ -322,7 +321,7 @@ contains
         if (.not. (limit%has_curve() .and. allocated(samples%series))) cycle
         largest = -1.0_wp
         k = self%columns%widest(limit%quantity, samples)
-        do h = 1, 2 * point%harmonics
+        do h = 1, samples%harmonics
           amplitude = samples%amplitude(k, h)
           ratio = limit%curve_ratio(h * point%orbit%rate, amplitude)
           if (ratio <= largest) cycle

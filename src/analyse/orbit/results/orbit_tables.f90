@@ -208,7 +208,7 @@ contains
     call write_header(file, labels)
     do i = 1, size(analysis%motions)
       associate (samples => analysis%motions(i)%samples, point => analysis%motions(i)%point)
-        do h = 0, 2 * point%harmonics
+        do h = 0, samples%harmonics
           do k = 1, size(signals)
             column = analysis%columns%widest(k, samples)
             row(2 * k - 1) = samples%series(1, column)

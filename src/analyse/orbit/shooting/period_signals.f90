@@ -1,18 +1,23 @@
 !> The signals of a machine over a period that is integrated: extremes in continuous time, as those of runs, and means.
 module nocdyn_period_signals
   use nocdyn_errors, only: error_t
+  use nocdyn_harmonic_basis, only: harmonic_basis_t, new_harmonic_basis
   use nocdyn_kinds, only: wp
   use nocdyn_observer, only: ranges_t, step_block_t
   use nocdyn_orbit_problem, only: signal_range_t
   use nocdyn_period_flow, only: flow_observer_t, flow_over, stages, state_in_step
   use nocdyn_periodic_machine, only: orbit_t, periodic_machine_t
+  use nocdyn_signal_samples, only: signal_samples_t
   use nocdyn_signal_values, only: new_signal_values, signal_values_t
   use nocdyn_signals, only: signal_angle, signal_source_t, signal_t
   use nocdyn_varied_machine, only: varied_machine_t
   implicit none (type, external)
   private
 
-  public :: measure_period
+  public :: measure_period, sample_period
+
+  integer, parameter :: fewest_samples = 1024   ! turning values are those of samples
+  integer, parameter :: harmonics = 100         ! that are told of
 
   type, extends(flow_observer_t) :: signal_observer_t
     type(signal_values_t) :: values
@@ -24,7 +29,73 @@ module nocdyn_period_signals
     procedure :: observe_lanes, tracked_values, find_pace, on_extremes
   end type signal_observer_t
 
+  !> Keeps rows of signals at the output times.
+  type, extends(flow_observer_t) :: row_observer_t
+    type(signal_values_t) :: values
+    real(wp), allocatable :: rows(:, :)     !! [times, signals]
+  contains
+    procedure :: on_output => keep_row
+  end type row_observer_t
+
 contains
+
+  !> Samples of signals over the period of an orbit, whose value has been set.
+  subroutine sample_period(periodic, orbit, rtol, signals, least_samples, samples, error)
+    type(periodic_machine_t), target, intent(inout) :: periodic   !! as in `measure_period`
+    type(orbit_t), intent(in) :: orbit
+    real(wp), intent(in) :: rtol
+    type(signal_t), intent(in) :: signals(:)
+    integer, intent(in) :: least_samples
+    type(signal_samples_t), intent(out) :: samples
+    type(error_t), allocatable, intent(out) :: error
+    type(row_observer_t) :: observer
+    type(harmonic_basis_t) :: basis
+    type(signal_source_t), allocatable :: sources(:)
+    real(wp) :: period, y(periodic%machine%states)
+    integer :: i, n
+
+    n = max(fewest_samples, 4 * ((least_samples + 3) / 4))
+    period = 2.0_wp * acos(-1.0_wp) / orbit%rate
+    sources = signals%source
+    observer%values = new_signal_values(periodic%machine%formulation, sources)
+    observer%values%in_motion = .true.
+    allocate (observer%rows(n + 1, size(signals)), source=0.0_wp)
+    observer%mean_rate = spread(0.0_wp, 1, size(y))
+    y = orbit%state
+    select type (machine => periodic%machine%formulation)
+    class is (varied_machine_t)
+      machine%outside = periodic%holding_acceleration(orbit%torque)
+      call machine%begin_variations(0.0_wp, y, .false.)
+      call flow_over(machine, rtol, [(period * i / n, i=0, n)], y, observer, error)
+    end select
+    if (allocated(error)) return
+    samples%t = [(period * i / n, i=0, n - 1)]
+    allocate (samples%rotation(size(signals)), source=0.0_wp)
+    samples%values = observer%rows(:n, :)
+    do i = 1, size(signals)
+      if (sources(i)%kind /= signal_angle) cycle
+      samples%rotation(i) = dot_product(periodic%turning(sources(i)%index, :), orbit%speed)
+      samples%values(:, i) = samples%values(:, i) - samples%rotation(i) * samples%t
+    end do
+    basis = new_harmonic_basis((n - 1) / 4, n)
+    samples%series = basis%coefficients_of(samples%values, 2 * basis%harmonics)
+    samples%has_kinks = .true.
+    samples%harmonics = harmonics
+  end subroutine sample_period
+
+  subroutine keep_row(self, lane, t, y)
+    class(row_observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)
+    real(wp) :: row(size(self%rows, 2)), state(1, size(y))
+
+    self%count = self%count + 1
+    state(1, :) = y
+    call self%values%observe([t], state)
+    call self%values%fill_row(lane, t, y, row)
+    self%rows(self%count, :) = row
+  end subroutine keep_row
 
   !> The ranges of signals over the period of an orbit, whose value has been set. Angles are those beside the mean rotation.
   subroutine measure_period(periodic, orbit, rtol, signals, ranges, error)

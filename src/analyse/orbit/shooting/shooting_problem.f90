@@ -12,9 +12,10 @@ module nocdyn_shooting_problem
   use nocdyn_orbit_problem, only: measured, orbit_point_t, orbit_problem_t, signal_range_t
   use nocdyn_orbit_series, only: find_series, state_of_series
   use nocdyn_period_flow, only: flow_observer_t, flow_over
-  use nocdyn_period_signals, only: measure_period
+  use nocdyn_period_signals, only: measure_period, sample_period
   use nocdyn_periodic_machine, only: orbit_t, periodic_machine_t
   use nocdyn_sampled_machine, only: new_sampled_machine
+  use nocdyn_signal_samples, only: signal_samples_t
   use nocdyn_signals, only: signal_t
   use nocdyn_targets, only: target_t
   use nocdyn_text, only: rounded_text
@@ -38,7 +39,7 @@ module nocdyn_shooting_problem
     real(wp), private :: gained = 0.0_wp                    !! speed in a period, as a share of the oscillation
   contains
     procedure :: begin, put_together, correct, find_tangent, weights_of, oscillation, set_scale, complete, find_multipliers
-    procedure :: find_fault, measure, resolution
+    procedure :: find_fault, measure, resolution, sample
     procedure, private :: take_apart, free_places, scales, shoot, fill_matrix, fill_differences, factor
   end type shooting_problem_t
 
@@ -470,6 +471,18 @@ contains
     call self%periodic%set_value(point%orbit, error)
     if (.not. allocated(error)) call measure_period(self%periodic, point%orbit, rtol, signals, ranges, error)
   end subroutine measure
+
+  subroutine sample(self, point, signals, least_samples, samples, error)
+    class(shooting_problem_t), target, intent(inout) :: self
+    type(orbit_point_t), intent(inout) :: point
+    type(signal_t), intent(in) :: signals(:)
+    integer, intent(in) :: least_samples
+    type(signal_samples_t), intent(out) :: samples
+    type(error_t), allocatable, intent(out) :: error
+
+    call self%periodic%set_value(point%orbit, error)
+    if (.not. allocated(error)) call sample_period(self%periodic, point%orbit, rtol, signals, least_samples, samples, error)
+  end subroutine sample
 
   function resolution(self) result(words)
     class(shooting_problem_t), intent(in) :: self
