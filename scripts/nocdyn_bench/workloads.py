@@ -316,7 +316,8 @@ def report(bench: Bench) -> Costs:
 
 
 def orbits(bench: Bench) -> Costs:
-    return Costs("orbit_costs", "Periodic motions", lambda rounds: orbit_costs(bench.nocdyn, bench.scratch, rounds))
+    engine = EXAMPLES / "engine" / "engine.nml"
+    return Costs("orbit_costs", "Periodic motions", lambda rounds: orbit_costs(bench.nocdyn, engine, bench.scratch, rounds))
 
 
 WORKLOADS: dict[str, Callable[[Bench], Workload]] = {
