@@ -208,7 +208,72 @@ def test_without_a_hopf_point_the_cycle_is_the_one_on_which_a_run_settles(nocdyn
     assert values["rate"][rows][-1] == pytest.approx(whole["rate"][-1], rel=1e-7)
 
 
+def test_both_methods_find_the_same_cycles(nocdyn):
+    text = MASS.replace("'mass' inertia", "'mass' angle = 0.5 inertia")
+    text = text.format(f"quadratic = {QUADRATIC}", -1.0, -2.0, "count = 3 tolerance = 1e-9 {}")
+    found = []
+    for method in ("harmonic_balance", "shooting"):
+        values, _ = branches(nocdyn, text.format(f"method = '{method}'"))
+        rows = (values["branch"] == values["branch"].max()) & np.isclose(values["motor.push.b"], -1.5, rtol=1e-12)
+        found.append([values[label][rows][0] for label in ("rate", "half_range_phi_mass", "multiplier_1_real")])
+    assert found[1] == pytest.approx(found[0], rel=1e-6)
+
+
+BELT = """\
+&body name = 'belt' inertia = 1.0e7 speed = 0.5 /
+&body name = 'mass' inertia = 1.0 /
+&coupling name = 'spring' bodies = 'ground', 'mass' stiffness = 1.0 /
+&clutch name = 'friction' bodies = 'belt', 'mass' capacity = 1.0 static_capacity = {} /
+&run t_end = {} /
+&orbit body = 'belt' speed = 0.5, 2.0 count = 4 {} /
+"""
+
+
+def test_a_mass_on_a_belt_sticks_and_slips_as_in_closed_form(nocdyn):
+    """It slips from a beside the middle with the speed v of the belt until it has this speed again, and sticks over 2 a."""
+    outcome = nocdyn.done(BELT.format(2.0, 60.0, ""), command="orbit")
+    assert "stable" in outcome.stdout and "steady state" not in outcome.stdout
+    values = nocdyn.values("out", "orbit.csv")
+    speed, offset = values["mean_speed_belt"], 1.0
+    period = np.pi + 2 * np.arctan(speed / offset) + 2 * offset / speed
+    assert speed.min() == 0.5 and speed.max() == 2.0
+    assert 2 * np.pi / values["rate"] == pytest.approx(period, rel=2e-8)  # the belt is not quite at one speed
+    assert values["half_range_phi_mass"] == pytest.approx(np.hypot(offset, speed), rel=1e-7)
+    assert values["multiplier_1_real"] == pytest.approx(1.0, abs=1e-6)  # of the speed of the belt
+    assert np.abs(values["multiplier_2_real"]).max() < 1e-6  # a state that sticks forgets
+    nocdyn.done(BELT.format(2.0, 60.0, ""), "--resume", command="orbit")
+
+
+STUCK = """\
+&body name = 'table' inertia = 2122.0 speed = 6.0 /
+&body name = 'bit' inertia = 374.0 speed = 6.0 /
+&coupling name = 'string' bodies = 'table', 'bit' stiffness = 473.0 damping = 23.2 /
+&clutch name = 'rock' bodies = 'bit', 'ground' table_slip = 0, 1, 3, 6, 12 table_capacity = 8000, 5500, 4500, 4000, 3900 /
+&motor name = 'drive' body = 'table' kind = 'constant' torque = {!r} /
+&load name = 'top' body = 'table' viscous = 200.0 /
+"""
+
+
+def test_a_bit_that_sticks_has_the_motion_of_a_settled_run(nocdyn):
+    over = "&run t_end = 60.0 /\n&orbit over = 'motor.drive.torque' range = 5000.0, 7000.0 count = 5 /\n"
+    values, _ = branches(nocdyn, STUCK.format(5000.0) + over)
+    (row,) = np.flatnonzero(np.isclose(values["motor.drive.torque"], 6000.0, rtol=1e-12))
+    end, period = settling_time(values, row), 2 * np.pi / values["rate"][row]
+    nocdyn.done(
+        STUCK.format(6000.0)
+        + f"&run t_end = {end!r} method = 'rk853' rtol = 1e-12 atol = 1e-13 max_steps = 10000000 /\n"
+        + f"&output extremes_from = {float(end - 1.02 * period)!r} points = 11 /\n"
+    )
+    columns = {label.split(" [")[0]: extremes for label, extremes in nocdyn.summary("out")["columns"].items()}
+    for label in ("twist_string", "omega_bit", "omega_table"):
+        half_range = values[f"half_range_{label}"][row]
+        found = (columns[label]["max"] - columns[label]["min"]) / 2
+        assert found == pytest.approx(half_range, abs=SETTLED * half_range), label
+    assert columns["omega_bit"]["min"] == pytest.approx(0.0, abs=1e-9)  # it sticks
+
+
 REFUSED = [
+    (BELT.format(1.0, 0.5, ""), "its run settles on no oscillation at the first value", "a longer &run t_end"),
     (MASS.format("quadratic = 1.0", 0.1, 0.4, ""), "does not excite itself", "has the real part -0.15 1/s"),
     (MASS.format("quadratic = 1.0", 0.0, -1.0, "subharmonic = 2"), "subharmonic: nothing excites this machine", ""),
     (MASS.format("quadratic = 1.0", 0.0, -1.0, "starts = 4"), "starts: nothing excites this machine", ""),

@@ -22,7 +22,7 @@ module nocdyn_orbit_analysis
   use nocdyn_periodic_machine, only: body_turning, orbit_t, periodic_machine_t
   use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
   use nocdyn_sampled_machine, only: new_sampled_machine
-  use nocdyn_self_excited, only: follow_self_excited
+  use nocdyn_self_excited, only: follow_cycle_of_run, follow_self_excited
   use nocdyn_shooting_problem, only: new_shooting_problem, shooting_problem_t
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
   implicit none (type, external)
@@ -83,8 +83,8 @@ contains
       call study_mode(input, machine, periodic, guess, self, error)
     else
       call study_machine(input, self%settings, merge(1, few_samples, has_joints), periodic, guess, error)
-      self%is_self_excited = periodic%rate_is_unknown
-      if (self%is_self_excited .and. .not. allocated(error)) call refuse_keys(input, self%settings, has_joints, error)
+      self%is_self_excited = periodic%rate_is_unknown .and. .not. has_joints
+      if (periodic%rate_is_unknown .and. .not. allocated(error)) call refuse_keys(input, self%settings, error)
     end if
     if (.not. allocated(error)) then
       if (has_joints .or. self%settings%method == shooting) then
@@ -112,22 +112,16 @@ contains
   end subroutine analyse_orbits
 
   !> Refuses what has no meaning for a machine that nothing excites.
-  subroutine refuse_keys(input, settings, has_joints, error)
+  subroutine refuse_keys(input, settings, error)
     type(input_t), intent(in) :: input
     type(orbit_settings_t), intent(in) :: settings
-    logical, intent(in) :: has_joints
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: key
 
     key = ''
-    if (settings%method == shooting) key = 'method'
     if (settings%subharmonic > 1) key = 'subharmonic'
     if (settings%starts > 0) key = 'starts'
     if (settings%starts_high .or. settings%start_file /= '') key = 'start'
-    if (key == '' .and. has_joints) then
-      call raise(error, exit_input, input%location(settings%group) // ': nothing excites this machine periodically, and ' // &
-                 'its joints lock; allowed: machines without such joints, whose limit cycles are followed')
-    end if
     if (key == '') return
     call raise(error, exit_input, input%location(settings%group, key) // ': ' // key // ': nothing excites this machine ' // &
                "periodically; allowed: the limit cycles that begin at its steady state, or start = 'settled_run'")
@@ -190,6 +184,11 @@ contains
     kink = harmonic%kink
     call move_alloc(harmonic, problem)
     if (kink == 0 .or. self%settings%method == harmonic_balance .or. self%settings%mode > 0) return
+    if (periodic%rate_is_unknown) then
+      call append(self%notes, 'limit cycles cross the ' // periodic%machine%formulation%switch_name(kink) // &
+                  "; method = 'shooting' follows them")
+      return
+    end if
     if (.not. allocated(error)) branch = self%branch
     self%notes = notes
     call append(self%notes, 'method = shooting, as motions cross the ' // periodic%machine%formulation%switch_name(kink))
@@ -238,10 +237,13 @@ contains
     if (self%settings%mode > 0) then
       call follow_branch(problem, self%settings, guess, self%branch, error)
       return
-    else if (self%is_self_excited) then
+    else if (problem%periodic%rate_is_unknown) then
       select type (problem)
       class is (harmonic_problem_t)
         call follow_self_excited(input, problem, self%settings, guess, self%branch, self%notes, error)
+      class default
+        self%is_self_excited = .false.   ! steady states are not followed
+        call follow_cycle_of_run(input, problem, self%settings, guess, self%branch, error)
       end select
       return
     end if

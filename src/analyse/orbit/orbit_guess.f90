@@ -61,15 +61,17 @@ contains
   end subroutine find_steady_guess
 
   !> The machine with the first value of the parameter, in its steady state if there is one.
-  subroutine start_machine(input, settings, machine)
+  subroutine start_machine(input, settings, machine, as_given)
     type(input_t), intent(in) :: input
     type(orbit_settings_t), intent(in) :: settings
     type(machine_t), intent(out) :: machine   !! of one lane
+    logical, intent(in), optional :: as_given !! not in equilibrium; absent: no
     type(input_t) :: changed
     type(error_t), allocatable :: error
     character(len=:), allocatable :: message
 
     changed = with_start(input, 'equilibrium')
+    if (present(as_given)) changed = with_start(input, 'given')
     if (size(settings%targets) > 0) call set_targets(changed, settings%targets, [settings%at], message)
     call assemble_machine(changed, machine, error)
     if (.not. allocated(error)) return

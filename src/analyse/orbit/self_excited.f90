@@ -9,16 +9,16 @@ module nocdyn_self_excited
   use nocdyn_orbit_branch, only: follow_branch, follow_walk
   use nocdyn_orbit_eigenvalues, only: find_eigenvalues, find_oscillation
   use nocdyn_orbit_points, only: branch_t, walk_t
-  use nocdyn_orbit_problem, only: hopf, orbit_point_t
+  use nocdyn_orbit_problem, only: hopf, orbit_point_t, orbit_problem_t
   use nocdyn_orbit_settings, only: orbit_settings_t
   use nocdyn_periodic_machine, only: orbit_t
-  use nocdyn_settled_cycle, only: find_settled_cycle
+  use nocdyn_settled_cycle, only: find_cycle_of_run, find_settled_cycle
   use nocdyn_steady_problem, only: new_steady_problem, steady_problem_t
   use nocdyn_text, only: append, rounded_text, string_t, to_text
   implicit none (type, external)
   private
 
-  public :: follow_self_excited
+  public :: follow_cycle_of_run, follow_self_excited
 
 contains
 
@@ -132,6 +132,32 @@ contains
     call branch%add_branch(cycles, 2)
     branch%ending = cycles%ending
   end subroutine follow_settled
+
+  !> Follows the limit cycles from the one on which the run of the input settles at the first value.
+  subroutine follow_cycle_of_run(input, problem, settings, guess, branch, error)
+    type(input_t), intent(in) :: input
+    class(orbit_problem_t), intent(inout) :: problem   !! of an unknown rate
+    type(orbit_settings_t), intent(in) :: settings
+    type(orbit_t), intent(in) :: guess                 !! the steady state at the first value
+    type(branch_t), intent(out) :: branch
+    type(error_t), allocatable, intent(out) :: error
+    type(orbit_t) :: cycle
+    logical :: is_cycle
+
+    cycle = guess
+    call find_cycle_of_run(input, settings, problem%periodic, cycle, is_cycle, error)
+    if (allocated(error)) return
+    if (.not. is_cycle) then
+      call raise(error, exit_failed, 'nothing excites the machine periodically, and its run settles on no oscillation at ' // &
+                 'the first value; required: an excitation with a frequency or orders, a start away from the steady state, ' // &
+                 'or a longer &run t_end')
+      return
+    end if
+    call problem%begin(error)
+    if (allocated(error)) return
+    call problem%keep_phase(cycle)
+    call follow_branch(problem, settings, cycle, branch, error)
+  end subroutine follow_cycle_of_run
 
   !> Refuses a machine that nothing excites, with what its steady state says.
   subroutine refuse(branch, values, error)

@@ -13,7 +13,7 @@ module nocdyn_settled_cycle
   implicit none (type, external)
   private
 
-  public :: find_settled_cycle
+  public :: find_cycle_of_run, find_settled_cycle
 
   real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)   ! [rad]
   integer, parameter :: windows = 8                      ! periods of the small oscillation that are looked at first
@@ -67,12 +67,80 @@ contains
     end associate
   end subroutine find_settled_cycle
 
+  !> Runs from the start of the input, and finds the last period, if the motion is periodic then. It begins where the speed that
+  !> oscillates most passes its mean upwards, so that nothing sticks there.
+  subroutine find_cycle_of_run(input, settings, periodic, guess, is_cycle, error)
+    type(input_t), intent(in) :: input
+    type(orbit_settings_t), intent(in) :: settings
+    type(periodic_machine_t), intent(in) :: periodic
+    type(orbit_t), intent(inout) :: guess     !! the steady state, then the cycle, with its state
+    logical, intent(out) :: is_cycle
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: samples = 4096, few = 4   ! of a run; periods that are looked at in the end
+    real(wp), parameter :: quiet = 1.0e-6_wp        ! oscillation of speeds, as a share of the largest one
+    class(formulation_t), allocatable :: formulation
+    type(machine_t) :: machine
+    real(wp), allocatable :: states(:, :), y(:, :)
+    real(wp) :: last, now, period, width
+    integer :: i, k
+
+    is_cycle = .false.
+    call start_machine(input, settings, machine, as_given=.true.)
+    call new_formulation('reduced', machine, formulation, with_energy_balance=.false.)
+    allocate (y, source=formulation%start())
+    width = input%groups(input%position('run'))%number('t_end')
+    now = 0.0_wp
+    period = 0.0_wp
+    associate (f => periodic%machine%freedoms)
+      do k = 1, 2 * longer
+        call look(width)
+        if (allocated(error)) return
+        if (.not. maxval(abs(beside_mean(states(:f, :)))) > quiet * maxval(abs(states(:f, :)))) return
+        if (k > 1) call find_period(states, f, width, period, last)
+        if (period > 0) exit
+        if (k > 1) width = 2 * width
+      end do
+      if (.not. period > 0) return
+      call advance(formulation, [now, now + settings%periods * period], y, states, error)
+      if (allocated(error)) return
+      now = now + settings%periods * period
+      width = few * period
+      call look(width)
+      if (allocated(error)) return
+      call find_period(states, f, width, period, last)
+      is_cycle = period > 0
+      if (.not. is_cycle) return
+      associate (wait => period + last - width)
+        call advance(formulation, [now, now + wait], y, states, error)
+        if (allocated(error)) return
+        now = now + wait
+      end associate
+      call advance(formulation, now + [(period * i / guess_samples, i=0, guess_samples)], y, states, error)
+      if (allocated(error)) return
+      states(f + 1:2 * f, :) = states(f + 1:2 * f, :) + spread(formulation_angles(machine, periodic), 2, size(states, 2))
+      guess%rate = turn / period
+      call find_series(periodic, states(f + 1:, :), 0.0_wp, period, guess)
+      guess%state = states(:, 1)
+    end associate
+
+  contains
+
+    subroutine look(duration)
+      real(wp), intent(in) :: duration   !! [s]
+
+      call advance(formulation, now + [(duration * i / samples, i=0, samples)], y, states, error)
+      now = now + duration
+    end subroutine look
+
+  end subroutine find_cycle_of_run
+
   !> The time after which the speeds return, by the upward passages of the one that oscillates most through its mean; 0: none.
-  pure subroutine find_period(states, freedoms, width, period)
+  pure subroutine find_period(states, freedoms, width, period, last)
     real(wp), intent(in) :: states(:, :)   !! at even distances of time, [states, times]
     integer, intent(in) :: freedoms        !! the first states are their speeds
     real(wp), intent(in) :: width          !! of all times [s]
     real(wp), intent(out) :: period        !! [s]
+    real(wp), intent(out), optional :: last   !! time of the last passage [s]
     real(wp), parameter :: returned = 0.05_wp   ! distance of speeds that are the same, as a share of their oscillation
     real(wp) :: beside(freedoms, size(states, 2)), times(size(states, 2)), speeds(freedoms, size(states, 2)), share
     integer :: i, main, n
@@ -91,6 +159,7 @@ contains
     do i = 1, min(n - 1, most_crossings)
       if (maxval(abs(speeds(:, n) - speeds(:, n - i))) > returned * maxval(abs(beside))) cycle
       period = times(n) - times(n - i)
+      if (present(last)) last = times(n)
       return
     end do
   end subroutine find_period

@@ -30,12 +30,12 @@ module nocdyn_period_signals
   end type signal_observer_t
 
   !> Keeps rows of signals at the output times.
-  type, extends(flow_observer_t) :: row_observer_t
+  type, extends(flow_observer_t) :: sample_rows_t
     type(signal_values_t) :: values
     real(wp), allocatable :: rows(:, :)     !! [times, signals]
   contains
     procedure :: on_output => keep_row
-  end type row_observer_t
+  end type sample_rows_t
 
 contains
 
@@ -48,7 +48,7 @@ contains
     integer, intent(in) :: least_samples
     type(signal_samples_t), intent(out) :: samples
     type(error_t), allocatable, intent(out) :: error
-    type(row_observer_t) :: observer
+    type(sample_rows_t) :: observer
     type(harmonic_basis_t) :: basis
     type(signal_source_t), allocatable :: sources(:)
     real(wp) :: period, y(periodic%machine%states)
@@ -84,7 +84,7 @@ contains
   end subroutine sample_period
 
   subroutine keep_row(self, lane, t, y)
-    class(row_observer_t), intent(inout) :: self
+    class(sample_rows_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t
     real(wp), contiguous, intent(in) :: y(:)

@@ -1,20 +1,17 @@
-!> Periodic motions by shooting: the state at the begin of a period returns after it, by integration with all events.
-!>
-!> The unknowns are this state, the mean speeds or the holding torque, and the parameter. The angle of each free rotation begins
-!> at zero; in its place stands the speed that the motion gains along it over a period, which must vanish: of itself where no
-!> torque depends on the mean speed, and else by an equation.
+!> Periodic motions by shooting: Newton's method on its equations, multipliers and signals.
 module nocdyn_shooting_problem
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_orbit_multipliers, only: multipliers_of
-  use nocdyn_orbit_problem, only: measured, orbit_point_t, orbit_problem_t, signal_range_t
-  use nocdyn_orbit_series, only: find_series, state_of_series
-  use nocdyn_period_flow, only: flow_observer_t, flow_over
+  use nocdyn_orbit_problem, only: measured, orbit_point_t, signal_range_t
+  use nocdyn_orbit_series, only: find_series
+  use nocdyn_period_flow, only: flow_observer_t
   use nocdyn_period_signals, only: measure_period, sample_period
   use nocdyn_periodic_machine, only: orbit_t, periodic_machine_t
   use nocdyn_sampled_machine, only: new_sampled_machine
+  use nocdyn_shooting_equations, only: shooting_equations_t, shooting_rtol, silent
   use nocdyn_signal_samples, only: signal_samples_t
   use nocdyn_signals, only: signal_t
   use nocdyn_targets, only: target_t
@@ -25,34 +22,23 @@ module nocdyn_shooting_problem
 
   public :: new_shooting_problem
 
-  type, extends(orbit_problem_t), public :: shooting_problem_t
-    integer, private :: states = 0
-    real(wp), private :: least_oscillation = 0.0_wp         !! [rad]
-    real(wp), allocatable, private :: half_range(:)         !! of the states over the last period, [states]
-    real(wp), allocatable, private :: monodromy(:, :)       !! of the last motion with variations
-    real(wp), allocatable, private :: x(:)                  !! its unknowns
-    real(wp), allocatable, private :: matrix(:, :)          !! of the equations there, without the last row
+  type, extends(shooting_equations_t), public :: shooting_problem_t
     real(wp), allocatable, private :: row(:)                !! the last row
     real(wp), allocatable, private :: factors(:, :)
     integer, allocatable, private :: pivots(:)
-    integer, private :: grazed = 0                          !! a switch whose edge is touched, 0: none
     real(wp), private :: gained = 0.0_wp                    !! speed in a period, as a share of the oscillation
   contains
-    procedure :: begin, put_together, correct, find_tangent, weights_of, oscillation, set_scale, complete, find_multipliers
+    procedure :: begin, correct, find_tangent, weights_of, oscillation, set_scale, complete, find_multipliers
     procedure :: find_fault, measure, resolution, sample
-    procedure, private :: take_apart, free_places, scales, shoot, fill_matrix, fill_differences, factor
+    procedure, private :: factor
   end type shooting_problem_t
 
   real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)   ! [rad]
-  real(wp), parameter :: rtol = 1.0e-12_wp       ! of the integration
   real(wp), parameter :: coarse = 100.0_wp       ! times it, for the error
   integer, parameter :: samples = 128            ! of a period, for series
   integer, parameter :: most_iterations = 14
   integer, parameter :: most_growths = 3
   real(wp), parameter :: converged_change = 1.0e-9_wp
-  real(wp), parameter :: difference = 1.0e-5_wp  ! steps of the central differences, in weighted size
-  real(wp), parameter :: silent = 1.0e-30_wp     ! a machine that does not oscillate yet
-  real(wp), parameter :: grazing = 1.0e-3_wp     ! rate of an indicator, as a share of the usual ones
   real(wp), parameter :: kept = 1.0e-6_wp        ! gain of speed that is none
   real(wp), parameter :: unresolved = 1.0e-3_wp  ! error above which a motion is none
 
@@ -83,180 +69,6 @@ contains
     self%half_range(:) = 0.0_wp
     self%least_oscillation = 0.0_wp
   end subroutine begin
-
-  !> Places of the angles of the free rotations in the state.
-  pure function free_places(self) result(places)
-    class(shooting_problem_t), intent(in) :: self
-    integer :: places(size(self%periodic%free))
-
-    places = self%periodic%machine%freedoms + self%periodic%free
-  end function free_places
-
-  function put_together(self, orbit) result(x)
-    class(shooting_problem_t), intent(inout) :: self
-    type(orbit_t), intent(in) :: orbit
-    real(wp), allocatable :: x(:)
-
-    allocate (x(self%states + size(self%periodic%border) + 1))
-    if (allocated(orbit%state)) then
-      x(:self%states) = orbit%state
-    else
-      call state_of_series(self%periodic, orbit, x(:self%states))
-    end if
-    associate (f => self%periodic%machine%freedoms)
-      x(f + 1:2 * f) = x(f + 1:2 * f) - matmul(self%periodic%rigid, x(self%free_places()))
-    end associate
-    x(self%states + 1:size(x) - 1) = self%periodic%put_border(orbit)
-    x(size(x)) = orbit%value
-  end function put_together
-
-  !> The orbit of unknowns, with its state.
-  subroutine take_apart(self, x, orbit)
-    class(shooting_problem_t), intent(in) :: self
-    real(wp), intent(in) :: x(:)
-    type(orbit_t), intent(inout) :: orbit
-
-    orbit%speed = self%periodic%floating_speed
-    call self%periodic%take_border(x(self%states + 1:size(x) - 1), x(size(x)), orbit)
-    orbit%state = x(:self%states)
-    orbit%state(self%free_places()) = 0.0_wp
-  end subroutine take_apart
-
-  !> Sizes of the states.
-  pure function scales(self, rate) result(scale)
-    class(shooting_problem_t), intent(in) :: self
-    real(wp), intent(in) :: rate   !! [rad/s]
-    real(wp) :: scale(self%states)
-    real(wp) :: largest
-
-    associate (f => self%periodic%machine%freedoms)
-      largest = max(silent, self%least_oscillation, maxval(self%half_range(f + 1:2 * f)), maxval(self%half_range(:f)) / rate)
-      scale(:f) = largest * rate
-      scale(f + 1:2 * f) = largest
-      scale(2 * f + 1:) = max(self%half_range(2 * f + 1:), sqrt(epsilon(largest)))
-    end associate
-  end function scales
-
-  !> What is left after a period: of the state, and of speeds that must not be gained.
-  subroutine shoot(self, x, with_variations, r, error)
-    class(shooting_problem_t), intent(inout) :: self
-    real(wp), intent(in) :: x(:)
-    logical, intent(in) :: with_variations
-    real(wp), intent(out) :: r(:)   !! [states + border]
-    type(error_t), allocatable, intent(out) :: error
-    type(flow_observer_t) :: observer
-    type(orbit_t) :: orbit
-
-    r = 0.0_wp
-    call self%take_apart(x, orbit)
-    call self%periodic%set_value(orbit, error)
-    if (.not. allocated(error)) call flow(self, orbit, rtol, [0.0_wp, turn / orbit%rate], with_variations, observer, error)
-    if (allocated(error)) return
-    call leave(self, x, orbit, observer, r)
-    if (.not. with_variations) return
-    self%half_range = 0.5_wp * (observer%highest - observer%lowest)
-    self%x = x
-  end subroutine shoot
-
-  !> The motion of an orbit through some times.
-  subroutine flow(self, orbit, tolerance, times, with_variations, observer, error)
-    class(shooting_problem_t), intent(inout) :: self
-    type(orbit_t), intent(in) :: orbit
-    real(wp), intent(in) :: tolerance, times(:)
-    logical, intent(in) :: with_variations
-    class(flow_observer_t), intent(inout) :: observer
-    type(error_t), allocatable, intent(out) :: error
-    real(wp), parameter :: unknown = 1.0e-20_wp, usual = 1.0e-3_wp   ! sizes of states before the first motion
-    real(wp) :: y(self%states)
-
-    select type (machine => self%periodic%machine%formulation)
-    class is (varied_machine_t)
-      machine%scale = self%scales(orbit%rate)
-      where (.not. machine%scale > unknown) machine%scale = usual
-      machine%duration = times(size(times))
-      machine%outside = self%periodic%holding_acceleration(orbit%torque)
-      y = orbit%state
-      call machine%begin_variations(0.0_wp, y, with_variations)
-      observer%mean_rate = spread(0.0_wp, 1, self%states)
-      associate (f => self%periodic%machine%freedoms)
-        observer%mean_rate(f + 1:2 * f) = matmul(self%periodic%rigid, orbit%speed)
-      end associate
-      call flow_over(machine, tolerance, times, y, observer, error)
-      self%grazed = 0
-      if (machine%slowest < grazing) self%grazed = machine%grazed
-      if (with_variations .and. .not. allocated(error)) self%monodromy = machine%variations
-      machine%is_varied = .false.
-    class default
-      error stop 'nocdyn_shooting_problem: the machine carries no variations'
-    end select
-  end subroutine flow
-
-  !> What is left after a period.
-  pure subroutine leave(self, x, orbit, observer, r)
-    class(shooting_problem_t), intent(in) :: self
-    real(wp), intent(in) :: x(:)
-    type(orbit_t), intent(in) :: orbit
-    type(flow_observer_t), intent(in) :: observer
-    real(wp), intent(out) :: r(:)
-    integer :: places(size(self%periodic%free))
-    real(wp) :: free(size(self%periodic%free))
-
-    places = self%free_places()
-    free = x(places)
-    associate (n => self%states, f => self%periodic%machine%freedoms, last => size(observer%samples, 2))
-      r(:n) = observer%samples(:, last) - orbit%state
-      r(f + 1:2 * f) = r(f + 1:2 * f) - observer%mean_rate(f + 1:2 * f) * (turn / orbit%rate)
-      r(:f) = r(:f) - matmul(self%periodic%rigid, free)
-      r(n + 1:) = x(places(self%periodic%border))
-    end associate
-  end subroutine leave
-
-  !> The matrix of the equations by the variations, after `shoot` with them; the columns of differences stay.
-  subroutine fill_matrix(self)
-    class(shooting_problem_t), intent(inout) :: self
-    integer :: i, k, m, places(size(self%periodic%free))
-
-    places = self%free_places()
-    associate (n => self%states, f => self%periodic%machine%freedoms)
-      self%matrix(:, :n) = 0.0_wp
-      do i = 1, n
-        if (any(places == i)) cycle
-        self%matrix(:n, i) = self%monodromy(:, i)
-        self%matrix(i, i) = self%matrix(i, i) - 1.0_wp
-      end do
-      do m = 1, size(places)
-        self%matrix(:f, places(m)) = -self%periodic%rigid(:, m)
-      end do
-      do k = 1, size(self%periodic%border)
-        self%matrix(n + k, places(self%periodic%border(k))) = 1.0_wp
-      end do
-    end associate
-  end subroutine fill_matrix
-
-  !> The columns of mean speeds, of the holding torque and of the parameter by central differences; those of the parameter do not
-  !> leave its range.
-  subroutine fill_differences(self, x, error)
-    class(shooting_problem_t), intent(inout) :: self
-    real(wp), intent(in) :: x(:)
-    type(error_t), allocatable, intent(out) :: error
-    real(wp), dimension(size(x) - 1) :: after, before
-    real(wp) :: ends(2), other(size(x)), weights(size(x))
-    integer :: i
-
-    weights = self%weights_of(x)
-    do i = self%states + 1, size(x)
-      ends = x(i) + [-difference, difference] / weights(i)
-      if (i == size(x)) ends = min(max(ends, self%periodic%bounds(1)), self%periodic%bounds(2))
-      other = x
-      other(i) = ends(1)
-      call self%shoot(other, .false., before, error)
-      if (allocated(error)) return
-      other(i) = ends(2)
-      call self%shoot(other, .false., after, error)
-      if (allocated(error)) return
-      self%matrix(:, i) = (after - before) / (ends(2) - ends(1))
-    end do
-  end subroutine fill_differences
 
   !> Factors the matrix with the last row.
   subroutine factor(self, is_regular)
@@ -354,6 +166,7 @@ contains
         end if
         weights(i) = 1.0_wp / max(weights(i), sqrt(epsilon(response)))
       end do
+      if (self%periodic%rate_is_unknown) weights(size(x) - 1) = 1.0_wp / orbit%rate
       weights(size(x)) = 1.0_wp / self%range()
     end associate
   end function weights_of
@@ -401,8 +214,8 @@ contains
     call self%periodic%set_value(point%orbit, error)
     if (allocated(error)) return
     times = [(turn / point%orbit%rate * i / samples, i=0, samples)]
-    call flow(self, point%orbit, rtol, times, .false., fine, error)
-    if (.not. allocated(error)) call flow(self, point%orbit, coarse * rtol, times, .false., rough, error)
+    call self%flow(point%orbit, shooting_rtol, times, .false., fine, error)
+    if (.not. allocated(error)) call self%flow(point%orbit, coarse * shooting_rtol, times, .false., rough, error)
     if (allocated(error)) return
     point%harmonics = 0
     point%crossed = 0
@@ -426,25 +239,22 @@ contains
     integer :: m, n
 
     call self%periodic%set_value(orbit, error)
-    if (.not. allocated(error)) call flow(self, orbit, rtol, [0.0_wp, turn / orbit%rate], .true., observer, error)
+    if (.not. allocated(error)) call self%flow(orbit, shooting_rtol, [0.0_wp, turn / orbit%rate], .true., observer, error)
     if (allocated(error)) return
     matrix = self%monodromy
     associate (f => self%periodic%machine%freedoms, free => self%periodic%free, rigid => self%periodic%rigid)
       n = size(free)
-      allocate (known(self%states, 2 * n - size(self%periodic%border)), source=0.0_wp)
+      associate (border => self%periodic%border)
+        allocate (known(self%states, 2 * n - size(border) + merge(1, 0, self%periodic%rate_is_unknown)), source=0.0_wp)
+      end associate
       do m = 1, size(free)
         known(f + 1:2 * f, m) = rigid(:, m)
-        if (m == self%periodic%period%motion) then
-          select type (machine => self%periodic%machine%formulation)
-          class is (varied_machine_t)
-            call machine%start_lane(1, 0.0_wp, orbit%state)
-            call machine%rates_at(0.0_wp, orbit%state, known(:, m))
-          end select
-        end if
+        if (m == self%periodic%period%motion) call self%find_rates(orbit, known(:, m))
         if (any(self%periodic%border == m)) cycle
         n = n + 1
         known(:f, n) = rigid(:, m)
       end do
+      if (self%periodic%rate_is_unknown) call self%find_rates(orbit, known(:, size(known, 2)))
       call multipliers_of(f, matrix, known, multipliers, error)
     end associate
   end subroutine find_multipliers
@@ -469,7 +279,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     call self%periodic%set_value(point%orbit, error)
-    if (.not. allocated(error)) call measure_period(self%periodic, point%orbit, rtol, signals, ranges, error)
+    if (.not. allocated(error)) call measure_period(self%periodic, point%orbit, shooting_rtol, signals, ranges, error)
   end subroutine measure
 
   subroutine sample(self, point, signals, least_samples, samples, error)
@@ -481,7 +291,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     call self%periodic%set_value(point%orbit, error)
-    if (.not. allocated(error)) call sample_period(self%periodic, point%orbit, rtol, signals, least_samples, samples, error)
+    if (allocated(error)) return
+    call sample_period(self%periodic, point%orbit, shooting_rtol, signals, least_samples, samples, error)
   end subroutine sample
 
   function resolution(self) result(words)
