@@ -242,3 +242,27 @@ def test_what_neither_method_follows_is_refused(nocdyn, text, message):
     outcome = nocdyn("orbit", nocdyn.write("machine.nml", text))
     assert outcome.returncode == 2, outcome.stdout + outcome.stderr
     assert message in outcome.stderr
+
+
+# Newton's method converges from the steady state to a motion that the integration does not confirm.
+FALSE_START = """\
+&body name = 'b0' inertia = 2.086 /
+&body name = 'b1' inertia = 0.5757 /
+&body name = 'b2' inertia = 1.936 /
+&coupling name = 'c0' bodies = 'ground', 'b0' table_twist = -0.0722, -0.0361, 0.0361, 0.0722
+          table_moment = -96.0, -27.4, 27.4, 82.3 damping = 0.83 /
+&coupling name = 'c1' bodies = 'b0', 'b1' stiffness = 820.7 cubic_stiffness = 1659.0 damping = 0.86 /
+&coupling name = 'c2' bodies = 'b1', 'b2' stiffness = 2157.0 cubic_stiffness = 1342.0 damping = 1.39 /
+&motor name = 'm' body = 'b0' kind = 'constant' torque = 39.31 /
+&excitation name = 'e' body = 'b0' amplitude = 46.77 frequency = 10.83 /
+&run t_end = 1.0 /
+&orbit over = 'excitation.e.amplitude' range = 46.77, 47.7 method = 'shooting' {} /
+"""
+
+
+def test_a_first_motion_that_is_none_is_replaced_by_the_settled_one(nocdyn):
+    values, _, printed = branch(nocdyn, FALSE_START.format(""))
+    assert "the first motion is the one on which a run settles" in printed
+    settled, _, _ = branch(nocdyn, FALSE_START.format("start = 'settled_run'"))
+    assert values["half_range_phi_b2"][0] == pytest.approx(settled["half_range_phi_b2"][0], rel=1e-9)
+    assert values["error"].max() < 1e-9

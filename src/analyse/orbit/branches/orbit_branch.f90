@@ -177,6 +177,7 @@ contains
     end do
     call problem%find_fault(walk%point, fault)
     if (fault /= '') then
+      has_begun = walk%point%crossed > 0   ! else it may be no motion at all
       call raise(error, exit_failed, 'at the first value, ' // rounded_text(settings%at, 8) // ', ' // fault)
       return
     end if
