@@ -1,4 +1,5 @@
 !> Newton's method on the equations of a periodic motion and one more row, which fixes the parameter or the place along a branch.
+!> The matrix is factored where it begins, and again where changes by former factors do not become small fast enough.
 !>
 !> Sizes of changes are measured by weights: coordinates by the largest oscillation of all, internal states by their own, mean
 !> speeds and an unknown rate by themselves, the parameter by its range.
