@@ -164,7 +164,8 @@ SHAFT = """\
 
 
 def test_a_linear_machine_has_the_half_ranges_of_its_response(nocdyn):
-    text = SHAFT + "&response frequency = 40.0, 80.0 count = 5 /\n" + OVER.format(40.0, 80.0, "count = 5 tolerance = 1e-10")
+    text = SHAFT + "&response frequency = 40.0, 80.0 count = 5 /\n"
+    text += OVER.format(40.0, 80.0, "count = 5 tolerance = 1e-10 stability = .false.")
     values, _ = branch(nocdyn, text)
     nocdyn.done(text, command="response")
     expected = nocdyn.values("out", "response.csv")

@@ -23,7 +23,7 @@ module nocdyn_orbit_variations
   integer, parameter :: fewest_panels = 6
   real(wp), parameter :: longest = 5.0_wp      ! step times an eigenvalue of the Jacobian
   real(wp), parameter :: longest_gone = 10.0_wp   ! the same of those that are gone after a period: such steps damp 85 % as much
-  real(wp), parameter :: tolerated = 1.0e-8_wp ! error of a multiplier
+  real(wp), parameter :: tolerated = 1.0e-7_wp ! error of a multiplier
   real(wp), parameter :: error_constant = 1.738e-13_wp   ! of a step: 6!^2 / (12! 13!)
   real(wp), parameter :: most_steps = 5.0e4_wp ! of a panel
   real(wp), parameter :: gone = 25.0_wp        ! e^-gone is left after a period
@@ -112,12 +112,57 @@ contains
     type(orbit_equations_t), intent(inout) :: equations
     type(orbit_t), intent(in) :: orbit
     type(course_t), intent(out) :: course
+    integer, parameter :: most_halvings = 3
+    real(wp), parameter :: resolved = 1.0e-8_wp   ! the last coefficients of a panel, as a share of the largest slope
     real(wp), allocatable :: all(:, :)
-    real(wp) :: t(equations%machine%samples), y(equations%machine%samples, equations%machine%states)
-    real(wp) :: part(nodes), slopes(equations%machine%samples, size(equations%machine%pattern%row)), period
-    integer :: first, i, panels, total
+    integer :: halvings, i, panels
 
     panels = max(fewest_panels, equations%basis%harmonics)
+    do halvings = 0, most_halvings
+      call sample_slopes(equations, orbit, panels, all)
+      if (roughness(all) <= resolved .or. halvings == most_halvings) exit
+      panels = 2 * panels
+    end do
+    allocate (course%is_constant(size(all, 2)))
+    do i = 1, size(all, 2)
+      course%is_constant(i) = .not. any(abs(all(:, i) - all(1, i)) > 0)
+    end do
+    call choose_steps(equations, all, turn / orbit%rate, panels, course)
+    allocate (course%slopes(nodes, size(all, 2), panels))
+    do i = 1, panels
+      course%slopes(:, :, i) = all((i - 1) * nodes + 1:i * nodes, :)
+    end do
+  end subroutine find_course
+
+  !> The largest of the last two Chebyshev coefficients of all panels, each as a share of the largest slope of its position.
+  pure real(wp) function roughness(slopes)
+    real(wp), intent(in) :: slopes(:, :)   !! at the nodes of all panels, [times, positions]
+    real(wp) :: last(nodes, 2), largest
+    integer :: i, k
+
+    do k = 1, 2
+      last(:, k) = [(2.0_wp / nodes * cos(0.25_wp * turn * (2 * i - 1) * (nodes - k) / nodes), i=1, nodes)]
+    end do
+    roughness = 0.0_wp
+    do k = 1, size(slopes, 2)
+      largest = maxval(abs(slopes(:, k)))
+      if (.not. any(abs(slopes(:, k) - slopes(1, k)) > 0)) cycle
+      do i = 0, size(slopes, 1) - nodes, nodes
+        roughness = max(roughness, maxval(abs(matmul(slopes(i + 1:i + nodes, k), last))) / largest)
+      end do
+    end do
+  end function roughness
+
+  !> The Jacobian along an orbit at the nodes of panels.
+  subroutine sample_slopes(equations, orbit, panels, all)
+    type(orbit_equations_t), intent(inout) :: equations
+    type(orbit_t), intent(in) :: orbit
+    integer, intent(in) :: panels
+    real(wp), allocatable, intent(out) :: all(:, :)   !! [times, positions]
+    real(wp) :: t(equations%machine%samples), y(equations%machine%samples, equations%machine%states)
+    real(wp) :: part(nodes), slopes(equations%machine%samples, size(equations%machine%pattern%row)), period
+    integer :: first, i, total
+
     period = turn / orbit%rate
     total = panels * nodes
     part = chebyshev_points(nodes)
@@ -130,16 +175,7 @@ contains
         all(first + 1:last, :) = slopes(:last - first, :)
       end associate
     end do
-    allocate (course%is_constant(size(slopes, 2)))
-    do i = 1, size(slopes, 2)
-      course%is_constant(i) = .not. any(abs(all(:, i) - all(1, i)) > 0)
-    end do
-    call choose_steps(equations, all, period, panels, course)
-    allocate (course%slopes(nodes, size(slopes, 2), panels))
-    do i = 1, panels
-      course%slopes(:, :, i) = all((i - 1) * nodes + 1:i * nodes, :)
-    end do
-  end subroutine find_course
+  end subroutine sample_slopes
 
   !> The Jacobian at the stages of a step.
   pure subroutine find_slopes(self, weights, panel, slopes)
