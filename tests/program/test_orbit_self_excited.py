@@ -55,6 +55,22 @@ def settling_time(values, row):
     return float((np.log(1e-11) / np.log(largest) + 5) * 2 * np.pi / values["rate"][row])
 
 
+def compare_with_run(nocdyn, machine, values, row, labels):
+    """Half ranges of a stable cycle beside those of a run that has settled; the extremes of this."""
+    end, period = settling_time(values, row), 2 * np.pi / values["rate"][row]
+    nocdyn.done(
+        machine
+        + f"&run t_end = {end!r} method = 'rk853' rtol = 1e-12 atol = 1e-13 max_steps = 10000000 /\n"
+        + f"&output extremes_from = {float(end - 1.02 * period)!r} points = 11 /\n"
+    )
+    columns = {label.split(" [")[0]: extremes for label, extremes in nocdyn.summary("out")["columns"].items()}
+    for label in labels:
+        half_range = values[f"half_range_{label}"][row]
+        found = (columns[label]["max"] - columns[label]["min"]) / 2
+        assert found == pytest.approx(half_range, abs=SETTLED * half_range), label
+    return columns
+
+
 def test_a_hopf_point_is_where_damping_vanishes_and_the_cycle_is_found_by_averaging(nocdyn):
     values, report = branches(nocdyn, MASS.format(f"quadratic = {QUADRATIC}", 0.0, -2.0, ""))
     (point,) = hopf_points(report)
@@ -164,16 +180,8 @@ def test_stable_cycles_of_a_turning_machine_are_those_of_settled_runs(nocdyn):
     half = (high - low) / 2
     for label, expected in zip(("twist_string", "omega_table", "omega_bit"), half, strict=True):
         assert values[f"half_range_{label}"][row] == pytest.approx(expected, abs=SETTLED * expected), label
-    nocdyn.done(
-        DRILL.replace("a = 40000.0", f"a = {torque!r}")
-        + f"&run t_end = {end!r} method = 'rk853' rtol = 1e-12 atol = 1e-13 max_steps = 10000000 /\n"
-        + f"&output extremes_from = {float(end - 1.02 * period)!r} points = 11 /\n"
-    )
-    columns = {label.split(" [")[0]: extremes for label, extremes in nocdyn.summary("out")["columns"].items()}
-    for label in ("twist_string", "omega_bit", "total_moment_string"):
-        half_range = values[f"half_range_{label}"][row]
-        found = (columns[label]["max"] - columns[label]["min"]) / 2
-        assert found == pytest.approx(half_range, abs=SETTLED * half_range), label
+    machine = DRILL.replace("a = 40000.0", f"a = {torque!r}")
+    compare_with_run(nocdyn, machine, values, row, ("twist_string", "omega_bit", "total_moment_string"))
 
 
 RESISTANCE, INDUCTANCE, FLUX, VOLTAGE, ROTOR, FAN, SET, GAIN = 0.5, 0.05, 1.5, 400.0, 0.5, 0.003, 100.0, 0.02
@@ -258,17 +266,7 @@ def test_a_bit_that_sticks_has_the_motion_of_a_settled_run(nocdyn):
     over = "&run t_end = 60.0 /\n&orbit over = 'motor.drive.torque' range = 5000.0, 7000.0 count = 5 /\n"
     values, _ = branches(nocdyn, STUCK.format(5000.0) + over)
     (row,) = np.flatnonzero(np.isclose(values["motor.drive.torque"], 6000.0, rtol=1e-12))
-    end, period = settling_time(values, row), 2 * np.pi / values["rate"][row]
-    nocdyn.done(
-        STUCK.format(6000.0)
-        + f"&run t_end = {end!r} method = 'rk853' rtol = 1e-12 atol = 1e-13 max_steps = 10000000 /\n"
-        + f"&output extremes_from = {float(end - 1.02 * period)!r} points = 11 /\n"
-    )
-    columns = {label.split(" [")[0]: extremes for label, extremes in nocdyn.summary("out")["columns"].items()}
-    for label in ("twist_string", "omega_bit", "omega_table"):
-        half_range = values[f"half_range_{label}"][row]
-        found = (columns[label]["max"] - columns[label]["min"]) / 2
-        assert found == pytest.approx(half_range, abs=SETTLED * half_range), label
+    columns = compare_with_run(nocdyn, STUCK.format(6000.0), values, row, ("twist_string", "omega_bit", "omega_table"))
     assert columns["omega_bit"]["min"] == pytest.approx(0.0, abs=1e-9)  # it sticks
 
 

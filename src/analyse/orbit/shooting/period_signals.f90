@@ -51,7 +51,7 @@ contains
     type(sample_rows_t) :: observer
     type(harmonic_basis_t) :: basis
     type(signal_source_t), allocatable :: sources(:)
-    real(wp) :: period, y(periodic%machine%states)
+    real(wp) :: period
     integer :: i, n
 
     n = max(fewest_samples, 4 * ((least_samples + 3) / 4))
@@ -60,14 +60,7 @@ contains
     observer%values = new_signal_values(periodic%machine%formulation, sources)
     observer%values%in_motion = .true.
     allocate (observer%rows(n + 1, size(signals)), source=0.0_wp)
-    observer%mean_rate = spread(0.0_wp, 1, size(y))
-    y = orbit%state
-    select type (machine => periodic%machine%formulation)
-    class is (varied_machine_t)
-      machine%outside = periodic%holding_acceleration(orbit%torque)
-      call machine%begin_variations(0.0_wp, y, .false.)
-      call flow_over(machine, rtol, [(period * i / n, i=0, n)], y, observer, error)
-    end select
+    call flow_from(periodic, orbit, rtol, [(period * i / n, i=0, n)], observer, error)
     if (allocated(error)) return
     samples%t = [(period * i / n, i=0, n - 1)]
     allocate (samples%rotation(size(signals)), source=0.0_wp)
@@ -82,6 +75,26 @@ contains
     samples%has_kinks = .true.
     samples%harmonics = harmonics
   end subroutine sample_period
+
+  !> Integrates from the begin of an orbit through some times, without variations.
+  subroutine flow_from(periodic, orbit, rtol, times, observer, error)
+    type(periodic_machine_t), target, intent(inout) :: periodic
+    type(orbit_t), intent(in) :: orbit
+    real(wp), intent(in) :: rtol
+    real(wp), contiguous, intent(in) :: times(:)   !! [s]
+    class(flow_observer_t), intent(inout) :: observer
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: y(periodic%machine%states)
+
+    observer%mean_rate = spread(0.0_wp, 1, size(y))
+    y = orbit%state
+    select type (machine => periodic%machine%formulation)
+    class is (varied_machine_t)
+      machine%outside = periodic%holding_acceleration(orbit%torque)
+      call machine%begin_variations(0.0_wp, y, .false.)
+      call flow_over(machine, rtol, times, y, observer, error)
+    end select
+  end subroutine flow_from
 
   subroutine keep_row(self, lane, t, y)
     class(sample_rows_t), intent(inout) :: self
@@ -107,7 +120,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(signal_observer_t) :: observer
     type(signal_source_t) :: sources(size(signals))
-    real(wp) :: period, y(periodic%machine%states)
+    real(wp) :: period
     integer :: i
 
     period = 2.0_wp * acos(-1.0_wp) / orbit%rate
@@ -121,14 +134,7 @@ contains
     do i = 1, size(signals)
       if (sources(i)%kind == signal_angle) observer%drift(i) = dot_product(periodic%turning(sources(i)%index, :), orbit%speed)
     end do
-    observer%mean_rate = spread(0.0_wp, 1, size(y))
-    y = orbit%state
-    select type (machine => periodic%machine%formulation)
-    class is (varied_machine_t)
-      machine%outside = periodic%holding_acceleration(orbit%torque)
-      call machine%begin_variations(0.0_wp, y, .false.)
-      call flow_over(machine, rtol, [0.0_wp, period], y, observer, error)
-    end select
+    call flow_from(periodic, orbit, rtol, [0.0_wp, period], observer, error)
     if (allocated(error)) return
     ranges%half_range = 0.5_wp * (observer%highest_value - observer%lowest_value)
     ranges%largest = max(abs(observer%highest_value), abs(observer%lowest_value))
