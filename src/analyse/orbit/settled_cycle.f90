@@ -59,11 +59,7 @@ contains
         width = 4 * width
       end do
       if (.not. is_cycle) return
-      call advance(formulation, now + [(period * i / guess_samples, i=0, guess_samples)], y, states, error)
-      if (allocated(error)) return
-      states(f + 1:2 * f, :) = states(f + 1:2 * f, :) + spread(formulation_angles(machine, periodic), 2, size(states, 2))
-      guess%rate = turn / period
-      call find_series(periodic, states(f + 1:, :), 0.0_wp, period, guess)
+      call take_cycle(formulation, machine, periodic, now, period, y, guess, error)
     end associate
   end subroutine find_settled_cycle
 
@@ -115,12 +111,9 @@ contains
         if (allocated(error)) return
         now = now + wait
       end associate
-      call advance(formulation, now + [(period * i / guess_samples, i=0, guess_samples)], y, states, error)
-      if (allocated(error)) return
-      states(f + 1:2 * f, :) = states(f + 1:2 * f, :) + spread(formulation_angles(machine, periodic), 2, size(states, 2))
-      guess%rate = turn / period
-      call find_series(periodic, states(f + 1:, :), 0.0_wp, period, guess)
-      guess%state = states(:, 1)
+      guess%state = y(1, :)
+      guess%state(f + 1:2 * f) = guess%state(f + 1:2 * f) + formulation_angles(machine, periodic)
+      call take_cycle(formulation, machine, periodic, now, period, y, guess, error)
     end associate
 
   contains
@@ -133,6 +126,27 @@ contains
     end subroutine look
 
   end subroutine find_cycle_of_run
+
+  !> The series of a period that begins now.
+  subroutine take_cycle(formulation, machine, periodic, now, period, y, guess, error)
+    class(formulation_t), intent(inout) :: formulation
+    type(machine_t), intent(in) :: machine                !! which has been formulated
+    type(periodic_machine_t), intent(in) :: periodic
+    real(wp), intent(in) :: now, period                   !! [s]
+    real(wp), contiguous, intent(inout) :: y(:, :)        !! state now, then after the period
+    type(orbit_t), intent(inout) :: guess
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: states(:, :)
+    integer :: i
+
+    call advance(formulation, now + [(period * i / guess_samples, i=0, guess_samples)], y, states, error)
+    if (allocated(error)) return
+    associate (f => periodic%machine%freedoms)
+      states(f + 1:2 * f, :) = states(f + 1:2 * f, :) + spread(formulation_angles(machine, periodic), 2, size(states, 2))
+      guess%rate = turn / period
+      call find_series(periodic, states(f + 1:, :), 0.0_wp, period, guess)
+    end associate
+  end subroutine take_cycle
 
   !> The time after which the speeds return, by the upward passages of the one that oscillates most through its mean; 0: none.
   pure subroutine find_period(states, freedoms, width, period, last)
