@@ -25,7 +25,7 @@ module nocdyn_synthesis
   type, public :: synthesis_t
     type(periodic_t), allocatable, private :: parts(:)
   contains
-    procedure :: extremes, find_period
+    procedure :: extremes, find_period, find_slopes
   end type synthesis_t
 
 contains
@@ -118,12 +118,12 @@ contains
     complex(wp), intent(in) :: amplitude(:)   !! [lines]
     real(wp), intent(out) :: lowest, highest
     integer :: p
-    real(wp) :: low, high
+    real(wp) :: angle(2), low, high
 
     lowest = 0.0_wp
     highest = 0.0_wp
     do p = 1, size(self%parts)
-      call periodic_extremes(self%parts(p), amplitude, low, high)
+      call periodic_extremes(self%parts(p), amplitude, low, high, angle)
       lowest = lowest + low
       highest = highest + high
     end do
@@ -146,10 +146,11 @@ contains
     end do
   end subroutine find_period
 
-  pure subroutine periodic_extremes(part, amplitude, low, high)
+  pure subroutine periodic_extremes(part, amplitude, low, high, angle)
     type(periodic_t), intent(in) :: part
     complex(wp), intent(in) :: amplitude(:)
     real(wp), intent(out) :: low, high
+    real(wp), intent(out) :: angle(2)   !! of the common frequency where they are, if there are several oscillations [rad]
     real(wp) :: half(part%samples / 2, 0:1)
     real(wp) :: value(0:part%samples + 1)   ! one more at each end
     integer :: i, k, parity
@@ -158,6 +159,7 @@ contains
     if (size(part%line) == 1) then
       high = abs(amplitude(part%line(1)))
       low = -high
+      angle = 0.0_wp
       return
     end if
     half = 0.0_wp   ! of the even and of the odd multiples, which change their sign from one half to the other
@@ -173,21 +175,26 @@ contains
     value(size(half, 1) + 1:part%samples) = half(:, 0) - half(:, 1)
     value(0) = value(part%samples)
     value(part%samples + 1) = value(1)
-    high = refined(part, amplitude, value, 1.0_wp)
-    low = -refined(part, amplitude, value, -1.0_wp)
+    call refine(part, amplitude, value, 1.0_wp, high, angle(2))
+    call refine(part, amplitude, value, -1.0_wp, low, angle(1))
+    low = -low
   end subroutine periodic_extremes
 
   !> The largest value of sign * function, by Newton's method from all samples that may be next to it.
-  pure real(wp) function refined(part, amplitude, value, sign)
+  pure subroutine refine(part, amplitude, value, sign, refined, angle)
     type(periodic_t), intent(in) :: part
     complex(wp), intent(in) :: amplitude(:)
     real(wp), intent(in) :: value(0:)  !! samples, [0 to samples + 1]
     real(wp), intent(in) :: sign       !! 1 or -1
+    real(wp), intent(out) :: refined
+    real(wp), intent(out) :: angle     !! of the common frequency there [rad]
     real(wp), dimension(part%samples) :: top, vertex   ! of the parabola through a maximum and its neighbours
-    real(wp) :: beside, bend, error, highest, slope
+    real(wp) :: at, beside, bend, climbed, error, highest, slope
     integer :: i, k, n
 
-    refined = maxval(sign * value)
+    i = maxloc(sign * value, dim=1) - 1
+    refined = sign * value(i)
+    angle = 2.0_wp * pi * (i - 1) / part%samples
     ! the largest value is within half a sample of one that is lower by this at most, for the curvature is bounded
     beside = 0.5_wp * sum(size_of(amplitude(part%line)) * part%multiple**2) * (pi / part%samples)**2
     n = 0
@@ -213,9 +220,13 @@ contains
             / (9.0_wp * sqrt(3.0_wp))
     do k = 1, n
       if (top(k) + error < max(refined, highest - error)) cycle
-      refined = max(refined, climbed(part, amplitude, 2.0_wp * pi * vertex(k) / part%samples, sign))
+      at = 2.0_wp * pi * vertex(k) / part%samples
+      call climb(part, amplitude, sign, at, climbed)
+      if (climbed <= refined) cycle
+      refined = climbed
+      angle = at
     end do
-  end function refined
+  end subroutine refine
 
   !> The magnitude of an amplitude, without the care of `abs` for numbers near the end of their range.
   elemental real(wp) function size_of(amplitude)
@@ -224,43 +235,92 @@ contains
     size_of = sqrt(real(amplitude, wp)**2 + aimag(amplitude)**2)
   end function size_of
 
-  pure real(wp) function climbed(part, amplitude, start, sign)
+  !> Goes from an angle to the maximum beside it.
+  pure subroutine climb(part, amplitude, sign, angle, climbed)
     type(periodic_t), intent(in) :: part
     complex(wp), intent(in) :: amplitude(:)
-    real(wp), intent(in) :: start, sign
+    real(wp), intent(in) :: sign
+    real(wp), intent(inout) :: angle   !! of the common frequency [rad]
+    real(wp), intent(out) :: climbed   !! the value there
     integer, parameter :: steps = 8
     real(wp), parameter :: near = 1.0e-4_wp   ! of the top, as a share of the shortest wave's radian: a parabola errs by its cube
-    complex(wp) :: power(0:maxval(part%multiple)), term
-    real(wp) :: angle, first, second, value
-    integer :: k, n
+    real(wp) :: before, derivative(0:2)
+    integer :: n
 
-    angle = start
     climbed = -huge(climbed)
+    before = angle
     do n = 1, steps
-      value = 0.0_wp
-      first = 0.0_wp
-      second = 0.0_wp
-      power(0) = sign
-      power(1) = cmplx(cos(angle), sin(angle), wp)
-      do k = 2, ubound(power, 1)
-        power(k) = power(k - 1) * power(1)
-      end do
-      power(1:) = sign * power(1:)
-      do k = 1, size(part%line)
-        term = amplitude(part%line(k)) * power(part%multiple(k))
-        value = value + real(term, wp)
-        first = first - part%multiple(k) * aimag(term)
-        second = second - part%multiple(k)**2 * real(term, wp)
-      end do
-      if (value <= climbed) return
-      climbed = value
-      if (.not. second < 0) return
-      if (abs(first) * maxval(part%multiple) <= near * abs(second)) then
-        climbed = value - 0.5_wp * first**2 / second
+      derivative = sign * derivatives_at(part, amplitude, angle)
+      if (derivative(0) <= climbed) then
+        angle = before
         return
       end if
-      angle = angle - max(-pi / part%samples, min(pi / part%samples, first / second))
+      climbed = derivative(0)
+      if (.not. derivative(2) < 0) return
+      before = angle
+      if (abs(derivative(1)) * maxval(part%multiple) <= near * abs(derivative(2))) then
+        climbed = derivative(0) - 0.5_wp * derivative(1)**2 / derivative(2)
+        return
+      end if
+      angle = angle - max(-pi / part%samples, min(pi / part%samples, derivative(1) / derivative(2)))
     end do
-  end function climbed
+    angle = before
+  end subroutine climb
+
+  !> The sum of the oscillations of a part, and its first two derivatives by the angle.
+  pure function derivatives_at(part, amplitude, angle) result(derivative)
+    type(periodic_t), intent(in) :: part
+    complex(wp), intent(in) :: amplitude(:)
+    real(wp), intent(in) :: angle      !! of the common frequency [rad]
+    real(wp) :: derivative(0:2)
+    complex(wp) :: power(0:maxval(part%multiple)), term
+    integer :: k
+
+    power(0) = 1.0_wp
+    power(1) = cmplx(cos(angle), sin(angle), wp)
+    do k = 2, ubound(power, 1)
+      power(k) = power(k - 1) * power(1)
+    end do
+    derivative = 0.0_wp
+    do k = 1, size(part%line)
+      term = amplitude(part%line(k)) * power(part%multiple(k))
+      derivative = derivative + [real(term, wp), -part%multiple(k) * aimag(term), -part%multiple(k)**2 * real(term, wp)]
+    end do
+  end function derivatives_at
+
+  !> The derivatives of the half range by the amplitudes: it grows by Re(sum of slope * growth of amplitude). The times of the
+  !> extremes may stay where they are, as the sum does not change with them.
+  pure subroutine find_slopes(self, amplitude, slope)
+    class(synthesis_t), intent(in) :: self
+    complex(wp), intent(in) :: amplitude(:)   !! [lines]
+    complex(wp), intent(out) :: slope(:)      !! [lines]
+    integer, parameter :: rounds = 3          ! of Newton's method, from angles that are right to a ten-thousandth
+    real(wp) :: angle(2), derivative(0:2), low, high
+    integer :: i, k, n, p
+
+    slope = (0.0_wp, 0.0_wp)
+    do p = 1, size(self%parts)
+      associate (part => self%parts(p))
+        if (size(part%line) == 1) then
+          associate (one => amplitude(part%line(1)))
+            if (abs(one) > 0) slope(part%line(1)) = conjg(one) / abs(one)
+          end associate
+          cycle
+        end if
+        call periodic_extremes(part, amplitude, low, high, angle)
+        do i = 1, 2
+          do n = 1, rounds
+            derivative = derivatives_at(part, amplitude, angle(i))
+            if (abs(derivative(2)) > 0) angle(i) = angle(i) - derivative(1) / derivative(2)
+          end do
+        end do
+        do k = 1, size(part%line)
+          associate (turn => part%multiple(k) * angle)
+            slope(part%line(k)) = 0.5_wp * cmplx(cos(turn(2)) - cos(turn(1)), sin(turn(2)) - sin(turn(1)), wp)
+          end associate
+        end do
+      end associate
+    end do
+  end subroutine find_slopes
 
 end module nocdyn_synthesis

@@ -21,6 +21,7 @@ module nocdyn_analysis_command
   use nocdyn_posix, only: catch_interrupts, is_interrupted, remove_file, stop_at_interrupts
   use nocdyn_result_files, only: result_files_t
   use nocdyn_result_folders, only: out_folder, refuse_shared_folders, result_folder
+  use nocdyn_sensitivity_results, only: sensitivity_results_t
   use nocdyn_strictness, only: be_strict
   use nocdyn_sweep_plan, only: add_plan_diagnostics, has_sweep, make_plan, sweep_plan_t
   use nocdyn_text, only: append, counted, listed, shown_path, string_t, to_text
@@ -70,6 +71,8 @@ contains
       call analyse_files(arguments, check_results_t(is_steady=.false., locks_joints=.false., takes_joints=.true.), code)
     case ('matrices')
       call analyse_files(arguments, matrices_results_t(is_steady=.false., locks_joints=.false., has_report=.false.), code)
+    case ('sensitivity')
+      call analyse_files(arguments, sensitivity_results_t(locks_joints=.false.), code)
     case ('transit')
       call analyse_files(arguments, transit_results_t(is_steady=.false., locks_joints=.false., takes_joints=.true., &
                                                       always_writes=.true.), code)

@@ -115,6 +115,17 @@ contains
       '                     machine with more than 600 degrees of freedom 100' // nl // &
       '  --range_hz LOW,HIGH  only the modes in this range of frequencies at the first speed [Hz]' // nl // &
       '  --quiet            print nothing but errors', analysis_command)
+    call add_command(commands, 'sensitivity', 'FILE...', '--out --set --case --at --modes --range_hz', &
+      'derivatives of frequencies, critical speeds and half ranges by every number', &
+      'Differentiates what modes and response answer by every number of the machine: frequencies and damping, with' // nl // &
+      '&response also critical speeds, their margins and the half ranges there. Prints for each answer the numbers' // nl // &
+      'with the largest effect, as what one per cent more of a number does.' // nl // nl // &
+      '  --at equilibrium   modes about the steady state (default), or at rest, as of nocdyn modes' // nl // &
+      '  --modes NUMBER     only so many modes, of the lowest frequencies' // nl // &
+      '  --range_hz LOW,HIGH  only the modes in this range of frequencies [Hz]' // nl // &
+      '  --set PATH=VALUE   override a key' // nl // &
+      '  --out DIR          write sensitivity.csv and sensitivity.json to DIR' // nl // &
+      case_help, analysis_command)
     call add_command(commands, 'orbit', 'FILE...', '--out --set --case --strict --resume --quiet', &
       'periodic motions of nonlinear machines: folds, jumps, stability', &
       'Follows by &orbit the periodic motions of a machine over a number of its input or over the mean speed of a' // nl // &

@@ -1,0 +1,84 @@
+!> Derivatives of what analyses answer by the numbers of a machine, as an analysis: sensitivity.csv and sensitivity.json.
+module nocdyn_sensitivity_results
+  use nocdyn_analyses, only: analysis_options_t, analysis_t
+  use nocdyn_answers, only: answer_t, differentiate
+  use nocdyn_errors, only: error_t
+  use nocdyn_input, only: input_t
+  use nocdyn_json, only: json_t
+  use nocdyn_machine, only: machine_t
+  use nocdyn_mode_answers, only: mode_answers_t, new_mode_answers
+  use nocdyn_output_file, only: output_file_t
+  use nocdyn_sensitivity_report, only: put_sensitivity, sensitivity_csv, sensitivity_t, sensitivity_text
+  use nocdyn_text, only: append, string_t
+  use nocdyn_varied_keys, only: list_varied_keys
+  use nocdyn_wanted_modes, only: modes_choice_t
+  implicit none (type, external)
+  private
+
+  character(len=*), parameter :: table_name = 'sensitivity.csv'
+
+  type, extends(analysis_t), public :: sensitivity_results_t
+    type(sensitivity_t), private :: found
+  contains
+    procedure :: solve, list_tables, put_table, put_report, text => printed
+  end type sensitivity_results_t
+
+contains
+
+  subroutine solve(self, input, machine, options, error)
+    class(sensitivity_results_t), intent(inout) :: self
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    type(analysis_options_t), intent(in) :: options
+    type(error_t), allocatable, intent(out) :: error
+    type(mode_answers_t) :: modes
+    character(len=:), allocatable :: at
+
+    at = 'equilibrium'
+    if (options%at /= '') at = options%at
+    allocate (self%found%notes(0), self%found%answers(0))
+    call list_varied_keys(input, self%found%keys, self%found%notes)
+    call new_mode_answers(input, at, modes_choice_t(options%modes, options%has_range, options%range_hz), modes, &
+                          self%found%notes, error)
+    if (.not. allocated(error)) call differentiate(input, self%found%keys, modes, self%found%notes, error)
+    if (allocated(error)) then
+      error%message = input%shown_case() // ': ' // error%message
+      return
+    end if
+    self%found%answers = [self%found%answers, modes%answers]
+  end subroutine solve
+
+  subroutine list_tables(self, names)
+    class(sensitivity_results_t), intent(in) :: self
+    type(string_t), allocatable, intent(out) :: names(:)
+
+    allocate (names(0))
+    call append(names, table_name)
+  end subroutine list_tables
+
+  subroutine put_table(self, input, name, file)
+    class(sensitivity_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: name
+    type(output_file_t), intent(inout) :: file
+
+    call sensitivity_csv(self%found, file)
+  end subroutine put_table
+
+  subroutine put_report(self, input, json)
+    class(sensitivity_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    type(json_t), intent(inout) :: json
+
+    call put_sensitivity(json, input, self%found)
+  end subroutine put_report
+
+  subroutine printed(self, input, text)
+    class(sensitivity_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    character(len=:), allocatable, intent(out) :: text
+
+    text = sensitivity_text(input%shown_case(), self%found)
+  end subroutine printed
+
+end module nocdyn_sensitivity_results

@@ -1,0 +1,180 @@
+!> The numbers of a machine by which its answers are differentiated: all that an input gives, one by one.
+!>
+!> A number p enters by central differences of the sixth order: what is differentiated is evaluated for the machines of the input
+!> with p + k h, k = -3 ... 3, and everything else, motions and eigenvectors, stays as it is. The numbers of a linear machine are
+!> smooth functions of those of the input, mostly powers, so that such a difference has ten digits and more. Where a key does not
+!> allow p + k h on one side, the six points are on the other one.
+module nocdyn_varied_keys
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack_lu, only: lu_factor, lu_solve
+  use nocdyn_schema, only: first_key, group_rules, key_rules
+  use nocdyn_schema_rules, only: a_number, in_machine, in_torques, key_rule_t
+  use nocdyn_targets, only: find_target, set_targets, target_t
+  use nocdyn_text, only: append, counted, joined, string_t, to_text
+  implicit none (type, external)
+  private
+
+  public :: list_varied_keys, set_key, sixth_order
+
+  integer, parameter, public :: points = 6                   !! of a difference
+  integer, parameter :: most_of_a_list = 12                  ! numbers of a list that are looked at one by one
+  real(wp), parameter :: relative_step = 2.0e-3_wp           ! h, as a share of the number; of angles at least [rad]
+  integer, parameter, public :: central(points) = [-3, -2, -1, 1, 2, 3]
+  integer, parameter :: one_sided(points) = [1, 2, 3, 4, 5, 6]
+
+  !> One number.
+  type, public :: varied_key_t
+    type(target_t) :: target
+    real(wp) :: value = 0.0_wp              !! in SI
+    real(wp) :: change(points) = 0.0_wp     !! of the number at each point
+    real(wp) :: weight(points) = 0.0_wp     !! of the derivative at its value
+    real(wp) :: weight_here = 0.0_wp        !! of the value itself; 0 where the points are on both sides
+  end type varied_key_t
+
+contains
+
+  !> The numbers that the bodies, connections and torques of an input have. Those that are 0, whole numbers, and long lists are
+  !> left out; notes say so.
+  subroutine list_varied_keys(given, keys, notes)
+    type(input_t), intent(in) :: given
+    type(varied_key_t), allocatable, intent(out) :: keys(:)
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    type(string_t), allocatable :: fixed(:), long(:)
+    type(varied_key_t) :: key
+    type(input_t) :: input
+    character(len=:), allocatable :: path
+    integer :: count, g, i, k
+    logical :: is_possible
+
+    input = given
+    allocate (keys(64), long(0), fixed(0))
+    count = 0
+    do g = 1, size(input%groups)
+      associate (group => input%groups(g))
+        if (all(group_rules(group%rule)%topic /= [in_machine, in_torques]) .or. group%name == '') cycle
+        do k = 1, size(group%values)
+          associate (rule => key_rules(first_key(group%rule) + k - 1), value => group%values(k))
+            if (rule%value_type /= a_number .or. .not. value%is_given .or. .not. allocated(value%numbers)) cycle
+            path = group%kind // '.' // group%name // '.' // trim(rule%name)
+            if (size(value%numbers) > most_of_a_list .or. rule%ascends) then
+              call append(long, path)
+              cycle
+            end if
+            do i = 1, size(value%numbers)
+              if (.not. abs(value%numbers(i)) > 0) cycle
+              call find_key(input, path, i, size(value%numbers), rule, key, is_possible)
+              if (is_possible) then
+                call append_key(keys, count, key)
+              else
+                call append(fixed, path)
+              end if
+            end do
+          end associate
+        end do
+      end associate
+    end do
+    keys = keys(:count)
+    if (size(long) > 0) call append(notes, 'without the numbers of tables: ' // joined(long, ', ', 4))
+    if (size(fixed) > 0) call append(notes, 'without numbers that other keys leave no room: ' // joined(fixed, ', ', 4))
+  end subroutine list_varied_keys
+
+  subroutine append_key(keys, count, key)
+    type(varied_key_t), allocatable, intent(inout) :: keys(:)   !! the first `count` are in use
+    integer, intent(inout) :: count
+    type(varied_key_t), intent(in) :: key
+    type(varied_key_t), allocatable :: more(:)
+
+    if (count == size(keys)) then
+      allocate (more(2 * count))
+      more(:count) = keys
+      call move_alloc(more, keys)
+    end if
+    count = count + 1
+    keys(count) = key
+  end subroutine append_key
+
+  !> A number with the points at which it is looked at.
+  subroutine find_key(input, path, position, count, rule, key, is_possible)
+    type(input_t), intent(inout) :: input
+    character(len=*), intent(in) :: path        !! without a subscript
+    integer, intent(in) :: position, count      !! in the list of the key
+    type(key_rule_t), intent(in) :: rule
+    type(varied_key_t), intent(out) :: key
+    logical, intent(out) :: is_possible         !! whether it can be changed alone
+    integer :: side
+    real(wp) :: step
+    character(len=:), allocatable :: message, whole
+
+    whole = path
+    if (count > 1) whole = path // '(' // to_text(position) // ')'
+    call find_target(input, whole, key%target, message)
+    is_possible = message == ''
+    if (.not. is_possible) return
+    key%value = input%groups(key%target%group)%values(key%target%key)%numbers(position)
+    step = relative_step * abs(key%value)
+    if (rule%unit == 'rad') step = max(step, relative_step)
+    do side = 0, 2   ! both, below, above
+      select case (side)
+      case (0)
+        key%change = step * central
+      case (1)
+        key%change = -sign(step, key%value) * one_sided
+      case default
+        key%change = sign(step, key%value) * one_sided
+      end select
+      call try_change(input, key, maxval(key%change), is_possible)
+      if (is_possible) call try_change(input, key, minval(key%change), is_possible)
+      if (is_possible) exit
+    end do
+    if (is_possible) call sixth_order(key%change, key%weight, key%weight_here)
+  end subroutine find_key
+
+  !> Whether a key may have a changed number.
+  subroutine try_change(input, key, change, is_allowed)
+    type(input_t), intent(inout) :: input   !! has the number itself again after all
+    type(varied_key_t), intent(in) :: key
+    real(wp), intent(in) :: change
+    logical, intent(out) :: is_allowed
+    character(len=:), allocatable :: again, message
+
+    call set_targets(input, [key%target], [key%value + change], message)
+    is_allowed = message == ''
+    call set_targets(input, [key%target], [key%value], again)
+  end subroutine try_change
+
+  !> The weights of six points, and of the point between or beside them, with which polynomials of the sixth degree are
+  !> differentiated exactly.
+  subroutine sixth_order(change, weight, weight_here)
+    real(wp), intent(in) :: change(points)    !! at which the function is evaluated, none of them 0
+    real(wp), intent(out) :: weight(points), weight_here
+    real(wp) :: powers(points, points), scale
+    integer :: k, pivots(points)
+    logical :: is_singular
+
+    scale = maxval(abs(change))
+    do k = 1, points
+      powers(k, :) = (change / scale)**k
+    end do
+    weight = 0.0_wp
+    weight(1) = 1.0_wp / scale
+    call lu_factor(powers, pivots, is_singular)
+    call lu_solve(powers, pivots, weight)
+    weight_here = -sum(weight)
+    if (abs(sum(change)) <= epsilon(scale) * scale) weight_here = 0.0_wp
+  end subroutine sixth_order
+
+  !> Gives a number of an input its value at a point.
+  subroutine set_key(input, key, point)
+    type(input_t), intent(inout) :: input
+    type(varied_key_t), intent(in) :: key
+    integer, intent(in) :: point   !! 0: the number itself
+    character(len=:), allocatable :: message
+    real(wp) :: value
+
+    value = key%value
+    if (point > 0) value = value + key%change(point)
+    call set_targets(input, [key%target], [value], message)
+  end subroutine set_key
+
+end module nocdyn_varied_keys
