@@ -29,6 +29,7 @@ module nocdyn_answers
   type, abstract, public :: answers_t
     type(answer_t), allocatable :: answers(:)
     integer :: functionals = 0
+    real(wp), allocatable :: scale(:)   !! sizes of the terms of each functional, [functionals]
   contains
     procedure(evaluate_interface), deferred :: evaluate
     procedure(finish_interface), deferred :: finish
@@ -37,10 +38,12 @@ module nocdyn_answers
   abstract interface
 
     !> The functionals of a changed input.
-    subroutine evaluate_interface(self, input, values, error)
-      import :: answers_t, error_t, input_t, wp
+    subroutine evaluate_interface(self, input, key, point, values, error)
+      import :: answers_t, error_t, input_t, varied_key_t, wp
       class(answers_t), intent(in) :: self
-      type(input_t), intent(in) :: input
+      type(input_t), intent(in) :: input                 !! with the number at the point
+      type(varied_key_t), intent(in) :: key
+      integer, intent(in) :: point
       real(wp), intent(out) :: values(:)                 !! [functionals]
       type(error_t), allocatable, intent(out) :: error   !! the changed machine has none, or another structure
     end subroutine evaluate_interface
@@ -92,7 +95,7 @@ contains
       do p = 0, points
         if (p == 0 .and. .not. abs(keys(k)%weight_here) > 0) cycle
         call set_key(varied, keys(k), p)
-        call group%evaluate(varied, values(:, p), own)
+        call group%evaluate(varied, keys(k), p, values(:, p), own)
         if (allocated(own)) exit
       end do
       call set_key(varied, keys(k), 0)
@@ -101,7 +104,7 @@ contains
         if (.not. all(is_finite(slopes(:, k)))) call raise(own, exit_failed, 'a derivative is not a finite number')
       end if
       if (.not. allocated(own)) then
-        if (is_rough(keys(k), values, slopes(:, k))) call append(rough, keys(k)%target%path)
+        if (is_rough(keys(k), values, slopes(:, k), group%scale)) call append(rough, keys(k)%target%path)
         cycle
       end if
       slopes(:, k) = 0.0_wp
@@ -120,18 +123,19 @@ contains
   end subroutine differentiate
 
   !> Whether differences of the fourth order tell otherwise.
-  pure logical function is_rough(key, values, slopes)
+  pure logical function is_rough(key, values, slopes, scale)
     type(varied_key_t), intent(in) :: key
     real(wp), intent(in) :: values(:, 0:)   !! [functionals, 0:points]
     real(wp), intent(in) :: slopes(:)       !! [functionals]
-    real(wp), parameter :: tolerance = 1.0e-4_wp, rounding = 1.0e-10_wp   ! relative
+    real(wp), intent(in) :: scale(:)        !! as of `answers_t`
+    real(wp), parameter :: tolerance = 1.0e-4_wp, least = 1.0e-7_wp   ! relative
     real(wp) :: lower(size(slopes))
 
     is_rough = .false.
     if (abs(key%weight_here) > 0) return
     associate (step => key%change(4))
       lower = (8.0_wp * (values(:, 4) - values(:, 3)) - (values(:, 5) - values(:, 2))) / (12.0_wp * step)
-      is_rough = any(abs(lower - slopes) > tolerance * abs(slopes) + rounding * maxval(abs(values), dim=2) / abs(step))
+      is_rough = any(abs(lower - slopes) > tolerance * abs(slopes) + least * scale / max(abs(key%value), abs(step)))
     end associate
   end function is_rough
 

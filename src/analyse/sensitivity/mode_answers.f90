@@ -17,9 +17,11 @@ module nocdyn_mode_answers
   use nocdyn_linearisation, only: find_slopes, has_turning_losses, held_elements
   use nocdyn_machine, only: machine_t
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
+  use nocdyn_quick_changes, only: new_quick_change, quick_change_t
   use nocdyn_slopes, only: slopes_t
   use nocdyn_text, only: append, rounded_text, string_t, to_text
   use nocdyn_units, only: from_si, unit_hz
+  use nocdyn_varied_keys, only: varied_key_t
   use nocdyn_wanted_modes, only: choose_numbers, find_covering, modes_choice_t, wanted_modes_t
   implicit none (type, external)
   private
@@ -30,6 +32,8 @@ module nocdyn_mode_answers
 
   type, extends(answers_t), public :: mode_answers_t
     type(frame_t), private :: frame
+    type(machine_t), private :: machine                !! at the operating point
+    type(slopes_t), private :: slopes
     character(len=:), allocatable, private :: at       !! the state: 'equilibrium', ...
     complex(wp), allocatable, private :: value(:)      !! eigenvalues [1/s], [modes]
     type(frozen_motion_t), allocatable, private :: motion(:)
@@ -69,6 +73,8 @@ contains
       return
     end if
     allocate (held, source=held_elements(point%formulation))
+    self%machine = point%formulation%machine
+    self%slopes = slopes
     self%frame = new_frame(point%formulation%machine)
     call new_band_pencil(point%formulation%machine, self%frame%incidence, slopes%stiffness, held, pencil, error)
     if (allocated(error)) return
@@ -108,6 +114,10 @@ contains
         self%norm(i) = motion%form_of_slope(other, point%formulation%machine, slopes, self%value(self%partner(1, i)))
         self%turn(i) = motion%form_of_frequency(other, slopes, self%value(self%partner(1, i)))
       end associate
+    end do
+    allocate (self%scale(2 * size(self%norm)))
+    do i = 1, size(self%norm)
+      self%scale(2 * i - 1:2 * i) = maxval(abs(self%norm)) * abs(self%value(self%partner(1, i)))
     end do
     self%functionals = 2 * size(self%partner, 2)
     call note_neighbours(self, notes)
@@ -164,33 +174,53 @@ contains
     if (.not. allocated(error)) call find_slopes(point%formulation, point%t, point%y, slopes, error)
   end subroutine find_state
 
-  subroutine evaluate(self, input, values, error)
+  subroutine evaluate(self, input, key, point, values, error)
     class(mode_answers_t), intent(in) :: self
     type(input_t), intent(in) :: input
+    type(varied_key_t), intent(in) :: key
+    integer, intent(in) :: point
     real(wp), intent(out) :: values(:)
     type(error_t), allocatable, intent(out) :: error
-    complex(wp) :: form
     type(machine_t) :: machine
-    type(operating_point_t) :: point
+    type(operating_point_t) :: operating
+    type(quick_change_t) :: quick
     type(slopes_t) :: slopes
     type(view_t) :: view
-    integer :: p
 
     values = 0.0_wp
-    call find_state(input, self%at, machine, point, slopes, error)
+    quick = new_quick_change(input, key, self%machine)
+    if (quick%body > 0) then
+      machine = self%machine
+      machine%inertia(1, quick%body) = machine%inertia(1, quick%body) + (key%at(point) - key%value)
+      call evaluate_forms(self, view, machine, self%slopes, values)
+      return
+    end if
+    call find_state(input, self%at, machine, operating, slopes, error)
     if (allocated(error)) return
-    view = new_view(self%frame, point%formulation%machine)
+    view = new_view(self%frame, operating%formulation%machine)
     if (.not. view%is_alike) then
       call raise(error, exit_failed, 'it changes the coordinates or the nodes of shafts')
       return
     end if
+    call evaluate_forms(self, view, operating%formulation%machine, slopes, values)
+  end subroutine evaluate
+
+  subroutine evaluate_forms(self, view, machine, slopes, values)
+    type(mode_answers_t), intent(in) :: self
+    type(view_t), intent(in) :: view
+    type(machine_t), intent(in) :: machine
+    type(slopes_t), intent(in) :: slopes
+    real(wp), intent(out) :: values(:)
+    complex(wp) :: form
+    integer :: p
+
     do p = 1, size(self%partner, 2)
       associate (i => self%partner(1, p), k => self%partner(2, p))
-        form = self%motion(i)%form(self%motion(k), self%frame, view, point%formulation%machine, slopes, self%value(i))
+        form = self%motion(i)%form(self%motion(k), self%frame, view, machine, slopes, self%value(i))
       end associate
       values(2 * p - 1:2 * p) = [real(form, wp), aimag(form)]
     end do
-  end subroutine evaluate
+  end subroutine evaluate_forms
 
   subroutine finish(self, slopes)
     class(mode_answers_t), intent(inout) :: self

@@ -6,7 +6,7 @@ module nocdyn_sensitivity_report
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: ascending_order
-  use nocdyn_table_text, only: cell_width, padded
+  use nocdyn_table_text, only: padded
   use nocdyn_output_file, only: output_file_t
   use nocdyn_text, only: rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
@@ -32,14 +32,15 @@ module nocdyn_sensitivity_report
 
 contains
 
-  !> By how much an answer changes if a number grows by one per cent: as a share of the answer [%], of shares in points [%], [keys].
+  !> By how much an answer changes if a number grows by one per cent, an angle by one degree: as a share of the answer [%], of
+  !> shares in points [%], [keys].
   pure function effects(self, answer)
     class(sensitivity_t), intent(in) :: self
     integer, intent(in) :: answer
     real(wp) :: effects(size(self%keys))
 
     associate (one => self%answers(answer))
-      effects = one%derivative * self%keys%value
+      effects = percent * one%derivative * self%keys%small
       if (one%is_share) return
       if (abs(one%value) > 0) effects = effects / abs(one%value)
     end associate
@@ -68,7 +69,7 @@ contains
       call report%append_line(file // ': note: ' // self%notes(i)%text)
     end do
     call report%append_line(file // ': derivatives by ' // to_text(size(self%keys)) // ' numbers; what one per cent more of ' // &
-                            'each does')
+                            'each does, of angles one degree')
     do i = 1, min(size(self%answers), most_answers)
       associate (one => self%answers(i))
         call report%append_line('  ' // one%kind // ' of ' // one%label // ' = ' // value_text(one))
@@ -77,8 +78,8 @@ contains
         if (size(order) > 0) then
           do k = 1, min(size(order), most_of_answer)
             if (abs(effect(order(k))) <= least * abs(effect(order(1)))) exit
-            line = '    ' // padded(signed(effect(order(k))) // trim(merge(' points', ' %     ', one%is_share)), cell_width)
-            call report%append_line(line // 'by ' // self%keys(order(k))%target%path // sentence(one, self%keys(order(k)), &
+            line = '    ' // padded(signed(effect(order(k))) // trim(merge(' points', ' %     ', one%is_share)), 16)
+            call report%append_line(line // ' by ' // self%keys(order(k))%target%path // sentence(one, self%keys(order(k)), &
                                                                                                 effect(order(k)), k))
           end do
         end if
@@ -99,7 +100,7 @@ contains
     character(len=:), allocatable :: text
 
     text = ''
-    if (answer%kind /= 'margin' .or. rank > 1 .or. .not. abs(effect) > 0) return
+    if (answer%kind /= 'margin' .or. rank > 1 .or. .not. abs(effect) > 0 .or. key%small_text /= '1 %') return
     text = ': the margin of ' // answer%label // ' gains 1 % for ' // signed(1.0_wp / effect) // ' % of ' // key%target%path
   end function sentence
 
@@ -131,7 +132,7 @@ contains
     integer :: i, k
     real(wp) :: effect(size(self%keys))
 
-    call file%put('answer,of,value,unit,number,number_value,number_unit,derivative,effect_of_1_percent [%]' // line_end)
+    call file%put('answer,of,value,unit,number,number_value,number_unit,derivative,change,effect [%]' // line_end)
     do i = 1, size(self%answers)
       order = ranking(self, i)
       effect = self%effects(i)
@@ -140,7 +141,8 @@ contains
           associate (key => self%keys(order(k)))
             call file%put(one%kind // ',"' // one%label // '",' // to_text(one%value) // ',' // one%unit // ',' // &
                           text_cell(key%target%path) // ',' // to_text(key%value) // ',' // key%target%unit)
-            call file%put_numbers([one%derivative(order(k)), effect(order(k))], ',')
+            call file%put(',' // to_text(one%derivative(order(k))) // ',' // trim(key%small_text) // ',' // &
+                          to_text(effect(order(k))))
             call file%put(line_end)
           end associate
         end do
@@ -164,6 +166,7 @@ contains
       call json%put('path', self%keys(i)%target%path)
       call json%put('value', self%keys(i)%value)
       call json%put('unit', self%keys(i)%target%unit)
+      call json%put('change', trim(self%keys(i)%small_text))
       call json%close()
     end do
     call json%close_list()
@@ -176,7 +179,7 @@ contains
         call json%put('value', one%value)
         call json%put('unit', one%unit)
         call json%put('derivative', one%derivative)
-        call json%put('effect_of_1_percent', self%effects(i))
+        call json%put('effect_percent', self%effects(i))
         call json%close()
       end associate
     end do

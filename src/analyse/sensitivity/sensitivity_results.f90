@@ -8,6 +8,7 @@ module nocdyn_sensitivity_results
   use nocdyn_machine, only: machine_t
   use nocdyn_mode_answers, only: mode_answers_t, new_mode_answers
   use nocdyn_output_file, only: output_file_t
+  use nocdyn_response_answers, only: new_response_answers, response_answers_t
   use nocdyn_sensitivity_report, only: put_sensitivity, sensitivity_csv, sensitivity_t, sensitivity_text
   use nocdyn_text, only: append, string_t
   use nocdyn_varied_keys, only: list_varied_keys
@@ -16,6 +17,7 @@ module nocdyn_sensitivity_results
   private
 
   character(len=*), parameter :: table_name = 'sensitivity.csv'
+  integer, parameter :: most_criticals = 20   ! those with the largest responses
 
   type, extends(analysis_t), public :: sensitivity_results_t
     type(sensitivity_t), private :: found
@@ -32,6 +34,7 @@ contains
     type(analysis_options_t), intent(in) :: options
     type(error_t), allocatable, intent(out) :: error
     type(mode_answers_t) :: modes
+    type(response_answers_t) :: response
     character(len=:), allocatable :: at
 
     at = 'equilibrium'
@@ -45,8 +48,23 @@ contains
       error%message = input%shown_case() // ': ' // error%message
       return
     end if
-    self%found%answers = [self%found%answers, modes%answers]
+    call add_answers(modes%answers, self%found%answers)
+    if (size(input%groups_named('response')) == 0) return
+    call new_response_answers(input, most_criticals, response, self%found%notes, error)
+    if (.not. allocated(error)) call differentiate(input, self%found%keys, response, self%found%notes, error)
+    if (.not. allocated(error)) call add_answers(response%answers, self%found%answers)
   end subroutine solve
+
+  subroutine add_answers(new, answers)
+    type(answer_t), intent(in) :: new(:)
+    type(answer_t), allocatable, intent(inout) :: answers(:)
+    type(answer_t), allocatable :: all(:)
+
+    allocate (all(size(answers) + size(new)))
+    all(:size(answers)) = answers
+    all(size(answers) + 1:) = new
+    call move_alloc(all, answers)
+  end subroutine add_answers
 
   subroutine list_tables(self, names)
     class(sensitivity_results_t), intent(in) :: self

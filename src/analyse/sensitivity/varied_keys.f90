@@ -12,6 +12,7 @@ module nocdyn_varied_keys
   use nocdyn_schema_rules, only: a_number, in_machine, in_torques, key_rule_t
   use nocdyn_targets, only: find_target, set_targets, target_t
   use nocdyn_text, only: append, counted, joined, string_t, to_text
+  use nocdyn_units, only: in_si, unit_deg
   implicit none (type, external)
   private
 
@@ -27,9 +28,13 @@ module nocdyn_varied_keys
   type, public :: varied_key_t
     type(target_t) :: target
     real(wp) :: value = 0.0_wp              !! in SI
+    real(wp) :: small = 0.0_wp              !! one per cent of it, or one degree of an angle
+    character(len=5) :: small_text = '1 %'
     real(wp) :: change(points) = 0.0_wp     !! of the number at each point
     real(wp) :: weight(points) = 0.0_wp     !! of the derivative at its value
     real(wp) :: weight_here = 0.0_wp        !! of the value itself; 0 where the points are on both sides
+  contains
+    procedure :: at
   end type varied_key_t
 
 contains
@@ -56,6 +61,7 @@ contains
         do k = 1, size(group%values)
           associate (rule => key_rules(first_key(group%rule) + k - 1), value => group%values(k))
             if (rule%value_type /= a_number .or. .not. value%is_given .or. .not. allocated(value%numbers)) cycle
+            if (index(rule%name, 'order') > 0) cycle   ! which lines there are
             path = group%kind // '.' // group%name // '.' // trim(rule%name)
             if (size(value%numbers) > most_of_a_list .or. rule%ascends) then
               call append(long, path)
@@ -113,7 +119,13 @@ contains
     if (.not. is_possible) return
     key%value = input%groups(key%target%group)%values(key%target%key)%numbers(position)
     step = relative_step * abs(key%value)
-    if (rule%unit == 'rad') step = max(step, relative_step)
+    key%small = 0.01_wp * key%value
+    key%small_text = '1 %'
+    if (rule%unit == 'rad') then
+      step = max(step, relative_step)
+      key%small = in_si(1.0_wp, unit_deg)
+      key%small_text = '1 deg'
+    end if
     do side = 0, 2   ! both, below, above
       select case (side)
       case (0)
@@ -170,11 +182,17 @@ contains
     type(varied_key_t), intent(in) :: key
     integer, intent(in) :: point   !! 0: the number itself
     character(len=:), allocatable :: message
-    real(wp) :: value
 
-    value = key%value
-    if (point > 0) value = value + key%change(point)
-    call set_targets(input, [key%target], [value], message)
+    call set_targets(input, [key%target], [key%at(point)], message)
   end subroutine set_key
+
+  !> The number at a point.
+  pure real(wp) function at(self, point)
+    class(varied_key_t), intent(in) :: self
+    integer, intent(in) :: point   !! 0: the number itself
+
+    at = self%value
+    if (point > 0) at = at + self%change(point)
+  end function at
 
 end module nocdyn_varied_keys

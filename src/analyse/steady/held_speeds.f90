@@ -63,7 +63,7 @@ module nocdyn_held_speeds
     logical :: supply_holds = .false.                !! whether they do so by the frequency of their supply
     real(wp), private :: slip = 0.0_wp               !! last share of the frequency beyond that without slip of the first motor
   contains
-    procedure :: hold, has_drive
+    procedure :: hold, has_drive, forget
   end type held_speeds_t
 
 contains
@@ -286,6 +286,13 @@ contains
     self%last_speed = speed
     if (self%is_free) self%steady = state
   end subroutine hold
+
+  !> After a change of numbers: a single steady state is to be found again.
+  subroutine forget(self)
+    class(held_speeds_t), intent(inout) :: self
+
+    if (allocated(self%steady)) deallocate (self%steady)
+  end subroutine forget
 
   !> Whether motors or engines can hold the speed.
   pure logical function has_drive(self)

@@ -1,0 +1,266 @@
+"""nocdyn sensitivity: derivatives against central differences of numbers of 200 bits, and of the program's own answers."""
+
+import json
+import random
+
+import mpmath
+import pytest
+
+DIGITS = 40
+STEP = mpmath.mpf("1e-14")  # relative, of central differences with so many digits
+TURN = 2 * mpmath.pi
+ORDER, TORQUE = 2.0, 7.0
+
+
+def random_chain(dice, bodies):
+    """Inertias and couplings (stiffness, relative damping, viscous damping) of a chain with a load at its end."""
+    inertias = [dice.uniform(0.5, 3) for _ in range(bodies)]
+    couplings = [(dice.uniform(1e4, 4e4), dice.uniform(0.05, 0.4), dice.uniform(0.5, 3)) for _ in range(bodies - 1)]
+    return {f"body.b{i}.inertia": inertia for i, inertia in enumerate(inertias)} | {
+        f"coupling.c{i}.{key}": value
+        for i, values in enumerate(couplings)
+        for key, value in zip(("stiffness", "relative_damping", "damping"), values, strict=True)
+    }
+
+
+def chain_text(numbers, bodies):
+    text = "".join(f"&body name = 'b{i}' inertia = {numbers[f'body.b{i}.inertia']!r} /\n" for i in range(bodies))
+    for i in range(bodies - 1):
+        keys = " ".join(f"{key} = {numbers[f'coupling.c{i}.{key}']!r}" for key in ("stiffness", "relative_damping", "damping"))
+        text += f"&coupling name = 'c{i}' bodies = 'b{i}', 'b{i + 1}' {keys} /\n"
+    return text + (
+        f"&load name = 'l' body = 'b{bodies - 1}' viscous = 0.1 /\n"
+        f"&excitation name = 'e' body = 'b0' kind = 'orders' orders = {ORDER} amplitudes = {TORQUE} /\n"
+        "&response body = 'b0' speed = 20, 150 count = 200 operating = 120, 140 /\n&run t_end = 1 start = 'equilibrium' /\n"
+    )
+
+
+class Chain:
+    """The same machine with exact numbers."""
+
+    def __init__(self, numbers, bodies):
+        self.bodies = bodies
+        self.inertia = [numbers[f"body.b{i}.inertia"] for i in range(bodies)]
+        self.couplings = [
+            [numbers[f"coupling.c{i}.{key}"] for key in ("stiffness", "relative_damping", "damping")] for i in range(bodies - 1)
+        ]
+
+    def stiffness(self, i, value):
+        """D of a coupling for motions exp(value t): the relative damping is 2 pi times the loss factor."""
+        k, psi, c = self.couplings[i]
+        return k + value * c + value / mpmath.im(value) * k * psi / (2 * mpmath.pi)
+
+    def matrix(self, value):
+        matrix = mpmath.matrix(self.bodies)
+        for i, inertia in enumerate(self.inertia):
+            matrix[i, i] += value**2 * inertia
+        matrix[self.bodies - 1, self.bodies - 1] += value * mpmath.mpf("0.1")
+        for i in range(self.bodies - 1):
+            d = self.stiffness(i, value)
+            for a, b, sign in ((i, i, 1), (i + 1, i + 1, 1), (i, i + 1, -1), (i + 1, i, -1)):
+                matrix[a, b] += sign * d
+        return matrix
+
+    def eigenvalue(self, start):
+        """Near a start: of both parts, because relative damping is no analytic function."""
+        scale = mpmath.det(self.matrix(start * mpmath.mpc(1, "0.2")))
+
+        def residual(real, imaginary):
+            determinant = mpmath.det(self.matrix(mpmath.mpc(real, imaginary))) / scale
+            return [mpmath.re(determinant), mpmath.im(determinant)]
+
+        found = mpmath.findroot(residual, (mpmath.re(start), mpmath.im(start)), tol=mpmath.mpf(10) ** (8 - 2 * DIGITS), maxsteps=30)
+        return mpmath.mpc(found[0], found[1])
+
+    def amplitude(self, coupling, speed):
+        """Of the moment of a coupling, by the only line."""
+        value = mpmath.mpc(0, ORDER * speed)
+        force = mpmath.matrix(self.bodies, 1)
+        force[0] = mpmath.mpf(TORQUE)
+        motion = mpmath.lu_solve(self.matrix(value), force)
+        return abs(self.stiffness(coupling, value) * (motion[coupling + 1] - motion[coupling]))
+
+
+def sensitivity(nocdyn, text, *words):
+    nocdyn.done(text, *words, command="sensitivity")
+    report = json.loads((nocdyn.folder / "out/sensitivity.json").read_text())
+    paths = [number["path"] for number in report["numbers"]]
+    return [one | {"by": dict(zip(paths, one["derivative"], strict=True))} for one in report["answers"]], report
+
+
+class Changed:
+    """What a chain with one number p (1 + sign STEP) answers, each mode found once."""
+
+    def __init__(self, numbers, bodies, starts, path=None, sign=0):
+        exact = {key: mpmath.mpf(value) for key, value in numbers.items()}
+        if path:
+            exact[path] *= 1 + sign * STEP
+        self.chain = Chain(exact, bodies)
+        self.modes = {number: self.chain.eigenvalue(start) for number, start in starts.items()}
+
+    def critical(self, number):
+        return mpmath.im(self.modes[number]) / ORDER
+
+    def answer(self, one, number, beside):
+        value = self.modes[number]
+        match one["kind"]:
+            case "frequency":
+                return mpmath.im(value) / TURN
+            case "damping ratio":
+                return -mpmath.re(value) / abs(value)
+            case "critical speed":
+                return self.critical(number) * 60 / TURN
+            case "margin":
+                return max(0, (120 - self.critical(number)) / 120, (self.critical(number) - 140) / 140)
+        coupling = int(one["of"].split("_c")[1].split(" ")[0])
+        return self.chain.amplitude(coupling, self.critical(number) + beside[number])
+
+
+def mode_of(one):
+    return int(one["of"].split("mode ")[1].split(",")[0])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_derivatives_of_a_chain_are_those_of_exact_numbers(nocdyn, seed):
+    dice = random.Random(seed)
+    bodies = 3
+    numbers = random_chain(dice, bodies)
+    answers, _ = sensitivity(nocdyn, chain_text(numbers, bodies))
+    nocdyn.done(chain_text(numbers, bodies), command="response")
+    criticals = json.loads((nocdyn.folder / "out/response.json").read_text())["critical_speeds"]
+    assert {one["kind"] for one in answers} == {"frequency", "damping ratio", "critical speed", "margin", "half range"}
+    known = {(one["kind"], mode_of(one)): one["value"] for one in answers if one["kind"] in {"frequency", "damping ratio"}}
+    with mpmath.workdps(DIGITS):
+        starts = {}
+        for number in {number for _, number in known}:
+            ratio = known["damping ratio", number]
+            size = known["frequency", number] * TURN / mpmath.sqrt(1 - ratio**2)
+            starts[number] = size * mpmath.mpc(-ratio, mpmath.sqrt(1 - ratio**2))
+        here = Changed(numbers, bodies, starts)
+        ends = {path: [Changed(numbers, bodies, here.modes, path, sign) for sign in (1, -1)] for path in numbers}
+        beside = {place["mode"]: place["peak_speed_rad_s"] - here.critical(place["mode"]) for place in criticals}
+        for one in answers:
+            number = mode_of(one)
+            assert one["value"] == pytest.approx(float(here.answer(one, number, beside)), rel=1e-9, abs=1e-12)
+            for path, value in numbers.items():
+                high, low = (end.answer(one, number, beside) for end in ends[path])
+                expected = float((high - low) / (2 * STEP * mpmath.mpf(value)))
+                # what a change of the whole number does, beside the answer itself
+                assert abs(one["by"][path] - expected) * value <= 1e-8 * (abs(one["value"]) or 1), (one["kind"], one["of"], path)
+
+
+CURVED = """\
+&body name = 'motor' inertia = 10 speed = 100 /
+&body name = 'pinion' inertia = 1.5 /
+&body name = 'wheel' inertia = 6 /
+&body name = 'machine' inertia = 8 /
+&coupling name = 'rubber' bodies = 'motor', 'pinion' stiffness = 3e4 cubic_stiffness = 4e6 relative_damping = 0.5 /
+&gear name = 'reducer' bodies = 'pinion', 'wheel' radii = 0.1, 0.23 /
+&shaft name = 'line' bodies = 'wheel', 'machine' lengths = 2 diameters = 0.12 shear_modulus = 8e10 density = 7850 nodes = 2 /
+&load name = 'brake' body = 'machine' quadratic = 0.5 viscous = 2 /
+&motor name = 'drive' body = 'motor' a = 4000 b = 30 c = 0 /
+&excitation name = 'fire' body = 'motor' kind = 'orders' orders = 1, 1.5, 3 amplitudes = 40, 60, 25 phases_deg = 0, 50, 130 /
+&response body = 'motor' speed = 40, 140 count = 200 operating = 60, 110 /
+&limit coupling = 'rubber' vibratory_moment = 500 /
+&run t_end = 1 start = 'equilibrium' /
+"""
+
+
+def answers_of(nocdyn, text, *words):
+    """Modes, critical speeds and half ranges at given speeds, as the other commands answer."""
+    nocdyn.done(text, *words, command="modes")
+    modes = json.loads((nocdyn.folder / "out/modes.json").read_text())["modes"]
+    nocdyn.done(text, *words, command="response")
+    response = json.loads((nocdyn.folder / "out/response.json").read_text())
+    return [mode for mode in modes if mode["kind"] == "oscillating"], response["critical_speeds"]
+
+
+def half_range(nocdyn, text, signal, speed, *words):
+    nocdyn.done(text, *words, "--set", f"response.speed={speed!r}", command="response")
+    return nocdyn.values(name="response.csv").by_name()[f"half_range_{signal}"][0]
+
+
+@pytest.mark.parametrize(
+    "path", ["coupling.rubber.stiffness", "gear.reducer.radii(2)", "shaft.line.diameters", "motor.drive.a", "body.wheel.inertia"]
+)
+def test_derivatives_of_a_curved_machine_are_those_of_its_answers(nocdyn, path):
+    """A number that moves the steady state, a ratio, nodes of a shaft: against the commands themselves."""
+    answers, report = sensitivity(nocdyn, CURVED)
+    value = next(number["value"] for number in report["numbers"] if number["path"] == path)
+    step = 1e-3 * value
+    modes, criticals = answers_of(nocdyn, CURVED)
+    ends = {k: answers_of(nocdyn, CURVED, "--set", f"{path}={value + k * step!r}") for k in (-2, -1, 1, 2)}
+    halves = [one for one in answers if one["kind"] == "half range"]
+
+    def by_differences(values):
+        return (values[-2] - 8 * values[-1] + 8 * values[1] - values[2]) / (12 * step)
+
+    def check(kind, of, values):
+        one = next(one for one in answers if (one["kind"], one["of"]) == (kind, of))
+        expected = by_differences(values)
+        assert abs(one["by"][path] - expected) * value <= 1e-7 * abs(one["value"]), (kind, of, one["by"][path], expected)
+
+    for i, mode in enumerate(modes):
+        check("frequency", f"mode {mode['mode']}", {k: end[0][i]["frequency_Hz"] for k, end in ends.items()})
+    assert len(criticals) == 3
+    for i, place in enumerate(criticals):
+        of = f"mode {place['mode']}, order {place['order']:g}"
+        speeds = {k: end[1][i]["speed_rad_s"] for k, end in ends.items()}
+        one = next(one for one in answers if (one["kind"], one["of"]) == ("critical speed", of))
+        assert abs(one["by"][path] * 0.10471975511965977 - by_differences(speeds)) * value <= 2e-6 * place["speed_rad_s"], of
+        if i > 1:
+            continue
+        peak = place["peak_speed_rad_s"]
+        moved = one["by"][path] * 0.10471975511965977  # the speed moves with the critical one
+        half = next(one for one in halves if one["of"].endswith(of))
+        signal = half["of"].split(" ")[0]
+        assert place["coupling"] in signal
+        values = {
+            k: half_range(nocdyn, CURVED, signal, peak + moved * k * step, "--set", f"{path}={value + k * step!r}") for k in ends
+        }
+        expected = by_differences(values)
+        assert half["value"] == pytest.approx(half_range(nocdyn, CURVED, signal, peak), rel=1e-9)
+        assert abs(half["by"][path] - expected) * value <= 1e-6 * half["value"], (of, half["by"][path], expected)
+    nearest = [one for one in halves if one["of"].endswith("nearest to its limit")]
+    assert [one["of"].split(" ")[0] for one in nearest] == ["moment_rubber"]
+
+
+TWINS = """\
+&body name = 'hub' inertia = 1000 speed = 10 /
+&body name = 'left' inertia = 2 /
+&body name = 'right' inertia = 2 /
+&body name = 'third' inertia = 2 /
+&coupling name = 'k1' bodies = 'hub', 'left' stiffness = 2e4 relative_damping = 0.2 /
+&coupling name = 'k2' bodies = 'hub', 'right' stiffness = 2e4 relative_damping = 0.2 /
+&coupling name = 'k3' bodies = 'hub', 'third' stiffness = 2e4 relative_damping = 0.2 /
+&load name = 'l' body = 'hub' viscous = 1 /
+&motor name = 'm' body = 'hub' a = 10 b = 0 c = 0 /
+&run t_end = 1 /
+"""
+
+
+def test_equal_frequencies_are_said_and_split(nocdyn):
+    answers, report = sensitivity(nocdyn, TWINS)
+    assert any("mode 1 and mode 2 have the same frequency" in note for note in report["notes"])
+    both = [one for one in answers if one["kind"] == "frequency" and one["of"] in {"mode 1", "mode 2"}]
+    step = 2e-6
+    nocdyn.done(TWINS, "--set", f"coupling.k1.stiffness={2e4 * (1 + step)!r}", command="modes")
+    modes = json.loads((nocdyn.folder / "out/modes.json").read_text())["modes"]
+    moved = sorted(mode["frequency_Hz"] for mode in modes if mode["kind"] == "oscillating")[:2]
+    for one, frequency in zip(both, moved, strict=True):
+        assert one["by"]["coupling.k1.stiffness"] * 2e4 * step == pytest.approx(frequency - one["value"], rel=1e-3, abs=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (TWINS.replace("'left' stiffness", "'left' efficiency = 0.9 stiffness"), "machine.nml:5"),
+        (TWINS.replace("a = 10", "a = 0"), ""),
+    ],
+)
+def test_refusals(nocdyn, text, message):
+    outcome = nocdyn("sensitivity", nocdyn.write("machine.nml", text), "--out", "out")
+    if message:
+        assert outcome.returncode == 2
+        assert message in outcome.stderr
+    assert "Backtrace" not in outcome.stderr
