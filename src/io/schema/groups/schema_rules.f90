@@ -18,12 +18,14 @@ module nocdyn_schema_rules
 
   ! Topic of a group.
   integer, parameter, public :: in_machine = 1, in_torques = 2, in_simulation = 3, in_torsional = 4, in_sweeps = 5
-  type(topic_t), parameter, public :: topics(5) = [ &   !! `in_machine` ... `in_sweeps`, in the order in which a user needs them
+  integer, parameter, public :: in_fits = 6
+  type(topic_t), parameter, public :: topics(6) = [ &   !! `in_machine` ... `in_fits`, in the order in which a user needs them
     topic_t('machine',    'bodies and what connects them'), &
     topic_t('torques',    'what drives and loads the machine'), &
     topic_t('simulation', 'the motion over time, and what is written'), &
     topic_t('torsional',  'vibrations over the speed, critical speeds, limits'), &
-    topic_t('sweeps',     'many variants of a machine')]
+    topic_t('sweeps',     'many variants of a machine'), &
+    topic_t('fits',       'numbers that are found from measurements')]
 
   ! Occurrence of a group.
   integer, parameter, public :: exactly_once = 1, at_most_once = 2, at_least_once = 3, any_times = 4

@@ -1,0 +1,260 @@
+!> Nonlinear least squares with bounds: the smallest sum of squares of residuals r(x) with low <= x <= high.
+!>
+!> Levenberg-Marquardt steps by the singular values of the Jacobian, damped as Nielsen does (K. Madsen, H. B. Nielsen, O. Tingleff,
+!> Methods for Non-Linear Least Squares Problems, IMM 2004, algorithm 3.16). A variable at a bound that the gradient pushes against
+!> stays there for the step; others are kept inside. Variables are scaled by their sizes. No library of Debian for Fortran has least
+!> squares with bounds: MINPACK has no bounds, NLopt no least squares.
+!>
+!> The Jacobian is of differences: at first forward ones; at the end central ones of the fourth order over a small part of the
+!> standard errors, with which the last steps are taken, so that the result is where the gradient of the residuals vanishes.
+module nocdyn_least_squares
+  use nocdyn_errors, only: error_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack_eigen, only: singular_vectors
+  implicit none (type, external)
+  private
+
+  public :: solve_least_squares
+
+  !> What is fitted.
+  type, abstract, public :: residuals_t
+    integer :: count = 0   !! of the residuals
+  contains
+    procedure(residuals_interface), deferred :: evaluate
+  end type residuals_t
+
+  abstract interface
+    subroutine residuals_interface(self, x, r, error)
+      import :: error_t, residuals_t, wp
+      class(residuals_t), intent(inout) :: self
+      real(wp), intent(in) :: x(:)
+      real(wp), intent(out) :: r(:)                       !! [count], each over its standard deviation
+      type(error_t), allocatable, intent(out) :: error    !! there are none at x
+    end subroutine residuals_interface
+  end interface
+
+  !> The variables, and what is known of them.
+  type, public :: solution_t
+    real(wp), allocatable :: x(:)
+    real(wp), allocatable :: residuals(:)
+    real(wp), allocatable :: jacobian(:, :)      !! by the variables, [residuals, variables]
+    real(wp) :: cost = huge(1.0_wp)              !! half the sum of squares
+    real(wp), allocatable :: covariance(:, :)    !! for residuals with deviations of 1, by the directions that are determined
+    real(wp), allocatable :: undetermined(:, :)  !! directions of ln x or x that no residual sees, [variables, directions]
+    logical, allocatable :: is_at_bound(:)
+    integer :: evaluations = 0
+    logical :: has_converged = .false.
+  end type solution_t
+
+  real(wp), parameter :: no_effect = 1.0e-7_wp   ! singular value of a direction, as a share of the largest
+
+contains
+
+  !> Goes downhill from x.
+  subroutine solve_least_squares(problem, start, low, high, scale, solution, error)
+    class(residuals_t), intent(inout) :: problem
+    real(wp), intent(in) :: start(:), low(:), high(:)
+    real(wp), intent(in) :: scale(:)                     !! sizes of the variables
+    type(solution_t), intent(out) :: solution
+    type(error_t), allocatable, intent(out) :: error     !! the residuals at the start
+    integer, parameter :: most_steps = 200, polish_steps = 4
+    real(wp), parameter :: small_step = 1.0e-8_wp, tiny_step = 1.0e-12_wp
+    real(wp) :: lambda, growth, step(size(start))
+    logical :: has_moved
+    integer :: i
+
+    solution%x = min(high, max(low, start))
+    allocate (solution%residuals(problem%count), solution%jacobian(problem%count, size(start)))
+    call problem%evaluate(solution%x, solution%residuals, error)
+    if (allocated(error)) return
+    solution%evaluations = 1
+    solution%cost = 0.5_wp * sum(solution%residuals**2)
+    lambda = -1.0_wp
+    growth = 2.0_wp
+    do i = 1, most_steps
+      call differentiate_forward(problem, low, high, scale, solution)
+      do
+        call find_step(solution, low, high, scale, lambda, step)
+        if (all(abs(step) <= small_step * scale)) exit
+        call try_step(problem, step, low, high, scale, solution, lambda, growth, has_moved)
+        if (has_moved) exit
+      end do
+      solution%has_converged = all(abs(step) <= small_step * scale)
+      if (solution%has_converged) exit
+    end do
+    do i = 1, polish_steps
+      call differentiate_centrally(problem, low, high, scale, solution)
+      lambda = 0.0_wp
+      call find_step(solution, low, high, scale, lambda, step)
+      if (all(abs(step) <= tiny_step * scale)) exit
+      lambda = tiny(lambda)
+      growth = 2.0_wp
+      call try_step(problem, step, low, high, scale, solution, lambda, growth, has_moved, may_rise=.true.)
+      if (.not. has_moved) exit
+    end do
+    call conclude(low, high, scale, solution)
+  end subroutine solve_least_squares
+
+  !> Which variables a step may move: not those that the gradient pushes against their bounds.
+  function free_variables(solution, low, high) result(free)
+    type(solution_t), intent(in) :: solution
+    real(wp), intent(in) :: low(:), high(:)
+    logical :: free(size(low))
+    real(wp) :: gradient(size(low))
+
+    gradient = matmul(transpose(solution%jacobian), solution%residuals)
+    free = .not. ((solution%x <= low .and. gradient > 0) .or. (solution%x >= high .and. gradient < 0))
+  end function free_variables
+
+  !> The damped step. Directions that nothing sees are left.
+  subroutine find_step(solution, low, high, scale, lambda, step)
+    type(solution_t), intent(in) :: solution
+    real(wp), intent(in) :: low(:), high(:), scale(:)
+    real(wp), intent(inout) :: lambda    !! negative: not yet known
+    real(wp), intent(out) :: step(:)
+    real(wp), parameter :: first = 1.0e-3_wp   ! of the largest square of a singular value
+    real(wp), allocatable :: part(:), scaled(:, :), values(:), vectors(:, :)
+    integer, allocatable :: chosen(:)
+    integer :: k
+    logical :: has_failed
+
+    step = 0.0_wp
+    allocate (chosen, source=pack([(k, k=1, size(step))], free_variables(solution, low, high)))
+    if (size(chosen) == 0) return
+    allocate (scaled(size(solution%residuals), size(chosen)), values(size(chosen)), vectors(size(chosen), size(chosen)))
+    do k = 1, size(chosen)
+      scaled(:, k) = solution%jacobian(:, chosen(k)) * scale(chosen(k))
+    end do
+    call singular_vectors(scaled, values, vectors, has_failed)
+    if (has_failed .or. .not. values(1) > 0) return
+    if (lambda < 0) lambda = first * values(1)**2
+    part = matmul(transpose(vectors), matmul(transpose(scaled), solution%residuals))
+    do k = 1, size(part)
+      if (values(k) <= no_effect * values(1)) then
+        part(k) = 0.0_wp
+      else
+        part(k) = -part(k) / (values(k)**2 + lambda)
+      end if
+    end do
+    step(chosen) = scale(chosen) * matmul(vectors, part)
+  end subroutine find_step
+
+  !> Takes a step if it goes down, and sets the damping of the next one.
+  subroutine try_step(problem, step, low, high, scale, solution, lambda, growth, has_moved, may_rise)
+    class(residuals_t), intent(inout) :: problem
+    real(wp), intent(in) :: step(:), low(:), high(:), scale(:)
+    type(solution_t), intent(inout) :: solution
+    real(wp), intent(inout) :: lambda, growth
+    logical, intent(out) :: has_moved
+    logical, intent(in), optional :: may_rise   !! whether rounding may hide that it goes down; absent: no
+    real(wp), parameter :: rounding = 1.0e-9_wp
+    type(error_t), allocatable :: error
+    real(wp) :: cost, gain, promised, r(problem%count), x(size(step))
+
+    x = min(high, max(low, solution%x + step))
+    call problem%evaluate(x, r, error)
+    solution%evaluations = solution%evaluations + 1
+    cost = huge(cost)
+    if (.not. allocated(error)) cost = 0.5_wp * sum(r**2)
+    promised = solution%cost - 0.5_wp * sum((solution%residuals + matmul(solution%jacobian, x - solution%x))**2)
+    has_moved = cost < solution%cost
+    if (present(may_rise)) has_moved = has_moved .or. cost <= (1.0_wp + rounding) * solution%cost
+    if (has_moved) then
+      gain = (solution%cost - cost) / max(promised, tiny(promised))
+      lambda = lambda * max(1.0_wp / 3.0_wp, 1.0_wp - (2.0_wp * min(gain, 2.0_wp) - 1.0_wp)**3)
+      growth = 2.0_wp
+      solution%x = x
+      solution%residuals = r
+      solution%cost = cost
+    else
+      lambda = lambda * growth
+      growth = 2.0_wp * growth
+    end if
+  end subroutine try_step
+
+  !> The Jacobian by differences on the side that is inside of the bounds.
+  subroutine differentiate_forward(problem, low, high, scale, solution)
+    class(residuals_t), intent(inout) :: problem
+    real(wp), intent(in) :: low(:), high(:), scale(:)
+    type(solution_t), intent(inout) :: solution
+    real(wp), parameter :: relative = 1.0e-6_wp
+    type(error_t), allocatable :: error
+    real(wp) :: r(problem%count), step, x(size(low))
+    integer :: k
+
+    do k = 1, size(low)
+      step = relative * scale(k)
+      if (solution%x(k) + step > high(k)) step = -step
+      x = solution%x
+      x(k) = x(k) + step
+      call problem%evaluate(x, r, error)
+      solution%evaluations = solution%evaluations + 1
+      solution%jacobian(:, k) = 0.0_wp
+      if (.not. allocated(error)) solution%jacobian(:, k) = (r - solution%residuals) / (x(k) - solution%x(k))
+    end do
+  end subroutine differentiate_forward
+
+  !> The Jacobian by central differences of the fourth order, over a twentieth of the standard errors.
+  subroutine differentiate_centrally(problem, low, high, scale, solution)
+    class(residuals_t), intent(inout) :: problem
+    real(wp), intent(in) :: low(:), high(:), scale(:)
+    type(solution_t), intent(inout) :: solution
+    real(wp), parameter :: of_error = 0.05_wp, least = 1.0e-6_wp, most = 1.0e-3_wp, weight(-2:2) = [1, -8, 0, 8, -1] / 12.0_wp
+    type(error_t), allocatable :: error
+    real(wp) :: change(problem%count), r(problem%count), step, x(size(low))
+    integer :: k, p
+
+    call find_covariance(low, high, scale, solution)
+    do k = 1, size(low)
+      step = min(most * scale(k), max(least * scale(k), of_error * sqrt(max(0.0_wp, solution%covariance(k, k)))))
+      if (solution%x(k) + 2 * step > high(k) .or. solution%x(k) - 2 * step < low(k)) cycle   ! the forward one stays
+      change = 0.0_wp
+      do p = -2, 2
+        if (p == 0) cycle
+        x = solution%x
+        x(k) = x(k) + p * step
+        call problem%evaluate(x, r, error)
+        solution%evaluations = solution%evaluations + 1
+        if (allocated(error)) exit
+        change = change + weight(p) * r
+      end do
+      if (.not. allocated(error)) solution%jacobian(:, k) = change / step
+    end do
+  end subroutine differentiate_centrally
+
+  !> The covariance of the variables that are not at their bounds, and the directions that nothing determines.
+  subroutine find_covariance(low, high, scale, solution)
+    real(wp), intent(in) :: low(:), high(:), scale(:)
+    type(solution_t), intent(inout) :: solution
+    real(wp) :: scaled(size(solution%residuals), size(low)), values(size(low)), vectors(size(low), size(low))
+    real(wp) :: inverse(size(low), size(low))
+    integer :: k, n
+    logical :: free(size(low)), has_failed
+
+    free = free_variables(solution, low, high)
+    do k = 1, size(low)
+      scaled(:, k) = merge(solution%jacobian(:, k) * scale(k), 0.0_wp, free(k))
+    end do
+    call singular_vectors(scaled, values, vectors, has_failed)
+    n = count(values > no_effect * maxval(values))
+    if (has_failed) n = 0
+    inverse = 0.0_wp
+    do k = 1, n
+      inverse = inverse + spread(vectors(:, k), 2, size(low)) * spread(vectors(:, k), 1, size(low)) / values(k)**2
+    end do
+    solution%covariance = inverse * spread(scale, 2, size(low)) * spread(scale, 1, size(low))
+    solution%undetermined = vectors(:, n + 1:)
+    do k = 1, size(solution%undetermined, 2)
+      if (.not. all(free .or. abs(solution%undetermined(:, k)) <= 0.5_wp)) solution%undetermined(:, k) = 0.0_wp   ! at a bound
+    end do
+  end subroutine find_covariance
+
+  subroutine conclude(low, high, scale, solution)
+    real(wp), intent(in) :: low(:), high(:), scale(:)
+    type(solution_t), intent(inout) :: solution
+
+    solution%is_at_bound = .not. free_variables(solution, low, high)
+    call find_covariance(low, high, scale, solution)
+  end subroutine conclude
+
+end module nocdyn_least_squares
