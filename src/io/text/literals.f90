@@ -1,6 +1,7 @@
 !> Numbers and logical values from their Fortran notation. Every text is checked digit by digit before the run-time library reads
 !> it, so that malformed numbers are refused, and overflow without a floating-point exception.
 module nocdyn_literals
+  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_size_t
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: lower_case
   implicit none (type, external)
@@ -17,6 +18,16 @@ module nocdyn_literals
   integer, parameter :: largest_exponent = 308
   integer, parameter :: exponent_limit = 99999999   !! larger exponents are cut to it
 
+  interface
+    !> Reads a plain decimal number as a whole, by std::from_chars (number_text.cpp); returns 0 for any other text.
+    integer(c_int) function number_of(text, length, value) bind(c, name='nocdyn_number_of')
+      import :: c_char, c_double, c_int, c_size_t
+      character(kind=c_char), intent(in) :: text(*)
+      integer(c_size_t), value, intent(in) :: length
+      real(c_double), intent(inout) :: value
+    end function number_of
+  end interface
+
 contains
 
   !> Reads a number in decimal notation, with an optional exponent after e, d or q.
@@ -27,6 +38,9 @@ contains
     character(len=:), allocatable :: word
     logical :: is_not_finite
 
+    value = 0.0_wp
+    status = literal_ok
+    if (number_of(text, len(text, c_size_t), value) /= 0) return
     value = 0.0_wp
     status = literal_malformed
     word = lower_case(text(sign_end(text) + 1:))
