@@ -56,11 +56,11 @@ def test_the_first_mistakes_are_shown_and_the_others_counted(nocdyn, text, mista
     assert lines[-1] == f"nocdyn: many.nml: {mistakes - SHOWN} more mistakes; the first {SHOWN} are shown"
 
 
-@pytest.mark.parametrize("list_of_values", ["100000*0.5 " * 2000, "100000*0.5 7", "1 " * 100_001])
-def test_a_key_has_at_most_100000_values(nocdyn, list_of_values):
+@pytest.mark.parametrize("list_of_values", ["1000000*0.5 " * 2000, "1000000*0.5 7", "1 " * 1_000_001])
+def test_a_key_has_at_most_a_million_values(nocdyn, list_of_values):
     nocdyn.write("values.nml", MACHINE + TABLE.format(list_of_values))
     outcome = limited(nocdyn, "check", "values.nml")
-    message = "nocdyn: values.nml:5: &excitation 'e': table_time: too many values; allowed: at most 100000 for a key\n"
+    message = "nocdyn: values.nml:5: &excitation 'e': table_time: too many values; allowed: at most 1000000 for a key\n"
     assert (outcome.returncode, outcome.stderr) == (2, message)
 
 
@@ -69,11 +69,11 @@ def test_a_long_list_by_subscripts_is_read_in_linear_time(nocdyn):
     nocdyn.write("long.nml", MACHINE + "&excitation name='e' body='a' kind='table'\n" + pairs + "/\n")
     assert limited(nocdyn, "check", "long.nml").returncode == 0
     nocdyn.write(
-        "beyond.nml", MACHINE + "&excitation name='e' body='a' kind='table' table_time(1::60000) = 1, 2, 3 table_torque = 1 /\n"
+        "beyond.nml", MACHINE + "&excitation name='e' body='a' kind='table' table_time(1::600000) = 1, 2, 3 table_torque = 1 /\n"
     )
     outcome = limited(nocdyn, "check", "beyond.nml")
     assert outcome.returncode == 2
-    assert "&excitation 'e': table_time has too many values; allowed: at most 100000" in outcome.stderr
+    assert "&excitation 'e': table_time has too many values; allowed: at most 1000000" in outcome.stderr
 
 
 def test_a_list_of_variants_needs_no_room_for_lines_without_numbers(nocdyn):

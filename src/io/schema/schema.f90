@@ -7,6 +7,8 @@ module nocdyn_schema
   use nocdyn_schema_couplings, only: coupling_examples, coupling_groups, coupling_keys, coupling_relations
   use nocdyn_schema_fit, only: fit_examples, fit_groups, fit_keys, fit_relations
   use nocdyn_schema_joints, only: joint_examples, joint_groups, joint_keys, joint_kinds, joint_relations
+  use nocdyn_schema_measurement, only: measurement_examples, measurement_groups, measurement_keys, measurement_kinds, &
+    measurement_relations
   use nocdyn_schema_response, only: response_examples, response_groups, response_keys, response_relations
   use nocdyn_schema_rules, only: a_body, a_document, a_flag, a_folder, a_name, a_number, a_selector, a_text, a_word, alias_t, &
     allowed_t, an_integer, any_number, any_times, anything, at_least_once, at_most_once, at_most_one, exactly_once, example_t, &
@@ -40,7 +42,7 @@ module nocdyn_schema
     group_rule_t('load_case',  in_simulation, any_times,     'load_case', &
                  'A start, a fault or a load: nocdyn run does one load case after the other.'), &
     group_rule_t('output',     in_simulation, at_most_once,  '',         'What is written, in which form, and where.'), &
-    response_groups, sweep_groups, fit_groups]
+    response_groups, measurement_groups, sweep_groups, fit_groups]
 
   type(key_rule_t), parameter :: frame_keys(*) = [ &
     key_rule_t('case', 'title', a_text, 1, '', "''", anything, 'title of summaries and figures, one line'), &
@@ -109,10 +111,10 @@ module nocdyn_schema
     key_rule_t('output', 'directory', a_folder, 1, '', "''", anything, &
       "folder of the results; '' means results/ and the name of the input file")]
 
-  type(kind_rule_t), parameter, public :: kind_rules(*) = [joint_kinds, torque_kinds, sweep_kinds]
+  type(kind_rule_t), parameter, public :: kind_rules(*) = [joint_kinds, torque_kinds, measurement_kinds, sweep_kinds]
 
   type(key_rule_t), parameter, public :: key_rules(*) = &
-    [frame_keys, coupling_keys, joint_keys, torque_keys, engine_keys, response_keys, sweep_keys, fit_keys]
+    [frame_keys, coupling_keys, joint_keys, torque_keys, engine_keys, response_keys, measurement_keys, sweep_keys, fit_keys]
 
   type(relation_rule_t), parameter, public :: relation_rules(*) = [ &
     relation_rule_t('run', less_than, 't_start', 't_end'), &
@@ -120,7 +122,7 @@ module nocdyn_schema
     relation_rule_t('run', requires, 'start_body free', 'start_speed'), &
     relation_rule_t('output', at_most_one, 'interval', 'points'), &
     coupling_relations, joint_relations, torque_relations, engine_relations, response_relations, &
-    sweep_relations, fit_relations]
+    measurement_relations, sweep_relations, fit_relations]
 
   type(alias_t), parameter, public :: aliases(*) = sweep_aliases
 
@@ -146,7 +148,8 @@ module nocdyn_schema
     example_t('run',        "t_end = 10.0  method = 'rk45'  rtol = 1.0e-9  atol = 1.0e-9"), &
     example_t('output',     'interval = 0.01'), &
     example_t('load_case',  "name = 'half_load'  repeats = 5000  set = 'load.work.viscous=50'", .false.), &
-    coupling_examples, joint_examples, torque_examples, response_examples, sweep_examples, fit_examples]
+    coupling_examples, joint_examples, torque_examples, response_examples, measurement_examples, &
+    sweep_examples, fit_examples]
 
   ! One value for each row of `group_rules`. The rows of `key_rules` of a group are consecutive.
   integer :: rule   ! index of the lists below

@@ -2,7 +2,7 @@
 module nocdyn_schema_sentences
   use nocdyn_schema, only: group_rules, has_word, key_rule_index, key_rules, relation_rules, words_in
   use nocdyn_schema_rules, only: at_most_one, columns, equal_lengths, exactly_one, key_rule_t, less_than, &
-    relation_rule_t, required, requires, unset
+    records, relation_rule_t, required, requires, unset
   use nocdyn_schema_units, only: name_in_unit, other_unit, unit_name
   use nocdyn_text, only: append, listed, quoted, string_t, to_text
   implicit none (type, external)
@@ -109,6 +109,8 @@ contains
     case (less_than)
       text = first(1)%text // ' is less than ' // second(1)%text
       if (relation%equal_if_one /= '') text = text // '; with ' // trim(relation%equal_if_one) // ' = 1 they may be equal'
+    case (records)
+      text = listed(first, ' and ') // ' have the same number of values; ' // second(1)%text // ' has them as columns'
     case (columns)
       text = listed([first, second(2:)], ' and ') // ' have the same number of values'
     case (equal_lengths)

@@ -10,7 +10,7 @@ module nocdyn_namelist_values
 
   public :: scan_items, read_subscript
 
-  integer, parameter, public :: longest_list = 100000   !! largest number of values of a key
+  integer, parameter, public :: longest_list = 1000000   !! largest number of values of a key
   integer, parameter :: most_values = 5000000           !! of all keys of a file: a repeat count writes many with few characters
   character(len=*), parameter :: separators = ' ,/!' // achar(9) // achar(10)
 

@@ -6,7 +6,7 @@ module nocdyn_group_checks
   use nocdyn_raw_group, only: raw_group_t
   use nocdyn_schema, only: first_key, key_name, key_rules
   use nocdyn_schema_relations, only: relation_t, relations_t
-  use nocdyn_schema_rules, only: a_body, body_or_ground, columns, equal_lengths, less_than, unset
+  use nocdyn_schema_rules, only: a_body, body_or_ground, columns, equal_lengths, less_than, records, unset
   use nocdyn_schema_text, only: number_text
   use nocdyn_schema_units, only: name_in_unit
   use nocdyn_text, only: counted, quoted, string_t, to_text
@@ -40,6 +40,11 @@ contains
         select case (relation%form)
         case (equal_lengths)
           call check_lengths(raw, group, relation%first, diagnostics)
+        case (records)
+          do k = 1, size(relation%first)
+            if (.not. group%values(relation%first(k))%has_any()) cycle
+            call check_lengths(raw, group, [relation%first(k), relation%first(size(relation%first))], diagnostics)
+          end do
         case (columns)
           call check_lengths(raw, group, relation%first, diagnostics)
           do k = 2, size(relation%second)

@@ -8,9 +8,10 @@ module nocdyn_group_reader
   use nocdyn_key_relations, only: apply_relations
   use nocdyn_namelist, only: assignment_t, namelist_group_t, namelist_t
   use nocdyn_raw_group, only: new_raw_group, raw_group_t
+  use nocdyn_record_reader, only: read_record
   use nocdyn_schema, only: first_key, group_rules, has_word, is_single, key_rules
   use nocdyn_schema_relations, only: relations_t
-  use nocdyn_schema_rules, only: a_document, a_line_file, a_name, columns, equal_lengths
+  use nocdyn_schema_rules, only: a_document, a_line_file, a_name, columns, equal_lengths, records
   use nocdyn_schema_text, only: similar_keys, suggest_key
   use nocdyn_schema_units, only: find_key, name_in_unit
   use nocdyn_table_columns, only: convert_column, read_table_columns
@@ -76,6 +77,7 @@ contains
     end do
     do i = 1, size(relations%list)
       associate (relation => relations%list(i))
+        if (relation%form == records) call read_record(folder, raw, group, diagnostics)
         if (all(relation%form /= [equal_lengths, columns]) .or. size(relation%second) == 0) cycle
         if (.not. all([(belongs(group, relations%selector, relation%first(k)), k=1, size(relation%first))])) cycle
         if (relation%form == equal_lengths) then

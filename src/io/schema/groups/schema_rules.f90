@@ -52,6 +52,8 @@ module nocdyn_schema_rules
   integer, parameter, public :: less_than = 5      !! the number `first` is less than the number `second`
   integer, parameter, public :: columns = 6        !! as equal_lengths; `second`: a file that names its columns, other lists
 
+  integer, parameter, public :: records = 7        !! lists of equal length; `second`: a file, and what says which are its columns
+
   integer, parameter, public :: any_number = 0   !! as `count`: a list of any length, possibly empty
   character(len=*), parameter, public :: required = '<required>', unset = '<unset>'   !! in place of a default
   character(len=*), parameter, public :: ground = 'ground'   !! the name of the body that does not turn
@@ -103,7 +105,7 @@ module nocdyn_schema_rules
   !> A relation between keys of one group.
   type, public :: relation_rule_t
     character(len=12) :: group
-    integer :: form                          !! `exactly_one` ... `less_than`
+    integer :: form                          !! `exactly_one` ... `records`
     character(len=144) :: first, second      !! keys, separated by blanks
     character(len=18) :: equal_if_one = ''   !! `less_than`: the numbers may be equal if this key is 1
     character(len=18) :: word = ''           !! `requires`: the only word of `second` that is enough; '': any value
