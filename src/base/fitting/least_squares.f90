@@ -149,14 +149,16 @@ contains
     logical, intent(in), optional :: may_rise   !! whether rounding may hide that it goes down; absent: no
     real(wp), parameter :: rounding = 1.0e-9_wp
     type(error_t), allocatable :: error
-    real(wp) :: cost, gain, promised, r(problem%count), x(size(step))
+    real(wp) :: change(size(step)), cost, expected(problem%count), gain, promised, r(problem%count), x(size(step))
 
     x = min(high, max(low, solution%x + step))
     call problem%evaluate(x, r, error)
     solution%evaluations = solution%evaluations + 1
     cost = huge(cost)
     if (.not. allocated(error)) cost = 0.5_wp * sum(r**2)
-    promised = solution%cost - 0.5_wp * sum((solution%residuals + matmul(solution%jacobian, x - solution%x))**2)
+    change = x - solution%x
+    expected = matmul(solution%jacobian, change)
+    promised = solution%cost - 0.5_wp * sum((solution%residuals + expected)**2)
     has_moved = cost < solution%cost
     if (present(may_rise)) has_moved = has_moved .or. cost <= (1.0_wp + rounding) * solution%cost
     if (has_moved) then
