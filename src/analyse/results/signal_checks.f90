@@ -1,10 +1,11 @@
-!> Checks that need the signals of a machine: two with one name, of which what asks for one would get the other, and limits of
-!> quantities that there are not.
+!> Checks that need the signals of a machine: two with one name, of which what asks for one would get the other, and limits or
+!> measurements of quantities that there are not.
 module nocdyn_signal_checks
   use nocdyn_errors, only: add_error, error_t, exit_input, raise
-  use nocdyn_input, only: input_t
+  use nocdyn_input, only: diagnostics_t, input_t
   use nocdyn_limit_groups, only: limited_kind
   use nocdyn_machine, only: machine_t
+  use nocdyn_measured_signals, only: check_measured_signals
   use nocdyn_signals, only: find_signal, label_signals, list_signals, signal_t
   use nocdyn_text, only: append, joined, quoted, string_t
   use nocdyn_text_sort, only: argsort
@@ -15,18 +16,21 @@ module nocdyn_signal_checks
 
 contains
 
-  !> Refuses an input whose signals have one label twice, or which limits others.
+  !> Refuses an input whose signals have one label twice, or which limits or measures others.
   subroutine check_signals(input, machine, error)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
     type(error_t), allocatable, intent(out) :: error   !! names file, line, group and key
     type(signal_t), allocatable :: signals(:)
+    type(diagnostics_t) :: diagnostics
     type(error_t), allocatable :: own
 
     call list_signals(machine, signals)
     call refuse_equal_labels(input, signals, error)
     call refuse_unknown_quantities(input, signals, own)
     call add_error(error, own)
+    call check_measured_signals(input, signals, diagnostics)
+    call input%refuse(diagnostics, error)
   end subroutine check_signals
 
   !> Refuses limits of quantities that their elements do not have.

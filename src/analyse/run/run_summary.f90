@@ -1,6 +1,7 @@
 !> The summary of a run, and its form as summary.json and as printed lines.
 module nocdyn_run_summary
   use nocdyn_column_lists, only: column_list_t
+  use nocdyn_comparisons, only: comparison_t, put_comparisons
   use nocdyn_energy_balance, only: energy_balance_t, put_energy_balance
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_fatigue_report, only: put_fatigue
@@ -59,6 +60,7 @@ module nocdyn_run_summary
     type(energy_balance_t), allocatable :: energy_balance  !! from the start to the last row; not allocated if there are no rows
     type(verdict_t) :: verdict                      !! on limits and damage
     type(run_fatigue_t) :: fatigue                  !! by &fatigue; no items before the first row
+    type(comparison_t), allocatable :: comparisons(:)   !! with measurements; not allocated before the first row
     real(wp) :: wall_time = 0.0_wp                  !! of integration and writing of the trajectory [s]
     type(named_event_t), allocatable :: events(:)   !! of joints; not allocated if there are no joints
   end type run_summary_t
@@ -167,6 +169,7 @@ contains
     call json%close()
     call put_settings(json, input%single('run'))
     if (allocated(summary%fatigue%items)) call put_fatigue(json, summary%fatigue)
+    if (allocated(summary%comparisons)) call put_comparisons(json, summary%comparisons)
     associate (solver_status => summary%solver_status)
       call json%open('counts')
       call json%put('accepted_steps', solver_status%accepted(1))

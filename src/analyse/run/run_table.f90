@@ -1,5 +1,6 @@
 !> The printed table of a run: what one looks for first, on one screen.
 module nocdyn_run_table
+  use nocdyn_comparisons, only: write_comparisons
   use nocdyn_energy_balance, only: append_energy_balance
   use nocdyn_fatigue_report, only: fatigue_text
   use nocdyn_input, only: input_t
@@ -40,6 +41,7 @@ contains
     call append_columns(report, summary, left)
     call report%append(text)
     call report%append(lives)
+    if (allocated(summary%comparisons)) call write_comparisons(summary%comparisons, report)
     text = report%text()
   end function summary_table
 

@@ -4,7 +4,7 @@ module nocdyn_transient
   use nocdyn_assembly, only: allocate_formulation, assemble_machine
   use nocdyn_column_names, only: choose_columns
   use nocdyn_equilibrium, only: mean_formulation, t_infinity
-  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_finite, only: is_finite
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: diagnostics_t, input_t
@@ -15,17 +15,21 @@ module nocdyn_transient
   use nocdyn_linearisation, only: linearisation_t, linearise
   use nocdyn_signal_checks, only: check_signals
   use nocdyn_machine, only: machine_t
+  use nocdyn_measured_runs, only: find_delays, merged_times, new_run_samples, run_samples_t
+  use nocdyn_measurements, only: measured_peak, measured_series, measurement_t, read_measurements
   use nocdyn_missed_states, only: note_missed_state
   use nocdyn_output_times, only: check_output_times, output_note, output_times
   use nocdyn_output_units, only: output_units
   use nocdyn_power_notes, only: note_power_signs
   use nocdyn_row_intervals, only: choose_row_count, note_sparse_rows
   use nocdyn_run_verdict, only: add_damage, add_end, add_run_limits, column_extreme_t
+  use nocdyn_run_peaks, only: compare_peaks, list_peak_statistics
   use nocdyn_run_settings, only: check_size, choose_settings
   use nocdyn_run_statistics, only: find_extremes, list_statistics, take_fatigue
   use nocdyn_run_summary, only: check_energy_balance, check_extremes, describe_machine, run_summary_t
   use nocdyn_statistics, only: statistic_t
   use nocdyn_statistics_observer, only: new_statistics_observer, statistics_observer_t
+  use nocdyn_signals, only: list_signals, signal_t
   use nocdyn_solver_status, only: failure_message, integration_done, integration_interrupted, integration_not_finite, &
     solver_status_t
   use nocdyn_start_transient, only: find_start_transient
@@ -82,6 +86,10 @@ module nocdyn_transient
     type(trajectory_table_t) :: table
     real(wp), allocatable :: row(:)          !! [columns]
     integer :: rows = 0
+    real(wp), allocatable :: row_times(:)    !! of all rows [s]
+    type(run_samples_t) :: samples           !! at measured times
+    type(measurement_t), allocatable :: peaks(:)
+    integer :: before_peaks = 0              !! number of statistics before the ones of the peaks
     integer, allocatable :: chosen(:)        !! columns that are written
     real(wp), allocatable :: written(:)      !! their values in the row
     type(vibration_t) :: vibration           !! its energy in the rows
@@ -112,7 +120,8 @@ contains
     type(integration_settings_t) :: settings
     type(diagnostics_t) :: diagnostics
     type(string_t), allocatable :: notes(:)
-    real(wp), allocatable :: times(:)
+    type(measurement_t), allocatable :: series(:)
+    real(wp), allocatable :: correlations(:), times(:)
     integer :: i, rows
 
     call check_output_times(input, diagnostics)
@@ -121,6 +130,9 @@ contains
     if (allocated(error)) return
     call choose_row_count(input, formulation%machine, rows, notes)
     times = output_times(input, rows)
+    call prepare_measurements(input, times([1, size(times)]), series, observer%peaks, correlations, error)
+    if (allocated(error)) return
+    observer%samples = new_run_samples(series, times([1, size(times)]))
     summary%method = trim(settings%method)
     call describe_machine(formulation%machine, summary)
     if (output_note(input) /= '') call append(notes, output_note(input))
@@ -139,8 +151,9 @@ contains
     allocate (summary%labels, source=observer%table%labels)
     allocate (summary%chosen, source=observer%chosen)
     summary%t_start = times(1)
-    call solve(formulation, settings, times, observer, summary, error)
-    if (summary%has_run) call complete_summary(input, observer, error, summary)
+    call observer%samples%attach(formulation, times(1))
+    call solve(formulation, settings, merged_times(times, observer%samples%times), observer, summary, error)
+    if (summary%has_run) call complete_summary(input, observer, correlations, error, summary)
     if (summary%has_run .and. .not. allocated(error) .and. output%shows_motion) then
       call note_sparse_rows(formulation%machine, observer%lowest, observer%highest, times(2) - times(1), summary%notes)
     end if
@@ -148,6 +161,39 @@ contains
     if (formulation%joints%count > 0) return   ! which of them a steady state has locked is not known
     call note_missed_state(formulation%machine, observer%last_time, observer%last_speeds, summary%notes)
   end subroutine run_transient
+
+  !> Reads what was measured over the time, and finds the delays of clocks that are to be found, by a run of its own.
+  subroutine prepare_measurements(input, span, series, peaks, correlations, error)
+    type(input_t), intent(in) :: input
+    real(wp), intent(in) :: span(2)   !! start and end of the run [s]
+    type(measurement_t), allocatable, intent(out) :: series(:), peaks(:)
+    real(wp), allocatable, intent(out) :: correlations(:)   !! by which delays were found, [series]
+    type(error_t), allocatable, intent(out) :: error
+    class(formulation_t), allocatable, target :: formulation
+    type(integration_settings_t) :: settings
+    type(string_t), allocatable :: notes(:)
+    type(signal_t), allocatable :: signals(:)
+    integer :: i
+
+    allocate (signals(0))
+    if (size(input%groups_named('measurement')) > 0) then
+      call build_formulation(input, formulation, settings, notes, error)
+      if (allocated(error)) return
+      call list_signals(formulation%machine, signals)
+    end if
+    call read_measurements(input, [measured_series], signals, series, error)
+    if (.not. allocated(error)) call read_measurements(input, [measured_peak], signals, peaks, error)
+    if (.not. allocated(error)) then
+      do i = 1, size(peaks)
+        if (peaks(i)%from >= span(2)) call raise(error, exit_input, input%location(peaks(i)%group, 'from') // ': from = ' // &
+                                                 to_text(peaks(i)%from) // ' is not before the end of the run, ' // &
+                                                 to_text(span(2)) // ' s')
+      end do
+    end if
+    if (allocated(error)) return
+    allocate (correlations(size(series)), source=0.0_wp)
+    if (any(series%finds_delay)) call find_delays(formulation, settings, span, series, correlations, error)
+  end subroutine prepare_measurements
 
   !> Notes on the damping of the modes about the start angles.
   subroutine note_damping(machine, notes)
@@ -194,8 +240,11 @@ contains
     type(statistic_t), allocatable :: statistics(:)
 
     observer%first_time = times(1)
+    allocate (observer%row_times, source=times)
     observer%end_time = times(size(times))
     call list_statistics(input, formulation%machine, times(1), statistics)
+    observer%before_peaks = size(statistics)
+    call list_peak_statistics(observer%peaks, times(1), statistics)
     observer%statistics_observer_t = new_statistics_observer(formulation, statistics, times(1), times(size(times)), &
                                                              may_bend=.false., is_run=.true.)
     observer%table = new_trajectory_table(formulation, times(1), output_units(input))
@@ -242,9 +291,10 @@ contains
     end if
   end subroutine solve
 
-  subroutine complete_summary(input, observer, error, summary)
+  subroutine complete_summary(input, observer, correlations, error, summary)
     type(input_t), intent(in) :: input
     type(run_observer_t), intent(inout) :: observer
+    real(wp), intent(in) :: correlations(:)   !! by which delays of series were found
     type(error_t), allocatable, intent(inout) :: error   !! of the integration, or that a number of the summary is not finite
     type(run_summary_t), intent(inout) :: summary
     real(wp), allocatable :: works(:, :)   ! [elements, 1]
@@ -253,6 +303,9 @@ contains
       call find_extremes(observer, input, table%unit, observer%row, observer%rows, summary%extremes)
       call take_fatigue(observer, input, table%columns%formulation%machine, size(table%labels), summary%fatigue)
     end associate
+    call observer%samples%compare(summary%comparisons)
+    summary%comparisons%clock_correlation = correlations
+    if (observer%has_begun(1)) call compare_peaks(observer, observer%before_peaks, observer%peaks, summary%comparisons)
     if (.not. allocated(error)) call check_extremes(summary%extremes, summary%labels, error)
     call check_energy_balance(summary%extremes, observer%vibration%largest, &
                               observer%atol * observer%largest_moment, summary%notes)
@@ -306,6 +359,8 @@ contains
 
     if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
     if (self%not_finite > 0) return
+    call self%samples%take(t, y)
+    if (abs(self%row_times(self%rows + 1) - t) > 0.0_wp) return   ! something was measured then
     call self%table%fill(t, y, self%row)
     self%not_finite = findloc(is_finite(self%row), .false., dim=1)
     self%failure_time = t

@@ -2,6 +2,7 @@
 !> &fatigue. A run that fails leaves trajectory.partial.csv and cycles.partial.csv.
 module nocdyn_run_files
   use nocdyn_column_lists, only: columns_file
+  use nocdyn_comparisons, only: comparison_file, put_comparison_csv
   use nocdyn_console, only: new_status_line, status_line_t
   use nocdyn_csv_grid, only: csv_grid_t
   use nocdyn_disk_room, only: check_room
@@ -109,15 +110,23 @@ contains
     type(result_files_t) :: files   ! but for the rows
     type(string_t), allocatable :: names(:)
     character(len=:), allocatable :: name
+    integer :: first, i
 
     allocate (names, source=[string_t(input_file)])
     call append(names, columns_file)
     if (size(summary%fatigue%items) > 0) call append(names, trim(cycles_names(state_of(summary))))
+    first = size(names)
+    do i = 1, size(summary%comparisons)
+      call append(names, comparison_file(summary%comparisons(i)))
+    end do
     call append(names, summary_file)
     call files%open(writer%folder, names)
     call files%files(1)%put(input_text(input))
     call files%files(2)%put(columns_json(summary, trim(trajectory_names(state_of(summary), writer%form))))
-    if (size(names) == 4) call put_cycles_csv(summary%fatigue, files%files(3))
+    if (size(summary%fatigue%items) > 0) call put_cycles_csv(summary%fatigue, files%files(3))
+    do i = 1, size(summary%comparisons)
+      call put_comparison_csv(summary%comparisons(i), files%files(first + i))
+    end do
     call files%files(size(names))%put(summary_json(input, summary))
     call writer%file%complete(trim(trajectory_names(1, writer%form)), error)
     if (.not. allocated(error)) call files%complete(error)

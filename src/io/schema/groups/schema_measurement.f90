@@ -2,8 +2,8 @@
 module nocdyn_schema_measurement
   use nocdyn_kinds, only: wp
   use nocdyn_schema_rules, only: a_file, a_name, a_number, a_selector, a_text, a_word, allowed_t, an_integer, any_number, &
-    any_times, anything, exactly_one, example_t, from_1, group_rule_t, in_torsional, key_rule_t, kind_rule_t, not_negative, &
-    not_zero, positive, records, relation_rule_t, required, requires, unset
+    any_times, anything, exactly_one, example_t, from_1, group_rule_t, in_torsional, key_rule_t, kind_rule_t, less_than, &
+    not_negative, not_zero, positive, records, relation_rule_t, required, requires, unset
   implicit none (type, external)
   private
 
@@ -80,15 +80,17 @@ module nocdyn_schema_measurement
       'speed of the body of &response at which it was measured; if not given that with the largest', 'peak'), &
     key_rule_t('measurement', 'deviation', a_number, 1, '', unset, positive, &
       'standard deviation of the values, in their unit; of frequencies relative to them'), &
-    key_rule_t('measurement', 'from', a_number, 1, '', unset, anything, &
-      'only values from this time of the run [s] or speed [rad/s] on', 'series order peak'), &
-    key_rule_t('measurement', 'until', a_number, 1, '', unset, anything, 'only values up to this time or speed', &
-      'series order peak')]
+    key_rule_t('measurement', 'from', a_number, 1, 's', unset, anything, &
+      'only values from this time of the run on', 'series peak'), &
+    key_rule_t('measurement', 'until', a_number, 1, 's', unset, anything, 'only values up to this time', 'series'), &
+    key_rule_t('measurement', 'speed_range', a_number, 2, 'rad/s', unset, anything, &
+      'only amplitudes between these speeds', 'order')]
 
   type(relation_rule_t), parameter, public :: measurement_relations(*) = [ &
     relation_rule_t('measurement', exactly_one, 'speeds pulses values', 'file'), &
     relation_rule_t('measurement', exactly_one, 'times values', 'file'), &
     relation_rule_t('measurement', requires, 'column time_column speed_column pulse_column time_unit speed_unit', 'file'), &
+    relation_rule_t('measurement', less_than, 'from', 'until'), &
     relation_rule_t('measurement', requires, 'largest_shift', 'alignment', word='found'), &
     relation_rule_t('measurement', requires, 'pulses_per_turn', 'pulses pulse_column'), &
     relation_rule_t('measurement', records, 'times speeds pulses values', &

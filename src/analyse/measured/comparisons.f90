@@ -1,0 +1,225 @@
+!> A measurement beside what was computed: differences, their statistics, and how they are printed and written.
+module nocdyn_comparisons
+  use nocdyn_csv, only: write_header, write_row
+  use nocdyn_json, only: json_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_measurements, only: measured_frequency, measured_kinds, measured_order, measured_peak, measured_series, &
+    measurement_t, peak_names
+  use nocdyn_output_file, only: output_file_t
+  use nocdyn_table_text, only: cell_digits
+  use nocdyn_text, only: append, counted, rounded_text, string_t, to_text
+  use nocdyn_text_buffer, only: text_buffer_t
+  use nocdyn_units, only: from_si, unit_hz
+  implicit none (type, external)
+  private
+
+  public :: comparison_file, new_comparison, put_comparison_csv, put_comparisons, write_comparisons
+
+  !> What was measured and computed at the same abscissae; differences are computed less measured.
+  type, public :: comparison_t
+    type(measurement_t) :: measurement
+    real(wp), allocatable :: abscissa(:)   !! times of the run [s], speeds [rad/s], or numbers of modes
+    real(wp), allocatable :: measured(:), computed(:)   !! in SI
+    real(wp), allocatable :: measured_damping(:), computed_damping(:)   !! of frequencies, if dampings were measured
+    integer :: outside = 0                 !! values that were measured where nothing was computed
+    real(wp) :: delay = 0.0_wp             !! added to the times of the recorder [s]
+    real(wp) :: clock_correlation = 0.0_wp !! by which a delay was found
+    real(wp) :: bias = 0.0_wp              !! mean of the differences
+    real(wp) :: spread = 0.0_wp            !! their standard deviation about it, with one less than their number
+    real(wp) :: correlation = 0.0_wp       !! of measured and computed values
+    logical :: has_correlation = .false.   !! whether both vary
+    real(wp) :: largest = 0.0_wp, largest_at = 0.0_wp   !! difference that is largest in size, and its abscissa
+  contains
+    procedure :: residuals
+  end type comparison_t
+
+contains
+
+  !> Weighted differences for a fit: computed less measured, over the standard deviation if that is known. Frequencies are
+  !> compared relatively.
+  pure function residuals(self)
+    class(comparison_t), intent(in) :: self
+    real(wp) :: residuals(size(self%measured))
+
+    residuals = (self%computed - self%measured) * self%measurement%weight()
+    if (self%measurement%kind == measured_frequency) residuals = residuals / self%measured
+  end function residuals
+
+  !> Compares values at the same abscissae.
+  type(comparison_t) function new_comparison(measurement, abscissa, measured, computed) result(self)
+    type(measurement_t), intent(in) :: measurement
+    real(wp), intent(in) :: abscissa(:), measured(:), computed(:)   !! [values]
+    real(wp) :: difference(size(measured)), of_computed, of_measured
+    integer :: n
+
+    self%measurement = measurement
+    allocate (self%abscissa, source=abscissa)
+    allocate (self%measured, source=measured)
+    allocate (self%computed, source=computed)
+    n = size(measured)
+    if (n == 0) return
+    difference = computed - measured
+    self%bias = sum(difference) / n
+    self%largest = difference(maxloc(abs(difference), dim=1))
+    if (size(abscissa) == n) self%largest_at = abscissa(maxloc(abs(difference), dim=1))
+    if (n == 1) return
+    self%spread = sqrt(sum((difference - self%bias)**2) / (n - 1))
+    of_measured = sum((measured - sum(measured) / n)**2)
+    of_computed = sum((computed - sum(computed) / n)**2)
+    self%has_correlation = n > 2 .and. of_measured > 0.0_wp .and. of_computed > 0.0_wp
+    if (self%has_correlation) then
+      self%correlation = sum((measured - sum(measured) / n) * (computed - sum(computed) / n)) / sqrt(of_measured * of_computed)
+    end if
+  end function new_comparison
+
+  !> Name of the file with the values of a comparison.
+  pure function comparison_file(comparison) result(name)
+    type(comparison_t), intent(in) :: comparison
+    character(len=:), allocatable :: name
+    integer :: i
+
+    name = 'measured_' // comparison%measurement%name // '.csv'
+    do i = 1, len(name)
+      if (name(i:i) == '/') name(i:i) = '_'
+    end do
+  end function comparison_file
+
+  !> Writes that file: abscissa, measured, computed, difference.
+  subroutine put_comparison_csv(comparison, file)
+    type(comparison_t), intent(in) :: comparison
+    type(output_file_t), intent(inout) :: file
+    type(string_t), allocatable :: labels(:)
+    integer :: i
+
+    associate (m => comparison%measurement)
+      allocate (labels(0))
+      select case (m%kind)
+      case (measured_series)
+        call append(labels, 't [s]')
+      case (measured_order)
+        call append(labels, 'speed [rad/s]')
+      case (measured_frequency)
+        call append(labels, 'mode [1]')
+      case default
+        call append(labels, 'number [1]')
+      end select
+      call append(labels, 'measured [' // m%unit // ']')
+      call append(labels, 'computed [' // m%unit // ']')
+      call append(labels, 'difference [' // m%unit // ']')
+      if (allocated(comparison%computed_damping)) then
+        call append(labels, 'measured_damping [1]')
+        call append(labels, 'computed_damping [1]')
+      end if
+      call write_header(file, labels)
+      do i = 1, size(comparison%measured)
+        if (allocated(comparison%computed_damping)) then
+          call write_row(file, [comparison%abscissa(i), comparison%measured(i), comparison%computed(i), &
+                                comparison%computed(i) - comparison%measured(i), comparison%measured_damping(i), &
+                                comparison%computed_damping(i)])
+        else
+          call write_row(file, [comparison%abscissa(i), comparison%measured(i), comparison%computed(i), &
+                                comparison%computed(i) - comparison%measured(i)])
+        end if
+      end do
+    end associate
+  end subroutine put_comparison_csv
+
+  !> Writes the list `measurements` of a report.
+  subroutine put_comparisons(json, comparisons)
+    type(json_t), intent(inout) :: json
+    type(comparison_t), intent(in) :: comparisons(:)
+    integer :: i
+
+    if (size(comparisons) == 0) return
+    call json%open_list('measurements')
+    do i = 1, size(comparisons)
+      associate (one => comparisons(i), m => comparisons(i)%measurement)
+        call json%open()
+        call json%put('name', m%name)
+        call json%put('kind', trim(measured_kinds(m%kind)))
+        if (m%kind /= measured_frequency) call json%put('signal', m%signal_name)
+        if (m%kind == measured_peak) call json%put('statistic', trim(peak_names(m%statistic)))
+        if (m%kind == measured_order) call json%put('order', m%order)
+        call json%put('unit', m%unit)
+        call json%put('caption', m%caption)
+        call json%put('file', comparison_file(one))
+        call json%put('values', size(one%measured))
+        call json%put('outside', one%outside)
+        call json%put('gaps', m%gaps)
+        if (m%kind == measured_series) then
+          call json%put('delay_s', one%delay)
+          if (m%finds_delay) call json%put('delay_correlation', one%clock_correlation)
+          if (m%band(2) > 0.0_wp) call json%put('band_Hz', from_si(m%band, unit_hz))
+        end if
+        if (size(one%measured) > 0) then
+          call json%put('bias', one%bias)
+          call json%put('spread', one%spread)
+          if (one%has_correlation) call json%put('correlation', one%correlation)
+          call json%put('largest_difference', one%largest)
+          call json%put('largest_difference_at', one%largest_at)
+          call json%put('half_range_measured', 0.5_wp * (maxval(one%measured) - minval(one%measured)))
+          call json%put('half_range_computed', 0.5_wp * (maxval(one%computed) - minval(one%computed)))
+        end if
+        call json%close()
+      end associate
+    end do
+    call json%close_list()
+  end subroutine put_comparisons
+
+  !> Appends lines for the screen, one or two for each measurement.
+  subroutine write_comparisons(comparisons, text)
+    type(comparison_t), intent(in) :: comparisons(:)
+    type(text_buffer_t), intent(inout) :: text
+    character(len=:), allocatable :: line
+    integer :: i
+
+    do i = 1, size(comparisons)
+      associate (one => comparisons(i), m => comparisons(i)%measurement)
+        line = 'measured ' // m%name
+        if (m%kind == measured_peak) line = line // ', ' // trim(peak_names(m%statistic)) // ' of'
+        if (m%kind == measured_order) line = line // ', order ' // to_text(m%order) // ' of'
+        if (m%kind /= measured_frequency) line = line // ' ' // m%signal_name
+        if (size(one%measured) == 0) then
+          call text%append_line(line // ': none of its values is where something was computed')
+          cycle
+        end if
+        if (size(one%measured) == 1) then
+          call text%append_line(line // ': computed ' // shown(one%computed(1)) // ', measured ' // shown(one%measured(1)) // &
+                                ' ' // m%unit // ', difference ' // shown(one%largest) // ' (' // &
+                                rounded_text(100.0_wp * one%largest / nonzero(one%measured(1)), 3) // ' %)')
+          cycle
+        end if
+        line = line // ': ' // counted(size(one%measured), 'value', 'values') // ', bias ' // shown(one%bias) // &
+               ', spread ' // shown(one%spread) // ' ' // m%unit
+        if (one%has_correlation) line = line // ', correlation ' // rounded_text(one%correlation, 3)
+        line = line // ', largest difference ' // shown(one%largest)
+        if (m%kind == measured_series) line = line // ' at t = ' // shown(one%largest_at) // ' s'
+        if (m%kind == measured_order) line = line // ' at ' // shown(one%largest_at) // ' rad/s'
+        if (m%kind == measured_frequency) line = line // ' of mode ' // shown(one%largest_at)
+        call text%append_line(line)
+        if (m%finds_delay) call text%append_line('  its clock: delay = ' // rounded_text(one%delay, 6) // &
+                                                 ' s found by correlation, ' // rounded_text(one%clock_correlation, 3))
+        if (one%outside > 0 .or. m%gaps > 0) call text%append_line('  left out: ' // to_text(one%outside) // &
+                                                                   ' values where nothing was computed, ' // to_text(m%gaps) // &
+                                                                   ' gaps of the file')
+      end associate
+    end do
+
+  contains
+
+    function shown(value) result(short)
+      real(wp), intent(in) :: value
+      character(len=:), allocatable :: short
+
+      short = rounded_text(value, cell_digits)
+    end function shown
+
+    pure real(wp) function nonzero(value)
+      real(wp), intent(in) :: value
+
+      nonzero = sign(max(abs(value), tiny(value)), value)
+    end function nonzero
+
+  end subroutine write_comparisons
+
+end module nocdyn_comparisons
