@@ -17,6 +17,7 @@ module nocdyn_analyses
   type, public :: analysis_options_t
     character(len=:), allocatable :: at       !! state about which the machine is linearised; '': the one of the analysis
     integer :: modes = 0                      !! number of oscillating modes that are wanted, the lowest; 0: as many as usual
+    integer :: starts = 0                     !! of a search, 0: as many as usual
     logical :: has_range = .false.            !! whether modes in a range are wanted
     real(wp) :: range_hz(2) = 0.0_wp          !! their frequencies, from and to [Hz]
     logical :: has_holzer = .false.           !! whether tables of Holzer are wanted

@@ -22,6 +22,7 @@ module nocdyn_arguments
     option_t('--case', value='NAME'), &
     option_t('--at', value='equilibrium|rest|TIME'), &
     option_t('--modes', value='NUMBER'), &
+    option_t('--starts', value='NUMBER'), &
     option_t('--range_hz', value='LOW,HIGH'), &
     option_t('--kind', value='KIND'), &
     option_t('--holzer', may_repeat=.true.), &
@@ -42,6 +43,7 @@ module nocdyn_arguments
     type(string_t), allocatable :: overrides(:)      !! PATH=VALUE of every --set
     integer :: threads = 0                           !! of --threads, 0 without it
     integer :: modes = 0                             !! of --modes, 0 without it
+    integer :: starts = 0                            !! of --starts, 0 without it
     real(wp) :: range_hz(2) = 0.0_wp                 !! of --range_hz [Hz]
     integer :: shard = 0, shards = 0                 !! of --shard, 0 without it
     type(string_t), allocatable :: names(:)          !! long names of all options, in the order of the command line

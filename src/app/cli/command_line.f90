@@ -171,6 +171,9 @@ contains
     case ('--out')
       if (is_too_long(value)) call raise(error, exit_input, '--out ' // shortened(value) // ' is too long for a folder; ' // &
         'allowed: ' // to_text(longest_path) // ' bytes, ' // to_text(longest_file_name) // ' from slash to slash')
+    case ('--starts')
+      arguments%starts = digits_value(value)
+      if (arguments%starts < 1) call raise(error, exit_input, '--starts ' // value // ': allowed: a number from 1 on')
     case ('--modes')
       arguments%modes = digits_value(value)
       if (arguments%modes < 1) call raise(error, exit_input, '--modes ' // value // ': allowed: a number from 1 on')

@@ -9,6 +9,7 @@ module nocdyn_analysis_command
   use nocdyn_console, only: print_text, report_error
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_errors, only: add_error, error_t, exit_done, exit_failed, exit_input, raise
+  use nocdyn_fit_results, only: fit_results_t
   use nocdyn_grid_file, only: grid_file_t
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
@@ -71,6 +72,9 @@ contains
       call analyse_files(arguments, check_results_t(is_steady=.false., locks_joints=.false., takes_joints=.true.), code)
     case ('matrices')
       call analyse_files(arguments, matrices_results_t(is_steady=.false., locks_joints=.false., has_report=.false.), code)
+    case ('fit')
+      call analyse_files(arguments, fit_results_t(is_steady=.false., locks_joints=.false., takes_joints=.true., &
+                                                  always_writes=.true.), code)
     case ('sensitivity')
       call analyse_files(arguments, sensitivity_results_t(locks_joints=.false.), code)
     case ('transit')
@@ -284,6 +288,7 @@ contains
     options%at = ''
     if (arguments%is_given('--at')) options%at = arguments%value('--at')
     options%modes = arguments%modes
+    options%starts = arguments%starts
     options%has_range = arguments%is_given('--range_hz')
     options%range_hz = arguments%range_hz
     options%has_code = arguments%is_given('--code')

@@ -126,6 +126,17 @@ contains
       '  --set PATH=VALUE   override a key' // nl // &
       '  --out DIR          write sensitivity.csv and sensitivity.json to DIR' // nl // &
       case_help, analysis_command)
+    call add_command(commands, 'fit', 'FILE...', '--out --set --case --starts --quiet', &
+      'find numbers of the machine from measurements', &
+      'Finds the values of &unknown with which the machine does what &measurement says, by least squares: with' // nl // &
+      'standard errors, correlations, and what the measurements do not tell apart. Writes fitted.nml, the input with' // nl // &
+      'the values, fit.csv and fit.json.' // nl // nl // &
+      '  --starts NUMBER    search from so many points between the bounds too; default: 1, the start' // nl // &
+      '  --out DIR          write to DIR, with several files to DIR/<name of the file>;' // nl // &
+      '                     default: &output directory, else results/<name of the file>' // nl // &
+      '  --set PATH=VALUE   override a key' // nl // &
+      case_help // nl // &
+      '  --quiet            print nothing but errors', analysis_command)
     call add_command(commands, 'orbit', 'FILE...', '--out --set --case --strict --resume --quiet', &
       'periodic motions of nonlinear machines: folds, jumps, stability', &
       'Follows by &orbit the periodic motions of a machine over a number of its input or over the mean speed of a' // nl // &

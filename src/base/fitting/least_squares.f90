@@ -40,7 +40,7 @@ module nocdyn_least_squares
     real(wp), allocatable :: jacobian(:, :)      !! by the variables, [residuals, variables]
     real(wp) :: cost = huge(1.0_wp)              !! half the sum of squares
     real(wp), allocatable :: covariance(:, :)    !! for residuals with deviations of 1, by the directions that are determined
-    real(wp), allocatable :: undetermined(:, :)  !! directions of ln x or x that no residual sees, [variables, directions]
+    real(wp), allocatable :: undetermined(:, :)  !! relative changes that no residual sees, [variables, directions]
     logical, allocatable :: is_at_bound(:)
     integer :: evaluations = 0
     logical :: has_converged = .false.
@@ -57,11 +57,14 @@ contains
     real(wp), intent(in) :: scale(:)                     !! sizes of the variables
     type(solution_t), intent(out) :: solution
     type(error_t), allocatable, intent(out) :: error     !! the residuals at the start
-    integer, parameter :: most_steps = 200, polish_steps = 4
-    real(wp), parameter :: small_step = 1.0e-8_wp, tiny_step = 1.0e-12_wp
-    real(wp) :: lambda, growth, step(size(start))
+    integer, parameter :: most_steps = 100, polish_steps = 6
+    real(wp), parameter :: small_step = 1.0e-8_wp, tiny_step = 1.0e-12_wp   ! as shares of the sizes
+    real(wp), parameter :: small_gain = 1.0e-8_wp                           ! as a share of the cost
+    real(wp), parameter :: curved = 1.5_wp                                  ! gain by which residuals are not linear
+    real(wp), parameter :: of_error = 1.0e-7_wp                             ! a step that is none, as a share of standard errors
+    real(wp) :: gain, growth, lambda, step(size(start))
     logical :: has_moved
-    integer :: i
+    integer :: i, k
 
     solution%x = min(high, max(low, start))
     allocate (solution%residuals(problem%count), solution%jacobian(problem%count, size(start)))
@@ -75,25 +78,36 @@ contains
       call differentiate_forward(problem, low, high, scale, solution)
       do
         call find_step(solution, low, high, scale, lambda, step)
-        if (all(abs(step) <= small_step * scale)) exit
-        call try_step(problem, step, low, high, scale, solution, lambda, growth, has_moved)
-        if (has_moved) exit
+        solution%has_converged = all(abs(step) <= small_step * scale) .or. promise(solution, step) <= small_gain * solution%cost
+        if (solution%has_converged) exit
+        call try_step(problem, step, low, high, solution, lambda, growth, has_moved, gain)
+        if (.not. has_moved) cycle
+        if (gain > curved) call extend_step(problem, step, low, high, solution)
+        exit
       end do
-      solution%has_converged = all(abs(step) <= small_step * scale)
       if (solution%has_converged) exit
     end do
     do i = 1, polish_steps
       call differentiate_centrally(problem, low, high, scale, solution)
       lambda = 0.0_wp
       call find_step(solution, low, high, scale, lambda, step)
-      if (all(abs(step) <= tiny_step * scale)) exit
-      lambda = tiny(lambda)
+      if (all(abs(step) <= max(tiny_step * scale, of_error * [(sqrt(solution%covariance(k, k)), k=1, size(step))]))) exit
       growth = 2.0_wp
-      call try_step(problem, step, low, high, scale, solution, lambda, growth, has_moved, may_rise=.true.)
+      call try_step(problem, step, low, high, solution, lambda, growth, has_moved, gain, may_rise=.true.)
       if (.not. has_moved) exit
     end do
     call conclude(low, high, scale, solution)
   end subroutine solve_least_squares
+
+  !> By how much the cost falls in a step if the residuals are linear.
+  real(wp) function promise(solution, step)
+    type(solution_t), intent(in) :: solution
+    real(wp), intent(in) :: step(:)
+    real(wp) :: expected(size(solution%residuals))
+
+    expected = matmul(solution%jacobian, step)
+    promise = solution%cost - 0.5_wp * sum((solution%residuals + expected)**2)
+  end function promise
 
   !> Which variables a step may move: not those that the gradient pushes against their bounds.
   function free_variables(solution, low, high) result(free)
@@ -140,16 +154,17 @@ contains
   end subroutine find_step
 
   !> Takes a step if it goes down, and sets the damping of the next one.
-  subroutine try_step(problem, step, low, high, scale, solution, lambda, growth, has_moved, may_rise)
+  subroutine try_step(problem, step, low, high, solution, lambda, growth, has_moved, gain, may_rise)
     class(residuals_t), intent(inout) :: problem
-    real(wp), intent(in) :: step(:), low(:), high(:), scale(:)
+    real(wp), intent(in) :: step(:), low(:), high(:)
     type(solution_t), intent(inout) :: solution
     real(wp), intent(inout) :: lambda, growth
     logical, intent(out) :: has_moved
+    real(wp), intent(out) :: gain               !! the fall of the cost, as a share of the one that linear residuals promise
     logical, intent(in), optional :: may_rise   !! whether rounding may hide that it goes down; absent: no
     real(wp), parameter :: rounding = 1.0e-9_wp
     type(error_t), allocatable :: error
-    real(wp) :: change(size(step)), cost, expected(problem%count), gain, promised, r(problem%count), x(size(step))
+    real(wp) :: change(size(step)), cost, promised, r(problem%count), x(size(step))
 
     x = min(high, max(low, solution%x + step))
     call problem%evaluate(x, r, error)
@@ -157,8 +172,8 @@ contains
     cost = huge(cost)
     if (.not. allocated(error)) cost = 0.5_wp * sum(r**2)
     change = x - solution%x
-    expected = matmul(solution%jacobian, change)
-    promised = solution%cost - 0.5_wp * sum((solution%residuals + expected)**2)
+    promised = promise(solution, change)
+    gain = 0.0_wp
     has_moved = cost < solution%cost
     if (present(may_rise)) has_moved = has_moved .or. cost <= (1.0_wp + rounding) * solution%cost
     if (has_moved) then
@@ -173,6 +188,30 @@ contains
       growth = 2.0_wp * growth
     end if
   end subroutine try_step
+
+  !> Goes on along a step that went down by more than linear residuals promise, in doubled strides.
+  subroutine extend_step(problem, step, low, high, solution)
+    class(residuals_t), intent(inout) :: problem
+    real(wp), intent(in) :: step(:), low(:), high(:)
+    type(solution_t), intent(inout) :: solution
+    integer, parameter :: most_strides = 20
+    type(error_t), allocatable :: error
+    real(wp) :: begin(size(step)), cost, r(problem%count), x(size(step))
+    integer :: i
+
+    begin = solution%x - step
+    do i = 1, most_strides
+      x = min(high, max(low, begin + 2.0_wp**i * step))
+      call problem%evaluate(x, r, error)
+      solution%evaluations = solution%evaluations + 1
+      if (allocated(error)) return
+      cost = 0.5_wp * sum(r**2)
+      if (cost >= solution%cost) return
+      solution%x = x
+      solution%residuals = r
+      solution%cost = cost
+    end do
+  end subroutine extend_step
 
   !> The Jacobian by differences on the side that is inside of the bounds.
   subroutine differentiate_forward(problem, low, high, scale, solution)
@@ -247,6 +286,7 @@ contains
     solution%covariance = inverse * spread(scale, 2, size(low)) * spread(scale, 1, size(low))
     solution%undetermined = vectors(:, n + 1:)
     do k = 1, size(solution%undetermined, 2)
+      where (abs(solution%x) > 0) solution%undetermined(:, k) = solution%undetermined(:, k) * scale / abs(solution%x)
       if (.not. all(free .or. abs(solution%undetermined(:, k)) <= 0.5_wp)) solution%undetermined(:, k) = 0.0_wp   ! at a bound
     end do
   end subroutine find_covariance
