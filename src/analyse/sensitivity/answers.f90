@@ -116,11 +116,20 @@ contains
       call raise(error, exit_failed, 'no number can be changed: ' // reason)
       return
     end if
-    if (size(failed) > 0) call append(notes, 'without derivatives by ' // joined(failed, ', ', 4) // ': ' // reason)
-    if (size(rough) > 0) call append(notes, 'not smooth within 0.6 % of ' // joined(rough, ', ', 4) // &
+    if (size(failed) > 0) call append_new(notes, 'without derivatives by ' // joined(failed, ', ', 4) // ': ' // reason)
+    if (size(rough) > 0) call append_new(notes, 'not smooth within 0.6 % of ' // joined(rough, ', ', 4) // &
                                             ': derivatives by these are averages of that range')
     call group%finish(slopes)
   end subroutine differentiate
+
+  !> Adds a note that is not there.
+  subroutine append_new(notes, note)
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    character(len=*), intent(in) :: note
+    integer :: i
+
+    if (.not. any([(notes(i)%text == note, i=1, size(notes))])) call append(notes, note)
+  end subroutine append_new
 
   !> Whether differences of the fourth order tell otherwise.
   pure logical function is_rough(key, values, slopes, scale)

@@ -6,7 +6,6 @@ module nocdyn_sensitivity_report
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: ascending_order
-  use nocdyn_table_text, only: padded
   use nocdyn_output_file, only: output_file_t
   use nocdyn_text, only: rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
@@ -16,7 +15,7 @@ module nocdyn_sensitivity_report
 
   public :: put_sensitivity, sensitivity_csv, sensitivity_text
 
-  integer, parameter :: most_answers = 60, most_of_answer = 4   ! that are printed; all are in the files
+  integer, parameter :: most_answers = 40, most_of_answer = 4   ! that are printed; all are in the files
   real(wp), parameter :: percent = 100.0_wp
   real(wp), parameter :: least = 1.0e-3_wp     ! a smaller share of the largest effect is not printed
   character(len=*), parameter :: line_end = new_line('a')
@@ -75,14 +74,16 @@ contains
         call report%append_line('  ' // one%kind // ' of ' // one%label // ' = ' // value_text(one))
         order = ranking(self, i)
         effect = self%effects(i)
-        if (size(order) > 0) then
-          do k = 1, min(size(order), most_of_answer)
-            if (abs(effect(order(k))) <= least * abs(effect(order(1)))) exit
-            line = '    ' // padded(signed(effect(order(k))) // trim(merge(' points', ' %     ', one%is_share)), 16)
-            call report%append_line(line // ' by ' // self%keys(order(k))%target%path // sentence(one, self%keys(order(k)), &
-                                                                                                effect(order(k)), k))
-          end do
-        end if
+        line = ''
+        do k = 1, min(size(order), most_of_answer)
+          if (abs(effect(order(k))) <= least * abs(effect(order(1)))) exit
+          if (k > 1) line = line // ', '
+          line = line // signed(effect(order(k))) // trim(merge(' points', ' %     ', one%is_share)) // ' ' // &
+                 self%keys(order(k))%target%path
+        end do
+        if (line == '') cycle
+        call report%append_line('    ' // line)
+        if (one%kind == 'margin') call append_sentence(one, self%keys(order(1)), effect(order(1)), report)
       end associate
     end do
     if (size(self%answers) > most_answers) then
@@ -91,18 +92,17 @@ contains
     text = report%text()
   end function sensitivity_text
 
-  !> ": the margin of mode 1, order 4.5 gains 1 % for +1.2 % of coupling.rubber.stiffness", of a margin and its first number.
-  function sentence(answer, key, effect, rank) result(text)
+  !> "the margin of mode 1, order 4.5 gains 1 point for +1.2 % of coupling.rubber.stiffness".
+  subroutine append_sentence(answer, key, effect, report)
     type(answer_t), intent(in) :: answer
     type(varied_key_t), intent(in) :: key
     real(wp), intent(in) :: effect
-    integer, intent(in) :: rank
-    character(len=:), allocatable :: text
+    type(text_buffer_t), intent(inout) :: report
 
-    text = ''
-    if (answer%kind /= 'margin' .or. rank > 1 .or. .not. abs(effect) > 0 .or. key%small_text /= '1 %') return
-    text = ': the margin of ' // answer%label // ' gains 1 % for ' // signed(1.0_wp / effect) // ' % of ' // key%target%path
-  end function sentence
+    if (key%small_text /= '1 %' .or. .not. abs(effect) > 0) return
+    call report%append_line('    the margin of ' // answer%label // ' gains 1 point for ' // signed(1.0_wp / effect) // &
+                            ' % of ' // key%target%path)
+  end subroutine append_sentence
 
   function value_text(answer) result(text)
     type(answer_t), intent(in) :: answer

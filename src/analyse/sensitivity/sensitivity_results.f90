@@ -48,11 +48,13 @@ contains
       error%message = input%shown_case() // ': ' // error%message
       return
     end if
+    if (size(input%groups_named('response')) > 0) then
+      call new_response_answers(input, most_criticals, response, self%found%notes, error)
+      if (.not. allocated(error)) call differentiate(input, self%found%keys, response, self%found%notes, error)
+      if (allocated(error)) return
+      call add_answers(response%answers, self%found%answers)
+    end if
     call add_answers(modes%answers, self%found%answers)
-    if (size(input%groups_named('response')) == 0) return
-    call new_response_answers(input, most_criticals, response, self%found%notes, error)
-    if (.not. allocated(error)) call differentiate(input, self%found%keys, response, self%found%notes, error)
-    if (.not. allocated(error)) call add_answers(response%answers, self%found%answers)
   end subroutine solve
 
   subroutine add_answers(new, answers)
