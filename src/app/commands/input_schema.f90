@@ -8,7 +8,7 @@ module nocdyn_input_schema
   use nocdyn_schema_rules, only: a_flag, a_number, a_selector, a_word, an_integer, any_number, any_times, at_least_once, &
     exactly_once, key_rule_t, occurrence_texts, required, topics, unset
   use nocdyn_schema_sentences, only: default_text
-  use nocdyn_schema_units, only: name_in_unit, other_unit, unit_name
+  use nocdyn_schema_units, only: name_in_unit, other_unit, takes_units, unit_name
   use nocdyn_text, only: append, string_t
   use nocdyn_units, only: from_si
   use nocdyn_version, only: version
@@ -16,6 +16,9 @@ module nocdyn_input_schema
   private
 
   public :: input_schema
+
+  !> Texts of numbers with a unit.
+  character(len=*), parameter :: quantity_pattern = '^ *[-+]?([0-9]+[.]?[0-9]*|[.][0-9]+)([eEdDqQ][-+]?[0-9]+)? *[^-+0-9. ].*$'
 
 contains
 
@@ -148,7 +151,12 @@ contains
 
     select case (rule%value_type)
     case (a_number)
-      call json%put('type', 'number')
+      if (takes_units(rule, unit)) then
+        call json%put('type', [string_t('number'), string_t('string')])
+        call json%put('pattern', quantity_pattern)
+      else
+        call json%put('type', 'number')
+      end if
       call put_range(json, rule, unit)
     case (an_integer)
       call json%put('type', 'integer')

@@ -6,8 +6,7 @@ module nocdyn_unit_expressions
   use nocdyn_kinds, only: wp
   use nocdyn_near_words, only: nearest_word
   use nocdyn_text, only: append, quoted, shortened, string_t, to_text
-  use nocdyn_unit_table, only: ambiguous_units, base_units, quantity_names, unit_prefixes, unit_spellings, unit_symbols, &
-    usual_units
+  use nocdyn_units, only: ambiguous_units, base_units, quantity_names, unit_prefixes, unit_spellings, unit_symbols, usual_units
   implicit none (type, external)
   private
 
@@ -84,7 +83,8 @@ contains
       reader%message = 'a degree of temperature in a product; allowed there: K'
     end if
     call move_alloc(reader%message, message)
-    if (message /= '') message = quoted(shortened(trim(text))) // ': ' // message
+    if (message == '') return
+    if (message(1:1) /= "'") message = quoted(shortened(trim(text))) // ': ' // message   ! else it names the symbol
   end subroutine read_unit
 
   !> Finds the conversion from a unit that the user writes to one of the program.

@@ -23,7 +23,8 @@ contains
     call buffer%append_line('# Input reference')
     call buffer%append_line('')
     call buffer%append_line('An input file is a Fortran namelist in SI units. Groups may be in any order. A speed, a ' // &
-                            'frequency or an angle may be given in rpm, Hz or degrees instead, by the key that ends in the unit.')
+                            'frequency or an angle may be given in rpm, Hz or degrees instead, by the key that ends in the ' // &
+                            "unit, and every number as a text with its unit, such as '12 kN m'.")
     do topic = 1, size(topics)
       call buffer%append_line('')
       heading = trim(topics(topic)%name) // ': ' // trim(topics(topic)%help)

@@ -7,8 +7,8 @@ module nocdyn_group_reader
   use nocdyn_input_overrides, only: override_t
   use nocdyn_key_relations, only: apply_relations
   use nocdyn_namelist, only: assignment_t, namelist_group_t, namelist_t
-  use nocdyn_raw_group, only: new_raw_group, raw_group_t
   use nocdyn_record_reader, only: read_record
+  use nocdyn_raw_group, only: has_bare_unit, new_raw_group, raw_group_t
   use nocdyn_schema, only: first_key, group_rules, has_word, is_single, key_rules
   use nocdyn_schema_relations, only: relations_t
   use nocdyn_schema_rules, only: a_document, a_line_file, a_name, columns, equal_lengths, records
@@ -37,7 +37,7 @@ contains
     type(group_t), intent(inout) :: group          !! `rule`, `kind` and `line` are set
     type(diagnostics_t), intent(inout) :: diagnostics
     type(raw_group_t), allocatable :: raw
-    integer :: i, k, key, unit
+    integer :: i, k, key, unit, written
     logical :: has_number
     character(len=:), allocatable :: message
 
@@ -50,12 +50,15 @@ contains
           call refuse_key(assignment, raw, diagnostics)
           cycle
         end if
+        written = key
         call raw%keys(raw%position(key))%assign(namelist, assignment, unit, message)
         if (message == '') cycle
         call find_key_without_equals(namelist, assignment, raw%rule, key, unit)
         if (key > 0) then
           message = message // "; is '=' missing after " // name_in_unit(key_rules(key), unit) // '?'
           raw%keys(raw%position(key))%may_be_missing = .true.
+        else if (has_bare_unit(raw%keys(raw%position(written)), namelist, assignment)) then
+          message = message // '; a number with its unit stands in quotes'
         end if
         call diagnostics%add(assignment%line, raw%index, message)
       end associate

@@ -6,8 +6,9 @@ module nocdyn_input_overrides
   use nocdyn_namelist_scanner, only: blank_control_characters, scan_value
   use nocdyn_namelist_values, only: longest_list
   use nocdyn_schema, only: holds_texts, key_rules
-  use nocdyn_schema_rules, only: a_name, any_number, key_rule_t
+  use nocdyn_schema_rules, only: a_name, a_number, any_number, key_rule_t
   use nocdyn_text, only: string_t, to_text
+  use nocdyn_unit_expressions, only: number_last
   implicit none (type, external)
   private
 
@@ -69,16 +70,19 @@ contains
     end if
   end subroutine find_key
 
-  !> Scans the value. A single text without quotes is taken unchanged: the shell has removed the quotes.
+  !> Scans the value. A single text without quotes, or number with a unit, is taken unchanged: the shell has removed the quotes.
   subroutine read_value(text, override, message)
     character(len=*), intent(in) :: text
     type(override_t), intent(inout) :: override
     character(len=:), allocatable, intent(out) :: message
     type(diagnostics_t) :: diagnostics
     type(key_rule_t) :: rule
+    logical :: is_single
 
     rule = key_rules(override%key_rule)
-    if (holds_texts(rule%value_type) .and. rule%count == 1 .and. scan(adjustl(text), '''"') /= 1) then
+    is_single = holds_texts(rule%value_type)
+    if (rule%value_type == a_number) is_single = verify(adjustl(text(number_last(text) + 1:)), '*,/;!''"') == 1
+    if (is_single .and. rule%count == 1 .and. scan(adjustl(text), '''"') /= 1) then
       override%namelist%source = text
       call blank_control_characters(override%namelist%source, diagnostics)
       if (index(text, new_line('a')) > 0) call diagnostics%add(no_line, 0, 'a line end does not belong in a value')

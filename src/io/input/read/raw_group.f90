@@ -7,12 +7,12 @@ module nocdyn_raw_group
   use nocdyn_schema, only: first_key, key_rules, last_key
   use nocdyn_schema_rules, only: any_number, key_rule_t, required, unset
   use nocdyn_schema_text, only: allowed_text
-  use nocdyn_schema_units, only: name_in_unit
+  use nocdyn_schema_units, only: name_in_unit, takes_units
   use nocdyn_text, only: listed, shortened, string_t, to_text
   implicit none (type, external)
   private
 
-  public :: new_raw_group, new_raw_key
+  public :: has_bare_unit, new_raw_group, new_raw_key
 
   !> One value of a key.
   type, public :: raw_value_t
@@ -192,6 +192,20 @@ contains
         // '); allowed: ' // to_text((last - assignment%first) / assignment%stride + 1)
     end if
   end subroutine find_last
+
+  !> Whether a word without quotes follows the first value of a single number, as its unit.
+  pure logical function has_bare_unit(key, namelist, assignment) result(has)
+    type(raw_key_t), intent(in) :: key
+    type(namelist_t), intent(in) :: namelist
+    type(assignment_t), intent(in) :: assignment
+
+    has = takes_units(key_rules(key%rule), key%unit) .and. assignment%last_item > assignment%first_item
+    if (.not. has) return
+    associate (item => namelist%items(assignment%first_item + 1))
+      has = .not. (item%is_quoted .or. item%is_null)
+      if (has) has = verify(namelist%item_text(item), '0123456789+-.') == 1
+    end associate
+  end function has_bare_unit
 
   !> The first few values as they are written.
   pure function found_values(namelist, assignment) result(text)

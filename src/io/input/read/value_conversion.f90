@@ -2,17 +2,20 @@
 module nocdyn_value_conversion
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_input, only: value_t
+  use nocdyn_key_path, only: key_path_t, read_path
   use nocdyn_kinds, only: wp
-  use nocdyn_literals, only: literal_ok, literal_too_large, number_problem, read_integer, read_logical, read_real
+  use nocdyn_literals, only: literal_malformed, literal_ok, literal_too_large, number_problem, read_integer, &
+    read_logical, read_real
   use nocdyn_raw_group, only: new_raw_key, raw_group_t, raw_key_t, raw_value_t
   use nocdyn_schema, only: holds_texts, key_rules, words_of
   use nocdyn_schema_rules, only: a_body, a_document, a_file, a_flag, a_folder, a_line_file, a_name, a_number, a_selector, &
     a_word, an_integer, ground, is_out_of_range, key_rule_t, longest_name, size_limit, unset
   use nocdyn_schema_text, only: allowed_text
-  use nocdyn_schema_units, only: name_in_unit
+  use nocdyn_schema_units, only: name_in_unit, path_key, takes_units, unit_name
   use nocdyn_near_words, only: nearest_word
   use nocdyn_text, only: counted, is_too_long, joined, longest_file_name, longest_path, lower_case, quoted, &
     shortened, string_t, to_text
+  use nocdyn_unit_expressions, only: find_conversion, number_last, unit_conversion_t
   use nocdyn_units, only: in_si
   implicit none (type, external)
   private
@@ -55,7 +58,7 @@ contains
       else if (known < rule%fewest) then
         message = ' has ' // counted(known, 'value', 'values') // '; needed: at least ' // to_text(rule%fewest)
       else
-        call convert_values(key, group%index, value, diagnostics)
+        call convert_values(key, group%index, unit_of_numbers(group, rule), value, diagnostics)
         return
       end if
       call group%report([position], key%name() // message, diagnostics)
@@ -71,13 +74,14 @@ contains
 
     key = new_raw_key(rule)
     call key%fill_defaults()
-    call convert_values(key, 0, value, none)
+    call convert_values(key, 0, '', value, none)
   end function default_value
 
   !> Converts all values of a key.
-  subroutine convert_values(key, group, value, diagnostics)
+  subroutine convert_values(key, group, unit, value, diagnostics)
     type(raw_key_t), intent(in) :: key     !! with all values given
     integer, intent(in) :: group           !! index of the group, for the diagnostics
+    character(len=*), intent(in) :: unit   !! of numbers, to which texts with a unit are converted
     type(value_t), intent(inout) :: value
     type(diagnostics_t), intent(inout) :: diagnostics
     character(len=:), allocatable :: element, message
@@ -97,7 +101,11 @@ contains
         allocate (value%texts(size(key%values)))
       end select
       do i = 1, size(key%values)
-        call convert_value(key%values(i), rule, key%override > 0, i, value, message)
+        if (rule%value_type == a_number .and. has_unit(key%values(i), key%override > 0)) then
+          call convert_quantity(key%values(i), rule, power_unit(unit, i), value%numbers(i), message)
+        else
+          call convert_value(key%values(i), rule, key%override > 0, i, value, message)
+        end if
         if (message == '') cycle
         has_error = .true.
         element = name_in_unit(rule, key%values(i)%unit)
@@ -134,7 +142,9 @@ contains
       case (a_number)
         call read_real(raw%text, value%numbers(i), status)
         message = number_problem(status)
-        if (message == '') then
+        if (status == literal_malformed .and. number_last(raw%text) > 0 .and. takes_units(rule, raw%unit)) then
+          message = message // '; a number with its unit stands in quotes'
+        else if (message == '') then
           call convert_number(rule, raw%unit, value%numbers(i), message)
           return
         end if
@@ -155,6 +165,78 @@ contains
       if (message /= '') message = message // '; allowed: ' // allowed_text(rule, raw%unit)
     end if
   end subroutine convert_value
+
+  !> The unit in which the numbers of a key are: the one of the schema, or of the number that a path names.
+  function unit_of_numbers(group, rule) result(unit)
+    type(raw_group_t), intent(in) :: group
+    type(key_rule_t), intent(in) :: rule
+    character(len=:), allocatable :: unit, message, owner
+    type(key_path_t) :: path
+    integer :: i
+
+    unit = trim(rule%unit)
+    owner = path_key(rule)
+    if (owner == '') return
+    do i = 1, size(group%keys)
+      associate (key => group%keys(i))
+        if (key%count_given() /= 1) cycle
+        if (key_rules(key%rule)%name == 'scale' .and. lower_case(key%values(1)%text) == 'relative') unit = ''   ! behind the path
+        if (key_rules(key%rule)%name /= owner) cycle
+        call read_path(trim(adjustl(key%values(1)%text)), '', path, message)
+        if (path%key_rule > 0) unit = unit_name(key_rules(path%key_rule), path%unit)
+      end associate
+    end do
+  end function unit_of_numbers
+
+  !> The unit of one value of a list: k of N m/rad^k is its index.
+  pure function power_unit(unit, i) result(text)
+    character(len=*), intent(in) :: unit
+    integer, intent(in) :: i
+    character(len=:), allocatable :: text
+
+    text = unit
+    if (index(text, '^k') > 0) text = text(:index(text, '^k')) // to_text(i)
+  end function power_unit
+
+  !> Whether a value is a number with its unit: '12 kN m'. Without quotes it stands on the command line only.
+  pure logical function has_unit(raw, may_be_bare)
+    type(raw_value_t), intent(in) :: raw
+    logical, intent(in) :: may_be_bare   !! texts need no quotes: the shell has removed them
+    integer :: last
+
+    last = number_last(raw%text)
+    has_unit = (raw%is_quoted .or. may_be_bare) .and. last > 0 .and. last < len_trim(raw%text)
+  end function has_unit
+
+  !> Converts a number with its unit and checks it.
+  subroutine convert_quantity(raw, rule, unit, number, message)
+    type(raw_value_t), intent(in) :: raw
+    type(key_rule_t), intent(in) :: rule
+    character(len=*), intent(in) :: unit   !! in which the number is needed
+    real(wp), intent(out) :: number        !! in this unit, unless it is wrong
+    character(len=:), allocatable, intent(out) :: message   !! text after 'KEY = VALUE'; '': the value is valid
+    type(unit_conversion_t) :: conversion
+    integer :: last, status
+
+    last = number_last(raw%text)
+    call read_real(trim(adjustl(raw%text(:last))), number, status)
+    if (raw%unit > 0) then
+      message = ' has a unit as ' // name_in_unit(rule, raw%unit) // ' has; allowed: a number, or ' // &
+                name_in_unit(rule, 0) // ' = ' // quoted(shortened(trim(raw%text)))
+    else if (number_problem(status) /= '') then
+      message = number_problem(status) // '; allowed: ' // allowed_text(rule)
+    else
+      call find_conversion(adjustl(raw%text(last + 1:)), unit, conversion, message)
+      if (message /= '') then
+        message = ': ' // message
+      else if (size_limit(number, rule%allowed, rule%ascends) /= '') then   ! which bounds products too
+        message = ' is out of range; allowed: ' // allowed_text(rule) // size_limit(number, rule%allowed, rule%ascends)
+      else
+        number = conversion%convert(number)
+        call convert_number(rule, 0, number, message)
+      end if
+    end if
+  end subroutine convert_quantity
 
   !> Converts a number to the unit of the schema and checks it.
   subroutine convert_number(rule, unit, number, message)
