@@ -104,6 +104,7 @@ OPTIONS = {
     "--out": "a",
     "--set": "a=1",
     "--case": "a",
+    "--variant": "a",
     "--at": "rest",
     "--modes": "1",
     "--range_hz": "1,2",

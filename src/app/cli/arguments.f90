@@ -20,6 +20,7 @@ module nocdyn_arguments
     option_t('--out', value='DIR'), &
     option_t('--set', value='PATH=VALUE', may_repeat=.true.), &
     option_t('--case', value='NAME'), &
+    option_t('--variant', value='DIR:NUMBER'), &
     option_t('--at', value='equilibrium|rest|TIME'), &
     option_t('--modes', value='NUMBER'), &
     option_t('--starts', value='NUMBER'), &

@@ -276,6 +276,8 @@ contains
     end do
     if (arguments%is_given('--modes') .and. arguments%is_given('--range_hz')) then
       call raise(error, exit_input, '--modes and --range_hz exclude each other')
+    else if (arguments%is_given('--variant') .and. size(arguments%operands) > 1) then
+      call raise(error, exit_input, '--variant is of one input; allowed: at most one FILE')
     end if
   end subroutine check_options
 
@@ -292,6 +294,7 @@ contains
       if (size(arguments%operands) > 0) call raise(error, exit_input, '--version takes no arguments')
       return
     end if
+    if (arguments%is_given('--variant') .and. size(arguments%operands) == 0) return   ! the folder of the sweep has an input
     usage = 'nocdyn ' // arguments%command // ' ' // commands(row)%operands
     select case (commands(row)%operands)
     case ('FILE...')

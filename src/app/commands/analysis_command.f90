@@ -28,6 +28,7 @@ module nocdyn_analysis_command
   use nocdyn_text, only: append, counted, listed, shown_path, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_transit_results, only: transit_results_t
+  use nocdyn_variant_choice, only: leave_sweep
   use nocdyn_verdicts, only: verdict_t
   implicit none (type, external)
   private
@@ -452,6 +453,7 @@ contains
     call read_input(arguments%operands(number)%text, arguments%overrides, reading%machine, reading%error, &
                     diagnostics, load_cases, wanted_case(arguments))
     if (allocated(reading%error)) call add_plan_diagnostics(reading%machine, diagnostics, reading%error)
+    if (.not. allocated(reading%error)) call leave_sweep(arguments, reading%machine, load_cases)
     if (.not. allocated(reading%error)) call find_inputs(arguments, reading%machine, wanted, reading%error)
     if (allocated(reading%error)) then
       if (arguments%command == 'check' .and. allocated(load_cases)) then   ! the machine itself can be read

@@ -12,8 +12,10 @@ module nocdyn_command_table
   public :: list_commands
 
   character(len=*), parameter :: nl = new_line('a')
+  character(len=*), parameter :: variant_help = &
+    '  --variant DIR:NUMBER  the machine of a variant of the sweep in DIR; FILE may be left out'
   character(len=*), parameter :: case_help = &
-    '  --case NAME        look at this &load_case only; default: all of them, each to DIR/NAME'
+    '  --case NAME        look at this &load_case only; default: all of them, each to DIR/NAME' // nl // variant_help
 
 contains
 
@@ -23,10 +25,11 @@ contains
 
     call list_analyses(commands)
     call list_torsional_analyses(commands)
-    call add_command(commands, 'matrices', 'FILE', '--code --set --case', 'print the matrices of the method for a machine', &
+    call add_command(commands, 'matrices', 'FILE', '--code --set --case --variant', &
+      'print the matrices of the method for a machine', &
       'Prints every matrix and vector of the method for the machine at its start, with its equation number.' // nl // nl // &
       '  --code             print the equations of motion as a program in C instead, to be built into others' // nl // &
-      '  --case NAME        look at the machine of this &load_case', analysis_command)
+      '  --case NAME        look at the machine of this &load_case' // nl // variant_help, analysis_command)
     call list_sweeps(commands)
     call list_python_commands(commands)
     call add_command(commands, 'new', 'FILE', '--kind', 'write a commented input to start from', &
@@ -45,25 +48,28 @@ contains
   subroutine list_analyses(commands)
     type(command_t), allocatable, intent(inout) :: commands(:)
 
-    call add_command(commands, 'run', 'FILE...', '--out --set --case --strict --quiet', &
+    call add_command(commands, 'run', 'FILE...', '--out --set --case --variant --strict --quiet', &
       'integrate machines and write their results', &
       'Integrates every input file and writes trajectory.csv (or trajectory.nc), summary.json and input.nml.' // nl // nl // &
       '  --out DIR          write to DIR, with several files to DIR/<name of the file>;' // nl // &
       '                     default: &output directory, else results/<name of the file>' // nl // &
       '  --set PATH=VALUE   override a key: run.rtol=1e-9, load.work.viscous=80, gear.reducer.radii=2,3' // nl // &
       '  --case NAME        run only this &load_case; default: all of them, each to DIR/NAME' // nl // &
+      variant_help // ', results' // nl // &
+      '                     are in DIR/variant-NUMBER then' // nl // &
       '  --strict           exit code 1 if a limit is exceeded' // nl // &
       '  --quiet            print nothing but errors' // nl // nl // &
       'A file with errors does not stop the others; the exit code is the highest of all files. After Ctrl-C or a' // nl // &
       'failed computation, the rows up to there are in trajectory.partial.csv.', run_command)
-    call add_command(commands, 'check', 'FILE...', '--out --set --case', 'read and analyse, integrate nothing', &
+    call add_command(commands, 'check', 'FILE...', '--out --set --case --variant', 'read and analyse, integrate nothing', &
       'Reads the files and analyses the machines. Prints every error with its line, or the degrees of freedom,' // nl // &
       'independent coordinates, ratios between geared bodies, redundant gears, and the load cases and the sweep if' // nl // &
       'there are some.' // nl // nl // &
       '  --out DIR          write check.json to DIR, with several files to DIR/<name of the file>: inertias,' // nl // &
       '                     ratios, stiffnesses' // nl // &
-      '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR', analysis_command)
-    call add_command(commands, 'equilibrium', 'FILE...', '--out --set --case', &
+      '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR' // nl // variant_help, &
+      analysis_command)
+    call add_command(commands, 'equilibrium', 'FILE...', '--out --set --case --variant', &
       'steady states: speeds, torques, twists, powers, stability', &
       'Finds the steady states of the machines: constant speeds at which the mean torques balance, and the' // nl // &
       'twists of the couplings that transmit them. If there are several steady states, all are printed with' // nl // &
@@ -71,7 +77,7 @@ contains
       '  --out DIR          write equilibrium.json to DIR, with several files to DIR/<name of the file>' // nl // &
       case_help // nl // nl // &
       'Exit code 1: there is no steady state.', analysis_command)
-    call add_command(commands, 'modes', 'FILE...', '--out --set --case --at --modes --range_hz --holzer', &
+    call add_command(commands, 'modes', 'FILE...', '--out --set --case --variant --at --modes --range_hz --holzer', &
       'natural frequencies, damping, shapes and energies of the modes', &
       'Linearises the machines and prints natural frequencies, damping ratios, time constants and the' // nl // &
       'distribution of the energy of each mode.' // nl // nl // &
@@ -89,7 +95,7 @@ contains
   subroutine list_torsional_analyses(commands)
     type(command_t), allocatable, intent(inout) :: commands(:)
 
-    call add_command(commands, 'response', 'FILE...', '--out --set --case --strict --quiet', &
+    call add_command(commands, 'response', 'FILE...', '--out --set --case --variant --strict --quiet', &
       'forced response by orders over a range of speeds, critical speeds, limits', &
       'Computes by &response what the orders of the excitations do at every speed: the steady state at the speed,' // nl // &
       'which the motors hold, and the oscillations about it, of each order and of all together. Prints the' // nl // &
@@ -102,7 +108,7 @@ contains
       '  --strict           exit code 1 if a limit is exceeded' // nl // &
       '  --quiet            print nothing but errors' // nl // nl // &
       'The verdict on the limits comes first, the worst line at its head; response.json has it too.', analysis_command)
-    call add_command(commands, 'campbell', 'FILE...', '--out --set --case --quiet --modes --range_hz', &
+    call add_command(commands, 'campbell', 'FILE...', '--out --set --case --variant --quiet --modes --range_hz', &
       'natural frequencies over a range of speeds, and where the orders meet them', &
       'Follows the natural frequencies of the machine, linearised about its steady states, over the speeds of' // nl // &
       '&response, and finds the speeds at which its orders, or those of the excitations, meet them. Writes' // nl // &
@@ -115,7 +121,7 @@ contains
       '                     machine with more than 600 degrees of freedom 100' // nl // &
       '  --range_hz LOW,HIGH  only the modes in this range of frequencies at the first speed [Hz]' // nl // &
       '  --quiet            print nothing but errors', analysis_command)
-    call add_command(commands, 'sensitivity', 'FILE...', '--out --set --case --at --modes --range_hz', &
+    call add_command(commands, 'sensitivity', 'FILE...', '--out --set --case --variant --at --modes --range_hz', &
       'derivatives of frequencies, critical speeds and half ranges by every number', &
       'Differentiates what modes and response answer by every number of the machine: frequencies and damping, with' // nl // &
       '&response also critical speeds, their margins and the half ranges there. Prints for each answer the numbers' // nl // &
@@ -137,7 +143,7 @@ contains
       '  --set PATH=VALUE   override a key' // nl // &
       case_help // nl // &
       '  --quiet            print nothing but errors', analysis_command)
-    call add_command(commands, 'orbit', 'FILE...', '--out --set --case --strict --resume --quiet', &
+    call add_command(commands, 'orbit', 'FILE...', '--out --set --case --variant --strict --resume --quiet', &
       'periodic motions of nonlinear machines: folds, jumps, stability', &
       'Follows by &orbit the periodic motions of a machine over a number of its input or over the mean speed of a' // nl // &
       'body, by harmonic balance or shooting: where motions jump, where they are unstable, the half ranges of all' // nl // &
@@ -149,7 +155,7 @@ contains
       '  --strict           exit code 1 if a limit is exceeded' // nl // &
       '  --resume           continue an interrupted analysis' // nl // &
       '  --quiet            print nothing but errors', analysis_command)
-    call add_command(commands, 'transit', 'FILE...', '--out --set --case --strict --quiet', &
+    call add_command(commands, 'transit', 'FILE...', '--out --set --case --variant --strict --quiet', &
       'run through barred ranges of speed: time, peaks, damage of a passage', &
       'Runs the machine as nocdyn run does, and finds the passages of the range of speeds of &transit, or of the' // nl // &
       'ranges that &limit bars: the time in the range, the largest moments and stresses in it against the limits' // nl // &

@@ -8,6 +8,7 @@ module nocdyn_program
   use nocdyn_help_command, only: help_command
   use nocdyn_posix, only: ignore_file_size_signal
   use nocdyn_text, only: append, quoted
+  use nocdyn_variant_choice, only: choose_variant
   use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
   private
@@ -38,7 +39,8 @@ contains
       else
         associate (command => commands(command_index(commands, arguments%command)))
           if (associated(command%run)) then
-            call command%run(arguments, code)
+            call choose_variant(command, arguments, error)
+            if (.not. allocated(error)) call command%run(arguments, code)
           else
             call raise(error, exit_input, name // ' has no command ' // quoted(command%name) // '; use nocdyn ' // command%name)
           end if

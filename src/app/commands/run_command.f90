@@ -20,6 +20,7 @@ module nocdyn_run_command
   use nocdyn_strictness, only: be_strict
   use nocdyn_text, only: append, counted, quoted, shown_path, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
+  use nocdyn_variant_choice, only: leave_sweep
   use nocdyn_verdicts, only: verdict_t
   implicit none (type, external)
   private
@@ -175,6 +176,7 @@ contains
     associate (file => arguments%operands(number)%text)
       call read_input(file, arguments%overrides, machine, reading%error, load_cases=load_cases, &
                       only_case=wanted_case(arguments))
+      if (.not. allocated(reading%error)) call leave_sweep(arguments, machine, load_cases)
       if (.not. allocated(reading%error)) call find_wanted(arguments, machine, wanted, reading%error)
       if (.not. allocated(reading%error)) then
         reading%folder = result_folder(arguments, machine)

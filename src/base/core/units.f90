@@ -1,8 +1,8 @@
 !> The units in which keys and columns are written beside SI, and the symbols of which users make others, with their dimensions
 !> and with factors that are exact by definition. `nocdyn_unit_expressions` reads units made of symbols.
 !>
-!> The factors are the ones of NIST Special Publication 811, Guide for the Use of the International System of Units (2008), appendix B.8: the
-!> international pound is 0.45359237 kg and the foot 0.3048 m; the pound-force, kilogram-force, psi, slug and
+!> The factors are the ones of NIST Special Publication 811, Guide for the Use of the International System of Units (2008),
+!> appendix B.8: the international pound is 0.45359237 kg and the foot 0.3048 m; the pound-force, kilogram-force, psi, slug and
 !> horsepower (550 ft lbf/s) follow from these and the standard gravity, 9.80665 m/s2; the metric horsepower is 75 kgf m/s.
 module nocdyn_units
   use nocdyn_kinds, only: wp

@@ -6,7 +6,7 @@ module nocdyn_sweep_differences
   implicit none (type, external)
   private
 
-  public :: header_difference
+  public :: header_difference, input_difference
 
   integer, parameter :: max_listed = 5   ! differences
 

@@ -13,6 +13,7 @@ module nocdyn_sweep_journal
   private
 
   public :: journal_name, journal_names, rank_journal_name, is_of_rank, is_of_shard, missing_variants, create_journal, &
+    read_journal_header, &
     open_journal, continue_journal
 
   character(len=*), parameter :: rank_beginning = 'sweep.rank-'
@@ -101,10 +102,11 @@ contains
   end subroutine create_journal
 
   !> Opens an existing journal to read it or to resume the sweep. An entry that was not written as a whole is removed.
-  subroutine open_journal(folder, name, journal, error)
+  subroutine open_journal(folder, name, journal, error, only_header)
     character(len=*), intent(in) :: folder, name
     type(sweep_journal_t), intent(out) :: journal
     type(error_t), allocatable, intent(out) :: error   !! `exit_file` if it cannot be opened, else `exit_input`
+    logical, intent(in), optional :: only_header       !! leaves the entries unread, and their file as it is
     integer :: length
     logical :: is_good, is_there
 
@@ -113,6 +115,7 @@ contains
     if (allocated(error)) return
     call journal%file%read(journal%file%end, header_tag, length, is_there, is_good)
     if (is_good) call unpack_header(journal%file%buffer(frame_bytes + 1:frame_bytes + length), journal%header, is_good)
+    if (is_good .and. present(only_header)) return
     if (is_good) then
       journal%file%end = journal%file%end + frame_bytes + length
       call journal%read_chunks()
@@ -123,6 +126,19 @@ contains
     end if
     if (allocated(error)) call journal%file%close()
   end subroutine open_journal
+
+  !> Reads what a journal says of its sweep; the journal stays as it is.
+  subroutine read_journal_header(folder, name, header, error)
+    character(len=*), intent(in) :: folder, name
+    type(sweep_header_t), intent(out) :: header
+    type(error_t), allocatable, intent(out) :: error   !! as of `open_journal`
+    type(sweep_journal_t) :: journal
+
+    call open_journal(folder, name, journal, error, only_header=.true.)
+    if (allocated(error)) return
+    header = journal%header
+    call journal%file%close()
+  end subroutine read_journal_header
 
   !> Opens a journal to append to it, or creates it if there is none or an empty one.
   subroutine continue_journal(folder, name, header, journal, error)

@@ -31,7 +31,7 @@ module nocdyn_sweep_plan
   implicit none (type, external)
   private
 
-  public :: make_plan, add_plan_diagnostics, new_sweep_header, has_sweep, without_sweep
+  public :: make_plan, add_plan_diagnostics, new_sweep_header, has_sweep, remove_sweep, without_sweep
 
   character(len=*), parameter :: kinds = 'sweep vary record'   ! of the groups of a sweep
 
@@ -308,6 +308,17 @@ contains
       machine_input%groups(kept) = input%groups(i)
     end do
   end function without_sweep
+
+  !> Removes the groups of the sweep from an input, or a load case.
+  pure subroutine remove_sweep(input)
+    type(input_t), intent(inout) :: input
+    type(input_t) :: kept
+
+    if (.not. allocated(input%groups)) return   ! a load case that is not wanted
+    if (.not. has_sweep(input)) return
+    kept = without_sweep(input)
+    call move_alloc(kept%groups, input%groups)
+  end subroutine remove_sweep
 
   !> Assembles the base machine and lists its signals, then those that exist only if targets which are 0 or not given are not 0.
   subroutine list_variant_signals(input, targets, machine, signals, error)

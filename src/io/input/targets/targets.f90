@@ -17,7 +17,7 @@ module nocdyn_targets
   implicit none (type, external)
   private
 
-  public :: find_target, set_targets
+  public :: find_target, set_targets, target_path
 
   !> One number of an input.
   type, public :: target_t
@@ -68,6 +68,20 @@ contains
       if (any([relations%list(i)%first, relations%list(i)%second] == target%key)) target%less_than = relations%list(i)
     end do
   end subroutine find_target
+
+  !> The path of one number, without a pattern, in the unit of its values: 'gear.reducer.radii(2)'.
+  function target_path(input, target) result(path)
+    type(input_t), intent(in) :: input
+    type(target_t), intent(in) :: target
+    character(len=:), allocatable :: path
+
+    associate (rule => key_rules(target%rule), group => input%groups(target%group))
+      path = group%kind // '.'
+      if (group%name /= '') path = path // group%name // '.'
+      path = path // name_in_unit(rule, target%in_unit)
+      if (rule%count /= 1) path = path // '(' // to_text(target%position) // ')'
+    end associate
+  end function target_path
 
   !> Sets numbers and checks them, then the relations to the other numbers of their groups. If one is wrong, some are set.
   subroutine set_targets(input, targets, values, message)
