@@ -18,7 +18,7 @@ def one_line(text):
         (
             ["rnu", "x.nml"],
             "'rnu' is not a command; did you mean 'run'? "
-            "allowed: 'run', 'check', 'equilibrium', 'modes', 'response', 'campbell', 'orbit', 'transit', "
+            "allowed: 'run', 'check', 'equilibrium', 'modes', 'response', 'campbell', 'sensitivity', 'fit', 'orbit', 'transit', "
             "'matrices', 'sweep', 'merge', 'plot', 'report', 'fmu', 'verify', 'new', 'help'",
         ),
         (["simulate"], "'simulate' is not a command"),
@@ -46,16 +46,22 @@ def one_line(text):
         (["run", CASE_1, "--quiet=yes"], "--quiet takes no value"),
         (
             ["new", "a.nml", "--out", "a"],
-            "--out is an option of nocdyn run, check, equilibrium, modes, response, campbell, orbit, transit and sweep",
+            "--out is an option of nocdyn run, check, equilibrium, modes, response, campbell, sensitivity, fit, orbit, transit and sweep",
         ),
         (["modes", CASE_1, "--at"], "--at needs a value: --at equilibrium|rest|TIME\n"),
         (["modes", CASE_1, "--at", "rest", "--at=0"], "--at is given twice"),
         (["equilibrium", CASE_1, "--at", "rest"], "--at is an option of nocdyn modes"),
-        (["modes", CASE_1, "--quiet"], "--quiet is an option of nocdyn run, response, campbell, orbit, transit, sweep and merge"),
-        (["check", CASE_1, "--quiet"], "--quiet is an option of nocdyn run, response, campbell, orbit, transit, sweep and merge"),
+        (
+            ["modes", CASE_1, "--quiet"],
+            "--quiet is an option of nocdyn run, response, campbell, fit, orbit, transit, sweep and merge",
+        ),
+        (
+            ["check", CASE_1, "--quiet"],
+            "--quiet is an option of nocdyn run, response, campbell, fit, orbit, transit, sweep and merge",
+        ),
         (
             ["new", "a.nml", "--set", "run.t_end=1"],
-            "--set is an option of nocdyn run, check, equilibrium, modes, response, campbell, orbit, transit, matrices and sweep",
+            "--set is an option of nocdyn run, check, equilibrium, modes, response, campbell, sensitivity, fit, orbit, transit, matrices and sweep",
         ),
         (["--version", "now"], "--version takes no arguments"),
         (["help", "gear"], "'gear' is a group of the input: nocdyn help input gear"),
@@ -64,7 +70,7 @@ def one_line(text):
         (
             ["help", "simulate"],
             "there is no help on 'simulate'; "
-            "try 'run', 'check', 'equilibrium', 'modes', 'response', 'campbell', 'orbit', 'transit', "
+            "try 'run', 'check', 'equilibrium', 'modes', 'response', 'campbell', 'sensitivity', 'fit', 'orbit', 'transit', "
             "'matrices', 'sweep', 'merge', 'plot', 'report', 'fmu', 'verify', 'new', 'help' or 'input'",
         ),
         (["help", "input", "boddy"], "there is no topic or group 'boddy'; did you mean 'body'?\n"),

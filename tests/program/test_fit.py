@@ -89,7 +89,7 @@ def record(nocdyn, seed=3, noise=0.02):
     rows = "".join(",".join(repr(float(v)) for v in row) + "\n" for row in np.array([TIMES, *measured]).T)
     nocdyn.write("record.csv", "t [s]," + ",".join(SIGNALS) + "\n" + rows)
     text = "".join(
-        f"&measurement name = 'm_{signal}' signal = '{signal}' file = 'record.csv' column = '{signal}' deviation = {float(d)!r} /\n"
+        f"&measurement name = 'm_{signal}' signal = '{signal}' file = 'record.csv'\n  column = '{signal}' deviation = {float(d)!r} /\n"
         for signal, d in zip(SIGNALS, deviations, strict=True)
     )
     return text, measured, deviations
@@ -125,7 +125,9 @@ GEARED = MACHINE + (
 
 def test_what_cannot_be_told_apart_is_named(nocdyn):
     text, _, _ = record(nocdyn)
-    two = "&unknown target = 'body.mid.inertia' low = 0.1 high = 2 /\n&unknown target = 'body.wheel.inertia' low = 0.1 high = 2 /\n"
+    two = (
+        "&unknown target = 'body.mid.inertia' low = 0.1 high = 2 /\n&unknown target = 'body.wheel.inertia' low = 0.1 high = 2 /\n"
+    )
     numbers = TRUE | {"mid": 0.5}
     report, printed = fit(nocdyn, GEARED.format(**numbers) + text + two)
     assert "cannot be told apart: 'body.mid.inertia', 'body.wheel.inertia': only their sum is determined" in printed
@@ -181,6 +183,8 @@ def test_refusals(nocdyn, addition, message):
 
 
 def test_without_measurements(nocdyn):
-    outcome = nocdyn("fit", nocdyn.write("machine.nml", MACHINE.format(**TRUE) + unknowns(v="low = 0.1 high = 2")), "--out", "out")
+    outcome = nocdyn(
+        "fit", nocdyn.write("machine.nml", MACHINE.format(**TRUE) + unknowns(v="low = 0.1 high = 2")), "--out", "out"
+    )
     assert outcome.returncode == 2
     assert "there is no group &measurement" in outcome.stderr

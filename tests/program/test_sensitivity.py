@@ -69,7 +69,9 @@ class Chain:
             determinant = mpmath.det(self.matrix(mpmath.mpc(real, imaginary))) / scale
             return [mpmath.re(determinant), mpmath.im(determinant)]
 
-        found = mpmath.findroot(residual, (mpmath.re(start), mpmath.im(start)), tol=mpmath.mpf(10) ** (8 - 2 * DIGITS), maxsteps=30)
+        found = mpmath.findroot(
+            residual, (mpmath.re(start), mpmath.im(start)), tol=mpmath.mpf(10) ** (8 - 2 * DIGITS), maxsteps=30
+        )
         return mpmath.mpc(found[0], found[1])
 
     def amplitude(self, coupling, speed):

@@ -21,7 +21,7 @@ module nocdyn_fit_report
   real(wp), parameter :: too_large = 4.0_wp                 ! variance of residuals over their deviations
   character(len=*), parameter :: line_end = new_line('a')
 
-  type, public :: fit_t
+  type, public :: machine_fit_t
     type(unknown_t), allocatable :: unknowns(:)
     type(solution_t) :: solution
     type(comparison_t), allocatable :: before(:), after(:)   !! [measurements]
@@ -32,13 +32,13 @@ module nocdyn_fit_report
     type(string_t), allocatable :: notes(:)
   contains
     procedure :: conclude
-  end type fit_t
+  end type machine_fit_t
 
 contains
 
   !> Finds standard errors and notes. Measurements without deviations are as exact as their residuals say.
   subroutine conclude(self)
-    class(fit_t), intent(inout) :: self
+    class(machine_fit_t), intent(inout) :: self
     integer :: freedoms, i, k
 
     allocate (self%notes(0))
@@ -83,7 +83,7 @@ contains
 
   !> What a direction that no measurement sees leaves open, e.g. "only the sum of the flexibilities of ... is determined".
   function combination_text(self, direction) result(text)
-    type(fit_t), intent(in) :: self
+    type(machine_fit_t), intent(in) :: self
     real(wp), intent(in) :: direction(:)   !! of relative changes
     character(len=:), allocatable :: text
     real(wp), parameter :: part = 0.01_wp, accuracy = 1.0e-3_wp
@@ -133,7 +133,7 @@ contains
   !> The table of the unknowns and that of the measurements.
   function fit_text(file, self) result(text)
     character(len=*), intent(in) :: file
-    type(fit_t), intent(in) :: self
+    type(machine_fit_t), intent(in) :: self
     character(len=:), allocatable :: line, text
     type(text_buffer_t) :: report
     integer :: i, width
@@ -174,7 +174,7 @@ contains
 
   !> Writes fit.csv: a row for each unknown.
   subroutine fit_csv(self, file)
-    type(fit_t), intent(in) :: self
+    type(machine_fit_t), intent(in) :: self
     type(output_file_t), intent(inout) :: file
     integer :: i, k
 
@@ -197,7 +197,7 @@ contains
 
   !> With all unknowns; 0 where one has no standard error.
   pure function correlations(self, i)
-    type(fit_t), intent(in) :: self
+    type(machine_fit_t), intent(in) :: self
     integer, intent(in) :: i
     real(wp) :: correlations(size(self%unknowns))
 
@@ -205,10 +205,11 @@ contains
     where (self%error * self%error(i) > 0) correlations = self%solution%covariance(:, i) / (self%error * self%error(i))
   end function correlations
 
+  !> The members of fit.json: the unknowns with their errors, covariances and correlations, and the measurements before and after.
   subroutine put_fit(json, input, self)
     type(json_t), intent(inout) :: json
     type(input_t), intent(in) :: input
-    type(fit_t), intent(in) :: self
+    type(machine_fit_t), intent(in) :: self
     integer :: i
 
     call json%open_report(input%file, input%title())

@@ -3,7 +3,7 @@ module nocdyn_fit_results
   use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_fit_problem, only: fit_problem_t, new_fit_problem
-  use nocdyn_fit_report, only: fit_csv, fit_t, fit_text, put_fit
+  use nocdyn_fit_report, only: fit_csv, machine_fit_t, fit_text, put_fit
   use nocdyn_input, only: input_t
   use nocdyn_input_text, only: input_text
   use nocdyn_json, only: json_t
@@ -23,7 +23,7 @@ module nocdyn_fit_results
   character(len=*), parameter :: table_name = 'fit.csv', input_name = 'fitted.nml'
 
   type, extends(analysis_t), public :: fit_results_t
-    type(fit_t), private :: fit
+    type(machine_fit_t), private :: fit
     type(input_t), private :: fitted
   contains
     procedure :: solve, list_tables, put_table, put_report, text => printed
@@ -78,7 +78,7 @@ contains
   subroutine solve_from_starts(problem, starts, fit, error)
     type(fit_problem_t), intent(inout) :: problem
     integer, intent(in) :: starts
-    type(fit_t), intent(inout) :: fit
+    type(machine_fit_t), intent(inout) :: fit
     type(error_t), allocatable, intent(out) :: error    !! from all of them
     type(error_t), allocatable :: own
     type(sobol_points_t) :: points

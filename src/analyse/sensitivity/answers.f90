@@ -64,7 +64,7 @@ contains
     class(answer_t), intent(inout) :: self
     character(len=*), intent(in) :: kind, label, unit
     real(wp), intent(in) :: value
-    logical, intent(in), optional :: is_share   !! absent: no
+    logical, intent(in), optional :: is_share   !! no if absent
 
     self%kind = kind
     self%label = label

@@ -36,6 +36,7 @@ module nocdyn_frozen_motions
 
 contains
 
+  !> The structure of a machine.
   type(frame_t) function new_frame(machine) result(self)
     type(machine_t), intent(in) :: machine   !! one lane
 

@@ -1,5 +1,5 @@
-!> Changes of a machine that need no new one: an inertia, on which no steady state depends, and numbers of couplings and loads that
-!> stand in their elements as they are.
+!> Changes of a machine that need no new one: an inertia, on which no steady state depends, and numbers of couplings and loads
+!> that stand in their elements as they are.
 module nocdyn_quick_changes
   use nocdyn_direct_parameters, only: direct_parameters_t, new_direct_parameters
   use nocdyn_held_speeds, only: held_speeds_t

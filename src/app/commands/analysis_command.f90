@@ -9,7 +9,6 @@ module nocdyn_analysis_command
   use nocdyn_console, only: print_text, report_error
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_errors, only: add_error, error_t, exit_done, exit_failed, exit_input, raise
-  use nocdyn_fit_results, only: fit_results_t
   use nocdyn_grid_file, only: grid_file_t
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
@@ -22,7 +21,6 @@ module nocdyn_analysis_command
   use nocdyn_posix, only: catch_interrupts, is_interrupted, remove_file, stop_at_interrupts
   use nocdyn_result_files, only: result_files_t
   use nocdyn_result_folders, only: out_folder, refuse_shared_folders, result_folder
-  use nocdyn_sensitivity_results, only: sensitivity_results_t
   use nocdyn_strictness, only: be_strict
   use nocdyn_sweep_plan, only: add_plan_diagnostics, has_sweep, make_plan, sweep_plan_t
   use nocdyn_text, only: append, counted, listed, shown_path, string_t, to_text
@@ -73,11 +71,6 @@ contains
       call analyse_files(arguments, check_results_t(is_steady=.false., locks_joints=.false., takes_joints=.true.), code)
     case ('matrices')
       call analyse_files(arguments, matrices_results_t(is_steady=.false., locks_joints=.false., has_report=.false.), code)
-    case ('fit')
-      call analyse_files(arguments, fit_results_t(is_steady=.false., locks_joints=.false., takes_joints=.true., &
-                                                  always_writes=.true.), code)
-    case ('sensitivity')
-      call analyse_files(arguments, sensitivity_results_t(locks_joints=.false.), code)
     case ('transit')
       call analyse_files(arguments, transit_results_t(is_steady=.false., locks_joints=.false., takes_joints=.true., &
                                                       always_writes=.true.), code)

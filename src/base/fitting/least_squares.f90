@@ -1,9 +1,9 @@
 !> Nonlinear least squares with bounds: the smallest sum of squares of residuals r(x) with low <= x <= high.
 !>
-!> Levenberg-Marquardt steps by the singular values of the Jacobian, damped as Nielsen does (K. Madsen, H. B. Nielsen, O. Tingleff,
-!> Methods for Non-Linear Least Squares Problems, IMM 2004, algorithm 3.16). A variable at a bound that the gradient pushes against
-!> stays there for the step; others are kept inside. Variables are scaled by their sizes. No library of Debian for Fortran has least
-!> squares with bounds: MINPACK has no bounds, NLopt no least squares.
+!> Levenberg-Marquardt steps by the singular values of the Jacobian, damped as Nielsen does (K. Madsen, H. B. Nielsen,
+!> O. Tingleff, Methods for Non-Linear Least Squares Problems, IMM 2004, algorithm 3.16). A variable at a bound that the gradient
+!> pushes against stays there for the step; others are kept inside. Variables are scaled by their sizes. No library of Debian for
+!> Fortran has least squares with bounds: MINPACK has no bounds, NLopt no least squares.
 !>
 !> The Jacobian is of differences: at first forward ones; at the end central ones of the fourth order over a small part of the
 !> standard errors, with which the last steps are taken, so that the result is where the gradient of the residuals vanishes.
@@ -46,6 +46,14 @@ module nocdyn_least_squares
     logical :: has_converged = .false.
   end type solution_t
 
+  !> How steps are damped.
+  type :: damping_t
+    real(wp) :: lambda = -1.0_wp   ! added to the squares of the singular values; negative: not yet known
+    real(wp) :: growth = 2.0_wp    ! of it, after a step that goes up
+    real(wp) :: gain = 0.0_wp      ! the last fall of the cost, as a share of the one that linear residuals promise
+    logical :: may_rise = .false.  ! whether rounding may hide that a step goes down
+  end type damping_t
+
   real(wp), parameter :: no_effect = 1.0e-7_wp   ! singular value of a direction, as a share of the largest
 
 contains
@@ -62,7 +70,8 @@ contains
     real(wp), parameter :: small_gain = 1.0e-8_wp                           ! as a share of the cost
     real(wp), parameter :: curved = 1.5_wp                                  ! gain by which residuals are not linear
     real(wp), parameter :: of_error = 1.0e-7_wp                             ! a step that is none, as a share of standard errors
-    real(wp) :: gain, growth, lambda, step(size(start))
+    type(damping_t) :: damping
+    real(wp) :: step(size(start))
     logical :: has_moved
     integer :: i, k
 
@@ -72,28 +81,26 @@ contains
     if (allocated(error)) return
     solution%evaluations = 1
     solution%cost = 0.5_wp * sum(solution%residuals**2)
-    lambda = -1.0_wp
-    growth = 2.0_wp
     do i = 1, most_steps
       call differentiate_forward(problem, low, high, scale, solution)
       do
-        call find_step(solution, low, high, scale, lambda, step)
+        call find_step(solution, low, high, scale, damping%lambda, step)
         solution%has_converged = all(abs(step) <= small_step * scale) .or. promise(solution, step) <= small_gain * solution%cost
         if (solution%has_converged) exit
-        call try_step(problem, step, low, high, solution, lambda, growth, has_moved, gain)
+        call try_step(problem, step, low, high, solution, damping, has_moved)
         if (.not. has_moved) cycle
-        if (gain > curved) call extend_step(problem, step, low, high, solution)
+        if (damping%gain > curved) call extend_step(problem, step, low, high, solution)
         exit
       end do
       if (solution%has_converged) exit
     end do
     do i = 1, polish_steps
       call differentiate_centrally(problem, low, high, scale, solution)
-      lambda = 0.0_wp
-      call find_step(solution, low, high, scale, lambda, step)
+      damping%lambda = 0.0_wp
+      call find_step(solution, low, high, scale, damping%lambda, step)
       if (all(abs(step) <= max(tiny_step * scale, of_error * [(sqrt(solution%covariance(k, k)), k=1, size(step))]))) exit
-      growth = 2.0_wp
-      call try_step(problem, step, low, high, solution, lambda, growth, has_moved, gain, may_rise=.true.)
+      damping%may_rise = .true.
+      call try_step(problem, step, low, high, solution, damping, has_moved)
       if (.not. has_moved) exit
     end do
     call conclude(low, high, scale, solution)
@@ -154,14 +161,12 @@ contains
   end subroutine find_step
 
   !> Takes a step if it goes down, and sets the damping of the next one.
-  subroutine try_step(problem, step, low, high, solution, lambda, growth, has_moved, gain, may_rise)
+  subroutine try_step(problem, step, low, high, solution, damping, has_moved)
     class(residuals_t), intent(inout) :: problem
     real(wp), intent(in) :: step(:), low(:), high(:)
     type(solution_t), intent(inout) :: solution
-    real(wp), intent(inout) :: lambda, growth
+    type(damping_t), intent(inout) :: damping
     logical, intent(out) :: has_moved
-    real(wp), intent(out) :: gain               !! the fall of the cost, as a share of the one that linear residuals promise
-    logical, intent(in), optional :: may_rise   !! whether rounding may hide that it goes down; absent: no
     real(wp), parameter :: rounding = 1.0e-9_wp
     type(error_t), allocatable :: error
     real(wp) :: change(size(step)), cost, promised, r(problem%count), x(size(step))
@@ -173,19 +178,19 @@ contains
     if (.not. allocated(error)) cost = 0.5_wp * sum(r**2)
     change = x - solution%x
     promised = promise(solution, change)
-    gain = 0.0_wp
+    damping%gain = 0.0_wp
     has_moved = cost < solution%cost
-    if (present(may_rise)) has_moved = has_moved .or. cost <= (1.0_wp + rounding) * solution%cost
+    if (damping%may_rise) has_moved = has_moved .or. cost <= (1.0_wp + rounding) * solution%cost
     if (has_moved) then
-      gain = (solution%cost - cost) / max(promised, tiny(promised))
-      lambda = lambda * max(1.0_wp / 3.0_wp, 1.0_wp - (2.0_wp * min(gain, 2.0_wp) - 1.0_wp)**3)
-      growth = 2.0_wp
+      damping%gain = (solution%cost - cost) / max(promised, tiny(promised))
+      damping%lambda = damping%lambda * max(1.0_wp / 3.0_wp, 1.0_wp - (2.0_wp * min(damping%gain, 2.0_wp) - 1.0_wp)**3)
+      damping%growth = 2.0_wp
       solution%x = x
       solution%residuals = r
       solution%cost = cost
     else
-      lambda = lambda * growth
-      growth = 2.0_wp * growth
+      damping%lambda = damping%lambda * damping%growth
+      damping%growth = 2.0_wp * damping%growth
     end if
   end subroutine try_step
 
