@@ -50,7 +50,7 @@ def one_line(text):
         ),
         (["modes", CASE_1, "--at"], "--at needs a value: --at equilibrium|rest|TIME\n"),
         (["modes", CASE_1, "--at", "rest", "--at=0"], "--at is given twice"),
-        (["equilibrium", CASE_1, "--at", "rest"], "--at is an option of nocdyn modes"),
+        (["equilibrium", CASE_1, "--at", "rest"], "--at is an option of nocdyn modes and sensitivity"),
         (
             ["modes", CASE_1, "--quiet"],
             "--quiet is an option of nocdyn run, response, campbell, fit, orbit, transit, sweep and merge",
