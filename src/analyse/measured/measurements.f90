@@ -3,7 +3,7 @@ module nocdyn_measurements
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: diagnostics_t, input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_measured_signals, only: find_measured_signal
+  use nocdyn_measured_signals, only: drives_only, find_measured_signal
   use nocdyn_order_tracking, only: track_order
   use nocdyn_signals, only: signal_t
   use nocdyn_text, only: to_text
@@ -54,7 +54,7 @@ contains
     if (self%deviation > 0.0_wp) weight = 1.0_wp / self%deviation
   end function weight
 
-  !> Reads the measurements of some kinds.
+  !> Reads the measurements of some kinds, but for series without a signal.
   subroutine read_measurements(input, kinds, signals, list, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: kinds(:)            !! `measured_series` ...
@@ -63,16 +63,22 @@ contains
     type(error_t), allocatable, intent(out) :: error   !! names file, line, group and key
     type(diagnostics_t) :: diagnostics
     integer, allocatable :: groups(:)
-    integer :: i, kind, n
+    integer, allocatable :: kind(:)
+    integer :: i, n
 
     allocate (groups, source=input%groups_named('measurement'))
-    n = 0
-    allocate (list(count([(any(measured_kinds(kinds) == input%groups(groups(i))%text('kind')), i=1, size(groups))])))
+    allocate (kind(size(groups)), source=0)
     do i = 1, size(groups)
-      kind = findloc(measured_kinds == input%groups(groups(i))%text('kind'), .true., dim=1)
-      if (all(kinds /= kind)) cycle
+      if (.not. drives_only(input%groups(groups(i)))) then
+        kind(i) = findloc(measured_kinds == input%groups(groups(i))%text('kind'), .true., dim=1)
+      end if
+    end do
+    allocate (list(count([(any(kinds == kind(i)), i=1, size(groups))])))
+    n = 0
+    do i = 1, size(groups)
+      if (all(kinds /= kind(i))) cycle
       n = n + 1
-      call read_one(input, groups(i), kind, signals, list(n), diagnostics)
+      call read_one(input, groups(i), kind(i), signals, list(n), diagnostics)
     end do
     call input%refuse(diagnostics, error)
   end subroutine read_measurements

@@ -1,7 +1,7 @@
 !> The signals of a machine that were measured: which one a &measurement is of, and the unit of its values.
 module nocdyn_measured_signals
   use nocdyn_column_names, only: explain_no_signal
-  use nocdyn_input, only: diagnostics_t, input_t
+  use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_output_units, only: match_signal, unit_of
   use nocdyn_signals, only: signal_t
   use nocdyn_text, only: quoted, shortened
@@ -9,7 +9,7 @@ module nocdyn_measured_signals
   implicit none (type, external)
   private
 
-  public :: check_measured_signals, find_measured_signal
+  public :: check_measured_signals, drives_only, find_measured_signal
 
 contains
 
@@ -24,10 +24,17 @@ contains
 
     allocate (groups, source=input%groups_named('measurement'))
     do i = 1, size(groups)
-      if (input%groups(groups(i))%text('kind') == 'frequency') cycle
+      if (input%groups(groups(i))%text('kind') == 'frequency' .or. drives_only(input%groups(groups(i)))) cycle
       call find_measured_signal(input, groups(i), signals, signal, conversion, diagnostics)
     end do
   end subroutine check_measured_signals
+
+  !> Whether a measurement names no signal with which it is compared: it may be the torque or the speed of a run.
+  pure logical function drives_only(measurement)
+    type(group_t), intent(in) :: measurement
+
+    drives_only = measurement%text('kind') == 'series' .and. .not. measurement%has_value('signal')
+  end function drives_only
 
   !> The signal of a measurement, and the conversion of its values to SI.
   subroutine find_measured_signal(input, group, signals, signal, conversion, diagnostics)

@@ -5,6 +5,7 @@ module nocdyn_input_reader
   use nocdyn_group_reader, only: read_group
   use nocdyn_input, only: group_t, input_t
   use nocdyn_input_overrides, only: override_t, read_overrides
+  use nocdyn_measured_tables, only: take_measured_tables
   use nocdyn_load_cases, only: find_load_cases, is_run_of_case, keep_groups
   use nocdyn_name_checks, only: check_duplicate_names, check_references, collect_names
   use nocdyn_namelist, only: namelist_group_t, namelist_t
@@ -171,6 +172,7 @@ contains
     call refuse_unused(input%groups, parsed, diagnostics)
     call check_duplicate_names(input%groups, diagnostics)
     call check_references(input%groups, bodies_are_known(input%groups), diagnostics)
+    call take_measured_tables(input%groups, diagnostics)
   end subroutine read_all_groups
 
   !> Reads all groups of the file, then the single groups that it does not have.

@@ -2,7 +2,7 @@
 !> &freewheel; joints whose ratio depends on the position and prescribed motions, &cardan, &crank, &relation and &drive.
 module nocdyn_schema_joints
   use nocdyn_kinds, only: wp
-  use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_name, a_number, a_selector, a_word, allowed_t, an_integer, &
+  use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_name, a_number, a_selector, a_text, a_word, allowed_t, an_integer, &
     any_number, any_times, anything, at_most_one, body_or_ground, columns, efficiencies, equal_lengths, exactly_one, example_t, &
     from_0_to_1, from_1, group_rule_t, in_machine, in_torques, interpolations, key_rule_t, kind_rule_t, less_than, linear, &
     not_negative, not_zero, positive, relation_rule_t, required, requires, reverse_efficiencies, strokes, unset, up_to_64
@@ -168,6 +168,8 @@ module nocdyn_schema_joints
     key_rule_t('drive', 'table_angle', a_number, any_number, 'rad', unset, anything, &
       'angle at these times; a spline between them, straight on beyond them', 'angle', fewest=2), &
     key_rule_t('drive', 'table_file', a_file, 1, '', unset, anything, 'two columns, time [s] and speed [rad/s] or angle [rad]'), &
+    key_rule_t('drive', 'measurement', a_text, 1, '', unset, anything, &
+      'in place of the table: name of a &measurement of a speed, or an angle, over the time'), &
     key_rule_t('drive', 'interpolation', a_word, 1, '', unset, drive_shapes, &
       'as of &relation; if not given straight lines between speeds and a spline through angles'), &
     key_rule_t('drive', 'speed_amplitude', a_number, 1, 'rad/s', unset, anything, 'amplitude of a sine that is added', 'speed'), &
@@ -206,9 +208,10 @@ module nocdyn_schema_joints
     relation_rule_t('crank', columns, 'crank_angles pressures', 'pressure_file'), &
     relation_rule_t('relation', exactly_one, 'table_angle table_driven', 'table_file'), &
     relation_rule_t('relation', equal_lengths, 'table_angle table_driven', 'table_file'), &
-    relation_rule_t('drive', at_most_one, 'table_time table_speed', 'table_file'), &
-    relation_rule_t('drive', at_most_one, 'table_time table_angle', 'table_file'), &
-    relation_rule_t('drive', requires, 'interpolation', 'table_time table_file'), &
+    relation_rule_t('drive', at_most_one, 'table_time table_speed', 'table_file measurement'), &
+    relation_rule_t('drive', at_most_one, 'table_time table_angle', 'table_file measurement'), &
+    relation_rule_t('drive', at_most_one, 'table_file', 'measurement'), &
+    relation_rule_t('drive', requires, 'interpolation', 'table_time table_file measurement'), &
     relation_rule_t('drive', requires, 'speed_amplitude angle_amplitude', 'frequency'), &
     relation_rule_t('drive', requires, 'frequency phase', 'speed_amplitude angle_amplitude'), &
     relation_rule_t('drive', equal_lengths, 'table_time table_speed', 'table_file'), &

@@ -206,6 +206,8 @@ module nocdyn_schema_torques
       'torque at these times', 'table', fewest=2), &
     key_rule_t('excitation', 'table_file', a_file, 1, '', unset, anything, &
       'two columns, time [s] and torque [N m]; orders: order, amplitude, phase_deg, speed_rpm', 'table orders'), &
+    key_rule_t('excitation', 'measurement', a_text, 1, '', unset, anything, &
+      'in place of the table: name of a &measurement of a torque over the time', 'table'), &
     key_rule_t('excitation', 'interpolation', a_word, 1, '', linear, interpolations, &
       'between the points: straight lines, or the monotone cubic of Fritsch and Butland', 'table'), &
     key_rule_t('excitation', 'time', a_number, 1, 's', required, anything, &
@@ -322,7 +324,8 @@ module nocdyn_schema_torques
     relation_rule_t('excitation', exactly_one, 'amplitudes', 'share_of_load'), &
     relation_rule_t('excitation', at_most_one, 'share_of_load', 'speeds'), &
     relation_rule_t('excitation', requires, 'load', 'share_of_load'), &
-    relation_rule_t('excitation', exactly_one, 'table_time table_torque', 'table_file'), &
+    relation_rule_t('excitation', exactly_one, 'table_time table_torque', 'table_file measurement'), &
+    relation_rule_t('excitation', at_most_one, 'table_file', 'measurement'), &
     relation_rule_t('motor', exactly_one, 'stator_resistance rotor_resistance stator_leakage rotor_leakage ' // &
                     'mutual_inductance stator_reactance rotor_reactance mutual_reactance', &
                     'rated_power rated_speed efficiency power_factor breakdown_ratio'), &
