@@ -1,6 +1,7 @@
 !> The files on the modes of a machine: modes.csv and modes.json.
 module nocdyn_modes_files
   use nocdyn_bank, only: bank_of
+  use nocdyn_comparisons, only: comparison_t, put_comparisons
   use nocdyn_equilibrium, only: t_infinity
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
@@ -83,10 +84,11 @@ contains
   end function phases
 
   !> The members of modes.json: drivetrain, operating point and modes; lists are in the order of the bodies or of the couplings.
-  subroutine put_modes(json, input, self)
+  subroutine put_modes(json, input, self, comparisons)
     type(json_t), intent(inout) :: json
     type(input_t), intent(in) :: input
     type(modes_report_t), intent(in) :: self
+    type(comparison_t), intent(in) :: comparisons(:)   !! with measured frequencies
     integer :: i
 
     call json%open_report(input%file, input%title())
@@ -94,6 +96,7 @@ contains
     call json%put('about', self%point)
     if (self%t < t_infinity) call json%put('time_s', self%t)
     call json%put('notes', self%notes)
+    call put_comparisons(json, comparisons)
     ! the topology: bodies, elastic couplings, and gears with the ratio of the second body's speed to the first one's
     call json%put('bodies', self%body_names)
     call json%put('inertia_kg_m2', self%machine%inertia(1, :size(self%body_names)))

@@ -2,18 +2,23 @@
 module nocdyn_modes_results
   use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_assembly, only: assemble_steady_machine
+  use nocdyn_comparisons, only: comparison_file, comparison_t, put_comparison_csv, write_comparisons
   use nocdyn_errors, only: error_t, exit_failed
   use nocdyn_holzer_report, only: holzer_tables
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_lumped_shafts, only: lump_shafts
+  use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_measured_modes, only: compare_modes
+  use nocdyn_modes, only: mode_oscillating
   use nocdyn_modes_files, only: put_modes, write_modes
   use nocdyn_modes_report, only: modes_report_t, modes_text, new_modes_report
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: output_units
   use nocdyn_text, only: append, string_t
+  use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_wanted_modes, only: modes_choice_t
   implicit none (type, external)
   private
@@ -22,6 +27,7 @@ module nocdyn_modes_results
 
   type, extends(analysis_t), public :: modes_results_t
     type(modes_report_t), private :: report
+    type(comparison_t), allocatable, private :: comparisons(:)   !! with measured frequencies
     character(len=:), allocatable, private :: holzer_text, holzer_csv   !! not allocated: not wanted
   contains
     procedure :: solve, list_tables, put_table, put_report, text => printed
@@ -43,10 +49,34 @@ contains
     is_of_point = allocated(error)
     if (.not. allocated(error)) call new_modes_report(point, modes_choice_t(options%modes, options%has_range, options%range_hz), &
                                                       self%report, error)
+    if (.not. allocated(error)) then
+      call compare_measured(self, input, error)
+      is_of_point = allocated(error)
+    end if
     if (.not. allocated(error) .and. options%has_holzer) call make_tables(self, input, machine, options, error)
     if (.not. allocated(error)) return
     if (.not. is_of_point .or. error%code == exit_failed) error%message = input%shown_case() // ': ' // error%message
   end subroutine solve
+
+  !> Compares measured frequencies with the modes.
+  subroutine compare_measured(self, input, error)
+    type(modes_results_t), intent(inout) :: self
+    type(input_t), intent(in) :: input
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: dampings(:), frequencies(:)
+    integer, allocatable :: chosen(:)
+    integer :: i
+
+    associate (modes => self%report%modes)
+      allocate (chosen, source=pack([(i, i=1, size(modes))], modes%kind == mode_oscillating))
+      allocate (frequencies, source=aimag(modes(chosen)%eigenvalue))
+      allocate (dampings(size(chosen)))
+      do i = 1, size(chosen)
+        dampings(i) = modes(chosen(i))%damping_ratio()
+      end do
+      call compare_modes(input, modes(chosen)%number, frequencies, dampings, self%comparisons, error)
+    end associate
+  end subroutine compare_measured
 
   !> Makes the tables of Holzer, of a machine with lumped shafts.
   recursive subroutine make_tables(self, input, machine, options, error)
@@ -78,10 +108,14 @@ contains
   subroutine list_tables(self, names)
     class(modes_results_t), intent(in) :: self
     type(string_t), allocatable, intent(out) :: names(:)
+    integer :: i
 
     allocate (names(0))
     if (allocated(self%holzer_csv)) call append(names, holzer_name)
     call append(names, table_name)
+    do i = 1, size(self%comparisons)
+      call append(names, comparison_file(self%comparisons(i)))
+    end do
   end subroutine list_tables
 
   subroutine put_table(self, input, name, file)
@@ -89,11 +123,16 @@ contains
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: name
     type(output_file_t), intent(inout) :: file
+    integer :: i
 
     if (name == holzer_name) then
       call file%put(self%holzer_csv)
-    else
+    else if (name == table_name) then
       call write_modes(file, self%report)
+    else
+      do i = 1, size(self%comparisons)
+        if (name == comparison_file(self%comparisons(i))) call put_comparison_csv(self%comparisons(i), file)
+      end do
     end if
   end subroutine put_table
 
@@ -102,15 +141,20 @@ contains
     type(input_t), intent(in) :: input
     type(json_t), intent(inout) :: json
 
-    call put_modes(json, input, self%report)
+    call put_modes(json, input, self%report, self%comparisons)
   end subroutine put_report
 
   subroutine printed(self, input, text)
     class(modes_results_t), intent(in) :: self
     type(input_t), intent(in) :: input
     character(len=:), allocatable, intent(out) :: text
+    type(text_buffer_t) :: measured
 
     text = modes_text(input%shown_case(), self%report, output_units(input))
+    if (size(self%comparisons) > 0) then
+      call write_comparisons(self%comparisons, measured)
+      text = text // measured%text()
+    end if
     if (allocated(self%holzer_text)) text = text // new_line('a') // self%holzer_text
   end subroutine printed
 

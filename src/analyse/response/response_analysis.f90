@@ -2,6 +2,7 @@
 module nocdyn_response_analysis
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_backward_speeds, only: refuse_backward_speeds
+  use nocdyn_comparisons, only: comparison_t
   use nocdyn_critical_speeds, only: crossing_t, keep_new, refine_peaks
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_excitation_lines, only: line_order, line_t
@@ -40,6 +41,7 @@ module nocdyn_response_analysis
     logical :: writes_grid = .false.                 !! whether the tables are written to one file
     integer, allocatable :: shown(:), shown_angles(:)   !! quantities and angles of the response that are written
     type(response_fatigue_t), allocatable :: fatigue(:)   !! after `add_fatigue`
+    type(comparison_t), allocatable :: comparisons(:)     !! with measurements; not allocated for a shaker
     type(string_t), allocatable :: notes(:)
     real(wp) :: wall_time = 0.0_wp                   !! of the computation, without reading and writing files [s]
   end type response_analysis_t

@@ -391,7 +391,6 @@ contains
     call put_largest(json, analysis, summary)
     call put_barred(json, input, analysis, summary)
     call put_fatigue(json, analysis)
-    call json%close()
   end subroutine put_response
 
   !> The order of a line, or its number, its name and its frequencies at both ends if these do not grow with the speed.

@@ -1,6 +1,7 @@
 !> The printed report of a forced response: critical speeds, the largest synthesis of every coupling, barred ranges.
 module nocdyn_response_report
   use nocdyn_column_names, only: with_unit
+  use nocdyn_comparisons, only: write_comparisons
   use nocdyn_kinds, only: wp
   use nocdyn_margins, only: margin_text, mode_text
   use nocdyn_response_analysis, only: response_analysis_t
@@ -47,6 +48,7 @@ contains
     call put_criticals(analysis, summary, report)
     call put_largest(analysis, summary, report)
     call put_fatigue(analysis, report)
+    if (allocated(analysis%comparisons)) call write_comparisons(analysis%comparisons, report)
     text = report%text()
   end function response_text
 

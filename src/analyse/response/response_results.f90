@@ -1,11 +1,13 @@
 !> The forced response by orders over the speed, as an analysis: response.csv, response_orders.csv and response.json.
 module nocdyn_response_results
   use nocdyn_analyses, only: analysis_options_t, analysis_t
+  use nocdyn_comparisons, only: comparison_file, put_comparison_csv, put_comparisons
   use nocdyn_errors, only: error_t
   use nocdyn_grid_file, only: grid_file_t
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_machine, only: machine_t
+  use nocdyn_measured_responses, only: compare_responses
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: output_units
   use nocdyn_response_analysis, only: add_fatigue, analyse_response, response_analysis_t, wants_grid
@@ -14,7 +16,7 @@ module nocdyn_response_results
   use nocdyn_response_report, only: response_text
   use nocdyn_response_summary, only: response_summary_t, summarise_response
   use nocdyn_response_verdict, only: find_response_verdict
-  use nocdyn_text, only: string_t
+  use nocdyn_text, only: append, string_t
   implicit none (type, external)
   private
 
@@ -38,15 +40,23 @@ contains
 
     call analyse_response(input, machine, self%analysis, error)
     if (.not. allocated(error)) call add_fatigue(input, self%analysis, error)
+    if (.not. allocated(error) .and. self%analysis%settings%shaker == 0) then
+      call compare_responses(input, machine, self%analysis%settings%body, self%analysis%comparisons, error)
+    end if
     if (.not. allocated(error)) self%summary = summarise_response(self%analysis)
   end subroutine solve
 
   subroutine list_tables(self, names)
     class(response_results_t), intent(in) :: self
     type(string_t), allocatable, intent(out) :: names(:)
+    integer :: i
 
     names = [string_t(columns_name)]
     if (.not. self%analysis%writes_grid) names = [string_t(response_table), string_t(orders_table), string_t(columns_name)]
+    if (.not. allocated(self%analysis%comparisons)) return
+    do i = 1, size(self%analysis%comparisons)
+      call append(names, comparison_file(self%analysis%comparisons(i)))
+    end do
   end subroutine list_tables
 
   pure function grid_name(self, input) result(name)
@@ -81,14 +91,19 @@ contains
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: name
     type(output_file_t), intent(inout) :: file
+    integer :: i
 
     select case (name)
     case (response_table)
       call put_response_csv(self%analysis, output_units(input), file)
     case (orders_table)
       call put_orders_csv(self%analysis, output_units(input), file)
-    case default
+    case (columns_name)
       call file%put(response_columns_json(self%analysis, output_units(input)))
+    case default
+      do i = 1, size(self%analysis%comparisons)
+        if (name == comparison_file(self%analysis%comparisons(i))) call put_comparison_csv(self%analysis%comparisons(i), file)
+      end do
     end select
   end subroutine put_table
 
@@ -105,6 +120,8 @@ contains
     type(json_t), intent(inout) :: json
 
     call put_response(json, input, self%analysis, self%summary, self%verdict)
+    if (allocated(self%analysis%comparisons)) call put_comparisons(json, self%analysis%comparisons)
+    call json%close()
   end subroutine put_report
 
   subroutine printed(self, input, text)

@@ -77,7 +77,7 @@ module nocdyn_schema_measurement
     key_rule_t('measurement', 'statistic', a_word, 1, '', "'half_range'", statistics, &
       'what the value is of: half the range, the largest or smallest value, the mean', 'peak'), &
     key_rule_t('measurement', 'speed', a_number, 1, 'rad/s', unset, not_zero, &
-      'speed of the body of &response at which it was measured; if not given that with the largest', 'peak'), &
+      'speed of the body of &response at which it was measured; if not given it is one of a run', 'peak'), &
     key_rule_t('measurement', 'deviation', a_number, 1, '', unset, positive, &
       'standard deviation of the values, in their unit; of frequencies relative to them'), &
     key_rule_t('measurement', 'from', a_number, 1, 's', unset, anything, &
