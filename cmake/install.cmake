@@ -15,7 +15,7 @@ endif()
 
 # The commands in Python, and what they read: as seen from bin, share/nocdyn/python (src/app/commands/python_command.f90).
 set(data_dir ${CMAKE_INSTALL_DATADIR}/nocdyn)
-install(DIRECTORY scripts/nocdyn_report scripts/nocdyn_verify python/nocdyn DESTINATION ${data_dir}/python
+install(DIRECTORY scripts/nocdyn_report scripts/nocdyn_verify scripts/nocdyn_import python/nocdyn DESTINATION ${data_dir}/python
   PATTERN __pycache__ EXCLUDE)
 install(DIRECTORY verification DESTINATION ${data_dir})
 install(DIRECTORY input/paper DESTINATION ${data_dir}/input)

@@ -11,6 +11,7 @@ OUTPUT = "standard output"
 FAILED = 1  # also of a command that was interrupted
 MODULES = {
     "fmu": "nocdyn._fmu",
+    "import": "nocdyn_import.command",
     "plot": "nocdyn_report.plot",
     "report": "nocdyn_report.report.command",
     "verify": "nocdyn_verify.__main__",

@@ -19,7 +19,7 @@ def one_line(text):
             ["rnu", "x.nml"],
             "'rnu' is not a command; did you mean 'run'? "
             "allowed: 'run', 'check', 'equilibrium', 'modes', 'response', 'campbell', 'sensitivity', 'fit', 'orbit', 'transit', "
-            "'matrices', 'sweep', 'merge', 'plot', 'report', 'fmu', 'verify', 'new', 'help'",
+            "'matrices', 'sweep', 'merge', 'plot', 'report', 'fmu', 'import', 'verify', 'new', 'help'",
         ),
         (["simulate"], "'simulate' is not a command"),
         (["x" * 3000], "'" + "x" * 80 + " ...' is not a command; allowed: "),
@@ -71,7 +71,7 @@ def one_line(text):
             ["help", "simulate"],
             "there is no help on 'simulate'; "
             "try 'run', 'check', 'equilibrium', 'modes', 'response', 'campbell', 'sensitivity', 'fit', 'orbit', 'transit', "
-            "'matrices', 'sweep', 'merge', 'plot', 'report', 'fmu', 'verify', 'new', 'help' or 'input'",
+            "'matrices', 'sweep', 'merge', 'plot', 'report', 'fmu', 'import', 'verify', 'new', 'help' or 'input'",
         ),
         (["help", "input", "boddy"], "there is no topic or group 'boddy'; did you mean 'body'?\n"),
         (["help", "input", "torsionel"], "there is no topic or group 'torsionel'; did you mean 'torsional'?\n"),

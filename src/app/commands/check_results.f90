@@ -11,6 +11,8 @@ module nocdyn_check_results
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: machine_report
+  use nocdyn_mass_elastic_sheet, only: left_out, put_sheet, sheet_file
+  use nocdyn_output_file, only: output_file_t
   use nocdyn_output_times, only: output_note
   use nocdyn_row_intervals, only: choose_row_count
   use nocdyn_run_files, only: check_rows, check_variants, trajectory_bytes, wants_netcdf
@@ -30,7 +32,7 @@ module nocdyn_check_results
     type(machine_t), private :: machine
     character(len=:), allocatable, private :: report
   contains
-    procedure :: solve, put_report, text => printed
+    procedure :: solve, put_report, list_tables, put_table, text => printed
   end type check_results_t
 
 contains
@@ -79,7 +81,12 @@ contains
       sizes = sizes // new_line('a') // '  note: ' // notes(i)%text
     end do
     self%report = machine_report(input%shown_file(), machine) // speed_table(input, machine) // sizes
-    if (options%writes_files) self%machine = machine
+    if (.not. options%writes_files) return
+    self%machine = machine
+    call left_out(input, notes)
+    do i = 1, size(notes)
+      self%report = self%report // new_line('a') // '  note: not in ' // sheet_file // ': ' // notes(i)%text
+    end do
   end subroutine solve
 
   subroutine put_report(self, input, json)
@@ -89,6 +96,24 @@ contains
 
     call put_check(json, input, self%machine)
   end subroutine put_report
+
+  !> The mass-elastic sheet.
+  subroutine list_tables(self, names)
+    class(check_results_t), intent(in) :: self
+    type(string_t), allocatable, intent(out) :: names(:)
+
+    allocate (names(1))
+    names(1)%text = sheet_file
+  end subroutine list_tables
+
+  subroutine put_table(self, input, name, file)
+    class(check_results_t), intent(in) :: self
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: name
+    type(output_file_t), intent(inout) :: file
+
+    call put_sheet(input, file)
+  end subroutine put_table
 
   subroutine printed(self, input, text)
     class(check_results_t), intent(in) :: self

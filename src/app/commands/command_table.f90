@@ -66,7 +66,7 @@ contains
       'independent coordinates, ratios between geared bodies, redundant gears, and the load cases and the sweep if' // nl // &
       'there are some.' // nl // nl // &
       '  --out DIR          write check.json to DIR, with several files to DIR/<name of the file>: inertias,' // nl // &
-      '                     ratios, stiffnesses' // nl // &
+      '                     ratios, stiffnesses; and mass_elastic.csv, a sheet that nocdyn import reads' // nl // &
       '  --case NAME        look at the machine of this &load_case, and write to its folder in DIR' // nl // variant_help, &
       analysis_command)
     call add_command(commands, 'equilibrium', 'FILE...', '--out --set --case --variant', &
@@ -216,6 +216,12 @@ contains
       '  nocdyn fmu machine.nml          machine.fmu in this folder, by FMI 2.0' // nl // &
       '  nocdyn fmu machine.nml --fmi 3  by FMI 3.0' // nl // &
       '  nocdyn fmu --help               the options' // on_python, python_command)
+    call add_command(commands, 'import', 'FILE', passed_on, 'an input from a mass-elastic sheet or from openTorsion', &
+      'Writes an input from a mass-elastic sheet, a CSV file with a row for each station, or from a machine of' // nl // &
+      'openTorsion in JSON. What of the file is not imported is told. nocdyn check FILE --out DIR writes such a' // nl // &
+      'sheet.' // nl // nl // &
+      '  nocdyn import machine.csv --out machine.nml' // nl // &
+      '  nocdyn import --help      the options' // on_python, python_command)
     call add_command(commands, 'verify', '[CASE]...', passed_on, 'compute cases with known answers and compare', &
       'Computes the verification cases with this program on this machine, all or the chosen ones, and writes' // nl // &
       'verification.html, verification.pdf and verification.json.' // nl // nl // &

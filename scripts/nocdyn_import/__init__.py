@@ -1,0 +1,1 @@
+"""Inputs from machines of other programs: nocdyn import."""
