@@ -69,6 +69,8 @@ def test_inputs_of_the_project_are_valid(schema, document):
     [
         ("inertia = 1", "inertia = -1"),
         ("inertia = 1", "inertia = 'heavy'"),
+        ("inertia = 1", "inertia = '1'"),
+        ("inertia = 1", "inertia = 1 speed_rpm = '20 Hz'"),
         ("inertia = 1", "mass = 1"),
         ("t_end = 1", "t_end = 1 method = 'euler'"),
         ("stiffness = 10", "stiffness = 10, 20"),
@@ -83,6 +85,13 @@ def test_what_the_program_refuses_is_not_valid(nocdyn, schema, document, old, ne
     assert text != MACHINE
     assert list(Draft202012Validator(schema).iter_errors(document(text, schema)))
     assert nocdyn("check", nocdyn.write("m.nml", text)).returncode == 2
+
+
+@pytest.mark.parametrize("quantity", ["'12 kN m/rad'", "'4.4e6lbf-ft/rad'", "'.5 N m/deg'"])
+def test_numbers_with_a_unit_are_valid(nocdyn, schema, document, quantity):
+    text = MACHINE.replace("stiffness = 10", f"stiffness = {quantity}")
+    assert not list(Draft202012Validator(schema).iter_errors(document(text, schema)))
+    assert nocdyn("check", nocdyn.write("m.nml", text)).returncode == 0
 
 
 def test_keys_have_their_units_and_defaults(schema):

@@ -477,3 +477,16 @@ def test_a_note_names_its_load_case_once(nocdyn):
     assert (outcome.returncode, outcome.stderr) == (0, "")
     [note] = [line for line in outcome.stdout.splitlines() if "shaft_shaft is called" in line]
     assert note.startswith("m.nml: load case 'a': note: --set output.columns='shaft_shaft': &output: ")
+
+
+def test_a_load_case_sets_numbers_with_a_unit(nocdyn):
+    text = """\
+&body name = 'disc' inertia = '2000 kg cm2' speed = '60 rpm' /
+&load name = 'drag' body = 'disc' viscous = '0.5 N m s/rad' /
+&load_case name = 'warm' set = 'load.drag.viscous=3 N m/rpm', "body.disc.inertia='4 lbm ft2'" /
+&run t_end = '10 ms' /
+"""
+    outcome = nocdyn("run", nocdyn.write("cases.nml", text), "--out", "out")
+    assert outcome.returncode == 0, outcome.stderr
+    used = (nocdyn.folder / "out/warm/input.nml").read_text()
+    assert "viscous = 28.64788975654116" in used and "inertia = 0.1685604" in used

@@ -89,6 +89,10 @@ def test_a_list_of_variants_is_read_beside_its_input(nocdyn):
     )
     done(nocdyn, "run", "m.nml", "--variant", "sweep:2", "-q")
     assert "viscous = 0.75" in (nocdyn.folder / "sweep/variant-2/input.nml").read_text()
+    nocdyn.write("list.csv", "load.drag.viscous\n0.25\n0.85\n")
+    refused = nocdyn("run", "m.nml", "--variant", "sweep:2", "-q")
+    message = "nocdyn: m.nml: the list of variants is not the one of the sweep in sweep\n"
+    assert (refused.returncode, refused.stderr) == (2, message)
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ module nocdyn_variant_choice
 
   public :: choose_variant, leave_sweep
 
-  character(len=*), parameter :: input_file = 'input.nml'   ! of the results of a sweep
+  character(len=*), parameter :: input_file = 'input.nml', summary_file = 'summary.json'   ! of the results of a sweep
 
 contains
 
@@ -31,7 +31,7 @@ contains
     type(command_t), intent(in) :: command
     type(arguments_t), intent(inout) :: arguments
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: folder, recorded
+    character(len=:), allocatable :: checksum, folder, recorded
     type(string_t), allocatable :: settings(:)
     type(input_t) :: input
     type(sweep_plan_t) :: plan
@@ -40,12 +40,13 @@ contains
     if (.not. arguments%is_given('--variant')) return
     call read_choice(arguments%value('--variant'), folder, variant, error)
     if (allocated(error)) return
-    call find_recorded_input(folder, size(arguments%operands) > 0, recorded, error)
+    call find_recorded_input(folder, size(arguments%operands) > 0, recorded, checksum, error)
     if (allocated(error)) return
     if (size(arguments%operands) == 0) call append(arguments%operands, folder // '/' // input_file)
     call read_sweep(arguments, input, error)
     if (.not. allocated(error)) call refuse_other_input(folder, recorded, input, error)
     if (.not. allocated(error)) call make_plan(input, plan, error)
+    if (.not. allocated(error)) call refuse_other_list(folder, checksum, plan, error)
     if (allocated(error)) return
     if (variant < 1 .or. variant > plan%design%variants) then
       call raise(error, exit_input, '--variant ' // arguments%value('--variant') // ': the sweep has no variant ' // &
@@ -97,10 +98,11 @@ contains
   end subroutine read_choice
 
   !> The text of the input that a sweep had, by its results or by the journal of an unfinished sweep.
-  subroutine find_recorded_input(folder, has_file, recorded, error)
+  subroutine find_recorded_input(folder, has_file, recorded, checksum, error)
     character(len=*), intent(in) :: folder
     logical, intent(in) :: has_file   !! the command line names the input file too
     character(len=:), allocatable, intent(out) :: recorded
+    character(len=:), allocatable, intent(out) :: checksum   !! of a journal, of the file of its list; not allocated: of results
     type(error_t), allocatable, intent(out) :: error
     type(string_t), allocatable :: names(:)
     type(sweep_header_t) :: header
@@ -113,6 +115,7 @@ contains
       call read_journal_header(folder, names(1)%text, header, error)
       if (allocated(error)) return
       recorded = header%input_text
+      checksum = header%list_checksum
       if (.not. has_file) call raise(error, exit_input, shown_path(folder) // ': this sweep is not finished; needed: its ' // &
         'input file beside --variant, ' // shown_path(header%input_file))
     else if (is_there) then
@@ -152,6 +155,27 @@ contains
     call raise(error, exit_input, input%shown_file() // ': ' // shown_path(folder) // &
                ' holds a sweep of another input: ' // difference)
   end subroutine refuse_other_input
+
+  !> Refuses a list of variants that has changed since the sweep, which its journal or summary tells.
+  subroutine refuse_other_list(folder, checksum, plan, error)
+    character(len=*), intent(in) :: folder
+    character(len=:), allocatable, intent(in) :: checksum   !! as of `find_recorded_input`
+    type(sweep_plan_t), intent(in) :: plan
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: summary
+    logical :: is_same
+
+    if (plan%list_checksum == '') return
+    if (allocated(checksum)) then
+      is_same = checksum == plan%list_checksum
+    else
+      call read_text_file(folder // '/' // summary_file, summary, error, largest_input)
+      if (allocated(error)) return
+      is_same = index(summary, '"list_checksum": "' // plan%list_checksum // '"') > 0
+    end if
+    if (.not. is_same) call raise(error, exit_input, plan%input%shown_file() // ': the list of variants is not the ' // &
+                                  'one of the sweep in ' // shown_path(folder))
+  end subroutine refuse_other_list
 
   !> PATH=VALUE of all numbers that a variant sets, with the digits that read back as the same bits.
   subroutine list_settings(plan, variant, settings)

@@ -113,7 +113,7 @@ contains
 
     call buffer%append_line('An input file is a Fortran namelist: groups &NAME KEY = VALUE ... / in any order, texts in quotes,')
     call buffer%append_line('lists with commas or blanks, upper and lower case alike in groups and keys; ! begins a comment.')
-    call buffer%append_line('SI units, or the unit at the end of a key: speed_rpm, frequency_hz, phase_deg.')
+    call buffer%append_line("SI units, the unit at the end of a key (speed_rpm, phase_deg), or a text with a unit: '12 kN m'.")
   end subroutine append_syntax
 
   !> "machine: bodies and what connects them".

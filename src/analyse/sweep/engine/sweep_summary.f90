@@ -48,6 +48,7 @@ contains
     call json%open('design')
     call json%put('design', header%design)
     call json%put('seed', header%seed)
+    if (header%list_checksum /= '') call json%put('list_checksum', header%list_checksum)
     call json%open('varied')
     do i = 1, size(header%parameters)
       call json%put(header%parameters(i)%label, header%parameters(i)%unit)
