@@ -46,6 +46,13 @@ class Machine:
         if text not in self.notes:
             self.notes.append(text)
 
+    def own_name(self, text, taken, default):
+        """A name that nocdyn takes; another one than the source has is told."""
+        name = plain_name(text, taken, default)
+        if name != text.strip():
+            self.note(f"{text.strip()!r} is named {name!r}")
+        return name
+
     def text(self):
         return "".join(f"{line}\n" for line in [*self.lines, "&run      t_end = 1.0 /  ! seconds; choose what is to be computed"])
 

@@ -4,7 +4,7 @@ import csv
 import re
 from dataclasses import dataclass, field
 
-from nocdyn_import.machine import FILES, Machine, Quantity, SourceError, plain_name
+from nocdyn_import.machine import FILES, Machine, Quantity, SourceError
 
 # Columns: their own names first, then what else they are called, and the SI unit of their numbers ('' if they have none).
 COLUMNS = {
@@ -64,7 +64,10 @@ class Sheet:
     def __init__(self, source):
         self.source, self.wrong, self.notes = source, [], []
         self.units, self.headings = {}, {}
-        self.rows = self.read_rows(self.read_text())
+        try:
+            self.rows = self.read_rows(self.read_text())
+        except csv.Error as error:
+            raise SourceError([f"{source}: not a sheet: {error}"]) from None
         self.stop_if_wrong()
         self.stations = self.find_stations()
         self.stop_if_wrong()
@@ -186,7 +189,7 @@ class Sheet:
     def write(self):
         taken, self.names = set(), {}
         for station, row in self.stations.items():
-            self.names[station] = plain_name(row["name"] or f"station {station}", taken, "station")
+            self.names[station] = self.machine.own_name(row["name"] or f"station {station}", taken, "station")
             place = f"{self.source}:{row.line}"
             inertia = self.number(row, "inertia")
             self.machine.add(
@@ -195,6 +198,8 @@ class Sheet:
         self.taken = set()
         for row, following in zip(self.rows, [*self.rows[1:], None], strict=True):
             self.connect(row, following)
+        if len(self.stations) > 1 and not self.taken:
+            self.machine.note("no station is connected to another one")
         for station, row in self.stations.items():
             damping = self.number(row, "station damping")
             if damping:
@@ -226,7 +231,10 @@ class Sheet:
             self.fail(row.line, f"connects to = {target!r} is no other station; allowed: {known}, ground, - for none")
             return
         own = self.names[row["station"]]
-        ends = {"name": plain_name(row["connection"] or f"{own} to {other}", self.taken, "connection"), "bodies": [own, other]}
+        ends = {
+            "name": self.machine.own_name(row["connection"] or f"{own} to {other}"[:59], self.taken, "connection"),
+            "bodies": [own, other],
+        }
         if row["stiffness"].lower() in RIGID:
             self.add_gear(row, target, ends)
         elif is_shaft:

@@ -7,7 +7,7 @@ diameters of shafts are in mm, the rest in SI; R1 w1 + R2 w2 = 0 at gears (opent
 
 import json
 
-from nocdyn_import.machine import FILES, Machine, Quantity, SourceError, plain_name
+from nocdyn_import.machine import FILES, Machine, Quantity, SourceError
 
 SHEAR_MODULUS, DENSITY = 80e9, 8000.0  # [Pa], [kg/m3], of openTorsion
 KNOWN = {
@@ -80,6 +80,9 @@ class Train:
             self.fail(name, "the name of two components")
         self.components[name] = component
         for element in elements:
+            if not isinstance(element, dict) or not isinstance(element.get("name"), str):
+                self.fail(name, f"element {element!r}; needed: objects with name and type"[:200])
+                continue
             kind = element.get("type")
             where = f"{name}.{element.get('name')}"
             if kind not in KNOWN:
@@ -157,13 +160,13 @@ class Train:
         names = []
         for number, (inertia, damping, where) in enumerate(self.nodes, 1):
             place = f"{self.source}: {where or f'node {number}, without a disk'}"
-            names.append(plain_name(where or f"node {number}", self.taken, f"node {number}"))
+            names.append(self.machine.own_name(where or f"node {number}", self.taken, f"node {number}"))
             self.machine.add(place, "body", {}, name=names[-1], inertia=float(inertia))
             if damping:
                 self.machine.add(place, "load", {}, name=f"damping of {names[-1]}"[:63], body=names[-1], viscous=float(damping))
         for where, kind, element, first, last in self.groups:
             place = f"{self.source}: {where}"
-            ends = {"name": plain_name(where, self.taken, kind), "bodies": [names[first], names[last]]}
+            ends = {"name": self.machine.own_name(where, self.taken, kind), "bodies": [names[first], names[last]]}
             if kind == "ShaftDiscrete":
                 stiffness, damping = float(element["stiffness"]), float(element.get("damping", 0))
                 self.machine.add(place, "coupling", {}, **ends, stiffness=stiffness, damping=damping or None)

@@ -93,7 +93,6 @@ def test_branches_gears_decimal_commas_and_a_line_of_units_are_read(nocdyn):
     for k, one in ((40.5e3, [1, -1, 0, 0]), (120e3, [0, -0.4, -1, 0]), (80e3, [0, -0.4, 0, -1])):
         stiffness += k * np.outer(one, one)
     squares = np.sort(np.linalg.eigvals(np.linalg.solve(inertia, stiffness)).real)[1:]
-    nocdyn("import", "geared.csv", "--out", "plain.nml")
     text = (nocdyn.folder / "machine.nml").read_text()
     nocdyn.write("undamped.nml", text.replace("damping = '0.1 kNms/rad'", "").replace("viscous = 0.5", "viscous = 0"))
     assert frequencies(nocdyn, "undamped.nml") == pytest.approx(np.sqrt(squares) / 2 / math.pi, rel=1e-9)
@@ -222,6 +221,12 @@ def broken(**changes):
             broken(type="Spring"),
             "a.json: drive.shaft: type = 'Spring' is not known; allowed: Disk, ShaftDiscrete, ShaftContinuous, GearElement",
         ),
+        (
+            "a.json",
+            broken(name=3),
+            "a.json: drive: element {'name': 3, 'type': 'ShaftDiscrete', 'stiffness': 40000.0}; "
+            "needed: objects with name and type",
+        ),
         ("a.json", broken(stiffness="4"), "a.json: drive.shaft: stiffness = '4' is not a number"),
         ("a.json", broken(stiffness=-1), "a.json: drive.shaft: stiffness = -1.0 is out of range; allowed: >= 0 [N m/rad]"),
         (
@@ -241,6 +246,12 @@ def test_wrong_sources_are_refused(nocdyn, name, text, message):
     outcome = nocdyn("import", name, "--out", "machine.nml")
     assert (outcome.returncode, outcome.stdout, outcome.stderr) == (2, "", f"nocdyn: {message}\n")
     assert not (nocdyn.folder / "machine.nml").exists()
+
+
+def test_names_that_are_changed_and_stations_that_nothing_connects_are_told(nocdyn):
+    printed = imported(nocdyn, "a.csv", "station,name,inertia\n1,disc,1\n2,disc,2\n3,a=b,2\n")
+    for note in ("'disc' is named 'disc 2'", "'a=b' is named 'a b'", "no station is connected to another one"):
+        assert f"a.csv: note: {note}\n" in printed
 
 
 def test_files_that_exist_stay_and_missing_ones_are_told(nocdyn):
