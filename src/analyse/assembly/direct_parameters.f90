@@ -5,6 +5,7 @@
 !> depend on it, so that only the responses to moments follow. A variant is written into a lane if every target is
 !> direct and one with the same signs of all values has been assembled and had the structure of the block.
 module nocdyn_direct_parameters
+  use nocdyn_derived_values, only: has_derived_values
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -76,6 +77,7 @@ contains
     do i = 1, size(targets)
       if (input%groups(targets(i)%group)%kind == 'body') then
         self%are_direct = key_of(input, targets(i)) == 'inertia' .and. .not. holds_inertia .and. &
+                          .not. has_derived_values(input) .and. &
                           .not. input%groups(targets(i)%group)%number('entrained', absent=0.0_wp) > 0
         self%inertia_target = [self%inertia_target, i]
         self%body = [self%body, findloc(input%groups_named('body'), targets(i)%group, dim=1)]

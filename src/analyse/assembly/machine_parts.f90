@@ -6,6 +6,8 @@ module nocdyn_machine_parts
   use nocdyn_coordinates, only: build_coordinates
   use nocdyn_coupling_assembly, only: add_coupling_form, check_coupling, coupling_form
   use nocdyn_crank_assembly, only: add_cranks, check_crank
+  use nocdyn_damper_values, only: check_damper
+  use nocdyn_derived_values, only: add_rubber_laws, derive_values, has_derived_values
   use nocdyn_electrical_faults, only: check_fault
   use nocdyn_driven_speeds, only: find_driven_speeds, moves_with
   use nocdyn_element_groups, only: add_banks, bodies_of, body_index_t, element_groups_t, new_body_index, new_element_groups
@@ -45,6 +47,25 @@ contains
 
   !> Builds the machine of a checked input, at the start that the input gives. Errors are the ones of `assemble_machine`.
   subroutine build_machine(input, view, machine, error, lanes)
+    type(input_t), intent(in) :: input
+    type(steady_view_t), intent(in) :: view
+    type(machine_t), intent(out) :: machine
+    type(error_t), allocatable, intent(out) :: error
+    integer, intent(in), optional :: lanes   !! 1 if absent
+    type(input_t), allocatable :: derived
+
+    if (has_derived_values(input)) then
+      allocate (derived, source=input)
+      call derive_values(derived)
+      call build_parts(derived, view, machine, error, lanes)
+    else
+      call build_parts(input, view, machine, error, lanes)
+    end if
+    if (.not. allocated(error)) call add_rubber_laws(input, machine)
+  end subroutine build_machine
+
+  !> Builds the machine of an input whose values are complete.
+  subroutine build_parts(input, view, machine, error, lanes)
     type(input_t), target, intent(in) :: input
     type(steady_view_t), intent(in) :: view
     type(machine_t), intent(out) :: machine
@@ -73,7 +94,7 @@ contains
     call analyse_machine_constraints(input, view, body_index, machine, error)
     if (allocated(error)) return
     call start_bodies(input, constraint_groups(input, view), view%is_steady, body_index, shafts, machine, error)
-  end subroutine build_machine
+  end subroutine build_parts
 
   !> Adds all mistakes of `check_input` to an error or to none.
   subroutine refuse_mistakes(input, error, known)
@@ -119,6 +140,8 @@ contains
     select case (input%groups(g)%kind)
     case ('coupling')
       call check_coupling(input, g, diagnostics)
+    case ('damper')
+      call check_damper(input, g, diagnostics)
     case ('shaft')
       call check_shaft(input, g, diagnostics)
     case ('mesh')

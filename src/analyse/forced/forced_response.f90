@@ -4,15 +4,17 @@
 !> At each speed the machine is linearised about its steady state. One complex band matrix is factored for each speed and line.
 !> The speeds are independent of each other and are divided among threads.
 module nocdyn_forced_response
-  use nocdyn_dynamic_stiffness, only: band_work_t, dynamic_stiffness_t, new_band_work, new_dynamic_stiffness
+  use nocdyn_dynamic_stiffness, only: dynamic_stiffness_t, new_dynamic_stiffness
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_excitation_lines, only: line_t, list_sources, new_lines, source_t
   use nocdyn_held_speeds, only: held_speeds_t, held_state_t, new_held_speeds
   use nocdyn_kinds, only: wp
+  use nocdyn_line_solutions, only: find_twist, line_work_t, lost_power, new_line_work, solve_at => solve_line
   use nocdyn_machine, only: machine_t
   use nocdyn_response_axes, only: response_axis_t
   use nocdyn_response_points, only: keep_points, merge_points, response_point_t
   use nocdyn_moment_forms, only: list_moment_forms, moment_form_t
+  use nocdyn_rubber_states, only: has_iterated_rubber, settle_rubber
   use nocdyn_signals, only: list_signals, signal_angle, signal_t
   use nocdyn_synthesis, only: new_synthesis, synthesis_t
   use nocdyn_text, only: to_text
@@ -32,6 +34,7 @@ module nocdyn_forced_response
     integer :: shaker = 0                              !! element whose frequency is varied at one steady state, 0: speeds are
     type(dynamic_stiffness_t) :: matrix
     type(line_t), allocatable :: lines(:)
+    type(line_t), allocatable :: all_lines(:)          !! those that heat couplings, also where `lines` are only some
     type(moment_form_t), allocatable :: quantities(:)  !! that are computed: all, or the ones of `keep`
     type(signal_t), allocatable :: angles(:)           !! of the bodies, without nodes of shafts
     type(moment_form_t), allocatable :: left_out(:)    !! moments that are not computed, but compared with others
@@ -48,11 +51,9 @@ module nocdyn_forced_response
 
   !> Work space of one thread.
   type :: work_t
-    type(band_work_t) :: band
+    type(line_work_t) :: line
     integer, allocatable :: elements(:)         !! whose moments are needed
-    complex(wp), allocatable :: stiffness(:)    !! [elements]
     complex(wp), allocatable :: moment(:, :)    !! of the elements that are needed, [elements, lines]
-    complex(wp), allocatable :: series(:)       !! twists in series with the elements [rad], [elements]
   end type work_t
 
 contains
@@ -88,6 +89,7 @@ contains
     call list_sources(machine, low, of_low, self%shaker)
     call list_sources(machine, high, of_high, self%shaker)
     call new_lines(of_low, of_high, self%lines)
+    self%all_lines = self%lines
     lowest = minval([unexcited, of_low%frequency], mask=[.true., of_low%frequency > 0])
     call new_dynamic_stiffness(machine, self%held%balance%incidence, lowest, &
                                max(abs(low%slopes%stiffness) + lowest * abs(low%slopes%damping), &
@@ -187,6 +189,7 @@ contains
     do i = 1, size(new)
       call set_lines(self, new(i))
     end do
+    if (has_iterated_rubber(self%machine)) call settle_points(self, new)
     is_complete = .not. self%has_oscillations
     if (present(only_states)) is_complete = is_complete .or. only_states
     if (.not. is_complete) call solve_points(self, new)
@@ -234,6 +237,23 @@ contains
     end associate
   end subroutine refuse_too_many
 
+  !> Finds the conditions of rubber couplings at all points, by threads.
+  subroutine settle_points(self, points)
+    type(forced_response_t), intent(in) :: self
+    type(response_point_t), intent(inout) :: points(:)
+    type(line_work_t) :: work
+    integer :: i
+
+    !$omp parallel private(work) if (size(points) > 1)
+    work = new_line_work(self%machine, self%matrix)
+    !$omp do schedule(dynamic, 4)
+    do i = 1, size(points)
+      call settle_rubber(self%machine, self%matrix, self%all_lines, points(i), work)
+    end do
+    !$omp end do
+    !$omp end parallel
+  end subroutine settle_points
+
   !> Solves at all points, by threads. They wait for each other longer than they compute few points.
   subroutine solve_points(self, points)
     type(forced_response_t), intent(in) :: self
@@ -255,7 +275,7 @@ contains
       call solve_point(self, points(i), work)
     end do
     !$omp end do
-    deallocate (work%elements, work%stiffness, work%moment, work%series)
+    deallocate (work%elements, work%moment)
     !$omp end parallel
   end subroutine solve_points
 
@@ -270,12 +290,9 @@ contains
     do q = 1, size(quantities)
       is_needed(quantities(q)%elements) = .true.
     end do
-    work%band = new_band_work(self%matrix)
+    work%line = new_line_work(self%machine, self%matrix)
     work%elements = pack([(e, e=1, size(is_needed))], is_needed)
-    associate (elements => size(is_needed))
-      allocate (work%stiffness(elements), work%series(elements), work%moment(elements, size(self%lines)), &
-                source=(0.0_wp, 0.0_wp))
-    end associate
+    allocate (work%moment(size(is_needed), size(self%lines)), source=(0.0_wp, 0.0_wp))
   end subroutine prepare_work
 
   !> The harmonics in a steady state, and the frequencies of the lines.
@@ -388,23 +405,16 @@ contains
     integer, intent(in) :: l
     type(response_point_t), intent(inout) :: point
     type(work_t), intent(inout) :: work
-    real(wp), parameter :: beside = 1.0e-9_wp   ! an undamped resonance, where there is no response
     complex(wp) :: twist
     integer :: e, i
-    logical :: singular
 
     associate (frequency => point%frequency(l), sources => point%sources, line => self%lines(l))
-      call point%state%slopes%find_stiffness(self%machine%elements%internal, cmplx(0.0_wp, frequency, wp), work%stiffness)
-      call self%matrix%factor(frequency, work%stiffness, work%band, singular)
-      if (singular) call self%matrix%factor(frequency * (1.0_wp + beside), work%stiffness, work%band, singular)
-      work%band%x(:) = (0.0_wp, 0.0_wp)
-      call add_sources(self, sources(line%source), work)
-      call self%matrix%solve(work%band)
+      call solve_at(self%machine, self%matrix, point%state%slopes, frequency, sources(line%source), work%line)
       work%moment(:, l) = (0.0_wp, 0.0_wp)
       do i = 1, size(work%elements)
         e = work%elements(i)
-        call self%matrix%find_moment(e, work%stiffness(e), work%series(e), work%band, twist, work%moment(e, l))
-        point%heat(e) = point%heat(e) + 0.5_wp * frequency * aimag(work%stiffness(e)) * (real(twist, wp)**2 + aimag(twist)**2)
+        call find_twist(self%matrix, e, work%line, twist, work%moment(e, l))
+        point%heat(e) = point%heat(e) + lost_power(frequency, work%line%stiffness(e), twist)
       end do
       do i = 1, size(line%source)
         associate (source => sources(line%source(i)))
@@ -415,26 +425,6 @@ contains
       call set_angles(self, work, point%angle(l, :))
     end associate
   end subroutine solve_line
-
-  !> The forces of some harmonics, and their twists in series.
-  pure subroutine add_sources(self, sources, work)
-    type(forced_response_t), intent(in) :: self
-    type(source_t), intent(in) :: sources(:)
-    type(work_t), intent(inout) :: work
-    integer :: i
-
-    work%series(:) = (0.0_wp, 0.0_wp)
-    do i = 1, size(sources)
-      associate (e => sources(i)%element, amplitude => sources(i)%moment)
-        if (sources(i)%is_twist) then
-          work%series(e) = work%series(e) + amplitude
-          call self%matrix%add_twist(e, work%stiffness(e), amplitude, work%band)
-        else
-          call self%matrix%add_forces(e, amplitude, work%band)
-        end if
-      end associate
-    end do
-  end subroutine add_sources
 
   !> The angles of the bodies that are kept.
   pure subroutine set_angles(self, work, angle)
@@ -448,7 +438,7 @@ contains
       do b = 1, size(place)
         if (place(b) == 0) cycle
         do k = map%first(b), map%first(b + 1) - 1
-          angle(place(b)) = angle(place(b)) + map%ratio(1, k) * work%band%x(self%matrix%position(map%coordinate(k)))
+          angle(place(b)) = angle(place(b)) + map%ratio(1, k) * work%line%band%x(self%matrix%position(map%coordinate(k)))
         end do
       end do
     end associate

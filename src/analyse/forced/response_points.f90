@@ -12,6 +12,7 @@ module nocdyn_response_points
   !> at t = 0 and its orders are sines of its angle.
   type, public :: response_point_t
     logical :: is_of_grid = .true.                 !! whether it is one of the speeds that were asked for
+    logical :: is_settled = .true.                 !! whether the conditions of rubber couplings were found
     type(held_state_t), allocatable :: state
     type(source_t), allocatable :: sources(:)
     real(wp), allocatable :: frequency(:)          !! Omega [rad/s], [lines]
@@ -95,6 +96,7 @@ contains
     type(response_point_t), intent(out) :: to
 
     to%is_of_grid = from%is_of_grid
+    to%is_settled = from%is_settled
     call move_alloc(from%state, to%state)
     call move_alloc(from%sources, to%sources)
     call move_alloc(from%frequency, to%frequency)

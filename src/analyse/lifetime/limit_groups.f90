@@ -82,6 +82,10 @@ contains
     integer :: i
 
     call check_temperature(input, index, diagnostics)
+    if (input%groups(index)%has_value('damper')) then   ! its coupling is derived
+      call check_damper_name(input, index, diagnostics)
+      return
+    end if
     kind = limited_kind(input%groups(index))
     allocate (groups, source=input%groups_named(trim(kind)))
     allocate (names(size(groups)))
@@ -99,6 +103,26 @@ contains
     call input%report(index, trim(kind), 'there is no ' // trim(kind) // ' ' // quoted(name), diagnostics, &
                       hint=suggestion(name, names))
   end subroutine check_limit
+
+  !> Refuses limits of dampers that there are not.
+  subroutine check_damper_name(input, index, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(string_t), allocatable :: names(:)
+    integer, allocatable :: groups(:)
+    integer :: i
+
+    allocate (groups, source=input%groups_named('damper'))
+    allocate (names(size(groups)))
+    do i = 1, size(groups)
+      names(i)%text = input%groups(groups(i))%name
+    end do
+    associate (name => input%groups(index)%text('damper'))
+      if (any([(names(i)%text == name, i=1, size(names))])) return
+      call input%report(index, 'damper', 'there is no damper ' // quoted(name), diagnostics, hint=suggestion(name, names))
+    end associate
+  end subroutine check_damper_name
 
   !> Whether a group of a kind has a name.
   pure logical function has_name(input, kind, name)

@@ -9,6 +9,7 @@ module nocdyn_response_analysis
   use nocdyn_followed_modes, only: follow_modes
   use nocdyn_forced_response, only: forced_response_t, new_forced_response
   use nocdyn_harmonic_notes, only: note_left_out_harmonics
+  use nocdyn_heat_results, only: note_rubber
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -100,6 +101,7 @@ contains
       if (self%modes%modes > 0) call note_shaft_modes(machine, self%modes, self%crossings, .false., self%notes)
       call note_separation(self%response, self%notes)
       call note_linear_ranges(self%response, self%notes)
+      call note_rubber(self%response, self%notes)
       call note_overloads(self%response, self%notes)
       call note_rated_speeds(input, self%settings, self%notes)
       call note_rules(self%limits, self%notes)

@@ -3,6 +3,7 @@ module nocdyn_response_files
   use nocdyn_column_lists, only: column_list_t
   use nocdyn_csv, only: write_header, write_row
   use nocdyn_grid_file, only: grid_file_t
+  use nocdyn_heat_results, only: heat_values, list_heat, put_rubber
   use nocdyn_input, only: input_t
   use nocdyn_input_text, only: input_text
   use nocdyn_json, only: json_t
@@ -12,7 +13,6 @@ module nocdyn_response_files
   use nocdyn_response_analysis, only: response_analysis_t
   use nocdyn_response_axes, only: response_axis_t
   use nocdyn_response_limits, only: no_limit, response_limit_t
-  use nocdyn_moment_forms, only: kind_moment, moment_form_t
   use nocdyn_response_summary, only: critical_t, response_summary_t, worst_ratio
   use nocdyn_text, only: string_t
   use nocdyn_verdicts, only: verdict_t
@@ -72,8 +72,7 @@ contains
           call list%add(signal, 'mean')
           call list%add(signal, 'half_range')
           call list%add(signal, 'peak')
-          if (has_heat(quantities, q)) call list%add_named('heat', 'W', 'mean power lost by the oscillation', &
-                                                           signal%element_kind, signal%element)
+          call list_heat(analysis%response, q, list)
           if (any(limits%quantity == q)) call list%add(signal, 'ratio', '1')
         end associate
       end do
@@ -90,16 +89,6 @@ contains
       call list%add_named('damage_per_hour', '1/h', 'damage per hour', 'fatigue', analysis%fatigue(k)%name)
     end do
   end subroutine list_columns
-
-  !> Whether the heat of a coupling stands beside a quantity: its moment, of a shaft that at the first end.
-  pure logical function has_heat(quantities, q)
-    type(moment_form_t), intent(in) :: quantities(:)
-    integer, intent(in) :: q
-
-    has_heat = quantities(q)%kind == kind_moment
-    if (has_heat .and. q > 1) has_heat = .not. (quantities(q - 1)%kind == kind_moment .and. &
-                                               quantities(q - 1)%element == quantities(q)%element)
-  end function has_heat
 
   !> Whether some limit of a quantity bounds its half range.
   logical function has_continuous(analysis, label)
@@ -140,6 +129,7 @@ contains
     type(response_analysis_t), intent(in) :: analysis
     integer, intent(in) :: i             !! point of the response
     real(wp), intent(out) :: row(:)
+    real(wp), allocatable :: heat(:)
     integer :: j, k, n, q
 
     n = 0
@@ -154,7 +144,9 @@ contains
         q = analysis%shown(j)
         row(n + 1:n + 3) = [point%mean(q), point%half_range(q), point%peak(q)]
         n = n + 3
-        if (has_heat(quantities, q)) call put(sum(point%heat(quantities(q)%elements)))
+        heat = heat_values(analysis%response, q, point)
+        row(n + 1:n + size(heat)) = heat
+        n = n + size(heat)
         if (any(limits%quantity == q)) call put(worst_ratio(limits, point, q))
       end do
       do k = 1, size(limits)
@@ -389,6 +381,7 @@ contains
     end do
     call json%close_list()
     call put_largest(json, analysis, summary)
+    call put_rubber(json, analysis%response)
     call put_barred(json, input, analysis, summary)
     call put_fatigue(json, analysis)
   end subroutine put_response

@@ -23,6 +23,7 @@ module nocdyn_response_limits
     real(wp), private :: peak = no_limit              !! of the largest magnitude, with the mean
     real(wp), private :: transient = no_limit         !! of the half range while a speed is passed
     real(wp) :: heat = no_limit                       !! of the element [W]
+    real(wp) :: temperature = no_limit                !! of a coupling that heats up [degC]
     real(wp), allocatable :: frequency(:)             !! of a curve of amplitudes, ascending [rad/s]
     real(wp), allocatable :: amplitude(:)             !! that each line may have there
     logical, private :: has_rule = .false.
@@ -70,7 +71,8 @@ contains
     character(len=*), intent(in) :: kind   !! of the element
     character(len=:), allocatable :: keys
 
-    keys = 'vibratory_moment, moment, stress, stress_transient, rule, rule_file, heat or vibratory_frequency'
+    keys = 'vibratory_moment, moment, stress, stress_transient, rule, rule_file, heat, largest_temperature or ' // &
+           'vibratory_frequency'
     if (kind == 'mesh') keys = 'vibratory_force or force'
   end function needed_keys
 
@@ -95,9 +97,10 @@ contains
     if (limit%vibratory < no_limit) limit%vibratory = factor * limit%vibratory
     if (limit%peak < no_limit) limit%peak = factor * limit%peak
     limit%heat = group%number('heat', absent=no_limit)
+    limit%temperature = group%number('largest_temperature', absent=no_limit)
     limit%frequency = group%numbers('vibratory_frequency')
     limit%amplitude = factor * group%numbers('vibratory_moments')
-    if (min(limit%vibratory, limit%peak, limit%heat) >= no_limit .and. .not. limit%has_curve()) return
+    if (min(limit%vibratory, limit%peak, limit%heat, limit%temperature) >= no_limit .and. .not. limit%has_curve()) return
     limit%quantity = limited_signal(group, signals)
     if (limit%quantity > 0) call add_one(limit, limits)
   end subroutine add_limit

@@ -5,6 +5,7 @@
 !> magnitude. In operation the limit is exceeded if there is none; outside of it the range is 'not assessed' then.
 module nocdyn_response_verdict
   use nocdyn_excitation_lines, only: line_t
+  use nocdyn_heat_results, only: temperatures
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_limit_groups, only: limited_kind
@@ -38,6 +39,7 @@ contains
       call add_transient(input, analysis, i, verdict)
       call add_peak(input, analysis, i, verdict)
       call add_heat(input, analysis, i, verdict)
+      call add_temperature(input, analysis, i, verdict)
       call add_curve(input, analysis, i, verdict)
     end do
     call add_other_limits(input, 'response', groups, 'a response has no such quantity: nocdyn run has', verdict)
@@ -183,6 +185,34 @@ contains
       call verdict%add(line)
     end associate
   end subroutine add_heat
+
+  !> The temperature of a rubber coupling.
+  subroutine add_temperature(input, analysis, number, verdict)
+    type(input_t), intent(in) :: input
+    type(response_analysis_t), intent(in) :: analysis
+    integer, intent(in) :: number   !! of the limit
+    type(verdict_t), intent(inout) :: verdict
+    type(verdict_line_t) :: line
+    real(wp), allocatable :: temperature(:)
+    integer :: worst
+
+    associate (limit => analysis%limits(number))
+      if (limit%temperature >= no_limit) return
+      temperature = temperatures(analysis%response, analysis%response%quantities(limit%quantity)%elements(1))
+      call start_line(input, analysis, number, '', line)
+      line%quantity = 'temperature'
+      line%criterion = 'temperature'
+      if (size(temperature) == 0) then
+        line%finding = is_not_assessed
+        line%reason = 'the coupling does not heat up: no data of its cooling, or a given condition'
+      else
+        worst = maxloc(temperature, dim=1)
+        call line%compare(temperature(worst), limit%temperature, 'degC')
+        call line%stand_at(analysis%response%points(worst)%state%speed)
+      end if
+      call verdict%add(line)
+    end associate
+  end subroutine add_temperature
 
   !> The amplitude of the order that comes nearest to a curve over the frequency.
   subroutine add_curve(input, analysis, number, verdict)

@@ -16,7 +16,8 @@ module nocdyn_run_verdict
 
   character(len=*), parameter :: peak_keys(*) = [character(len=7) :: 'moment', 'force', 'largest']   ! of the largest magnitude
   character(len=*), parameter :: steady_keys(*) = [character(len=19) :: 'vibratory_moment', 'vibratory_frequency', &
-    'vibratory_force', 'vibratory', 'stress', 'stress_transient', 'rule', 'rule_file', 'heat']
+    'vibratory_force', 'vibratory', 'stress', 'stress_transient', 'rule', 'rule_file', 'heat', &
+    'largest_temperature']
 
   !> An extreme of a column.
   type, public :: column_extreme_t

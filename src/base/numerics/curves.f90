@@ -7,7 +7,7 @@ module nocdyn_curves
   implicit none (type, external)
   private
 
-  public :: new_curve, new_steps
+  public :: new_curve, new_curve_by_slopes, new_steps
 
   integer, parameter, public :: interpolation_linear = 1
   integer, parameter, public :: interpolation_cubic = 2    !! without overshoot (monotone); its second derivative jumps
@@ -49,17 +49,12 @@ contains
     integer, intent(in) :: extrapolation     !! extrapolation_...
     type(curve_t) :: self
     real(wp) :: h(size(x) - 1), secant(size(x) - 1), slope(size(x))
-    integer :: i, n
+    integer :: n
 
     n = size(x)
-    if (n < 2) error stop 'nocdyn_curves: a curve has at least two points'
+    call start_curve(x, y, self)
     h = x(2:) - x(:n - 1)
-    if (any(h <= 0)) error stop 'nocdyn_curves: the points of a curve ascend'
     secant = (y(2:) - y(:n - 1)) / h
-    allocate (self%knot, source=x)
-    allocate (self%origin(0:n), self%area(0:n), self%coefficient(0:3, 0:n), source=0.0_wp)
-    self%origin(:) = [x(1), x]
-    self%coefficient(0, :) = [y(1), y]
     self%coefficient(1, 1:n - 1) = secant
     slope = [secant, secant(n - 1)]
     if (interpolation /= interpolation_linear .and. n > 2) then
@@ -71,17 +66,63 @@ contains
       case default
         slope = monotone_slopes(h, secant)
       end select
-      do i = 1, n - 1
-        self%coefficient(1, i) = slope(i)
-        self%coefficient(2, i) = (3.0_wp * secant(i) - 2.0_wp * slope(i) - slope(i + 1)) / h(i)
-        self%coefficient(3, i) = (slope(i) + slope(i + 1) - 2.0_wp * secant(i)) / h(i)**2
-      end do
+      call set_cubics(h, secant, slope, self)
     end if
     if (extrapolation == extrapolation_linear) self%coefficient(1, [0, n]) = slope([1, n])
-    do i = 1, n - 1
+    call sum_areas(x, self)
+  end function new_curve
+
+  !> The curve of cubics through points (x, y) with given slopes there, straight beyond its ends.
+  function new_curve_by_slopes(x, y, slope) result(self)
+    real(wp), intent(in) :: x(:)                !! ascending, at least 2
+    real(wp), intent(in) :: y(:), slope(:)      !! [points]
+    type(curve_t) :: self
+    real(wp) :: h(size(x) - 1)
+
+    call start_curve(x, y, self)
+    h = x(2:) - x(:size(x) - 1)
+    call set_cubics(h, (y(2:) - y(:size(x) - 1)) / h, slope, self)
+    self%coefficient(1, [0, size(x)]) = slope([1, size(x)])
+    call sum_areas(x, self)
+  end function new_curve_by_slopes
+
+  !> Sets the points of a curve, which is constant between them.
+  subroutine start_curve(x, y, self)
+    real(wp), intent(in) :: x(:), y(:)   !! [points]
+    type(curve_t), intent(inout) :: self
+
+    if (size(x) < 2) error stop 'nocdyn_curves: a curve has at least two points'
+    if (any(x(2:) - x(:size(x) - 1) <= 0)) error stop 'nocdyn_curves: the points of a curve ascend'
+    allocate (self%knot, source=x)
+    allocate (self%origin(0:size(x)), self%area(0:size(x)), self%coefficient(0:3, 0:size(x)), source=0.0_wp)
+    self%origin(:) = [x(1), x]
+    self%coefficient(0, :) = [y(1), y]
+  end subroutine start_curve
+
+  !> Sets the cubics between the points by the slopes there.
+  pure subroutine set_cubics(h, secant, slope, self)
+    real(wp), intent(in) :: h(:), secant(:)   !! distance of the points and slope between them, [points - 1]
+    real(wp), intent(in) :: slope(:)          !! at the points
+    type(curve_t), intent(inout) :: self
+    integer :: i
+
+    do i = 1, size(h)
+      self%coefficient(1, i) = slope(i)
+      self%coefficient(2, i) = (3.0_wp * secant(i) - 2.0_wp * slope(i) - slope(i + 1)) / h(i)
+      self%coefficient(3, i) = (slope(i) + slope(i + 1) - 2.0_wp * secant(i)) / h(i)**2
+    end do
+  end subroutine set_cubics
+
+  !> Sets the integrals from the first point to the others.
+  pure subroutine sum_areas(x, self)
+    real(wp), intent(in) :: x(:)   !! of the points
+    type(curve_t), intent(inout) :: self
+    integer :: i
+
+    do i = 1, size(x) - 1
       self%area(i + 1) = integral_to(self, i, x(i + 1))
     end do
-  end function new_curve
+  end subroutine sum_areas
 
   !> Where the numbers stand, as long as the curve is not changed.
   subroutine describe(self, plain)
@@ -97,16 +138,14 @@ contains
     real(wp), intent(in) :: x(:)   !! ascending, at least 1
     real(wp), intent(in) :: y(:)   !! [points]
     type(curve_t) :: self
-    integer :: i, n
+    integer :: n
 
     n = size(x)
     allocate (self%knot, source=x)
     allocate (self%origin(0:n), self%area(0:n), self%coefficient(0:3, 0:n), source=0.0_wp)
     self%origin(:) = [x(1), x]
     self%coefficient(0, 1:) = y
-    do i = 1, n - 1
-      self%area(i + 1) = integral_to(self, i, x(i + 1))
-    end do
+    call sum_areas(x, self)
   end function new_steps
 
   !> Number of points.

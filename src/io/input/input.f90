@@ -332,15 +332,32 @@ contains
     integer, intent(in) :: index   !! of the group
     character(len=label_length(self, index)) :: text
 
-    text = '&' // shortened(self%groups(index)%kind)
+    text = '&' // shortened(label_kind(self, index))
     if (len(self%groups(index)%name) > 0) text = trim(text) // ' ' // quoted(shortened(self%groups(index)%name))
   end function label
+
+  !> The kind of a group in the file: the group itself, or the one that it is a part of.
+  pure function label_kind(self, index) result(kind)
+    class(input_t), intent(in) :: self
+    integer, intent(in) :: index
+    character(len=len(self%groups(in_file(self, index))%kind)) :: kind
+
+    kind = self%groups(in_file(self, index))%kind
+  end function label_kind
+
+  pure integer function in_file(self, index) result(group)
+    class(input_t), intent(in) :: self
+    integer, intent(in) :: index
+
+    group = index
+    if (self%groups(index)%made_from > 0) group = self%groups(index)%made_from
+  end function in_file
 
   pure integer function label_length(self, index) result(length)
     class(input_t), intent(in) :: self
     integer, intent(in) :: index
 
-    length = 1 + len(shortened(self%groups(index)%kind))
+    length = 1 + len(shortened(label_kind(self, index)))
     if (len(self%groups(index)%name) > 0) length = length + 1 + len(quoted(shortened(self%groups(index)%name)))
   end function label_length
 

@@ -11,6 +11,7 @@ module nocdyn_input_group
     logical :: is_given = .false.   !! by the file or by an override, not by default
     integer :: line = 0             !! of the key in the file
     integer :: override = 0         !! index of the override that sets it, 0: none
+    logical :: is_derived = .false. !! from other groups or files that are written
     integer :: unit = 0             !! in which numbers are written: index of `units`, 0: the one of the schema
     real(wp), allocatable :: numbers(:)
     integer, allocatable :: whole_numbers(:)
@@ -28,6 +29,7 @@ module nocdyn_input_group
     integer :: rule = 0                     !! its row of `group_rules`
     integer :: ordinal = 0                  !! its number among the groups of its kind, 0: not in the file
     integer :: line = 0                     !! where it begins, 0: not in the file
+    integer :: made_from = 0                !! group that it is a part of, which is in the file; 0: none
     type(value_t), allocatable :: values(:) !! one for each key, in the order of the schema
   contains
     procedure :: number          !! the single value of a key

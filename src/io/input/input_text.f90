@@ -24,6 +24,7 @@ contains
 
     call buffer%append_line('! The complete input of a run: every key with the value that was used.')
     do g = 1, size(input%groups)
+      if (input%groups(g)%made_from > 0) cycle
       call append_group(buffer, input%groups(g))
     end do
     text = buffer%text()
@@ -39,7 +40,7 @@ contains
     call buffer%append_line('&' // group%kind)
     do i = 1, size(group%values)
       associate (rule => key_rules(first_key(group%rule) + i - 1))
-        if (rule%follows .and. .not. group%values(i)%is_given) cycle
+        if (rule%follows .and. .not. group%values(i)%is_given .or. group%values(i)%is_derived) cycle
         allocate (items(group%values(i)%count()))
         do k = 1, size(items)
           if (allocated(group%values(i)%numbers)) then

@@ -4,7 +4,9 @@
 !> Reading, checking, help, template and reference use the rows. The rows of large groups are in modules of their own.
 module nocdyn_schema
   use nocdyn_kinds, only: wp
-  use nocdyn_schema_couplings, only: coupling_examples, coupling_groups, coupling_keys, coupling_relations
+  use nocdyn_schema_couplings, only: conditions, coupling_examples, coupling_groups, coupling_keys, coupling_kinds, &
+    coupling_relations
+  use nocdyn_schema_dampers, only: damper_aliases, damper_examples, damper_groups, damper_keys, damper_kinds, damper_relations
   use nocdyn_schema_fit, only: fit_examples, fit_groups, fit_keys, fit_relations
   use nocdyn_schema_joints, only: joint_examples, joint_groups, joint_keys, joint_kinds, joint_relations
   use nocdyn_schema_measurement, only: measurement_examples, measurement_groups, measurement_keys, measurement_kinds, &
@@ -37,7 +39,7 @@ module nocdyn_schema
   type(group_rule_t), parameter, public :: group_rules(*) = [ &
     group_rule_t('case',       in_machine,    at_most_once,  '',         'What the file is about.'), &
     group_rule_t('body',       in_machine,    at_least_once, 'body',     'A rigid body that turns about its axis.'), &
-    coupling_groups, joint_groups, torque_groups, &
+    coupling_groups, damper_groups, joint_groups, torque_groups, &
     group_rule_t('run',        in_simulation, exactly_once,  '',         'What is computed, and how.'), &
     group_rule_t('load_case',  in_simulation, any_times,     'load_case', &
                  'A start, a fault or a load: nocdyn run does one load case after the other.'), &
@@ -95,6 +97,10 @@ module nocdyn_schema
       'names of elements that only the cases have which name them here', fewest=1), &
     key_rule_t('load_case', 'without', a_text, any_number, '', unset, anything, &
       'names of elements that it leaves out', fewest=1), &
+    key_rule_t('load_case', 'rubber', a_word, 1, '', unset, conditions, &
+      'condition of all couplings of kind rubber: cold, warm, steady'), &
+    key_rule_t('load_case', 'misfire', an_integer, 1, '', unset, not_negative, &
+      'cylinder of each &engine that does not fire, as misfire there'), &
     key_rule_t('load_case', 'analyses', a_word, any_number, '', unset, analyses, &
       'commands of it: run, response, campbell, modes, equilibrium, transit, orbit; default: all', fewest=1), &
     key_rule_t('output', 'interval', a_number, 1, 's', unset, positive, 'time from row to row'), &
@@ -111,17 +117,19 @@ module nocdyn_schema
     key_rule_t('output', 'directory', a_folder, 1, '', "''", anything, &
       "folder of the results; '' means results/ and the name of the input file")]
 
-  type(kind_rule_t), parameter, public :: kind_rules(*) = [joint_kinds, torque_kinds, measurement_kinds, sweep_kinds]
+  type(kind_rule_t), parameter, public :: kind_rules(*) = [coupling_kinds, damper_kinds, joint_kinds, torque_kinds, &
+    measurement_kinds, sweep_kinds]
 
   type(key_rule_t), parameter, public :: key_rules(*) = &
-    [frame_keys, coupling_keys, joint_keys, torque_keys, engine_keys, response_keys, measurement_keys, sweep_keys, fit_keys]
+    [frame_keys, coupling_keys, damper_keys, joint_keys, torque_keys, engine_keys, response_keys, measurement_keys, sweep_keys, &
+     fit_keys]
 
   type(relation_rule_t), parameter, public :: relation_rules(*) = [ &
     relation_rule_t('run', less_than, 't_start', 't_end'), &
     relation_rule_t('run', requires, 'start_speed', 'start_body'), &
     relation_rule_t('run', requires, 'start_body free', 'start_speed'), &
     relation_rule_t('output', at_most_one, 'interval', 'points'), &
-    coupling_relations, joint_relations, torque_relations, engine_relations, response_relations, &
+    coupling_relations, damper_relations, joint_relations, torque_relations, engine_relations, response_relations, &
     measurement_relations, sweep_relations, fit_relations]
 
   type(alias_t), parameter, public :: aliases(*) = sweep_aliases
@@ -138,7 +146,8 @@ module nocdyn_schema
     group_alias_t('piston slider_crank',                      'crank'), &
     group_alias_t('motion prescribed_motion hold',            'drive'), &
     group_alias_t('worm bevel spur pinion',                   'gear'), &
-    group_alias_t('spring damper torsion_spring',             'coupling')]
+    group_alias_t('spring torsion_spring',                    'coupling'), &
+    damper_aliases]
 
   type(example_t), parameter, public :: examples(*) = [ &
     example_t('case',       "title = 'Paper, case 2: harmonic torque on the motor'"), &
@@ -147,8 +156,9 @@ module nocdyn_schema
     example_t('body',       "name = 'machine'  inertia = 5.0"), &
     example_t('run',        "t_end = 10.0  method = 'rk45'  rtol = 1.0e-9  atol = 1.0e-9"), &
     example_t('output',     'interval = 0.01'), &
+    example_t('load_case',  "name = 'misfire'  misfire = 3", .false.), &
     example_t('load_case',  "name = 'half_load'  repeats = 5000  set = 'load.work.viscous=50'", .false.), &
-    coupling_examples, joint_examples, torque_examples, response_examples, measurement_examples, &
+    coupling_examples, damper_examples, joint_examples, torque_examples, response_examples, measurement_examples, &
     sweep_examples, fit_examples]
 
   ! One value for each row of `group_rules`. The rows of `key_rules` of a group are consecutive.

@@ -84,6 +84,7 @@ module nocdyn_bank
     procedure, non_overridable :: knees
     procedure :: extremes
     procedure :: keep_energy
+    procedure :: stand_in
     generic :: connect => connect_keys, connect_rows
     procedure, private :: connect_keys, connect_rows
     procedure :: list_structure
@@ -117,6 +118,15 @@ contains
     allocate (longer(size(longer))%bank, source=bank)
     call move_alloc(longer, banks)
   end subroutine append_bank
+
+  !> The viscous damping in place of the relative one over the time [N m s/rad], [elements]. `loss_damping` is allocated.
+  pure function stand_in(self, stiffness) result(damping)
+    class(bank_t), intent(in) :: self
+    real(wp), intent(in) :: stiffness(:)   !! in this state [N m/rad], [elements]
+    real(wp) :: damping(size(stiffness))
+
+    damping = self%loss_damping
+  end function stand_in
 
   !> Elements that act on one body each, the one of the key `body`.
   subroutine connect_keys(self, role, keys)

@@ -12,7 +12,7 @@ module nocdyn_tables
   implicit none (type, external)
   private
 
-  public :: add_table, curve_value, curve_integral, guard_segment, picked_value, guard_picked_square
+  public :: add_table, curve_value, curve_slope, curve_integral, guard_segment, picked_value, guard_picked_square
 
 contains
 
@@ -35,6 +35,17 @@ contains
     value = cubic(x - segment_part(tape, segment_origin), segment_part(tape, segment_value), segment_part(tape, segment_slope), &
                   segment_part(tape, segment_half_curvature), segment_part(tape, segment_cubic))
   end function curve_value
+
+  !> The slope of the curve of the element at x, on its present segment.
+  function curve_slope(tape, x) result(slope)
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t), intent(in) :: x
+    type(expression_t) :: d, slope
+
+    d = x - segment_part(tape, segment_origin)
+    slope = segment_part(tape, segment_slope) + d * (2.0_wp * segment_part(tape, segment_half_curvature) + &
+                                                     3.0_wp * segment_part(tape, segment_cubic) * d)
+  end function curve_slope
 
   !> value + d (slope + d (half_curvature + d cubic)).
   function cubic(d, value, slope, half_curvature, third)

@@ -10,6 +10,7 @@ module nocdyn_machine
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_polynomial_laws, only: new_polynomial_laws, polynomial_laws_t
   use nocdyn_rigid_trains, only: rigid_trains_t
+  use nocdyn_rubber_laws, only: rubber_law_t
   use nocdyn_switches, only: new_switches, switches_t
   use nocdyn_text, only: quoted, string_t
   implicit none (type, external)
@@ -48,6 +49,7 @@ module nocdyn_machine
     type(rigid_trains_t) :: trains
     type(geared_group_t), allocatable :: groups(:)
     type(coordinates_t) :: coordinates
+    type(rubber_law_t), allocatable :: rubber(:)   !! rubber couplings by data sheets
   contains
     procedure :: add_nodes
     procedure :: freedoms

@@ -8,16 +8,18 @@ module nocdyn_coupling_assembly
   use nocdyn_kinds, only: wp
   use nocdyn_maxwell_couplings, only: new_maxwell_couplings
   use nocdyn_polynomial_couplings, only: elastic_coefficients, new_polynomial_couplings
+  use nocdyn_rubber_couplings, only: new_rubber_couplings
+  use nocdyn_rubber_laws, only: new_factors, rubber_law_t
   use nocdyn_saturated_couplings, only: new_saturated_couplings
   use nocdyn_table_couplings, only: new_table_couplings
   use nocdyn_text, only: to_text
   implicit none (type, external)
   private
 
-  public :: coupling_form, add_coupling_form, check_coupling
+  public :: coupling_form, add_coupling_form, check_coupling, is_rubber, new_rubber_law
 
-  integer, parameter :: cubic = 1, slipping = 2, polynomial = 3, gap = 4, saturated = 5, table = 6, maxwell = 7   ! forms
-  integer, parameter :: elastic_forms = 7   ! these forms with relative damping follow
+  integer, parameter :: cubic = 1, slipping = 2, polynomial = 3, gap = 4, saturated = 5, table = 6, maxwell = 7, rubber = 8
+  integer, parameter :: elastic_forms = 8   ! these forms with relative damping follow
 
 contains
 
@@ -30,6 +32,7 @@ contains
 
     associate (group => input%groups(index))
       call check_relative_damping(input, index, diagnostics)
+      if (is_rubber(group)) call check_rubber(input, index, diagnostics)
       select case (elastic_form(group))
       case (gap)
         call find_gap_obstacle(coefficients_of(group), group%number('gap'), obstacle)
@@ -80,11 +83,74 @@ contains
     end associate
   end subroutine check_relative_damping
 
+  !> Refuses rubber without stiffness, and conditions whose numbers are missing.
+  subroutine check_rubber(input, index, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    type(diagnostics_t), intent(inout) :: diagnostics
+
+    associate (group => input%groups(index))
+      if (.not. group%number('stiffness', absent=0.0_wp) > 0) call input%report(index, 'kind', &
+        "kind = 'rubber' needs stiffness > 0 [N m/rad]", diagnostics)
+      if (.not. group%has_value('condition')) return
+      select case (group%text('condition'))
+      case ('steady')
+        if (group%has_value('thermal_resistance') .or. group%has_value('power_loss')) return
+        call input%report(index, 'condition', "condition = 'steady' needs thermal_resistance [K/W], or power_loss [W] and " // &
+                          'power_loss_rise [K]', diagnostics)
+      case ('warm')
+        if (group%has_value('warm_temperature') .or. group%has_value('warm_stiffness') .or. &
+            group%has_value('warm_damping')) return
+        call input%report(index, 'condition', "condition = 'warm' needs warm_temperature [degC] beside table_temperature, " // &
+                          'or warm_stiffness [N m/rad] and warm_damping', diagnostics)
+      case default   ! cold needs nothing
+      end select
+    end associate
+  end subroutine check_rubber
+
+  !> Whether a group &coupling is one by a data sheet.
+  pure logical function is_rubber(group)
+    type(group_t), intent(in) :: group
+
+    is_rubber = group%kind == 'coupling'
+    if (is_rubber) is_rubber = group%text('kind') == 'rubber'
+  end function is_rubber
+
+  !> The law of a rubber coupling, but for its number in the machine. Over the time it has one frequency, the one of its damping.
+  type(rubber_law_t) function new_rubber_law(group) result(law)
+    type(group_t), intent(in) :: group   !! &coupling of kind rubber
+    character(len=:), allocatable :: condition
+
+    law%by_torque = new_factors(group%numbers('table_torque'), group%numbers('torque_stiffness'), group%numbers('torque_damping'))
+    law%by_amplitude = new_factors(group%numbers('table_amplitude'), group%numbers('amplitude_stiffness'), &
+                                   group%numbers('amplitude_damping'))
+    law%by_frequency = new_factors(group%numbers('table_frequency'), group%numbers('frequency_stiffness'), &
+                                   group%numbers('frequency_damping'))
+    law%by_temperature = new_factors(group%numbers('table_temperature'), group%numbers('temperature_stiffness'), &
+                                     group%numbers('temperature_damping'))
+    law%ambient = group%number('ambient_temperature', absent=0.0_wp)
+    law%temperature = law%ambient
+    law%resistance = group%number('thermal_resistance', absent=0.0_wp)
+    if (group%has_value('power_loss')) law%resistance = group%number('power_loss_rise') / group%number('power_loss')
+    condition = merge('steady', 'cold  ', law%resistance > 0)
+    if (group%has_value('condition')) condition = group%text('condition')
+    law%heats_up = condition == 'steady'
+    if (condition == 'warm') then
+      law%temperature = group%number('warm_temperature', absent=law%ambient)
+      if (.not. group%has_value('warm_temperature')) law%by_temperature%are_given = .false.   ! its values have the factors
+    end if
+    law%base = [law%by_temperature%stiffness(law%temperature), &
+                law%by_temperature%damping(law%temperature) * law%by_torque%damping(0.0_wp)]
+    if (group%has_value('damping_frequency')) law%base = law%base * &
+      [law%by_frequency%stiffness(group%number('damping_frequency')), law%by_frequency%damping(group%number('damping_frequency'))]
+  end function new_rubber_law
+
   !> Form of the law of a group &coupling.
   pure integer function coupling_form(group)
     type(group_t), intent(in) :: group
 
-    associate (is_relative => group%number('relative_damping', absent=0.0_wp) > 0 .or. group%has_value('magnifier'))
+    associate (is_relative => group%number('relative_damping', absent=0.0_wp) > 0 .or. group%has_value('magnifier') .or. &
+               is_rubber(group))
       coupling_form = elastic_form(group) + merge(elastic_forms, 0, is_relative)
     end associate
   end function coupling_form
@@ -95,6 +161,8 @@ contains
 
     if (group%has_value('table_twist')) then
       coupling_form = table
+    else if (group%has_value('table_torque')) then
+      coupling_form = rubber
     else if (group%has_value('maxwell_stiffness')) then
       coupling_form = maxwell
     else if (group%has_value('saturation')) then
@@ -136,6 +204,8 @@ contains
       call append_bank(banks, new_saturated_couplings(groups))
     case (maxwell)
       call append_bank(banks, new_maxwell_couplings(groups))
+    case (rubber)
+      call append_bank(banks, new_rubber_couplings(groups))
     case default
       call append_bank(banks, new_table_couplings(groups))
     end select

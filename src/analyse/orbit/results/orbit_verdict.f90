@@ -214,6 +214,7 @@ contains
     associate (limit => analysis%limits(number))
       if (limit%has_transient()) call add('transient', 'for speeds that are passed: nocdyn response and nocdyn transit')
       if (limit%heat < no_limit) call add('heat', 'the power that is lost: nocdyn response')
+      if (limit%temperature < no_limit) call add('temperature', 'temperatures: nocdyn response')
     end associate
 
   contains
@@ -224,7 +225,7 @@ contains
 
       call start_line(input, analysis, number, of_half_range, line)
       line%criterion = in_words(analysis%columns%signals(analysis%limits(number)%quantity)%symbol) // ', ' // what
-      if (what == 'heat') line%criterion = what
+      if (what /= 'transient') line%criterion = what
       line%finding = is_not_assessed
       line%reason = whose // trim(merge(' compare with it ', ' compares with it', what == 'transient'))
       call verdict%add(line)

@@ -7,6 +7,7 @@ module nocdyn_input_reader
   use nocdyn_input_overrides, only: override_t, read_overrides
   use nocdyn_measured_tables, only: take_measured_tables
   use nocdyn_load_cases, only: find_load_cases, is_run_of_case, keep_groups
+  use nocdyn_made_groups, only: make_groups
   use nocdyn_name_checks, only: check_duplicate_names, check_references, collect_names
   use nocdyn_namelist, only: namelist_group_t, namelist_t
   use nocdyn_namelist_scanner, only: scan_namelist
@@ -63,8 +64,9 @@ contains
     if (is_readable) call find_load_cases(input, lacks, diagnostics)
     if (diagnostics%count > 0) then
       call input%refuse(diagnostics, error)
-    else if (size(input%load_cases) > 0) then
-      call keep_groups(input, lacks)
+    else
+      if (size(input%load_cases) > 0) call keep_groups(input, lacks)
+      call make_groups(input)
     end if
     if (present(all_diagnostics)) all_diagnostics = diagnostics
     if (.not. (is_readable .and. present(load_cases))) return
@@ -110,12 +112,13 @@ contains
         end do
       end do
     end associate
-    call input%refuse(diagnostics, own)
-    if (.not. allocated(own)) then
+    if (diagnostics%count == 0) then
       call keep_groups(input, input%load_case%lacks)
-    else if (allocated(input%groups)) then
-      deallocate (input%groups)   ! they are not to be looked at
+      call check_references(input%groups, bodies_are_known(input%groups), diagnostics)   ! to dampers that it leaves out
+      call make_groups(input)
     end if
+    call input%refuse(diagnostics, own)
+    if (allocated(own) .and. allocated(input%groups)) deallocate (input%groups)   ! they are not to be looked at
     call add_error(error, own)
   end subroutine read_load_case
 

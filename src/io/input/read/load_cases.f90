@@ -78,16 +78,54 @@ contains
         load_case%title = group%text('title')
         load_case%repeats = group%number('repeats')
         load_case%line = group%line
-        allocate (load_case%overrides, source=group%texts('set'))
         allocate (load_case%analyses, source=group%texts('analyses'))
         allocate (load_case%lacks(size(input%groups)))
         load_case%lacks(:) = members%lacks(c, :) .or. (any(members%has, dim=1) .and. .not. members%has(c, :))
+        call list_overrides(input, members%groups(c), load_case%lacks, load_case%overrides, diagnostics)
         call leave_frame(input, members, merge(members%runs(c), members%common_run, members%runs(c) > 0), load_case%lacks)
       end associate
     end do
     machine_lacks(:) = any(members%has, dim=1)
     call leave_frame(input, members, members%common_run, machine_lacks)
   end subroutine find_load_cases
+
+  !> The values that a load case sets: the condition of all couplings of rubber, the cylinder of all engines that does not fire,
+  !> and what it lists, which goes before these.
+  subroutine list_overrides(input, group, lacks, overrides, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: group        !! the &load_case
+    logical, intent(in) :: lacks(:)     !! groups that it leaves out
+    type(string_t), allocatable, intent(out) :: overrides(:)
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(string_t), allocatable :: listed(:)
+    integer :: g, i
+
+    allocate (overrides(0))
+    associate (own => input%groups(group))
+      if (own%has_value('rubber')) then
+        do g = 1, size(lacks)
+          if (lacks(g) .or. input%groups(g)%kind /= 'coupling') cycle
+          if (input%groups(g)%text('kind') /= 'rubber') cycle
+          call append(overrides, 'coupling.' // input%groups(g)%name // '.condition=' // own%text('rubber'))
+        end do
+        if (size(overrides) == 0) call input%report(group, 'rubber', 'rubber = ' // quoted(own%text('rubber')) // &
+          ": the machine has no &coupling of kind = 'rubber'", diagnostics)
+      end if
+      if (own%has_value('misfire')) then
+        i = size(overrides)
+        do g = 1, size(lacks)
+          if (lacks(g) .or. input%groups(g)%kind /= 'engine') cycle
+          call append(overrides, 'engine.' // input%groups(g)%name // '.misfire=' // to_text(own%whole_number('misfire')))
+        end do
+        if (size(overrides) == i) call input%report(group, 'misfire', 'misfire = ' // to_text(own%whole_number('misfire')) // &
+                                                    ': the machine has no &engine', diagnostics)
+      end if
+      allocate (listed, source=own%texts('set'))
+      do i = 1, size(listed)
+        call append(overrides, listed(i)%text)
+      end do
+    end associate
+  end subroutine list_overrides
 
   !> Leaves out the groups &load_case, every &run but one, and each &limit of an element that is left out.
   subroutine leave_frame(input, members, run, lacks)
@@ -115,7 +153,7 @@ contains
     integer :: g
 
     are_limits = .false.
-    if (all(element%kind /= [character(len=8) :: 'coupling', 'shaft', 'mesh'])) return
+    if (all(element%kind /= [character(len=8) :: 'coupling', 'shaft', 'mesh', 'damper'])) return
     do g = 1, size(input%groups)
       associate (group => input%groups(g))
         if (group%kind /= 'limit' .or. group%rule == 0) cycle
@@ -239,7 +277,8 @@ contains
     type(group_t), intent(in) :: group
 
     is_element = group%rule > 0 .and. group%name /= ''
-    if (is_element) is_element = all(group_rules(group%rule)%name_space /= [character(len=9) :: 'body', 'load_case'])
+    if (is_element) is_element = group%kind == 'damper' .or. &
+                                 all(group_rules(group%rule)%name_space /= [character(len=9) :: 'body', 'load_case'])
   end function is_element
 
   !> Leaves the groups of a load case or of the machine itself. Its &run is the one of an input without load cases then.

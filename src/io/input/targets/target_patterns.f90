@@ -33,7 +33,9 @@ contains
       call append(paths, pattern)
       return
     end if
-    call collect_names(input%groups, input%groups_named(kind), names)
+    associate (groups => input%groups_named(kind))
+      call collect_names(input%groups, pack(groups, input%groups(groups)%made_from == 0), names)
+    end associate
     do i = 1, size(names)
       if (matches(name, names(i)%text)) call append(paths, kind // '.' // names(i)%text // pattern(last_dot:))
     end do

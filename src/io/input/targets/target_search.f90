@@ -43,7 +43,9 @@ contains
     if (message /= '') return
     call find_group(input, path, group)
     if (group == 0) then
-      call collect_names(input%groups, input%groups_named(trim(group_rules(path%group_rule)%name)), names)
+      associate (groups => input%groups_named(trim(group_rules(path%group_rule)%name)))
+        call collect_names(input%groups, pack(groups, input%groups(groups)%made_from == 0), names)
+      end associate
       call suggest(path%name, names, path%hint, path%is_near)
       if (.not. path%is_near) call suggest_path(input, text, .true., path%hint)
       message = 'there is no &' // trim(group_rules(path%group_rule)%name) // ' ' // quoted(path%name) // path%hint
@@ -137,7 +139,7 @@ contains
   pure logical function can_vary(group)
     type(group_t), intent(in) :: group
 
-    can_vary = .not. has_word(fixed_groups, group%kind)
+    can_vary = .not. (has_word(fixed_groups, group%kind) .or. group%made_from > 0)
   end function can_vary
 
   !> Refuses keys that are not numbers.
@@ -169,7 +171,7 @@ contains
     integer, intent(out) :: group   !! index in the input, 0: there is none
 
     do group = 1, size(input%groups)
-      if (input%groups(group)%rule /= path%group_rule) cycle
+      if (input%groups(group)%rule /= path%group_rule .or. input%groups(group)%made_from > 0) cycle
       if (input%groups(group)%name == path%name) return
     end do
     group = 0

@@ -1,14 +1,16 @@
 !> Rows of the schema: elastic elements, &coupling, &shaft and &mesh.
 module nocdyn_schema_couplings
   use nocdyn_kinds, only: wp
-  use nocdyn_schema_rules, only: a_file, a_flag, a_name, a_number, a_word, allowed_t, an_integer, any_number, any_times, &
-    anything, at_most_one, body_or_ground, efficiencies, equal_lengths, exactly_one, example_t, extrapolations, from_1, &
-    group_rule_t, in_machine, interpolations, key_rule_t, less_than, linear, not_negative, positive, relation_rule_t, required, &
-    requires, reverse_efficiencies, unset
+  use nocdyn_schema_rules, only: a_file, a_flag, a_name, a_number, a_selector, a_word, allowed_t, &
+    an_integer, any_number, any_times, anything, at_most_one, body_or_ground, efficiencies, equal_lengths, exactly_one, &
+    example_t, extrapolations, from_1, group_rule_t, in_machine, interpolations, key_rule_t, kind_rule_t, less_than, linear, &
+    not_negative, positive, relation_rule_t, required, requires, reverse_efficiencies, unset
   implicit none (type, external)
   private
 
   type(allowed_t), parameter :: node_counts = allowed_t(low=0.0_wp, high=1000.0_wp)
+  type(allowed_t), parameter :: temperatures = allowed_t(low=-273.15_wp, high=1000.0_wp)
+  type(allowed_t), parameter, public :: conditions = allowed_t(words='cold warm steady')
   type(allowed_t), parameter :: pressure_angles = allowed_t(low=0.0_wp, high=0.7854_wp)   ! [rad]
 
   type(group_rule_t), parameter, public :: coupling_groups(*) = [ &
@@ -17,15 +19,20 @@ module nocdyn_schema_couplings
     group_rule_t('shaft', in_machine, any_times, 'coupling', 'A stepped, solid or hollow elastic shaft between two bodies.'), &
     group_rule_t('mesh', in_machine, any_times, 'coupling', 'An elastic mesh of two wheels.')]
 
+  type(kind_rule_t), parameter, public :: coupling_kinds(*) = [ &
+    kind_rule_t('coupling', 'elastic', 'a spring with damping, friction, play or a table'), &
+    kind_rule_t('coupling', 'rubber', 'stiffness and relative damping of a data sheet, with their tables and heat')]
+
   type(key_rule_t), parameter, public :: coupling_keys(*) = [ &
     key_rule_t('coupling', 'name', a_name, 1, '', required, anything, 'name in results and messages'), &
+    key_rule_t('coupling', 'kind', a_selector, 1, '', "'elastic'", anything, 'which law its moment follows'), &
     key_rule_t('coupling', 'bodies', body_or_ground, 2, '', required, anything, &
       "the two ends; twist = angle of the second - angle of the first; 'ground' does not turn"), &
     key_rule_t('coupling', 'stiffness', a_number, 1, 'N m/rad', '0', not_negative, 'linear part of the elastic moment'), &
     key_rule_t('coupling', 'cubic_stiffness', a_number, 1, 'N m/rad3', '0', anything, &
-      'cubic part of the elastic moment; negative softens'), &
+      'cubic part of the elastic moment; negative softens', only_if='elastic'), &
     key_rule_t('coupling', 'polynomial', a_number, any_number, 'N m/rad^k', unset, anything, &
-      'p_1, p_2, ...: p_k w^k, w = twist - rest_twist, are added to the elastic moment', fewest=1), &
+      'p_1, p_2, ...: p_k w^k, w = twist - rest_twist, are added to the elastic moment', fewest=1, only_if='elastic'), &
     key_rule_t('coupling', 'damping', a_number, 1, 'N m s/rad', '0', not_negative, &
       'moment per rate of twist; with a gap only in contact, at most as large as the elastic moment'), &
     key_rule_t('coupling', 'relative_damping', a_number, 1, '', unset, not_negative, &
@@ -41,27 +48,67 @@ module nocdyn_schema_couplings
     key_rule_t('coupling', 'bore', a_number, 1, 'm', unset, not_negative, 'diameter of its bore; 0 if not given'), &
     key_rule_t('coupling', 'rest_twist', a_number, 1, 'rad', '0', anything, 'twist without elastic moment'), &
     key_rule_t('coupling', 'gap', a_number, 1, 'rad', '0', not_negative, &
-      'total play: no moment within +- gap/2 of rest_twist, beyond it contact, which never pulls'), &
+      'total play: no moment within +- gap/2 of rest_twist, beyond it contact, which never pulls', only_if='elastic'), &
     key_rule_t('coupling', 'saturation', a_number, 1, 'N m', unset, positive, &
-      'bounds the elastic moment M smoothly: saturation tanh(M / saturation)'), &
+      'bounds the elastic moment M smoothly: saturation tanh(M / saturation)', only_if='elastic'), &
     key_rule_t('coupling', 'friction', a_number, 1, 'N m', '0', not_negative, &
-      'moment of a slipping clutch: friction tanh(rate of twist / friction_speed)'), &
+      'moment of a slipping clutch: friction tanh(rate of twist / friction_speed)', only_if='elastic'), &
     key_rule_t('coupling', 'friction_speed', a_number, 1, 'rad/s', '0.01', positive, &
-      'rate of twist at which the friction has 76 % of its full moment'), &
+      'rate of twist at which the friction has 76 % of its full moment', only_if='elastic'), &
     key_rule_t('coupling', 'maxwell_stiffness', a_number, any_number, 'N m/rad', unset, positive, &
-      'stiffness of springs in series with dampers, parallel to the spring, as of rubber', fewest=1), &
+      'stiffness of springs in series with dampers, parallel to the spring, as of rubber', fewest=1, only_if='elastic'), &
     key_rule_t('coupling', 'maxwell_time', a_number, any_number, 's', unset, positive, &
-      'relaxation time of each of them: damping / maxwell_stiffness', fewest=1), &
+      'relaxation time of each of them: damping / maxwell_stiffness', fewest=1, only_if='elastic'), &
     key_rule_t('coupling', 'table_twist', a_number, any_number, 'rad', unset, anything, &
-      'twist - rest_twist of the points of a table, ascending', fewest=2, ascends=.true.), &
+      'twist - rest_twist of the points of a table, ascending', fewest=2, ascends=.true., only_if='elastic'), &
     key_rule_t('coupling', 'table_moment', a_number, any_number, 'N m', unset, anything, &
-      'elastic moment at these points', fewest=2), &
+      'elastic moment at these points', fewest=2, only_if='elastic'), &
     key_rule_t('coupling', 'table_file', a_file, 1, '', unset, anything, &
-      'file with the table: two columns, twist - rest_twist [rad] and moment [N m]'), &
+      'file with the table: two columns, twist - rest_twist [rad] and moment [N m]', only_if='elastic'), &
     key_rule_t('coupling', 'interpolation', a_word, 1, '', linear, interpolations, &
-      'between the points: straight lines, or the monotone cubic of Fritsch and Butland'), &
+      'between the points: straight lines, or the monotone cubic of Fritsch and Butland', only_if='elastic'), &
     key_rule_t('coupling', 'extrapolation', a_word, 1, '', linear, extrapolations, &
-      'beyond the table: straight on with the end slope, or constant'), &
+      'beyond the table: straight on with the end slope, or constant', only_if='elastic'), &
+    key_rule_t('coupling', 'table_torque', a_number, any_number, 'N m', unset, not_negative, &
+      'mean torques, without sign, of the two factors that follow, ascending', 'rubber', fewest=2, ascends=.true.), &
+    key_rule_t('coupling', 'torque_stiffness', a_number, any_number, '', '1', positive, &
+      'factors of stiffness at these torques; stiffness is linear in the twist between them', 'rubber', fewest=2), &
+    key_rule_t('coupling', 'torque_damping', a_number, any_number, '', '1', positive, &
+      'factors of the relative damping at these torques; straight between them', 'rubber', fewest=2), &
+    key_rule_t('coupling', 'table_amplitude', a_number, any_number, 'N m', unset, not_negative, &
+      'vibratory torques of the two factors that follow, ascending', 'rubber', fewest=2, ascends=.true.), &
+    key_rule_t('coupling', 'amplitude_stiffness', a_number, any_number, '', '1', positive, &
+      'factors of stiffness at these amplitudes; straight between them', 'rubber', fewest=2), &
+    key_rule_t('coupling', 'amplitude_damping', a_number, any_number, '', '1', positive, &
+      'factors of the relative damping at these amplitudes', 'rubber', fewest=2), &
+    key_rule_t('coupling', 'table_frequency', a_number, any_number, 'rad/s', unset, not_negative, &
+      'frequencies of the two factors that follow, ascending', 'rubber', fewest=2, ascends=.true.), &
+    key_rule_t('coupling', 'frequency_stiffness', a_number, any_number, '', '1', positive, &
+      'factors of stiffness at these frequencies; straight between them', 'rubber', fewest=2), &
+    key_rule_t('coupling', 'frequency_damping', a_number, any_number, '', '1', positive, &
+      'factors of the relative damping at these frequencies', 'rubber', fewest=2), &
+    key_rule_t('coupling', 'table_temperature', a_number, any_number, 'degC', unset, anything, &
+      'temperatures of the rubber of the two factors that follow, ascending', 'rubber', fewest=2, ascends=.true.), &
+    key_rule_t('coupling', 'temperature_stiffness', a_number, any_number, '', '1', positive, &
+      'factors of stiffness at these temperatures, S_t of data sheets', 'rubber', fewest=2), &
+    key_rule_t('coupling', 'temperature_damping', a_number, any_number, '', '1', positive, &
+      'factors of the relative damping at these temperatures', 'rubber', fewest=2), &
+    key_rule_t('coupling', 'condition', a_word, 1, '', unset, conditions, &
+      'cold, warm, or steady by its heat, the default with data of its cooling; else cold', 'rubber'), &
+    key_rule_t('coupling', 'ambient_temperature', a_number, 1, 'degC', unset, temperatures, &
+      'temperature of the coupling without loss of power, and if it is cold', 'rubber'), &
+    key_rule_t('coupling', 'thermal_resistance', a_number, 1, 'K/W', unset, positive, &
+      'rise of the temperature by the mean power that is lost', 'rubber'), &
+    key_rule_t('coupling', 'power_loss', a_number, 1, 'W', unset, positive, &
+      'P_KV of data sheets: permissible power loss, at which the rise is power_loss_rise', 'rubber'), &
+    key_rule_t('coupling', 'power_loss_rise', a_number, 1, 'K', unset, positive, &
+      'rise of the temperature at power_loss: from the ambient to the permissible temperature', 'rubber'), &
+    key_rule_t('coupling', 'warm_temperature', a_number, 1, 'degC', unset, temperatures, &
+      'temperature of the coupling if it is warm', 'rubber'), &
+    key_rule_t('coupling', 'warm_stiffness', a_number, 1, 'N m/rad', unset, positive, &
+      'stiffness of the warm coupling, where data sheets give it in place of tables', 'rubber'), &
+    key_rule_t('coupling', 'warm_damping', a_number, 1, '', unset, not_negative, &
+      'relative damping of the warm coupling', 'rubber'), &
     key_rule_t('shaft', 'name', a_name, 1, '', required, anything, 'name in messages and results'), &
     key_rule_t('shaft', 'bodies', body_or_ground, 2, '', required, anything, &
       'the two bodies at its ends; half of the inertia of a short shaft is added to each'), &
@@ -137,6 +184,21 @@ module nocdyn_schema_couplings
     relation_rule_t('coupling', less_than, 'bore', 'diameter'), &
     relation_rule_t('coupling', requires, 'interpolation extrapolation', 'table_twist table_file'), &
     relation_rule_t('coupling', equal_lengths, 'table_twist table_moment', 'table_file'), &
+    relation_rule_t('coupling', requires, 'torque_stiffness torque_damping', 'table_torque'), &
+    relation_rule_t('coupling', equal_lengths, 'table_torque torque_stiffness torque_damping', ''), &
+    relation_rule_t('coupling', requires, 'amplitude_stiffness amplitude_damping', 'table_amplitude'), &
+    relation_rule_t('coupling', equal_lengths, 'table_amplitude amplitude_stiffness amplitude_damping', ''), &
+    relation_rule_t('coupling', requires, 'frequency_stiffness frequency_damping', 'table_frequency'), &
+    relation_rule_t('coupling', equal_lengths, 'table_frequency frequency_stiffness frequency_damping', ''), &
+    relation_rule_t('coupling', requires, 'temperature_stiffness temperature_damping', 'table_temperature'), &
+    relation_rule_t('coupling', equal_lengths, 'table_temperature temperature_stiffness temperature_damping', ''), &
+    relation_rule_t('coupling', at_most_one, 'thermal_resistance', 'power_loss power_loss_rise'), &
+    relation_rule_t('coupling', requires, 'power_loss', 'power_loss_rise'), &
+    relation_rule_t('coupling', requires, 'power_loss_rise', 'power_loss'), &
+    relation_rule_t('coupling', requires, 'thermal_resistance power_loss table_temperature', 'ambient_temperature'), &
+    relation_rule_t('coupling', requires, 'ambient_temperature', 'thermal_resistance power_loss table_temperature'), &
+    relation_rule_t('coupling', requires, 'warm_temperature', 'table_temperature'), &
+    relation_rule_t('coupling', at_most_one, 'warm_temperature', 'warm_stiffness warm_damping'), &
     relation_rule_t('shaft', equal_lengths, 'lengths diameters bores', ''), &
     relation_rule_t('shaft', at_most_one, 'damping_ratio', 'relative_damping'), &
     relation_rule_t('shaft', requires, 'damping_frequency', 'damping_ratio relative_damping'), &
@@ -157,6 +219,8 @@ module nocdyn_schema_couplings
     example_t('coupling', "name = 'clutch'   bodies = 'motor', 'pinion' friction = 50.0", .false.), &
     example_t('coupling', "name = 'rubber'   bodies = 'motor', 'pinion'|" // &
                           "table_twist = -0.2, 0, 0.2  table_moment = -90, 0, 60  interpolation = 'cubic'", .false.), &
+    example_t('coupling', "name = 'highly_flexible'  bodies = 'motor', 'pinion'|" // &
+      "kind = 'rubber'  stiffness = 100.0  relative_damping = 1.13  damping_frequency_hz = 5.0", .false.), &
     example_t('shaft', "name = 'line'  bodies = 'motor', 'machine'|" // &
       'lengths = 2.0, 3.0  diameters = 0.4, 0.35  shear_modulus = 8.0e10  density = 7850', .false.), &
     example_t('mesh', "name = 'teeth'  bodies = 'pinion', 'machine'  radii = 2.0, 3.0|" // &

@@ -24,7 +24,7 @@ module nocdyn_schema_response
   type(group_rule_t), parameter, public :: response_groups(*) = [ &
     group_rule_t('response', in_torsional, at_most_once, '', "Speeds and orders of 'nocdyn response' and 'nocdyn campbell'."), &
     group_rule_t('limit', in_torsional, any_times, '', &
-                 'Limits of moments, stresses and forces of a coupling, a shaft or a mesh.'), &
+                 'Limits of moments, stresses, forces and heat of a coupling, a damper, a shaft or a mesh.'), &
     group_rule_t('fatigue', in_torsional, any_times, 'fatigue', &
                  'Cycles and damage of a coupling, shaft, mesh or gear, in runs and responses.'), &
     group_rule_t('orbit', in_torsional, at_most_once, '', &
@@ -58,6 +58,7 @@ module nocdyn_schema_response
     key_rule_t('response', 'margin_rule_lines', a_text, any_number, '', unset, anything, &
       'the lines of margin_rule_file, as an input that was written has them'), &
     key_rule_t('limit', 'coupling', a_text, 1, '', unset, anything, 'name of the coupling'), &
+    key_rule_t('limit', 'damper', a_text, 1, '', unset, anything, 'name of the damper'), &
     key_rule_t('limit', 'shaft', a_text, 1, '', unset, anything, 'name of the shaft'), &
     key_rule_t('limit', 'mesh', a_text, 1, '', unset, anything, 'name of the mesh'), &
     key_rule_t('limit', 'vibratory_moment', a_number, 1, 'N m', unset, positive, &
@@ -76,6 +77,8 @@ module nocdyn_schema_response
       'factors of the limits of moments at these temperatures; straight between them', fewest=2), &
     key_rule_t('limit', 'heat', a_number, 1, 'W', unset, positive, &
       'mean power that the coupling or shaft loses by its oscillation'), &
+    key_rule_t('limit', 'largest_temperature', a_number, 1, 'degC', unset, anything, &
+      'permissible temperature of a rubber coupling that heats up'), &
     key_rule_t('limit', 'vibratory_force', a_number, 1, 'N', unset, positive, &
       'half range of the force of the mesh in continuous operation'), &
     key_rule_t('limit', 'force', a_number, 1, 'N', unset, positive, 'largest magnitude of this force, its mean included'), &
@@ -212,11 +215,13 @@ module nocdyn_schema_response
     relation_rule_t('response', requires, 'margin margin_rule margin_rule_file', 'operating'), &
     relation_rule_t('response', at_most_one, 'margin_rule', 'margin_rule_file'), &
     relation_rule_t('response', requires, 'margin_rule_lines', 'margin_rule_file'), &
-    relation_rule_t('limit', exactly_one, 'coupling shaft', 'mesh'), &
-    relation_rule_t('limit', at_most_one, 'coupling', 'shaft'), &
+    relation_rule_t('limit', exactly_one, 'coupling shaft damper', 'mesh'), &
+    relation_rule_t('limit', at_most_one, 'coupling', 'shaft damper'), &
+    relation_rule_t('limit', at_most_one, 'shaft', 'damper'), &
+    relation_rule_t('limit', requires, 'largest_temperature', 'coupling'), &
     relation_rule_t('limit', requires, 'vibratory_force force', 'mesh'), &
     relation_rule_t('limit', requires, 'vibratory_moment vibratory_frequency vibratory_moments table_file ' // &
-                                       'heat moment stress stress_transient rule rule_file', 'coupling shaft'), &
+                                       'heat moment stress stress_transient rule rule_file', 'coupling shaft damper'), &
     relation_rule_t('limit', equal_lengths, 'derating_temperatures derating_factors', ''), &
     relation_rule_t('limit', requires, 'temperature', 'derating_temperatures'), &
     relation_rule_t('limit', requires, 'derating_temperatures', 'temperature'), &
@@ -225,6 +230,7 @@ module nocdyn_schema_response
     relation_rule_t('limit', at_most_one, 'vibratory_frequency vibratory_moments', 'table_file'), &
     relation_rule_t('limit', at_most_one, 'quantity', 'vibratory_force force vibratory_moment moment stress ' // &
                                                       'stress_transient rule rule_file heat vibratory_frequency ' // &
+                                                      'largest_temperature ' // &
                                                       'table_file'), &
     relation_rule_t('limit', requires, 'largest vibratory', 'quantity'), &
     relation_rule_t('limit', requires, 'quantity', 'largest vibratory'), &

@@ -1,6 +1,7 @@
 !> Couplings with the elastic moment of a table over the twist.
 module nocdyn_table_couplings
   use nocdyn_couplings, only: coupling_common_t, couplings_t
+  use nocdyn_curves, only: curve_t
   use nocdyn_element_keys, only: element_keys_t
   use nocdyn_law_expressions, only: expression_t, node_of, operator(-)
   use nocdyn_law_tape, only: law_tape_t
@@ -8,7 +9,7 @@ module nocdyn_table_couplings
   implicit none (type, external)
   private
 
-  public :: new_table_couplings
+  public :: new_table_couplings, set_table
 
   !> M_el = -curve(u - rest_twist) on the second body.
   type, extends(couplings_t), public :: table_couplings_t
@@ -22,14 +23,23 @@ contains
   function new_table_couplings(keys) result(bank)
     class(element_keys_t), intent(in) :: keys
     type(table_couplings_t) :: bank
-    integer :: e
 
-    call bank%set_common(coupling_common_t(keys))
-    call bank%add_damping()
-    call add_table(bank, keys%curves('table_twist', 'table_moment'))
-    bank%elastic = [(e, e=1, bank%count)]
+    call set_table(bank, coupling_common_t(keys), keys%curves('table_twist', 'table_moment'))
     call bank%prepare_law()
   end function new_table_couplings
+
+  !> Sets what couplings with a curve have in common, before the law is prepared.
+  subroutine set_table(bank, common, curve)
+    class(table_couplings_t), intent(inout) :: bank
+    type(coupling_common_t), intent(in) :: common
+    type(curve_t), intent(in) :: curve(:, :)   !! moment over the twist from rest, [lanes, couplings]
+    integer :: e
+
+    call bank%set_common(common)
+    call bank%add_damping()
+    call add_table(bank, curve)
+    bank%elastic = [(e, e=1, bank%count)]
+  end subroutine set_table
 
   subroutine describe(self, tape)
     class(table_couplings_t), intent(in) :: self

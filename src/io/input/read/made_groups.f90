@@ -1,0 +1,94 @@
+!> Groups that an input does not have, but that others stand for: the body and the coupling of a &damper. They come last. What
+!> they are is set here; the assembly sets their numbers.
+module nocdyn_made_groups
+  use nocdyn_input, only: group_t, input_t, value_t
+  use nocdyn_schema, only: first_key, group_rule_index, has_word, key_rules, last_key, selector_rule
+  use nocdyn_schema_rules, only: required, unset
+  use nocdyn_value_conversion, only: default_value
+  implicit none (type, external)
+  private
+
+  public :: make_groups
+
+contains
+
+  !> Adds the groups, and gives limits of dampers the couplings of these.
+  subroutine make_groups(input)
+    type(input_t), intent(inout) :: input   !! checked
+    type(group_t), allocatable :: groups(:)
+    integer, allocatable :: dampers(:)
+    integer :: d, g, n
+
+    allocate (dampers, source=input%groups_named('damper'))
+    if (size(dampers) == 0) return
+    n = size(input%groups)
+    allocate (groups(n + 2 * size(dampers)))
+    do g = 1, n
+      groups(g) = input%groups(g)
+      if (groups(g)%kind == 'limit') call take_coupling(groups(g))
+    end do
+    do d = 1, size(dampers)
+      associate (damper => input%groups(dampers(d)))
+        call start_group('body', dampers(d), damper, groups(n + d))
+        call set_text(groups(n + d), 'name', damper%name)
+        groups(n + d)%values(groups(n + d)%key_position('inertia'))%numbers = [damper%number('ring_inertia')]
+        call start_group('coupling', dampers(d), damper, groups(n + size(dampers) + d))
+        call set_text(groups(n + size(dampers) + d), 'name', damper%name)
+        call set_text(groups(n + size(dampers) + d), 'bodies', damper%text('body'), damper%name)
+      end associate
+    end do
+    call move_alloc(groups, input%groups)
+  end subroutine make_groups
+
+  !> Names the coupling of a damper where a limit names the damper.
+  subroutine take_coupling(limit)
+    type(group_t), intent(inout) :: limit   !! &limit
+
+    if (.not. limit%has_value('damper')) return
+    associate (coupling => limit%values(limit%key_position('coupling')))
+      coupling = limit%values(limit%key_position('damper'))
+      coupling%is_derived = .true.
+    end associate
+  end subroutine take_coupling
+
+  !> A group with the defaults of its default kind.
+  subroutine start_group(kind, number, source, group)
+    character(len=*), intent(in) :: kind
+    integer, intent(in) :: number          !! of the group in the file
+    type(group_t), intent(in) :: source    !! this group
+    type(group_t), intent(out) :: group
+    character(len=:), allocatable :: word
+    integer :: k, rule
+
+    group%kind = kind
+    group%name = source%name
+    group%rule = group_rule_index(kind)
+    group%line = source%line
+    group%made_from = number
+    word = ''
+    if (selector_rule(group%rule) > 0) word = key_rules(selector_rule(group%rule))%default
+    word = word(verify(word, "'"):len_trim(word) - 1)
+    allocate (group%values(last_key(group%rule) - first_key(group%rule) + 1))
+    do k = 1, size(group%values)
+      rule = first_key(group%rule) + k - 1
+      if (key_rules(rule)%default == required .or. key_rules(rule)%default == unset) cycle
+      if (key_rules(rule)%only_if /= '' .and. .not. has_word(key_rules(rule)%only_if, word)) cycle
+      group%values(k) = default_value(rule)
+    end do
+  end subroutine start_group
+
+  !> Sets one or two texts of a key.
+  subroutine set_text(group, key, first, second)
+    type(group_t), intent(inout) :: group
+    character(len=*), intent(in) :: key, first
+    character(len=*), intent(in), optional :: second
+    integer :: k
+
+    k = group%key_position(key)
+    group%values(k) = value_t(line=group%line)
+    allocate (group%values(k)%texts(merge(2, 1, present(second))))
+    group%values(k)%texts(1)%text = first
+    if (present(second)) group%values(k)%texts(2)%text = second
+  end subroutine set_text
+
+end module nocdyn_made_groups
