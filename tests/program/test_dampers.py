@@ -1,5 +1,6 @@
 """Torsional vibration dampers by their data sheets: the machines that they stand for, the optimum of Houdaille's damper, heat."""
 
+import csv
 import math
 
 import numpy as np
@@ -89,7 +90,7 @@ def amplification(nocdyn, zeta):
 
 
 def test_houdailles_damper_has_den_hartogs_optimum(nocdyn):
-    assert BEST_ZETA == pytest.approx(0.4352, abs=1e-4)
+    assert pytest.approx(0.4352, abs=1e-4) == BEST_ZETA
     best = amplification(nocdyn, BEST_ZETA)
     assert best == pytest.approx(BEST_AMPLIFICATION, rel=1e-6) == pytest.approx(11.0)
     assert min(amplification(nocdyn, BEST_ZETA * factor) for factor in (0.95, 1.05)) > best
@@ -106,3 +107,85 @@ def test_the_power_of_the_excitation_is_the_heat_of_the_damper(nocdyn):
     assert table["heat_ring"] == pytest.approx(0.5 * omega * oil.imag * x**2, rel=1e-9)
     moment = np.abs(1e4 - omega**2 + oil) * x
     assert moment == pytest.approx(10.0, rel=1e-9)
+
+
+DAMPER = "&damper name = 'ring' body = 'engine' ring_inertia = 2.0 {} /\n"
+
+
+def test_a_load_case_may_leave_out_the_damper(nocdyn):
+    cases = "&load_case name = 'with_damper' /\n&load_case name = 'without_damper' without = 'ring' /\n"
+    limit = "&limit damper = 'ring' heat = 1e-3 /\n"
+    text = MACHINE.format(engine=3.0, damper=DAMPER.format("damping = 50") + cases + limit)
+    outcome = nocdyn("response", nocdyn.write("machine.nml", text), "--out", "out")
+    assert outcome.returncode in (0, 1), outcome.stderr
+    assert "heat_ring" in nocdyn.values("out/with_damper", "response.csv").by_name()
+    assert "heat_ring" not in nocdyn.values("out/without_damper", "response.csv").by_name()
+    report = (nocdyn.folder / "out/with_damper/response.json").read_text()
+    assert '"exceeded"' in report
+    nocdyn.done(MACHINE.format(engine=3.0, damper=""), command="response")
+    plain = nocdyn.values(name="response.csv")
+    assert plain["half_range_total_moment_shaft"] == pytest.approx(
+        nocdyn.values("out/without_damper", "response.csv")["half_range_total_moment_shaft"]
+    )
+
+
+def test_numbers_of_dampers_vary_in_sweeps(nocdyn):
+    sweep = "&sweep design = 'grid' /\n&vary target = 'damper.ring.viscosity' low = 20 high = 80 count = 3 /\n"
+    record = "&record response = 'total_moment_shaft' statistic = 'peak' /\n"
+    keys = "viscosity = 40 outer_radius = 0.3 inner_radius = 0.15 width = 0.1 radial_gap = 8e-4 lateral_gap = 6e-4"
+    text = MACHINE.format(engine=3.0, damper=DAMPER.format(keys) + sweep + record)
+    outcome = nocdyn("sweep", nocdyn.write("machine.nml", text), "--out", "out", "--csv")
+    assert outcome.returncode == 0, outcome.stderr
+    with open(nocdyn.folder / "out/sweep.csv", newline="") as file:
+        peaks = [float(row[next(label for label in row if "peak" in label)]) for row in csv.DictReader(file)]
+    for viscosity, peak in zip((20, 50, 80), peaks, strict=True):
+        one = MACHINE.format(engine=3.0, damper=DAMPER.format(keys))
+        nocdyn.done(one, "--set", f"damper.ring.viscosity={viscosity}", command="response")
+        assert max(nocdyn.values(name="response.csv")["half_range_total_moment_shaft"]) == pytest.approx(peak, rel=1e-9)
+
+
+REFUSED = {
+    "": "kind = 'viscous' needs damping [N m s/rad], or viscosity",
+    "kind = 'viscous_spring' stiffness = 1": "kind = 'viscous_spring' needs damping [N m s/rad], damping_ratio or loss_factor",
+    "kind = 'rubber' relative_damping = 1": "stiffness or tuning_frequency is missing",
+    "kind = 'rubber' stiffness = 1": "relative_damping or loss_factor is missing",
+    "kind = 'rubber' stiffness = 1 relative_damping = 1 damping = 1": "damping belongs to kind",
+    "viscosity = 40": "viscosity needs outer_radius",
+    "damping = 1 viscosity = 40": "are both given",
+    "viscosity = 4 outer_radius = 0.1 inner_radius = 0.2 width = 0.1 radial_gap = 8e-4 lateral_gap = 6e-4": "outer_radius = 0.1",
+    "damping = 1 body = 'none'": "body",
+}
+
+
+@pytest.mark.parametrize("keys", REFUSED)
+def test_wrong_dampers_are_refused(nocdyn, keys):
+    outcome = nocdyn("check", nocdyn.write("machine.nml", MACHINE.format(engine=3.0, damper=DAMPER.format(keys))))
+    assert outcome.returncode == 2
+    assert REFUSED[keys] in outcome.stderr
+    assert "machine.nml:7: &damper 'ring'" in outcome.stderr
+
+
+def test_names_of_dampers_are_those_of_bodies_and_couplings(nocdyn):
+    for name, message in (("engine", "is taken by &body"), ("shaft", "is taken by &coupling on line 3")):
+        damper = DAMPER.format("damping = 1").replace("'ring'", f"'{name}'")
+        outcome = nocdyn("check", nocdyn.write("machine.nml", MACHINE.format(engine=3.0, damper=damper)))
+        assert outcome.returncode == 2
+        assert message in outcome.stderr
+    limit = DAMPER.format("damping = 1") + "&limit damper = 'rings' heat = 1 /\n"
+    outcome = nocdyn("check", nocdyn.write("machine.nml", MACHINE.format(engine=3.0, damper=limit)))
+    assert (outcome.returncode, "there is no damper 'rings'; did you mean 'ring'?" in outcome.stderr) == (2, True)
+    case = (
+        DAMPER.format("damping = 1")
+        + "&load name = 'drag' body = 'ring' viscous = 1 /\n&load_case name = 'a' without = 'ring' /\n"
+    )
+    outcome = nocdyn("check", nocdyn.write("machine.nml", MACHINE.format(engine=3.0, damper=case)))
+    assert outcome.returncode == 2
+    assert "there is no &body 'ring'" in outcome.stderr
+    made = (
+        DAMPER.format("damping = 1")
+        + "&sweep design = 'grid' /\n&vary target = 'coupling.ring.damping' low = 1 high = 2 count = 2 /\n"
+    )
+    made += "&record response = 'total_moment_shaft' statistic = 'peak' /\n"
+    outcome = nocdyn("sweep", nocdyn.write("machine.nml", MACHINE.format(engine=3.0, damper=made)), "--out", "out")
+    assert outcome.returncode == 2
+    assert "there is no &coupling 'ring'" in outcome.stderr

@@ -1,6 +1,5 @@
 """Rubber couplings by their data sheets, against iterations with numpy that know nothing of the program."""
 
-import json
 import os
 import random
 
@@ -74,7 +73,11 @@ def lines_at(machine, names, speed, temperature, amplitude):
     moments, power = [], 0.0
     for order, torque in zip(machine["orders"], machine["amplitudes"], strict=True):
         omega = order * speed
-        by = [factors(names, "temperature", temperature), factors(names, "amplitude", amplitude), factors(names, "frequency", omega)]
+        by = [
+            factors(names, "temperature", temperature),
+            factors(names, "amplitude", amplitude),
+            factors(names, "frequency", omega),
+        ]
         k = torque_stiffness(names, machine["stiffness"], mean) * np.prod([one[0] for one in by])
         psi = machine["psi"] * factors(names, "torque", mean)[1] * np.prod([one[1] for one in by])
         rubber = k * (1 + 1j * psi / (2 * np.pi))

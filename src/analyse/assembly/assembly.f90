@@ -19,6 +19,7 @@ module nocdyn_assembly
   use nocdyn_mean_time_notes, only: note_mean_times
   use nocdyn_pressure_notes, only: note_pressures
   use nocdyn_reduced, only: reduced_t
+  use nocdyn_rubber_notes, only: note_given_conditions
   use nocdyn_steady_joints, only: choose_overruns
   use nocdyn_steady_start, only: start_steadily
   use nocdyn_steady_views, only: steady_view_t
@@ -52,6 +53,7 @@ contains
     call note_left_out_harmonics(input, machine%start_notes)
     call note_pressures(input, machine%start_notes)
     call note_mean_times(machine, machine%start_notes)
+    call note_given_conditions(machine, 'over the time', machine%start_notes)
   end subroutine assemble_machine
 
   !> Builds a machine that starts in equilibrium at a given speed, with the number that is found for it.

@@ -23,13 +23,15 @@ contains
     associate (damper => input%groups(index))
       select case (damper%text('kind'))
       case ('viscous')
-        if (.not. (damper%has_value('damping') .or. damper%has_value('viscosity'))) call input%report(index, 'kind', &
-          "kind = 'viscous' needs damping [N m s/rad], or viscosity [Pa s] with the radii, the width and the gaps of the ring", &
-          diagnostics)
+        if (.not. (damper%has_value('damping') .or. damper%has_value('viscosity'))) then
+          call input%report(index, 'kind', "kind = 'viscous' needs damping [N m s/rad], or viscosity [Pa s] with the radii, " // &
+                            'the width and the gaps of the ring', diagnostics)
+        end if
       case ('viscous_spring')
-        if (.not. (damper%has_value('damping') .or. damper%has_value('damping_ratio') .or. damper%has_value('loss_factor'))) &
+        if (.not. (damper%has_value('damping') .or. damper%has_value('damping_ratio') .or. damper%has_value('loss_factor'))) then
           call input%report(index, 'kind', "kind = 'viscous_spring' needs damping [N m s/rad], damping_ratio or loss_factor", &
                             diagnostics)
+        end if
       case default   ! the schema asks for all numbers of rubber
       end select
       do g = 1, size(input%groups)

@@ -7,6 +7,7 @@ module nocdyn_derived_values
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_rubber_laws, only: rubber_law_t
+  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -32,27 +33,53 @@ contains
 
     do g = 1, size(input%groups)
       if (is_rubber(input%groups(g))) call derive_rubber(input%groups(g))
-      if (input%groups(g)%made_from > 0) call derive_damper(input%groups(input%groups(g)%made_from), input%groups(g))
+      if (input%groups(g)%made_from == 0) cycle
+      associate (source => input%groups(input%groups(g)%made_from))
+        if (source%kind == 'damper') call derive_damper(source, input%groups(g))
+      end associate
     end do
     do g = 1, size(input%groups)
-      if (input%groups(g)%kind == 'damper') call add_housing(input, g)
+      if (input%groups(g)%kind == 'damper' .or. is_rubber(input%groups(g))) call add_inertias(input, g)
     end do
   end subroutine derive_values
 
-  !> Adds the inertia of the housing of a damper to its body.
-  subroutine add_housing(input, damper)
+  !> Adds the inertia of the housing of a damper to its body, or those of both sides of a coupling to its bodies.
+  subroutine add_inertias(input, index)
     type(input_t), intent(inout) :: input
-    integer, intent(in) :: damper   !! index of the group
+    integer, intent(in) :: index   !! of the group
+    type(string_t), allocatable :: bodies(:)
+    real(wp) :: inertias(2)
+    integer :: i
+
+    associate (group => input%groups(index))
+      if (group%kind == 'damper') then
+        inertias = group%number('housing_inertia')
+        allocate (bodies, source=group%texts('body'))
+      else
+        if (.not. group%flag('inertias')) return
+        inertias = [group%number('first_inertia', absent=0.0_wp), group%number('second_inertia', absent=0.0_wp)]
+        allocate (bodies, source=group%texts('bodies'))
+      end if
+    end associate
+    do i = 1, size(bodies)
+      call add_inertia(input, bodies(i)%text, inertias(i))
+    end do
+  end subroutine add_inertias
+
+  !> Adds an inertia to a body, which may be the ground.
+  subroutine add_inertia(input, name, inertia)
+    type(input_t), intent(inout) :: input
+    character(len=*), intent(in) :: name   !! of the body
+    real(wp), intent(in) :: inertia        !! [kg m2]
     integer :: g
 
     do g = 1, size(input%groups)
-      if (input%groups(g)%kind /= 'body' .or. input%groups(g)%name /= input%groups(damper)%text('body')) cycle
+      if (input%groups(g)%kind /= 'body' .or. input%groups(g)%name /= name) cycle
       associate (body => input%groups(g))
-        call set(body, 'inertia', body%number('inertia') + input%groups(damper)%number('housing_inertia') / &
-                                                           (1.0_wp + body%number('entrained', absent=0.0_wp)))
+        call set(body, 'inertia', body%number('inertia') + inertia / (1.0_wp + body%number('entrained', absent=0.0_wp)))
       end associate
     end do
-  end subroutine add_housing
+  end subroutine add_inertia
 
   !> Sets stiffness and relative damping of a rubber coupling in its condition over the time.
   subroutine derive_rubber(group)

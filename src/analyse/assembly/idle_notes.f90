@@ -28,8 +28,8 @@ contains
               quoted(group%name) // ' does not engage in the run: its engagement is 0 from t = ' // &
               to_text(run%number('t_start')) // ' to ' // to_text(run%number('t_end')) // ' s')
           case ('coupling')
-            if (.not. transmits(group)) call append(notes, 'coupling ' // quoted(group%name) // ' transmits nothing: it has ' // &
-              'no stiffness, table, damping or friction')
+            if (group%made_from == 0 .and. .not. transmits(group)) call append(notes, 'coupling ' // quoted(group%name) // &
+              ' transmits nothing: it has no stiffness, table, damping or friction')
           case ('drive')
             if (.not. (group%is_given('speed') .or. group%has_value('table_time') .or. group%has_value('speed_amplitude') .or. &
                 group%has_value('angle_amplitude'))) call append(notes, 'drive ' // quoted(group%name) // &

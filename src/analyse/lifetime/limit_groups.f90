@@ -110,6 +110,7 @@ contains
     integer, intent(in) :: index   !! of the group
     type(diagnostics_t), intent(inout) :: diagnostics
     type(string_t), allocatable :: names(:)
+    character(len=:), allocatable :: name
     integer, allocatable :: groups(:)
     integer :: i
 
@@ -118,10 +119,9 @@ contains
     do i = 1, size(groups)
       names(i)%text = input%groups(groups(i))%name
     end do
-    associate (name => input%groups(index)%text('damper'))
-      if (any([(names(i)%text == name, i=1, size(names))])) return
-      call input%report(index, 'damper', 'there is no damper ' // quoted(name), diagnostics, hint=suggestion(name, names))
-    end associate
+    name = input%groups(index)%text('damper')
+    if (any([(names(i)%text == name, i=1, size(names))])) return
+    call input%report(index, 'damper', 'there is no damper ' // quoted(name), diagnostics, hint=suggestion(name, names))
   end subroutine check_damper_name
 
   !> Whether a group of a kind has a name.

@@ -10,6 +10,7 @@ module nocdyn_operating_point
   use nocdyn_literals, only: literal_ok, read_real
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: new_reduced
+  use nocdyn_rubber_notes, only: note_given_conditions
   use nocdyn_run_settings, only: choose_settings
   use nocdyn_solve, only: solve
   use nocdyn_steady_start, only: find_operating_state
@@ -44,6 +45,7 @@ contains
     run = input%single('run')
     point%t = run%number('t_start')
     allocate (point%notes, source=machine%simplifications)
+    call note_given_conditions(machine, 'here', point%notes)
     select case (at)
     case ('equilibrium')
       call use_equilibrium(machine, point, error)

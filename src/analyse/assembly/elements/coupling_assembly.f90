@@ -92,10 +92,17 @@ contains
     associate (group => input%groups(index))
       if (.not. group%number('stiffness', absent=0.0_wp) > 0) call input%report(index, 'kind', &
         "kind = 'rubber' needs stiffness > 0 [N m/rad]", diagnostics)
+      if (group%flag('limits') .and. .not. (group%has_value('maximum_torque') .or. group%has_value('vibratory_torque') .or. &
+                                            group%has_value('power_loss'))) then
+        call input%report(index, 'limits', 'limits need maximum_torque [N m], vibratory_torque [N m] or power_loss [W]', &
+                          diagnostics)
+      end if
+      if (thermal_resistance(group) > 0 .and. .not. group%has_value('ambient_temperature')) call input%report(index, 'kind', &
+        'its temperature by its power needs ambient_temperature [degC]', diagnostics)
       if (.not. group%has_value('condition')) return
       select case (group%text('condition'))
       case ('steady')
-        if (group%has_value('thermal_resistance') .or. group%has_value('power_loss')) return
+        if (thermal_resistance(group) > 0) return
         call input%report(index, 'condition', "condition = 'steady' needs thermal_resistance [K/W], or power_loss [W] and " // &
                           'power_loss_rise [K]', diagnostics)
       case ('warm')
@@ -130,8 +137,7 @@ contains
                                      group%numbers('temperature_damping'))
     law%ambient = group%number('ambient_temperature', absent=0.0_wp)
     law%temperature = law%ambient
-    law%resistance = group%number('thermal_resistance', absent=0.0_wp)
-    if (group%has_value('power_loss')) law%resistance = group%number('power_loss_rise') / group%number('power_loss')
+    law%resistance = thermal_resistance(group)
     condition = merge('steady', 'cold  ', law%resistance > 0)
     if (group%has_value('condition')) condition = group%text('condition')
     law%heats_up = condition == 'steady'
@@ -144,6 +150,15 @@ contains
     if (group%has_value('damping_frequency')) law%base = law%base * &
       [law%by_frequency%stiffness(group%number('damping_frequency')), law%by_frequency%damping(group%number('damping_frequency'))]
   end function new_rubber_law
+
+  !> The rise of the temperature of a coupling by its power [K/W]; 0 if it is not known.
+  pure real(wp) function thermal_resistance(group) result(resistance)
+    type(group_t), intent(in) :: group   !! &coupling of kind rubber
+
+    resistance = group%number('thermal_resistance', absent=0.0_wp)
+    if (resistance > 0 .or. .not. (group%has_value('power_loss') .and. group%has_value('power_loss_rise'))) return
+    resistance = group%number('power_loss_rise') / group%number('power_loss')
+  end function thermal_resistance
 
   !> Form of the law of a group &coupling.
   pure integer function coupling_form(group)

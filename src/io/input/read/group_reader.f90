@@ -1,5 +1,6 @@
 !> One group of the input, from the texts of the file and the overrides to checked values.
 module nocdyn_group_reader
+  use nocdyn_catalogues, only: take_catalogue
   use nocdyn_diagnostics, only: diagnostics_t, most_shown, no_line
   use nocdyn_errors, only: error_t
   use nocdyn_group_checks, only: check_group
@@ -92,6 +93,7 @@ contains
     end do
     call check_documents(folder, raw, group, diagnostics)
     call read_line_files(folder, raw, group, diagnostics)
+    call take_catalogue(raw, group, diagnostics)
     call check_group(raw, relations, group, diagnostics)
   end subroutine read_group
 

@@ -1,5 +1,5 @@
-!> Groups that an input does not have, but that others stand for: the body and the coupling of a &damper. They come last. What
-!> they are is set here; the assembly sets their numbers.
+!> Groups that an input does not have, but that others stand for: the body and the coupling of a &damper, the &limit of a
+!> &coupling by its data sheet. They come last. The assembly sets the numbers of the parts of dampers.
 module nocdyn_made_groups
   use nocdyn_input, only: group_t, input_t, value_t
   use nocdyn_schema, only: first_key, group_rule_index, has_word, key_rules, last_key, selector_rule
@@ -16,13 +16,15 @@ contains
   subroutine make_groups(input)
     type(input_t), intent(inout) :: input   !! checked
     type(group_t), allocatable :: groups(:)
-    integer, allocatable :: dampers(:)
+    integer, allocatable :: couplings(:), dampers(:)
     integer :: d, g, n
 
     allocate (dampers, source=input%groups_named('damper'))
-    if (size(dampers) == 0) return
+    allocate (couplings, source=input%groups_named('coupling', 'rubber'))
+    couplings = pack(couplings, [(input%groups(couplings(d))%flag('limits'), d=1, size(couplings))])
+    if (size(dampers) + size(couplings) == 0) return
     n = size(input%groups)
-    allocate (groups(n + 2 * size(dampers)))
+    allocate (groups(n + 2 * size(dampers) + size(couplings)))
     do g = 1, n
       groups(g) = input%groups(g)
       if (groups(g)%kind == 'limit') call take_coupling(groups(g))
@@ -37,18 +39,37 @@ contains
         call set_text(groups(n + size(dampers) + d), 'bodies', damper%text('body'), damper%name)
       end associate
     end do
+    do g = 1, size(couplings)
+      call make_limit(input%groups(couplings(g)), couplings(g), groups(n + 2 * size(dampers) + g))
+    end do
     call move_alloc(groups, input%groups)
   end subroutine make_groups
+
+  !> The limits of the data sheet of a coupling.
+  subroutine make_limit(coupling, number, limit)
+    type(group_t), intent(in) :: coupling
+    integer, intent(in) :: number   !! of the group in the file
+    type(group_t), intent(out) :: limit
+    character(len=*), parameter :: from(*) = [character(len=16) :: 'maximum_torque', 'vibratory_torque', 'power_loss']
+    character(len=*), parameter :: to(*) = [character(len=16) :: 'moment', 'vibratory_moment', 'heat']
+    integer :: k
+
+    call start_group('limit', number, coupling, limit)
+    limit%name = ''
+    call set_text(limit, 'coupling', coupling%name)
+    do k = 1, size(from)
+      if (.not. coupling%has_value(trim(from(k)))) cycle
+      limit%values(limit%key_position(trim(to(k)))) = coupling%values(coupling%key_position(trim(from(k))))
+    end do
+  end subroutine make_limit
 
   !> Names the coupling of a damper where a limit names the damper.
   subroutine take_coupling(limit)
     type(group_t), intent(inout) :: limit   !! &limit
 
     if (.not. limit%has_value('damper')) return
-    associate (coupling => limit%values(limit%key_position('coupling')))
-      coupling = limit%values(limit%key_position('damper'))
-      coupling%is_derived = .true.
-    end associate
+    call set_text(limit, 'coupling', limit%text('damper'))
+    limit%values(limit%key_position('coupling'))%is_derived = .true.
   end subroutine take_coupling
 
   !> A group with the defaults of its default kind.
@@ -67,7 +88,7 @@ contains
     group%made_from = number
     word = ''
     if (selector_rule(group%rule) > 0) word = key_rules(selector_rule(group%rule))%default
-    word = word(verify(word, "'"):len_trim(word) - 1)
+    if (word /= '') word = word(2:len_trim(word) - 1)   ! without its quotes
     allocate (group%values(last_key(group%rule) - first_key(group%rule) + 1))
     do k = 1, size(group%values)
       rule = first_key(group%rule) + k - 1

@@ -1,7 +1,7 @@
 !> Rows of the schema: elastic elements, &coupling, &shaft and &mesh.
 module nocdyn_schema_couplings
   use nocdyn_kinds, only: wp
-  use nocdyn_schema_rules, only: a_file, a_flag, a_name, a_number, a_selector, a_word, allowed_t, &
+  use nocdyn_schema_rules, only: a_file, a_flag, a_line_file, a_name, a_number, a_selector, a_text, a_word, allowed_t, &
     an_integer, any_number, any_times, anything, at_most_one, body_or_ground, efficiencies, equal_lengths, exactly_one, &
     example_t, extrapolations, from_1, group_rule_t, in_machine, interpolations, key_rule_t, kind_rule_t, less_than, linear, &
     not_negative, positive, relation_rule_t, required, requires, reverse_efficiencies, unset
@@ -109,6 +109,23 @@ module nocdyn_schema_couplings
       'stiffness of the warm coupling, where data sheets give it in place of tables', 'rubber'), &
     key_rule_t('coupling', 'warm_damping', a_number, 1, '', unset, not_negative, &
       'relative damping of the warm coupling', 'rubber'), &
+    key_rule_t('coupling', 'nominal_torque', a_number, 1, 'N m', unset, positive, &
+      'T_KN of data sheets: torque in continuous operation', 'rubber'), &
+    key_rule_t('coupling', 'maximum_torque', a_number, 1, 'N m', unset, positive, 'T_Kmax of data sheets', 'rubber'), &
+    key_rule_t('coupling', 'vibratory_torque', a_number, 1, 'N m', unset, positive, &
+      'T_KW of data sheets: amplitude in continuous operation', 'rubber'), &
+    key_rule_t('coupling', 'limits', a_flag, 1, '', '.false.', anything, &
+      'whether maximum_torque, vibratory_torque and power_loss are limits, as of a &limit', 'rubber'), &
+    key_rule_t('coupling', 'first_inertia', a_number, 1, 'kg m2', unset, not_negative, &
+      'inertia of its side at the first body', 'rubber'), &
+    key_rule_t('coupling', 'second_inertia', a_number, 1, 'kg m2', unset, not_negative, 'and at the second body', 'rubber'), &
+    key_rule_t('coupling', 'inertias', a_flag, 1, '', '.false.', anything, &
+      'whether these are added to those of the bodies', 'rubber'), &
+    key_rule_t('coupling', 'catalogue_file', a_line_file, 1, '', unset, anything, &
+      'file with a row for each size of a series of couplings, which gives the keys that are not given', 'rubber'), &
+    key_rule_t('coupling', 'catalogue_lines', a_text, any_number, '', unset, anything, &
+      'the lines of catalogue_file, as an input that was written has them', 'rubber'), &
+    key_rule_t('coupling', 'size', a_text, 1, '', unset, anything, 'the size in the catalogue', 'rubber'), &
     key_rule_t('shaft', 'name', a_name, 1, '', required, anything, 'name in messages and results'), &
     key_rule_t('shaft', 'bodies', body_or_ground, 2, '', required, anything, &
       'the two bodies at its ends; half of the inertia of a short shaft is added to each'), &
@@ -178,7 +195,7 @@ module nocdyn_schema_couplings
     relation_rule_t('coupling', requires, 'saturation', 'stiffness'), &
     relation_rule_t('coupling', requires, 'friction_speed', 'friction'), &
     relation_rule_t('coupling', at_most_one, 'relative_damping', 'magnifier'), &
-    relation_rule_t('coupling', requires, 'damping_frequency', 'relative_damping magnifier'), &
+    relation_rule_t('coupling', requires, 'damping_frequency', 'relative_damping magnifier catalogue_file'), &
     relation_rule_t('coupling', at_most_one, 'section_modulus', 'diameter bore'), &
     relation_rule_t('coupling', requires, 'bore', 'diameter'), &
     relation_rule_t('coupling', less_than, 'bore', 'diameter'), &
@@ -192,13 +209,15 @@ module nocdyn_schema_couplings
     relation_rule_t('coupling', equal_lengths, 'table_frequency frequency_stiffness frequency_damping', ''), &
     relation_rule_t('coupling', requires, 'temperature_stiffness temperature_damping', 'table_temperature'), &
     relation_rule_t('coupling', equal_lengths, 'table_temperature temperature_stiffness temperature_damping', ''), &
-    relation_rule_t('coupling', at_most_one, 'thermal_resistance', 'power_loss power_loss_rise'), &
-    relation_rule_t('coupling', requires, 'power_loss', 'power_loss_rise'), &
-    relation_rule_t('coupling', requires, 'power_loss_rise', 'power_loss'), &
-    relation_rule_t('coupling', requires, 'thermal_resistance power_loss table_temperature', 'ambient_temperature'), &
-    relation_rule_t('coupling', requires, 'ambient_temperature', 'thermal_resistance power_loss table_temperature'), &
+    relation_rule_t('coupling', at_most_one, 'thermal_resistance', 'power_loss_rise'), &
+    relation_rule_t('coupling', requires, 'power_loss_rise', 'power_loss catalogue_file'), &
+    relation_rule_t('coupling', requires, 'thermal_resistance power_loss_rise table_temperature', 'ambient_temperature'), &
+    relation_rule_t('coupling', requires, 'ambient_temperature', &
+                    'thermal_resistance power_loss_rise table_temperature catalogue_file'), &
     relation_rule_t('coupling', requires, 'warm_temperature', 'table_temperature'), &
     relation_rule_t('coupling', at_most_one, 'warm_temperature', 'warm_stiffness warm_damping'), &
+    relation_rule_t('coupling', requires, 'catalogue_file', 'size'), &
+    relation_rule_t('coupling', requires, 'catalogue_lines size', 'catalogue_file'), &
     relation_rule_t('shaft', equal_lengths, 'lengths diameters bores', ''), &
     relation_rule_t('shaft', at_most_one, 'damping_ratio', 'relative_damping'), &
     relation_rule_t('shaft', requires, 'damping_frequency', 'damping_ratio relative_damping'), &

@@ -68,8 +68,8 @@ module nocdyn_schema_dampers
 
   type(example_t), parameter, public :: damper_examples(*) = [ &
     example_t('damper', "name = 'ring'  body = 'motor'  ring_inertia = 2.0|" // &
-      "housing_inertia = 0.5  damping = 30.0", .false.), &
+      'housing_inertia = 0.5  damping = 30.0', .false.), &
     example_t('damper', "name = 'rubber_ring'  body = 'motor'  kind = 'rubber'|" // &
-      "ring_inertia = 2.0  tuning_frequency_hz = 4.0  relative_damping = 1.2", .false.)]
+      'ring_inertia = 2.0  tuning_frequency_hz = 4.0  relative_damping = 1.2', .false.)]
 
 end module nocdyn_schema_dampers

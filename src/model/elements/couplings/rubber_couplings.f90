@@ -26,12 +26,12 @@ contains
   function new_rubber_couplings(keys) result(bank)
     class(element_keys_t), intent(in) :: keys
     type(rubber_couplings_t) :: bank
-    type(coupling_common_t) :: common
+    type(coupling_common_t) :: shared
     type(curve_t) :: curve(keys%lanes, size(keys%names))
     real(wp), dimension(keys%lanes, size(keys%names)) :: stiffness, viscous
     integer :: e, lane
 
-    common = coupling_common_t(keys)
+    shared = coupling_common_t(keys)
     stiffness = keys%values('stiffness')
     viscous = keys%values('damping')
     do e = 1, size(curve, 2)
@@ -40,8 +40,8 @@ contains
                                       stiffness(lane, e) * keys%numbers('torque_stiffness', lane, e))
       end do
     end do
-    call set_table(bank, common, curve)
-    call bank%add_parameter('damping_time', (common%damping - viscous) / stiffness, is_key=.false.)
+    call set_table(bank, shared, curve)
+    call bank%add_parameter('damping_time', (shared%damping - viscous) / stiffness, is_key=.false.)
     bank%parameters(bank%number_of('damping'))%value(:, :) = viscous
     call bank%prepare_law()
   end function new_rubber_couplings
