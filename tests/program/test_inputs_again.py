@@ -15,6 +15,10 @@ BASE = """&body name = 'a' inertia = 1 /
 SINE = "kind = 'startup' frequency = 30 pole_pairs = 2 amplitude = 1"
 FAULT = "&excitation name = 'x' body = 'a' kind = 'fault' time = 0 frequency = 300"
 TABLE = "table_speed = 0, 5, 20 table_torque = 1, 2, 3"
+RUBBER = (
+    "table_torque = 0, 1 torque_stiffness = 1, 2 table_temperature = 20, 90 temperature_stiffness = 1, 0.5 "
+    "ambient_temperature = 20 warm_temperature = 90 power_loss = 1 power_loss_rise = 70"
+)
 DQ = "kind = 'induction_dq' voltage = 40 frequency = 20 poles = 2"
 VARY = "&vary target = 'body.a.inertia' low = 1 high = 2"
 RECORD = "&record quantity = 'omega_a' statistic = 'final'"
@@ -49,6 +53,18 @@ ELEMENTS = {
     },
     "coupling table": "&coupling name = 'k' bodies = 'a', 'b' table_twist = 0, 1, 2 table_moment = 0, 2, 3 "
     "interpolation = 'linear' extrapolation = 'linear' /",
+    "elastic": "&coupling name = 'k' bodies = 'a', 'b' kind = 'elastic' stiffness = 1 /",
+    **{
+        f"{word} rubber": f"&coupling name = 'k' bodies = 'a', 'b' kind = 'rubber' stiffness = 1 relative_damping = 1 {RUBBER} "
+        f"damping_frequency = 9 condition = '{word}' /"
+        for word in ("cold", "warm", "steady")
+    },
+    "rubber load case": f"&coupling name = 'k' bodies = 'a', 'b' kind = 'rubber' stiffness = 1 {RUBBER} limits = .true. /\n"
+    "&limit coupling = 'k' largest_temperature = 90 /",
+    "viscous": "&damper name = 'd' body = 'a' kind = 'viscous' ring_inertia = 1 damping = 1 /\n&limit damper = 'd' heat = 1 /",
+    "rubber": "&damper name = 'd' body = 'a' kind = 'rubber' ring_inertia = 1 stiffness = 1 loss_factor = 0.1 /",
+    "viscous_spring": "&damper name = 'd' body = 'a' kind = 'viscous_spring' ring_inertia = 1 tuning_frequency_hz = 1 "
+    "damping_ratio = 0.1 /",
     "shaft": "&shaft name = 's' bodies = 'a', 'b' lengths = 1 diameters = 0.1 shear_modulus = 8e10 density = 7850 /",
     "mesh": "&mesh name = 'z' bodies = 'a', 'b' teeth = 20, 60 module = 0.005 stiffness = 4e8 damping = 1e3 /",
     "quadratic": "&motor name = 'm' body = 'a' kind = 'quadratic' a = 1 b = 2 c = 3 /",

@@ -6,10 +6,10 @@
 module nocdyn_forced_response
   use nocdyn_dynamic_stiffness, only: dynamic_stiffness_t, new_dynamic_stiffness
   use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_excitation_lines, only: line_t, list_sources, new_lines, source_t
+  use nocdyn_excitation_lines, only: find_twist, line_t, line_work_t, list_sources, lost_power, new_line_work, new_lines, &
+    solve_at => solve_line, source_t
   use nocdyn_held_speeds, only: held_speeds_t, held_state_t, new_held_speeds
   use nocdyn_kinds, only: wp
-  use nocdyn_line_solutions, only: find_twist, line_work_t, lost_power, new_line_work, solve_at => solve_line
   use nocdyn_machine, only: machine_t
   use nocdyn_response_axes, only: response_axis_t
   use nocdyn_response_points, only: keep_points, merge_points, response_point_t

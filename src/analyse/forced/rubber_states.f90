@@ -9,10 +9,9 @@
 !> 35 (1998) 508-523).
 module nocdyn_rubber_states
   use nocdyn_dynamic_stiffness, only: dynamic_stiffness_t
-  use nocdyn_excitation_lines, only: line_t
+  use nocdyn_excitation_lines, only: find_twist, line_t, line_work_t, lost_power, solve_line
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
-  use nocdyn_line_solutions, only: find_twist, line_work_t, lost_power, solve_line
   use nocdyn_machine, only: machine_t
   use nocdyn_response_points, only: response_point_t
   use nocdyn_rubber_laws, only: rubber_condition_t
@@ -21,11 +20,14 @@ module nocdyn_rubber_states
 
   public :: has_iterated_rubber, settle_rubber
 
-  !> The unknowns of one machine.
-  type :: unknowns_t
+  !> The unknowns of one machine, and what excites it.
+  type :: problem_t
+    type(machine_t), pointer :: machine => null()
+    type(dynamic_stiffness_t), pointer :: matrix => null()
+    type(line_t), pointer :: lines(:) => null()
     integer, allocatable :: heated(:)      !! rubber couplings whose temperatures are unknown
     integer, allocatable :: amplified(:)   !! and those whose amplitudes are
-  end type unknowns_t
+  end type problem_t
 
 contains
 
@@ -43,9 +45,9 @@ contains
 
   !> Finds the conditions at one speed, and linearises the machine there.
   subroutine settle_rubber(machine, matrix, lines, point, work)
-    type(machine_t), intent(in) :: machine
-    type(dynamic_stiffness_t), intent(in) :: matrix
-    type(line_t), intent(in) :: lines(:)                !! all that excite the machine
+    type(machine_t), target, intent(in) :: machine
+    type(dynamic_stiffness_t), target, intent(in) :: matrix
+    type(line_t), target, intent(in) :: lines(:)        !! all that excite the machine
     type(response_point_t), intent(inout) :: point      !! with its state and its sources
     type(line_work_t), intent(inout) :: work
     integer, parameter :: most_steps = 400, most_stuck = 8   ! steps that bring nothing
@@ -54,15 +56,18 @@ contains
     real(wp), parameter :: least_step = 0.05_wp, relief = 1.25_wp
     real(wp), parameter :: tolerance = 1.0e-13_wp       ! relative
     real(wp), parameter :: enough = 1.0e-9_wp           ! where rounding allows no more
-    type(unknowns_t) :: unknowns
+    type(problem_t) :: problem
     real(wp), allocatable :: g(:), scale(:), x(:)
     real(wp) :: before, longest, residual, step
     integer :: i, stuck
 
-    call list_unknowns(machine, unknowns)
-    call start(machine, unknowns, x)
-    call evaluate(machine, matrix, lines, unknowns, x, point, work, g)
-    scale = sizes(machine, unknowns, g)
+    problem%machine => machine
+    problem%matrix => matrix
+    problem%lines => lines
+    call list_unknowns(problem)
+    call start(problem, x)
+    call evaluate(problem, x, point, work, g)
+    scale = sizes(problem, g)
     residual = maxval(abs(g - x) / scale)
     step = first_step
     longest = huge(step)
@@ -70,8 +75,8 @@ contains
     do i = 1, most_steps
       if (residual <= tolerance) exit
       before = residual
-      call take_step(machine, matrix, lines, unknowns, step, scale, point, work, x, g)
-      scale = sizes(machine, unknowns, g)
+      call take_step(problem, step, scale, point, work, x, g)
+      scale = sizes(problem, g)
       residual = maxval(abs(g - x) / scale)
       if (residual >= before) stuck = stuck + 1
       if (residual <= enough .and. stuck >= most_stuck) exit
@@ -81,95 +86,89 @@ contains
       step = min(longest, step * min(most_growth, max(1.0_wp / most_growth, before / max(residual, tiny(residual)))))
     end do
     point%is_settled = residual <= enough
-    call set_conditions(machine, unknowns, x, point)
+    call set_conditions(problem, x, point)
   end subroutine settle_rubber
 
-  subroutine list_unknowns(machine, unknowns)
-    type(machine_t), intent(in) :: machine
-    type(unknowns_t), intent(out) :: unknowns
+  subroutine list_unknowns(problem)
+    type(problem_t), intent(inout) :: problem   !! with its machine
     integer :: r
 
-    unknowns%heated = pack([(r, r=1, size(machine%rubber))], machine%rubber%heats_up)
-    unknowns%amplified = pack([(r, r=1, size(machine%rubber))], machine%rubber%by_amplitude%are_given)
+    associate (rubber => problem%machine%rubber)
+      problem%heated = pack([(r, r=1, size(rubber))], rubber%heats_up)
+      problem%amplified = pack([(r, r=1, size(rubber))], rubber%by_amplitude%are_given)
+    end associate
   end subroutine list_unknowns
 
   !> Cold couplings without vibration.
-  subroutine start(machine, unknowns, x)
-    type(machine_t), intent(in) :: machine
-    type(unknowns_t), intent(in) :: unknowns
+  subroutine start(problem, x)
+    type(problem_t), intent(in) :: problem
     real(wp), allocatable, intent(out) :: x(:)   !! temperatures [degC], amplitudes [N m]
 
-    allocate (x(size(unknowns%heated) + size(unknowns%amplified)), source=0.0_wp)
-    x(:size(unknowns%heated)) = machine%rubber(unknowns%heated)%ambient
+    allocate (x(size(problem%heated) + size(problem%amplified)), source=0.0_wp)
+    x(:size(problem%heated)) = problem%machine%rubber(problem%heated)%ambient
   end subroutine start
 
   !> The sizes of the unknowns, relative to which they are exact: rises of temperatures, at least 1 mK, and amplitudes.
-  function sizes(machine, unknowns, g) result(scale)
-    type(machine_t), intent(in) :: machine
-    type(unknowns_t), intent(in) :: unknowns
+  function sizes(problem, g) result(scale)
+    type(problem_t), intent(in) :: problem
     real(wp), intent(in) :: g(:)
     real(wp) :: scale(size(g))
     real(wp), parameter :: least = 1.0e-3_wp   ! [K]
     integer :: heated
 
-    heated = size(unknowns%heated)
-    scale(:heated) = max(least, g(:heated) - machine%rubber(unknowns%heated)%ambient)
+    heated = size(problem%heated)
+    scale(:heated) = max(least, g(:heated) - problem%machine%rubber(problem%heated)%ambient)
     scale(heated + 1:) = max(tiny(least), g(heated + 1:))
   end function sizes
 
   !> Sets the conditions of the machine at a point.
-  subroutine set_conditions(machine, unknowns, x, point)
-    type(machine_t), intent(in) :: machine
-    type(unknowns_t), intent(in) :: unknowns
+  subroutine set_conditions(problem, x, point)
+    type(problem_t), intent(in) :: problem
     real(wp), intent(in) :: x(:)
     type(response_point_t), intent(inout) :: point
-    type(rubber_condition_t) :: condition(size(machine%rubber))
+    type(rubber_condition_t) :: condition(size(problem%machine%rubber))
 
     condition = point%state%slopes%condition
-    condition(unknowns%heated)%temperature = x(:size(unknowns%heated))
-    condition(unknowns%amplified)%amplitude = x(size(unknowns%heated) + 1:)
+    condition(problem%heated)%temperature = x(:size(problem%heated))
+    condition(problem%amplified)%amplitude = x(size(problem%heated) + 1:)
     call point%state%slopes%set_conditions(condition)
   end subroutine set_conditions
 
   !> The temperatures and amplitudes that follow from some.
-  subroutine evaluate(machine, matrix, lines, unknowns, x, point, work, g)
-    type(machine_t), intent(in) :: machine
-    type(dynamic_stiffness_t), intent(in) :: matrix
-    type(line_t), intent(in) :: lines(:)
-    type(unknowns_t), intent(in) :: unknowns
+  subroutine evaluate(problem, x, point, work, g)
+    type(problem_t), intent(in) :: problem
     real(wp), intent(in) :: x(:)
     type(response_point_t), intent(inout) :: point
     type(line_work_t), intent(inout) :: work
     real(wp), allocatable, intent(out) :: g(:)
     complex(wp) :: moment, twist
-    real(wp), dimension(size(machine%rubber)) :: power, square
+    real(wp), dimension(size(problem%machine%rubber)) :: power, square
     integer :: l, r
 
-    call set_conditions(machine, unknowns, x, point)
+    call set_conditions(problem, x, point)
     power = 0.0_wp
     square = 0.0_wp
-    do l = 1, size(lines)
-      associate (frequency => point%sources(lines(l)%source(1))%frequency)
-        call solve_line(machine, matrix, point%state%slopes, frequency, point%sources(lines(l)%source), work)
+    do l = 1, size(problem%lines)
+      associate (frequency => point%sources(problem%lines(l)%source(1))%frequency)
+        call solve_line(problem%machine, problem%matrix, point%state%slopes, frequency, &
+                        point%sources(problem%lines(l)%source), work)
         do r = 1, size(power)
-          associate (e => machine%rubber(r)%element)
-            call find_twist(matrix, e, work, twist, moment)
+          associate (e => problem%machine%rubber(r)%element)
+            call find_twist(problem%matrix, e, work, twist, moment)
             power(r) = power(r) + lost_power(frequency, work%stiffness(e), twist)
             square(r) = square(r) + real(moment, wp)**2 + aimag(moment)**2
           end associate
         end do
       end associate
     end do
-    g = [machine%rubber(unknowns%heated)%ambient + machine%rubber(unknowns%heated)%resistance * power(unknowns%heated), &
-         sqrt(square(unknowns%amplified))]
+    associate (heated => problem%machine%rubber(problem%heated))
+      g = [heated%ambient + heated%resistance * power(problem%heated), sqrt(square(problem%amplified))]
+    end associate
   end subroutine evaluate
 
   !> A linearly implicit Euler step, by differences.
-  subroutine take_step(machine, matrix, lines, unknowns, step, scale, point, work, x, g)
-    type(machine_t), intent(in) :: machine
-    type(dynamic_stiffness_t), intent(in) :: matrix
-    type(line_t), intent(in) :: lines(:)
-    type(unknowns_t), intent(in) :: unknowns
+  subroutine take_step(problem, step, scale, point, work, x, g)
+    type(problem_t), intent(in) :: problem
     real(wp), intent(in) :: step       !! in time constants
     real(wp), intent(in) :: scale(:)   !! of the unknowns
     type(response_point_t), intent(inout) :: point
@@ -185,7 +184,7 @@ contains
     do k = 1, size(x)
       moved = x
       moved(k) = moved(k) + difference * scale(k)
-      call evaluate(machine, matrix, lines, unknowns, moved, point, work, other)
+      call evaluate(problem, moved, point, work, other)
       a(:, k) = -(other - g) / (moved(k) - x(k))
       a(k, k) = a(k, k) + 1.0_wp + 1.0_wp / step
     end do
@@ -197,11 +196,11 @@ contains
       call lu_solve(a, pivots, change)
     end if
     x = x + change
-    associate (heated => size(unknowns%heated))
-      x(:heated) = max(x(:heated), machine%rubber(unknowns%heated)%ambient)
+    associate (heated => size(problem%heated))
+      x(:heated) = max(x(:heated), problem%machine%rubber(problem%heated)%ambient)
       x(heated + 1:) = max(x(heated + 1:), 0.0_wp)
     end associate
-    call evaluate(machine, matrix, lines, unknowns, x, point, work, g)
+    call evaluate(problem, x, point, work, g)
   end subroutine take_step
 
 end module nocdyn_rubber_states

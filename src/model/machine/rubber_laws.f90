@@ -60,7 +60,7 @@ contains
   !> The factor of the stiffness.
   pure real(wp) function stiffness_factor(self, x) result(factor)
     class(factors_t), intent(in) :: self
-    real(wp), intent(in) :: x
+    real(wp), intent(in) :: x   !! the quantity, in the unit of its points
 
     factor = 1.0_wp
     if (self%are_given) factor = self%of_stiffness%value(x)
@@ -69,7 +69,7 @@ contains
   !> The factor of the relative damping.
   pure real(wp) function damping_factor(self, x) result(factor)
     class(factors_t), intent(in) :: self
-    real(wp), intent(in) :: x
+    real(wp), intent(in) :: x   !! the quantity, in the unit of its points
 
     factor = 1.0_wp
     if (self%are_given) factor = self%of_damping%value(x)
@@ -78,7 +78,7 @@ contains
   !> The derivative of the factor of the stiffness.
   pure real(wp) function stiffness_slope(self, x) result(slope)
     class(factors_t), intent(in) :: self
-    real(wp), intent(in) :: x
+    real(wp), intent(in) :: x   !! the quantity, in the unit of its points
     real(wp) :: y(0:3)
 
     slope = 0.0_wp
@@ -90,7 +90,7 @@ contains
   !> The derivative of the factor of the relative damping.
   pure real(wp) function damping_slope(self, x) result(slope)
     class(factors_t), intent(in) :: self
-    real(wp), intent(in) :: x
+    real(wp), intent(in) :: x   !! the quantity, in the unit of its points
     real(wp) :: y(0:3)
 
     slope = 0.0_wp
@@ -102,7 +102,7 @@ contains
   !> The smallest and the largest factor of the stiffness and of the relative damping.
   pure subroutine write_range(self, stiffness, damping)
     class(factors_t), intent(in) :: self
-    real(wp), intent(out) :: stiffness(2), damping(2)
+    real(wp), intent(out) :: stiffness(2), damping(2)   !! lowest and highest factor
     real(wp), allocatable :: x(:)
     integer :: i
 
