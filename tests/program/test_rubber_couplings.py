@@ -150,3 +150,37 @@ def test_without_tables_rubber_is_the_coupling_of_its_numbers(nocdyn, command):
     for name in results[0]:
         first, last = (np.genfromtxt(one[name].splitlines(), delimiter=",", skip_header=1) for one in (results[0], results[2]))
         assert np.nan_to_num(last) == pytest.approx(np.nan_to_num(first), rel=1e-9, abs=1e-9 * np.nanmax(abs(first)))
+
+
+RUN = """\
+&body name = 'engine' inertia = 5.0 speed = 20 /
+&body name = 'machine' inertia = 8.0 /
+&coupling name = 'rubber' bodies = 'engine', 'machine' kind = 'rubber' stiffness = 4000 relative_damping = 1.0
+  damping_frequency = 40 {tables} /
+&load name = 'work' body = 'machine' constant = 1500 viscous = 20 /
+&motor name = 'drive' body = 'engine' a = 1900 b = 0 c = 0 /
+&excitation name = 'gas' body = 'engine' kind = 'orders' orders = 2 amplitudes = 2.0 phases = 0.3 /
+&response body = 'engine' speed = 20 /
+&run t_end = 60 start = 'equilibrium' rtol = 1e-9 atol = 1e-11 /
+&output points = 60001 columns = 'total_moment_rubber' /
+"""
+
+
+def test_a_run_has_the_stiffness_and_damping_of_its_mean_torque(nocdyn):
+    """At 20 rad/s order 2 has the frequency of the damping; the torque is 1900 N m, the vibration small."""
+    text = RUN.format(tables=table_keys("torque").replace("0.95, 0.9\n", "1.0, 1.0\n"))
+    nocdyn.done(text)
+    moment = nocdyn.values()["total_moment_rubber"][50000:]
+    swing = (max(moment) - min(moment)) / 2
+    nocdyn.done(text, command="response")
+    table = nocdyn.values(name="response.csv")
+    assert np.mean(moment) == pytest.approx(table["mean_total_moment_rubber"][0], rel=1e-5)
+    assert swing == pytest.approx(table["half_range_total_moment_rubber"][0], rel=1e-4)
+
+
+def test_a_run_says_what_it_leaves_out_with_its_size(nocdyn):
+    tables = table_keys("amplitude", "temperature") + f"ambient_temperature = {AMBIENT} thermal_resistance = 0.1"
+    outcome = nocdyn("check", nocdyn.write("machine.nml", RUN.format(tables=tables)))
+    assert outcome.returncode == 0
+    assert "by its temperature its stiffness may be 72 to 110 % of this, its relative damping 70 to 110 %" in outcome.stdout
+    assert "by its amplitude its stiffness may be 80 to 110 % of this, its relative damping 90 to 115 %" in outcome.stdout
