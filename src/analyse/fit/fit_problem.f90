@@ -3,7 +3,7 @@
 module nocdyn_fit_problem
   use nocdyn_comparisons, only: comparison_t
   use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_fit_comparisons, only: compare_measurements, fix_delays
+  use nocdyn_fit_comparisons, only: compare_measurements, fix_delays, refuse_unfitted
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_least_squares, only: residuals_t
@@ -37,7 +37,8 @@ contains
     self%input = input
     allocate (self%unknowns, source=unknowns)
     allocate (self%measurements, source=measurements)
-    call fix_delays(self%input, self%measurements, error)
+    call refuse_unfitted(input, measurements, error)
+    if (.not. allocated(error)) call fix_delays(self%input, self%measurements, error)
     if (.not. allocated(error)) call compare_measurements(self%input, self%measurements, self%comparisons, error)
     if (allocated(error)) return
     self%count = count(unknowns%has_prior)
