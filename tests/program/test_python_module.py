@@ -264,3 +264,14 @@ def test_the_examples_of_the_page_give_what_it_shows(monkeypatch):
     monkeypatch.chdir(SOURCE)
     failed, tried = doctest.testfile(str(SOURCE / "docs/pages/python.md"), module_relative=False, verbose=False)
     assert failed == 0 and tried > 25
+
+
+def test_numbers_with_a_unit_are_texts():
+    machine = package.Input()
+    machine.add("body", name="rotor", inertia="1383 lbm ft2", speed="60 rpm")
+    machine.add("run", t_end="10 ms")
+    machine["body.rotor.inertia"] = "2000 kg cm2"
+    machine.check()
+    machine.groups[0].inertia = "5 kg m"
+    with pytest.raises(package.InputError, match="'kg m' is a unit of kg m; needed: one of moment of inertia"):
+        package.Input(machine.text).check()
