@@ -5,6 +5,7 @@
 module nocdyn_unit_expressions
   use nocdyn_kinds, only: wp
   use nocdyn_near_words, only: nearest_word
+  use nocdyn_printable, only: utf_8_length
   use nocdyn_text, only: append, quoted, shortened, string_t, to_text
   use nocdyn_units, only: ambiguous_units, base_units, quantity_names, unit_prefixes, unit_spellings, unit_symbols, usual_units
   implicit none (type, external)
@@ -240,7 +241,8 @@ contains
         ', in a unit; allowed: symbols of units'
       reader%at = last + 1
     else
-      reader%message = quoted(reader%text(reader%at:reader%at)) // ' is no part of a unit'
+      last = reader%at - 1 + max(1, utf_8_length(reader%text, reader%at))
+      reader%message = quoted(reader%text(reader%at:last)) // ' is no part of a unit'
     end if
     if (reader%message /= '') return
     call read_power(reader, power)

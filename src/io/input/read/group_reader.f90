@@ -155,6 +155,10 @@ contains
       overrides(i)%is_used = .true.
       call raw%keys(raw%position(overrides(i)%key_rule))%override_with(overrides(i)%namelist, overrides(i)%target, &
                                                                        overrides(i)%unit, i, message)
+      if (message /= '' .and. has_bare_unit(raw%keys(raw%position(overrides(i)%key_rule)), overrides(i)%namelist, &
+                                            overrides(i)%target)) then
+        message = message // '; a number with its unit stands in quotes'
+      end if
       if (message /= '') call diagnostics%add(no_line, 0, message, i)
     end do
   end subroutine take_overrides
