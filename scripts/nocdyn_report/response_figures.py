@@ -17,6 +17,7 @@ from matplotlib.patches import Patch
 
 from .columns import by_sort
 from .failure import ChoiceError
+from .measured_figures import measured_figures
 from .response_marks import BARRED, draw_barred, mark_criticals
 from .selection import matches
 from .speed_panels import (
@@ -266,6 +267,8 @@ def figures_of(folder: Path, arguments: argparse.Namespace) -> Figures:
             pages[kind] = pages.get(kind, 0) + 1
             name = kind if pages[kind] == 1 else f"{kind}_{pages[kind]}"
             yield name, draw_page(response, members[first : first + MOST_PANELS], look, styles)
+    if not arguments.columns:
+        yield from measured_figures(folder, "response.json", response.title).items()
 
 
 def main() -> None:

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from .columns import CURRENT, FORCE, LOSS, MOMENT, REACTION, SLIP, SPEED, STRESS, TORQUE, TWIST, Column, by_sort
 from .failure import ResultsError
+from .measured_figures import measured_figures
 from .multiples import MOST_PANELS, draw_multiples
 from .phase_planes import MOST_PLANES, draw_phase_planes
 from .results import Header, Results, read_results
@@ -225,6 +226,8 @@ def main() -> None:
     if results.shortfall:
         print(f"{parser.prog}: {arguments.results}: the trajectory is partial: {results.shortfall}", file=sys.stderr)
     figures = _drawn(results, arguments)
+    if not arguments.columns:
+        figures |= measured_figures(arguments.results, "summary.json", results.title)
     if not figures:
         raise ResultsError(f"{arguments.results}: nothing to draw: the trajectory has the time only")
     for name, figure in figures.items():

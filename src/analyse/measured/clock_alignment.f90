@@ -4,12 +4,55 @@ module nocdyn_clock_alignment
   implicit none (type, external)
   private
 
-  public :: find_shift
+  public :: add_drift, find_drift, find_shift
 
 contains
 
-  !> The number of intervals by which the second record comes later than the first one, with its fraction: where their correlation
-  !> is largest, by a parabola through three values. Shifts at which less than half of the first record has a partner do not count.
+  !> The shifts of the pieces of a record, each as by `find_shift`: clocks that drift.
+  pure subroutine find_drift(first, second, offset, piece, most, middles, shifts)
+    real(wp), intent(in) :: first(:), second(:)   !! values at equal intervals
+    integer, intent(in) :: offset                 !! first(i) is said to be at the time of second(i + offset)
+    integer, intent(in) :: piece                  !! number of values in a piece
+    integer, intent(in) :: most                   !! largest shift, in intervals
+    real(wp), allocatable, intent(out) :: middles(:)   !! of the pieces: indices of the first record
+    real(wp), allocatable, intent(out) :: shifts(:)    !! [pieces]
+    real(wp) :: correlation
+    integer :: begin, i, pieces
+
+    pieces = max(1, size(first) / piece)
+    allocate (middles(pieces), shifts(pieces))
+    do i = 1, pieces
+      begin = 1 + (i - 1) * piece
+      middles(i) = begin + 0.5_wp * (piece - 1)
+      call find_shift(first(begin:min(size(first), begin + piece - 1)), second, offset + begin - 1, most, shifts(i), correlation)
+    end do
+  end subroutine find_drift
+
+  !> Adds a drift to times: straight between the middles of the pieces, constant beyond them.
+  pure subroutine add_drift(middles, shifts, times)
+    real(wp), intent(in) :: middles(:), shifts(:)   !! [s], ascending; [s]
+    real(wp), intent(inout) :: times(:)             !! ascending [s]
+    integer :: i, s
+    real(wp) :: part
+
+    s = 1
+    do i = 1, size(times)
+      do while (s < size(middles) - 1)
+        if (times(i) < middles(s + 1)) exit
+        s = s + 1
+      end do
+      if (size(middles) == 1) then
+        times(i) = times(i) + shifts(1)
+      else
+        part = min(1.0_wp, max(0.0_wp, (times(i) - middles(s)) / (middles(s + 1) - middles(s))))
+        times(i) = times(i) + (1.0_wp - part) * shifts(s) + part * shifts(s + 1)
+      end if
+    end do
+  end subroutine add_drift
+
+  !> The number of intervals by which the second record comes later than the first one, with its fraction: where their
+  !> correlation is largest, by a parabola through three values. Shifts at which less than half of the first record has a
+  !> partner do not count.
   pure subroutine find_shift(first, second, offset, most, shift, correlation)
     real(wp), intent(in) :: first(:), second(:)   !! values at equal intervals
     integer, intent(in) :: offset                 !! first(i) is said to be at the time of second(i + offset)
@@ -27,7 +70,8 @@ contains
     correlation = correlations(best)
     bend = correlations(best - 1) - 2.0_wp * correlations(best) + correlations(best + 1)
     shift = real(best, wp)
-    if (bend < 0.0_wp) shift = shift + min(0.5_wp, max(-0.5_wp, 0.5_wp * (correlations(best - 1) - correlations(best + 1)) / bend))
+    if (bend >= 0.0_wp) return
+    shift = shift + min(0.5_wp, max(-0.5_wp, 0.5_wp * (correlations(best - 1) - correlations(best + 1)) / bend))
 
   contains
 

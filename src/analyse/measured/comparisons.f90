@@ -101,7 +101,7 @@ contains
       case (measured_frequency)
         call append(labels, 'mode [1]')
       case default
-        call append(labels, 'number [1]')
+        call append(labels, trim(merge('speed [rad/s]', 'number [1]   ', abs(m%speed) > 0.0_wp)))
       end select
       call append(labels, 'measured [' // m%unit // ']')
       call append(labels, 'computed [' // m%unit // ']')
@@ -149,6 +149,7 @@ contains
         if (m%kind == measured_series) then
           call json%put('delay_s', one%delay)
           if (m%finds_delay) call json%put('delay_correlation', one%clock_correlation)
+          if (m%drifts) call json%put('drift_s', m%drift)
           if (m%band(2) > 0.0_wp) call json%put('band_Hz', from_si(m%band, unit_hz))
         end if
         if (size(one%measured) > 0) then
@@ -157,6 +158,8 @@ contains
           if (one%has_correlation) call json%put('correlation', one%correlation)
           call json%put('largest_difference', one%largest)
           call json%put('largest_difference_at', one%largest_at)
+        end if
+        if (m%kind == measured_series .and. size(one%measured) > 1) then
           call json%put('half_range_measured', 0.5_wp * (maxval(one%measured) - minval(one%measured)))
           call json%put('half_range_computed', 0.5_wp * (maxval(one%computed) - minval(one%computed)))
         end if
@@ -197,8 +200,11 @@ contains
         if (m%kind == measured_order) line = line // ' at ' // shown(one%largest_at) // ' rad/s'
         if (m%kind == measured_frequency) line = line // ' of mode ' // shown(one%largest_at)
         call text%append_line(line)
-        if (m%finds_delay) call text%append_line('  its clock: delay = ' // rounded_text(one%delay, 6) // &
-                                                 ' s found by correlation, ' // rounded_text(one%clock_correlation, 3))
+        line = '  its clock: delay = ' // rounded_text(one%delay, 6) // ' s found by correlation, ' // &
+               rounded_text(one%clock_correlation, 3)
+        if (m%drifts) line = line // '; drifts by ' // rounded_text(m%drift(1), 3) // ' to ' // &
+                             rounded_text(m%drift(2), 3) // ' s'
+        if (m%finds_delay) call text%append_line(line)
         if (one%outside > 0 .or. m%gaps > 0) call text%append_line('  left out: ' // to_text(one%outside) // &
                                                                    ' values where nothing was computed, ' // to_text(m%gaps) // &
                                                                    ' gaps of the file')

@@ -47,8 +47,9 @@ contains
                                         frequencies(pack(mode, has_mode)))
         comparisons(i)%outside = count(.not. has_mode)
         if (size(m%damping) == 0) cycle
-        allocate (comparisons(i)%measured_damping, source=pack(m%damping, has_mode))
-        allocate (comparisons(i)%computed_damping, source=dampings(pack(mode, has_mode)))
+        comparisons(i)%measured_damping = pack(m%damping, has_mode)
+        allocate (comparisons(i)%computed_damping(count(has_mode)))
+        comparisons(i)%computed_damping(:) = dampings(pack(mode, has_mode))
       end associate
     end do
     call input%refuse(diagnostics, error)

@@ -1,7 +1,7 @@
 !> Measurements over the time beside a run: its signals at the measured times, by the dense output of the integration.
 module nocdyn_measured_runs
   use nocdyn_band_filters, only: filter_band
-  use nocdyn_clock_alignment, only: find_shift
+  use nocdyn_clock_alignment, only: add_drift, find_drift, find_shift
   use nocdyn_comparisons, only: comparison_t, new_comparison
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
@@ -205,11 +205,13 @@ contains
 
     call samples%attach(formulation, span(1))
     observer%samples => samples
+    observer%takes_shifts = .true.   ! the samples evaluate the formulation, which has them
     allocate (y, source=formulation%start())
     call integrate(formulation, settings, merged_times(span, samples%times), y, observer, status, error)
     if (allocated(error)) return
-    if (status%code(1) /= integration_done) call raise(error, exit_failed, failure_message(status, 1, formulation, settings%rtol, &
-                                                                                          settings%atol))
+    if (status%code(1) /= integration_done) then
+      call raise(error, exit_failed, failure_message(status, 1, formulation, settings%rtol, settings%atol))
+    end if
   end subroutine sample_run
 
   subroutine take_output(self, lane, t, y)
@@ -233,7 +235,7 @@ contains
     type(run_samples_t), target :: samples
     type(measurement_t), allocatable :: even(:)
     real(wp) :: interval(size(list)), shift
-    real(wp), allocatable :: filtered(:), measured(:)
+    real(wp), allocatable :: filtered(:), measured(:), middles(:), shifts(:)
     integer :: first, i, k, last, n
 
     correlations = 0.0_wp
@@ -260,17 +262,32 @@ contains
         first = count(one%times < m%abscissa(1) + m%delay) + 1
         last = count(one%times <= m%abscissa(size(m%abscissa)) + m%delay)
         if (last - first < 2) cycle   ! the record is not of this time
-        measured = sampled_at(m%abscissa + m%delay, m%values, one%times(first:last))
         filtered = one%computed
-        if (m%band(2) > 0.0_wp) then
-          call filter_band(measured, interval(i), m%band)
-          call filter_band(filtered, interval(i), m%band)
-        end if
+        if (m%band(2) > 0.0_wp) call filter_band(filtered, interval(i), m%band)
+        call sample_record(m, one%times(first:last), interval(i), measured)
         call find_shift(measured, filtered, first - 1, min(size(filtered) / 2, max(1, ceiling(m%largest_shift / interval(i)))), &
                         shift, correlations(i))
         m%delay = m%delay + shift * interval(i)
+        if (.not. m%drifts) cycle
+        call sample_record(m, one%times(first:last), interval(i), measured)
+        call find_drift(measured, filtered, first - 1, max(2, nint(m%drift_interval / interval(i))), &
+                        max(1, ceiling(m%largest_drift / interval(i))), middles, shifts)
+        shifts = shifts * interval(i)
+        m%drift = [minval(shifts), maxval(shifts)]
+        call add_drift(one%times(first) + interval(i) * (middles - 1.0_wp) - m%delay, shifts, m%abscissa)
       end associate
     end do
   end subroutine find_delays
+
+  !> A record at even times of the run, in its band.
+  subroutine sample_record(m, times, interval, values)
+    type(measurement_t), intent(in) :: m
+    real(wp), intent(in) :: times(:)                  !! [s]
+    real(wp), intent(in) :: interval                  !! from time to time [s]
+    real(wp), allocatable, intent(out) :: values(:)   !! there
+
+    values = sampled_at(m%abscissa + m%delay, m%values, times)
+    if (m%band(2) > 0.0_wp) call filter_band(values, interval, m%band)
+  end subroutine sample_record
 
 end module nocdyn_measured_runs

@@ -28,11 +28,14 @@ module nocdyn_measurements
     character(len=:), allocatable :: signal_name, unit, caption   !! of the signal, in SI
     real(wp), allocatable :: abscissa(:)     !! times of the recorder [s], or speeds of the body of &response [rad/s]
     real(wp), allocatable :: values(:)       !! in the unit of the signal; frequencies [rad/s]
-    real(wp) :: deviation = 0.0_wp           !! standard deviation of the values, in their unit; of frequencies their share; 0: unknown
+    real(wp) :: deviation = 0.0_wp           !! standard deviation of the values, of frequencies as a share; 0: unknown
     integer :: gaps = 0                      !! values that the file does not have
     real(wp) :: delay = 0.0_wp               !! added to the times [s]
     logical :: finds_delay = .false.         !! whether the delay is corrected by cross-correlation
     real(wp) :: largest_shift = 0.0_wp       !! of this correction [s]
+    logical :: drifts = .false.              !! whether the clock drifts against the run, in pieces
+    real(wp) :: largest_drift = 0.0_wp, drift_interval = 0.0_wp   !! of a piece [s]
+    real(wp) :: drift(2) = 0.0_wp            !! smallest and largest one that was found, in `abscissa` already [s]
     real(wp) :: band(2) = 0.0_wp             !! frequencies that are compared [rad/s]; both 0: all
     real(wp) :: from = -huge(1.0_wp), until = huge(1.0_wp)   !! times of the run [s], or speeds [rad/s]
     real(wp) :: order = 0.0_wp               !! oscillations per turn of the body of &response
@@ -130,7 +133,14 @@ contains
         self%abscissa = group%numbers('times')
         if (group%has_value('gaps')) self%gaps = group%whole_number('gaps')
         self%delay = group%number('delay')
-        self%finds_delay = group%text('alignment') == 'found'
+        self%finds_delay = group%text('alignment') /= 'given'
+        self%drifts = group%text('alignment') == 'drifting'
+        self%largest_drift = group%number('largest_drift', absent=0.05_wp)
+        self%drift_interval = group%number('drift_interval', absent=1.0_wp)
+        if (2 * self%largest_drift >= self%drift_interval) then
+          call input%report(g, 'largest_drift', 'largest_drift must be less than half of drift_interval, ' // &
+                            to_text(self%drift_interval) // ' s', diagnostics)
+        end if
         self%largest_shift = group%number('largest_shift', &
                                           absent=0.1_wp * (self%abscissa(size(self%abscissa)) - self%abscissa(1)))
         self%from = group%number('from', absent=self%from)

@@ -1,8 +1,8 @@
 !> Amplitudes of an order over the speed from a record over the time: computed order tracking.
 !>
-!> K. R. Fyfe, E. D. S. Munck, Analysis of computed order tracking, Mechanical Systems and Signal Processing 11 (1997) 187-205: the
-!> record is sampled again at equal angles, by cubic polynomials, and its Fourier coefficients over some turns are the orders. The
-!> turns come from a speed or from pulses. Each amplitude has a Hann window over its turns, and windows overlap by half.
+!> K. R. Fyfe, E. D. S. Munck, Analysis of computed order tracking, Mechanical Systems and Signal Processing 11 (1997) 187-205:
+!> the record is sampled again at equal angles, by cubic polynomials, and its Fourier coefficients over some turns are the orders.
+!> The turns come from a speed or from pulses. Each amplitude has a Hann window over its turns, and windows overlap by half.
 module nocdyn_order_tracking
   use nocdyn_kinds, only: wp
   use nocdyn_resampling, only: sampled_at
@@ -26,7 +26,7 @@ contains
     real(wp), intent(in) :: values(:)         !! of the record
     real(wp), intent(in) :: order             !! oscillations per turn
     integer, intent(in) :: turns              !! in a window
-    real(wp), allocatable, intent(out) :: window_speeds(:)      !! mean speeds in the windows, with their sign [rad/s]
+    real(wp), allocatable, intent(out) :: window_speeds(:)      !! speeds in the windows, with their sign [rad/s]
     real(wp), allocatable, intent(out) :: amplitudes(:)         !! in the unit of the values
     character(len=:), allocatable, intent(out) :: message       !! why there are none; '': there are some
     real(wp), allocatable :: angles(:), at(:), beside(:), sample(:), window(:), wave(:)
@@ -71,7 +71,9 @@ contains
       sample = sampled_at(times, values, at)
       window = 1.0_wp - cos(wave / turns)
       n = n + 1
-      window_speeds(n) = sense * turns * turn / (ends(2) - ends(1))
+      associate (step => wave(3) - wave(1), weight => window(2:samples - 1))   ! the speed has the same window
+        window_speeds(n) = sense * sum(weight * step / (at(3:) - at(:samples - 2))) / sum(weight)
+      end associate
       amplitudes(n) = 2.0_wp * hypot(sum(window * sample * cos(order * wave)), sum(window * sample * sin(order * wave))) / &
                       sum(window)
       deallocate (at, sample, window, wave)

@@ -71,11 +71,11 @@ contains
       allocate (chosen, source=pack([(i, i=1, size(modes))], modes%kind == mode_oscillating))
       allocate (frequencies, source=aimag(modes(chosen)%eigenvalue))
       allocate (dampings(size(chosen)))
-      do i = 1, size(chosen)
-        dampings(i) = modes(chosen(i))%damping_ratio()
-      end do
-      call compare_modes(input, modes(chosen)%number, frequencies, dampings, self%comparisons, error)
     end associate
+    do i = 1, size(chosen)
+      dampings(i) = self%report%modes(chosen(i))%damping_ratio()
+    end do
+    call compare_modes(input, self%report%modes(chosen)%number, frequencies, dampings, self%comparisons, error)
   end subroutine compare_measured
 
   !> Makes the tables of Holzer, of a machine with lumped shafts.

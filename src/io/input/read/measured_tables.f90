@@ -59,7 +59,7 @@ contains
     if (groups(m)%text('kind') /= 'series') then
       call report(groups(g), g, quoted(wanted) // " is of kind '" // groups(m)%text('kind') // "'; needed: 'series'", diagnostics)
       m = 0
-    else if (groups(m)%text('alignment') == 'found') then
+    else if (groups(m)%text('alignment') /= 'given') then
       call report(groups(g), g, 'the delay of ' // quoted(wanted) // ' is found by a run, which it cannot drive; needed: ' // &
                   "alignment = 'given'", diagnostics)
       m = 0

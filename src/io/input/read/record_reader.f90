@@ -1,4 +1,4 @@
-!> Files of recorders: the columns that a group names become its lists. Values may be missing; their rows are left out and counted.
+!> Files of recorders: the columns that a group names become its lists. Rows with missing values are left out and counted.
 module nocdyn_record_reader
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use nocdyn_data_table, only: data_table_t, headings_after_preamble, line_messages_t, read_data_table, split_unit

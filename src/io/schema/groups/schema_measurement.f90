@@ -8,7 +8,7 @@ module nocdyn_schema_measurement
   private
 
   type(allowed_t), parameter :: statistics = allowed_t(words='half_range largest smallest mean')
-  type(allowed_t), parameter :: alignments = allowed_t(words='given found')
+  type(allowed_t), parameter :: alignments = allowed_t(words='given found drifting')
   type(allowed_t), parameter :: fractions = allowed_t(low=0.0_wp, high=1.0_wp)
 
   type(group_rule_t), parameter, public :: measurement_groups(*) = [ &
@@ -58,9 +58,13 @@ module nocdyn_schema_measurement
     key_rule_t('measurement', 'delay', a_number, 1, 's', '0', anything, &
       'added to the times: the time of the run at the time 0 of the recorder', 'series'), &
     key_rule_t('measurement', 'alignment', a_word, 1, '', "'given'", alignments, &
-      'of the clocks: by delay, or found near it by cross-correlation', 'series'), &
+      'of the clocks: by delay; found near it by cross-correlation; drifting: for each interval', 'series'), &
     key_rule_t('measurement', 'largest_shift', a_number, 1, 's', unset, positive, &
       'largest correction of delay that is looked for; a tenth of the record if not given', 'series'), &
+    key_rule_t('measurement', 'largest_drift', a_number, 1, 's', unset, positive, &
+      'largest shift of an interval beside the common delay; 0.05 if not given', 'series'), &
+    key_rule_t('measurement', 'drift_interval', a_number, 1, 's', unset, positive, &
+      'time over which a drifting clock gets one shift; 1 if not given', 'series'), &
     key_rule_t('measurement', 'frequency_band', a_number, 2, 'rad/s', unset, not_negative, &
       'lowest and highest frequency that are compared; all if not given', 'series'), &
     key_rule_t('measurement', 'order', a_number, 1, '', unset, positive, &
@@ -89,15 +93,16 @@ module nocdyn_schema_measurement
   type(relation_rule_t), parameter, public :: measurement_relations(*) = [ &
     relation_rule_t('measurement', exactly_one, 'speeds pulses values', 'file'), &
     relation_rule_t('measurement', exactly_one, 'times values', 'file'), &
-    relation_rule_t('measurement', requires, 'column time_column speed_column pulse_column time_unit speed_unit', 'file'), &
+    relation_rule_t('measurement', requires, 'column time_column speed_column', 'file'), &
+    relation_rule_t('measurement', requires, 'pulse_column time_unit speed_unit', 'file'), &
     relation_rule_t('measurement', less_than, 'from', 'until'), &
-    relation_rule_t('measurement', requires, 'largest_shift', 'alignment', word='found'), &
+    relation_rule_t('measurement', requires, 'largest_drift drift_interval', 'alignment', word='drifting'), &
     relation_rule_t('measurement', requires, 'pulses_per_turn', 'pulses pulse_column'), &
     relation_rule_t('measurement', records, 'times speeds pulses values', &
                     'file time_column speed_column pulse_column column time_unit speed_unit unit gaps')]
 
   type(example_t), parameter, public :: measurement_examples(*) = [ &
     example_t('measurement', "name = 'strain_gauge'  signal = 'total_moment_coupling'|" // &
-                             "times = 0, 0.01, 0.02  values = 0, 12.5, 31.0  deviation = 2.0", .false.)]
+                             'times = 0, 0.01, 0.02  values = 0, 12.5, 31.0  deviation = 2.0', .false.)]
 
 end module nocdyn_schema_measurement
