@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-# Den Hartog, Mechanical Vibrations, 4th edition, 3.3: the untuned viscous damper.
+# The untuned viscous damper: Automotive Chassis Engineering, section 5.9, eqs. (5.46), (5.47), after Den Hartog.
 MU = 0.2
 BEST_ZETA = 1 / math.sqrt(2 * (1 + MU) * (2 + MU))
 BEST_AMPLIFICATION = (2 + MU) / MU

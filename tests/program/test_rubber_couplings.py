@@ -1,5 +1,6 @@
 """Rubber couplings by their data sheets, against iterations with numpy that know nothing of the program."""
 
+import csv
 import os
 import random
 
@@ -184,3 +185,30 @@ def test_a_run_says_what_it_leaves_out_with_its_size(nocdyn):
     assert outcome.returncode == 0
     assert "by its temperature its stiffness may be 72 to 110 % of this, its relative damping 70 to 110 %" in outcome.stdout
     assert "by its amplitude its stiffness may be 80 to 110 % of this, its relative damping 90 to 115 %" in outcome.stdout
+
+
+def test_temperatures_beyond_the_table_are_announced(nocdyn):
+    machine = random_machine(random.Random(1))
+    rubber = f"kind = 'rubber' {table_keys('temperature')} ambient_temperature = {AMBIENT} thermal_resistance = 1"
+    outcome = nocdyn("response", nocdyn.write("machine.nml", text_of(machine, rubber)), "--out", "out")
+    assert "is heated by its losses from 30 to " in outcome.stdout
+    assert (
+        "its stiffness is 72 % of the cold one, and its relative damping 70 %, as at 100 degC, where its table ends"
+        in outcome.stdout
+    )
+
+
+def test_the_stiffness_of_rubber_varies_in_sweeps(nocdyn):
+    machine = random_machine(random.Random(2))
+    text = text_of(machine, f"kind = 'rubber' {table_keys('torque')} ambient_temperature = {AMBIENT} thermal_resistance = 0.1")
+    values = [machine["stiffness"] * factor for factor in (0.8, 1.0, 1.2)]
+    vary = f"&vary target = 'coupling.rubber.stiffness' low = {values[0]!r} high = {values[2]!r} count = 3 /\n"
+    sweep = f"&sweep design = 'grid' /\n{vary}"
+    sweep += "&record response = 'moment_rubber' statistic = 'peak' /\n"
+    outcome = nocdyn("sweep", nocdyn.write("machine.nml", text + sweep), "--out", "out", "--csv")
+    assert outcome.returncode == 0, outcome.stderr
+    with open(nocdyn.folder / "out/sweep.csv", newline="") as file:
+        peaks = [float(row[next(label for label in row if "peak" in label)]) for row in csv.DictReader(file)]
+    for value, peak in zip(values, peaks, strict=True):
+        nocdyn.done(text, "--set", f"coupling.rubber.stiffness={value!r}", command="response")
+        assert max(nocdyn.values(name="response.csv")["half_range_moment_rubber"]) == pytest.approx(peak, rel=1e-6)

@@ -85,6 +85,7 @@ contains
     type(forced_response_t), intent(in) :: response
     type(string_t), allocatable, intent(inout) :: notes(:)
     real(wp), allocatable :: temperature(:)
+    character(len=:), allocatable :: beyond
     integer :: i, r, unsettled, worst
 
     if (.not. allocated(response%machine%rubber)) return
@@ -93,6 +94,9 @@ contains
         temperature = temperatures(response, law%element)
         if (size(temperature) > 0) then
           worst = maxloc(temperature, dim=1)
+          beyond = ''
+          if (temperature(worst) > law%by_temperature%last_point()) beyond = ', as at ' // &
+            rounded_text(law%by_temperature%last_point(), 4) // ' degC, where its table ends'
           call append(notes, 'coupling ' // quoted(response%machine%element_name(law%element)) // ' is heated by its losses ' // &
                              'from ' // rounded_text(law%ambient, 4) // ' to ' // rounded_text(temperature(worst), 4) // &
                              ' degC at ' // rounded_text(response%axis%shown(points(worst)%state%speed), 6) // ' ' // &
@@ -100,7 +104,7 @@ contains
                              rounded_text(100.0_wp * law%by_temperature%stiffness(temperature(worst)) / &
                                           law%by_temperature%stiffness(law%ambient), 3) // ' % of the cold one, and its ' // &
                              'relative damping ' // rounded_text(100.0_wp * law%by_temperature%damping(temperature(worst)) / &
-                                                                 law%by_temperature%damping(law%ambient), 3) // ' %')
+                                                                 law%by_temperature%damping(law%ambient), 3) // ' %' // beyond)
         end if
       end associate
     end do

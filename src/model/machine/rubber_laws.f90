@@ -19,7 +19,7 @@ module nocdyn_rubber_laws
     type(curve_t), private :: of_stiffness, of_damping
   contains
     procedure :: stiffness => stiffness_factor, damping => damping_factor, stiffness_slope, damping_slope
-    procedure :: write_range
+    procedure :: last_point, write_range
   end type factors_t
 
   !> What changes in one coupling while the machine vibrates.
@@ -98,6 +98,17 @@ contains
     y = self%of_damping%derivatives(self%of_damping%segment(x), x)
     slope = y(1)
   end function damping_slope
+
+  !> The last point, beyond which the factors stay; huge without points.
+  pure real(wp) function last_point(self)
+    class(factors_t), intent(in) :: self
+    real(wp), allocatable :: x(:)
+
+    last_point = huge(last_point)
+    if (.not. self%are_given) return
+    allocate (x, source=self%of_stiffness%knots())
+    last_point = x(size(x))
+  end function last_point
 
   !> The smallest and the largest factor of the stiffness and of the relative damping.
   pure subroutine write_range(self, stiffness, damping)
