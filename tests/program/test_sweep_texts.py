@@ -21,6 +21,7 @@ BEFORE_THREADS = {
     *("sweep_plan", "sweep_design", "input_text", "target_consistency", "table_file", "text_file", "posix", "posix_files"),
     *("recorded_analyses", "recorded_orbits", "target_patterns", "column_names", "output_units", "json", "name_checks"),
     "namelist_values",
+    "unit_expressions",
 }
 VALUES_OF_A_VARIANT = {
     *("targets", "target_search", "key_path", "group_checks", "raw_group", "value_conversion", "schema_text", "schema_units"),
