@@ -46,7 +46,8 @@ def one_line(text):
         (["run", CASE_1, "--quiet=yes"], "--quiet takes no value"),
         (
             ["new", "a.nml", "--out", "a"],
-            "--out is an option of nocdyn run, check, equilibrium, modes, response, campbell, sensitivity, fit, orbit, transit and sweep",
+            "--out is an option of nocdyn run, check, equilibrium, modes, response, campbell, sensitivity, fit, orbit, "
+            "transit and sweep",
         ),
         (["modes", CASE_1, "--at"], "--at needs a value: --at equilibrium|rest|TIME\n"),
         (["modes", CASE_1, "--at", "rest", "--at=0"], "--at is given twice"),
@@ -61,7 +62,8 @@ def one_line(text):
         ),
         (
             ["new", "a.nml", "--set", "run.t_end=1"],
-            "--set is an option of nocdyn run, check, equilibrium, modes, response, campbell, sensitivity, fit, orbit, transit, matrices and sweep",
+            "--set is an option of nocdyn run, check, equilibrium, modes, response, campbell, sensitivity, fit, orbit, "
+            "transit, matrices and sweep",
         ),
         (["--version", "now"], "--version takes no arguments"),
         (["help", "gear"], "'gear' is a group of the input: nocdyn help input gear"),

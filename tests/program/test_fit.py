@@ -89,7 +89,8 @@ def record(nocdyn, seed=3, noise=0.02):
     rows = "".join(",".join(repr(float(v)) for v in row) + "\n" for row in np.array([TIMES, *measured]).T)
     nocdyn.write("record.csv", "t [s]," + ",".join(SIGNALS) + "\n" + rows)
     text = "".join(
-        f"&measurement name = 'm_{signal}' signal = '{signal}' file = 'record.csv'\n  column = '{signal}' deviation = {float(d)!r} /\n"
+        f"&measurement name = 'm_{signal}' signal = '{signal}' file = 'record.csv'\n"
+        f"  column = '{signal}' deviation = {float(d)!r} /\n"
         for signal, d in zip(SIGNALS, deviations, strict=True)
     )
     return text, measured, deviations

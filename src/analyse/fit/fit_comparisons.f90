@@ -39,8 +39,8 @@ contains
 
     do i = 1, size(measurements)
       if (measurements(i)%kind /= measured_peak .or. abs(measurements(i)%speed) > 0) cycle
-      call raise(error, exit_input, input%location(measurements(i)%group) // ': the peak of a run is not fitted, which jumps from ' // &
-                 'one time to another; allowed: a speed, for the peak of a response there, or another kind')
+      call raise(error, exit_input, input%location(measurements(i)%group) // ': the peak of a run is not fitted, which ' // &
+                 'jumps from one time to another; allowed: a speed, for the peak of a response there, or another kind')
       return
     end do
   end subroutine refuse_unfitted

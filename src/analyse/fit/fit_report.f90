@@ -1,4 +1,5 @@
-!> What a fit has found: values with standard errors, correlations, what cannot be told apart, and the measurements before and after.
+!> What a fit has found: values with standard errors, correlations, what cannot be told apart, and the measurements before and
+!> after.
 module nocdyn_fit_report
   use nocdyn_comparisons, only: comparison_t
   use nocdyn_csv, only: text_cell

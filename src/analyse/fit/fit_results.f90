@@ -50,12 +50,12 @@ contains
       return
     end if
     call list_signals(machine, signals)
-    call read_measurements(input, [measured_series, measured_order, measured_frequency, measured_peak], signals, measurements, &
-                           error)
+    call read_measurements(input, [measured_series, measured_order, measured_frequency, measured_peak], signals, &
+                           measurements, error)
     if (allocated(error)) return
     if (size(measurements) == 0) then
-      call raise(error, exit_input, input%shown_file() // ': there is no group &measurement; required: what the unknowns are ' // &
-                 'fitted to')
+      call raise(error, exit_input, input%shown_file() // ': there is no group &measurement; required: what the unknowns ' // &
+                 'are fitted to')
       return
     end if
     call new_fit_problem(input, self%fit%unknowns, measurements, problem, error)

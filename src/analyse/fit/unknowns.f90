@@ -117,8 +117,8 @@ contains
     do i = 1, 2
       call set_targets(changed, self%targets, spread(merge(self%low, self%high, i == 1), 1, size(self%targets)), message)
       if (message == '') cycle
-      call input%report(self%group, trim(merge('low ', 'high', i == 1)), trim(merge('low: ', 'high:', i == 1)) // ' ' // message, &
-                        diagnostics)
+      call input%report(self%group, trim(merge('low ', 'high', i == 1)), &
+                        trim(merge('low ', 'high', i == 1)) // ': ' // message, diagnostics)
     end do
   end subroutine check_ends
 

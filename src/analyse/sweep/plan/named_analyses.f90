@@ -43,7 +43,8 @@ contains
     case ('sensitivity')
       allocate (analysis, source=sensitivity_results_t(locks_joints=.false.))
     case ('fit')
-      allocate (analysis, source=fit_results_t(is_steady=.false., locks_joints=.false., takes_joints=.true., always_writes=.true.))
+      allocate (analysis, source=fit_results_t(is_steady=.false., locks_joints=.false., takes_joints=.true., &
+                                               always_writes=.true.))
     case default
       error stop 'nocdyn_named_analyses: there is no analysis of this name'
     end select
