@@ -251,6 +251,7 @@ contains
       call settle_rubber(self%machine, self%matrix, self%all_lines, points(i), work)
     end do
     !$omp end do
+    deallocate (work%stiffness, work%series)
     !$omp end parallel
   end subroutine settle_points
 
@@ -275,7 +276,7 @@ contains
       call solve_point(self, points(i), work)
     end do
     !$omp end do
-    deallocate (work%elements, work%moment)
+    deallocate (work%elements, work%moment, work%line%stiffness, work%line%series)
     !$omp end parallel
   end subroutine solve_points
 

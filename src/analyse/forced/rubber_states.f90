@@ -53,7 +53,7 @@ contains
     integer, parameter :: most_steps = 400, most_stuck = 8   ! steps that bring nothing
     real(wp), parameter :: first_step = 0.25_wp         ! of the thermal time constants
     real(wp), parameter :: most_growth = 4.0_wp
-    real(wp), parameter :: least_step = 0.05_wp, relief = 1.25_wp
+    real(wp), parameter :: least_step = 0.05_wp, relief = 1.25_wp, unlimited = 1.0e10_wp
     real(wp), parameter :: tolerance = 1.0e-13_wp       ! relative
     real(wp), parameter :: enough = 1.0e-9_wp           ! where rounding allows no more
     type(problem_t) :: problem
@@ -70,20 +70,20 @@ contains
     scale = sizes(problem, g)
     residual = maxval(abs(g - x) / scale)
     step = first_step
-    longest = huge(step)
+    longest = unlimited
     stuck = 0
-    do i = 1, most_steps
-      if (residual <= tolerance) exit
+    do i = 1, merge(most_steps, 0, residual > tolerance)
       before = residual
       call take_step(problem, step, scale, point, work, x, g)
       scale = sizes(problem, g)
       residual = maxval(abs(g - x) / scale)
+      if (residual <= tolerance) exit
       if (residual >= before) stuck = stuck + 1
       if (residual <= enough .and. stuck >= most_stuck) exit
       ! Newton's steps may cycle about kinks of tables: short ones do not
-      longest = min(huge(step) / relief, longest) * relief
+      longest = min(unlimited, relief * longest)
       if (residual >= before) longest = max(least_step, 0.5_wp * step)
-      step = min(longest, step * min(most_growth, max(1.0_wp / most_growth, before / max(residual, tiny(residual)))))
+      step = min(longest, step * min(most_growth, max(1.0_wp / most_growth, before / residual)))
     end do
     point%is_settled = residual <= enough
     call set_conditions(problem, x, point)
@@ -108,17 +108,19 @@ contains
     x(:size(problem%heated)) = problem%machine%rubber(problem%heated)%ambient
   end subroutine start
 
-  !> The sizes of the unknowns, relative to which they are exact: rises of temperatures, at least 1 mK, and amplitudes.
+  !> The sizes of the unknowns, relative to which they are exact: rises of temperatures, at least 1 mK, and amplitudes, at least
+  !> 1 pN m.
   function sizes(problem, g) result(scale)
     type(problem_t), intent(in) :: problem
     real(wp), intent(in) :: g(:)
     real(wp) :: scale(size(g))
-    real(wp), parameter :: least = 1.0e-3_wp   ! [K]
+    real(wp), parameter :: least = 1.0e-3_wp               ! [K]
+    real(wp), parameter :: least_amplitude = 1.0e-12_wp    ! [N m]
     integer :: heated
 
     heated = size(problem%heated)
     scale(:heated) = max(least, g(:heated) - problem%machine%rubber(problem%heated)%ambient)
-    scale(heated + 1:) = max(tiny(least), g(heated + 1:))
+    scale(heated + 1:) = max(least_amplitude, g(heated + 1:))
   end function sizes
 
   !> Sets the conditions of the machine at a point.

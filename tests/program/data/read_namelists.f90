@@ -65,9 +65,10 @@ contains
     character(len=64) :: name, bodies(2), interpolation, extrapolation
     real(wp) :: stiffness, cubic_stiffness, damping, rest_twist, gap, saturation, friction, friction_speed
     real(wp), dimension(most_numbers) :: polynomial, table_twist, table_moment
+    character(len=16) :: kind
     integer :: status
-    namelist /coupling/ name, bodies, stiffness, cubic_stiffness, polynomial, damping, rest_twist, gap, saturation, friction, &
-      friction_speed, table_twist, table_moment, interpolation, extrapolation
+    namelist /coupling/ name, kind, bodies, stiffness, cubic_stiffness, polynomial, damping, rest_twist, gap, saturation, &
+      friction, friction_speed, table_twist, table_moment, interpolation, extrapolation
 
     rewind (unit)
     do
