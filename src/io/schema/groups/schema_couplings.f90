@@ -122,7 +122,7 @@ module nocdyn_schema_couplings
     key_rule_t('coupling', 'inertias', a_flag, 1, '', '.false.', anything, &
       'whether these are added to those of the bodies', 'rubber'), &
     key_rule_t('coupling', 'catalogue_file', a_line_file, 1, '', unset, anything, &
-      'file with a row for each size of a series of couplings, which gives the keys that are not given', 'rubber'), &
+      'file with a row for each size of a series, which gives the keys that are not given', 'rubber'), &
     key_rule_t('coupling', 'catalogue_lines', a_text, any_number, '', unset, anything, &
       'the lines of catalogue_file, as an input that was written has them', 'rubber'), &
     key_rule_t('coupling', 'size', a_text, 1, '', unset, anything, 'the size in the catalogue', 'rubber'), &
@@ -239,7 +239,7 @@ module nocdyn_schema_couplings
     example_t('coupling', "name = 'rubber'   bodies = 'motor', 'pinion'|" // &
                           "table_twist = -0.2, 0, 0.2  table_moment = -90, 0, 60  interpolation = 'cubic'", .false.), &
     example_t('coupling', "name = 'highly_flexible'  bodies = 'motor', 'pinion'|" // &
-      "kind = 'rubber'  stiffness = 100.0  relative_damping = 1.13  damping_frequency_hz = 5.0", .false.), &
+      "kind = 'rubber'  stiffness = 100  relative_damping = 1.13  damping_frequency_hz = 5", .false.), &
     example_t('shaft', "name = 'line'  bodies = 'motor', 'machine'|" // &
       'lengths = 2.0, 3.0  diameters = 0.4, 0.35  shear_modulus = 8.0e10  density = 7850', .false.), &
     example_t('mesh', "name = 'teeth'  bodies = 'pinion', 'machine'  radii = 2.0, 3.0|" // &

@@ -44,7 +44,7 @@ module nocdyn_schema_dampers
     key_rule_t('damper', 'damping_ratio', a_number, 1, '', unset, not_negative, &
       'damping / (2 sqrt(stiffness * ring_inertia))', 'viscous_spring'), &
     key_rule_t('damper', 'damping_frequency', a_number, 1, 'rad/s', unset, positive, &
-      'frequency at which viscous damping stands for that of rubber over the time; default: as tuned', 'rubber')]
+      'frequency at which viscous damping stands for it over the time; as tuned if not given', 'rubber')]
 
   type(relation_rule_t), parameter, public :: damper_relations(*) = [ &
     relation_rule_t('damper', exactly_one, 'damping', &
