@@ -182,7 +182,7 @@ def keys_of_help(text):
     for line in one_line_each.splitlines():
         if group := re.match(r"&(\w+), ", line):
             keys = groups.setdefault(group[1], set())
-        elif key := re.match(r" {4}(\w+) .*?\s((?:required|default|optional|this or).*)$", line):
+        elif key := re.match(r" {4}(\w+) .*?\s((?:required|default|optional|this or|this,).*)$", line):
             keys.add((key[1], key[2]))
     return groups
 

@@ -24,7 +24,18 @@ VARY = "&vary target = 'body.a.inertia' low = 1 high = 2"
 RECORD = "&record quantity = 'omega_a' statistic = 'final'"
 
 # One small input each; the elements that the shipped machines of the tests have in all their forms are not repeated.
+SERIES = "&measurement name = 'm' kind = 'series' signal = 'omega_a' times = 0, 4e-4, 1e-3 values = 0, 1, 2"
+PEAK = "&measurement name = 'm' kind = 'peak' signal = 'omega_a' values = 1"
 ELEMENTS = {
+    "measured": SERIES + " unit = 'rpm' scale = 2 offset = 1 deviation = 3 alignment = 'given' /",
+    "measured band": SERIES + " alignment = 'found' largest_shift = 1e-4 frequency_band_hz = 0, 400 from = 0 until = 1e-3 /",
+    "measured drift": SERIES + " alignment = 'drifting' largest_drift = 1e-4 drift_interval = 1e-3 /",
+    "measured order": "&measurement name = 'm' kind = 'order' order = 1 signal = 'omega_a' speeds_rpm = 5, 9 values = 1, 2 /",
+    "measured peaks": PEAK + " statistic = 'largest' / " + PEAK.replace("'m'", "'n'") + " statistic = 'smallest' /",
+    "measured mean": PEAK + " statistic = 'mean' / " + PEAK.replace("'m'", "'n'") + " statistic = 'half_range' /",
+    "measured modes": "&measurement name = 'm' kind = 'frequency' frequency_hz = 5, 9 relative_damping = 0.1, 0.2 modes = 1, 2 /",
+    "measured torque": "&excitation name = 'x' body = 'a' kind = 'table' measurement = 'm' / "
+    "&measurement name = 'm' signal = 'torque_x' times = 0, 1e-3 values = 1, 2 unit = 'kN m' /",
     "friction": "&clutch name = 'k' bodies = 'a', 'b' kind = 'friction' capacity = 3 /",
     "friction table": "&clutch name = 'k' bodies = 'a', 'b' table_slip = 0, 9 table_capacity = 3, 2 interpolation = 'cubic' /",
     "levels": "&clutch name = 'k' bodies = 'a', 'b' capacity = 3 table_time = 0, 1 table_level = 0, 1 /",

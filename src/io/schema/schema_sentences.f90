@@ -29,13 +29,13 @@ contains
     do i = 1, size(relation_rules)
       associate (relation => relation_rules(i))
         if (relation%group /= rule%group .or. relation%form /= exactly_one) cycle
-        if (has_word(relation%first, rule%name)) text = 'this or ' // others(rule, relation%second, relation%first)
-        if (has_word(relation%second, rule%name)) text = 'this or ' // others(rule, relation%first, relation%second)
+        if (has_word(relation%first, rule%name)) text = others(rule, relation%second, relation%first)
+        if (has_word(relation%second, rule%name)) text = others(rule, relation%first, relation%second)
       end associate
     end do
   end function default_text
 
-  !> What may stand in place of a key: keys of the other set, and the ones of its own that exclude it.
+  !> "this, teeth or ratio": what may stand in place of a key: keys of the other set, and the ones of its own that exclude it.
   pure function others(rule, other_set, own_set) result(text)
     type(key_rule_t), intent(in) :: rule
     character(len=*), intent(in) :: other_set, own_set   !! keys, separated by blanks
@@ -51,7 +51,8 @@ contains
         if (own(i)%text /= rule%name) call append(keys, own(i)%text)
       end do
     end if
-    text = listed(keys, ' or ')
+    text = 'this or ' // listed(keys, ' or ')
+    if (size(keys) > 1) text = 'this, ' // listed(keys, ' or ')
   end function others
 
   !> Whether the first keys of a set exclude each other.

@@ -34,7 +34,7 @@ module nocdyn_data_table
     type(dialect_t) :: dialect
     integer :: columns = 0
     integer :: rows = 0
-    integer :: heading_line = 0                  !! 0: the table has no headings
+    integer :: heading_line = 0                  !! line of the headings, 0 if there are none
     type(string_t), allocatable :: headings(:)   !! [columns], '' where there is none; with their units
     integer, allocatable :: lines(:)             !! number of the line of each row
     integer, allocatable, private :: firsts(:), lasts(:)        !! positions of the rows in the text
@@ -463,7 +463,7 @@ contains
   !> Counts a message on a line; the first ones are kept.
   subroutine add_message(self, line, text)
     class(line_messages_t), intent(inout) :: self
-    integer, intent(in) :: line            !! 0: the file as a whole
+    integer, intent(in) :: line            !! its number, 0 for the file as a whole
     character(len=*), intent(in) :: text
 
     if (.not. allocated(self%messages)) allocate (self%messages(0))

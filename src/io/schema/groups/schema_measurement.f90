@@ -31,9 +31,9 @@ module nocdyn_schema_measurement
     key_rule_t('measurement', 'speeds', a_number, any_number, 'rad/s', unset, anything, &
       'speeds of the body of &response at the amplitudes, or at the times', 'order', fewest=1), &
     key_rule_t('measurement', 'pulses', a_number, any_number, '', unset, anything, &
-      'in place of speeds at the times: the signal of a pickup, pulses_per_turn of them in each turn', 'order', fewest=4), &
+      'signal of a pickup at the times, in place of speeds', 'order', fewest=4), &
     key_rule_t('measurement', 'values', a_number, any_number, '', unset, anything, &
-      'measured values; of an order its amplitudes, or, with times, the signal whose orders are found', 'series order peak', &
+      'measured values; of an order its amplitudes or, with times, the signal that has it', 'series order peak', &
       fewest=1), &
     key_rule_t('measurement', 'file', a_file, 1, '', unset, anything, &
       'file of a recorder in place of the lists: columns separated by ; , tabs or blanks', 'series order'), &
