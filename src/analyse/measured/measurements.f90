@@ -4,7 +4,7 @@ module nocdyn_measurements
   use nocdyn_input, only: diagnostics_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_measured_signals, only: drives_only, find_measured_signal
-  use nocdyn_order_tracking, only: track_order
+  use nocdyn_order_tracking, only: track_order, turning_t
   use nocdyn_signals, only: signal_t
   use nocdyn_text, only: to_text
   use nocdyn_unit_expressions, only: unit_conversion_t
@@ -154,6 +154,7 @@ contains
 
     !> Amplitudes over speeds, given or found from a record over the time.
     subroutine read_order()
+      type(turning_t) :: turning
       real(wp), allocatable :: amplitudes(:), range(:), speeds(:)
       character(len=:), allocatable :: message
 
@@ -169,9 +170,11 @@ contains
             call input%report(g, 'name', 'pulses_per_turn is missing beside pulses', diagnostics)
             return
           end if
-          call track_order(group%numbers('times'), group%numbers('speeds'), group%numbers('pulses'), &
-                           group%number('pulses_per_turn', absent=1.0_wp), self%values, self%order, &
-                           group%whole_number('turns'), speeds, amplitudes, message)
+          turning%speeds = group%numbers('speeds')
+          turning%pulses = group%numbers('pulses')
+          turning%pulses_per_turn = group%number('pulses_per_turn', absent=1.0_wp)
+          call track_order(group%numbers('times'), turning, self%values, self%order, group%whole_number('turns'), speeds, &
+                           amplitudes, message)
           if (message /= '') then
             call input%report(g, 'name', message, diagnostics)
             return

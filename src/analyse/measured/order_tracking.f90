@@ -15,14 +15,19 @@ module nocdyn_order_tracking
   real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)   ! [rad]
   integer, parameter :: fewest_samples = 8   ! of the record in a period of the order
 
+  !> What says how the body turns.
+  type, public :: turning_t
+    real(wp), allocatable :: speeds(:)          !! at the times of the record [rad/s]; empty: by pulses
+    real(wp), allocatable :: pulses(:)          !! signal of a pickup at these times
+    real(wp) :: pulses_per_turn = 1.0_wp
+  end type turning_t
+
 contains
 
   !> Finds the amplitudes.
-  subroutine track_order(times, speeds, pulses, pulses_per_turn, values, order, turns, window_speeds, amplitudes, message)
+  subroutine track_order(times, turning, values, order, turns, window_speeds, amplitudes, message)
     real(wp), intent(in) :: times(:)          !! ascending [s]
-    real(wp), intent(in) :: speeds(:)         !! at these times [rad/s]; empty: by pulses
-    real(wp), intent(in) :: pulses(:)         !! signal of the pickup at these times
-    real(wp), intent(in) :: pulses_per_turn
+    type(turning_t), intent(in) :: turning
     real(wp), intent(in) :: values(:)         !! of the record
     real(wp), intent(in) :: order             !! oscillations per turn
     integer, intent(in) :: turns              !! in a window
@@ -35,21 +40,21 @@ contains
 
     message = ''
     sense = 1.0_wp
-    if (size(speeds) > 0) then
-      if (any(speeds > 0.0_wp) .and. any(speeds < 0.0_wp)) then
+    if (size(turning%speeds) > 0) then
+      if (any(turning%speeds > 0.0_wp) .and. any(turning%speeds < 0.0_wp)) then
         message = 'the speed changes its sign; orders need one direction'
         return
       end if
-      if (any(speeds < 0.0_wp)) sense = -1.0_wp
-      call turns_of_speeds(times, abs(speeds), beside, angles)
+      if (any(turning%speeds < 0.0_wp)) sense = -1.0_wp
+      call turns_of_speeds(times, abs(turning%speeds), beside, angles)
     else
-      call turns_of_pulses(times, pulses, beside)
+      call turns_of_pulses(times, turning%pulses, beside)
       if (size(beside) < 4) then
         message = to_text(size(beside)) // ' pulses; needed: 4 at least'
         return
       end if
       allocate (angles(size(beside)))
-      angles = [(turn * i / pulses_per_turn, i=0, size(beside) - 1)]
+      angles = [(turn * i / turning%pulses_per_turn, i=0, size(beside) - 1)]
     end if
     windows = int(2.0_wp * (angles(size(angles)) - angles(1)) / (turns * turn)) - 1
     if (windows < 1) then

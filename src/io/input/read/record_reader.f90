@@ -18,16 +18,18 @@ module nocdyn_record_reader
   public :: read_record
 
   !> A column that is wanted.
-  type :: wanted_t
+  type :: wanted_column_t
     character(len=6) :: list      !! key of the list
     character(len=12) :: key      !! that says which column it is
     character(len=10) :: unit     !! key of its unit; '': numbers of any unit
     character(len=5) :: si        !! unit of the list; '': numbers stay as they are
-  end type wanted_t
+  end type wanted_column_t
 
-  type(wanted_t), parameter :: wanted(4) = [wanted_t('times', 'time_column', 'time_unit', 's'), &
-                                            wanted_t('speeds', 'speed_column', 'speed_unit', 'rad/s'), &
-                                            wanted_t('pulses', 'pulse_column', '', ''), wanted_t('values', 'column', 'unit', '')]
+  type(wanted_column_t), parameter :: wanted(4) = [ &
+    wanted_column_t('times', 'time_column', 'time_unit', 's'), &
+    wanted_column_t('speeds', 'speed_column', 'speed_unit', 'rad/s'), &
+    wanted_column_t('pulses', 'pulse_column', '', ''), &
+    wanted_column_t('values', 'column', 'unit', '')]
   integer, parameter :: time = 1, speed = 2, pulse = 3, value = 4   ! indices of `wanted`
 
 contains
@@ -171,7 +173,7 @@ contains
 
     !> The unit of a column: of its key, else of its heading. The one of values, which the machine decides on, is kept.
     subroutine find_unit(item, column, conversion)
-      type(wanted_t), intent(in) :: item
+      type(wanted_column_t), intent(in) :: item
       integer, intent(in) :: column
       type(unit_conversion_t), intent(out) :: conversion
       character(len=:), allocatable :: message, name, unit
