@@ -20,8 +20,7 @@ EMBEDDED = {"nocdyn_live_machine", "nocdyn_c_interface"}  # likewise, of machine
 BEFORE_THREADS = {
     *("sweep_plan", "sweep_design", "input_text", "target_consistency", "table_file", "text_file", "posix", "posix_files"),
     *("recorded_analyses", "recorded_orbits", "target_patterns", "column_names", "output_units", "json", "name_checks"),
-    "namelist_values",
-    "unit_expressions",
+    *("namelist_values", "data_table", "unit_expressions", "measured_signals"),
 }
 VALUES_OF_A_VARIANT = {
     *("targets", "target_search", "key_path", "group_checks", "raw_group", "value_conversion", "schema_text", "schema_units"),
@@ -33,7 +32,17 @@ ANALYSES = {  # wrong limits and rules, which the base machine has too; modes at
     *("limit_groups", "response_limits", "limit_rules", "rule_files", "rule_expressions", "solve", "margins"),
 }
 REPORTS = {  # of recorded paths, in the critical section
-    *("csv", "energy_balance", "hidden_file", "holzer", "holzer_report", "machine_report", "output_file", "table_text"),
+    *(
+        "comparisons",
+        "csv",
+        "energy_balance",
+        "hidden_file",
+        "holzer",
+        "holzer_report",
+        "machine_report",
+        "output_file",
+        "table_text",
+    ),
     *(f"{command}_{part}" for command in ("campbell", "response", "modes") for part in ("files", "report", "results")),
     *("equilibrium_report", "equilibrium_results", "response_verdict", "verdicts"),
 }

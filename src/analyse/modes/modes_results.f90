@@ -49,10 +49,11 @@ contains
     is_of_point = allocated(error)
     if (.not. allocated(error)) call new_modes_report(point, modes_choice_t(options%modes, options%has_range, options%range_hz), &
                                                       self%report, error)
-    if (.not. allocated(error)) then
+    if (.not. allocated(error) .and. options%compares) then
       call compare_measured(self, input, error)
       is_of_point = allocated(error)
     end if
+    if (.not. allocated(self%comparisons)) allocate (self%comparisons(0))
     if (.not. allocated(error) .and. options%has_holzer) call make_tables(self, input, machine, options, error)
     if (.not. allocated(error)) return
     if (.not. is_of_point .or. error%code == exit_failed) error%message = input%shown_case() // ': ' // error%message
@@ -99,6 +100,7 @@ contains
     end if
     without_tables = options
     without_tables%has_holzer = .false.
+    without_tables%compares = .false.
     call assemble_steady_machine(chains, self%locks_joints, lumped, error)
     if (.not. allocated(error)) call of_lumped%solve(chains, lumped, without_tables, error)
     if (allocated(error)) return

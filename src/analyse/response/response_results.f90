@@ -40,7 +40,7 @@ contains
 
     call analyse_response(input, machine, self%analysis, error)
     if (.not. allocated(error)) call add_fatigue(input, self%analysis, error)
-    if (.not. allocated(error) .and. self%analysis%settings%shaker == 0) then
+    if (.not. allocated(error) .and. options%compares .and. self%analysis%settings%shaker == 0) then
       call compare_responses(input, machine, self%analysis%settings%body, self%analysis%comparisons, error)
     end if
     if (.not. allocated(error)) self%summary = summarise_response(self%analysis)

@@ -23,6 +23,7 @@ module nocdyn_analyses
     logical :: has_holzer = .false.           !! whether tables of Holzer are wanted
     logical :: has_code = .false.             !! whether a program in C is wanted instead of matrices
     logical :: writes_files = .false.         !! whether files are written
+    logical :: compares = .true.              !! whether measurements are compared; variants of a sweep are not
     character(len=:), allocatable :: folder   !! of the results of a run of the input
     character(len=:), allocatable :: journal  !! folder in which a journal may be kept, if there is one
     logical :: resumes = .false.              !! whether a journal that is there is gone on with

@@ -78,11 +78,11 @@ contains
     call new_analysis(word, analysis)
     call assemble_analysed(word, analysis, input, machine, error)
     if (.not. allocated(error) .and. analysis%is_for_threads) then
-      call analysis%solve(input, machine, analysis_options_t(at=''), error)
+      call analysis%solve(input, machine, analysis_options_t(at='', compares=.false.), error)
     end if
     !$omp critical (texts)
     if (.not. (allocated(error) .or. analysis%is_for_threads)) then
-      call analysis%solve(input, machine, analysis_options_t(at=''), error)
+      call analysis%solve(input, machine, analysis_options_t(at='', compares=.false.), error)
     end if
     if (.not. allocated(error)) then
       call analysis%judge(input)
