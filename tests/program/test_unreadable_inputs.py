@@ -100,7 +100,7 @@ DISC = """\
     ("key", "value", "place", "message"),
     [
         ("body", "'" + "\u00e4" * 5000 + "'", "3: &load 'l': body: there is no &body", "; allowed: 'disc'"),
-        ("rtol", "1" * 5000 + "x", "5: &run: rtol = 111", " is not a number; allowed: 1e-14 to 0.1"),
+        ("rtol", "1" * 5000 + "x", "5: &run: rtol = 111", " is not a number; a number with its unit stands in quotes; allowed: 1e-14 to 0.1"),
         (
             "directory",
             "'" + "x" * 5000 + "'",
@@ -113,7 +113,7 @@ DISC = """\
             "7: &output: directory: a quote is missing: the text <'xxx",
             "> is not closed on its line",
         ),
-        ("rtol", "2" * 5000 + "*1", "5: &run: rtol: the repeat count of 222", "2 ... must be from 1 to 100000"),
+        ("rtol", "2" * 5000 + "*1", "5: &run: rtol: the repeat count of 222", "2 ... must be from 1 to 1000000"),
     ],
 )
 def test_messages_name_file_line_and_key_and_cut_long_values(nocdyn, key, value, place, message):

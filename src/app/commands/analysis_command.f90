@@ -4,7 +4,7 @@ module nocdyn_analysis_command
   use nocdyn_arguments, only: arguments_t
   use nocdyn_case_choice, only: find_wanted, wanted_case
   use nocdyn_case_results, only: case_result_t, combine_verdicts, put_cases, status_failed, status_refused
-  use nocdyn_check_results, only: check_results_t
+  use nocdyn_command_analyses, only: new_command_analysis
   use nocdyn_companion_command, only: become_companion
   use nocdyn_console, only: print_text, report_error
   use nocdyn_diagnostics, only: diagnostics_t
@@ -16,8 +16,7 @@ module nocdyn_analysis_command
   use nocdyn_signal_checks, only: check_signals
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_parts, only: check_input, refuse_mistakes
-  use nocdyn_matrices_results, only: matrices_results_t
-  use nocdyn_named_analyses, only: assemble_analysed, new_analysis
+  use nocdyn_named_analyses, only: assemble_analysed
   use nocdyn_posix, only: catch_interrupts, is_interrupted, remove_file, stop_at_interrupts
   use nocdyn_result_files, only: result_files_t
   use nocdyn_result_folders, only: out_folder, refuse_shared_folders, result_folder
@@ -25,7 +24,6 @@ module nocdyn_analysis_command
   use nocdyn_sweep_plan, only: add_plan_diagnostics, has_sweep, make_plan, sweep_plan_t
   use nocdyn_text, only: append, counted, listed, shown_path, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
-  use nocdyn_transit_results, only: transit_results_t
   use nocdyn_variant_choice, only: leave_sweep
   use nocdyn_verdicts, only: verdict_t
   implicit none (type, external)
@@ -66,18 +64,8 @@ contains
     class(grid_file_t), intent(in), optional :: netcdf   !! not open
     class(analysis_t), allocatable :: kind
 
-    select case (arguments%command)
-    case ('check')
-      call analyse_files(arguments, check_results_t(is_steady=.false., locks_joints=.false., takes_joints=.true.), code)
-    case ('matrices')
-      call analyse_files(arguments, matrices_results_t(is_steady=.false., locks_joints=.false., has_report=.false.), code)
-    case ('transit')
-      call analyse_files(arguments, transit_results_t(is_steady=.false., locks_joints=.false., takes_joints=.true., &
-                                                      always_writes=.true.), code)
-    case default
-      call new_analysis(arguments%command, kind)
-      call analyse_files(arguments, kind, code, netcdf)
-    end select
+    call new_command_analysis(arguments%command, kind)
+    call analyse_files(arguments, kind, code, netcdf)
   end subroutine analyse
 
   !> Analyses every file. Files with errors do not stop the others.

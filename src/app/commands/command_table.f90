@@ -132,7 +132,7 @@ contains
       '  --set PATH=VALUE   override a key' // nl // &
       '  --out DIR          write sensitivity.csv and sensitivity.json to DIR' // nl // &
       case_help, analysis_command)
-    call add_command(commands, 'fit', 'FILE...', '--out --set --case --starts --quiet', &
+    call add_command(commands, 'fit', 'FILE...', '--out --set --case --variant --starts --quiet', &
       'find numbers of the machine from measurements', &
       'Finds the values of &unknown with which the machine does what &measurement says, by least squares: with' // nl // &
       'standard errors, correlations, and what the measurements do not tell apart. Writes fitted.nml, the input with' // nl // &

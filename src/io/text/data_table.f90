@@ -52,14 +52,16 @@ module nocdyn_data_table
 contains
 
   !> Finds headings and cells of a table. Missing cells at the end of a row that is separated by other than blanks are empty ones
-  !> if `columns` is 0.
-  subroutine read_data_table(text, headings, columns, table)
+  !> if `columns` is 0, unless all rows are to be full.
+  subroutine read_data_table(text, headings, columns, table, are_full)
     character(len=*), intent(in) :: text
     integer, intent(in) :: headings   !! `headings_first` ...
     integer, intent(in) :: columns    !! number of columns needed, 0: as many as headings or the rows have
     type(data_table_t), intent(out) :: table
+    logical, intent(in), optional :: are_full   !! no if absent
     integer, allocatable :: firsts(:), lasts(:), numbers(:)
     integer :: first, r, sample
+    logical :: is_complete
 
     table%text = text
     table%columns = columns
@@ -84,7 +86,9 @@ contains
     allocate (table%counts(table%rows), table%begins(table%columns, table%rows), table%ends(table%columns, table%rows))
     do r = 1, table%rows
       call find_cells(text(table%firsts(r):table%lasts(r)), table%dialect, table%begins(:, r), table%ends(:, r), table%counts(r))
-      if (columns > 0 .or. table%dialect%takes_blanks .or. table%counts(r) >= table%columns) cycle
+      is_complete = columns > 0 .or. table%dialect%takes_blanks .or. table%counts(r) >= table%columns
+      if (present(are_full)) is_complete = is_complete .or. are_full
+      if (is_complete) cycle
       table%begins(table%counts(r) + 1:, r) = 1
       table%ends(table%counts(r) + 1:, r) = 0
       table%counts(r) = table%columns

@@ -1,18 +1,16 @@
-!> The analyses by the names of their commands, each of the machine that it looks at. Sweeps can record some.
+!> The analyses by the names of their commands that sweeps can record: each of the machine that it looks at.
 module nocdyn_named_analyses
   use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_assembly, only: assemble_machine, assemble_steady_machine
   use nocdyn_campbell_results, only: campbell_results_t
   use nocdyn_equilibrium_results, only: equilibrium_results_t
   use nocdyn_errors, only: error_t
-  use nocdyn_fit_results, only: fit_results_t
   use nocdyn_input, only: input_t
   use nocdyn_joint_simplifications, only: refuse_joints
   use nocdyn_machine, only: machine_t
   use nocdyn_modes_results, only: modes_results_t
   use nocdyn_orbit_results, only: orbit_results_t
   use nocdyn_response_results, only: response_results_t
-  use nocdyn_sensitivity_results, only: sensitivity_results_t
   implicit none (type, external)
   private
 
@@ -25,7 +23,7 @@ contains
 
   !> An analysis before its solution.
   subroutine new_analysis(word, analysis)
-    character(len=*), intent(in) :: word   !! the command
+    character(len=*), intent(in) :: word   !! of `analysis_words`
     class(analysis_t), allocatable, intent(out) :: analysis
 
     select case (word)
@@ -40,11 +38,6 @@ contains
     case ('orbit')
       allocate (analysis, source=orbit_results_t(is_steady=.false., locks_joints=.false., takes_joints=.true., &
                                                  always_writes=.true., keeps_journal=.true.))
-    case ('sensitivity')
-      allocate (analysis, source=sensitivity_results_t(locks_joints=.false.))
-    case ('fit')
-      allocate (analysis, source=fit_results_t(is_steady=.false., locks_joints=.false., takes_joints=.true., &
-                                               always_writes=.true.))
     case default
       error stop 'nocdyn_named_analyses: there is no analysis of this name'
     end select

@@ -70,7 +70,7 @@ contains
     integer :: rows
 
     reading%file = file
-    call read_data_table(text, headings_first, 0, table)
+    call read_data_table(text, headings_first, 0, table, are_full=.true.)
     line = table%heading_line
     call move_alloc(table%headings, names)
     rows = 0

@@ -24,7 +24,7 @@ module nocdyn_schema_response
   type(group_rule_t), parameter, public :: response_groups(*) = [ &
     group_rule_t('response', in_torsional, at_most_once, '', "Speeds and orders of 'nocdyn response' and 'nocdyn campbell'."), &
     group_rule_t('limit', in_torsional, any_times, '', &
-                 'Limits of moments, stresses, forces and heat of a coupling, a damper, a shaft or a mesh.'), &
+                 'Limits of moments, stresses, forces and heat of a coupling, damper, shaft or mesh.'), &
     group_rule_t('fatigue', in_torsional, any_times, 'fatigue', &
                  'Cycles and damage of a coupling, shaft, mesh or gear, in runs and responses.'), &
     group_rule_t('orbit', in_torsional, at_most_once, '', &
