@@ -56,10 +56,11 @@ contains
     real(wp), intent(in), optional :: weight(:)        !! factors on the moments of the inelastic elements, [elements]; absent: 1
     real(wp), intent(in), optional :: torque(:)        !! more torques on the coordinates [N m], [coordinates]; absent: none
     real(wp), parameter :: rounding = 1.0e-12_wp
-    integer, parameter :: most_steps = 500
+    integer, parameter :: most_steps = 500, most_idle = 40   ! of all, and of those without a residual that is `lower`
+    real(wp), parameter :: lower = 0.99_wp
     real(wp), parameter :: stalled = 1.0e3_wp   ! residuals up to this many tolerances are rounding if they stop falling
-    real(wp) :: damping, energy, excess, last_excess, new_q(size(q)), step(size(q))
-    integer :: i
+    real(wp) :: damping, energy, excess, last_excess, least_excess, new_q(size(q)), step(size(q))
+    integer :: i, idle
     logical :: is_singular
 
     is_found = .false.
@@ -70,6 +71,8 @@ contains
     self%diagonal_scale = 0.0_wp
     damping = 0.0_wp
     last_excess = huge(1.0_wp)
+    least_excess = huge(1.0_wp)
+    idle = 0
     do i = 1, most_steps
       ! the largest residual, in units of its tolerance
       associate (torque => abs(self%torque(self%unknown)))
@@ -78,6 +81,11 @@ contains
       is_found = excess <= 1.0_wp .or. (excess <= stalled .and. excess > 0.5_wp * last_excess)
       if (is_found) exit
       last_excess = excess
+      idle = idle + 1
+      if (excess < lower * least_excess) then
+        idle = 0
+        least_excess = excess
+      end if
       energy = self%energy
       call solve(balance, damping, self, step, is_singular)
       new_q = q + step
@@ -90,7 +98,7 @@ contains
         call evaluate_angles(balance, q, self)
         call raise_damping(self, damping)
       end if
-      if (is_found .or. damping > most_damping .or. maxval(abs(q)) > max_twist) exit
+      if (is_found .or. idle > most_idle .or. damping > most_damping .or. maxval(abs(q)) > max_twist) exit
     end do
   end subroutine find_twists
 
