@@ -5,6 +5,7 @@ import random
 
 import mpmath
 import pytest
+from conftest import SOURCE
 
 DIGITS = 40
 STEP = mpmath.mpf("1e-14")  # relative, of central differences with so many digits
@@ -253,16 +254,26 @@ def test_equal_frequencies_are_said_and_split(nocdyn):
         assert one["by"]["coupling.k1.stiffness"] * 2e4 * step == pytest.approx(frequency - one["value"], rel=1e-3, abs=1e-11)
 
 
+RUBBER = TWINS.replace("'left' stiffness", "'left' kind = 'rubber'{} stiffness")
+
+
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("keys", "is_refused"),
     [
-        (TWINS.replace("'left' stiffness", "'left' efficiency = 0.9 stiffness"), "machine.nml:5"),
-        (TWINS.replace("a = 10", "a = 0"), ""),
+        (" table_frequency = 1, 10 frequency_stiffness = 1, 1.2", True),
+        (" table_amplitude = 1, 100 amplitude_stiffness = 1, 0.8", True),
+        ("", False),
     ],
 )
-def test_refusals(nocdyn, text, message):
-    outcome = nocdyn("sensitivity", nocdyn.write("machine.nml", text), "--out", "out")
-    if message:
-        assert outcome.returncode == 2
-        assert message in outcome.stderr
-    assert "Backtrace" not in outcome.stderr
+def test_a_stiffness_that_follows_from_the_vibration_is_refused(nocdyn, keys, is_refused):
+    outcome = nocdyn("sensitivity", nocdyn.write("machine.nml", RUBBER.format(keys)), "--out", "out")
+    assert outcome.returncode == (1 if is_refused else 0), outcome.stderr
+    assert ("the stiffness of 'k1' follows from its frequency" in outcome.stderr) == is_refused
+    assert (nocdyn.folder / "out/sensitivity.json").exists() != is_refused
+
+
+def test_teeth_that_lose_power_are_refused(nocdyn):
+    outcome = nocdyn("sensitivity", SOURCE / "input/examples/winch/winch.nml", "--out", "out")
+    assert outcome.returncode == 1
+    assert "the teeth of this machine lose power" in outcome.stderr
+    assert not (nocdyn.folder / "out/sensitivity.json").exists()

@@ -100,7 +100,12 @@ DISC = """\
     ("key", "value", "place", "message"),
     [
         ("body", "'" + "\u00e4" * 5000 + "'", "3: &load 'l': body: there is no &body", "; allowed: 'disc'"),
-        ("rtol", "1" * 5000 + "x", "5: &run: rtol = 111", " is not a number; a number with its unit stands in quotes; allowed: 1e-14 to 0.1"),
+        (
+            "rtol",
+            "1" * 5000 + "x",
+            "5: &run: rtol = 111",
+            " is not a number; a number with its unit stands in quotes; allowed: 1e-14 to 0.1",
+        ),
         (
             "directory",
             "'" + "x" * 5000 + "'",

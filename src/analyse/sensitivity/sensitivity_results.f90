@@ -2,7 +2,7 @@
 module nocdyn_sensitivity_results
   use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_answers, only: answer_t, differentiate
-  use nocdyn_errors, only: error_t
+  use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_machine, only: machine_t
@@ -10,7 +10,7 @@ module nocdyn_sensitivity_results
   use nocdyn_output_file, only: output_file_t
   use nocdyn_response_answers, only: new_response_answers, response_answers_t
   use nocdyn_sensitivity_report, only: put_sensitivity, sensitivity_csv, sensitivity_t, sensitivity_text
-  use nocdyn_text, only: append, string_t
+  use nocdyn_text, only: append, quoted, string_t
   use nocdyn_varied_keys, only: list_varied_keys
   use nocdyn_wanted_modes, only: modes_choice_t
   implicit none (type, external)
@@ -39,6 +39,11 @@ contains
 
     at = 'equilibrium'
     if (options%at /= '') at = options%at
+    call refuse_rubber(machine, error)
+    if (allocated(error)) then
+      error%message = input%shown_case() // ': ' // error%message
+      return
+    end if
     allocate (self%found%notes(0), self%found%answers(0))
     call list_varied_keys(input, self%found%keys, self%found%notes)
     call new_mode_answers(input, at, modes_choice_t(options%modes, options%has_range, options%range_hz), modes, &
@@ -56,6 +61,22 @@ contains
     end if
     call add_answers(modes%answers, self%found%answers)
   end subroutine solve
+
+  !> Refuses couplings whose stiffness follows from the vibration itself.
+  subroutine refuse_rubber(machine, error)
+    type(machine_t), intent(in) :: machine
+    type(error_t), allocatable, intent(out) :: error
+    integer :: r
+
+    if (.not. allocated(machine%rubber)) return
+    do r = 1, size(machine%rubber)
+      if (.not. (machine%rubber(r)%needs_iteration() .or. machine%rubber(r)%by_frequency%are_given)) cycle
+      call raise(error, exit_failed, 'the stiffness of ' // quoted(machine%element_name(machine%rubber(r)%element)) // &
+                 ' follows from its frequency, its amplitude or its heat, which has no derivatives here; allowed: a ' // &
+                 "coupling without tables over these, with condition = 'cold' or 'warm'")
+      return
+    end do
+  end subroutine refuse_rubber
 
   subroutine add_answers(new, answers)
     type(answer_t), intent(in) :: new(:)
