@@ -113,16 +113,22 @@ contains
     type(machine_t) :: machine
     type(mode_t), allocatable :: modes(:)
     type(operating_point_t) :: point
-    integer, allocatable :: chosen(:)
+    integer, allocatable :: chosen(:), numbers(:)
     integer :: i, none(0)
+    real(wp), allocatable :: dampings(:), frequencies(:)
 
     call assemble_steady_machine(input, .false., machine, error)
     if (.not. allocated(error)) call find_operating_point(input, machine, 'equilibrium', point, error)
     if (.not. allocated(error)) call find_machine_modes(point, modes_choice_t(), none, linear, modes, error)
     if (allocated(error)) return
     allocate (chosen, source=pack([(i, i=1, size(modes))], modes%kind == mode_oscillating))
-    call compare_modes(input, modes(chosen)%number, [(in_si(modes(chosen(i))%frequency(), unit_hz), i=1, size(chosen))], &
-                       [(modes(chosen(i))%damping_ratio(), i=1, size(chosen))], some, error)
+    allocate (numbers(size(chosen)), frequencies(size(chosen)), dampings(size(chosen)))
+    do i = 1, size(chosen)
+      numbers(i) = modes(chosen(i))%number
+      frequencies(i) = in_si(modes(chosen(i))%frequency(), unit_hz)
+      dampings(i) = modes(chosen(i))%damping_ratio()
+    end do
+    call compare_modes(input, numbers, frequencies, dampings, some, error)
     if (.not. allocated(error)) call put_back(measurements%kind == measured_frequency, some, comparisons)
   end subroutine compare_frequencies
 

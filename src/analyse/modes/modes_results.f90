@@ -65,18 +65,19 @@ contains
     type(input_t), intent(in) :: input
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: dampings(:), frequencies(:)
-    integer, allocatable :: chosen(:)
+    integer, allocatable :: chosen(:), numbers(:)
     integer :: i
 
     associate (modes => self%report%modes)
       allocate (chosen, source=pack([(i, i=1, size(modes))], modes%kind == mode_oscillating))
       allocate (frequencies, source=aimag(modes(chosen)%eigenvalue))
-      allocate (dampings(size(chosen)))
+      allocate (dampings(size(chosen)), numbers(size(chosen)))
     end associate
     do i = 1, size(chosen)
       dampings(i) = self%report%modes(chosen(i))%damping_ratio()
+      numbers(i) = self%report%modes(chosen(i))%number
     end do
-    call compare_modes(input, self%report%modes(chosen)%number, frequencies, dampings, self%comparisons, error)
+    call compare_modes(input, numbers, frequencies, dampings, self%comparisons, error)
   end subroutine compare_measured
 
   !> Makes the tables of Holzer, of a machine with lumped shafts.
