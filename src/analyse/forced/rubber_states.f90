@@ -94,8 +94,9 @@ contains
     integer :: r
 
     associate (rubber => problem%machine%rubber)
-      problem%heated = pack([(r, r=1, size(rubber))], rubber%heats_up)
-      problem%amplified = pack([(r, r=1, size(rubber))], rubber%by_amplitude%are_given)
+      allocate (problem%heated, source=pack([(r, r=1, size(rubber))], [(rubber(r)%heats_up, r=1, size(rubber))]))
+      allocate (problem%amplified, source=pack([(r, r=1, size(rubber))], &
+                                               [(rubber(r)%by_amplitude%are_given, r=1, size(rubber))]))
     end associate
   end subroutine list_unknowns
 
