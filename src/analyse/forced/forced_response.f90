@@ -131,19 +131,22 @@ contains
     end associate
   end subroutine add_quantity
 
-  !> The first of some speeds that has a steady state; of many speeds some are tried, over the whole range.
+  !> The first of some speeds that has a steady state. Twists that are found at none of several speeds are sought no longer.
   subroutine hold_first(held, speeds, state, error)
     type(held_speeds_t), intent(inout) :: held
     real(wp), intent(in) :: speeds(:)   !! [rad/s]
     type(held_state_t), intent(out) :: state
     type(error_t), allocatable, intent(out) :: error   !! of the first one, if none has
     type(error_t), allocatable :: another
-    integer, parameter :: most = 20   ! that are tried after the first one
-    integer :: i
+    integer, parameter :: most = 10   ! speeds without twists
+    integer :: i, lacking
 
     call held%hold(speeds(1), state, error)
     if (.not. allocated(error)) return
-    do i = 2, size(speeds), max(1, (size(speeds) - 1) / most)
+    lacking = 0
+    do i = 2, size(speeds)
+      if (held%lacks_twists) lacking = lacking + 1
+      if (lacking >= most) return
       call held%hold(speeds(i), state, another)
       if (allocated(another)) cycle
       deallocate (error)

@@ -180,7 +180,7 @@ contains
   subroutine set_key(input, key, point)
     type(input_t), intent(inout) :: input
     type(varied_key_t), intent(in) :: key
-    integer, intent(in) :: point   !! 0: the number itself
+    integer, intent(in) :: point   !! 0 is the number itself
     character(len=:), allocatable :: message
 
     call set_targets(input, [key%target], [key%at(point)], message)
@@ -189,7 +189,7 @@ contains
   !> The number at a point.
   pure real(wp) function at(self, point)
     class(varied_key_t), intent(in) :: self
-    integer, intent(in) :: point   !! 0: the number itself
+    integer, intent(in) :: point   !! 0 is the number itself
 
     at = self%value
     if (point > 0) at = at + self%change(point)

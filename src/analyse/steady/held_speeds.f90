@@ -61,6 +61,7 @@ module nocdyn_held_speeds
     real(wp), allocatable, private :: beside(:)      !! speeds that other drives give the bodies [rad/s], [bodies]
     logical, private :: motors_hold = .false.        !! whether the motors hold the speed, else a torque
     logical :: supply_holds = .false.                !! whether they do so by the frequency of their supply
+    logical :: lacks_twists = .false.                !! whether the torques balanced in the last search, but no twists carry them
     real(wp), private :: slip = 0.0_wp               !! last share of the frequency beyond that without slip of the first motor
   contains
     procedure :: hold, has_drive, forget
@@ -226,6 +227,7 @@ contains
     logical :: is_found
     integer :: attempt
 
+    self%lacks_twists = .false.
     if (allocated(self%steady)) then
       state = self%steady
       state%speed = speed
@@ -457,7 +459,8 @@ contains
     q = self%q
     call find_twists(self%twists, self%balance, q, is_found, error, weight, extra)
     if (is_found) self%q(:) = q
-    if (.not. allocated(error) .and. .not. is_found) then
+    self%lacks_twists = .not. (allocated(error) .or. is_found)
+    if (self%lacks_twists) then
       call raise(error, exit_failed, 'the torques balance, but no twists of the couplings were found that carry them')
     end if
     if (allocated(error)) return

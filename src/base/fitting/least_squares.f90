@@ -131,7 +131,7 @@ contains
   subroutine find_step(solution, low, high, scale, lambda, step)
     type(solution_t), intent(in) :: solution
     real(wp), intent(in) :: low(:), high(:), scale(:)
-    real(wp), intent(inout) :: lambda    !! negative: not yet known
+    real(wp), intent(inout) :: lambda    !! not yet known if negative
     real(wp), intent(out) :: step(:)
     real(wp), parameter :: first = 1.0e-3_wp   ! of the largest square of a singular value
     real(wp), allocatable :: part(:), scaled(:, :), values(:), vectors(:, :)
