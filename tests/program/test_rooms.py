@@ -9,7 +9,7 @@ LAYERS = ["base", "integrate", "model", "io", "analyse", "app"]
 MODEL_AND_FILES_APART = {"integrate", "model", "io"}  # which do not use one another
 LEAST_MODULES = 200  # fewer than that were not found where they are
 MOST_FILES = 14
-ROW = re.compile(r"^\| `([a-z_/]+)` \| (.+) \| (.+) \|$", re.MULTILINE)
+ROW = re.compile(r"^\| `([a-z_/]+)` \| ([^|]+) \| ([^|]+) \|$", re.MULTILINE)
 MODULE = re.compile(r"^\s*(?:module|program)\s+(nocdyn\w*)", re.MULTILINE | re.IGNORECASE)
 USE = re.compile(r"^\s*use\b[^!\n]*?\b(nocdyn_\w+)", re.MULTILINE | re.IGNORECASE)
 
