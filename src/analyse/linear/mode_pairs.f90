@@ -14,7 +14,7 @@ module nocdyn_mode_pairs
   implicit none (type, external)
   private
 
-  public :: keep_pairs, masses_times, refine, set_motion, set_sizes
+  public :: angles_of, keep_pairs, masses_times, refine, set_motion, set_sizes
 
   !> The oscillating modes at one state.
   type, public :: mode_pairs_t
@@ -165,9 +165,10 @@ contains
     self%angle(:, m) = angles_of(machine, self%x(:, m))
   end subroutine set_motion
 
+  !> The angles of the bodies in a motion of coordinates.
   pure function angles_of(machine, x) result(angle)
     type(machine_t), intent(in) :: machine
-    complex(wp), intent(in) :: x(:)   !! coordinates
+    complex(wp), intent(in) :: x(:)        !! [coordinates]
     complex(wp) :: angle(machine%bodies)
     complex(wp) :: sum_of_parts
     integer :: b, k

@@ -8,7 +8,7 @@ module nocdyn_frozen_motions
   implicit none (type, external)
   private
 
-  public :: angles_of, eigenvalue_change, new_frame, new_view
+  public :: eigenvalue_change, new_frame, new_view
 
   !> The structure of the machine in which the motions are.
   type, public :: frame_t
@@ -91,34 +91,16 @@ contains
     type(frame_t), intent(in) :: frame
     complex(wp), intent(in) :: x(:)
     complex(wp) :: angle(size(frame%first) - 1)
-
-    angle = (0.0_wp, 0.0_wp)
-    if (.not. self%has_same_ratios) angle = mapped(frame, self%angle_ratio, x)
-  end function more_angle
-
-  !> The angles of the bodies in a motion of coordinates.
-  pure function angles_of(frame, x) result(angle)
-    type(frame_t), intent(in) :: frame
-    complex(wp), intent(in) :: x(:)
-    complex(wp) :: angle(size(frame%first) - 1)
-
-    angle = mapped(frame, frame%ratio, x)
-  end function angles_of
-
-  pure function mapped(frame, ratio, x) result(angle)
-    type(frame_t), intent(in) :: frame
-    real(wp), intent(in) :: ratio(:)
-    complex(wp), intent(in) :: x(:)
-    complex(wp) :: angle(size(frame%first) - 1)
     integer :: b, k
 
     angle = (0.0_wp, 0.0_wp)
+    if (self%has_same_ratios) return
     do b = 1, size(angle)
       do k = frame%first(b), frame%first(b + 1) - 1
-        angle(b) = angle(b) + ratio(k) * x(frame%coordinate(k))
+        angle(b) = angle(b) + self%angle_ratio(k) * x(frame%coordinate(k))
       end do
     end do
-  end function mapped
+  end function more_angle
 
   !> The bilinear form y^T T(lambda) x of two motions in a changed machine, T the matrix of its modes (`nocdyn_mode_pairs`).
   complex(wp) function form(self, other, frame, view, machine, slopes, value)

@@ -5,13 +5,13 @@
 !> changes by dA = sum of (w_e + U_e a) dm_e + d(Omega^2 a^T M x), where x and the adjoint motion a stay, which solves the same
 !> equations with the twists in series -w_e. A half range changes by Re(sum of slopes times the changes of the amplitudes).
 module nocdyn_line_responses
-  use nocdyn_dynamic_stiffness, only: band_work_t, new_band_work
-  use nocdyn_excitation_lines, only: source_t
+  use nocdyn_excitation_lines, only: find_twist, line_work_t, new_line_work, solve_line, source_t
   use nocdyn_forced_response, only: forced_response_t
-  use nocdyn_frozen_motions, only: angles_of, frame_t, view_t
+  use nocdyn_frozen_motions, only: frame_t, view_t
   use nocdyn_held_speeds, only: held_state_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_mode_pairs, only: angles_of
   use nocdyn_moment_forms, only: moment_form_t
   implicit none (type, external)
   private
@@ -42,24 +42,22 @@ module nocdyn_line_responses
 contains
 
   !> Solves at a state of a response.
-  subroutine new_line_responses(response, frame, state, sources, quantity, self)
+  subroutine new_line_responses(response, state, sources, quantity, self)
     type(forced_response_t), intent(in) :: response
-    type(frame_t), intent(in) :: frame                 !! of its machine
     type(held_state_t), intent(in) :: state
     type(source_t), intent(in) :: sources(:)           !! at this state
     type(moment_form_t), intent(in) :: quantity        !! no power
     type(line_responses_t), intent(inout) :: self      !! with `form`
-    type(band_work_t) :: work
+    type(line_work_t) :: work
     complex(wp), allocatable :: amplitude(:, :), moment(:, :), slope(:)   ! [lines, points], [elements, lines], [lines]
-    complex(wp) :: stiffness(response%machine%elements%count)
     integer :: l, p
     real(wp) :: half_range, high, low
 
-    associate (lines => size(response%lines), elements => size(stiffness), points => size(quantity%weight, 1))
-      work = new_band_work(response%matrix)
+    associate (lines => size(response%lines), elements => response%machine%elements%count, points => size(quantity%weight, 1))
+      work = new_line_work(response%machine, response%matrix)
       allocate (self%lines(lines), moment(elements, lines), amplitude(lines, points), slope(lines), self%weight(elements))
       do l = 1, lines
-        call solve(response, frame, state, sources(response%lines(l)%source), work, self%lines(l), moment(:, l))
+        call solve(response, state, sources(response%lines(l)%source), work, self%lines(l), moment(:, l))
         do p = 1, points
           amplitude(l, p) = quantity%total(p, moment(:, l))
         end do
@@ -76,8 +74,7 @@ contains
       self%weight = weights_of(quantity, self%point, elements)
       do l = 1, lines
         self%lines(l)%slope = slope(l)
-        call solve_adjoint(response, frame, state, sources(response%lines(l)%source(1))%frequency, self%weight, work, &
-                           self%lines(l))
+        call solve_adjoint(response, state, sources(response%lines(l)%source(1))%frequency, self%weight, work, self%lines(l))
       end do
     end associate
   end subroutine new_line_responses
@@ -95,48 +92,26 @@ contains
     end do
   end function weights_of
 
-  !> Factors the matrix at the frequency of a line; beside an undamped resonance where it is singular.
-  subroutine factor(response, state, frequency, work, stiffness)
-    type(forced_response_t), intent(in) :: response
-    type(held_state_t), intent(in) :: state
-    real(wp), intent(in) :: frequency
-    type(band_work_t), intent(inout) :: work
-    complex(wp), intent(out) :: stiffness(:)
-    real(wp), parameter :: beside = 1.0e-9_wp
-    logical :: singular
-
-    call state%slopes%find_stiffness(response%machine%elements%internal, cmplx(0.0_wp, frequency, wp), stiffness)
-    call response%matrix%factor(frequency, stiffness, work, singular)
-    if (singular) call response%matrix%factor(frequency * (1.0_wp + beside), stiffness, work, singular)
-    work%x(:) = (0.0_wp, 0.0_wp)
-  end subroutine factor
-
   !> The motion by the sources of a line.
-  subroutine solve(response, frame, state, sources, work, self, moment)
+  subroutine solve(response, state, sources, work, self, moment)
     type(forced_response_t), intent(in) :: response
-    type(frame_t), intent(in) :: frame
     type(held_state_t), intent(in) :: state
     type(source_t), intent(in) :: sources(:)   !! of the line
-    type(band_work_t), intent(inout) :: work
+    type(line_work_t), intent(inout) :: work
     type(line_response_t), intent(inout) :: self
     complex(wp), intent(out) :: moment(:)      !! [N m], [elements]
-    complex(wp), dimension(size(moment)) :: force, stiffness
+    complex(wp) :: force(size(moment))
     integer :: e
 
-    call factor(response, state, sources(1)%frequency, work, stiffness)
-    call list_forces(sources, force, self)
-    do e = 1, size(moment)
-      if (abs(force(e)) > 0) call response%matrix%add_forces(e, force(e), work)
-      if (abs(self%series(e)) > 0) call response%matrix%add_twist(e, stiffness(e), self%series(e), work)
-    end do
-    call response%matrix%solve(work)
+    call solve_line(response%machine, response%matrix, state%slopes, sources(1)%frequency, sources, work)
     allocate (self%twist(size(moment)))
     do e = 1, size(moment)
-      call response%matrix%find_moment(e, stiffness(e), self%series(e), work, self%twist(e), moment(e))
+      call find_twist(response%matrix, e, work, self%twist(e), moment(e))
     end do
+    call list_forces(sources, force, self)
     moment = moment + force
-    allocate (self%x, source=work%x(response%matrix%position(:response%matrix%coordinates)))
-    allocate (self%angle, source=angles_of(frame, self%x))
+    allocate (self%x, source=work%band%x(response%matrix%position(:response%matrix%coordinates)))
+    allocate (self%angle, source=angles_of(response%machine, self%x))
   end subroutine solve
 
   !> The forces of the sources of a line on all elements, and their twists in series.
@@ -161,28 +136,30 @@ contains
   end subroutine list_forces
 
   !> The adjoint motion of a line.
-  subroutine solve_adjoint(response, frame, state, frequency, weight, work, self)
+  subroutine solve_adjoint(response, state, frequency, weight, work, self)
     type(forced_response_t), intent(in) :: response
-    type(frame_t), intent(in) :: frame
     type(held_state_t), intent(in) :: state
     real(wp), intent(in) :: frequency
     real(wp), intent(in) :: weight(:)   !! w_e, [elements]
-    type(band_work_t), intent(inout) :: work
+    type(line_work_t), intent(inout) :: work
     type(line_response_t), intent(inout) :: self
-    complex(wp) :: moment, stiffness(size(weight))
-    integer :: e
+    type(source_t) :: twists(count(abs(weight) > 0))
+    complex(wp) :: moment
+    integer :: e, n
 
-    call factor(response, state, frequency, work, stiffness)
+    n = 0
     do e = 1, size(weight)
-      if (abs(weight(e)) > 0) call response%matrix%add_twist(e, stiffness(e), cmplx(-weight(e), kind=wp), work)
+      if (.not. abs(weight(e)) > 0) cycle
+      n = n + 1
+      twists(n) = source_t(element=e, moment=cmplx(-weight(e), kind=wp), is_twist=.true.)
     end do
-    call response%matrix%solve(work)
+    call solve_line(response%machine, response%matrix, state%slopes, frequency, twists, work)
     allocate (self%weight(size(weight)))
     do e = 1, size(weight)
-      call response%matrix%find_moment(e, stiffness(e), cmplx(-weight(e), kind=wp), work, self%weight(e), moment)
+      call find_twist(response%matrix, e, work, self%weight(e), moment)
     end do
-    allocate (self%adjoint, source=work%x(response%matrix%position(:response%matrix%coordinates)))
-    allocate (self%adjoint_angle, source=angles_of(frame, self%adjoint))
+    allocate (self%adjoint, source=work%band%x(response%matrix%position(:response%matrix%coordinates)))
+    allocate (self%adjoint_angle, source=angles_of(response%machine, self%adjoint))
   end subroutine solve_adjoint
 
   !> The half range of a changed machine to the first order, up to a constant.

@@ -299,7 +299,7 @@ contains
       if (allocated(error)) return
       call list_sources(response%machine, state, sources, response%shaker)
       half%state = state
-      call new_line_responses(response, self%frame, state, sources, quantity, half%lines)
+      call new_line_responses(response, state, sources, quantity, half%lines)
       if (half%critical == 0) return
       view = new_view(self%frame, response%machine)
       change = speed_step * half%speed * central
